@@ -1,0 +1,375 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The words that pass between the rooms.
+
+Every word checks shape and dtype when it is made and raises ValueError with what it expected and what it got; its
+arrays are read-only. Points are float32 metres in the camera's optical frame (x right, y down, z forward), poses
+float64, time integer nanoseconds, angles radians. A pose ``T_a_b`` maps points of b into a.
+A failure is None, a `Rejected` or an exception. It is never a pose.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from enum import Enum, IntFlag
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+word = dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+
+
+def _hold(owner: Any, name: str, dtype: Any, shape: tuple[int | str | None, ...], sizes: dict[str, int]) -> None:
+    """Check one array field and make it read-only. A size is a number, a name shared by fields, or None for any."""
+    array = getattr(owner, name)
+    expected = f"{type(owner).__name__}.{name}: expected {np.dtype(dtype)} of shape {_shape_text(shape)}"
+    if not isinstance(array, np.ndarray):
+        raise ValueError(f"{expected}, got {type(array).__name__}")
+    wrong = array.dtype != np.dtype(dtype) or array.ndim != len(shape)
+    if not wrong:
+        for got, size in zip(array.shape, shape, strict=True):
+            wanted = sizes.setdefault(size, got) if isinstance(size, str) else size
+            wrong = wrong or (wanted is not None and got != wanted)
+    if wrong:
+        known = {k: v for k, v in sizes.items() if k in shape}
+        raise ValueError(f"{expected}{f' with {known}' if known else ''}, got {array.dtype} of shape {array.shape}")
+    view = array.view()
+    view.flags.writeable = False
+    object.__setattr__(owner, name, view)
+
+
+def _shape_text(shape: tuple[int | str | None, ...]) -> str:
+    return "(" + ", ".join("any" if s is None else str(s) for s in shape) + ("," if len(shape) == 1 else "") + ")"
+
+
+def _hold_pose(owner: Any, name: str) -> None:
+    _hold(owner, name, np.float64, (4, 4), {})
+    T = getattr(owner, name)
+    R = T[:3, :3]
+    if not np.isfinite(T).all() or np.abs(R @ R.T - np.eye(3)).max() > 1e-4 or np.linalg.det(R) < 0:
+        raise ValueError(f"{type(owner).__name__}.{name}: expected a rigid motion, got {T.tolist()}")
+
+
+def _require(owner: Any, truth: bool, expected: str, got: object) -> None:
+    if not truth:
+        raise ValueError(f"{type(owner).__name__}: expected {expected}, got {got}")
+
+
+@word
+class Intrinsics:
+    """A pinhole camera without distortion: pixel ``u = fx x/z + cx``, pixel centres on integers."""
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    width: int
+    height: int
+
+    def __post_init__(self) -> None:
+        numbers = (self.fx, self.fy, self.cx, self.cy)
+        _require(self, all(np.isfinite(numbers)), "finite fx fy cx cy", numbers)
+        _require(self, self.fx > 0 and self.fy > 0, "focal lengths above 0 px", numbers[:2])
+        _require(self, self.width > 0 and self.height > 0, "a size above 0 px", (self.width, self.height))
+
+    def scaled(self, step: int) -> Intrinsics:
+        """The camera that sees every ``step``-th pixel of each row and column, starting at pixel ``step // 2``."""
+        first = step // 2
+        return Intrinsics(
+            fx=self.fx / step,
+            fy=self.fy / step,
+            cx=(self.cx - first) / step,
+            cy=(self.cy - first) / step,
+            width=len(range(first, self.width, step)),
+            height=len(range(first, self.height, step)),
+        )
+
+
+@word
+class ColourImage:
+    """``rgb (H, W, 3) uint8`` as a camera saw it at ``stamp_ns``."""
+
+    rgb: Array
+    stamp_ns: int
+    frame_id: str = "camera"
+
+    def __post_init__(self) -> None:
+        _hold(self, "rgb", np.uint8, (None, None, 3), {})
+
+
+@word
+class Detections:
+    """What the detector saw in one image: N boxes, best first, with the score and the label of each.
+
+    ``xyxy (N, 4) float32`` pixels of the full image, half open (x_max and y_max are outside); ``score (N,) float32``
+    in 0..1; ``label`` N names; ``image_hw`` the image's height and width. An image with no object gives N = 0.
+    """
+
+    xyxy: Array
+    score: Array
+    label: tuple[str, ...]
+    image_hw: tuple[int, int]
+    stamp_ns: int
+    frame_id: str = "camera"
+
+    def __post_init__(self) -> None:
+        sizes = {"N": len(self.label)}
+        _hold(self, "xyxy", np.float32, ("N", 4), sizes)
+        _hold(self, "score", np.float32, ("N",), sizes)
+        _require(self, bool(np.isfinite(self.xyxy).all()), "finite boxes", self.xyxy)
+        _require(self, bool(((self.score >= 0) & (self.score <= 1)).all()), "scores in 0..1", self.score)
+        _require(self, min(self.image_hw) > 0, "an image size above 0 px", self.image_hw)
+
+    def __len__(self) -> int:
+        return len(self.label)
+
+
+@word
+class PointCloud:
+    """Points as a sensor sent them, before they become a `DepthImage`.
+
+    ``xyz (H, W, 3) float32`` m, NaN where nothing was measured; H = 1 for an unorganised cloud; ``rgb`` (H, W, 3) uint8
+    or None.
+    """
+
+    xyz: Array
+    rgb: Array | None
+    stamp_ns: int
+    frame_id: str = "camera"
+
+    def __post_init__(self) -> None:
+        sizes: dict[str, int] = {}
+        _hold(self, "xyz", np.float32, ("H", "W", 3), sizes)
+        if self.rgb is not None:
+            _hold(self, "rgb", np.uint8, ("H", "W", 3), sizes)
+
+    @property
+    def organised(self) -> bool:
+        """Whether rows and columns are those of an image."""
+        return bool(self.xyz.shape[0] > 1)
+
+
+@word
+class DepthImage:
+    """What every depth source becomes at the segmenter's door.
+
+    ``depth (H, W) float32`` metres along the optical axis, 0 where there is none (never NaN); ``rgb (H, W, 3) uint8``
+    registered to it, or None; ``intrinsics`` of the same size.
+    """
+
+    depth: Array
+    rgb: Array | None
+    intrinsics: Intrinsics
+    stamp_ns: int
+    frame_id: str = "camera"
+
+    def __post_init__(self) -> None:
+        sizes = {"H": self.intrinsics.height, "W": self.intrinsics.width}
+        _hold(self, "depth", np.float32, ("H", "W"), sizes)
+        if self.rgb is not None:
+            _hold(self, "rgb", np.uint8, ("H", "W", 3), sizes)
+
+
+class PointFlag(IntFlag):
+    """What the segmenter knows of a point, or of the object that it belongs to (then all its points carry it)."""
+
+    EDGE = 1  # the point lies at a depth jump: its position lies
+    CUT_BY_IMAGE = 2  # the object leaves the image
+    CUT_BY_BOX = 4  # the object leaves its detection box
+    WALL_LIKE = 8  # a flat patch of something larger, not an object of its own
+    UNSUPPORTED = 16  # no support surface was found under the object
+
+
+@word
+class ObjectCloud:
+    """One segmented object in one frame, in the camera frame.
+
+    ``xyz (M, 3) float32`` m; ``normals (M, 3) float32`` of length 1, towards the camera (0 0 0 where unknown);
+    ``rgb (M, 3) uint8`` or None; ``flags (M,) uint16`` of `PointFlag`; ``density`` measured points per square metre of
+    surface; ``instance`` counts the objects of the frame from 1 (0 is the support surface).
+    """
+
+    label: str
+    score: float
+    instance: int
+    xyz: Array
+    normals: Array
+    rgb: Array | None
+    flags: Array
+    density: float
+
+    def __post_init__(self) -> None:
+        sizes: dict[str, int] = {}
+        _hold(self, "xyz", np.float32, ("M", 3), sizes)
+        _hold(self, "normals", np.float32, ("M", 3), sizes)
+        _hold(self, "flags", np.uint16, ("M",), sizes)
+        if self.rgb is not None:
+            _hold(self, "rgb", np.uint8, ("M", 3), sizes)
+        _require(self, bool(np.isfinite(self.xyz).all()), f"finite points of {self.label!r}", "NaN or infinity")
+
+    def __len__(self) -> int:
+        return len(self.xyz)
+
+    def has(self, flag: PointFlag) -> bool:
+        """Whether every point carries ``flag``; False without points."""
+        return len(self) > 0 and bool((self.flags & flag).all())
+
+
+@word
+class View:
+    """A frame at reduced size: what free space and texture are checked against, and what refinement holds on to.
+
+    ``xyz (h, w, 3) float32`` m, NaN where nothing was measured; ``grey (h, w) uint8`` or None; ``intrinsics`` of the
+    reduced camera.
+    """
+
+    xyz: Array
+    grey: Array | None
+    intrinsics: Intrinsics
+
+    def __post_init__(self) -> None:
+        sizes = {"h": self.intrinsics.height, "w": self.intrinsics.width}
+        _hold(self, "xyz", np.float32, ("h", "w", 3), sizes)
+        if self.grey is not None:
+            _hold(self, "grey", np.uint8, ("h", "w"), sizes)
+
+
+@word
+class Frame:
+    """Everything that the segmenter says of one moment.
+
+    ``objects`` with instance >= 1; ``support`` the points of the surfaces they stand on (instance 0) or None;
+    ``gravity (3,) float64`` of length 1, the way things fall in the camera frame, or None; ``gravity_confidence`` 0..1;
+    ``T_odom_camera`` the odometry's pose of the camera or None.
+    """
+
+    objects: tuple[ObjectCloud, ...]
+    support: ObjectCloud | None
+    view: View
+    gravity: Array | None
+    gravity_confidence: float
+    T_odom_camera: Array | None
+    stamp_ns: int
+    frame_id: str = "camera"
+
+    def __post_init__(self) -> None:
+        if self.gravity is not None:
+            _hold(self, "gravity", np.float64, (3,), {})
+            length = float(np.linalg.norm(self.gravity))
+            _require(self, abs(length - 1) < 1e-6, "gravity of length 1", length)
+        if self.T_odom_camera is not None:
+            _hold_pose(self, "T_odom_camera")
+
+
+@word
+class Odometry:
+    """The pose of a body in the odometry frame at ``stamp_ns``."""
+
+    T_odom_body: Array
+    stamp_ns: int
+    frame_id: str = "odom"
+    child_frame_id: str = "base_link"
+
+    def __post_init__(self) -> None:
+        _hold_pose(self, "T_odom_body")
+
+
+@word
+class Alignment:
+    """A registration and its evidence.
+
+    ``information (6, 6) float64`` of the error ``[tx ty tz rx ry rz]`` in the target frame; ``inliers`` how many source
+    points found a partner; ``overlap`` their share 0..1; ``rmse`` m of the inliers; ``slack (K, 6) float64`` unit
+    directions of the same tangent space that the data leave open, K may be 0.
+    """
+
+    T_target_source: Array
+    information: Array
+    inliers: int
+    overlap: float
+    rmse: float
+    iterations: int
+    converged: bool
+    slack: Array = field(default_factory=lambda: np.zeros((0, 6)))
+
+    def __post_init__(self) -> None:
+        _hold_pose(self, "T_target_source")
+        _hold(self, "information", np.float64, (6, 6), {})
+        _hold(self, "slack", np.float64, (None, 6), {})
+
+
+@word
+class ObjectMatch:
+    """One object registered between two moments: the object ``label`` of *to* seen in *from*."""
+
+    label: str
+    object_id: int
+    T_from_to: Array
+    overlap: float
+
+    def __post_init__(self) -> None:
+        _hold_pose(self, "T_from_to")
+
+
+@word
+class LoopClosure:
+    """Two moments that saw the same place: ``T_from_to`` maps points of the camera at *to* into the camera at *from*.
+
+    ``covariance (6, 6) float64`` in ROS order [tx ty tz rx ry rz], of the pose in the *from* frame; ``labels`` of the
+    objects that closed it; ``matches`` the registration of each; ``evidence`` named numbers of the verification.
+    """
+
+    from_ns: int
+    to_ns: int
+    T_from_to: Array
+    covariance: Array
+    labels: tuple[str, ...]
+    matches: tuple[ObjectMatch, ...] = ()
+    evidence: dict[str, float] = field(default_factory=dict)
+    frame_id: str = "camera"
+
+    def __post_init__(self) -> None:
+        _hold_pose(self, "T_from_to")
+        _hold(self, "covariance", np.float64, (6, 6), {})
+        C = self.covariance
+        symmetric = bool(np.isfinite(C).all()) and bool(np.abs(C - C.T).max() <= 1e-6 * max(1e-12, np.abs(C).max()))
+        _require(self, symmetric, "a finite, symmetric covariance", C.tolist())
+        _require(self, bool(np.linalg.eigvalsh((C + C.T) / 2).min() > 0), "a positive definite covariance", C.tolist())
+
+
+class Reason(Enum):
+    """Why something was refused. The value is what diagnostics and JSON show."""
+
+    NO_CANDIDATE = "no_candidate"
+    FEW_POINTS = "few_points"
+    NO_HYPOTHESIS = "no_hypothesis"
+    NOT_CONVERGED = "not_converged"
+    LOW_OVERLAP = "low_overlap"
+    FREE_SPACE = "free_space_violated"
+    TEXTURE = "texture_disagrees"
+    FEW_OBJECTS = "few_objects_explained"
+    CHAINS_DISAGREE = "chains_disagree"
+    GRAVITY = "gravity_not_kept"
+    IMPLAUSIBLE_MOTION = "implausible_motion"
+    ODOMETRY = "odometry_disagrees"
+    SLACK = "slides_along_a_plane"
+    MOVED = "objects_moved"
+    REDUNDANT = "redundant"
+    OVER_BUDGET = "over_budget"
+
+
+@word
+class Rejected:
+    """A refused closure: the reason, and the numbers behind it in ``detail``."""
+
+    reason: Reason
+    from_ns: int
+    to_ns: int
+    detail: str
+
+
+def as_dict(value: Any) -> dict[str, Any]:
+    """The fields of a word by name, not recursive."""
+    return {f.name: getattr(value, f.name) for f in fields(value)}

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Room 1: colour image in, Detections out."""

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rigid motions and the pinhole camera, for more than one room.
+
+A pose ``T_a_b`` is a (4, 4) float64 matrix that maps points of frame b into frame a: ``p_a = T_a_b @ p_b``.
+Tangent vectors follow ROS (REP-103): translation first, ``[tx ty tz rx ry rz]``, metres and radians.
+Camera frames are optical: x right, y down, z forward.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.floating]
+
+
+def inverse(T_a_b: Array) -> Array:
+    """The inverse motion ``T_b_a`` of a rigid (4, 4) ``T_a_b``."""
+    T_b_a = np.eye(4)
+    T_b_a[:3, :3] = T_a_b[:3, :3].T
+    T_b_a[:3, 3] = -T_b_a[:3, :3] @ T_a_b[:3, 3]
+    return T_b_a
+
+
+def transform(T_a_b: Array, points_b: Array) -> Array:
+    """Points (..., 3) of frame b in frame a; the dtype of the points is kept."""
+    R, t = T_a_b[:3, :3].astype(points_b.dtype), T_a_b[:3, 3].astype(points_b.dtype)
+    return points_b @ R.T + t
+
+
+def rotate(T_a_b: Array, vectors_b: Array) -> Array:
+    """Directions (..., 3) of frame b in frame a; the dtype of the vectors is kept."""
+    return vectors_b @ T_a_b[:3, :3].T.astype(vectors_b.dtype)
+
+
+def pose(R: Array, t: Array) -> Array:
+    """The (4, 4) pose of a (3, 3) rotation and a (3,) translation."""
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = R, t
+    return T
+
+
+def is_rigid(T: Array, tolerance: float = 1e-5) -> bool:
+    """Whether ``T`` is a finite (4, 4) with an orthonormal, right-handed rotation and the last row 0 0 0 1."""
+    if T.shape != (4, 4) or not np.isfinite(T).all() or not np.array_equal(T[3], (0, 0, 0, 1)):
+        return False
+    R = T[:3, :3]
+    return bool(np.abs(R @ R.T - np.eye(3)).max() < tolerance and np.linalg.det(R) > 0)
+
+
+def skew(v: Array) -> Array:
+    """The (3, 3) cross-product matrix: ``skew(v) @ w == cross(v, w)``."""
+    x, y, z = v
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def rotation_from_vector(rotation_vector: Array) -> Array:
+    """Rodrigues' formula: the (3, 3) rotation about a (3,) axis by its length in radians."""
+    angle = float(np.linalg.norm(rotation_vector))
+    if angle < 1e-12:
+        return np.eye(3) + skew(rotation_vector)
+    K = skew(rotation_vector / angle)
+    return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * (K @ K)
+
+
+def vector_from_rotation(R: Array) -> Array:
+    """The (3,) rotation vector of a (3, 3) rotation, of length 0 to pi; the inverse of Rodrigues' formula."""
+    x, y, z, w = quaternion_from_rotation(R)
+    axis = np.array([x, y, z]) * (1.0 if w >= 0 else -1.0)
+    sine = float(np.linalg.norm(axis))
+    if sine < 1e-12:
+        return 2.0 * axis
+    return axis / sine * (2.0 * np.arctan2(sine, abs(w)))
+
+
+def quaternion_from_rotation(R: Array) -> Array:
+    """The unit quaternion (x, y, z, w) of a (3, 3) rotation, stable for every angle.
+
+    Eigenvector form of Bar-Itzhack, "New method for extracting the quaternion from a rotation matrix" (2000).
+    """
+    xx, yx, zx, xy, yy, zy, xz, yz, zz = (float(v) for v in R.T.flat)
+    N = np.array(
+        [
+            [xx - yy - zz, 0.0, 0.0, 0.0],
+            [yx + xy, yy - xx - zz, 0.0, 0.0],
+            [zx + xz, zy + yz, zz - xx - yy, 0.0],
+            [zy - yz, xz - zx, yx - xy, xx + yy + zz],
+        ]
+    )
+    q = np.linalg.eigh(N / 3.0)[1][:, -1]
+    return q if q[3] >= 0 else -q
+
+
+def rotation_from_quaternion(xyzw: Array) -> Array:
+    """The (3, 3) rotation of a quaternion (x, y, z, w) of any non-zero length; ValueError if it has none."""
+    q = np.asarray(xyzw, float)
+    norm = float(np.linalg.norm(q))
+    if not np.isfinite(norm) or norm < 1e-9:
+        raise ValueError(f"expected a quaternion of non-zero length, got {q.tolist()}")
+    x, y, z, w = q / norm
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def rotation_angle(R: Array) -> float:
+    """The angle of a (3, 3) rotation in radians, 0 to pi; exact for small angles too."""
+    return float(np.linalg.norm(vector_from_rotation(R)))
+
+
+def pose_error(T_estimated: Array, T_true: Array) -> tuple[float, float]:
+    """(rotation in degrees, distance in centimetres) between two poses of the same frames."""
+    rotation = np.degrees(rotation_angle(T_true[:3, :3].T @ T_estimated[:3, :3]))
+    return float(rotation), float(100.0 * np.linalg.norm(T_estimated[:3, 3] - T_true[:3, 3]))
+
+
+def rotation_between(source: Array, target: Array) -> Array:
+    """The shortest (3, 3) rotation that turns the direction ``source`` (3,) into ``target`` (3,)."""
+    a, b = source / np.linalg.norm(source), target / np.linalg.norm(target)
+    cosine = float(a @ b)
+    if cosine < -1.0 + 1e-9:  # opposite: half a turn about any axis at a right angle to a
+        axis = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
+        return rotation_from_vector(np.pi * axis / np.linalg.norm(axis))
+    K = skew(np.cross(a, b))
+    return np.eye(3) + K + K @ K / (1.0 + cosine)
+
+
+def interpolate(T_a: Array, T_b: Array, fraction: float) -> Array:
+    """The pose at ``fraction`` 0..1 of the way from ``T_a`` to ``T_b``: linear in position, shortest arc in rotation."""
+    R = T_a[:3, :3] @ rotation_from_vector(fraction * vector_from_rotation(T_a[:3, :3].T @ T_b[:3, :3]))
+    return pose(R, (1.0 - fraction) * T_a[:3, 3] + fraction * T_b[:3, 3])
+
+
+def back_project(depth: Array, fx: float, fy: float, cx: float, cy: float) -> Array:
+    """(H, W) depth in metres to (H, W, 3) points of the optical frame; the dtype of the depth is kept."""
+    height, width = depth.shape
+    x = ((np.arange(width) - cx) / fx).astype(depth.dtype)
+    y = ((np.arange(height) - cy) / fy).astype(depth.dtype)
+    return np.stack([x[None, :] * depth, y[:, None] * depth, depth], axis=-1)

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A parameter is declared once, as a field of its room's frozen dataclass:
+
+    @dataclass(frozen=True)
+    class DetectorParams(Params):
+        threshold: float = param(0.5, "least score of a detection", ge=0.0, le=1.0)
+
+From that line come the ROS declaration with description and range, config/objreg.yaml, the README's table, and the same
+refusal in a node, a test and an offline run. This file knows neither ROS nor any room.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import types
+import typing
+from collections.abc import Mapping
+from typing import Any, Self
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Declaration:
+    """What is known of one parameter. ``kind`` is bool, int, float or str, or a tuple of one of them when ``many``."""
+
+    name: str
+    kind: type
+    many: bool
+    default: Any
+    doc: str
+    unit: str = ""
+    ge: float | None = None
+    le: float | None = None
+    choices: tuple[str, ...] = ()
+    live: bool = False
+
+    def check(self, value: Any) -> Any:
+        """The value in its declared type; ValueError with expected and got if it is not that or out of range."""
+        if self.many:
+            if isinstance(value, str) or not isinstance(value, (list, tuple)) and not hasattr(value, "tolist"):
+                raise ValueError(f"{self.name}: expected a list of {self.kind.__name__}, got {value!r}")
+            return tuple(self._check_one(item) for item in value)
+        return self._check_one(value)
+
+    def _check_one(self, value: Any) -> Any:
+        if self.kind is float and isinstance(value, int) and not isinstance(value, bool):
+            value = float(value)
+        if not isinstance(value, self.kind) or (self.kind is int and isinstance(value, bool)):
+            raise ValueError(f"{self.name}: expected {self.kind.__name__}, got {value!r}")
+        if self.kind is float and not math.isfinite(value):
+            raise ValueError(f"{self.name}: expected a finite number, got {value!r}")
+        if (self.ge is not None and value < self.ge) or (self.le is not None and value > self.le):
+            raise ValueError(f"{self.name}: expected {self.range_text}, got {value!r}")
+        if self.choices and value not in self.choices:
+            raise ValueError(f"{self.name}: expected one of {', '.join(self.choices)}, got {value!r}")
+        return value
+
+    @property
+    def range_text(self) -> str:
+        """The range or the choices in words; empty if anything goes."""
+        if self.choices:
+            return " | ".join(self.choices)
+        if self.ge is not None and self.le is not None:
+            return f"{self.ge:g} … {self.le:g}"
+        if self.ge is not None:
+            return f"at least {self.ge:g}"
+        return f"at most {self.le:g}" if self.le is not None else ""
+
+
+def param(
+    default: Any,
+    doc: str,
+    unit: str = "",
+    ge: float | None = None,
+    le: float | None = None,
+    choices: tuple[str, ...] = (),
+    live: bool = False,
+) -> Any:
+    """Declare one parameter. ``live`` ones may be changed while a node runs; the others are read-only there."""
+    metadata = {"doc": doc, "unit": unit, "ge": ge, "le": le, "choices": choices, "live": live}
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+@dataclasses.dataclass(frozen=True)
+class Params:
+    """The base of every room's parameters; checks all values when it is made."""
+
+    def __post_init__(self) -> None:
+        for declaration in self.declarations():
+            value = declaration.check(getattr(self, declaration.name))
+            object.__setattr__(self, declaration.name, value)
+
+    @classmethod
+    def declarations(cls) -> tuple[Declaration, ...]:
+        """Every parameter of this class, in the order of its fields."""
+        hints = typing.get_type_hints(cls)
+        return tuple(_declaration(field, hints[field.name]) for field in dataclasses.fields(cls))
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, Any]) -> Self:
+        """Parameters from a mapping; ValueError for a name that is not declared."""
+        names = [declaration.name for declaration in cls.declarations()]
+        unknown = sorted(set(values) - set(names))
+        if unknown:
+            raise ValueError(f"{cls.__name__}: no parameter {', '.join(unknown)}; there are {', '.join(names)}")
+        return cls(**values)
+
+    def replaced(self, **values: Any) -> Self:
+        """A copy with some values changed, checked again."""
+        return type(self).from_mapping({**dataclasses.asdict(self), **values})
+
+
+def _declaration(field: dataclasses.Field[Any], hint: Any) -> Declaration:
+    many = typing.get_origin(hint) is tuple
+    kind = typing.get_args(hint)[0] if many else hint
+    if isinstance(kind, types.UnionType) or kind not in (bool, int, float, str):
+        raise TypeError(f"{field.name}: a parameter is bool, int, float, str or a tuple of one, got {hint}")
+    return Declaration(name=field.name, kind=kind, many=many, default=field.default, **field.metadata)

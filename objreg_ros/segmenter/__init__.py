@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Room 2: Detections and a depth image in, a Frame of ObjectClouds and one reduced View out."""
