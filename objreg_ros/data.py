@@ -11,14 +11,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
 from enum import Enum, IntFlag
-from typing import Any
+from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
 
-word = dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+Word = TypeVar("Word")
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True, eq_default=False, field_specifiers=(field,))
+def word(cls: type[Word]) -> type[Word]:
+    """The decorator of a word: a frozen dataclass with keyword fields and slots."""
+    return dataclass(frozen=True, slots=True, kw_only=True, eq=False)(cls)
 
 
 def _hold(owner: Any, name: str, dtype: Any, shape: tuple[int | str | None, ...], sizes: dict[str, int]) -> None:

@@ -130,7 +130,7 @@ def rotation_between(source: Array, target: Array) -> Array:
 
 
 def interpolate(T_a: Array, T_b: Array, fraction: float) -> Array:
-    """The pose at ``fraction`` 0..1 of the way from ``T_a`` to ``T_b``: linear in position, shortest arc in rotation."""
+    """The pose at ``fraction`` 0..1 from ``T_a`` to ``T_b``: linear in position, shortest arc in rotation."""
     R = T_a[:3, :3] @ rotation_from_vector(fraction * vector_from_rotation(T_a[:3, :3].T @ T_b[:3, :3]))
     return pose(R, (1.0 - fraction) * T_a[:3, 3] + fraction * T_b[:3, 3])
 

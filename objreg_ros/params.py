@@ -37,7 +37,7 @@ class Declaration:
     def check(self, value: Any) -> Any:
         """The value in its declared type; ValueError with expected and got if it is not that or out of range."""
         if self.many:
-            if isinstance(value, str) or not isinstance(value, (list, tuple)) and not hasattr(value, "tolist"):
+            if not isinstance(value, list | tuple) and not hasattr(value, "tolist"):
                 raise ValueError(f"{self.name}: expected a list of {self.kind.__name__}, got {value!r}")
             return tuple(self._check_one(item) for item in value)
         return self._check_one(value)
