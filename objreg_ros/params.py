@@ -24,7 +24,7 @@ class Declaration:
     """What is known of one parameter. ``kind`` is bool, int, float or str, or a tuple of one of them when ``many``."""
 
     name: str
-    kind: type
+    kind: type[Any]
     many: bool
     default: Any
     doc: str
