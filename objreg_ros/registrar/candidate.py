@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the engine hands to the gate: a pose between two keyframes and the evidence for and against it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from objreg_ros.data import Alignment, Array
+
+
+class ObjectPair(NamedTuple):
+    """Object ``source`` of the source keyframe against object ``target`` of the target keyframe, by index."""
+
+    source: int
+    target: int
+    label: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verification:
+    """How well two views agree under a pose, looked at both ways: each field is the worse way's, except ``tested``.
+
+    Of the ``tested`` pixels that land in the other view (both ways together), ``inliers`` is the share whose depth
+    agrees, ``violations`` the share that floats in space which the other view saw to be free, ``occluded`` the share
+    hidden behind something. ``texture`` is the correlation -1..1 of the high-passed grey of the inliers, None without
+    grey. ``score`` is V: higher is better, and above 0 is more evidence for than against.
+    """
+
+    inliers: float
+    violations: float
+    occluded: float
+    texture: float | None
+    tested: int
+    score: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Candidate:
+    """One hypothesis after refinement, with its evidence. It decides nothing: the gate does.
+
+    ``chain`` proposed it, ``agreeing_chains`` (``chain`` among them) came to the same pose independently;
+    ``explained`` are the object pairs that lie upon each other under it, ``moved`` those of the same kind that should
+    and do not although both views look there; ``gravity_error_deg`` is the angle between the two gravities under it,
+    None where one is unknown.
+    """
+
+    alignment: Alignment
+    chain: str
+    agreeing_chains: tuple[str, ...]
+    verification: Verification
+    explained: tuple[ObjectPair, ...] = ()
+    moved: tuple[ObjectPair, ...] = ()
+    gravity_error_deg: float | None = None
+
+    @property
+    def T_target_source(self) -> Array:
+        """The pose: maps points of the source keyframe's camera into the target keyframe's camera."""
+        return self.alignment.T_target_source

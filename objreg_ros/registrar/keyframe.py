@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The words inside the room: a keyframe, its objects and its context.
+
+A keyframe is a place that was seen for a moment: one or more frames that were close in time, fused in the camera frame
+of one of them, its reference frame. It is what the store keeps and what the engine registers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from objreg_ros.data import Array, ObjectCloud, View
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Context:
+    """What is around the objects, thinned to voxels, in the camera frame of the keyframe.
+
+    ``xyz (N, 3) float32`` m; ``normals (N, 3) float32`` of length 1 towards the camera (0 0 0: unknown); N may be 0.
+    """
+
+    xyz: Array
+    normals: Array
+
+    def __len__(self) -> int:
+        return len(self.xyz)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class KeyObject:
+    """One object of a keyframe: its points from ``sightings`` frames, fused, in the camera frame of the keyframe."""
+
+    cloud: ObjectCloud
+    sightings: int = 1
+
+    @property
+    def label(self) -> str:
+        """What the detector called it most often."""
+        return self.cloud.label
+
+    @property
+    def centroid(self) -> Array:
+        """The (3,) float64 middle of its bounding box: it shifts less with the viewing angle than the mean."""
+        low, high = self.cloud.xyz.min(axis=0), self.cloud.xyz.max(axis=0)
+        return np.asarray((low + high) / 2.0, float)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Keyframe:
+    """A moment with its objects, context and view, all in the camera frame of the reference frame at ``stamp_ns``.
+
+    ``keyframe_id`` is unique in a store and grows with time, ``session`` counts the runs that wrote into it;
+    ``gravity (3,)`` is of length 1 or None; ``T_odom_camera`` is the odometry's pose of the reference frame or None,
+    and says something about another keyframe of the same session only.
+    """
+
+    keyframe_id: int
+    session: int
+    stamp_ns: int
+    frame_id: str
+    objects: tuple[KeyObject, ...]
+    context: Context
+    view: View
+    gravity: Array | None
+    gravity_confidence: float
+    T_odom_camera: Array | None
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The label of each object, in their order."""
+        return tuple(item.label for item in self.objects)
+
+    def numbered(self, keyframe_id: int, session: int) -> Keyframe:
+        """The same keyframe under the ids that a store gave it."""
+        return replace(self, keyframe_id=keyframe_id, session=session)

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The parameters of the registrar."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from objreg_ros.params import Params, param
+
+
+@dataclass(frozen=True)
+class RegistrarParams(Params):
+    """Everything that a user may set in this room."""
+
+    method: str = param(
+        "objreg", "how keyframes are registered; paper is the founding point-to-point ICP", choices=("objreg", "paper")
+    )
+    seed: int = param(0, "seed of everything that draws at random", ge=0)
+
+    # What becomes a keyframe, and what it keeps.
+    keyframe_translation: float = param(0.15, "motion that ends a keyframe", "m", ge=0.0)
+    keyframe_rotation: float = param(8.0, "rotation that ends a keyframe", "deg", ge=0.0, le=180.0)
+    keyframe_seconds: float = param(1.0, "longest time that a keyframe spans", "s", ge=0.0)
+    keyframe_min_objects: int = param(1, "least number of objects of a keyframe", ge=1)
+    context_radius: float = param(1.0, "how far around an object the context reaches", "m", ge=0.1)
+    context_voxel: float = param(0.03, "edge of a voxel of the context", "m", ge=0.005, le=0.2)
+    context_range: float = param(4.0, "context farther from the camera is left out", "m", ge=0.5)
+
+    # Which stored keyframes a new one is compared with.
+    label_groups: tuple[str, ...] = param(
+        ("cup mouse bottle bowl vase", "book remote phone", "tv laptop"),
+        "labels that detectors confuse: one group an item, spaces between (an underscore for a space in a name)",
+    )
+    min_gap: float = param(2.0, "least time between the two moments of a constraint", "s", ge=0.0)
+    candidates: int = param(6, "stored keyframes that are tried for each new one, best first", ge=1, le=100)
+
+    # What decides a closure. Below score_alone a closure needs agreement of chains or objects.
+    min_tested: int = param(600, "least number of pixels that both views must see", ge=1)
+    min_inliers: float = param(0.45, "least share of tested pixels whose depth agrees", ge=0.0, le=1.0)
+    max_violations: float = param(0.10, "largest share of tested pixels in seen free space", ge=0.0, le=1.0)
+    min_texture: float = param(0.10, "least correlation of the high-passed grey, where there is grey", ge=-1.0, le=1.0)
+    min_score: float = param(0.15, "least verification score V", ge=-3.0, le=2.0)
+    min_chains: int = param(2, "chains that must agree when fewer objects than min_objects are explained", ge=1)
+    min_objects: int = param(2, "explained objects that make up for chains that do not agree", ge=1)
+    max_gravity_error: float = param(5.0, "largest angle between the gravities", "deg", ge=0.0, le=180.0)
+    max_translation: float = param(5.0, "largest distance between the two cameras", "m", ge=0.0)
+    max_slack_sigma: float = param(0.10, "largest standard deviation along any translation", "m", ge=0.0)
