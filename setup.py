@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One description for both ways: an ament_python package for colcon, and a pip package."""
+
+import os
+from glob import glob
+
+from setuptools import find_packages, setup
+
+NAME = "objreg_ros"
+
+
+def files_below(folder: str) -> list[tuple[str, list[str]]]:
+    """The data_files of a folder and all its subfolders."""
+    return [
+        (os.path.join("share", NAME, root), [os.path.join(root, name) for name in sorted(names)])
+        for root, _, names in os.walk(folder)
+        if names
+    ]
+
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="Object-level loop closure for ROS 2: detect, segment, register, and say no",
+    license="Apache-2.0",
+    maintainer="objreg_ros maintainers",
+    maintainer_email="maintainers@objreg-ros.invalid",
+    packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/launch", glob("launch/*.launch.py")),
+        *files_below("config"),
+        *files_below("models"),
+    ],
+    python_requires=">=3.11",
+    install_requires=[
+        "setuptools",
+        "click>=8.1",
+        "matplotlib>=3.6",
+        "numba>=0.59",
+        "numpy>=1.26",
+        "onnxruntime>=1.17",
+        "open3d>=0.18",
+        "opencv-python-headless>=4.6",
+        "pyyaml>=6",
+        "rosbags>=0.10",
+        "scipy>=1.11",
+        "small_gicp>=1.0",
+        "tqdm>=4.64",
+    ],
+    extras_require={
+        # The real ROS 2 Jazzy as wheels, for machines without a ROS installation.
+        "ros": ["ros-jazzy-rclpy", "ros-jazzy-common-interfaces", "ros-jazzy-rmw-fastrtps-cpp"],
+        "test": ["hypothesis", "mypy", "onnx", "pytest", "ruff"],
+    },
+    entry_points={
+        "console_scripts": [
+            "objreg = objreg_ros.cli:main",
+            "detector = objreg_ros.detector.node:main",
+            "segmenter = objreg_ros.segmenter.node:main",
+            "registrar = objreg_ros.registrar.node:main",
+        ],
+    },
+    zip_safe=True,
+)

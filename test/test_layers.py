@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The import law of ARCHITECTURE.md, section 3, read off the tree."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[1] / "objreg_ros"
+ROOMS = ("detector", "segmenter", "registrar", "mapper")
+ROS = {"rclpy", "launch", "launch_ros", "tf2_ros", "ament_index_python", "rosgraph_msgs"}
+FREE_BRIDGE = ("bridge.from_msg", "bridge.sync", "bridge.layout")
+CORE = ("data", "geometry", "params", "share")
+HOUSE = ("offline", "truth", "report")
+
+
+def module_name(path: Path) -> str:
+    """The dotted name below objreg_ros, without a trailing __init__."""
+    parts = list(path.relative_to(PACKAGE).with_suffix("").parts)
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {module_name(path): path for path in sorted(PACKAGE.rglob("*.py")) if "__pycache__" not in path.parts}
+
+
+def imports(path: Path) -> set[str]:
+    """Every module that a file imports, anywhere in it, by its absolute name."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import in line {node.lineno}"
+            base = node.module or ""
+            found |= {f"{base}.{alias.name}" for alias in node.names} if base.startswith("objreg_ros") else {base}
+    return found
+
+
+def own_imports(path: Path) -> set[str]:
+    """The modules of this package that a file imports, below objreg_ros."""
+    found = set()
+    for name in imports(path):
+        if name.startswith("objreg_ros."):
+            inner = name.removeprefix("objreg_ros.")
+            found.add(inner if inner in MODULES else inner.rpartition(".")[0])
+    return found - {""}
+
+
+def below(name: str, *packages: str) -> bool:
+    return any(name == package or name.startswith(package + ".") for package in packages)
+
+
+def allowed(importer: str, imported: str) -> bool:
+    """The table of the import law."""
+    room = importer.split(".")[0]
+    if importer in CORE or importer == "":
+        return False
+    if below(importer, "cli"):
+        return True
+    if room in ROOMS and importer.endswith(".node"):
+        return below(imported, room, "bridge", *CORE)
+    if room in ROOMS:
+        return below(imported, room, "data", "geometry", "params")
+    if importer in FREE_BRIDGE:
+        return below(imported, "data", "geometry", *FREE_BRIDGE)
+    if room == "bridge":
+        return below(imported, "bridge", *CORE)
+    if room == "recording":
+        return below(imported, "recording", "data", "geometry", *FREE_BRIDGE)
+    if room == "simulation":
+        return below(imported, "simulation", "recording", "data", "geometry", "params")
+    if room in HOUSE:
+        return below(imported, *ROOMS, *CORE, *HOUSE, *FREE_BRIDGE, "recording") and not imported.endswith(".node")
+    return False
+
+
+def may_use_ros(module: str) -> bool:
+    return module.endswith(".node") or below(module, "cli") or (below(module, "bridge") and module not in FREE_BRIDGE)
+
+
+@pytest.mark.parametrize("module", sorted(MODULES))
+def test_a_module_imports_only_what_the_law_allows(module: str) -> None:
+    broken = sorted(name for name in own_imports(MODULES[module]) if not allowed(module, name))
+    assert not broken, f"objreg_ros.{module} may not import {broken}: ARCHITECTURE.md, section 3"
+
+
+@pytest.mark.parametrize("module", sorted(MODULES))
+def test_only_nodes_bridge_and_cli_know_ros(module: str) -> None:
+    ros = sorted(
+        n for n in imports(MODULES[module]) if n.split(".")[0] in ROS or n.split(".")[0].endswith(("_msgs", "_srvs"))
+    )
+    assert may_use_ros(module) or not ros, f"objreg_ros.{module} imports {ros}: only nodes, bridge/ and cli/ may"
+
+
+@pytest.mark.parametrize("library", ["onnxruntime", "small_gicp"])
+def test_an_engine_is_imported_in_one_file_only(library: str) -> None:
+    users = [name for name, path in MODULES.items() if library in {i.split(".")[0] for i in imports(path)}]
+    assert len(users) <= 1, f"{library} is imported in {users}"
+
+
+def test_the_law_can_be_broken() -> None:
+    assert not allowed("detector.mobilenet_ssd", "segmenter.segment")
+    assert not allowed("data", "geometry")
+    assert not allowed("offline", "registrar.node")
+    assert allowed("registrar.node", "bridge.to_msg")
