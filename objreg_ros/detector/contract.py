@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The two kinds of answer that a detection model gives, and the one word that they become."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.detector.boxes import decode
+from objreg_ros.detector.runtime import Port
+
+RAW_CONTRACT = "ssd_raw/1"
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Boxes before suppression: ``xyxy (N, 4)`` in 0..1 of the image, ``score (N,)``, ``index (N,)`` of the class."""
+
+    xyxy: Array
+    score: Array
+    index: Array
+
+
+class Contract(Protocol):
+    """Reads a model's answer."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The outputs that `read` needs, in its order."""
+
+    def read(self, outputs: list[Array], threshold: float) -> Candidates:
+        """The boxes of score ``threshold`` and more, classes counted from 0; ValueError for an answer out of shape."""
+
+
+def recognise(
+    inputs: tuple[Port, ...], outputs: tuple[Port, ...], metadata: Mapping[str, str], probe: Mapping[str, Array],
+    labels: int, offset: str,
+) -> Contract:  # fmt: skip
+    """The contract that a graph keeps, told by its outputs; ``probe`` is its answer to a test picture.
+
+    ValueError says what was expected and what the graph has.
+    """
+    if "objreg.contract" in metadata or {"loc", "logits"} <= set(probe):
+        return RawSsd.of(probe, metadata, labels)
+    return TfDetection.of(inputs, outputs, probe, labels, offset)
+
+
+@dataclass(frozen=True)
+class TfDetection:
+    """Boxes, classes, scores [, count] after the model's own suppression, as TF's detection graphs give them."""
+
+    names: tuple[str, ...]
+    first: int
+    labels: int
+
+    @classmethod
+    def of(
+        cls, inputs: tuple[Port, ...], outputs: tuple[Port, ...], probe: Mapping[str, Array], labels: int, offset: str
+    ) -> TfDetection:
+        """The contract of a graph with such outputs, under whatever names."""
+        roles = _roles(outputs, probe)
+        missing = [role for role in ("boxes", "classes", "scores") if role not in roles]
+        rows = {probe[name].shape[1] for role, name in roles.items() if role != "count"}
+        if missing or len(rows) > 1:
+            raise ValueError(
+                "outputs of the model: expected boxes [1,N,4], classes [1,N], scores [1,N] [, count [1]], or loc "
+                f"[1,A,4] and logits [1,A,1+C] with objreg.contract = {RAW_CONTRACT}, got {_shapes(probe)}; "
+                "export the model with its post-processing"
+            )
+        names = tuple(roles[role] for role in ("boxes", "classes", "scores", "count") if role in roles)
+        first = int(offset) if offset != "auto" else _first_class(inputs, names)
+        return cls(names, first, labels)
+
+    def read(self, outputs: list[Array], threshold: float) -> Candidates:
+        """See `Contract`."""
+        boxes, classes, scores = (output[0] for output in outputs[:3])
+        count = int(outputs[3].reshape(-1)[0]) if len(outputs) > 3 else len(scores)
+        good = (np.arange(len(scores)) < count) & (scores >= threshold)
+        index = np.rint(classes[good]).astype(np.int64) - self.first
+        if len(index) and not 0 <= index.min() <= index.max() < self.labels:
+            raise ValueError(
+                f"class of a box: expected one of {self.labels} labels, got number {index.min()} to {index.max()} "
+                "counted from 0; give the model's own file of `labels`, or set `label_offset`"
+            )
+        return Candidates(boxes[good][:, [1, 0, 3, 2]].astype(np.float32), scores[good].astype(np.float32), index)
+
+
+@dataclass(frozen=True)
+class RawSsd:
+    """``loc [1,A,4]`` and ``logits [1,A,1+C]`` with the priors in the metadata (Liu et al., "SSD", 2016)."""
+
+    names: tuple[str, ...]
+    priors: Array
+    variances: Array
+
+    @classmethod
+    def of(cls, probe: Mapping[str, Array], metadata: Mapping[str, str], labels: int) -> RawSsd:
+        """The contract of a graph with raw heads; ValueError when heads, priors and labels do not fit each other."""
+        got = _shapes(probe)
+        if metadata.get("objreg.contract") != RAW_CONTRACT or not {"loc", "logits"} <= set(probe):
+            contract = metadata.get("objreg.contract")
+            raise ValueError(f"model: expected objreg.contract {RAW_CONTRACT} with outputs loc and logits, "
+                             f"got {contract!r} with {got}; export it again with this version")  # fmt: skip
+        priors, variances = _priors(metadata), _variances(metadata)
+        expected = {"loc": (1, len(priors), 4), "logits": (1, len(priors), labels + 1)}
+        if any(probe[name].shape != shape for name, shape in expected.items()):
+            raise ValueError(f"heads of the model: expected {expected} from {len(priors)} priors and {labels} labels, "
+                             f"got {got}; give the labels and priors that it was trained with")  # fmt: skip
+        return cls(("loc", "logits"), priors, variances)
+
+    def read(self, outputs: list[Array], threshold: float) -> Candidates:
+        """See `Contract`."""
+        offsets, logits = outputs[0][0], outputs[1][0].astype(np.float32)
+        logits = logits - logits.max(axis=1, keepdims=True)
+        exponent = np.exp(logits)
+        score = exponent[:, 1:] / exponent.sum(axis=1, keepdims=True)
+        rows, index = np.nonzero(score >= threshold)
+        xyxy = decode(offsets[rows].astype(np.float32), self.priors[rows], self.variances)
+        return Candidates(xyxy, score[rows, index], index)
+
+
+def _roles(outputs: tuple[Port, ...], probe: Mapping[str, Array]) -> dict[str, str]:
+    """Which output is boxes, classes, scores and count: by shape, then by name, then by the order of TFLite's op."""
+    roles: dict[str, str] = {}
+    flat: list[str] = []
+    for name in (port.name for port in outputs if not port.name.startswith("raw_")):
+        shape = probe[name].shape
+        if len(shape) == 3 and shape[0] == 1 and shape[2] == 4:
+            roles.setdefault("boxes", name)
+        elif len(shape) == 2 and shape[0] == 1:
+            flat.append(name)
+        elif probe[name].size == 1:
+            roles.setdefault("count", name)
+    named = {role: name for name in flat for role, word in (("classes", "class"), ("scores", "score")) if word in name}
+    return roles | (named if len(named) == 2 else dict(zip(("classes", "scores"), flat, strict=False)))
+
+
+def _first_class(inputs: tuple[Port, ...], names: tuple[str, ...]) -> int:
+    """1 for a graph of TF's object detection API, which counts the background; 0 for one that went through TFLite."""
+    api_input = inputs[0].name.split(":")[0] in ("image_tensor", "input_tensor", "ToFloat")
+    return int(api_input or any(name.startswith("detection_") for name in names))
+
+
+def _priors(metadata: Mapping[str, str]) -> Array:
+    try:
+        raw = np.frombuffer(base64.b64decode(metadata["objreg.priors"], validate=True), "<f4")
+        return raw.reshape(-1, 4).astype(np.float32)
+    except (KeyError, ValueError) as error:
+        raise ValueError(f"objreg.priors: expected base64 of float32 [A,4], got {error!r}") from error
+
+
+def _variances(metadata: Mapping[str, str]) -> Array:
+    text = metadata.get("objreg.variances", "[0.1, 0.1, 0.2, 0.2]")
+    try:
+        return np.asarray(json.loads(text), np.float32).reshape(4)
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"objreg.variances: expected a list of 4 numbers, got {text!r}") from error
+
+
+def _shapes(probe: Mapping[str, Array]) -> str:
+    return ", ".join(f"{name} {list(value.shape)}" for name, value in probe.items())

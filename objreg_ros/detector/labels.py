@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The names of a model's classes: from a file, or from the model's metadata."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+UNNAMED = "???"
+"""What a label file writes for the background and for a class without a name."""
+
+METADATA_KEY = "objreg.labels"
+
+
+def find_labels(model_path: Path, labels_path: Path | None, metadata: Mapping[str, str]) -> tuple[str, ...]:
+    """The labels of a model: ``labels_path``, else its metadata, else ``<model>.txt`` or ``labelmap.txt`` beside it.
+
+    Label c is that of the c-th class, counted from 0 and without background. ValueError when there are none.
+    """
+    if labels_path is not None:
+        return read_labels(labels_path)
+    if METADATA_KEY in metadata:
+        return _labels_of_metadata(metadata[METADATA_KEY])
+    beside = (model_path.with_suffix(".txt"), model_path.with_name("labelmap.txt"))
+    for path in beside:
+        if path.is_file():
+            return read_labels(path)
+    raise ValueError(
+        f"labels of {model_path.name}: expected {METADATA_KEY} in its metadata or one of "
+        f"{', '.join(str(path) for path in beside)}, got neither; name a file of one label a line with `labels`"
+    )
+
+
+def read_labels(path: Path) -> tuple[str, ...]:
+    """The labels of a text file, one a line. A first line ``???`` stands for the background and is left out."""
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"labels {path}: expected a text file of one label a line, got {error}") from error
+    names = [line.strip() for line in lines]
+    while names and not names[-1]:
+        names.pop()
+    labels = tuple(names[1:] if names and names[0] == UNNAMED else names)
+    if not labels or "" in labels:
+        raise ValueError(f"labels {path}: expected one label a line, got {len(labels)} with an empty one or none")
+    return labels
+
+
+def _labels_of_metadata(text: str) -> tuple[str, ...]:
+    try:
+        labels = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise ValueError(f"{METADATA_KEY}: expected a JSON list of names, got {text[:80]!r}") from error
+    if not isinstance(labels, list) or not labels or not all(isinstance(name, str) and name for name in labels):
+        raise ValueError(f"{METADATA_KEY}: expected a JSON list of names, got {text[:80]!r}")
+    return tuple(labels)

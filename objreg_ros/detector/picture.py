@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From a camera's picture to a model's input tensor."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.detector.runtime import Port
+
+MEAN, SCALE = 127.5, 1 / 127.5
+EXPECTED = "expected one input, uint8 [1, H, W, 3], or float32 [1, H, W, 3] or [1, 3, H, W]"
+
+
+@dataclass(frozen=True)
+class Picture:
+    """How a model wants its picture: size (None where the graph takes any), layout and number range."""
+
+    height: int | None
+    width: int | None
+    channels_first: bool
+    floating: bool
+    mean: Array
+    scale: Array
+
+    @classmethod
+    def of(cls, inputs: tuple[Port, ...], metadata: Mapping[str, str]) -> Picture:
+        """The picture that the graph's input asks for; ValueError when it is no picture."""
+        got = ", ".join(map(str, inputs))
+        if len(inputs) != 1 or len(inputs[0].shape) != 4 or inputs[0].dtype not in ("uint8", "float"):
+            raise ValueError(f"input of the model: {EXPECTED}, got {got}")
+        batch, *size, last = inputs[0].shape
+        floating = inputs[0].dtype == "float"
+        channels_first = floating and size[0] == 3 and last != 3
+        if batch not in (1, None) or not (channels_first or last in (3, None)):
+            raise ValueError(f"input of the model: {EXPECTED}, got {got}")
+        height, width = (size[1], last) if channels_first else size
+        mean, scale = (_numbers(metadata, f"objreg.{key}", usual) for key, usual in (("mean", MEAN), ("scale", SCALE)))
+        return cls(height, width, channels_first, floating, mean, scale)
+
+    def tensor(self, rgb: Array) -> Array:
+        """The input tensor for ``rgb (H, W, 3) uint8``."""
+        height, width = self.height or rgb.shape[0], self.width or rgb.shape[1]
+        if (height, width) != rgb.shape[:2]:
+            rgb = cv2.resize(rgb, (width, height), interpolation=cv2.INTER_LINEAR)
+        if self.floating:
+            rgb = (rgb.astype(np.float32) - self.mean) * self.scale
+        return np.ascontiguousarray((rgb.transpose(2, 0, 1) if self.channels_first else rgb)[None])
+
+
+def _numbers(metadata: Mapping[str, str], key: str, usual: float) -> Array:
+    """One number or three, of a metadata entry."""
+    try:
+        return np.broadcast_to(np.asarray(json.loads(metadata.get(key, str(usual))), np.float32), (3,))
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"{key}: expected a number or a list of three, got {metadata[key]!r}") from error

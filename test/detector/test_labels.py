@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the names of classes come from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from objreg_ros.detector.labels import find_labels, read_labels
+
+
+def test_a_first_line_of_question_marks_is_the_background(tmp_path: Path) -> None:
+    path = tmp_path / "labels.txt"
+    path.write_text("???\nperson\n???\ncar\n\n")
+    assert read_labels(path) == ("person", "???", "car")
+
+
+def test_windows_line_ends_and_a_byte_order_mark_are_no_part_of_a_name(tmp_path: Path) -> None:
+    path = tmp_path / "labels.txt"
+    path.write_bytes("\ufeffcap\r\nbowl\r\n".encode())
+    assert read_labels(path) == ("cap", "bowl")
+
+
+def test_a_named_file_wins_over_metadata_and_metadata_over_a_file_beside_the_model(tmp_path: Path) -> None:
+    model, named = tmp_path / "m.onnx", tmp_path / "named.txt"
+    named.write_text("named")
+    (tmp_path / "labelmap.txt").write_text("map")
+    metadata = {"objreg.labels": '["inside"]'}
+    assert find_labels(model, named, metadata) == ("named",)
+    assert find_labels(model, None, metadata) == ("inside",)
+    assert find_labels(model, None, {}) == ("map",)
+    (tmp_path / "m.txt").write_text("own")
+    assert find_labels(model, None, {}) == ("own",)
+
+
+def test_no_labels_at_all_are_refused_with_the_places_that_were_searched(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"expected objreg.labels .* got neither; name a file"):
+        find_labels(tmp_path / "m.onnx", None, {})
+
+
+@pytest.mark.parametrize("text", ["not json", "{}", "[]", "[1]", '[""]'])
+def test_labels_that_are_no_list_of_names_are_refused(text: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="expected a JSON list of names"):
+        find_labels(tmp_path / "m.onnx", None, {"objreg.labels": text})
+
+
+@pytest.mark.parametrize("content", [b"", b"a\n\nb\n", b"\xff\xfe\x00"])
+def test_a_file_that_is_no_list_of_names_is_refused(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "labels.txt"
+    path.write_bytes(content)
+    with pytest.raises(ValueError, match="one label a line"):
+        read_labels(path)
+    with pytest.raises(ValueError, match="one label a line"):
+        read_labels(tmp_path / "absent.txt")
