@@ -1,0 +1,300 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Messages to words. The only place that knows the fields of a message on its way in.
+
+Reads attributes only, so the messages of rclpy and of rosbags (ROS 1 and 2) both fit. Pixels are in `pictures`, records
+in `layout`. A message that breaks its contract raises ValueError with what was expected and what came.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from objreg_ros.bridge.layout import SUPPORT_ID, SUPPORT_LABEL, columns, table
+from objreg_ros.bridge.pictures import colour_pixels, depth_metres, unpack_rgb
+from objreg_ros.data import (
+    ColourImage,
+    DepthImage,
+    Detections,
+    Frame,
+    Intrinsics,
+    LoopClosure,
+    ObjectCloud,
+    Odometry,
+    PointCloud,
+    View,
+)
+from objreg_ros.geometry import pose, rotation_from_quaternion
+
+Array = NDArray[Any]
+
+NANOSECONDS = 1_000_000_000
+
+
+def stamp_ns(message: Any) -> int:
+    """The time of a message with a header, of a Header or of a Time, in integer nanoseconds."""
+    stamp = getattr(message, "header", message)
+    stamp = getattr(stamp, "stamp", stamp)
+    return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
+
+
+def _when_and_where(message: Any) -> dict[str, Any]:
+    return {"stamp_ns": stamp_ns(message), "frame_id": message.header.frame_id}
+
+
+# ------------------------------------------------------------------------------------------------------------- cameras
+
+
+def image(message: Any) -> ColourImage:
+    """A sensor_msgs Image (rgb8 bgr8 rgba8 bgra8 mono8 mono16 8UC1 8UC3 8UC4) or CompressedImage (jpeg, png)."""
+    return ColourImage(rgb=colour_pixels(message), **_when_and_where(message))
+
+
+compressed_image = image
+
+
+def depth(message: Any) -> Array:
+    """Metres (H, W) float32, 0 where there is none, of an Image (16UC1, mono16: mm; 32FC1: m) or a compressedDepth."""
+    return depth_metres(message)
+
+
+def depth_image(depth_message: Any, camera_info: Any, colour: Any = None) -> DepthImage:
+    """The depth word of a depth message, its CameraInfo and, if at hand, the colour message registered to it.
+
+    Colour of another size is left out: it is not registered to this depth.
+    """
+    metres = depth(depth_message)
+    camera = intrinsics(camera_info)
+    if metres.shape != (camera.height, camera.width):
+        got = f"{metres.shape[1]} × {metres.shape[0]}"
+        raise ValueError(f"depth: expected camera_info's size {camera.width} × {camera.height}, got {got} pixels")
+    rgb = None if colour is None else image(colour).rgb
+    rgb = rgb if rgb is not None and rgb.shape[:2] == metres.shape else None
+    return DepthImage(depth=metres, rgb=rgb, intrinsics=camera, **_when_and_where(depth_message))
+
+
+def intrinsics(message: Any) -> Intrinsics:
+    """The pinhole camera of a CameraInfo, with its binning and region of interest applied.
+
+    ValueError for a camera that is not calibrated (ROS drivers say so with zeros in K).
+    """
+    K = np.asarray(message.k if hasattr(message, "k") else message.K, np.float64)  # K: the name in ROS 1
+    if K.shape != (9,) or not np.isfinite(K).all() or K[0] <= 0 or K[4] <= 0:
+        raise ValueError(f"camera_info: expected a calibrated K with focal lengths above 0, got {K.tolist()}")
+    roi, (bin_x, bin_y) = message.roi, (max(1, int(b)) for b in (message.binning_x, message.binning_y))
+    width, height = int(roi.width) or int(message.width), int(roi.height) or int(message.height)
+    return Intrinsics(
+        fx=float(K[0]) / bin_x,
+        fy=float(K[4]) / bin_y,
+        cx=(float(K[2]) - int(roi.x_offset)) / bin_x,
+        cy=(float(K[5]) - int(roi.y_offset)) / bin_y,
+        width=width // bin_x,
+        height=height // bin_y,
+    )
+
+
+def point_cloud(message: Any) -> PointCloud:
+    """A PointCloud2 with x y z and, if it has them, rgb or rgba; N × 1 comes as 1 × N. NaN where not measured."""
+    records = table(message, "x", "y", "z")
+    if records.size == 0:
+        raise ValueError(f"cloud: expected points, got {message.width} × {message.height}")
+    if records.shape[1] == 1:
+        records = records.reshape(1, -1)
+    xyz = columns(records, "x", "y", "z")
+    finite = np.isfinite(xyz)
+    if not finite.all():
+        measured = finite[..., 0] & finite[..., 1] & finite[..., 2]
+        xyz += np.where(measured, np.float32(0), np.float32(np.nan))[..., None]
+    return PointCloud(xyz=xyz, rgb=_colours(records), **_when_and_where(message))
+
+
+def _colours(records: Array) -> Array | None:
+    names = records.dtype.names or ()
+    packed = next((name for name in ("rgb", "rgba") if name in names), None)
+    return None if packed is None else unpack_rgb(records[packed])
+
+
+# --------------------------------------------------------------------------------------------------------------- poses
+
+
+def odometry(message: Any) -> Odometry:
+    """An Odometry, PoseStamped, PoseWithCovarianceStamped or TransformStamped; ValueError without a rotation."""
+    return Odometry(
+        T_odom_body=_pose(message),
+        stamp_ns=stamp_ns(message),
+        frame_id=message.header.frame_id,
+        child_frame_id=getattr(message, "child_frame_id", ""),
+    )
+
+
+def _pose(message: Any) -> Array:
+    if hasattr(message, "transform"):
+        where, turn = message.transform.translation, message.transform.rotation
+    else:
+        body = getattr(message.pose, "pose", message.pose)
+        where, turn = body.position, body.orientation
+    R = rotation_from_quaternion(np.array([turn.x, turn.y, turn.z, turn.w], float))
+    return pose(R, np.array([where.x, where.y, where.z], float))
+
+
+def loop_closure(message: Any) -> LoopClosure:
+    """A constraint (nav_msgs/Odometry, frames ``name@sec.nsec``); its labels and evidence do not travel with it."""
+    frame_id, from_ns = moment(message.header.frame_id)
+    _, to_ns = moment(message.child_frame_id)
+    covariance = np.asarray(message.pose.covariance, np.float64).reshape(6, 6)
+    return LoopClosure(
+        from_ns=from_ns, to_ns=to_ns, T_from_to=_pose(message), covariance=covariance, labels=(), frame_id=frame_id
+    )
+
+
+def moment(frame_id: str) -> tuple[str, int]:
+    """The frame and the time in nanoseconds of ``name@sec.nsec`` with nine digits behind the point."""
+    name, _, time = frame_id.rpartition("@")
+    seconds, _, nanoseconds = time.partition(".")
+    if not name or not seconds.lstrip("-").isdigit() or not nanoseconds.isdigit() or len(nanoseconds) != 9:
+        raise ValueError(f"constraint: expected a frame_id like camera@12.000000034, got {frame_id!r}")
+    return name, int(seconds) * NANOSECONDS + int(nanoseconds)
+
+
+# --------------------------------------------------------------------------------------------------- between the rooms
+
+
+def labels(message: Any) -> dict[int, str]:
+    """The names of the classes: std_msgs/String with JSON ``{"id": "name"}``."""
+    try:
+        return {int(number): str(name) for number, name in json.loads(message.data).items()}
+    except (ValueError, AttributeError) as error:
+        raise ValueError(f'labels: expected JSON like {{"0": "cup"}}, got {message.data[:80]!r}') from error
+
+
+def detections(message: Any, names: Mapping[int, str], image_hw: tuple[int, int] = (1, 1)) -> Detections:
+    """A ``detections_table`` or a vision_msgs/Detection2DArray. A class without a name is called by its number.
+
+    ``image_hw`` is what to believe where the message does not tell: an empty table, a Detection2DArray.
+    """
+    rows = _rows_of_array(message, names) if hasattr(message, "detections") else _rows_of_table(message, names)
+    xyxy, score, label, told_hw = rows
+    order = np.argsort(-score, kind="stable")
+    return Detections(
+        xyxy=np.ascontiguousarray(xyxy[order]),
+        score=np.ascontiguousarray(score[order]),
+        label=tuple(label[i] for i in order),
+        image_hw=told_hw or image_hw,
+        **_when_and_where(message),
+    )
+
+
+Rows = tuple[Array, Array, list[str], tuple[int, int] | None]
+
+
+def _rows_of_table(message: Any, names: Mapping[int, str]) -> Rows:
+    corners = ("x_min", "y_min", "x_max", "y_max")
+    rows = table(message, *corners, "score", "class_id", "image_width", "image_height").reshape(1, -1)
+    label = [names.get(number, str(number)) for number in rows["class_id"][0].tolist()]
+    image_hw = (int(rows["image_height"][0, 0]), int(rows["image_width"][0, 0])) if rows.size else None
+    return columns(rows, *corners)[0], rows["score"][0].astype(np.float32), label, image_hw
+
+
+def _rows_of_array(message: Any, names: Mapping[int, str]) -> Rows:
+    seen = [d for d in message.detections if len(d.results)]
+    best = [max(d.results, key=_score) for d in seen]
+    score = np.array([_score(result) for result in best], np.float32)
+    xyxy = np.array([_corners(d.bbox) for d in seen], np.float32).reshape(-1, 4)
+    return xyxy, score, [_class_name(result, names) for result in best], None
+
+
+def _score(result: Any) -> float:
+    return float(getattr(result, "hypothesis", result).score)
+
+
+def _class_name(result: Any, names: Mapping[int, str]) -> str:
+    hypothesis = getattr(result, "hypothesis", result)
+    name = str(getattr(hypothesis, "class_id", None) or getattr(hypothesis, "id", ""))
+    return names.get(int(name), name) if name.isdigit() else name
+
+
+def _corners(bbox: Any) -> tuple[float, float, float, float]:
+    centre = getattr(bbox.center, "position", bbox.center)  # vision_msgs 4 and before
+    half_w, half_h = bbox.size_x / 2, bbox.size_y / 2
+    return centre.x - half_w, centre.y - half_h, centre.x + half_w, centre.y + half_h
+
+
+def objects(message: Any, names: Mapping[int, str]) -> tuple[tuple[ObjectCloud, ...], ObjectCloud | None]:
+    """The objects (instance 1 and up, in order) and the support surface (instance 0) of an ``objects`` cloud."""
+    needed = ("x", "y", "z", "normal_x", "normal_y", "normal_z", "score", "density", "class_id", "instance", "flags")
+    rows = table(message, *needed).reshape(1, -1)
+    rows = rows[:, np.argsort(rows["instance"][0], kind="stable")]
+    _, starts = np.unique(rows["instance"][0], return_index=True)
+    clouds = [_object(part, names) for part in np.split(rows, starts[1:], axis=1) if part.size]
+    support = next((cloud for cloud in clouds if cloud.instance == 0), None)
+    return tuple(cloud for cloud in clouds if cloud.instance > 0), support
+
+
+def _object(rows: Array, names: Mapping[int, str]) -> ObjectCloud:
+    first = rows[0, 0]
+    number = int(first["class_id"])
+    colours = _colours(rows)
+    return ObjectCloud(
+        label=SUPPORT_LABEL if number == SUPPORT_ID else names.get(number, str(number)),
+        score=float(first["score"]),
+        instance=int(first["instance"]),
+        xyz=columns(rows, "x", "y", "z")[0],
+        normals=columns(rows, "normal_x", "normal_y", "normal_z")[0],
+        rgb=None if colours is None else colours[0],
+        flags=rows["flags"][0].astype(np.uint16),
+        density=float(first["density"]),
+    )
+
+
+def view(message: Any, camera_info: Any) -> View:
+    """The reduced frame: an organised cloud whose rgb, if it has one, is grey."""
+    cloud = point_cloud(message)
+    grey = None if cloud.rgb is None else np.ascontiguousarray(cloud.rgb[..., 0])
+    return View(xyz=cloud.xyz, grey=grey, intrinsics=intrinsics(camera_info))
+
+
+def gravity(message: Any) -> tuple[Array | None, float]:
+    """The way things fall (3,) of length 1 and the confidence 0..1 of a Vector3Stamped; None and 0 if unknown."""
+    return split_gravity(np.array([message.vector.x, message.vector.y, message.vector.z], float))
+
+
+def split_gravity(vector: Array) -> tuple[Array | None, float]:
+    """The direction and the confidence of a gravity vector whose length is the confidence."""
+    confidence = float(np.linalg.norm(vector))
+    return (None, 0.0) if not confidence > 1e-9 else (vector / confidence, min(confidence, 1.0))
+
+
+def frame(
+    objects_message: Any,
+    view_message: Any,
+    view_info: Any,
+    gravity_message: Any,
+    names: Mapping[int, str],
+    odometry_message: Any = None,
+    T_body_camera: Array | None = None,
+) -> Frame:
+    """One moment from the segmenter's four messages, which must carry one stamp, and the odometry that goes with it.
+
+    ``T_body_camera`` is where the camera sits on the body that the odometry speaks of; the same place if None.
+    """
+    stamps = [stamp_ns(m) for m in (objects_message, view_message, view_info, gravity_message)]
+    if len(set(stamps)) != 1:
+        raise ValueError(f"frame: expected objects, view, camera_info and gravity of one stamp, got {stamps} ns")
+    clouds, support = objects(objects_message, names)
+    falls, confidence = gravity(gravity_message)
+    T_odom_camera = None if odometry_message is None else odometry(odometry_message).T_odom_body
+    if T_odom_camera is not None and T_body_camera is not None:
+        T_odom_camera = T_odom_camera @ T_body_camera
+    return Frame(
+        objects=clouds,
+        support=support,
+        view=view(view_message, view_info),
+        gravity=falls,
+        gravity_confidence=confidence,
+        T_odom_camera=T_odom_camera,
+        **_when_and_where(objects_message),
+    )

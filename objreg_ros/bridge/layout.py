@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How a PointCloud2 lies in memory, and the layouts of the tables that this package sends as one.
+
+A PointCloud2 is a typed table: named fields at offsets in records of ``point_step`` bytes, in rows of ``row_step``
+bytes. Reading one here copies nothing and touches no element. Reads attributes only, so the messages of rclpy and of
+rosbags both fit.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+SUPPORT_ID = 65535  # class_id of the support surface, which is no class
+SUPPORT_LABEL = "support"
+
+DETECTIONS = np.dtype(
+    [
+        ("x_min", "<f4"),
+        ("y_min", "<f4"),
+        ("x_max", "<f4"),
+        ("y_max", "<f4"),
+        ("score", "<f4"),
+        ("class_id", "<u2"),
+        ("image_width", "<u2"),
+        ("image_height", "<u2"),
+    ]
+)
+
+# rgb is 0x00RRGGBB; the wire calls it FLOAT32, as PCL and RViz do.
+OBJECTS = np.dtype(
+    [
+        ("x", "<f4"),
+        ("y", "<f4"),
+        ("z", "<f4"),
+        ("rgb", "<u4"),
+        ("normal_x", "<f4"),
+        ("normal_y", "<f4"),
+        ("normal_z", "<f4"),
+        ("score", "<f4"),
+        ("density", "<f4"),
+        ("class_id", "<u2"),
+        ("instance", "<u2"),
+        ("flags", "<u2"),
+    ]
+)
+
+VIEW = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("rgb", "<u4")])
+
+PACKED = ("rgb", "rgba")
+# sensor_msgs/PointField: INT8 = 1 ... FLOAT64 = 8
+FORMATS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
+DATATYPES = {text: number for number, text in FORMATS.items()}
+
+
+def fields_of(layout: np.dtype[Any]) -> list[tuple[str, int, int]]:
+    """(name, offset, datatype) of each field of a layout, as sensor_msgs/PointField wants them."""
+    assert layout.fields is not None
+    placed = [(name, *layout.fields[name][:2]) for name in layout.names or ()]
+    return [(name, offset, DATATYPES["f4" if name in PACKED else kind.str[1:]]) for name, kind, offset in placed]
+
+
+def table(cloud: Any, *required: str) -> Array:
+    """The records of a PointCloud2, (height, width) with one named column a field; a view of ``cloud.data``.
+
+    Packed colours (``rgb``, ``rgba``) come as unsigned integers whatever the type that carries them. ValueError for a
+    field that is ``required`` and missing, for fields that leave the record and for data that are cut off.
+    """
+    layout = record_layout(cloud)
+    missing = [name for name in required if name not in (layout.names or ())]
+    if missing:
+        raise ValueError(
+            f"cloud: expected the fields {', '.join(required)}, got {', '.join(layout.names or ('none',))}"
+        )
+    height, width, row = int(cloud.height), int(cloud.width), int(cloud.row_step)
+    if height * width == 0:
+        return np.empty((height, width), layout)
+    data = np.frombuffer(cloud.data, np.uint8)
+    row = row if height > 1 else max(row, width * layout.itemsize)  # some drivers leave row_step 0 in a single row
+    expected = (height - 1) * row + width * layout.itemsize
+    if row < width * layout.itemsize:
+        raise ValueError(f"cloud: expected a row_step of at least {width} × {layout.itemsize} bytes, got {row}")
+    if data.size < expected:
+        raise ValueError(f"cloud: expected {expected} bytes for {width} × {height} points, got {data.size}; truncated?")
+    return np.ndarray((height, width), layout, buffer=data, strides=(row, layout.itemsize))
+
+
+def record_layout(cloud: Any) -> np.dtype[Any]:
+    """The structured dtype of one record of a PointCloud2; ValueError if it cannot be one."""
+    step, order = int(cloud.point_step), ">" if cloud.is_bigendian else "<"
+    names, kinds, offsets = [], [], []
+    for field in cloud.fields:
+        kind = _field_kind(field, order)
+        if field.name in names:
+            raise ValueError(f"cloud: expected fields with names of their own, got {field.name!r} twice")
+        if field.offset + kind.itemsize > step:
+            end = field.offset + kind.itemsize
+            raise ValueError(
+                f"cloud: expected field {field.name!r} within point_step {step}, got its end at byte {end}"
+            )
+        names.append(field.name)
+        kinds.append(kind)
+        offsets.append(int(field.offset))
+    if step <= 0:
+        raise ValueError(f"cloud: expected a point_step above 0, got {step}")
+    return np.dtype({"names": names, "formats": kinds, "offsets": offsets, "itemsize": step})  # type: ignore[call-overload, no-any-return]
+
+
+def _field_kind(field: Any, order: str) -> np.dtype[Any]:
+    if field.datatype not in FORMATS:
+        raise ValueError(f"cloud: expected a datatype 1..8 of field {field.name!r}, got {field.datatype}")
+    packed = field.name in PACKED and FORMATS[field.datatype] in ("f4", "u4", "i4")
+    kind = np.dtype(order + ("u4" if packed else FORMATS[field.datatype]))
+    return kind if field.count <= 1 else np.dtype((kind, (int(field.count),)))
+
+
+def columns(records: Array, *names: str) -> Array:
+    """Some columns of a (height, width) table as (height, width, len(names)) float32 in native order, copied."""
+    return np.stack([records[name] for name in names], axis=-1, dtype=np.float32, casting="same_kind")

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The pixels of Image and CompressedImage messages, raw and compressed, as colour or as depth."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+DEPTH_SCALE = 0.001  # metres of one step of 16UC1, REP-118
+NO_DEPTH = 65535  # some drivers write it where they measured nothing
+
+# encoding: (dtype, channels, OpenCV's conversion to RGB). OpenCV's plain 8UC3 and 8UC4 are BGR by its own convention.
+COLOUR: dict[str, tuple[str, int, int | None]] = {
+    "rgb8": ("u1", 3, None),
+    "bgr8": ("u1", 3, cv2.COLOR_BGR2RGB),
+    "rgba8": ("u1", 4, cv2.COLOR_RGBA2RGB),
+    "bgra8": ("u1", 4, cv2.COLOR_BGRA2RGB),
+    "mono8": ("u1", 1, cv2.COLOR_GRAY2RGB),
+    "mono16": ("u2", 1, cv2.COLOR_GRAY2RGB),
+    "8UC1": ("u1", 1, cv2.COLOR_GRAY2RGB),
+    "8UC3": ("u1", 3, cv2.COLOR_BGR2RGB),
+    "8UC4": ("u1", 4, cv2.COLOR_BGRA2RGB),
+}
+DEPTH = {"16UC1": "u2", "mono16": "u2", "32FC1": "f4"}
+COMPRESSED_DEPTH_HEADER = 12  # compressed_depth_image_transport: an enum and two floats before the PNG
+
+
+def colour_pixels(message: Any) -> Array:
+    """(H, W, 3) uint8 RGB of an Image or CompressedImage; ValueError for an encoding that is no colour."""
+    if hasattr(message, "format"):
+        return _decoded(message.data, cv2.IMREAD_COLOR, cv2.COLOR_BGR2RGB, "a jpeg or png")
+    if message.encoding not in COLOUR:
+        raise ValueError(f"image: expected an encoding of {', '.join(COLOUR)}, got {message.encoding!r}")
+    dtype, channels, conversion = COLOUR[message.encoding]
+    pixels = _pixels(message, dtype, channels)
+    if dtype == "u2":
+        pixels = (pixels >> 8).astype(np.uint8)
+    return pixels.copy() if conversion is None else cv2.cvtColor(pixels, conversion)
+
+
+def depth_metres(message: Any) -> Array:
+    """(H, W) float32 metres, 0 where there is none, of a depth Image or a compressedDepth CompressedImage."""
+    if hasattr(message, "format"):
+        return _compressed_depth(message)
+    if message.encoding not in DEPTH:
+        raise ValueError(f"depth: expected an encoding of {', '.join(DEPTH)}, got {message.encoding!r}")
+    pixels = _pixels(message, DEPTH[message.encoding], 1)
+    return _metres(pixels) if pixels.dtype == np.uint16 else _measured(pixels.astype(np.float32))
+
+
+def unpack_rgb(packed: Array) -> Array:
+    """(..., 3) uint8 RGB of the 0xAARRGGBB integers of a cloud, in any byte order."""
+    bgra = np.ascontiguousarray(packed, "<u4").view(np.uint8).reshape(-1, 1, 4)
+    return cv2.cvtColor(bgra, cv2.COLOR_BGRA2RGB).reshape(*packed.shape, 3)
+
+
+def _pixels(message: Any, dtype: str, channels: int) -> Array:
+    """(H, W) or (H, W, channels) in native byte order; contiguous; a view of the message where it can be."""
+    kind = np.dtype((">" if message.is_bigendian else "<") + dtype)
+    height, width, step = int(message.height), int(message.width), int(message.step)
+    line = width * channels * kind.itemsize
+    if height <= 0 or width <= 0:
+        raise ValueError(f"image: expected pixels, got {width} × {height}")
+    step = step if height > 1 else max(step, line)
+    if step < line:
+        raise ValueError(f"image: expected a step of at least {line} bytes for {message.encoding}, got {step}")
+    data = np.frombuffer(message.data, np.uint8)
+    if data.size < (height - 1) * step + line:
+        expected = (height - 1) * step + line
+        raise ValueError(f"image: expected {expected} bytes for {width} × {height}, got {data.size}; truncated?")
+    shape, strides = (height, width, channels), (step, channels * kind.itemsize, kind.itemsize)
+    pixels = np.ndarray(shape, kind, buffer=data, strides=strides)
+    return np.ascontiguousarray(pixels[..., 0] if channels == 1 else pixels, kind.newbyteorder("="))
+
+
+def _metres(pixels: Array) -> Array:
+    """16-bit millimetres as metres; 65535 means nothing measured."""
+    return np.where(pixels == NO_DEPTH, np.float32(0), pixels * np.float32(DEPTH_SCALE))
+
+
+def _measured(metres: Array) -> Array:
+    """Floating depth with 0 where it is NaN, infinite or not in front of the camera."""
+    metres[~(np.isfinite(metres) & (metres > 0))] = 0
+    return metres
+
+
+def _decoded(data: Any, flags: int, conversion: int | None, expected: str) -> Array:
+    buffer = np.frombuffer(data, np.uint8)
+    pixels = cv2.imdecode(buffer, flags) if buffer.size else None
+    if pixels is None:
+        raise ValueError(f"compressed image: expected {expected}, got {buffer.size} bytes that do not decode")
+    return np.asarray(pixels if conversion is None else cv2.cvtColor(pixels, conversion))
+
+
+def _compressed_depth(message: Any) -> Array:
+    """PNG of 16-bit millimetres, or of quantised inverse depth with its two constants (compressedDepth of 32FC1)."""
+    data = np.frombuffer(message.data, np.uint8)
+    if "compressedDepth" not in message.format:
+        pixels = _decoded(data, cv2.IMREAD_UNCHANGED, None, "a 16-bit png")
+        return _metres(_one_channel(pixels))
+    pixels = _one_channel(_decoded(data[COMPRESSED_DEPTH_HEADER:], cv2.IMREAD_UNCHANGED, None, "compressedDepth png"))
+    if not message.format.startswith("32FC1"):
+        return _metres(pixels)
+    a, b = data[4:COMPRESSED_DEPTH_HEADER].view("<f4")
+    with np.errstate(divide="ignore", invalid="ignore"):
+        metres = (np.float32(a) / (pixels.astype(np.float32) - np.float32(b))).astype(np.float32)
+    return _measured(np.where(pixels == 0, np.float32(0), metres))
+
+
+def _one_channel(pixels: Array) -> Array:
+    if pixels.ndim != 2 or pixels.dtype != np.uint16:
+        raise ValueError(f"compressed depth: expected 16 bits of one channel, got {pixels.dtype} {pixels.shape}")
+    return pixels

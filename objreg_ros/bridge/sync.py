@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Streams of stamped things brought together by time; knows neither ROS nor what the things are.
+
+The first stream is the reference: every match is one of its items with the nearest item of each other stream. Nothing
+is lost in silence: for every stream ``received = matched + waiting + dropped by reason``.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+
+class Need(Enum):
+    """What a match does without an item of a stream."""
+
+    REQUIRED = "required"  # there is no match; an item serves one match
+    OPTIONAL = "optional"  # it goes without; waited for once the stream has spoken; an item may serve many matches
+    LATCHED = "latched"  # the last value serves whatever its stamp; there is no match before the first
+
+
+class Drop(Enum):
+    """Why an item met no match. The value is what diagnostics show."""
+
+    UNMATCHED = "unmatched"  # its time has passed and no partner came
+    QUEUE_FULL = "queue_full"  # it waited for a partner until the queue was full
+    TIME_JUMP = "time_jump"  # time jumped back and left it in the future
+
+
+@dataclass(slots=True)
+class Item:
+    """One stamped thing that waits."""
+
+    stamp_ns: int
+    payload: Any
+    used: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """How one input is treated: ``slop_ns`` is the largest distance in time to the reference, 0 for exact."""
+
+    name: str
+    need: Need = Need.REQUIRED
+    slop_ns: int = 0
+    depth: int = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """One payload a stream, by name; None where an optional stream had nothing near."""
+
+    stamp_ns: int
+    payloads: Mapping[str, Any]
+
+    def __getitem__(self, name: str) -> Any:
+        return self.payloads[name]
+
+
+@dataclass(slots=True)
+class Queue:
+    """The items of one stream and what became of them."""
+
+    stream: Stream
+    items: deque[Item] = field(default_factory=deque)
+    last_ns: int | None = None
+    latched: Any = None
+    received: int = 0
+    matched: int = 0
+    dropped: Counter[str] = field(default_factory=Counter)
+
+    @property
+    def waiting(self) -> int:
+        """Items that no match has used yet."""
+        return sum(not item.used for item in self.items)
+
+    def nearest(self, stamp_ns: int) -> Item | None:
+        """The item nearest to a time within the slop; None if there is none. The earlier of two that are as near."""
+        near = min(self.items, key=lambda item: abs(item.stamp_ns - stamp_ns), default=None)
+        return near if near is not None and abs(near.stamp_ns - stamp_ns) <= self.stream.slop_ns else None
+
+    def settled(self, stamp_ns: int) -> bool:
+        """Whether no item that may still come can be nearer to a time than those that are here."""
+        if self.last_ns is None:
+            return self.stream.need is Need.OPTIONAL
+        return self.last_ns > stamp_ns or any(item.stamp_ns == stamp_ns for item in self.items)
+
+    def use(self, item: Item) -> None:
+        """Count an item as matched, once."""
+        self.matched += not item.used
+        item.used = True
+
+    def drop_oldest(self, why: Drop) -> None:
+        """Take the oldest item out and count it if nothing used it."""
+        item = self.items.popleft()
+        if not item.used:
+            self.dropped[why.value] += 1
+
+    def drop_before(self, stamp_ns: int) -> None:
+        """Take out what is older than a time."""
+        while self.items and self.items[0].stamp_ns < stamp_ns:
+            self.drop_oldest(Drop.UNMATCHED)
+
+    def drop_after(self, stamp_ns: int) -> None:
+        """Take out what lies in the future of a time that was jumped back to."""
+        kept = deque(item for item in self.items if item.stamp_ns <= stamp_ns)
+        self.dropped[Drop.TIME_JUMP.value] += sum(not item.used for item in self.items if item.stamp_ns > stamp_ns)
+        self.items = kept
+
+
+class Synchroniser:
+    """Matches the items of several streams. `add` returns the matches that an item completes, in order of time.
+
+    A stream whose stamps go back has jumped in time (a looped bag): what waits with a later stamp is dropped as
+    ``time_jump``, in every stream, and matching starts afresh.
+    """
+
+    def __init__(self, streams: Sequence[Stream]) -> None:
+        if not streams or streams[0].need is not Need.REQUIRED:
+            raise ValueError("expected a required stream first: it is the reference that the others are matched to")
+        self.queues = {stream.name: Queue(stream) for stream in streams}
+        self._reference = self.queues[streams[0].name]
+        self._others = [queue for queue in self.queues.values() if queue is not self._reference]
+        self.time_jumps = 0
+
+    def add(self, name: str, stamp_ns: int, payload: Any) -> list[Match]:
+        """Take one item of a stream; KeyError for a stream that was not named."""
+        queue = self.queues[name]
+        queue.received += 1
+        if queue.stream.need is Need.LATCHED:
+            queue.latched, queue.matched = payload, queue.matched + 1
+            return self._matches()
+        if queue.last_ns is not None and stamp_ns < queue.last_ns:
+            self.time_jumps += 1
+            self._forget_after(stamp_ns)
+        queue.last_ns = stamp_ns
+        queue.items.append(Item(stamp_ns, payload))
+        return [*self._matches(), *self._make_room(queue)]
+
+    def flush(self) -> list[Match]:
+        """The matches that are still possible when nothing more will come; the rest is dropped as unmatched."""
+        found = []
+        while self._reference.items:
+            found += self._resolve(self._reference.items[0])
+        for queue in self._others:
+            while queue.items:
+                queue.drop_oldest(Drop.UNMATCHED)
+        return found
+
+    def clear(self) -> None:
+        """Drop everything that waits, counted like a jump in time; latched values stay."""
+        self._forget_after(-(2**63))
+
+    def _forget_after(self, stamp_ns: int) -> None:
+        for queue in self.queues.values():
+            queue.drop_after(stamp_ns)
+            queue.last_ns = None
+
+    def _matches(self) -> list[Match]:
+        found = []
+        while self._reference.items and self._decided(self._reference.items[0]):
+            found += self._resolve(self._reference.items[0])
+        return found
+
+    def _decided(self, item: Item) -> bool:
+        """Whether the fate of a reference item is known: waiting longer would change nothing."""
+        for queue in self._others:
+            if queue.stream.need is Need.LATCHED:
+                if queue.latched is None:
+                    return False
+            elif not queue.settled(item.stamp_ns):
+                return False
+        return True
+
+    def _resolve(self, item: Item, why: Drop = Drop.UNMATCHED) -> list[Match]:
+        """Take the first reference item out: a match, or a drop."""
+        partners = {queue.stream.name: queue.nearest(item.stamp_ns) for queue in self._others if not _latched(queue)}
+        if self._lacks(partners):
+            self._reference.drop_oldest(why)
+            return []
+        self._reference.use(item)
+        self._reference.items.popleft()
+        payloads = {queue.stream.name: queue.latched for queue in self._others if _latched(queue)}
+        for name, partner in partners.items():
+            payloads[name] = None if partner is None else partner.payload
+            self._spend(self.queues[name], partner)
+        return [Match(item.stamp_ns, {self._reference.stream.name: item.payload, **payloads})]
+
+    def _lacks(self, partners: Mapping[str, Item | None]) -> bool:
+        required = any(p is None and self.queues[name].stream.need is Need.REQUIRED for name, p in partners.items())
+        return required or any(_latched(queue) and queue.latched is None for queue in self._others)
+
+    @staticmethod
+    def _spend(queue: Queue, partner: Item | None) -> None:
+        if partner is None:
+            return
+        queue.use(partner)
+        queue.drop_before(partner.stamp_ns)
+        if queue.stream.need is Need.REQUIRED:
+            queue.items.popleft()
+
+    def _make_room(self, queue: Queue) -> list[Match]:
+        """Keep a queue within its depth: the oldest reference item goes as it is, the oldest of others is dropped."""
+        found: list[Match] = []
+        while len(queue.items) > queue.stream.depth:
+            if queue is self._reference:
+                found += self._resolve(queue.items[0], Drop.QUEUE_FULL)
+            else:
+                queue.drop_oldest(Drop.UNMATCHED if queue.stream.need is Need.OPTIONAL else Drop.QUEUE_FULL)
+        return found
+
+
+def _latched(queue: Queue) -> bool:
+    return queue.stream.need is Need.LATCHED

@@ -1,0 +1,294 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import json
+from types import SimpleNamespace
+
+import messages
+import numpy as np
+import pytest
+
+from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.layout import DETECTIONS, OBJECTS, SUPPORT_ID, VIEW
+from objreg_ros.geometry import rotation_from_vector
+
+K = [500.0, 0, 31.5, 0, 510.0, 23.5, 0, 0, 1]
+PACKED = np.dtype({"names": ["x", "y", "z", "rgb"], "formats": ["<f4"] * 4, "offsets": [0, 4, 8, 16], "itemsize": 32})
+
+
+def packed_cloud(height: int = 3, width: int = 4, dtype: np.dtype = PACKED) -> np.ndarray:
+    records = np.zeros((height, width), dtype)
+    for i, name in enumerate("xyz"):
+        records[name] = np.arange(height * width).reshape(height, width) + 100 * i
+    records["rgb"] = np.full((height, width), 0x00102030, "u4").view("f4").astype(dtype["rgb"])
+    return records
+
+
+def test_the_stamp_of_a_header_a_message_and_a_time_is_the_same() -> None:
+    message = messages.cloud(packed_cloud(), stamp_ns=12_000_000_345)
+    assert {from_msg.stamp_ns(m) for m in (message, message.header, message.header.stamp)} == {12_000_000_345}
+
+
+def test_depth_comes_with_the_size_of_its_camera() -> None:
+    raw = messages.image(np.full((48, 64), 1500, np.uint16), "16UC1")
+    word = from_msg.depth_image(raw, messages.camera_info(K, 64, 48))
+    assert word.depth.shape == (48, 64) and word.depth[0, 0] == pytest.approx(1.5)
+    with pytest.raises(ValueError, match=r"expected camera_info's size 32 × 24, got 64 × 48"):
+        from_msg.depth_image(raw, messages.camera_info(K, 32, 24))
+
+
+def test_colour_of_another_size_is_not_taken_for_registered() -> None:
+    raw = messages.image(np.full((48, 64), 1500, np.uint16), "16UC1")
+    small, fitting = (messages.image(np.zeros((h, 64, 3), np.uint8), "rgb8") for h in (24, 48))
+    info = messages.camera_info(K, 64, 48)
+    assert from_msg.depth_image(raw, info, small).rgb is None
+    assert from_msg.depth_image(raw, info, fitting).rgb is not None
+
+
+def test_an_uncalibrated_camera_is_refused() -> None:
+    with pytest.raises(ValueError, match="calibrated K"):
+        from_msg.intrinsics(messages.camera_info([0.0] * 9, 64, 48))
+
+
+def test_binning_and_region_of_interest_move_the_camera() -> None:
+    info = messages.camera_info(K, 64, 48)
+    info.binning_x = info.binning_y = 2
+    info.roi.x_offset, info.roi.y_offset, info.roi.width, info.roi.height = 10, 4, 40, 30
+    camera = from_msg.intrinsics(info)
+    assert (camera.fx, camera.cx, camera.cy) == (250.0, 10.75, 9.75)
+    assert (camera.width, camera.height) == (20, 15)
+
+
+def test_intrinsics_of_ros_1_are_read_too() -> None:
+    info = messages.camera_info(K, 64, 48)
+    info.K = info.k
+    del info.k
+    assert from_msg.intrinsics(info).fy == 510.0
+
+
+@pytest.mark.parametrize("pad", [0, 5])
+def test_a_cloud_is_read_with_its_padding(pad: int) -> None:
+    cloud = from_msg.point_cloud(messages.cloud(packed_cloud(), pad))
+    assert cloud.organised and cloud.xyz[1, 2].tolist() == [6, 106, 206]
+    assert cloud.rgb is not None and cloud.rgb[2, 3].tolist() == [0x10, 0x20, 0x30]
+
+
+def test_a_big_endian_cloud_gives_the_same_points() -> None:
+    big = np.dtype([(name, ">f4") for name in ("x", "y", "z", "rgb")])
+    records = packed_cloud().astype(big)
+    cloud = from_msg.point_cloud(messages.cloud(records))
+    assert cloud.xyz[1, 2].tolist() == [6, 106, 206]
+    assert cloud.rgb is not None and cloud.rgb[0, 0].tolist() == [0x10, 0x20, 0x30]
+
+
+def test_fields_in_any_order_and_type_are_read() -> None:
+    mixed = np.dtype([("z", "<f8"), ("rgba", "<u4"), ("x", "<f4"), ("y", "<i2")])
+    records = np.zeros((1, 2), mixed)
+    records["z"], records["x"], records["y"], records["rgba"] = 2.5, 1.5, -3, 0xFF0A0B0C
+    cloud = from_msg.point_cloud(messages.cloud(records))
+    assert cloud.xyz[0, 1].tolist() == [1.5, -3, 2.5]
+    assert cloud.rgb is not None and cloud.rgb[0, 0].tolist() == [10, 11, 12]
+
+
+def test_a_column_of_points_comes_as_a_row() -> None:
+    cloud = from_msg.point_cloud(messages.cloud(packed_cloud(6, 1)))
+    assert cloud.xyz.shape == (1, 6, 3) and not cloud.organised
+
+
+def test_a_point_that_is_infinite_in_one_axis_is_not_measured() -> None:
+    records = packed_cloud()
+    records["y"][1, 1] = np.inf
+    cloud = from_msg.point_cloud(messages.cloud(records))
+    assert np.isnan(cloud.xyz[1, 1]).all() and np.isfinite(cloud.xyz[1, 2]).all()
+
+
+def test_a_cloud_of_nothing_but_nan_is_still_a_cloud() -> None:
+    records = packed_cloud()
+    records["x"] = np.nan
+    assert np.isnan(from_msg.point_cloud(messages.cloud(records)).xyz).all()
+
+
+def test_a_truncated_cloud_is_refused_with_expected_and_got() -> None:
+    message = messages.cloud(packed_cloud())
+    message.data = message.data[:-40]
+    with pytest.raises(ValueError, match=r"expected 384 bytes for 4 × 3 points, got 344"):
+        from_msg.point_cloud(message)
+
+
+def test_a_missing_field_is_named() -> None:
+    records = np.zeros((2, 2), [("x", "<f4"), ("y", "<f4")])
+    with pytest.raises(ValueError, match="expected the fields x, y, z, got x, y"):
+        from_msg.point_cloud(messages.cloud(records))
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        ({"point_step": 8}, "within point_step 8"),
+        ({"point_step": 0}, "within point_step 0"),
+        ({"row_step": 4}, "row_step of at least"),
+        ({"height": 2**32 - 1}, "truncated"),
+        ({"width": 2**31}, "row_step of at least"),
+        ({"width": 0}, "expected points"),
+        ({"height": 0}, "expected points"),
+        ({"fields": []}, "expected the fields x, y, z, got none"),
+    ],
+)
+def test_an_absurd_cloud_is_refused(change: dict, complaint: str) -> None:
+    message = messages.cloud(packed_cloud())
+    for name, value in change.items():
+        setattr(message, name, value)
+    with pytest.raises(ValueError, match=complaint):
+        from_msg.point_cloud(message)
+
+
+def test_a_datatype_that_does_not_exist_is_refused() -> None:
+    message = messages.cloud(packed_cloud())
+    message.fields[1].datatype = 9
+    with pytest.raises(ValueError, match=r"datatype 1..8 of field 'y', got 9"):
+        from_msg.point_cloud(message)
+
+
+def test_odometry_is_a_pose() -> None:
+    half = np.sqrt(0.5)
+    word = from_msg.odometry(messages.odometry((0, 0, half, half), (1, 2, 3)))
+    assert np.allclose(word.T_odom_body[:3, :3], rotation_from_vector(np.array([0, 0, np.pi / 2])))
+    assert word.T_odom_body[:3, 3].tolist() == [1, 2, 3] and word.child_frame_id == "base_link"
+
+
+def test_a_stamped_pose_and_a_transform_are_odometry_too() -> None:
+    full = messages.odometry(at=(1, 2, 3))
+    stamped = SimpleNamespace(header=full.header, pose=full.pose.pose)
+    transform = SimpleNamespace(translation=full.pose.pose.position, rotation=full.pose.pose.orientation)
+    moved = SimpleNamespace(header=full.header, child_frame_id="camera", transform=transform)
+    for message in (stamped, moved):
+        assert from_msg.odometry(message).T_odom_body[:3, 3].tolist() == [1, 2, 3]
+
+
+def test_a_pose_without_a_rotation_is_refused() -> None:
+    with pytest.raises(ValueError, match="quaternion"):
+        from_msg.odometry(messages.odometry((0, 0, 0, 0)))
+
+
+def test_a_constraint_tells_its_two_moments() -> None:
+    message = messages.odometry(at=(0.1, 0, 0), frame_id="camera@12.000000034")
+    message.child_frame_id = "camera@99.500000000"
+    closure = from_msg.loop_closure(message)
+    assert (closure.from_ns, closure.to_ns, closure.frame_id) == (12_000_000_034, 99_500_000_000, "camera")
+    assert closure.T_from_to[0, 3] == 0.1 and np.array_equal(closure.covariance, np.eye(6))
+
+
+@pytest.mark.parametrize("name", ["camera", "camera@12", "camera@12.34", "@1.000000000", "camera@x.000000001", ""])
+def test_a_frame_without_a_moment_is_refused(name: str) -> None:
+    with pytest.raises(ValueError, match=r"camera@12.000000034"):
+        from_msg.moment(name)
+
+
+def test_a_frame_may_have_an_at_sign_in_its_name() -> None:
+    assert from_msg.moment("robot@home/camera@0.000000007") == ("robot@home/camera", 7)
+
+
+def test_labels_are_json() -> None:
+    assert from_msg.labels(SimpleNamespace(data=json.dumps({"3": "cup"}))) == {3: "cup"}
+
+
+@pytest.mark.parametrize("text", ["", "cup", "[1]", '{"a": "cup"}'])
+def test_labels_of_another_shape_are_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="labels: expected JSON"):
+        from_msg.labels(SimpleNamespace(data=text))
+
+
+def test_a_table_of_detections_comes_best_first() -> None:
+    rows = np.array([(1, 2, 30, 40, 0.5, 3, 64, 48), (5, 6, 7, 8, 0.75, 9, 64, 48)], DETECTIONS)
+    found = from_msg.detections(messages.own_table(rows), {3: "cup"})
+    assert found.label == ("9", "cup") and found.image_hw == (48, 64)
+    assert found.xyxy[1].tolist() == [1, 2, 30, 40] and found.score.tolist() == [0.75, 0.5]
+
+
+def test_an_empty_table_is_no_detection_of_the_size_at_hand() -> None:
+    found = from_msg.detections(messages.own_table(np.zeros((1, 0), DETECTIONS)), {}, image_hw=(48, 64))
+    assert len(found) == 0 and found.image_hw == (48, 64)
+
+
+@pytest.mark.parametrize("version", [2, 4])
+def test_vision_msgs_are_read_in_their_new_and_their_old_form(version: int) -> None:
+    scored = (("7", 0.2), ("3", 0.9))
+    if version == 4:
+        results = [
+            SimpleNamespace(hypothesis=SimpleNamespace(class_id=c, score=s)) for c, s in (("7", 0.2), ("3", 0.9))
+        ]
+        centre = SimpleNamespace(position=SimpleNamespace(x=20.0, y=30.0), theta=0.0)
+    else:
+        results = [SimpleNamespace(id=int(c), score=s) for c, s in scored]
+        centre = SimpleNamespace(x=20.0, y=30.0, theta=0.0)
+    box = SimpleNamespace(center=centre, size_x=10.0, size_y=20.0)
+    seen = [SimpleNamespace(bbox=box, results=results), SimpleNamespace(bbox=box, results=[])]
+    array = SimpleNamespace(header=messages.header(), detections=seen)
+    found = from_msg.detections(array, {3: "cup"}, image_hw=(48, 64))
+    assert found.label == ("cup",) and found.xyxy.tolist() == [[15, 20, 25, 40]]
+    assert found.score[0] == pytest.approx(0.9)
+
+
+def object_rows() -> np.ndarray:
+    rows = np.zeros(5, OBJECTS)
+    rows["instance"] = [2, 0, 1, 2, 1]
+    rows["class_id"] = [3, SUPPORT_ID, 4, 3, 4]
+    rows["x"] = [20, 0, 10, 21, 11]
+    rows["normal_z"], rows["score"], rows["density"], rows["flags"] = -1, 0.5, 1000, 5
+    rows["rgb"] = 0x010203
+    return rows
+
+
+def test_objects_come_in_order_with_the_support_apart() -> None:
+    clouds, support = from_msg.objects(messages.own_table(object_rows()), {3: "cup", 4: "box"})
+    assert [(c.label, c.instance, c.xyz[:, 0].tolist()) for c in clouds] == [("box", 1, [10, 11]), ("cup", 2, [20, 21])]
+    assert support is not None and support.label == "support" and len(support) == 1
+    assert clouds[0].rgb is not None and clouds[0].rgb[0].tolist() == [1, 2, 3]
+    assert (clouds[1].score, clouds[1].density, clouds[1].flags.tolist()) == (0.5, 1000.0, [5, 5])
+
+
+def test_no_objects_are_no_objects() -> None:
+    assert from_msg.objects(messages.own_table(np.zeros((1, 0), OBJECTS)), {}) == ((), None)
+
+
+def view_messages() -> tuple[SimpleNamespace, SimpleNamespace]:
+    rows = np.zeros((3, 4), VIEW)
+    rows["z"], rows["rgb"] = 2, 0x404040
+    return messages.own_table(rows), messages.camera_info([5.0, 0, 1.5, 0, 5, 1, 0, 0, 1], 4, 3)
+
+
+def gravity_message(x: float, y: float, z: float) -> SimpleNamespace:
+    return SimpleNamespace(header=messages.header(), vector=messages.xyz(x, y, z))
+
+
+def test_a_frame_is_made_of_its_four_messages() -> None:
+    view, info = view_messages()
+    frame = from_msg.frame(
+        messages.own_table(object_rows()),
+        view,
+        info,
+        gravity_message(0, 0.5, 0),
+        {3: "cup"},
+        messages.odometry(at=(1, 0, 0)),
+    )
+    assert [cloud.label for cloud in frame.objects] == ["4", "cup"]
+    assert frame.view.grey is not None and frame.view.grey[0, 0] == 0x40
+    assert frame.gravity is not None and frame.gravity.tolist() == [0, 1, 0] and frame.gravity_confidence == 0.5
+    assert frame.T_odom_camera is not None and frame.T_odom_camera[0, 3] == 1
+
+
+def test_the_camera_sits_where_the_body_carries_it() -> None:
+    view, info = view_messages()
+    T_body_camera = np.eye(4)
+    T_body_camera[1, 3] = 2
+    parts = (messages.own_table(object_rows()), view, info, gravity_message(0, 0, 0), {})
+    frame = from_msg.frame(*parts, messages.odometry(at=(1, 0, 0)), T_body_camera)
+    assert frame.T_odom_camera is not None and frame.T_odom_camera[:3, 3].tolist() == [1, 2, 0]
+    assert frame.gravity is None and frame.gravity_confidence == 0
+
+
+def test_messages_of_two_moments_are_no_frame() -> None:
+    view, info = view_messages()
+    later = messages.own_table(object_rows(), stamp_ns=5)
+    with pytest.raises(ValueError, match="of one stamp"):
+        from_msg.frame(later, view, info, gravity_message(0, 1, 0), {})

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import messages
+import numpy as np
+import pytest
+
+from objreg_ros.bridge.layout import DETECTIONS, OBJECTS, VIEW, columns, fields_of, table
+
+
+def test_our_tables_are_packed_and_colour_goes_as_float() -> None:
+    assert (DETECTIONS.itemsize, OBJECTS.itemsize, VIEW.itemsize) == (26, 42, 16)
+    assert fields_of(VIEW) == [("x", 0, 7), ("y", 4, 7), ("z", 8, 7), ("rgb", 12, 7)]
+    assert fields_of(DETECTIONS)[5] == ("class_id", 20, 4)
+
+
+@pytest.mark.parametrize("layout", [DETECTIONS, OBJECTS, VIEW])
+def test_a_table_that_is_sent_is_the_table_that_is_read(layout: np.dtype) -> None:
+    sent = np.frombuffer(np.random.default_rng(0).bytes(7 * layout.itemsize), layout)
+    got = table(messages.own_table(sent))
+    assert got.dtype == layout and got.tobytes() == sent.tobytes()
+
+
+def test_reading_a_table_copies_nothing() -> None:
+    message = messages.own_table(np.zeros(4, VIEW))
+    assert np.shares_memory(table(message), np.frombuffer(message.data, np.uint8))
+
+
+def test_a_field_of_several_values_is_a_column_of_arrays() -> None:
+    message = messages.cloud(np.zeros((1, 2), [("histogram", "<f4"), ("b", "<f4"), ("c", "<f4")]))
+    message.fields = message.fields[:1]
+    message.fields[0].count = 3
+    assert table(message)["histogram"].shape == (1, 2, 3)
+
+
+def test_a_single_row_may_leave_its_row_step_out() -> None:
+    message = messages.cloud(np.ones((1, 5), [("x", "<f4")]))
+    message.row_step = 0
+    assert table(message)["x"].tolist() == [[1, 1, 1, 1, 1]]
+
+
+def test_one_name_twice_is_refused() -> None:
+    message = messages.cloud(np.zeros((1, 2), [("x", "<f4"), ("y", "<f4")]))
+    message.fields[1].name = "x"
+    with pytest.raises(ValueError, match="'x' twice"):
+        table(message)
+
+
+def test_columns_of_any_type_come_as_float32() -> None:
+    records = np.array([[(1, 2.5)]], [("a", ">i2"), ("b", ">f8")])
+    assert columns(records, "b", "a").tolist() == [[[2.5, 1.0]]] and columns(records, "a").dtype == np.float32

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import array
+import struct
+
+import cv2
+import messages
+import numpy as np
+import pytest
+
+from objreg_ros.bridge.pictures import colour_pixels, depth_metres, unpack_rgb
+
+RED = (200, 30, 10)
+
+
+def flat(*channels: int, dtype: str = "u1") -> np.ndarray:
+    return np.tile(np.array(channels, dtype), (4, 6, 1))
+
+
+@pytest.mark.parametrize("pad", [0, 3])
+@pytest.mark.parametrize(
+    ("encoding", "pixels"),
+    [
+        ("rgb8", flat(200, 30, 10)),
+        ("bgr8", flat(10, 30, 200)),
+        ("rgba8", flat(200, 30, 10, 9)),
+        ("bgra8", flat(10, 30, 200, 9)),
+        ("8UC3", flat(10, 30, 200)),
+        ("8UC4", flat(10, 30, 200, 9)),
+    ],
+)
+def test_every_colour_encoding_gives_rgb(encoding: str, pixels: np.ndarray, pad: int) -> None:
+    rgb = colour_pixels(messages.image(pixels, encoding, pad))
+    assert rgb.shape == (4, 6, 3) and (rgb == RED).all()
+
+
+@pytest.mark.parametrize("big", [False, True])
+@pytest.mark.parametrize(("encoding", "value"), [("mono8", 7), ("8UC1", 7), ("mono16", 7 << 8)])
+def test_grey_has_three_equal_channels(encoding: str, value: int, big: bool) -> None:
+    pixels = np.full((4, 6), value, "u2" if encoding == "mono16" else "u1")
+    assert (colour_pixels(messages.image(pixels, encoding, 2, big)) == 7).all()
+
+
+@pytest.mark.parametrize("holder", [bytes, lambda data: array.array("B", data), lambda d: np.frombuffer(d, np.uint8)])
+def test_the_data_may_be_of_any_kind_of_buffer(holder: object) -> None:
+    message = messages.image(flat(200, 30, 10), "rgb8")
+    message.data = holder(message.data)  # type: ignore[operator]
+    assert (colour_pixels(message) == RED).all()
+
+
+def test_an_unknown_encoding_is_named() -> None:
+    with pytest.raises(ValueError, match="got 'bayer_rggb16'"):
+        colour_pixels(messages.image(flat(1), "bayer_rggb16"))
+    with pytest.raises(ValueError, match="depth: expected an encoding of 16UC1, mono16, 32FC1, got 'rgb8'"):
+        depth_metres(messages.image(flat(1, 2, 3), "rgb8"))
+
+
+def test_an_empty_image_is_refused() -> None:
+    message = messages.image(flat(200, 30, 10), "rgb8")
+    message.width = 0
+    with pytest.raises(ValueError, match="expected pixels, got 0 × 4"):
+        colour_pixels(message)
+
+
+def test_a_truncated_image_is_refused_with_expected_and_got() -> None:
+    message = messages.image(flat(200, 30, 10), "rgb8")
+    message.data = message.data[:-1]
+    with pytest.raises(ValueError, match="expected 72 bytes for 6 × 4, got 71"):
+        colour_pixels(message)
+
+
+def test_a_step_below_the_line_is_refused() -> None:
+    message = messages.image(flat(200, 30, 10), "rgb8")
+    message.step = 17
+    with pytest.raises(ValueError, match="step of at least 18"):
+        colour_pixels(message)
+
+
+@pytest.mark.parametrize("kind", [".jpg", ".png"])
+def test_a_compressed_image_is_rgb(kind: str) -> None:
+    data = cv2.imencode(kind, flat(10, 30, 200))[1].tobytes()
+    rgb = colour_pixels(messages.compressed(data, f"bgr8; {kind[1:]} compressed bgr8"))
+    assert np.abs(rgb.astype(int) - RED).max() <= 2
+
+
+@pytest.mark.parametrize("data", [b"", b"\xff\xd8\xff\xe0 no jpeg"])
+def test_a_broken_compressed_image_is_refused(data: bytes) -> None:
+    with pytest.raises(ValueError, match="do not decode"):
+        colour_pixels(messages.compressed(data, "jpeg"))
+
+
+@pytest.mark.parametrize("big", [False, True])
+@pytest.mark.parametrize("encoding", ["16UC1", "mono16"])
+def test_millimetres_become_metres_and_no_depth_becomes_zero(encoding: str, big: bool) -> None:
+    pixels = np.array([[0, 1, 1500], [65535, 65534, 10000]], np.uint16)
+    depth = depth_metres(messages.image(pixels, encoding, 4, big))
+    assert depth.dtype == np.float32
+    assert depth == pytest.approx(np.array([[0, 0.001, 1.5], [0, 65.534, 10]]))
+
+
+@pytest.mark.parametrize("big", [False, True])
+def test_floating_depth_keeps_only_what_was_measured(big: bool) -> None:
+    pixels = np.array([[np.nan, np.inf, -np.inf], [-1, 0, 1.25]], np.float32)
+    depth = depth_metres(messages.image(pixels, "32FC1", 4, big))
+    assert depth.tolist() == [[0, 0, 0], [0, 0, 1.25]]
+
+
+def compressed_depth(pixels: np.ndarray, kind: str, a: float = 0, b: float = 0) -> object:
+    png = cv2.imencode(".png", pixels)[1].tobytes()
+    return messages.compressed(struct.pack("<iff", 0, a, b) + png, f"{kind}; compressedDepth png")
+
+
+def test_compressed_depth_of_16_bits_is_millimetres() -> None:
+    depth = depth_metres(compressed_depth(np.array([[0, 1500]], np.uint16), "16UC1"))
+    assert depth == pytest.approx(np.array([[0, 1.5]]))
+
+
+def test_compressed_depth_of_floats_is_inverse_depth() -> None:
+    a, b = 1000.0, -20.0  # as the sender has it: q = a / depth + b
+    quantised = np.array([[0, round(a / 2.0 + b)]], np.uint16)
+    depth = depth_metres(compressed_depth(quantised, "32FC1", a, b))
+    assert depth == pytest.approx(np.array([[0, 2.0]]), rel=1e-3)
+
+
+def test_a_plain_png_of_depth_is_millimetres() -> None:
+    png = cv2.imencode(".png", np.array([[0, 1500]], np.uint16))[1].tobytes()
+    assert depth_metres(messages.compressed(png, "png")) == pytest.approx(np.array([[0, 1.5]]))
+
+
+def test_a_colour_png_is_no_depth() -> None:
+    png = cv2.imencode(".png", flat(1, 2, 3))[1].tobytes()
+    with pytest.raises(ValueError, match="expected 16 bits of one channel"):
+        depth_metres(messages.compressed(png, "png"))
+
+
+def test_packed_colours_come_apart() -> None:
+    assert unpack_rgb(np.array([[0xFF010203, 0x000A0B0C]], "u4")).tolist() == [[[1, 2, 3], [10, 11, 12]]]

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from objreg_ros.bridge.sync import Match, Need, Stream, Synchroniser
+
+EXACT = (Stream("image"), Stream("depth"))
+
+
+def accounts_hold(sync: Synchroniser) -> bool:
+    return all(q.received == q.matched + q.waiting + q.dropped.total() for q in sync.queues.values())
+
+
+def pairs(matches: list[Match], *names: str) -> list[tuple]:
+    return [tuple(match[name] for name in names) for match in matches]
+
+
+def test_equal_stamps_match_in_any_order_of_arrival() -> None:
+    sync = Synchroniser(EXACT)
+    assert sync.add("depth", 5, "d5") == [] and sync.add("depth", 6, "d6") == []
+    assert pairs(sync.add("image", 5, "i5"), "image", "depth") == [("i5", "d5")]
+    assert pairs(sync.add("image", 6, "i6"), "image", "depth") == [("i6", "d6")]
+    assert accounts_hold(sync)
+
+
+def test_an_image_whose_depth_was_lost_is_dropped_and_counted() -> None:
+    sync = Synchroniser(EXACT)
+    sync.add("image", 1, "i1")
+    sync.add("image", 2, "i2")
+    assert pairs(sync.add("depth", 2, "d2"), "image") == [("i2",)]
+    assert sync.queues["image"].dropped == {"unmatched": 1} and accounts_hold(sync)
+
+
+def test_the_nearest_within_the_slop_is_taken_once_it_is_known() -> None:
+    sync = Synchroniser((Stream("image"), Stream("depth", slop_ns=10)))
+    sync.add("depth", 92, "far")
+    sync.add("depth", 97, "near")
+    assert sync.add("image", 100, "i") == []  # one at 101 may still come
+    assert pairs(sync.add("depth", 105, "later"), "depth") == [("near",)]
+    assert sync.queues["depth"].dropped == {"unmatched": 1} and sync.queues["depth"].waiting == 1
+    assert accounts_hold(sync)
+
+
+def test_nothing_within_the_slop_is_no_match() -> None:
+    sync = Synchroniser((Stream("image"), Stream("depth", slop_ns=10)))
+    sync.add("image", 100, "i")
+    assert sync.add("depth", 111, "d") == []
+    assert sync.queues["image"].dropped == {"unmatched": 1} and accounts_hold(sync)
+
+
+def test_a_required_item_serves_one_match() -> None:
+    sync = Synchroniser((Stream("image"), Stream("depth", slop_ns=10)))
+    sync.add("image", 100, "i")
+    sync.add("image", 104, "j")
+    assert pairs(sync.add("depth", 104, "d"), "image") == [("i",)]
+    assert sync.flush() == [] and accounts_hold(sync)
+
+
+def test_a_latched_value_serves_every_match_and_is_waited_for() -> None:
+    sync = Synchroniser((Stream("image"), Stream("info", Need.LATCHED)))
+    assert sync.add("image", 1, "i1") == []
+    assert pairs(sync.add("info", 0, "K"), "image", "info") == [("i1", "K")]
+    assert pairs(sync.add("image", 2, "i2"), "info") == [("K",)]
+    assert accounts_hold(sync)
+
+
+def test_an_optional_stream_that_never_spoke_is_not_waited_for() -> None:
+    sync = Synchroniser((Stream("image"), Stream("odom", Need.OPTIONAL, slop_ns=10)))
+    assert pairs(sync.add("image", 1, "i"), "odom") == [(None,)]
+
+
+def test_an_optional_stream_that_has_spoken_is_waited_for_and_reused() -> None:
+    sync = Synchroniser((Stream("image"), Stream("odom", Need.OPTIONAL, slop_ns=10)))
+    sync.add("odom", 0, "o0")
+    assert sync.add("image", 4, "i4") == [] and sync.add("image", 5, "i5") == []
+    assert pairs(sync.add("odom", 20, "o20"), "image", "odom") == [("i4", "o0"), ("i5", "o0")]
+    assert sync.queues["odom"].matched == 1 and accounts_hold(sync)
+
+
+def test_an_optional_stream_that_died_is_given_up_when_the_queue_is_full() -> None:
+    sync = Synchroniser((Stream("image", depth=2), Stream("odom", Need.OPTIONAL, slop_ns=10)))
+    sync.add("odom", 0, "o")
+    found = [match for t in (100, 200, 300, 400) for match in sync.add("image", t, t)]
+    assert pairs(found, "image", "odom") == [(100, None), (200, None)] and accounts_hold(sync)
+
+
+def test_a_full_queue_drops_its_oldest_with_a_reason() -> None:
+    sync = Synchroniser((Stream("image", depth=2), Stream("depth", depth=3)))
+    for t in range(5):
+        sync.add("image", t, t)
+    assert sync.queues["image"].dropped == {"queue_full": 3} and sync.queues["image"].waiting == 2
+    other = Synchroniser((Stream("image", depth=2), Stream("depth", depth=3)))
+    for t in range(5):
+        other.add("depth", t, t)
+    assert other.queues["depth"].dropped == {"queue_full": 2} and accounts_hold(sync) and accounts_hold(other)
+
+
+def test_a_looped_recording_matches_as_well_the_second_time() -> None:
+    sync = Synchroniser(EXACT)
+    passes = [sum(len(sync.add(name, t, t)) for t in range(50) for name in ("image", "depth")) for _ in range(3)]
+    assert passes == [50, 50, 50] and sync.time_jumps == 2 and accounts_hold(sync)
+
+
+def test_a_jump_back_drops_what_waits_in_the_future() -> None:
+    sync = Synchroniser(EXACT)
+    sync.add("image", 100, "old")
+    sync.add("image", 10, "new")
+    assert sync.queues["image"].dropped == {"time_jump": 1}
+    assert pairs(sync.add("depth", 10, "d"), "image") == [("new",)] and accounts_hold(sync)
+
+
+def test_one_frame_played_again_and_again_matches_each_time() -> None:
+    sync = Synchroniser(EXACT)
+    assert sum(len(sync.add(name, 7, 7)) for _ in range(4) for name in ("image", "depth")) == 4
+
+
+def test_flush_gives_what_is_still_possible() -> None:
+    sync = Synchroniser((Stream("image"), Stream("depth", slop_ns=10)))
+    sync.add("depth", 97, "d")
+    sync.add("image", 100, "i")
+    sync.add("image", 200, "alone")
+    assert pairs(sync.flush(), "image", "depth") == [("i", "d")]
+    assert sync.queues["image"].dropped == {"unmatched": 1} and accounts_hold(sync)
+
+
+def test_a_cleared_synchroniser_waits_for_nothing_and_keeps_what_is_latched() -> None:
+    sync = Synchroniser((Stream("image"), Stream("depth"), Stream("info", Need.LATCHED)))
+    sync.add("info", 0, "K")
+    sync.add("image", 5, "i")
+    sync.clear()
+    assert sync.queues["image"].waiting == 0 and accounts_hold(sync)
+    sync.add("image", 1, "i")
+    assert pairs(sync.add("depth", 1, "d"), "info") == [("K",)]
+
+
+def test_a_reference_that_is_not_required_is_refused() -> None:
+    with pytest.raises(ValueError, match="required stream first"):
+        Synchroniser((Stream("info", Need.LATCHED),))
+
+
+NAMES = ("image", "depth", "odom", "info")
+ARRIVALS = st.lists(st.tuples(st.sampled_from(NAMES), st.integers(0, 30)), max_size=80)
+
+
+@given(ARRIVALS, st.integers(0, 5), st.integers(1, 4))
+def test_nothing_is_lost_in_silence_whatever_comes(arrivals: list[tuple[str, int]], slop: int, depth: int) -> None:
+    sync = Synchroniser(
+        (
+            Stream("image", depth=depth),
+            Stream("depth", slop_ns=slop, depth=depth),
+            Stream("odom", Need.OPTIONAL, slop_ns=slop, depth=depth),
+            Stream("info", Need.LATCHED),
+        )
+    )
+    found = []
+    for name, stamp in arrivals:
+        found += sync.add(name, stamp, stamp)
+        assert accounts_hold(sync) and all(q.waiting <= depth for q in sync.queues.values())
+    found += sync.flush()
+    assert accounts_hold(sync)
+    assert all(abs(match["depth"] - match["image"]) <= slop for match in found)
+    assert sync.queues["image"].matched == sync.queues["depth"].matched == len(found)
