@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every cloud becomes a `DepthImage`: an organised one by its z, an unorganised one by projection."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from objreg_ros.data import Array, DepthImage, Intrinsics, PointCloud
+
+FAR = 65.0  # metres; 65535 mm and 65535 m both mean "no depth"
+MIN_FIT = 30  # points that a fit of the intrinsics needs
+FIT_ERROR_PX = 1.5  # the median distance that a pixel may have from where the fitted camera sees its point
+
+
+def organise(cloud: PointCloud, intrinsics: Intrinsics | None = None) -> DepthImage:
+    """The depth image of a cloud.
+
+    An organised cloud (H > 1) gives its z; with no ``intrinsics`` (or intrinsics of another size) the camera is fitted
+    to the cloud's own points. An unorganised cloud (H = 1) is projected with ``intrinsics``, the nearest point of a
+    pixel wins. NaN, infinity, 0 and 65535 are "no depth" (0).
+    Raises ValueError when the camera is not known and cannot be fitted, when nothing was measured, and when the points
+    do not lie in front of the camera (negative z: the cloud is not in an optical frame).
+    """
+    xyz = cloud.xyz
+    measured = _measured(xyz)
+    _require_in_front(xyz[..., 2], measured)
+    in_front = measured & (xyz[..., 2] > 0)
+    if cloud.organised:
+        height, width = xyz.shape[:2]
+        if intrinsics is None or (intrinsics.height, intrinsics.width) != (height, width):
+            intrinsics = fit_intrinsics(xyz, in_front)
+        depth, rgb = np.where(in_front, xyz[..., 2], np.float32(0)), cloud.rgb
+    else:
+        if intrinsics is None:
+            raise ValueError(
+                f"an unorganised cloud of {xyz.shape[1]} points: expected camera_info to project it with, got none; "
+                "publish camera_info beside the cloud, or an organised cloud"
+            )
+        depth, rgb = _project(xyz[0][in_front[0]], None if cloud.rgb is None else cloud.rgb[0][in_front[0]], intrinsics)
+    return DepthImage(depth=depth, rgb=rgb, intrinsics=intrinsics, stamp_ns=cloud.stamp_ns, frame_id=cloud.frame_id)
+
+
+def _measured(xyz: Array) -> Array:
+    z = xyz[..., 2]
+    with np.errstate(invalid="ignore"):
+        return np.isfinite(xyz).all(axis=-1) & (np.abs(z) < FAR) & (z != 0)
+
+
+def _require_in_front(z: Array, measured: Array) -> None:
+    count = int(np.count_nonzero(measured))
+    in_front = int(np.count_nonzero(z[measured] > 0))
+    if count == 0:
+        raise ValueError(f"expected measured points, got {z.size} points that are all NaN, 0 or 65535")
+    if in_front < count / 2:
+        raise ValueError(
+            f"expected a cloud in the optical frame (x right, y down, z forward) with points in front of the camera, "
+            f"got {count - in_front} of {count} points with negative z; transform it to the camera's optical frame"
+        )
+
+
+def fit_intrinsics(xyz: Array, valid: Array) -> Intrinsics:
+    """The pinhole camera that sees each point of an organised ``xyz (H, W, 3)`` in its own pixel.
+
+    Least squares of ``u = fx x/z + cx`` over the ``valid (H, W)`` points, and the same for rows. ValueError if there
+    are fewer than 30 points or the pixels do not fit to a median of 1.5 px (the cloud is not one pinhole image).
+    """
+    rows, cols = np.nonzero(valid)
+    if len(rows) < MIN_FIT:
+        raise ValueError(
+            f"expected at least {MIN_FIT} measured points to fit the camera of an organised cloud, got {len(rows)}; "
+            "publish camera_info beside the cloud"
+        )
+    step = max(1, len(rows) // 20000)
+    rows, cols = rows[::step], cols[::step]
+    x, y, z = xyz[rows, cols].T.astype(np.float64)
+    fx, cx, error_u = _fit_line(x / z, cols)
+    fy, cy, error_v = _fit_line(y / z, rows)
+    error = max(error_u, error_v)
+    if not error <= FIT_ERROR_PX or fx <= 0 or fy <= 0:
+        raise ValueError(
+            f"expected pixels that fit a pinhole camera to {FIT_ERROR_PX} px, got {error:.3g} px with "
+            f"fx {fx:.4g}, fy {fy:.4g}; publish camera_info, or the cloud as unorganised (height 1)"
+        )
+    height, width = valid.shape
+    return Intrinsics(fx=fx, fy=fy, cx=cx, cy=cy, width=width, height=height)
+
+
+def _fit_line(ratio: Array, pixel: Array) -> tuple[float, float, float]:
+    """Slope, offset and median error of ``pixel = slope · ratio + offset``."""
+    if np.ptp(ratio) < 1e-6:
+        return 0.0, 0.0, float("inf")
+    slope, offset = np.polyfit(ratio, pixel.astype(np.float64), 1)
+    return float(slope), float(offset), float(np.median(np.abs(slope * ratio + offset - pixel)))
+
+
+def _project(points: Array, rgb: Array | None, camera: Intrinsics) -> tuple[Array, Array | None]:
+    """The depth (H, W) and colour (H, W, 3) of points (N, 3) in front of the camera; of one pixel the nearest wins."""
+    x, y, z = points.T
+    u = np.rint(camera.fx * x / z + camera.cx)
+    v = np.rint(camera.fy * y / z + camera.cy)
+    inside = (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
+    if not inside.any():
+        raise ValueError(
+            f"expected points within the {camera.width}x{camera.height} image, got none of {len(points)} there; "
+            "is the cloud in the optical frame of this camera?"
+        )
+    index = (v[inside] * camera.width + u[inside]).astype(np.int64)
+    far_first = np.argsort(-z[inside], kind="stable")
+    depth = np.zeros(camera.height * camera.width, np.float32)
+    depth[index[far_first]] = z[inside][far_first]
+    if rgb is None:
+        return depth.reshape(camera.height, camera.width), None
+    colour = np.zeros((camera.height * camera.width, 3), np.uint8)
+    colour[index[far_first]] = rgb[inside][far_first]
+    return depth.reshape(camera.height, camera.width), colour.reshape(camera.height, camera.width, 3)

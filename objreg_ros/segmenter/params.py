@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The segmenter's parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from objreg_ros.params import Params, param
+
+PAPER_Z_MAX, PAPER_Y_MAX = 1.75, 0.75  # the passthrough limits of the founding method, metres
+
+
+@dataclass(frozen=True)
+class SegmenterParams(Params):
+    """What a user may change in the segmenter."""
+
+    preset: str = param("default", "the method; paper is the founding filter of each box", choices=("default", "paper"))
+    z_min: float = param(0.2, "nearest depth that is believed", "m", ge=0.0)
+    z_max: float = param(4.0, "farthest depth that is believed (1.75 in preset paper)", "m", ge=0.1, live=True)
+    y_max: float = param(100.0, "farthest below or above the camera's axis (0.75 in preset paper)", "m", ge=0.0)
+    min_points: int = param(80, "an object of fewer points is not published", ge=1, live=True)
+    margin: float = param(0.3, "how far around a box its surroundings are looked at, of the box's size", ge=0.0, le=1.0)
+    jump: float = param(0.012, "depth step that ends an object, at the camera", "m", ge=0.001)
+    jump_z2: float = param(0.008, "how the depth step grows with squared depth", "1/m", ge=0.0)
+    height: float = param(0.004, "a point this far above the support belongs to it, without noise", "m", ge=0.0)
+    up_tilt: float = param(65.0, "most tilt of the camera's y axis from the vertical", "deg", ge=5.0, le=89.0)
+    support_area: float = param(0.02, "least visible area of a support surface", "m²", ge=0.0)
+    view_step: int = param(4, "the view keeps one pixel of so many in each row and column", ge=1, le=32)
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """The passthrough limits (z_max, y_max) in metres that hold for the preset."""
+        return (PAPER_Z_MAX, PAPER_Y_MAX) if self.preset == "paper" else (self.z_max, self.y_max)

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The segmenter: from boxes and a depth image to a frame of objects."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from objreg_ros.data import Array, DepthImage, Detections, Frame, Intrinsics, ObjectCloud, PointFlag
+from objreg_ros.segmenter import boxes, paper
+from objreg_ros.segmenter.boxes import Box
+from objreg_ros.segmenter.extract import Pixels
+from objreg_ros.segmenter.gravity import CAMERA_UP, estimate_up
+from objreg_ros.segmenter.isolate import isolate
+from objreg_ros.segmenter.params import SegmenterParams
+from objreg_ros.segmenter.support import Ground, find_supports
+from objreg_ros.segmenter.surface import Surface, reduce
+from objreg_ros.segmenter.view import reduced_view
+
+COARSE = 4  # pixels per cell of the whole frame: gravity and support surfaces
+GIVEN_UP_CONE_DEG = 15.0  # how far level surfaces may be from a gravity that is given
+
+
+class Segmenter:
+    """Segments one frame at a time; keeps nothing between frames."""
+
+    def __init__(self, params: SegmenterParams | None = None) -> None:
+        self.params = params or SegmenterParams()
+
+    def warm(self) -> None:
+        """Compile or load every kernel, so that the first frame is as fast as the others."""
+        depth = np.full((48, 64), 1.0, np.float32)
+        depth[10:30, 20:40] = 0.8
+        camera = Intrinsics(fx=50.0, fy=50.0, cx=32.0, cy=24.0, width=64, height=48)
+        image = DepthImage(depth=depth, rgb=np.zeros((48, 64, 3), np.uint8), intrinsics=camera, stamp_ns=0)
+        box = np.array([[16, 6, 44, 34]], np.float32)
+        one = np.ones(1, np.float32)
+        self.segment(Detections(xyxy=box, score=one, label=("",), image_hw=(48, 64), stamp_ns=0), image)
+
+    def segment(self, detections: Detections, depth: DepthImage, gravity: Array | None = None) -> Frame:
+        """The objects of one moment, in the order of their boxes; stamp and frame_id are those of ``depth``.
+
+        Boxes of a picture of another size are scaled by ``detections.image_hw`` to the depth image, which must show
+        the same field of view. ``gravity (3,)`` is the way things fall in the camera frame where an odometry or an IMU
+        knows it; it is then handed on with confidence 1, else it is estimated from the frame. A box without an object
+        of `min_points` gives none; instances count the objects from 1. ``T_odom_camera`` is None.
+        """
+        params = self.params
+        ground = self._ground(depth, gravity)
+        objects: list[ObjectCloud] = []
+        for k, box in enumerate(boxes.pixel_boxes(detections, *depth.depth.shape)):
+            if boxes.is_empty(box):
+                continue
+            pixels, flags = self._cut(depth, box, ground)
+            if len(pixels) >= params.min_points:
+                label, score = detections.label[k], float(detections.score[k])
+                objects.append(_object(label, score, len(objects) + 1, pixels, flags, depth.rgb))
+        return Frame(
+            objects=tuple(objects),
+            support=_support_cloud(ground, depth),
+            view=reduced_view(depth, params.view_step, params.z_min, params.limits[0]),
+            gravity=None if ground.up is None else -ground.up,
+            gravity_confidence=ground.confidence,
+            T_odom_camera=None,
+            stamp_ns=depth.stamp_ns,
+            frame_id=depth.frame_id,
+        )
+
+    def _cut(self, depth: DepthImage, box: Box, ground: Ground) -> tuple[Pixels, PointFlag]:
+        if self.params.preset == "paper":
+            return paper.cut(depth, box, self.params), PointFlag(0)
+        return isolate(depth, box, ground, self.params)
+
+    def _ground(self, depth: DepthImage, gravity: Array | None) -> Ground:
+        params = self.params
+        height, width = depth.depth.shape
+        step = COARSE if min(height, width) >= 16 * COARSE else 1
+        z_max, y_max = params.limits
+        limits, jump = (params.z_min, z_max, y_max), (params.jump, params.jump_z2)
+        surface = reduce(depth.depth, depth.intrinsics, (0, 0, width, height), step, limits, jump)
+        up, confidence = _up(surface, gravity, params.up_tilt)
+        supports = [] if up is None else find_supports(surface, depth.intrinsics, up, params.support_area, jump)
+        return Ground(up, confidence, supports, surface)
+
+
+def _up(surface: Surface, gravity: Array | None, tilt_deg: float) -> tuple[Array | None, float]:
+    if gravity is not None:
+        length = float(np.linalg.norm(gravity))
+        if not np.isfinite(length) or length < 1e-6:
+            raise ValueError(f"gravity: expected a direction of non-zero length, got {np.asarray(gravity).tolist()}")
+        return -np.asarray(gravity, np.float64) / length, 1.0
+    normals = surface.normals.reshape(-1, 3)
+    known = normals[normals[:, 2] != 0]
+    return estimate_up(known[:: max(1, len(known) // 4000)], CAMERA_UP, tilt_deg)
+
+
+def _object(
+    label: str, score: float, instance: int, pixels: Pixels, flags: PointFlag, rgb: Array | None
+) -> ObjectCloud:
+    u, v = pixels.uv.T
+    return ObjectCloud(
+        label=label,
+        score=score,
+        instance=instance,
+        xyz=pixels.xyz,
+        normals=pixels.normals,
+        rgb=None if rgb is None else rgb[v, u],
+        flags=pixels.edge | np.uint16(flags),
+        density=len(pixels) / max(pixels.area, 1e-9),
+    )
+
+
+def _support_cloud(ground: Ground, depth: DepthImage) -> ObjectCloud | None:
+    """The cells of all support surfaces, one point each; None where there is none."""
+    if not ground.supports:
+        return None
+    surface = ground.surface
+    cells = np.any([support.parts > 0 for support in ground.supports], axis=0)
+    rows, cols = np.nonzero(cells)
+    v, u = surface.top + rows * surface.step + surface.step // 2, surface.left + cols * surface.step + surface.step // 2
+    area = sum(support.area for support in ground.supports)
+    return ObjectCloud(
+        label="support",
+        score=1.0,
+        instance=0,
+        xyz=np.ascontiguousarray(surface.points[cells]),
+        normals=np.ascontiguousarray(surface.normals[cells]),
+        rgb=None if depth.rgb is None else depth.rgb[v, u],
+        flags=np.zeros(len(rows), np.uint16),
+        density=len(rows) / max(area, 1e-9),
+    )

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Clouds of every kind become the same depth image."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from objreg_ros.data import Intrinsics, PointCloud
+from objreg_ros.geometry import back_project
+from objreg_ros.segmenter.organise import fit_intrinsics, organise
+
+CAMERA = Intrinsics(fx=300.0, fy=310.0, cx=30.2, cy=22.9, width=64, height=48)
+
+
+def hilly_depth() -> np.ndarray:
+    v, u = np.mgrid[:48, :64]
+    return (1.0 + 0.2 * np.sin(u / 9) + 0.1 * np.cos(v / 7)).astype(np.float32)
+
+
+def cloud_of(depth: np.ndarray, rgb: np.ndarray | None = None) -> PointCloud:
+    xyz = back_project(depth, CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy)
+    return PointCloud(xyz=xyz, rgb=rgb, stamp_ns=5, frame_id="eye")
+
+
+def test_an_organised_cloud_gives_its_z_and_its_own_camera() -> None:
+    depth = hilly_depth()
+    image = organise(cloud_of(depth), None)
+    np.testing.assert_array_equal(image.depth, depth)
+    got = image.intrinsics
+    assert (got.fx, got.fy, got.cx, got.cy) == pytest.approx((300.0, 310.0, 30.2, 22.9), abs=1e-2)
+    assert (image.stamp_ns, image.frame_id) == (5, "eye")
+
+
+def test_given_intrinsics_of_the_same_size_are_kept() -> None:
+    assert organise(cloud_of(hilly_depth()), CAMERA).intrinsics == CAMERA
+
+
+def test_nan_zero_infinity_and_65535_are_all_no_depth() -> None:
+    xyz = np.array(cloud_of(hilly_depth()).xyz)
+    for column, value in enumerate((np.nan, np.inf, 0.0, 65.535, 65535.0)):
+        xyz[:, column, 2] = value
+    depth = organise(PointCloud(xyz=xyz, rgb=None, stamp_ns=0), CAMERA).depth
+    assert (depth[:, :5] == 0).all()
+    assert (depth[:, 5:] > 0).all()
+
+
+def test_an_unorganised_cloud_gives_the_depth_and_colour_of_the_organised_one() -> None:
+    rng = np.random.default_rng(0)
+    rgb = rng.integers(0, 255, (48, 64, 3)).astype(np.uint8)
+    organised = cloud_of(hilly_depth(), rgb)
+    order = rng.permutation(48 * 64)
+    shuffled = PointCloud(
+        xyz=organised.xyz.reshape(1, -1, 3)[:, order], rgb=rgb.reshape(1, -1, 3)[:, order], stamp_ns=5, frame_id="eye"
+    )
+    image = organise(shuffled, CAMERA)
+    np.testing.assert_allclose(image.depth, organise(organised, CAMERA).depth)
+    np.testing.assert_array_equal(image.rgb, rgb)
+
+
+def test_the_nearest_of_two_points_in_a_pixel_wins() -> None:
+    xyz = np.array([[[0, 0, 2], [0, 0, 1], [0, 0, 3]]], np.float32)
+    rgb = np.array([[[2, 2, 2], [1, 1, 1], [3, 3, 3]]], np.uint8)
+    image = organise(PointCloud(xyz=xyz, rgb=rgb, stamp_ns=0), CAMERA)
+    assert image.depth[23, 30] == 1
+    assert image.rgb is not None
+    assert image.rgb[23, 30].tolist() == [1, 1, 1]
+
+
+@pytest.mark.parametrize(
+    ("xyz", "camera", "said"),
+    [
+        (np.full((48, 64, 3), np.nan, np.float32), CAMERA, "expected measured points, got 3072"),
+        (-np.array(back_project(hilly_depth(), 300, 310, 30, 23)), CAMERA, "negative z"),
+        (np.ones((1, 9, 3), np.float32), None, "expected camera_info"),
+        (np.ones((48, 64, 3), np.float32), None, "expected pixels that fit a pinhole camera"),
+        (np.array([[[9, 9, 1], [9, 8, 1]]], np.float32), CAMERA, "expected points within the 64x48 image"),
+        (np.ones((2, 2, 3), np.float32), None, "expected at least 30 measured points"),
+    ],
+)
+def test_a_cloud_that_cannot_be_used_is_refused_with_expected_and_got(
+    xyz: np.ndarray, camera: Intrinsics | None, said: str
+) -> None:
+    with pytest.raises(ValueError, match=said):
+        organise(PointCloud(xyz=xyz, rgb=None, stamp_ns=0), camera)
+
+
+def test_intrinsics_fit_in_spite_of_noise_and_holes() -> None:
+    rng = np.random.default_rng(1)
+    xyz = np.array(cloud_of(hilly_depth()).xyz)
+    xyz[..., 2] += rng.normal(0, 0.002, xyz.shape[:2])
+    valid = rng.random(xyz.shape[:2]) < 0.3
+    got = fit_intrinsics(xyz, valid)
+    assert (got.fx, got.cy) == pytest.approx((300.0, 22.9), rel=0.01)

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whole frames of known shapes through the segmenter."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from objreg_ros.data import DepthImage, Detections, PointFlag
+from objreg_ros.segmenter.params import SegmenterParams
+from objreg_ros.segmenter.segment import Segmenter
+from .scenes import SMALL, Scene
+
+NOISE = 0.0015
+
+
+def two_boxes() -> Scene:
+    """A table (1), a tall box (2) to the left and a low one (3) to the right."""
+    return Scene().plane().box((-0.25, -0.05, 0), (-0.15, 0.05, 0.2)).box((0.1, -0.1, 0), (0.3, 0.1, 0.06))
+
+
+def test_two_boxes_on_a_table_are_found_whole_and_without_the_table() -> None:
+    scene = two_boxes()
+    frame = Segmenter().segment(scene.detections(scene.box_of(2), scene.box_of(3)), scene.image(NOISE))
+    assert [o.instance for o in frame.objects] == [1, 2]
+    assert [o.label for o in frame.objects] == ["0", "1"]
+    assert scene.iou(frame.objects[0].xyz, 2) > 0.95
+    assert scene.iou(frame.objects[1].xyz, 3) > 0.85
+
+
+def test_gravity_is_the_way_things_fall() -> None:
+    scene = two_boxes()
+    frame = Segmenter().segment(scene.detections(), scene.image(NOISE))
+    assert frame.gravity is not None
+    assert np.degrees(np.arccos(-frame.gravity @ scene.up)) < 0.5
+    assert frame.gravity_confidence > 0.9
+
+
+def test_a_given_gravity_is_handed_on_with_full_confidence() -> None:
+    scene = two_boxes()
+    frame = Segmenter().segment(scene.detections(scene.box_of(2)), scene.image(NOISE), gravity=-2 * scene.up)
+    np.testing.assert_allclose(frame.gravity, -scene.up)
+    assert frame.gravity_confidence == 1.0
+    assert scene.iou(frame.objects[0].xyz, 2) > 0.95
+
+
+def test_a_gravity_without_direction_is_refused() -> None:
+    with pytest.raises(ValueError, match="non-zero length"):
+        Segmenter().segment(two_boxes().detections(), two_boxes().image(), gravity=np.zeros(3))
+
+
+def test_boxes_of_a_larger_picture_are_scaled_to_the_depth_image() -> None:
+    scene = Scene(SMALL).plane().box((-0.05, -0.05, 0), (0.05, 0.05, 0.15))
+    box = scene.box_of(2)
+    doubled = Detections(
+        xyxy=2 * np.array([box], np.float32),
+        score=np.ones(1, np.float32),
+        label=("box",),
+        image_hw=(480, 640),
+        stamp_ns=0,
+    )
+    image = scene.image(NOISE)
+    whole = Segmenter().segment(scene.detections(box), image).objects[0]
+    np.testing.assert_array_equal(Segmenter().segment(doubled, image).objects[0].xyz, whole.xyz)
+
+
+def test_normals_point_to_the_camera_and_colour_comes_from_the_pixel() -> None:
+    scene = two_boxes()
+    image = scene.image(0.0)
+    thing = Segmenter().segment(scene.detections(scene.box_of(3)), image).objects[0]
+    known = np.linalg.norm(thing.normals, axis=1) > 0
+    assert known.mean() > 0.9
+    assert ((thing.normals * thing.xyz).sum(axis=1)[known] < 0).all()
+    top = thing.normals @ scene.up > 0.99
+    assert top.mean() > 0.3
+    assert thing.rgb is not None
+    assert image.rgb is not None
+    np.testing.assert_array_equal(thing.rgb, image.rgb[scene.pixels(thing.xyz)])
+
+
+def test_density_is_points_per_square_metre() -> None:
+    scene = Scene(tilt_deg=60).plane().box((-0.15, -0.15, 0), (0.15, 0.15, 0.01))
+    scene = scene.box((-0.1, -0.1, 0.01), (0.1, 0.1, 0.05))
+    thing = Segmenter().segment(scene.detections(scene.box_of(3)), scene.image(0.0)).objects[0]
+    shown = scene.owner == 3
+    front = shown & (np.abs((scene.eye + scene.rays * scene.depth[..., None])[..., 2] - 0.05) > 1e-6)
+    area = 0.04 + 0.008 * min(1.0, front.sum() / 1)  # the top and the front side, both fully seen
+    assert thing.density == pytest.approx(shown.sum() / area, rel=0.1)
+
+
+def test_an_object_cut_by_the_image_says_so() -> None:
+    scene = Scene().plane().box((-0.7, -0.1, 0), (-0.45, 0.1, 0.2)).box((0.0, -0.05, 0), (0.1, 0.05, 0.1))
+    frame = Segmenter().segment(scene.detections(scene.box_of(2), scene.box_of(3)), scene.image(NOISE))
+    assert frame.objects[0].has(PointFlag.CUT_BY_IMAGE)
+    assert not frame.objects[1].has(PointFlag.CUT_BY_IMAGE)
+
+
+def test_an_object_cut_by_its_box_says_so_and_keeps_to_the_box() -> None:
+    scene = two_boxes()
+    x0, y0, x1, y1 = scene.box_of(2, pad=0.0)
+    frame = Segmenter().segment(scene.detections((x0, y0, x1, y0 + 0.6 * (y1 - y0))), scene.image(NOISE))
+    rows, _ = np.nonzero(scene.pixels(frame.objects[0].xyz))
+    assert frame.objects[0].has(PointFlag.CUT_BY_BOX)
+    assert rows.max() < y0 + 0.6 * (y1 - y0)
+
+
+def test_points_at_a_silhouette_carry_the_edge_flag() -> None:
+    scene = two_boxes()
+    thing = Segmenter().segment(scene.detections(scene.box_of(2)), scene.image(NOISE)).objects[0]
+    edge = (thing.flags & PointFlag.EDGE) > 0
+    assert 0.01 < edge.mean() < 0.3
+
+
+def test_the_support_surface_is_instance_0_and_lies_on_the_table() -> None:
+    scene = two_boxes()
+    support = Segmenter().segment(scene.detections(), scene.image(NOISE)).support
+    assert support is not None
+    assert (support.instance, support.label) == (0, "support")
+    heights = (support.xyz @ scene.R.T + scene.eye)[:, 2]
+    assert np.median(np.abs(heights)) < 0.01
+
+
+def test_the_view_is_a_quarter_of_the_image() -> None:
+    frame = Segmenter().segment(two_boxes().detections(), two_boxes().image())
+    assert frame.view.xyz.shape == (120, 160, 3)
+    assert (frame.stamp_ns, frame.frame_id) == (7, "eye")
+
+
+def test_nothing_measured_gives_a_frame_without_objects_and_without_gravity() -> None:
+    scene = two_boxes()
+    empty = DepthImage(depth=np.zeros((480, 640), np.float32), rgb=None, intrinsics=scene.camera, stamp_ns=0)
+    frame = Segmenter().segment(scene.detections((10, 10, 300, 300)), empty)
+    assert frame.objects == ()
+    assert frame.support is None
+    assert frame.gravity is None
+    assert frame.gravity_confidence == 0
+    assert np.isnan(frame.view.xyz).all()
+
+
+def test_preset_paper_loses_the_largest_plane_of_the_crop() -> None:
+    scene = Scene().plane().box((-0.1, 0.0, 0), (0.1, 0.04, 0.3))
+    image = scene.image(NOISE)
+    boxes = scene.detections(scene.box_of(2, pad=0.02))
+    ours = Segmenter().segment(boxes, image).objects[0]
+    founding = Segmenter(SegmenterParams(preset="paper")).segment(boxes, image).objects
+    assert scene.iou(ours.xyz, 2) > 0.9
+    assert not founding or scene.iou(founding[0].xyz, 2) < 0.5
+
+
+def test_warming_up_changes_nothing() -> None:
+    segmenter = Segmenter()
+    segmenter.warm()
+    scene = two_boxes()
+    assert len(segmenter.segment(scene.detections(scene.box_of(2)), scene.image(NOISE)).objects) == 1
