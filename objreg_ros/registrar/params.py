@@ -34,6 +34,23 @@ class RegistrarParams(Params):
     min_gap: float = param(2.0, "least time between the two moments of a constraint", "s", ge=0.0)
     candidates: int = param(6, "stored keyframes that are tried for each new one, best first", ge=1, le=100)
 
+    # How a pose is found and looked at.
+    feature_voxel: float = param(0.05, "distance of the points that carry a local feature", "m", ge=0.01, le=0.2)
+    feature_radius: float = param(0.20, "how far a local feature looks", "m", ge=0.03, le=1.0)
+    feature_matches: int = param(500, "most matches of local features that are considered", ge=10)
+    centroid_tolerance: float = param(0.12, "how far the middle of one object may differ between views", "m", ge=0.01)
+    seeds_per_chain: int = param(40, "hypotheses that each chain proposes", ge=1)
+    refined_per_chain: int = param(4, "hypotheses of each chain that are refined", ge=1)
+    quick_sample: int = param(500, "points a side that rank the hypotheses", ge=50)
+    reaches: tuple[float, ...] = param((0.12, 0.05), "correspondence distances of the refinement", "m")
+    iterations: int = param(20, "most iterations of one round of refinement", ge=1)
+    depth_tolerance: float = param(0.02, "depths this close agree, at the camera", "m", ge=0.001)
+    depth_tolerance_growth: float = param(0.006, "growth of that tolerance with the square of depth", "1/m", ge=0.0)
+    detail_sigma: float = param(3.0, "blur that the high pass of grey takes away", "px", ge=0.5)
+    agreement_rotation: float = param(5.0, "chains agree within this rotation", "deg", ge=0.0)
+    agreement_translation: float = param(0.15, "chains agree within this distance", "m", ge=0.0)
+    explained_distance: float = param(0.12, "an object is explained when the middles are this close", "m", ge=0.0)
+
     # What decides a closure. Below score_alone a closure needs agreement of chains or objects.
     min_tested: int = param(600, "least number of pixels that both views must see", ge=1)
     min_inliers: float = param(0.45, "least share of tested pixels whose depth agrees", ge=0.0, le=1.0)

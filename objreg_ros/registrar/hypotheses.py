@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where a pose may come from: the chains, each independent of the others, and what they propose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.registrar.consensus import Matches, poses
+from objreg_ros.registrar.features import match
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.prepared import Prepared
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Hypothesis:
+    """A pose to be refined: who proposed it, and what it was worth to its proposer."""
+
+    T_target_source: Array
+    chain: str
+    worth: float
+
+
+def from_features(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Hypothesis]:
+    """Poses from matched local features of the contexts."""
+    a, b, weights = match(source.features, target.features, params.feature_matches)
+    matches = Matches(
+        source=source.features.xyz[a].astype(float),
+        target=target.features.xyz[b].astype(float),
+        source_normals=source.features.normals[a].astype(float),
+        target_normals=target.features.normals[b].astype(float),
+        weights=weights,
+    )
+    found = poses(matches, source.up, target.up, 1.5 * params.feature_voxel, 0.3, params.seeds_per_chain)
+    return [Hypothesis(T_target_source=T, chain="features", worth=worth) for T, worth in found]
+
+
+def from_centroids(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Hypothesis]:
+    """Poses from the middles of object pairs and triples; every assignment among look-alikes is tried."""
+    pairs = [(i, j) for i, a in enumerate(source.groups) for j, b in enumerate(target.groups) if a == b]
+    if len(pairs) < 2 or source.up is None or target.up is None:
+        return []
+    a, b = np.array(pairs).T
+    unknown = np.zeros((len(a), 3))
+    matches = Matches(
+        source=source.centroids[a],
+        target=target.centroids[b],
+        source_normals=unknown,
+        target_normals=unknown,
+        weights=np.ones(len(a)),
+    )
+    found = poses(matches, source.up, target.up, params.centroid_tolerance, 0.15, params.seeds_per_chain)
+    return [Hypothesis(T_target_source=T, chain="centroids", worth=worth) for T, worth in found]
+
+
+def from_prior(T_target_source: Array | None) -> list[Hypothesis]:
+    """The pose that odometry expects, where it expects one."""
+    return [] if T_target_source is None else [Hypothesis(T_target_source=T_target_source, chain="odometry", worth=1.0)]

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a pose says of the objects: which lie upon each other under it, and which must have moved."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.geometry import inverse, transform
+from objreg_ros.registrar.candidate import ObjectPair
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.prepared import Prepared
+from objreg_ros.registrar.visibility import SEEN, VIOLATIONS, count
+
+Pairs = tuple[ObjectPair, ...]
+
+
+def explain(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> tuple[Pairs, Pairs]:
+    """(explained, moved): one-to-one pairs of confusable labels, nearest first.
+
+    Explained are those whose middles lie within ``explained_distance``; moved are those left over of which each, where
+    it stood, is now free space in the other view.
+    """
+    distances = gaps(source, target, T_target_source)
+    explained = _assign(source, distances, params.explained_distance)
+    left = distances.copy()
+    left[[pair.source for pair in explained], :] = np.inf
+    left[:, [pair.target for pair in explained]] = np.inf
+    _keep_gone(left, source, target, T_target_source, params)
+    return explained, _assign(source, left, np.inf)
+
+
+def gaps(source: Prepared, target: Prepared, T_target_source: Array) -> Array:
+    """Distances (K, L) m of the objects' middles under a pose; infinite between labels that no detector confuses."""
+    moved = transform(T_target_source, source.centroids)
+    distances = np.linalg.norm(moved[:, None] - target.centroids[None], axis=-1)
+    same = np.array([[a == b for b in target.groups] for a in source.groups], bool).reshape(distances.shape)
+    return np.asarray(np.where(same, distances, np.inf))
+
+
+def _assign(source: Prepared, distances: Array, limit: float) -> Pairs:
+    """The nearest pairs, one-to-one, nearer than ``limit``."""
+    pairs, used_source, used_target = [], set(), set()
+    for flat in np.argsort(distances, axis=None, kind="stable"):
+        i, j = np.unravel_index(flat, distances.shape)
+        if not distances[i, j] < limit:
+            break
+        if i not in used_source and j not in used_target:
+            used_source.add(i)
+            used_target.add(j)
+            pairs.append(ObjectPair(int(i), int(j), source.keyframe.objects[i].label))
+    return tuple(pairs)
+
+
+def _keep_gone(distances: Array, source: Prepared, target: Prepared, T: Array, params: RegistrarParams) -> None:
+    """Make infinite the rows and columns of objects that the other view does not see to be gone."""
+    for i in range(distances.shape[0]):
+        if np.isfinite(distances[i]).any() and not is_gone(source, i, target, T, params):
+            distances[i, :] = np.inf
+    for j in range(distances.shape[1]):
+        if np.isfinite(distances[:, j]).any() and not is_gone(target, j, source, inverse(T), params):
+            distances[:, j] = np.inf
+
+
+def is_gone(owner: Prepared, index: int, other: Prepared, T_other_owner: Array, params: RegistrarParams) -> bool:
+    """Whether the other view looks through most of an object where it would stand."""
+    points = owner.keyframe.objects[index].cloud.xyz[::4]
+    sight = other.sight
+    counts = count(
+        points,
+        np.zeros(len(points), np.float32),
+        T_other_owner,
+        sight.near,
+        sight.far,
+        sight.detail,
+        sight.camera,
+        params.depth_tolerance,
+        params.depth_tolerance_growth,
+    )
+    return bool(counts[SEEN] >= 0.5 * len(points) and counts[VIOLATIONS] > 0.5 * counts[SEEN])

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What one view says of points that another view measured: seen there, floating in free space, or hidden.
+
+A `Sight` is a `View` made ready for that question: the nearest and the farthest depth around each pixel (colour and
+depth are a few pixels apart on real cameras, and edges are ragged), the high-passed grey, and the points to ask with.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numba
+import numpy as np
+
+from objreg_ros.data import Array, Intrinsics, View
+
+# What `count` counts, in the order of its result.
+SEEN, INLIERS, VIOLATIONS, OCCLUDED, SHADED, SUM_A, SUM_B, SUM_AA, SUM_BB, SUM_AB = range(10)
+
+NEAREST = 0.3  # m; nearer depth is noise on every structured-light camera
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sight:
+    """A view made ready. ``near``, ``far (h, w) float32`` m, 0 where nothing was measured; ``detail (h, w) float32``.
+
+    ``points (P, 3) float32`` m and ``shades (P,) float32`` are its measured pixels in a fixed shuffled order, so that
+    the first n of them are a fair sample.
+    """
+
+    near: Array
+    far: Array
+    detail: Array
+    points: Array
+    shades: Array
+    textured: bool
+    intrinsics: Intrinsics
+
+    @property
+    def camera(self) -> tuple[float, float, float, float]:
+        """fx, fy, cx, cy."""
+        return self.intrinsics.fx, self.intrinsics.fy, self.intrinsics.cx, self.intrinsics.cy
+
+
+def prepare_sight(view: View, sight_range: float, detail_sigma: float, seed: int = 0) -> Sight:
+    """Make a view ready: depth beyond ``sight_range`` m is dropped; ``detail_sigma`` px is of the high pass."""
+    depth = np.nan_to_num(view.xyz[..., 2], nan=0.0)
+    depth = np.where((depth > NEAREST) & (depth < sight_range), depth, 0.0).astype(np.float32)
+    near, far = depth_bounds(depth)
+    detail = high_pass(view.grey, detail_sigma) if view.grey is not None else np.zeros_like(depth)
+    chosen = np.random.default_rng(seed).permutation(np.flatnonzero(depth > 0))
+    return Sight(
+        near=near,
+        far=far,
+        detail=detail,
+        points=np.ascontiguousarray(view.xyz.reshape(-1, 3)[chosen]),
+        shades=np.ascontiguousarray(detail.ravel()[chosen]),
+        textured=view.grey is not None,
+        intrinsics=view.intrinsics,
+    )
+
+
+def depth_bounds(depth: Array) -> tuple[Array, Array]:
+    """The nearest and the farthest measured depth in the 3 x 3 pixels around each; 0 where none was measured."""
+    window = np.ones((3, 3), np.uint8)
+    near = cv2.erode(np.where(depth > 0, depth, np.float32(1e3)), window)
+    return np.where(near < 1e3, near, 0.0).astype(np.float32), cv2.dilate(depth, window)
+
+
+def high_pass(grey: Array, sigma: float) -> Array:
+    """Grey without its slow part, so that lighting and exposure drop out."""
+    image = cv2.GaussianBlur(grey.astype(np.float32), (0, 0), 0.5)
+    return np.asarray(image - cv2.GaussianBlur(image, (0, 0), sigma), np.float32)
+
+
+@numba.njit(cache=True, fastmath=True, nogil=True)
+def count(points, shades, T, near, far, detail, camera, tolerance, growth):  # type: ignore[no-untyped-def]
+    """Count what the view (near, far, detail, camera) says of ``points`` moved by ``T (4, 4)``.
+
+    A depth agrees within ``tolerance + growth z^2``. Returns (10,) float64 in the order SEEN ... SUM_AB; the sums are
+    of the shades of the inliers (A) and of the detail where they land (B).
+    """
+    fx, fy, cx, cy = camera
+    height, width = near.shape
+    out = np.zeros(10)
+    for i in range(len(points)):
+        px, py, pz = points[i, 0], points[i, 1], points[i, 2]
+        z = T[2, 0] * px + T[2, 1] * py + T[2, 2] * pz + T[2, 3]
+        if z < 0.1:
+            continue
+        u = fx * (T[0, 0] * px + T[0, 1] * py + T[0, 2] * pz + T[0, 3]) / z + cx
+        v = fy * (T[1, 0] * px + T[1, 1] * py + T[1, 2] * pz + T[1, 3]) / z + cy
+        if u < 0.0 or v < 0.0 or u > width - 1.001 or v > height - 1.001:
+            continue
+        column, row = int(u + 0.5), int(v + 0.5)
+        low, high = near[row, column], far[row, column]
+        if high <= 0.0:
+            continue
+        slop = tolerance + growth * z * z
+        if z < low - slop:
+            out[SEEN] += 1.0
+            out[VIOLATIONS] += 1.0
+            continue
+        if z > high + slop:
+            out[SEEN] += 1.0
+            out[OCCLUDED] += 1.0
+            continue
+        if z > low + slop and z < high - slop:  # between the two sides of an edge: says nothing
+            continue
+        out[SEEN] += 1.0
+        out[INLIERS] += 1.0
+        left, top = int(u), int(v)
+        a, b = u - left, v - top
+        shade = (1.0 - b) * ((1.0 - a) * detail[top, left] + a * detail[top, left + 1]) + b * (
+            (1.0 - a) * detail[top + 1, left] + a * detail[top + 1, left + 1]
+        )
+        own = shades[i]
+        out[SHADED] += 1.0
+        out[SUM_A] += own
+        out[SUM_B] += shade
+        out[SUM_AA] += own * own
+        out[SUM_BB] += shade * shade
+        out[SUM_AB] += own * shade
+    return out
+
+
+def correlation(counts: Array) -> float:
+    """The normalised correlation -1..1 of the shades in ``counts``; 0 with fewer than 30 of them or none that vary."""
+    n = counts[SHADED]
+    if n < 30:
+        return 0.0
+    a = counts[SUM_AA] - counts[SUM_A] ** 2 / n
+    b = counts[SUM_BB] - counts[SUM_B] ** 2 / n
+    if min(a, b) <= 1e-6 * n:
+        return 0.0
+    return float((counts[SUM_AB] - counts[SUM_A] * counts[SUM_B] / n) / np.sqrt(a * b))

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of the pose engine on a room whose poses are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from objreg_ros.geometry import inverse, pose_error
+from objreg_ros.registrar.engine import Engine
+from objreg_ros.registrar.keyframe import Context
+from objreg_ros.registrar.params import RegistrarParams
+
+from .rooms import ROOM, keyframe, seen_from
+
+
+@pytest.fixture(scope="module")
+def engine() -> Engine:
+    return Engine(RegistrarParams())
+
+
+@pytest.mark.parametrize("angle", [-35.0, 10.0, 30.0])
+def test_a_place_seen_again_is_found_and_believed(engine: Engine, angle: float) -> None:
+    source, target = keyframe(seen_from(0.0), seed=1), keyframe(seen_from(angle), seed=2)
+    best = engine.propose(source, target)[0]
+    rotation, distance = pose_error(best.T_target_source, inverse(seen_from(angle)) @ seen_from(0.0))
+    assert rotation < 1.0 and distance < 2.0
+    assert best.verification.score > 0.3
+    assert best.gravity_error_deg is not None and best.gravity_error_deg < 1.0
+
+
+def test_the_other_way_round_is_the_inverse(engine: Engine) -> None:
+    source, target = keyframe(seen_from(0.0), seed=1), keyframe(seen_from(20.0), seed=2)
+    best = engine.propose(target, source)[0]
+    rotation, distance = pose_error(best.T_target_source, inverse(seen_from(0.0)) @ seen_from(20.0))
+    assert rotation < 1.0 and distance < 2.0
+
+
+def test_objects_that_stand_still_are_explained(engine: Engine) -> None:
+    best = engine.propose(keyframe(seen_from(0.0), seed=1), keyframe(seen_from(20.0), seed=2))[0]
+    assert {pair.label for pair in best.explained} >= {"book", "cup", "bottle"}
+    assert best.moved == ()
+
+
+def test_an_object_that_moved_is_reported_and_outvoted(engine: Engine) -> None:
+    changed = tuple(("bottle", (1.5, 0.6, 0.72), (1.58, 0.68, 1.0)) if box[0] == "bottle" else box for box in ROOM)
+    best = engine.propose(keyframe(seen_from(0.0), seed=1), keyframe(seen_from(15.0), changed, seed=2))[0]
+    rotation, distance = pose_error(best.T_target_source, inverse(seen_from(15.0)) @ seen_from(0.0))
+    assert rotation < 1.0 and distance < 2.0
+    assert [pair.label for pair in best.moved] == ["bottle"]
+
+
+def test_a_prior_is_a_chain_of_its_own(engine: Engine) -> None:
+    source, target = keyframe(seen_from(0.0), seed=1), keyframe(seen_from(15.0), seed=2)
+    truth = inverse(seen_from(15.0)) @ seen_from(0.0)
+    best = engine.propose(source, target, truth)[0]
+    assert "odometry" in best.agreeing_chains and len(best.agreeing_chains) >= 2
+
+
+def test_the_same_keyframes_give_the_same_candidates() -> None:
+    source, target = keyframe(seen_from(0.0), seed=1), keyframe(seen_from(25.0), seed=2)
+    first, second = (Engine(RegistrarParams()).propose(source, target) for _ in range(2))
+    assert len(first) == len(second)
+    for a, b in zip(first, second, strict=True):
+        assert np.array_equal(a.T_target_source, b.T_target_source)
+        assert a.verification == b.verification
+
+
+def test_without_gravity_and_grey_there_is_still_a_pose(engine: Engine) -> None:
+    source = keyframe(seen_from(0.0), seed=1, gravity=False, grey=False)
+    target = keyframe(seen_from(15.0), seed=2, gravity=False, grey=False)
+    best = engine.propose(source, target)[0]
+    rotation, distance = pose_error(best.T_target_source, inverse(seen_from(15.0)) @ seen_from(0.0))
+    assert rotation < 1.5 and distance < 3.0
+    assert best.verification.texture is None and best.gravity_error_deg is None
+
+
+def test_an_empty_keyframe_proposes_nothing(engine: Engine) -> None:
+    full = keyframe(seen_from(0.0))
+    nothing = np.zeros((0, 3), np.float32)
+    empty = replace(full, objects=(), context=Context(xyz=nothing, normals=nothing))
+    assert engine.propose(full, empty) == () == engine.propose(empty, full)
