@@ -8,7 +8,7 @@ is lost in silence: for every stream ``received = matched + waiting + dropped by
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
@@ -65,6 +65,7 @@ class Queue:
     """The items of one stream and what became of them."""
 
     stream: Stream
+    on_drop: Callable[[str, int, str], None]
     items: deque[Item] = field(default_factory=deque)
     last_ns: int | None = None
     latched: Any = None
@@ -95,9 +96,7 @@ class Queue:
 
     def drop_oldest(self, why: Drop) -> None:
         """Take the oldest item out and count it if nothing used it."""
-        item = self.items.popleft()
-        if not item.used:
-            self.dropped[why.value] += 1
+        self._let_go(self.items.popleft(), why)
 
     def drop_before(self, stamp_ns: int) -> None:
         """Take out what is older than a time."""
@@ -106,22 +105,31 @@ class Queue:
 
     def drop_after(self, stamp_ns: int) -> None:
         """Take out what lies in the future of a time that was jumped back to."""
-        kept = deque(item for item in self.items if item.stamp_ns <= stamp_ns)
-        self.dropped[Drop.TIME_JUMP.value] += sum(not item.used for item in self.items if item.stamp_ns > stamp_ns)
-        self.items = kept
+        held, self.items = self.items, deque(item for item in self.items if item.stamp_ns <= stamp_ns)
+        for item in held:
+            if item.stamp_ns > stamp_ns:
+                self._let_go(item, Drop.TIME_JUMP)
+
+    def _let_go(self, item: Item, why: Drop) -> None:
+        if not item.used:
+            self.dropped[why.value] += 1
+            self.on_drop(self.stream.name, item.stamp_ns, why.value)
 
 
 class Synchroniser:
     """Matches the items of several streams. `add` returns the matches that an item completes, in order of time.
 
     A stream whose stamps go back has jumped in time (a looped bag): what waits with a later stamp is dropped as
-    ``time_jump``, in every stream, and matching starts afresh.
+    ``time_jump``, in every stream, and matching starts afresh. ``on_drop`` hears of every item that met no match: the
+    stream's name, the stamp and the reason.
     """
 
-    def __init__(self, streams: Sequence[Stream]) -> None:
+    def __init__(
+        self, streams: Sequence[Stream], on_drop: Callable[[str, int, str], None] = lambda name, stamp_ns, why: None
+    ) -> None:
         if not streams or streams[0].need is not Need.REQUIRED:
             raise ValueError("expected a required stream first: it is the reference that the others are matched to")
-        self.queues = {stream.name: Queue(stream) for stream in streams}
+        self.queues = {stream.name: Queue(stream, on_drop) for stream in streams}
         self._reference = self.queues[streams[0].name]
         self._others = [queue for queue in self.queues.values() if queue is not self._reference]
         self.time_jumps = 0

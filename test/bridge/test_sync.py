@@ -163,3 +163,15 @@ def test_nothing_is_lost_in_silence_whatever_comes(arrivals: list[tuple[str, int
     assert accounts_hold(sync)
     assert all(abs(match["depth"] - match["image"]) <= slop for match in found)
     assert sync.queues["image"].matched == sync.queues["depth"].matched == len(found)
+
+
+def test_every_drop_is_told_with_its_stream_stamp_and_reason() -> None:
+    told: list[tuple[str, int, str]] = []
+    sync = Synchroniser(EXACT, on_drop=lambda name, stamp_ns, why: told.append((name, stamp_ns, why)))
+    sync.add("image", 10, "i10")
+    sync.add("image", 20, "i20")
+    sync.add("depth", 20, "d20")
+    sync.add("depth", 30, "d30")
+    sync.add("image", 5, "i5")
+    assert told == [("image", 10, "unmatched"), ("depth", 30, "time_jump")]
+    assert sum(q.dropped.total() for q in sync.queues.values()) == len(told)
