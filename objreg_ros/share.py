@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where config/, launch/ and models/ are: in a checkout, in a colcon workspace or beside a pip installation."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+NAME = "objreg_ros"
+
+
+def folders() -> Iterator[Path]:
+    """The places where the package's files may be, the one that belongs to this very code first."""
+    package = Path(__file__).resolve().parent
+    if (package.parent / "package.xml").is_file():
+        yield package.parent
+    for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep):
+        if prefix:
+            yield Path(prefix) / "share" / NAME
+    if len(package.parents) > 3:  # <prefix>/lib/python3.x/site-packages/objreg_ros
+        yield package.parents[3] / "share" / NAME
+    yield Path(sys.prefix) / "share" / NAME
+
+
+def find(relative: str) -> Path:
+    """The installed file or folder, like ``config/fastdds.xml``; FileNotFoundError with every place that was tried."""
+    tried = [folder / relative for folder in folders()]
+    for path in tried:
+        if path.exists():
+            return path
+    places = ", ".join(dict.fromkeys(map(str, tried)))
+    raise FileNotFoundError(f"{relative}: expected it at one of {places}; is {NAME} installed?")
+
+
+def model(name: str) -> Path:
+    """A model by its path, or by its file name in the user's data folder or in models/; else FileNotFoundError."""
+    data = Path(os.environ.get("XDG_DATA_HOME", "~/.local/share")).expanduser() / NAME / "models" / name
+    for path in (Path(name).expanduser(), data):
+        if path.is_file():
+            return path
+    return find(f"models/{name}")
