@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The books of a node as diagnostic_msgs, and back for those who read them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from std_msgs.msg import Header
+
+from objreg_ros.bridge.ledger import Balance
+
+DROPPED = "dropped: "
+LATENCY = "latency "
+
+
+def diagnostic(
+    node: str,
+    now: Time,
+    balance: Balance,
+    rate_hz: float,
+    silent: Mapping[str, str],
+    extra: Mapping[str, object],
+) -> DiagnosticArray:
+    """One status: counts, rate, latencies per stage and what the node adds; a warning names the silent inputs."""
+    status = DiagnosticStatus(
+        level=DiagnosticStatus.WARN if silent else DiagnosticStatus.OK,
+        name=f"{node}: frames",
+        message="; ".join(silent.values()) or f"{rate_hz:.1f} frames/s",
+        hardware_id="objreg_ros",
+        values=[KeyValue(key=key, value=str(value)) for key, value in {**_counts(balance, rate_hz), **extra}.items()],
+    )
+    return DiagnosticArray(header=Header(stamp=now), status=[status])
+
+
+def _counts(balance: Balance, rate_hz: float) -> dict[str, object]:
+    latencies = {
+        f"{LATENCY}{stage} {name} [ms]": f"{value:.2f}"
+        for stage, values in sorted(balance.stage_ms.items())
+        for name, value in zip(("p50", "p95"), values, strict=True)
+    }
+    return {
+        "received": balance.received,
+        "published": balance.published,
+        "waiting": balance.waiting,
+        **{f"{DROPPED}{reason}": count for reason, count in sorted(balance.dropped.items())},
+        "lost in transport": balance.lost,
+        "rate [Hz]": f"{rate_hz:.2f}",
+        **latencies,
+    }
+
+
+def balance_of(status: DiagnosticStatus) -> Balance:
+    """The books that a status of `diagnostic` tells."""
+    values = {pair.key: pair.value for pair in status.values}
+    stages = sorted({key.split(" ")[1] for key in values if key.startswith(LATENCY)})
+    return Balance(
+        received=int(values["received"]),
+        published=int(values["published"]),
+        waiting=int(values["waiting"]),
+        dropped={key.removeprefix(DROPPED): int(value) for key, value in values.items() if key.startswith(DROPPED)},
+        lost=int(values["lost in transport"]),
+        stage_ms={
+            stage: (float(values[f"{LATENCY}{stage} p50 [ms]"]), float(values[f"{LATENCY}{stage} p95 [ms]"]))
+            for stage in stages
+        },
+    )

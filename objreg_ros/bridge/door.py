@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What every node is: a door. It reads messages, lets its room work, writes messages and keeps the books."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
+from rclpy.task import Future
+from std_msgs.msg import Header
+
+from objreg_ros.bridge import qos, to_msg
+from objreg_ros.bridge.diagnostics import diagnostic
+from objreg_ros.bridge.ledger import Ledger
+from objreg_ros.bridge.log import ThrottledLog
+from objreg_ros.bridge.parameters import Parameters
+from objreg_ros.bridge.params import DoorParams
+from objreg_ros.bridge.watch import Watch
+from objreg_ros.bridge.worker import Worker
+from objreg_ros.params import Params
+
+
+class DroppedError(Exception):
+    """Ends the work on a frame with a reason that is counted and a text that is logged."""
+
+    def __init__(self, reason: str, text: str) -> None:
+        super().__init__(text)
+        self.reason = reason
+
+
+class Door(Node):
+    """A node with declared parameters, one worker, books, diagnostics at 1 Hz and a receipt for every frame.
+
+    A subclass listens, calls `accept` once for each frame, and hands it to ``worker`` as (stamp_ns, payload) when it is
+    complete. The worker calls `compute`; what that drops or refuses is counted, logged and leaves the node running.
+    """
+
+    def __init__(self, name: str, *kinds: type[Params]) -> None:
+        super().__init__(name)
+        self.settings = Parameters(self, *kinds, DoorParams)
+        self.settings.changed = self.adopt
+        self.ledger = Ledger()
+        self.failure: Future = Future()
+        self.throttled = ThrottledLog(self.get_logger().warning)
+        self.watch = Watch(self.count_publishers, self.settings.of(DoorParams).silence)
+        self.worker: Worker[tuple[int, Any]] = Worker(self._work, self._overtaken, self.failure.set_exception)
+        self._finished = self.create_publisher(Header, "finished", qos.room(depth=1000))
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", qos.room())
+        self._last = (time.monotonic(), 0)
+        self.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    # What a subclass fills in
+
+    def compute(self, stamp_ns: int, payload: Any) -> None:
+        """Read → compute → write for one frame; runs on the worker. `DroppedError` or ValueError if it cannot be."""
+        raise NotImplementedError
+
+    def adopt(self) -> None:
+        """Live parameters have changed."""
+
+    def extra_diagnostics(self) -> Mapping[str, object]:
+        """What this node adds to its diagnostics."""
+        return {}
+
+    # Inputs
+
+    def listen(
+        self, kind: type, topic: str, heard: Callable[[Any], None], profile: QoSProfile, watched: str = ""
+    ) -> Subscription:
+        """Subscribe; ``watched`` is the input of `expect` that this topic belongs to."""
+
+        def hear(message: Any) -> None:
+            self.watch.hear(watched)
+            heard(message)
+
+        events = SubscriptionEventCallbacks(message_lost=self._lose)
+        return self.create_subscription(kind, topic, hear, profile, event_callbacks=events)
+
+    def listen_to_first(
+        self, name: str, topics: Mapping[str, type], heard: Callable[[str, Any], None], profile: QoSProfile
+    ) -> None:
+        """Subscribe to topics that carry the same thing. The first that speaks is kept, the others are closed."""
+        opened: dict[str, Subscription] = {}
+
+        def hear(topic: str, message: Any) -> None:
+            if topic not in opened:
+                return
+            for other in [other for other in opened if other != topic]:
+                self.destroy_subscription(opened.pop(other))
+            heard(topic, message)
+
+        for topic, kind in topics.items():
+            opened[topic] = self.listen(kind, topic, partial(hear, topic), profile, watched=name)
+        self.expect(name, *topics)
+
+    def _lose(self, event: Any) -> None:
+        self.ledger.lose(event.total_count_change)
+
+    def expect(self, name: str, *topics: str) -> None:
+        """Warn when none of ``topics`` speaks."""
+        self.watch.expect(name, {topic: self.resolve_topic_name(topic) for topic in topics})
+
+    def sensor(self) -> QoSProfile:
+        """The QoS of what a camera or an odometry sends."""
+        return qos.sensor(self.settings.of(DoorParams).reliable)
+
+    # The life of a frame
+
+    def accept(self, stamp_ns: int) -> None:
+        """A frame came in; from now on it is in the books."""
+        self.ledger.receive(stamp_ns)
+
+    def drop(self, stamp_ns: int, reason: str, text: str = "") -> None:
+        """The frame ends here: counted by reason, receipted, and logged (throttled) if there is a ``text``."""
+        self.ledger.drop(stamp_ns, reason)
+        if text:
+            self.throttled.warn(reason, f"frame dropped, {reason.replace('_', ' ')}: {text}")
+        self._finished.publish(to_msg.finished(self.get_name(), stamp_ns, reason))
+
+    def read(self, topic: str, decode: Callable[..., Any], *messages: Any) -> Any:
+        """The word of a message; `DroppedError` as ``malformed_<topic>`` if it breaks its contract."""
+        try:
+            with self.ledger.timed("decode"):
+                return decode(*messages)
+        except ValueError as error:
+            raise DroppedError(f"malformed_{topic}", str(error)) from error
+
+    def _work(self, job: tuple[int, Any]) -> None:
+        stamp_ns, payload = job
+        try:
+            self.compute(stamp_ns, payload)
+        except DroppedError as dropped:
+            self.drop(stamp_ns, dropped.reason, str(dropped))
+        except ValueError as error:
+            self.drop(stamp_ns, "refused", str(error))
+        else:
+            self.ledger.publish(stamp_ns)
+            self._finished.publish(to_msg.finished(self.get_name(), stamp_ns))
+
+    def _overtaken(self, job: tuple[int, Any]) -> None:
+        self.drop(job[0], "overtaken")  # by a newer frame: usual where the camera is faster than the room
+
+    # Diagnostics, parameters, the end
+
+    def _report(self) -> None:
+        silent = self.watch.silent()
+        for name, advice in silent.items():
+            self.throttled.warn(name, advice)
+        balance = self.ledger.balance()
+        (then, before), now = self._last, time.monotonic()
+        self._last = (now, balance.received)
+        rate = (balance.received - before) / (now - then)
+        stamp = self.get_clock().now().to_msg()
+        name = self.get_fully_qualified_name()
+        self._diagnostics.publish(diagnostic(name, stamp, balance, rate, silent, self.extra_diagnostics()))
+
+    def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> SetParametersResult:
+        """As rclpy, but refused in the words of `Params`, and with 1 good for 1.0."""
+        try:
+            return super().set_parameters_atomically(self.settings.checked(parameter_list))
+        except ValueError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+
+    def set_parameters(self, parameter_list: Sequence[Parameter]) -> list[SetParametersResult]:
+        """One by one, each as in `set_parameters_atomically`."""
+        return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
+
+    def close(self) -> None:
+        """End the worker and the node."""
+        self.worker.close()
+        self.destroy_node()

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The books of a node: where every input frame is, and how long it took. Knows no ROS.
+
+Every frame that is received ends as published or as dropped with a reason, exactly once, and waits until then:
+received = published + waiting + dropped, at every moment.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import Counter, defaultdict, deque
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+
+RECENT = 1000  # how many durations of a stage the percentiles look back on
+
+
+@dataclass(frozen=True)
+class Balance:
+    """The state of the books at one moment."""
+
+    received: int
+    published: int
+    waiting: int
+    dropped: dict[str, int]
+    lost: int  # messages that the transport says it lost before they reached us
+    stage_ms: dict[str, tuple[float, float]] = field(default_factory=dict)  # stage → (p50, p95)
+
+
+class Ledger:
+    """Counts frames by their stamps; safe to use from the executor and the worker at once."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._arrived: defaultdict[int, list[float]] = defaultdict(list)
+        self._received = self._published = self._lost = 0
+        self._dropped: Counter[str] = Counter()
+        self._stages: defaultdict[str, deque[float]] = defaultdict(lambda: deque(maxlen=RECENT))
+
+    def receive(self, stamp_ns: int) -> None:
+        """A frame came in."""
+        with self._lock:
+            self._received += 1
+            self._arrived[stamp_ns].append(time.perf_counter())
+
+    def publish(self, stamp_ns: int) -> None:
+        """A waiting frame went out; KeyError if none of this stamp waits."""
+        with self._lock:
+            self._stages["total"].append(time.perf_counter() - self._settle(stamp_ns))
+            self._published += 1
+
+    def drop(self, stamp_ns: int, reason: str) -> None:
+        """A waiting frame will not go out; KeyError if none of this stamp waits."""
+        with self._lock:
+            self._settle(stamp_ns)
+            self._dropped[reason] += 1
+
+    def lose(self, count: int) -> None:
+        """The transport lost messages."""
+        with self._lock:
+            self._lost += count
+
+    def waits(self, stamp_ns: int) -> bool:
+        """Whether a frame of this stamp is neither published nor dropped yet."""
+        with self._lock:
+            return stamp_ns in self._arrived
+
+    @contextmanager
+    def timed(self, stage: str) -> Iterator[None]:
+        """Measure a stage."""
+        start = time.perf_counter()
+        yield
+        self.spend(stage, time.perf_counter() - start)
+
+    def spend(self, stage: str, seconds: float) -> None:
+        """Book the duration of a stage."""
+        with self._lock:
+            self._stages[stage].append(seconds)
+
+    def balance(self) -> Balance:
+        """The books now."""
+        with self._lock:
+            waiting = sum(map(len, self._arrived.values()))
+            stage_ms = {stage: percentiles_ms(seconds) for stage, seconds in self._stages.items()}
+            return Balance(
+                received=self._received,
+                published=self._published,
+                waiting=waiting,
+                dropped=dict(self._dropped),
+                lost=self._lost,
+                stage_ms=stage_ms,
+            )
+
+    def _settle(self, stamp_ns: int) -> float:
+        arrivals = self._arrived.get(stamp_ns, [])
+        if not arrivals:
+            raise KeyError(f"no frame of {stamp_ns} ns waits")
+        arrived = arrivals.pop(0)
+        if not arrivals:
+            del self._arrived[stamp_ns]
+        return arrived
+
+
+def percentiles_ms(seconds: deque[float] | list[float]) -> tuple[float, float]:
+    """The median and the 95th percentile in milliseconds."""
+    p50, p95 = np.percentile(np.fromiter(seconds, float), (50, 95)) * 1e3
+    return float(p50), float(p95)

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The ROS parameters of a node, made from its `Params` classes: description, type, range, read-only or live.
+
+What is refused is refused by `Params`, so in the same words as in a test or an offline run. A float accepts 1, and an
+empty list keeps the type that was declared.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from objreg_ros.params import Declaration, Params
+
+Kind = TypeVar("Kind", bound=Params)
+
+TYPES = {
+    (bool, False): Parameter.Type.BOOL,
+    (int, False): Parameter.Type.INTEGER,
+    (float, False): Parameter.Type.DOUBLE,
+    (str, False): Parameter.Type.STRING,
+    (bool, True): Parameter.Type.BOOL_ARRAY,
+    (int, True): Parameter.Type.INTEGER_ARRAY,
+    (float, True): Parameter.Type.DOUBLE_ARRAY,
+    (str, True): Parameter.Type.STRING_ARRAY,
+}
+
+
+class Parameters:
+    """The declared parameters of ``node`` and their current values, one `Params` a class.
+
+    ValueError at construction for a start value that is refused. ``changed`` is called after a live change.
+    """
+
+    def __init__(self, node: Node, *kinds: type[Params]) -> None:
+        self.changed: Callable[[], None] = lambda: None
+        self._declarations = {d.name: d for kind in kinds for d in kind.declarations()}
+        start = {name: _declare(node, declaration) for name, declaration in self._declarations.items()}
+        self._current = {kind: kind(**_part(kind, start)) for kind in kinds}
+        node.add_post_set_parameters_callback(self._adopt)
+
+    def of(self, kind: type[Kind]) -> Kind:
+        """The current values of one class."""
+        return self._current[kind]  # type: ignore[return-value]
+
+    def checked(self, changes: Sequence[Parameter]) -> list[Parameter]:
+        """The changes in their declared types; ValueError with `Params`' words if any is refused."""
+        values = {p.name: p.value for p in changes}
+        for kind, current in self._current.items():
+            current.replaced(**_part(kind, values))
+        return [self._typed(change) for change in changes]
+
+    def _typed(self, change: Parameter) -> Parameter:
+        declaration = self._declarations.get(change.name)
+        return change if declaration is None else _parameter(declaration, declaration.check(change.value))
+
+    def _adopt(self, changes: Sequence[Parameter]) -> None:
+        values = {p.name: p.value for p in changes}
+        touched = [kind for kind in self._current if _part(kind, values)]
+        for kind in touched:
+            self._current[kind] = self._current[kind].replaced(**_part(kind, values))
+        if touched:
+            self.changed()
+
+
+def _part(kind: type[Params], values: dict[str, Any]) -> dict[str, Any]:
+    return {d.name: values[d.name] for d in kind.declarations() if d.name in values}
+
+
+def _declare(node: Node, declaration: Declaration) -> Any:
+    """Declare without type and range, let `Params` judge what the user set, then fix the descriptor."""
+    declared = declaration.check(declaration.default)
+    loose = ParameterDescriptor(dynamic_typing=True)
+    given = node.declare_parameter(declaration.name, list(declared) if declaration.many else declared, loose).value
+    value = declared if given is None else declaration.check(given)
+    Node.set_parameters(node, [_parameter(declaration, value)])  # rclpy's own: a Door's asks what we are making here
+    node.set_descriptor(declaration.name, descriptor(declaration))
+    return value
+
+
+def _parameter(declaration: Declaration, value: Any) -> Parameter:
+    kind = TYPES[declaration.kind, declaration.many]
+    return Parameter(declaration.name, kind, list(value) if declaration.many else value)
+
+
+def descriptor(declaration: Declaration) -> ParameterDescriptor:
+    """What ``ros2 param describe`` shows of a declaration."""
+    unit = f" [{declaration.unit}]" if declaration.unit else ""
+    made = ParameterDescriptor(
+        name=declaration.name,
+        type=TYPES[declaration.kind, declaration.many].value,
+        description=f"{declaration.doc}{unit}",
+        additional_constraints=declaration.range_text,
+        read_only=not declaration.live,
+    )
+    if declaration.many or (declaration.ge is None and declaration.le is None):
+        return made
+    if declaration.kind is float:
+        made.floating_point_range = [_float_range(declaration)]
+    elif declaration.kind is int:
+        made.integer_range = [_integer_range(declaration)]
+    return made
+
+
+def _float_range(declaration: Declaration) -> FloatingPointRange:
+    low = -sys.float_info.max if declaration.ge is None else float(declaration.ge)
+    high = sys.float_info.max if declaration.le is None else float(declaration.le)
+    return FloatingPointRange(from_value=low, to_value=high)
+
+
+def _integer_range(declaration: Declaration) -> IntegerRange:
+    low = -(2**63) if declaration.ge is None else int(declaration.ge)
+    high = 2**63 - 1 if declaration.le is None else int(declaration.le)
+    return IntegerRange(from_value=low, to_value=high, step=0)

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How messages are delivered, by what they are."""
+
+from __future__ import annotations
+
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+
+def sensor(reliable: bool) -> QoSProfile:
+    """What a camera sends. Best effort matches every publisher; reliable only reliable ones, and loses nothing.
+
+    Five messages deep: the newest wins in our own queue, where what it replaces is counted, and not inside DDS.
+    """
+    reliability = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
+    return QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=5, reliability=reliability)
+
+
+def room(depth: int = 20) -> QoSProfile:
+    """What passes between the rooms: small and reliable."""
+    return QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=depth, reliability=ReliabilityPolicy.RELIABLE)
+
+
+def latched(depth: int = 1) -> QoSProfile:
+    """What a late subscriber must still get: the last ``depth`` messages."""
+    profile = room(depth)
+    profile.durability = DurabilityPolicy.TRANSIENT_LOCAL
+    return profile

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From `main` to a running node, and to a clean end."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+
+import rclpy
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+
+from objreg_ros.bridge import profile
+from objreg_ros.bridge.door import Door
+
+
+def run(make: Callable[[], Door], args: Sequence[str] | None = None) -> int:
+    """Run one node until SIGINT or SIGTERM; the exit status.
+
+    What the node refuses at start (ValueError, OSError) is one line on stderr and status 1. A bug propagates.
+    """
+    transport = profile.apply()
+    rclpy.init(args=None if args is None else list(args))
+    try:
+        return _serve(make, transport)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        return 0
+    finally:
+        rclpy.try_shutdown()
+
+
+def _serve(make: Callable[[], Door], transport: str) -> int:
+    try:
+        door = make()
+    except (ValueError, OSError) as error:
+        print(" ".join(str(error).split()), file=sys.stderr)
+        return 1
+    door.get_logger().info(transport)
+    executor = SingleThreadedExecutor()
+    executor.add_node(door)
+    try:
+        executor.spin_until_future_complete(door.failure)
+        if rclpy.ok() and door.failure.done():
+            door.failure.result()  # raises what ended the worker
+        return 0
+    finally:
+        executor.shutdown()
+        door.close()
