@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The door of the detector: ``image`` (raw or compressed) in; ``detections_table``, ``detections``, ``labels`` out."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+from sensor_msgs.msg import CompressedImage, Image, PointCloud2
+from std_msgs.msg import String
+
+from objreg_ros import share
+from objreg_ros.bridge import from_msg, qos, to_msg
+from objreg_ros.bridge.door import Door
+from objreg_ros.bridge.spin import run
+from objreg_ros.detector.mobilenet_ssd import Detector
+from objreg_ros.detector.params import DetectorParams
+
+IMAGES = {"image": Image, "image/compressed": CompressedImage}
+
+
+class DetectorNode(Door):
+    """Detects the objects of the newest image; a table goes out for every image, empty if it shows no object."""
+
+    def __init__(self) -> None:
+        super().__init__("detector", DetectorParams)
+        params = self.settings.of(DetectorParams)
+        labels = Path(params.labels) if params.labels else None
+        self._detector = Detector(params, share.model(params.model), labels)
+        self._names = dict(enumerate(self._detector.labels))
+        self._table = self.create_publisher(PointCloud2, "detections_table", qos.room())
+        self._array = self.create_publisher(to_msg.Detection2DArray, "detections", qos.room()) if self._vision else None
+        self._labels = self.create_publisher(String, "labels", qos.latched())
+        self._labels.publish(to_msg.labels(self._names))
+        self.listen_to_first("image", IMAGES, self._hear, self.sensor())
+
+    @property
+    def _vision(self) -> bool:
+        return to_msg.Detection2DArray is not None
+
+    def adopt(self) -> None:
+        """Live parameters hold from the next image on."""
+        self._detector.params = self.settings.of(DetectorParams)
+
+    def _hear(self, _: str, message: Any) -> None:
+        stamp_ns = from_msg.stamp_ns(message)
+        self.accept(stamp_ns)
+        self.worker.put((stamp_ns, message))
+
+    def compute(self, stamp_ns: int, payload: Any) -> None:
+        """One image."""
+        image = self.read("image", from_msg.image, payload)
+        with self.ledger.timed("detect"):
+            detections = self._detector.detect(image)
+        self._table.publish(to_msg.detections_table(detections, self._names))
+        if self._array is not None:
+            self._array.publish(to_msg.detection_array(detections))
+
+
+def main() -> int:
+    """The executable ``detector``."""
+    return run(DetectorNode)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
