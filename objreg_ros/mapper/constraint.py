@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A constraint moved to where a consumer needs it: to its own keyframes, and into its own order of six numbers.
+
+`LoopClosure.covariance` follows ROS: the error ``[dt dr]`` with ``t' = t + dt`` and ``R' = exp(dr) R``, in the axes of
+the *from* frame. What a consumer wants differs in three ways, and each of them has a function here.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from objreg_ros.data import Array, LoopClosure
+from objreg_ros.geometry import inverse, pose, skew
+from objreg_ros.mapper.trajectory import Trajectory
+
+# Between the error [t r] of ROS, RTAB-Map, g2o and the error [r t] of Open3D and GTSAM.
+ROTATION_FIRST = np.roll(np.eye(6), 3, axis=0)
+
+
+class Constraint(NamedTuple):
+    """``T_from_to (4, 4)`` and its ``covariance (6, 6)`` in ROS order, in the *from* frame."""
+
+    T_from_to: Array
+    covariance: Array
+
+
+def between_keyframes(
+    closure: LoopClosure, odometry: Trajectory, k1_ns: int, k2_ns: int, T_body_camera: Array
+) -> Constraint:
+    """The closure as a constraint between the bodies at a consumer's own keyframes, near *from* and near *to*.
+
+    ``T_k1_k2 = O(k1)^-1 O(from) T_from_to O(to)^-1 O(k2)`` with O the odometry of the camera at the closure's moments
+    and of the body at the keyframes. ValueError for a moment that odometry does not cover.
+    """
+    T_k1_from = inverse(odometry.at(k1_ns)) @ odometry.at(closure.from_ns) @ T_body_camera
+    T_k2_to = inverse(odometry.at(k2_ns)) @ odometry.at(closure.to_ns) @ T_body_camera
+    return compensated(Constraint(closure.T_from_to, closure.covariance), T_k1_from, inverse(T_k2_to))
+
+
+def compensated(constraint: Constraint, T_k1_from: Array, T_to_k2: Array) -> Constraint:
+    """``T_k1_k2 = T_k1_from T_from_to T_to_k2`` and its covariance, to first order.
+
+    The two outer poses count as exact, so the keyframes have to be near.
+    """
+    R_k1_from = T_k1_from[:3, :3]
+    lever = constraint.T_from_to[:3, :3] @ T_to_k2[:3, 3]
+    J = np.zeros((6, 6))
+    J[:3, :3] = J[3:, 3:] = R_k1_from
+    J[:3, 3:] = -R_k1_from @ skew(lever)
+    return Constraint(T_k1_from @ constraint.T_from_to @ T_to_k2, J @ constraint.covariance @ J.T)
+
+
+def inverted(constraint: Constraint) -> Constraint:
+    """The same constraint from *to* to *from*: ``T_to_from`` and the covariance in the *to* frame."""
+    R, t = constraint.T_from_to[:3, :3], constraint.T_from_to[:3, 3]
+    J = np.zeros((6, 6))
+    J[:3, :3] = J[3:, 3:] = -R.T
+    J[:3, 3:] = -R.T @ skew(t)
+    return Constraint(pose(R.T, -R.T @ t), J @ constraint.covariance @ J.T)
+
+
+def local_information(constraint: Constraint) -> Array:
+    """The (6, 6) information of the error ``[t r]`` in the axes of the *to* frame: ``T' = T exp([t r])``.
+
+    This is what pose-graph optimisers weigh (g2o's EdgeSE3, GTSAM's BetweenFactor, and RTAB-Map over them): the error
+    of ``measured^-1 estimated``.
+    """
+    R_to_from = constraint.T_from_to[:3, :3].T
+    J = np.kron(np.eye(2), R_to_from)
+    information = np.linalg.inv(J @ constraint.covariance @ J.T)
+    return (information + information.T) / 2
+
+
+def open3d_information(constraint: Constraint) -> Array:
+    """The (6, 6) information of an Open3D ``PoseGraphEdge(source=to, target=from, T_from_to)``: rotation first.
+
+    Open3D's registration gives its information about the target's origin, yet its optimiser applies what it is given
+    to ``T_target_source^-1 T_target^-1 T_source``, which is an error in the *source's* axes (GlobalOptimization.cpp).
+    Given the former the optimum is off as soon as the two frames are not close, so this is the latter.
+    """
+    return ROTATION_FIRST @ local_information(constraint) @ ROTATION_FIRST.T

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pose-graph optimisation that survives wrong edges: Open3D's optimiser with line processes, tightened in stages.
+
+Choi, Zhou, Koltun, "Robust Reconstruction of Indoor Scenes" (2015) give every uncertain edge a switch in 0..1 that
+equals the Geman-McClure weight ``(mu / (mu + r^2))^2`` of its residual r. With drift a right edge begins far off and
+would be switched off at once, so mu comes down in stages from the largest residual to the wanted one: Yang et al.,
+"Graduated Non-Convexity for Robust Spatial Perception" (2020).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.geometry import inverse, vector_from_rotation
+
+STAGE = 4.0  # mu shrinks by this factor from stage to stage
+PRUNED = 0.25  # the weight of an edge whose squared residual is mu
+
+
+class Edge(NamedTuple):
+    """``T_target_source`` between two nodes and its ``information (6, 6)``, `constraint.open3d_information`'s kind.
+
+    An ``uncertain`` edge may be pruned.
+    """
+
+    target: int
+    source: int
+    T_target_source: Array
+    information: Array
+    uncertain: bool
+
+
+class Solution(NamedTuple):
+    """The poses of the nodes in the map, and for every edge whether it was ``kept``."""
+
+    poses: tuple[Array, ...]
+    kept: tuple[bool, ...]
+
+
+def optimise(poses: Sequence[Array], edges: Sequence[Edge], max_residual: float) -> Solution:
+    """Optimise the poses (4, 4) of the nodes; the first stays where it is.
+
+    The certain edges have to connect all nodes. An uncertain edge whose residual stays above ``max_residual`` standard
+    deviations is pruned: it has no influence on the poses that come back.
+    """
+    wanted = max_residual**2
+    kept = np.ones(len(edges), bool)
+    for mu in _stages(poses, edges, wanted):
+        poses, weights = _optimise_once(poses, edges, mu)
+        kept = weights >= PRUNED
+    if not kept.all():
+        survivors = [edge for edge, keep in zip(edges, kept, strict=True) if keep]
+        poses, _ = _optimise_once(poses, survivors, wanted)
+    return Solution(tuple(poses), tuple(bool(keep) for keep in kept))
+
+
+def squared_residual(poses: Sequence[Array], edge: Edge) -> float:
+    """How far the poses are from what the edge says, in squared standard deviations."""
+    estimated = inverse(poses[edge.target]) @ poses[edge.source]
+    error = inverse(edge.T_target_source) @ estimated
+    e = np.concatenate([vector_from_rotation(error[:3, :3]), error[:3, 3]])
+    return float(e @ edge.information @ e)
+
+
+def _stages(poses: Sequence[Array], edges: Sequence[Edge], wanted: float) -> list[float]:
+    """The values of mu, falling to ``wanted``."""
+    largest = max((squared_residual(poses, edge) for edge in edges if edge.uncertain), default=0.0)
+    count = int(np.ceil(np.log(max(largest / wanted, 1.0)) / np.log(STAGE)))
+    return [wanted * STAGE**k for k in range(count, -1, -1)]
+
+
+def _optimise_once(poses: Sequence[Array], edges: Sequence[Edge], mu: float) -> tuple[list[Array], Array]:
+    """Poses and weights of the edges at one value of mu."""
+    import open3d as o3d
+
+    registration = o3d.pipelines.registration
+    graph = _open3d_graph(registration, poses, edges)
+    # Open3D derives mu from a distance and the mean of information(5, 5), which it takes for a count of points.
+    mean_information = float(np.mean([edge.information[5, 5] for edge in edges]))
+    option = registration.GlobalOptimizationOption(
+        max_correspondence_distance=float(np.sqrt(mu / mean_information)),
+        edge_prune_threshold=0.0,
+        preference_loop_closure=1.0,
+        reference_node=0,
+    )
+    quiet = o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error)
+    with quiet:
+        registration.global_optimization(
+            graph,
+            registration.GlobalOptimizationLevenbergMarquardt(),
+            registration.GlobalOptimizationConvergenceCriteria(),
+            option,
+        )
+    weights = np.array([edge.confidence if edge.uncertain else 1.0 for edge in graph.edges])
+    return [np.array(node.pose) for node in graph.nodes], weights
+
+
+def _open3d_graph(registration: Any, poses: Sequence[Array], edges: Sequence[Edge]) -> Any:
+    graph = registration.PoseGraph()
+    for pose in poses:
+        graph.nodes.append(registration.PoseGraphNode(np.array(pose)))
+    for edge in edges:
+        graph.edges.append(
+            registration.PoseGraphEdge(
+                edge.source, edge.target, np.array(edge.T_target_source), edge.information, edge.uncertain
+            )
+        )
+    return graph

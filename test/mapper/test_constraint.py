@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames and orders of a constraint, each against small motions made by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from objreg_ros.data import Array, LoopClosure
+from objreg_ros.geometry import inverse, pose, rotation_from_vector, vector_from_rotation
+from objreg_ros.mapper.constraint import (
+    Constraint,
+    between_keyframes,
+    compensated,
+    inverted,
+    local_information,
+    open3d_information,
+)
+from objreg_ros.mapper.trajectory import Trajectory
+
+RNG = np.random.default_rng(7)
+
+
+def random_pose() -> Array:
+    return pose(rotation_from_vector(RNG.normal(size=3)), RNG.normal(size=3))
+
+
+def random_covariance() -> Array:
+    A = 1e-3 * RNG.normal(size=(6, 6))
+    return A @ A.T + 1e-8 * np.eye(6)
+
+
+def disturbed(T: Array, error: Array) -> Array:
+    """``T`` with the error [dt dr] of ROS."""
+    return pose(rotation_from_vector(error[3:]) @ T[:3, :3], T[:3, 3] + error[:3])
+
+
+def difference(T_disturbed: Array, T: Array) -> Array:
+    """The error [dt dr] of ROS between two poses."""
+    turn = vector_from_rotation(T_disturbed[:3, :3] @ T[:3, :3].T)
+    return np.concatenate([T_disturbed[:3, 3] - T[:3, 3], turn])
+
+
+def sampled_covariance(through: object, constraint: Constraint, local: bool = False) -> Array:
+    """The covariance of ``through(T)`` by disturbing T along each eigenvector of its covariance."""
+    values, vectors = np.linalg.eigh(constraint.covariance)
+    total, step = np.zeros((6, 6)), 1e-5
+    T_out = through(constraint.T_from_to)  # type: ignore[operator]
+    for value, vector in zip(values, vectors.T, strict=True):
+        T_moved = through(disturbed(constraint.T_from_to, step * vector))  # type: ignore[operator]
+        if local:
+            error = inverse(T_out) @ T_moved
+            moved = np.concatenate([error[:3, 3], vector_from_rotation(error[:3, :3])]) / step
+        else:
+            moved = difference(T_moved, T_out) / step
+        total += value * np.outer(moved, moved)
+    return total
+
+
+def test_compensation_carries_pose_and_covariance_to_the_keyframes() -> None:
+    T_k1_from, T_to_k2 = random_pose(), random_pose()
+    constraint = Constraint(random_pose(), random_covariance())
+    moved = compensated(constraint, T_k1_from, T_to_k2)
+    np.testing.assert_allclose(moved.T_from_to, T_k1_from @ constraint.T_from_to @ T_to_k2)
+    expected = sampled_covariance(lambda T: T_k1_from @ T @ T_to_k2, constraint)
+    np.testing.assert_allclose(moved.covariance, expected, rtol=1e-3, atol=1e-10)
+
+
+def test_inverting_carries_the_covariance_and_twice_is_nothing() -> None:
+    constraint = Constraint(random_pose(), random_covariance())
+    back = inverted(constraint)
+    np.testing.assert_allclose(back.T_from_to, inverse(constraint.T_from_to), atol=1e-12)
+    np.testing.assert_allclose(back.covariance, sampled_covariance(inverse, constraint), rtol=1e-3, atol=1e-10)
+    np.testing.assert_allclose(inverted(back).covariance, constraint.covariance, atol=1e-15)
+
+
+def test_local_information_is_the_inverse_covariance_in_the_axes_of_to() -> None:
+    constraint = Constraint(random_pose(), random_covariance())
+    expected = sampled_covariance(lambda T: T, constraint, local=True)
+    np.testing.assert_allclose(np.linalg.inv(local_information(constraint)), expected, rtol=1e-3, atol=1e-10)
+
+
+def test_open3d_wants_the_same_numbers_with_rotation_first() -> None:
+    constraint = Constraint(np.eye(4), np.diag([1.0, 4.0, 9.0, 16.0, 25.0, 36.0]))
+    np.testing.assert_allclose(np.diag(open3d_information(constraint)), 1 / np.array([16, 25, 36, 1, 4, 9]))
+
+
+def test_a_closure_between_cameras_becomes_one_between_the_bodies_of_the_keyframes() -> None:
+    T_body_camera = random_pose()
+    T_world_body = {stamp: random_pose() for stamp in (0, 10, 20, 30)}
+    odometry = Trajectory()
+    for stamp, T in T_world_body.items():
+        odometry.append(stamp, T)
+    T_from_to = inverse(T_world_body[0] @ T_body_camera) @ T_world_body[20] @ T_body_camera
+    closure = LoopClosure(from_ns=0, to_ns=20, T_from_to=T_from_to, covariance=np.eye(6), labels=())
+    constraint = between_keyframes(closure, odometry, 10, 30, T_body_camera)
+    np.testing.assert_allclose(constraint.T_from_to, inverse(T_world_body[10]) @ T_world_body[30], atol=1e-9)
+
+
+def test_a_closure_outside_odometry_is_refused_with_the_span() -> None:
+    odometry = Trajectory()
+    odometry.append(5, np.eye(4))
+    closure = LoopClosure(from_ns=0, to_ns=5, T_from_to=np.eye(4), covariance=np.eye(6), labels=())
+    with pytest.raises(ValueError, match="expected a stamp within 5 to 5 ns, got 0 ns"):
+        between_keyframes(closure, odometry, 5, 5, np.eye(4))

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A bent square becomes straight, and a wrong edge does not bend it again."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from objreg_ros.data import Array, LoopClosure, Odometry
+from objreg_ros.geometry import inverse, pose, rotation_from_vector
+from objreg_ros.mapper.params import MapperParams
+from objreg_ros.mapper.pose_graph import PoseGraph
+
+from .bent import SECOND, bent, closure, distances, odometry, square
+
+TRUE = square(laps=2)
+BENT = bent(TRUE)
+HALF = len(TRUE) // 2
+RIGHT = [closure(TRUE, k, k + HALF) for k in range(3, HALF, 13)]
+SIDEWAYS = pose(rotation_from_vector(np.array([0.0, 0.0, 1.2])), np.array([0.8, 0.6, 0.0]))
+
+
+def mapped(closures: list[LoopClosure], params: MapperParams | None = None) -> PoseGraph:
+    graph = PoseGraph(params)
+    for pose_in_time in odometry(BENT):
+        graph.add_odometry(pose_in_time)
+    for constraint in closures:
+        assert graph.add_closure(constraint)
+    return graph
+
+
+def corrected(graph: PoseGraph) -> list[Array]:
+    return graph.corrected(o.stamp_ns for o in odometry(BENT))
+
+
+def test_a_bent_square_becomes_straight() -> None:
+    graph = mapped(RIGHT)
+    summary = graph.optimise()
+    before, after = distances(BENT, TRUE), distances(corrected(graph), TRUE)
+    assert len(summary.kept) == len(RIGHT) and not summary.pruned
+    assert np.sqrt(np.mean(after**2)) < 0.25 * np.sqrt(np.mean(before**2))
+
+
+def test_wrong_edges_are_pruned_and_change_nothing() -> None:
+    wrong = [closure(TRUE, 10, 90, SIDEWAYS), closure(TRUE, 30, 130, inverse(SIDEWAYS))]
+    clean, dirty = mapped(RIGHT), mapped([*RIGHT[:3], *wrong, *RIGHT[3:]])
+    clean.optimise()
+    summary = dirty.optimise()
+    assert {(c.from_ns, c.to_ns) for c in summary.pruned} == {(c.from_ns, c.to_ns) for c in wrong}
+    assert distances(corrected(dirty), corrected(clean)).max() < 0.005
+
+
+def test_without_closures_the_map_is_odometry() -> None:
+    graph = mapped([])
+    assert graph.optimise().kept == ()
+    np.testing.assert_allclose(graph.T_map_odom, np.eye(4), atol=1e-12)
+    assert distances(corrected(graph), BENT).max() < 1e-9
+
+
+def test_the_correction_belongs_to_the_newest_keyframe() -> None:
+    graph = mapped(RIGHT)
+    graph.optimise()
+    stamp, T_map_body = graph.path()[-1]
+    np.testing.assert_allclose(graph.T_map_odom @ graph.odometry.at(stamp), T_map_body, atol=1e-9)
+
+
+def test_new_keyframes_continue_from_the_corrected_map() -> None:
+    graph = mapped(RIGHT)
+    graph.optimise()
+    correction = graph.T_map_odom
+    T_odom_body = BENT[-1] @ pose(np.eye(3), np.array([1.0, 0.0, 0.0]))
+    assert graph.add_odometry(Odometry(T_odom_body=T_odom_body, stamp_ns=1000 * SECOND))
+    np.testing.assert_allclose(graph.path()[-1][1], correction @ T_odom_body, atol=1e-9)
+
+
+def test_a_closure_waits_for_its_odometry() -> None:
+    graph = PoseGraph()
+    assert not graph.add_closure(RIGHT[0])
+    for pose_in_time in odometry(BENT):
+        graph.add_odometry(pose_in_time)
+    assert graph.add_closure(RIGHT[0])
+
+
+def test_the_place_of_the_camera_on_the_body_is_honoured() -> None:
+    """Closures between cameras that look sideways give the same map as closures between bodies."""
+    T_body_camera = pose(rotation_from_vector(np.array([-1.2, 1.2, -1.2])), np.array([0.1, 0.0, 0.4]))
+    of_body, of_camera = mapped(RIGHT), mapped([])
+    of_camera.T_body_camera = T_body_camera
+    for right in RIGHT:
+        T_from_to = inverse(T_body_camera) @ right.T_from_to @ T_body_camera
+        moved = LoopClosure(
+            from_ns=right.from_ns, to_ns=right.to_ns, T_from_to=T_from_to, covariance=right.covariance, labels=()
+        )
+        assert of_camera.add_closure(moved)
+    of_body.optimise()
+    of_camera.optimise()
+    assert distances(corrected(of_camera), corrected(of_body)).max() < 0.03
+    assert distances(corrected(of_camera), TRUE).max() < 0.3 * distances(BENT, TRUE).max()
+
+
+def test_keyframes_are_apart_by_the_parameters() -> None:
+    near, far = (mapped([], MapperParams(keyframe_translation=d, keyframe_rotation=180.0)) for d in (0.2, 0.8))
+    assert len(near.keyframes) > 2.5 * len(far.keyframes)
+    steps = [np.linalg.norm((inverse(a) @ b)[:3, 3]) for a, b in pairwise(far.keyframes.poses)]
+    assert min(steps) >= 0.8
+
+
+def test_time_that_runs_back_is_refused_and_clear_starts_anew() -> None:
+    graph = mapped(RIGHT)
+    with pytest.raises(ValueError, match="expected a stamp after"):
+        graph.add_odometry(odometry(BENT)[0])
+    graph.clear()
+    assert graph.path() == [] and graph.add_odometry(odometry(BENT)[0])
