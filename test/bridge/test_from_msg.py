@@ -4,13 +4,14 @@ from __future__ import annotations
 import json
 from types import SimpleNamespace
 
-import messages
 import numpy as np
 import pytest
 
 from objreg_ros.bridge import from_msg
 from objreg_ros.bridge.layout import DETECTIONS, OBJECTS, SUPPORT_ID, VIEW
 from objreg_ros.geometry import rotation_from_vector
+
+from . import messages
 
 K = [500.0, 0, 31.5, 0, 510.0, 23.5, 0, 0, 1]
 PACKED = np.dtype({"names": ["x", "y", "z", "rgb"], "formats": ["<f4"] * 4, "offsets": [0, 4, 8, 16], "itemsize": 32})

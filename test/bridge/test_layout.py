@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
-import messages
 import numpy as np
 import pytest
 
 from objreg_ros.bridge.layout import DETECTIONS, OBJECTS, VIEW, columns, fields_of, table
+
+from . import messages
 
 
 def test_our_tables_are_packed_and_colour_goes_as_float() -> None:

@@ -5,11 +5,12 @@ import array
 import struct
 
 import cv2
-import messages
 import numpy as np
 import pytest
 
 from objreg_ros.bridge.pictures import colour_pixels, depth_metres, unpack_rgb
+
+from . import messages
 
 RED = (200, 30, 10)
 

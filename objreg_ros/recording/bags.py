@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""rosbag1 and rosbag2, plain and compressed, read through the library `rosbags`."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.rosbag1 import ReaderError as Rosbag1Error
+from rosbags.rosbag2 import ReaderError as Rosbag2Error
+from rosbags.serde import SerdeError
+
+from objreg_ros.recording.messages import serialise, standard_types
+from objreg_ros.recording.record import Record, Recording, Topic
+
+# What the library lets through when the bytes of a file are not what they should be.
+BROKEN = (
+    AnyReaderError,
+    Rosbag1Error,
+    Rosbag2Error,
+    SerdeError,
+    struct.error,
+    AssertionError,
+    EOFError,
+    KeyError,
+    IndexError,
+    TypeError,
+    UnicodeDecodeError,
+)
+REPAIR = {
+    ".bag": "`rosbag reindex` repairs a bag that was not closed",
+    ".mcap": "`mcap recover` saves what is readable",
+    ".db3": "`ros2 bag reindex` writes the metadata again",
+}
+
+
+class BagRecording(Recording):
+    """A rosbag1 file, a rosbag2 folder or a single rosbag2 file."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.notes = path, []
+        with _broken_means_value_error(path):
+            self._reader = AnyReader([path], default_typestore=standard_types())
+            self._reader.open()
+        self.kind = _kind(path)
+        self.topics = _topics(self._reader)
+        self.start_ns, self.end_ns = (self._reader.start_time, self._reader.end_time) if self.topics else (0, 0)
+
+    def records(
+        self, topics: Collection[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
+    ) -> Iterator[Record]:
+        """See `Recording.records`. ValueError at the place where the file is broken."""
+        wanted = [c for c in self._reader.connections if topics is None or c.topic in topics]
+        if not wanted:
+            return
+        with _broken_means_value_error(self.path):
+            for connection, stamp_ns, raw in self._reader.messages(wanted, start_ns, end_ns):
+                yield self._record(connection, stamp_ns, raw)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._reader.close()
+
+    def _record(self, connection: Any, stamp_ns: int, raw: bytes) -> Record:
+        def decode() -> Any:
+            with _broken_means_value_error(self.path):
+                return self._reader.deserialize(raw, connection.msgtype)
+
+        def encode() -> bytes:
+            return bytes(raw) if self._reader.is2 else serialise(decode())
+
+        return Record(connection.topic, connection.msgtype, stamp_ns, decode, encode)
+
+
+def _topics(reader: AnyReader) -> dict[str, Topic]:
+    counts: dict[str, Topic] = {}
+    for connection in reader.connections:
+        before = counts[connection.topic].count if connection.topic in counts else 0
+        counts[connection.topic] = Topic(connection.topic, connection.msgtype, before + connection.msgcount)
+    return dict(sorted(counts.items()))
+
+
+def _kind(path: Path) -> str:
+    if path.suffix == ".bag":
+        return "rosbag1"
+    files = [path] if path.is_file() else sorted(path.iterdir())
+    return "rosbag2 (mcap)" if any(".mcap" in file.suffixes for file in files) else "rosbag2 (sqlite3)"
+
+
+@contextmanager
+def _broken_means_value_error(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except BROKEN as error:
+        said = str(error).rstrip(".") or type(error).__name__
+        suffix = path.suffix if path.is_file() else next((f.suffix for f in path.iterdir() if f.suffix in REPAIR), "")
+        repair = REPAIR.get(suffix, "record it again or check the copy")
+        raise ValueError(f"{path}: expected a whole bag, got: {said}; truncated or corrupt? {repair}") from error

@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which topics of a recording go to which input of the graph: by type, then by the names that drivers use.
+
+Drivers do not agree on names, so a choice is a ranking: the first pattern that fits wins, and what `--remap` names wins
+over everything.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+
+from objreg_ros.recording.record import Topic
+
+PICTURES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
+POSES = (
+    "geometry_msgs/msg/PoseStamped",
+    "nav_msgs/msg/Odometry",
+    "geometry_msgs/msg/PoseWithCovarianceStamped",
+    "geometry_msgs/msg/TransformStamped",
+)
+TRUTH = r"ground_?truth|(^|/)gt(/|$|_)|vicon|mocap|vrpn|optitrack"
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """What an input may be: its types, names that it never has, and names by preference (regular expressions)."""
+
+    types: tuple[str, ...]
+    never: str
+    prefer: tuple[str, ...]
+
+
+# The first of two pictures that fit equally is the one of the shorter name: raw before compressed.
+RULES = {
+    "image": Rule(
+        PICTURES,
+        r"(?<!rgb_to_)depth|(^|/)ir(/|_|$)|infra|disparity|mask|label|(^|/)theora"
+        r"|objects|view|left|right",
+        (
+            r"rgb_to_depth/image",  # Azure Kinect: colour in the geometry of its native depth
+            r"^/?image$",
+            r"rgb/image_rect_color",
+            r"image_color_rect",
+            r"rgb/image_color",
+            r"rgb/image_raw",
+            r"rgb/image",
+            r"color/image",
+            r"colou?r",
+            r"rgb",
+            r"image",
+        ),
+    ),
+    "points": Rule(
+        ("sensor_msgs/msg/PointCloud2",),
+        r"objects|view|detections_table|velodyne|lidar|ouster|livox|map",
+        (r"^/?points$", r"depth_registered/points", r"hd/points|qhd/points|sd/points", r"points2?$", r"points|cloud"),
+    ),
+    "depth": Rule(
+        PICTURES,
+        r"(^|/)ir(/|_|$)|infra|rgb_to_depth|disparity",
+        (
+            r"^/?depth/image$",
+            r"depth_registered/hw_registered/image_rect",
+            r"depth_registered/.*image_rect",
+            r"depth_registered/",
+            r"aligned_depth_to_colou?r",
+            r"depth_to_rgb/",
+            r"(hd|qhd)/image_depth_rect",
+            r"rgb.*depth",
+            r"depth/image_rect",
+            r"depth/image",
+            r"depth",
+        ),
+    ),
+    "odom": Rule(("nav_msgs/msg/Odometry",), TRUTH, (r"^/?odom$", r"odom", r".")),
+    "ground_truth": Rule(POSES, r"(?!.*(" + TRUTH + r"))^", (TRUTH,)),
+}
+RULES["depth_native"] = Rule(PICTURES, RULES["depth"].never + "|depth_to_rgb", (r"depth/image",))
+NATIVE = "rgb_to_depth"  # colour in the geometry of the native depth
+REGISTERED = RULES["depth"].prefer.index(r"depth/image_rect")  # the names before it say that they are registered
+CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
+COMPRESSED = re.compile(r"/(compressed|compressedDepth)$")
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """The topic of a recording for each input of the graph; None where it has none."""
+
+    image: str | None = None
+    points: str | None = None
+    depth: str | None = None
+    camera_info: str | None = None
+    odom: str | None = None
+    ground_truth: str | None = None
+
+    def chosen(self) -> dict[str, str]:
+        """Input → topic, of those that there are."""
+        return {f.name: topic for f in fields(self) if (topic := getattr(self, f.name)) is not None}
+
+    @property
+    def complete(self) -> bool:
+        """Whether the graph can run on it: colour, and a depth of one kind."""
+        return self.image is not None and (self.points is not None or None not in (self.depth, self.camera_info))
+
+    @property
+    def missing(self) -> str:
+        """What keeps the graph from running, in words; empty if nothing does."""
+        lacks = [] if self.image else ["a colour image"]
+        if self.points is None and self.depth is None:
+            lacks.append("points or a depth image")
+        elif self.points is None and self.camera_info is None:
+            lacks.append("the camera_info of the depth image")
+        return " and ".join(lacks)
+
+
+GRAPH_TOPICS = {  # the names that the nodes subscribe to
+    "image": "image",
+    "points": "points",
+    "depth": "depth/image",
+    "camera_info": "camera_info",
+    "odom": "odom",
+    "ground_truth": "ground_truth",
+}
+_INPUT_OF = {topic: name for name, topic in GRAPH_TOPICS.items()}
+
+
+def choose_inputs(topics: Mapping[str, Topic], remaps: Mapping[str, str] | None = None) -> Inputs:
+    """The best topic for each input. ``remaps`` say it outright: input → topic, or input → "" for none.
+
+    A depth image with its camera_info goes before points: it is the same measurement in a thirteenth of the bytes.
+    Points go before a depth image whose name does not say that it is registered to colour. ValueError for a remap
+    that names no input or no topic of the recording.
+    """
+    asked = {_input_name(name): topic for name, topic in (remaps or {}).items()}
+    _require_known(asked, topics)
+    found = {name: asked[name] if name in asked else _best(rule, topics.values()) for name, rule in RULES.items()}
+    if "depth" not in asked and NATIVE in (found["image"] or ""):
+        found["depth"] = _best(RULES["depth_native"], topics.values())
+    found["camera_info"] = asked.get("camera_info", _camera_info_of((found["depth"], found["image"]), topics))
+    if _depth_wins(found, asked):
+        found["points"] = None
+    else:
+        found["depth"] = None
+        found["camera_info"] = asked.get("camera_info", _camera_info_of((found["image"], found["points"]), topics))
+    return Inputs(**{field.name: found[field.name] or None for field in fields(Inputs)})
+
+
+def _depth_wins(found: Mapping[str, str | None], asked: Mapping[str, str]) -> bool:
+    """Whether the depth image is used and not the points."""
+    if not found["depth"] or not found["points"]:
+        return bool(found["depth"])
+    if "points" in asked or not found["camera_info"]:
+        return "depth" in asked and bool(found["camera_info"])
+    return "depth" in asked or NATIVE in (found["image"] or "") or _rank(RULES["depth"], found["depth"]) < REGISTERED
+
+
+def parse_remaps(texts: Iterable[str]) -> dict[str, str]:
+    """``image:=/camera/rgb/image_color`` and the like as a mapping; ValueError for another form."""
+    remaps = {}
+    for text in texts:
+        name, sign, topic = text.partition(":=")
+        if not sign or not name:
+            raise ValueError(f"remap: expected input:=/topic, got {text!r}")
+        remaps[_input_name(name)] = topic
+    return remaps
+
+
+def _input_name(name: str) -> str:
+    plain = name.lstrip("/")
+    plain = _INPUT_OF.get(plain, plain)
+    if plain not in GRAPH_TOPICS:
+        raise ValueError(f"remap: expected an input of {', '.join(GRAPH_TOPICS)}, got {name!r}")
+    return plain
+
+
+def _require_known(asked: Mapping[str, str], topics: Mapping[str, Topic]) -> None:
+    unknown = sorted(topic for topic in asked.values() if topic and topic not in topics)
+    if unknown:
+        raise ValueError(f"remap: expected a topic of the recording ({', '.join(topics)}), got {', '.join(unknown)}")
+
+
+def _best(rule: Rule, topics: Iterable[Topic]) -> str | None:
+    fitting = [t.name for t in topics if t.msgtype in rule.types and t.count and not re.search(rule.never, t.name)]
+    ranked = [(_rank(rule, name), len(name), name) for name in fitting]
+    return min(ranked)[2] if ranked else None
+
+
+def _rank(rule: Rule, name: str) -> int:
+    base = COMPRESSED.sub("", name)
+    return next((i for i, pattern in enumerate(rule.prefer) if re.search(pattern, base)), len(rule.prefer))
+
+
+def _camera_info_of(pictures: Iterable[str | None], topics: Mapping[str, Topic]) -> str | None:
+    """The camera_info beside the first of the pictures that has one, else the only one."""
+    infos = [t.name for t in topics.values() if t.msgtype == CAMERA_INFO and t.count]
+    for picture in filter(None, pictures):
+        shared, nearest = max(((_shared(info, picture), info) for info in infos), default=(0, ""))
+        if nearest and shared >= _folders(picture):
+            return nearest
+    return infos[0] if len(infos) == 1 else None
+
+
+def _folders(picture: str) -> int:
+    """How many leading folders a camera_info must share with a picture to be of the same camera, two at most."""
+    return min(2, len(COMPRESSED.sub("", picture).strip("/").split("/")) - 1)
+
+
+def _shared(info: str, picture: str) -> int:
+    pairs = zip(info.strip("/").split("/")[:-1], picture.strip("/").split("/"), strict=False)
+    return next((i for i, (a, b) in enumerate(pairs) if a != b), len(info.strip("/").split("/")) - 1)

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Standard ROS 2 messages made and written without ROS, by the types that `rosbags` ships."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.store import Typestore
+
+from objreg_ros.bridge.layout import fields_of
+from objreg_ros.data import Intrinsics
+from objreg_ros.geometry import quaternion_from_rotation
+
+Array = NDArray[Any]
+
+
+@cache
+def standard_types() -> Typestore:
+    """The message types of ROS 2 Jazzy."""
+    return get_typestore(Stores.ROS2_JAZZY)
+
+
+def message(msgtype: str, **values: Any) -> Any:
+    """A message of a type like ``sensor_msgs/Image`` with all its fields."""
+    package, _, name = msgtype.partition("/")
+    return standard_types().types[f"{package}/msg/{name}"](**values)
+
+
+def serialise(made: Any) -> bytes:
+    """The CDR bytes of a message of a standard type; of a ROS 1 message after it was brought up to date."""
+    modern = modernise(made)
+    return bytes(standard_types().serialize_cdr(modern, modern.__msgtype__))
+
+
+def modernise(old: Any) -> Any:
+    """A message with the fields that its type has in ROS 2: no ``seq`` in headers, small letters in CameraInfo."""
+    types = standard_types().types
+    if old.__msgtype__ not in types:
+        raise ValueError(f"{old.__msgtype__}: expected a type that ROS 2 ships; leave its topic out")
+    kind: Any = types[old.__msgtype__]
+    if isinstance(old, kind):
+        return old
+    return kind(**{field.name: _modern_value(old, field.name) for field in _fields(kind)})
+
+
+def _fields(kind: Any) -> Sequence[Any]:
+    return [field for field in dataclasses.fields(kind) if field.init]
+
+
+def _modern_value(old: Any, name: str) -> Any:
+    value = getattr(old, name) if hasattr(old, name) else getattr(old, name.upper())
+    if hasattr(value, "__msgtype__"):
+        return modernise(value)
+    if isinstance(value, list):
+        return [modernise(item) if hasattr(item, "__msgtype__") else item for item in value]
+    return value
+
+
+# -------------------------------------------------------------------------------------------------- the ones we need
+
+
+def header(stamp_ns: int, frame_id: str) -> Any:
+    """std_msgs/Header."""
+    return message("std_msgs/Header", stamp=time(stamp_ns), frame_id=frame_id)
+
+
+def time(stamp_ns: int) -> Any:
+    """builtin_interfaces/Time."""
+    return message("builtin_interfaces/Time", sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9)
+
+
+def image(pixels: Array, encoding: str, stamp_ns: int, frame_id: str) -> Any:
+    """sensor_msgs/Image of pixels (H, W) or (H, W, C) whose dtype fits the encoding."""
+    little = np.ascontiguousarray(pixels, pixels.dtype.newbyteorder("<"))
+    return message(
+        "sensor_msgs/Image",
+        header=header(stamp_ns, frame_id),
+        height=pixels.shape[0],
+        width=pixels.shape[1],
+        encoding=encoding,
+        is_bigendian=0,
+        step=little.strides[0],
+        data=little.reshape(-1).view(np.uint8),
+    )
+
+
+def camera_info(camera: Intrinsics, stamp_ns: int, frame_id: str, distortion: Sequence[float] = (0,) * 5) -> Any:
+    """sensor_msgs/CameraInfo of a pinhole camera with plumb-bob distortion."""
+    K = [camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1]
+    P = [camera.fx, 0, camera.cx, 0, 0, camera.fy, camera.cy, 0, 0, 0, 1, 0]
+    roi = message("sensor_msgs/RegionOfInterest", x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
+    return message(
+        "sensor_msgs/CameraInfo",
+        header=header(stamp_ns, frame_id),
+        height=camera.height,
+        width=camera.width,
+        distortion_model="plumb_bob",
+        d=np.array(distortion, np.float64),
+        k=np.array(K, np.float64),
+        r=np.eye(3).ravel(),
+        p=np.array(P, np.float64),
+        binning_x=0,
+        binning_y=0,
+        roi=roi,
+    )
+
+
+def point_cloud(records: Array, stamp_ns: int, frame_id: str) -> Any:
+    """sensor_msgs/PointCloud2 of structured records (H, W); `objreg_ros.bridge.layout` has layouts."""
+    packed = np.ascontiguousarray(records)
+    fields = [
+        message("sensor_msgs/PointField", name=name, offset=offset, datatype=datatype, count=1)
+        for name, offset, datatype in fields_of(packed.dtype)
+    ]
+    return message(
+        "sensor_msgs/PointCloud2",
+        header=header(stamp_ns, frame_id),
+        height=packed.shape[0],
+        width=packed.shape[1],
+        fields=fields,
+        is_bigendian=False,
+        point_step=packed.itemsize,
+        row_step=packed.itemsize * packed.shape[1],
+        data=np.frombuffer(packed.tobytes(), np.uint8),
+        is_dense=False,
+    )
+
+
+def pose(T_parent_child: Array) -> Any:
+    """geometry_msgs/Pose."""
+    x, y, z, w = (float(v) for v in quaternion_from_rotation(T_parent_child[:3, :3]))
+    px, py, pz = (float(v) for v in T_parent_child[:3, 3])
+    return message(
+        "geometry_msgs/Pose",
+        position=message("geometry_msgs/Point", x=px, y=py, z=pz),
+        orientation=message("geometry_msgs/Quaternion", x=x, y=y, z=z, w=w),
+    )
+
+
+def pose_stamped(T_parent_child: Array, stamp_ns: int, frame_id: str) -> Any:
+    """geometry_msgs/PoseStamped: the pose of something in ``frame_id``."""
+    return message("geometry_msgs/PoseStamped", header=header(stamp_ns, frame_id), pose=pose(T_parent_child))
+
+
+def odometry(T_odom_body: Array, covariance: Array, stamp_ns: int, frame_id: str, child_frame_id: str) -> Any:
+    """nav_msgs/Odometry with a (6, 6) covariance and no twist."""
+    zero = message("geometry_msgs/Vector3", x=0.0, y=0.0, z=0.0)
+    still = message("geometry_msgs/Twist", linear=zero, angular=zero)
+    return message(
+        "nav_msgs/Odometry",
+        header=header(stamp_ns, frame_id),
+        child_frame_id=child_frame_id,
+        pose=message(
+            "geometry_msgs/PoseWithCovariance",
+            pose=pose(T_odom_body),
+            covariance=np.ascontiguousarray(covariance, np.float64).ravel(),
+        ),
+        twist=message("geometry_msgs/TwistWithCovariance", twist=still, covariance=np.zeros(36)),
+    )

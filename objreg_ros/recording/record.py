@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What every recording is: topics, and records in order of time that are decoded only when someone asks."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+from objreg_ros.recording.messages import serialise
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """A topic of a recording; ``msgtype`` as in ``sensor_msgs/msg/Image``."""
+
+    name: str
+    msgtype: str
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One recorded message. ``stamp_ns`` is when it was recorded; the time of the measurement is in its header."""
+
+    topic: str
+    msgtype: str
+    stamp_ns: int
+    decode: Callable[[], Any]
+    encode: Callable[[], bytes]
+
+    @classmethod
+    def of(cls, topic: str, message: Any, stamp_ns: int) -> Record:
+        """A record of a message made with `objreg_ros.recording.messages`."""
+        return cls.made(topic, message.__msgtype__, stamp_ns, lambda: message)
+
+    @classmethod
+    def made(cls, topic: str, msgtype: str, stamp_ns: int, make: Callable[[], Any]) -> Record:
+        """A record whose message is made when it is wanted."""
+        return cls(topic, msgtype, stamp_ns, make, lambda: serialise(make()))
+
+    @property
+    def message(self) -> Any:
+        """The message, decoded now; keep it if it is needed twice. Its fields are those of the ROS message."""
+        return self.decode()
+
+    @property
+    def cdr(self) -> bytes:
+        """The message as ROS 2 sends it; ValueError if it is of a ROS 1 type that ROS 2 does not know."""
+        return self.encode()
+
+
+class Recording(ABC):
+    """A recording that is open; a context manager. ``notes`` say what was assumed or is odd, for the user."""
+
+    path: Path
+    kind: str
+    topics: dict[str, Topic]
+    start_ns: int
+    end_ns: int
+    notes: list[str]
+
+    @abstractmethod
+    def records(
+        self, topics: Collection[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
+    ) -> Iterator[Record]:
+        """The records of some topics (None: of all) from ``start_ns`` and before ``end_ns``, in order of time."""
+
+    def close(self) -> None:  # noqa: B027  a folder has nothing to close
+        """Let go of the files."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def seconds(self) -> float:
+        """From the first to the last record."""
+        return max(0.0, (self.end_ns - self.start_ns) * 1e-9)

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Folders in the TUM RGB-D layout, as a recording of standard messages.
+
+``rgb/`` and ``depth/`` (16-bit PNG registered to colour), ``associations.txt`` or ``rgb.txt`` and ``depth.txt``,
+``groundtruth.txt`` (timestamp tx ty tz qx qy qz qw of the colour camera in the world), ``camera.yaml``. See Sturm et
+al., "A Benchmark for the Evaluation of RGB-D SLAM Systems" (2012).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+from decimal import Decimal, InvalidOperation
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from objreg_ros.data import Intrinsics
+from objreg_ros.geometry import pose, rotation_from_quaternion
+from objreg_ros.recording import messages
+from objreg_ros.recording.record import Record, Recording, Topic
+
+Array = NDArray[Any]
+
+IMAGE, DEPTH, CAMERA_INFO, GROUND_TRUTH = "/image", "/depth/image", "/camera_info", "/ground_truth"
+TYPES = {
+    CAMERA_INFO: "sensor_msgs/msg/CameraInfo",
+    GROUND_TRUTH: "geometry_msgs/msg/PoseStamped",
+    IMAGE: "sensor_msgs/msg/Image",
+    DEPTH: "sensor_msgs/msg/Image",
+}
+CAMERA_FRAME, WORLD_FRAME = "camera", "world"
+ASSOCIATION_NS = 20_000_000  # as the benchmark's associate.py
+MILLIMETRES = 1000.0
+# The benchmark's own advice for sequences without calibration: ROS's default camera and depth in steps of 0.2 mm.
+DEFAULT_CAMERA = {"fx": 525.0, "fy": 525.0, "cx": 319.5, "cy": 239.5, "depth_scale": 5000.0}
+
+
+class Moment(NamedTuple):
+    """One record before it is made."""
+
+    stamp_ns: int
+    topic: str
+    make: Callable[[], Any]
+
+
+class TumRecording(Recording):
+    """A TUM RGB-D folder; its topics are those of the graph and ``/ground_truth``. It never has odometry."""
+
+    kind = "TUM RGB-D folder"
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.notes = path, []
+        pairs = _pairs(path)
+        self._camera, self._depth_scale, self._distortion = self._read_camera(path / pairs[0][1])
+        moments = [m for pair in pairs for m in self._moments(*pair)] + _ground_truth(path)
+        order = list(TYPES)
+        self._sequence = sorted(moments, key=lambda m: (m.stamp_ns, order.index(m.topic)))
+        counts = {name: sum(m.topic == name for m in moments) for name in TYPES}
+        self.topics = {name: Topic(name, TYPES[name], count) for name, count in counts.items() if count}
+        self.start_ns, self.end_ns = self._sequence[0].stamp_ns, self._sequence[-1].stamp_ns + 1
+
+    def records(
+        self, topics: Collection[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
+    ) -> Iterator[Record]:
+        """See `Recording.records`. OSError for a picture that cannot be read."""
+        for stamp_ns, topic, make in self._sequence:
+            wanted = topics is None or topic in topics
+            if wanted and (start_ns is None or stamp_ns >= start_ns) and (end_ns is None or stamp_ns < end_ns):
+                yield Record.made(topic, TYPES[topic], stamp_ns, make)
+
+    def _moments(self, colour_ns: int, colour: str, depth_ns: int, depth: str) -> list[Moment]:
+        info = partial(messages.camera_info, self._camera, depth_ns, CAMERA_FRAME, self._distortion)
+        return [
+            Moment(depth_ns, CAMERA_INFO, info),
+            Moment(colour_ns, IMAGE, partial(_colour_message, self.path / colour, colour_ns)),
+            Moment(depth_ns, DEPTH, partial(_depth_message, self.path / depth, depth_ns, self._depth_scale)),
+        ]
+
+    def _read_camera(self, picture: Path) -> tuple[Intrinsics, float, list[float]]:
+        file = self.path / "camera.yaml"
+        height, width = _read_picture(picture, cv2.IMREAD_COLOR).shape[:2]
+        if not file.exists():
+            self.notes.append("no camera.yaml: the benchmark's default camera (525 px, depth / 5000) is assumed")
+        values = {"width": width, "height": height, **DEFAULT_CAMERA, **(_read_yaml(file) if file.exists() else {})}
+        try:
+            numbers = {name: float(values[name]) for name in ("fx", "fy", "cx", "cy")}
+            camera = Intrinsics(**numbers, width=int(values["width"]), height=int(values["height"]))
+            distortion = [float(value) for value in values.get("distortion", (0.0,) * 5)]
+            return camera, float(values["depth_scale"]), distortion
+        except (KeyError, TypeError, ValueError) as error:
+            raise ValueError(f"{file}: expected numbers fx fy cx cy width height depth_scale, got: {error}") from error
+
+
+def _read_yaml(file: Path) -> dict[str, Any]:
+    try:
+        values = yaml.safe_load(file.read_text())
+    except yaml.YAMLError as error:
+        raise ValueError(f"{file}: expected YAML, got: {error}") from error
+    if not isinstance(values, dict):
+        raise ValueError(f"{file}: expected a mapping like fx: 525.0, got {type(values).__name__}")
+    return values
+
+
+def _pairs(folder: Path) -> list[tuple[int, str, int, str]]:
+    """(colour stamp, colour file, depth stamp, depth file) of every associated pair."""
+    names = ("associations.txt", "associate.txt", "association.txt", "assoc.txt")
+    file = next((folder / name for name in names if (folder / name).exists()), None)
+    if file is not None:
+        pairs = [(_stamp(row[0], file), row[1], _stamp(row[2], file), row[3]) for row in _rows(file, 4)]
+    else:
+        pairs = _associate(_pictures(folder, "rgb"), _pictures(folder, "depth"))
+    missing = next((name for _, c, _, d in pairs for name in (c, d) if not (folder / name).exists()), None)
+    if missing or not pairs:
+        raise FileNotFoundError(
+            f"{folder}: expected pairs of colour and depth pictures, got {missing or 'none'} missing"
+        )
+    return pairs
+
+
+def _pictures(folder: Path, name: str) -> list[tuple[int, str]]:
+    """(stamp, file) of a list like rgb.txt, or of the pictures themselves where they are named by time."""
+    file = folder / f"{name}.txt"
+    if file.exists():
+        return [(_stamp(row[0], file), row[1]) for row in _rows(file, 2)]
+    pictures = sorted((folder / name).glob("*.*")) if (folder / name).is_dir() else []
+    return [(_stamp(picture.stem, picture), f"{name}/{picture.name}") for picture in pictures]
+
+
+def _associate(colour: list[tuple[int, str]], depth: list[tuple[int, str]]) -> list[tuple[int, str, int, str]]:
+    """Each colour picture with the depth picture nearest in time, each used once, best pairs first."""
+    depth_ns = np.array([stamp for stamp, _ in depth], np.int64)
+    near = [(abs(stamp - int(d)), i, j) for i, (stamp, _) in enumerate(colour) for j, d in _around(depth_ns, stamp)]
+    pairs: dict[int, int] = {}
+    for _, i, j in sorted(n for n in near if n[0] <= ASSOCIATION_NS):
+        if i not in pairs and j not in pairs.values():
+            pairs[i] = j
+    return [(*colour[i], *depth[j]) for i, j in sorted(pairs.items())]
+
+
+def _around(stamps: Array, stamp: int) -> list[tuple[int, int]]:
+    place = int(np.searchsorted(stamps, stamp))
+    return [(j, int(stamps[j])) for j in (place - 1, place) if 0 <= j < len(stamps)]
+
+
+def _ground_truth(folder: Path) -> list[Moment]:
+    file = folder / "groundtruth.txt"
+    return [_true_moment(row, file) for row in _rows(file, 8)] if file.exists() else []
+
+
+def _true_moment(row: list[str], file: Path) -> Moment:
+    try:
+        numbers = np.array([float(text) for text in row[1:8]])
+        T_world_camera = pose(rotation_from_quaternion(numbers[3:]), numbers[:3])
+    except ValueError as error:
+        raise ValueError(f"{file}: expected timestamp tx ty tz qx qy qz qw, got {' '.join(row)}") from error
+    stamp_ns = _stamp(row[0], file)
+    return Moment(stamp_ns, GROUND_TRUTH, partial(messages.pose_stamped, T_world_camera, stamp_ns, WORLD_FRAME))
+
+
+def _rows(file: Path, columns: int) -> list[list[str]]:
+    lines = [line.split() for line in file.read_text().splitlines() if line.strip() and not line.startswith("#")]
+    short = next((line for line in lines if len(line) < columns), None)
+    if short is not None:
+        raise ValueError(f"{file}: expected {columns} columns in each line, got {' '.join(short)!r}")
+    return lines
+
+
+def _stamp(text: str, file: Path) -> int:
+    try:
+        return int((Decimal(text) * 10**9).to_integral_value())
+    except InvalidOperation:
+        raise ValueError(f"{file}: expected a time in seconds, got {text!r}") from None
+
+
+def _read_picture(file: Path, flags: int) -> Array:
+    pixels = cv2.imread(str(file), flags)
+    if pixels is None:
+        raise OSError(f"{file}: expected a picture, got a file that does not decode; check the download")
+    return np.asarray(pixels)
+
+
+def _colour_message(file: Path, stamp_ns: int) -> Any:
+    rgb = cv2.cvtColor(_read_picture(file, cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
+    return messages.image(rgb, "rgb8", stamp_ns, CAMERA_FRAME)
+
+
+def _depth_message(file: Path, stamp_ns: int, scale: float) -> Any:
+    """16UC1 where the steps are millimetres, else 32FC1 metres."""
+    pixels = _read_picture(file, cv2.IMREAD_UNCHANGED)
+    if pixels.dtype != np.uint16 or pixels.ndim != 2:
+        raise OSError(f"{file}: expected a 16-bit picture of one channel, got {pixels.dtype} {pixels.shape}")
+    if scale == MILLIMETRES:
+        return messages.image(pixels, "16UC1", stamp_ns, CAMERA_FRAME)
+    metres = np.where(pixels == np.iinfo(np.uint16).max, np.float32(0), pixels / np.float32(scale)).astype(np.float32)
+    return messages.image(metres, "32FC1", stamp_ns, CAMERA_FRAME)

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rosbags.rosbag1 import Writer as Rosbag1Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+from objreg_ros.bridge import from_msg
+from objreg_ros.recording import open_recording, write_rosbag2
+from objreg_ros.recording.messages import standard_types
+
+from .folders import CAMERA, records
+
+STORAGES = ("mcap", "sqlite3")
+
+
+@pytest.fixture(params=STORAGES)
+def bag(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    write_rosbag2(tmp_path / "bag", records(), request.param)
+    return tmp_path / "bag"
+
+
+def test_what_was_written_is_read(bag: Path) -> None:
+    with open_recording(bag) as recording:
+        assert {name: topic.count for name, topic in recording.topics.items()} == {
+            "/camera_info": 3,
+            "/depth/image": 3,
+            "/image": 3,
+            "/odom": 3,
+        }
+        assert (recording.start_ns, recording.seconds) == (10**9, pytest.approx(0.2))
+        assert [r.stamp_ns for r in recording.records(["/image"])] == [10**9, 11 * 10**8, 12 * 10**8]
+        first = next(recording.records(["/image"]))
+        assert from_msg.image(first.message).rgb[0, 0].tolist() == [0, 20, 30]
+
+
+def test_a_single_file_is_a_recording_too(bag: Path) -> None:
+    file = next(f for f in bag.iterdir() if f.suffix in (".mcap", ".db3"))
+    with open_recording(file) as recording:
+        assert recording.topics["/odom"].count == 3
+        poses = [from_msg.odometry(r.message).T_odom_body[0, 3] for r in recording.records(["/odom"])]
+        assert poses == pytest.approx([0, 0.1, 0.2])
+
+
+def test_a_part_in_time_is_read(bag: Path) -> None:
+    with open_recording(bag) as recording:
+        part = list(recording.records(["/odom", "/image"], start_ns=11 * 10**8, end_ns=12 * 10**8))
+        assert [(r.topic, r.stamp_ns) for r in part] == [("/odom", 11 * 10**8), ("/image", 11 * 10**8)]
+
+
+def test_a_topic_that_is_not_there_gives_nothing(bag: Path) -> None:
+    with open_recording(bag) as recording:
+        assert list(recording.records(["/nothing"])) == []
+
+
+def test_the_bytes_are_those_that_ros_2_sends(bag: Path) -> None:
+    with open_recording(bag) as recording:
+        record = next(recording.records(["/camera_info"]))
+        info = standard_types().deserialize_cdr(record.cdr, record.msgtype)
+        assert from_msg.intrinsics(info) is not None and from_msg.intrinsics(info).fx == CAMERA.fx
+
+
+@pytest.mark.parametrize("mode", [CompressionMode.FILE, CompressionMode.MESSAGE])
+def test_a_compressed_rosbag2_is_read(mode: CompressionMode, tmp_path: Path) -> None:
+    writer = Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.SQLITE3)
+    writer.set_compression(mode, CompressionFormat.ZSTD)
+    with writer:
+        for record in records(1):
+            connection = writer.add_connection(record.topic, record.msgtype, typestore=standard_types())
+            writer.write(connection, record.stamp_ns, record.cdr)
+    with open_recording(tmp_path / "bag") as recording:
+        assert from_msg.depth(next(recording.records(["/depth/image"])).message)[0, 0] == 1.0
+
+
+@pytest.fixture
+def rosbag1(tmp_path: Path) -> Path:
+    types = get_typestore(Stores.ROS1_NOETIC)
+    made = types.types
+    stamp = made["builtin_interfaces/msg/Time"](sec=5, nanosec=6)
+    header = made["std_msgs/msg/Header"](seq=7, stamp=stamp, frame_id="camera")
+    roi = made["sensor_msgs/msg/RegionOfInterest"](x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
+    info = made["sensor_msgs/msg/CameraInfo"](
+        header=header,
+        height=48,
+        width=64,
+        distortion_model="plumb_bob",
+        D=np.zeros(5),
+        K=np.array([50.0, 0, 31.5, 0, 50, 23.5, 0, 0, 1]),
+        R=np.eye(3).ravel(),
+        P=np.zeros(12),
+        binning_x=0,
+        binning_y=0,
+        roi=roi,
+    )
+    writer = Rosbag1Writer(tmp_path / "one.bag")
+    writer.set_compression(Rosbag1Writer.CompressionFormat.LZ4)
+    with writer:
+        connection = writer.add_connection("/camera/rgb/camera_info", info.__msgtype__, typestore=types)
+        writer.write(connection, 9 * 10**9, types.serialize_ros1(info, info.__msgtype__))
+    return tmp_path / "one.bag"
+
+
+def test_a_compressed_rosbag1_is_read_and_brought_up_to_date(rosbag1: Path) -> None:
+    with open_recording(rosbag1) as recording:
+        record = next(recording.records())
+        assert recording.kind == "rosbag1" and record.stamp_ns == 9 * 10**9
+        assert from_msg.intrinsics(record.message).cx == 31.5
+        modern = standard_types().deserialize_cdr(record.cdr, record.msgtype)
+        assert from_msg.stamp_ns(modern) == 5_000_000_006 and from_msg.intrinsics(modern).cx == 31.5
+
+
+def test_a_real_rosbag1_gives_its_cloud(shared: Path) -> None:
+    with open_recording(shared / "data/bag_soda_can/perception_tutorial.bag") as recording:
+        cloud = from_msg.point_cloud(next(recording.records()).message)
+    assert cloud.organised and cloud.xyz.shape == (480, 640, 3) and cloud.rgb is not None
+    assert np.isfinite(cloud.xyz[..., 2]).mean() > 0.5
+
+
+def cut(file: Path, share: float) -> None:
+    file.write_bytes(file.read_bytes()[: int(file.stat().st_size * share)])
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
+def test_a_truncated_rosbag2_says_what_to_do(bag: Path, share: float) -> None:
+    file = next(f for f in bag.iterdir() if f.suffix in (".mcap", ".db3"))
+    cut(file, share)
+    with pytest.raises(ValueError, match="expected a whole bag"), open_recording(bag) as recording:
+        for record in recording.records():
+            assert record.message is not None
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
+def test_a_truncated_rosbag1_says_what_to_do(rosbag1: Path, share: float) -> None:
+    cut(rosbag1, share)
+    with pytest.raises(ValueError, match=r"expected a whole bag.*rosbag reindex"):
+        open_recording(rosbag1)
+
+
+def test_metadata_that_are_no_metadata_are_refused(bag: Path) -> None:
+    (bag / "metadata.yaml").write_text("rosbag2_bagfile_information: [1, 2")
+    with pytest.raises(ValueError, match="expected a whole bag"):
+        open_recording(bag)
+
+
+def test_a_bag_whose_file_was_moved_away_is_refused(bag: Path) -> None:
+    next(f for f in bag.iterdir() if f.suffix in (".mcap", ".db3")).unlink()
+    with pytest.raises(ValueError, match="missing"):
+        open_recording(bag)
+
+
+def test_a_folder_that_lost_its_metadata_is_still_read(bag: Path) -> None:
+    (bag / "metadata.yaml").unlink()
+    with open_recording(bag) as recording:
+        assert recording.topics["/image"].count == 3
+
+
+def test_text_that_is_called_a_bag_is_refused(tmp_path: Path) -> None:
+    for suffix in (".bag", ".mcap", ".db3"):
+        (tmp_path / f"x{suffix}").write_text("hello " * 100)
+        with pytest.raises(ValueError, match="expected a whole bag"):
+            open_recording(tmp_path / f"x{suffix}")
+
+
+def test_an_empty_bag_has_no_topics(tmp_path: Path) -> None:
+    write_rosbag2(tmp_path / "bag", [], "mcap")
+    with open_recording(tmp_path / "bag") as recording:
+        assert recording.topics == {} and recording.seconds == 0 and list(recording.records()) == []
+    shutil.rmtree(tmp_path / "bag")

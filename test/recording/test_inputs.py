@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import pytest
+
+from objreg_ros.recording.inputs import choose_inputs, parse_remaps
+from objreg_ros.recording.record import Topic
+
+IMAGE, INFO = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo"
+KINDS = {
+    "info": INFO,
+    "points": "sensor_msgs/msg/PointCloud2",
+    "odom": "nav_msgs/msg/Odometry",
+    "pose": "geometry_msgs/msg/PoseStamped",
+    "jpeg": "sensor_msgs/msg/CompressedImage",
+}
+
+
+def topics(text: str) -> dict[str, Topic]:
+    """``/a /b:info``: an image and a camera_info."""
+    named = [part.partition(":") for part in text.split()]
+    return {name: Topic(name, KINDS.get(kind, IMAGE), 3) for name, _, kind in named}
+
+
+DRIVERS = {
+    "ours": (
+        "/image /depth/image /camera_info:info /odom:odom /ground_truth:pose /view:points /objects:points",
+        "image=/image depth=/depth/image camera_info=/camera_info odom=/odom ground_truth=/ground_truth",
+    ),
+    "openni with a registered cloud": (
+        "/camera/rgb/image_color /camera/rgb/camera_info:info /camera/depth_registered/points:points "
+        "/camera/depth/image /camera/depth/camera_info:info /camera/ir/image_raw",
+        "image=/camera/rgb/image_color points=/camera/depth_registered/points camera_info=/camera/rgb/camera_info",
+    ),
+    "openni with registered depth": (
+        "/camera/rgb/image_rect_color /camera/rgb/camera_info:info /camera/depth_registered/points:points "
+        "/camera/depth_registered/hw_registered/image_rect_raw /camera/depth_registered/camera_info:info",
+        "image=/camera/rgb/image_rect_color depth=/camera/depth_registered/hw_registered/image_rect_raw "
+        "camera_info=/camera/depth_registered/camera_info",
+    ),
+    "the TUM benchmark": (
+        "/camera/rgb/image_color /camera/rgb/camera_info:info /camera/depth/image /camera/depth/camera_info:info",
+        "image=/camera/rgb/image_color depth=/camera/depth/image camera_info=/camera/depth/camera_info",
+    ),
+    "kinect2_bridge": (
+        "/kinect2/hd/image_color /kinect2/qhd/image_color_rect /kinect2/qhd/image_color_rect/compressed:jpeg "
+        "/kinect2/qhd/image_depth_rect /kinect2/qhd/camera_info:info /kinect2/hd/camera_info:info",
+        "image=/kinect2/qhd/image_color_rect depth=/kinect2/qhd/image_depth_rect camera_info=/kinect2/qhd/camera_info",
+    ),
+    "Azure Kinect, native geometry": (
+        "/rgb/image_raw /rgb/camera_info:info /depth/image_raw /depth/camera_info:info /rgb_to_depth/image_raw "
+        "/rgb_to_depth/camera_info:info /points2:points /ir/image_raw",
+        "image=/rgb_to_depth/image_raw depth=/depth/image_raw camera_info=/depth/camera_info",
+    ),
+    "Azure Kinect, colour geometry": (
+        "/rgb/image_raw /rgb/camera_info:info /depth_to_rgb/image_raw /depth_to_rgb/camera_info:info",
+        "image=/rgb/image_raw depth=/depth_to_rgb/image_raw camera_info=/depth_to_rgb/camera_info",
+    ),
+    "realsense": (
+        "/camera/color/image_raw /camera/color/camera_info:info /camera/aligned_depth_to_color/image_raw "
+        "/camera/depth/image_rect_raw /camera/infra1/image_rect_raw /camera/odom/sample:odom",
+        "image=/camera/color/image_raw depth=/camera/aligned_depth_to_color/image_raw "
+        "camera_info=/camera/color/camera_info odom=/camera/odom/sample",
+    ),
+    "only compressed colour": (
+        "/camera/rgb/image_raw/compressed:jpeg /camera/depth_registered/points:points",
+        "image=/camera/rgb/image_raw/compressed points=/camera/depth_registered/points",
+    ),
+    "truth as odometry": (
+        "/odometry/filtered:odom /vicon/camera:odom",
+        "odom=/odometry/filtered ground_truth=/vicon/camera",
+    ),
+    "a cloud alone": ("/camera/depth_registered/points:points", "points=/camera/depth_registered/points"),
+}
+
+
+@pytest.mark.parametrize("driver", DRIVERS)
+def test_the_topics_of_a_driver_are_recognised(driver: str) -> None:
+    there, expected = DRIVERS[driver]
+    assert choose_inputs(topics(there)).chosen() == dict(pair.split("=") for pair in expected.split())
+
+
+def test_a_remap_wins_over_everything() -> None:
+    there = topics("/image /other /depth/image /camera_info:info /points:points")
+    assert choose_inputs(there, {"image": "/other"}).image == "/other"
+    inputs = choose_inputs(there, {"points": "/points"})
+    assert (inputs.points, inputs.depth) == ("/points", None)
+
+
+def test_an_input_can_be_left_out() -> None:
+    inputs = choose_inputs(topics("/image /depth/image /camera_info:info /odom:odom"), {"odom": ""})
+    assert inputs.odom is None and inputs.complete
+
+
+def test_an_empty_topic_is_no_input() -> None:
+    assert choose_inputs({"/image": Topic("/image", IMAGE, 0)}).image is None
+
+
+def test_what_is_missing_is_said() -> None:
+    assert choose_inputs(topics("/odom:odom")).missing == "a colour image and points or a depth image"
+    assert choose_inputs(topics("/image /depth/image")).missing == "the camera_info of the depth image"
+    assert choose_inputs(topics("/image /points:points")).missing == ""
+
+
+def test_remaps_are_written_as_in_ros() -> None:
+    texts = ("image:=/a", "/depth/image:=/b", "odom:=")
+    assert parse_remaps(texts) == {"image": "/a", "depth": "/b", "odom": ""}
+
+
+@pytest.mark.parametrize("text", ["image=/a", ":=/a", "lidar:=/a"])
+def test_a_remap_of_another_form_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="remap: expected"):
+        parse_remaps([text])
+
+
+def test_a_remap_to_nowhere_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"expected a topic of the recording \(/image\), got /nowhere"):
+        choose_inputs(topics("/image"), {"image": "/nowhere"})

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.layout import OBJECTS, VIEW, table
+from objreg_ros.geometry import pose, rotation_from_vector
+from objreg_ros.recording import messages
+
+from .folders import CAMERA
+
+T = pose(rotation_from_vector(np.array([0.3, -0.2, 1.1])), np.array([1.0, -2.0, 0.5]))
+
+
+def through_cdr(made: object) -> object:
+    raw = messages.serialise(made)
+    return messages.standard_types().deserialize_cdr(raw, made.__msgtype__)  # type: ignore[attr-defined]
+
+
+def test_colour_and_depth_pass_through_their_bytes() -> None:
+    rgb = np.arange(48 * 64 * 3, dtype=np.uint8).reshape(48, 64, 3)
+    assert np.array_equal(from_msg.image(through_cdr(messages.image(rgb, "rgb8", 5, "c"))).rgb, rgb)
+    millimetres = np.full((48, 64), 1234, np.uint16)
+    assert from_msg.depth(through_cdr(messages.image(millimetres, "16UC1", 5, "c")))[0, 0] == pytest.approx(1.234)
+
+
+def test_a_camera_passes_through_its_bytes() -> None:
+    camera = from_msg.intrinsics(through_cdr(messages.camera_info(CAMERA, 5, "c")))
+    assert (camera.fx, camera.cy, camera.width) == (CAMERA.fx, CAMERA.cy, CAMERA.width)
+
+
+@pytest.mark.parametrize("layout", [VIEW, OBJECTS])
+def test_a_table_passes_through_its_bytes(layout: np.dtype) -> None:
+    rows = np.frombuffer(np.random.default_rng(1).bytes(6 * layout.itemsize), layout).reshape(2, 3)
+    assert table(through_cdr(messages.point_cloud(rows, 5, "c"))).tobytes() == rows.tobytes()
+
+
+def test_poses_pass_through_their_bytes() -> None:
+    stamped = from_msg.odometry(through_cdr(messages.pose_stamped(T, 12_000_000_003, "world")))
+    assert np.allclose(stamped.T_odom_body, T) and stamped.stamp_ns == 12_000_000_003
+    moved = from_msg.odometry(through_cdr(messages.odometry(T, np.eye(6), 5, "odom", "camera")))
+    assert np.allclose(moved.T_odom_body, T) and moved.child_frame_id == "camera"
+
+
+def test_a_type_that_ros_2_does_not_ship_is_refused() -> None:
+    with pytest.raises(ValueError, match="my_msgs/msg/Odd: expected a type that ROS 2 ships"):
+        messages.serialise(SimpleNamespace(__msgtype__="my_msgs/msg/Odd"))

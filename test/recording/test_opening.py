@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from objreg_ros.recording import open_recording
+
+from .folders import tum_folder
+
+
+def test_nothing_is_no_recording(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="no such file or folder; expected a rosbag1 file"):
+        open_recording(tmp_path / "nothing")
+
+
+def test_a_picture_is_no_recording(tmp_path: Path) -> None:
+    (tmp_path / "cat.jpg").write_bytes(b"")
+    with pytest.raises(ValueError, match=r"got a file \.jpg"):
+        open_recording(tmp_path / "cat.jpg")
+
+
+def test_a_folder_of_something_else_is_no_recording(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("")
+    with pytest.raises(ValueError, match=r"got a folder with notes\.txt"):
+        open_recording(tmp_path)
+
+
+def test_a_path_may_be_text(tmp_path: Path) -> None:
+    assert open_recording(str(tum_folder(tmp_path))).kind == "TUM RGB-D folder"

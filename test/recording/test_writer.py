@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from objreg_ros.recording import Record, open_recording, write_rosbag2
+
+from .folders import records, tum_folder
+
+
+def test_a_folder_becomes_a_rosbag2_with_the_same_messages(tmp_path: Path) -> None:
+    recording = open_recording(tum_folder(tmp_path / "tum"))
+    assert write_rosbag2(tmp_path / "bag", recording.records()) == 12
+    with open_recording(tmp_path / "bag") as bag:
+        pairs = list(zip(recording.records(), bag.records(), strict=True))
+        assert all(a.cdr == b.cdr and (a.topic, a.stamp_ns) == (b.topic, b.stamp_ns) for a, b in pairs)
+
+
+def test_nothing_is_overwritten(tmp_path: Path) -> None:
+    with pytest.raises(FileExistsError, match="expected a new folder"):
+        write_rosbag2(tmp_path, records())
+
+
+def test_an_unknown_storage_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="expected one of mcap, sqlite3, got 'tape'"):
+        write_rosbag2(tmp_path / "bag", records(), "tape")
+
+
+def test_a_type_that_ros_2_does_not_ship_is_refused(tmp_path: Path) -> None:
+    odd = Record("/odd", "my_msgs/msg/Odd", 1, lambda: None, lambda: b"")
+    with pytest.raises(ValueError, match="expected a type that ROS 2 ships, got my_msgs/msg/Odd"):
+        write_rosbag2(tmp_path / "bag", [odd])
