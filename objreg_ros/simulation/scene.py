@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A scene: placed objects in a furnished room under lamps; and rooms made at random from a seed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.geometry import pose
+from objreg_ros.simulation import distractors, furniture
+from objreg_ros.simulation.furniture import Furniture, Room
+from objreg_ros.simulation.light import Lamp, ShadowMaps, looking, shadow_maps
+from objreg_ros.simulation.mesh import Mesh
+from objreg_ros.simulation.model import ObjectModel, turn
+from objreg_ros.simulation.objects import LABELS, make_object
+from objreg_ros.simulation.surfaces import Surfaces, flatten
+
+Random = np.random.Generator
+Board = tuple[float, float, float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """An object in the world: ``instance`` from 1 is its number in masks; ``T_world_object (4, 4)``."""
+
+    instance: int
+    model: ObjectModel
+    T_world_object: Array
+
+    @property
+    def label(self) -> str:
+        """The class of the object, or the kind of the distractor."""
+        return self.model.label
+
+    @property
+    def is_distractor(self) -> bool:
+        """Whether the object is none of the nine classes."""
+        return self.model.label not in LABELS
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Somewhere worth looking at: ``centre (3,)`` m in the world, among the objects, and their ``reach`` around it."""
+
+    centre: Array
+    reach: float
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """``objects`` in front of a ``backdrop`` under ``lamps``; ``ambient (3,)`` linear light from everywhere.
+
+    ``ceiling`` is what throws no shadow; ``places`` where the objects are; ``reach`` metres around the first place, or
+    the world's origin where there is none, have soft shadows.
+    """
+
+    objects: tuple[Placed, ...]
+    backdrop: tuple[Mesh, ...]
+    lamps: tuple[Lamp, ...]
+    ambient: Array
+    places: tuple[Place, ...] = ()
+    ceiling: tuple[Mesh, ...] = ()
+    reach: float = 3.0
+    middle: Array = field(default_factory=lambda: np.array([0.0, 0.0, 0.75]))
+
+    @cached_property
+    def surfaces(self) -> Surfaces:
+        """The scene's triangles: the room first, then every object in order."""
+        rooms = [*self.backdrop, *self.ceiling]
+        meshes = [*rooms, *(o.model.mesh.placed(o.T_world_object) for o in self.objects)]
+        numbers = [0] * len(rooms) + [o.instance for o in self.objects]
+        casts = [True] * len(self.backdrop) + [False] * len(self.ceiling) + [True] * len(self.objects)
+        return flatten(meshes, numbers, casts)
+
+    @cached_property
+    def shadows(self) -> ShadowMaps:
+        """The shadow maps of the lamps and of the open room above."""
+        return shadow_maps(self.surfaces, self.lamps, self.middle, self.reach, size=1024 if self.reach > 2 else 512)
+
+    @cached_property
+    def face_range(self) -> dict[int, tuple[int, int]]:
+        """First and last (outside) face of every instance."""
+        instance = self.surfaces.instance
+        first = {o.instance: int(np.argmax(instance == o.instance)) for o in self.objects}
+        return {o.instance: (first[o.instance], first[o.instance] + len(o.model.mesh.faces)) for o in self.objects}
+
+    def with_objects(self, objects: Sequence[Placed]) -> Scene:
+        """The same room with other objects in it."""
+        return replace(self, objects=tuple(objects))
+
+
+def place_on(model: ObjectModel, T_world_surface: Array, x: float, y: float, yaw: float, rest: int = 0) -> Array:
+    """``T_world_object`` of a model at rest at (x, y) of a surface (z = 0), turned by ``yaw`` radians."""
+    at = pose(np.eye(3), np.array([x, y, 0.0]))
+    return T_world_surface @ at @ model.resting(rest, yaw)
+
+
+def spread(
+    rng: Random, models: Sequence[ObjectModel], board: Board, gap: float = 0.01
+) -> list[tuple[ObjectModel, Array]]:
+    """Lay models on a board at random without overlap: each with its pose in the board's furniture frame.
+
+    What finds no room after some trials is left out.
+    """
+    x0, y0, height, half_x, half_y = board
+    laid: list[tuple[ObjectModel, Array]] = []
+    taken: list[tuple[float, float, float]] = []
+    surface = pose(np.eye(3), np.array([x0, y0, height]))
+    for model in models:
+        rest = int(rng.integers(1, len(model.rests) + 1)) if model.rests and rng.random() < 0.2 else 0
+        radius = _footprint(model, rest)
+        if model.size[2] > 2.0 or radius > 1.3 * max(half_x, half_y):
+            continue
+        for _ in range(12):
+            room_x, room_y = max(half_x - 0.7 * radius, 0.0), max(half_y - 0.7 * radius, 0.0)
+            x, y = rng.uniform(-room_x, room_x), rng.uniform(-room_y, room_y)
+            if all(np.hypot(x - a, y - b) > radius + r + gap for a, b, r in taken):
+                yaw = rng.uniform(0, 2 * np.pi) if rng.random() < 0.7 else rng.normal(0, 0.3)
+                laid.append((model, place_on(model, surface, x, y, yaw, rest)))
+                taken.append((x, y, radius))
+                break
+    return laid
+
+
+def _footprint(model: ObjectModel, rest: int) -> float:
+    """A radius of the footprint, between its inner and its outer circle: close neighbours, hardly any overlap."""
+    T = model.resting(rest, 0.0)
+    xy = model.mesh.vertices @ T[:2, :3].T.astype(np.float32) + T[:2, 3].astype(np.float32)
+    half = (xy.max(0) - xy.min(0)) / 2
+    return float(0.5 * (np.hypot(*half) + half.max()))
+
+
+def some_models(rng: Random, count: int, distractor_share: float, labels: Sequence[str] = LABELS) -> list[ObjectModel]:
+    """Models of random classes and random distractors; no chairs."""
+    out = []
+    for _ in range(count):
+        seed = int(rng.integers(2**31))
+        if rng.random() < distractor_share:
+            out.append(distractors.make_distractor(str(rng.choice(list(distractors.FAMILIES))), seed))
+        else:
+            out.append(make_object(str(rng.choice([name for name in labels if name != "chair"])), seed))
+    return out
+
+
+def lamps_for(rng: Random, room: Room, count: int) -> tuple[tuple[Lamp, ...], Array]:
+    """Lamps under the ceiling or beside, and the ambient light, from warm to cold."""
+    warmth = rng.uniform(-0.12, 0.2)
+    tone = np.array([1 + warmth, 1.0, 1 - warmth])
+    lamps = []
+    for _ in range(count):
+        at = [
+            rng.uniform(-0.7, 0.7) * room.half[0],
+            rng.uniform(-0.7, 0.7) * room.half[1],
+            rng.uniform(1.9, room.height - 0.1),
+        ]
+        colour = tone * rng.uniform(0.25, 0.9) * (1 + rng.normal(0, 0.04, 3))
+        lamps.append(Lamp(np.array(at), np.clip(colour, 0.05, None)))
+    return tuple(lamps), np.clip(tone * rng.uniform(0.15, 0.6), 0.05, None)
+
+
+def furnished(rng: Random, pieces: Sequence[tuple[Furniture, Array]], room: Room, lamp_count: int = 2) -> Scene:
+    """A room with furniture, each piece with its pose ``T_world_piece``, and nothing on it yet."""
+    lamps, ambient = lamps_for(rng, room, lamp_count)
+    meshes = [piece.mesh.placed(T) for piece, T in pieces]
+    reach = max(room.half)
+    return Scene((), (room.mesh, *meshes), lamps, ambient, (), (room.ceiling,), reach)
+
+
+def number(laid: Sequence[tuple[ObjectModel, Array]], first: int = 1) -> tuple[Placed, ...]:
+    """Placed objects from models and their poses in the world, numbered from ``first``."""
+    return tuple(Placed(first + k, model, T) for k, (model, T) in enumerate(laid))
+
+
+def random_scene(seed: int, labels: Sequence[str] = LABELS, distractor_share: float = 0.4) -> Scene:
+    """A corner of a room made at random: furniture, walls, lamps, clutter, objects of the nine classes and others.
+
+    Everything follows from ``seed``. Its places are where `random_view` looks.
+    """
+    rng = np.random.default_rng([seed, 1])
+    half = (rng.uniform(1.8, 3.5), rng.uniform(1.8, 3.5))
+    room = furniture.room(rng, half)
+    pieces = _arranged(rng, room)
+    laid, places = _clutter(rng, pieces, labels, distractor_share)
+    if "chair" in labels:
+        chairs, seats = _chairs(rng, pieces, room)
+        laid, places = laid + chairs, places + seats
+    scene = furnished(rng, pieces, room, int(rng.integers(1, 4)))
+    middle = places[0].centre if places else np.array([0.0, 0.0, 0.75])
+    return replace(scene, objects=number(laid), places=tuple(places), middle=middle, reach=2.0)
+
+
+def _arranged(rng: Random, room: Room) -> list[tuple[Furniture, Array]]:
+    """A table somewhere and a few pieces along the walls."""
+    yaw = float(rng.choice([0, 90, 180, 270])) + rng.normal(0, 8)
+    T = turn("z", yaw)
+    T[:2, 3] = rng.uniform(-0.45, 0.45, 2) * room.half
+    pieces = [(furniture.table(rng), T)]
+    for wall in rng.permutation(4)[: int(rng.integers(1, 4))]:
+        kind = (furniture.shelf, furniture.cupboard, furniture.table, furniture.sofa)[
+            int(rng.choice(4, p=[0.4, 0.3, 0.15, 0.15]))
+        ]
+        piece = kind(rng)
+        along, reach = (room.half[0], room.half[1]) if wall % 2 == 0 else (room.half[1], room.half[0])
+        T = turn("z", 90.0 * wall)
+        depth = float(piece.mesh.bounds[1, 1])
+        T[:3, 3] = T[:3, :3] @ [rng.uniform(-0.6, 0.6) * along, reach - depth - 0.02, 0.0]
+        if all(np.linalg.norm(T[:2, 3] - other[:2, 3]) > piece.floor_radius + o.floor_radius for o, other in pieces):
+            pieces.append((piece, T))
+    return pieces
+
+
+def _clutter(
+    rng: Random, pieces: Sequence[tuple[Furniture, Array]], labels: Sequence[str], share: float
+) -> tuple[list[tuple[ObjectModel, Array]], list[Place]]:
+    """Objects on every board, in the world, and the places where they are."""
+    laid, places = [], []
+    for piece, T in pieces:
+        for board in piece.boards:
+            count = int(rng.integers(4, 14)) if board[3] * board[4] > 0.12 else int(rng.integers(0, 6))
+            on_board = [(m, T @ P) for m, P in spread(rng, some_models(rng, count, share, labels), board)]
+            laid += on_board
+            if on_board:
+                centre = T[:3, :3] @ [board[0], board[1], board[2] + 0.08] + T[:3, 3]
+                places.append(Place(centre, max(board[3], board[4])))
+    return laid, places
+
+
+def _chairs(
+    rng: Random, pieces: Sequence[tuple[Furniture, Array]], room: Room
+) -> tuple[list[tuple[ObjectModel, Array]], list[Place]]:
+    """Chairs on the floor, most at the table, and the places where they are."""
+    laid: list[tuple[ObjectModel, Array]] = []
+    places = []
+    piece, T_table = pieces[0]
+    for _ in range(int(rng.integers(1, 5))):
+        model = make_object("chair", int(rng.integers(2**31)))
+        angle = rng.uniform(0, 2 * np.pi)
+        reach = piece.floor_radius * rng.uniform(0.85, 1.5) + 0.15
+        xy = np.clip(
+            T_table[:2, 3] + reach * np.array([np.cos(angle), np.sin(angle)]),
+            *(s * (np.array(room.half) - 0.4) for s in (-1, 1)),
+        )
+        if all(np.linalg.norm(xy - T[:2, 3]) > 0.6 for _, T in laid):
+            yaw = angle - np.pi / 2 + rng.normal(0, 0.6)
+            laid.append((model, place_on(model, np.eye(4), float(xy[0]), float(xy[1]), yaw)))
+            places.append(Place(np.array([*xy, 0.5]), 0.5))
+    return laid, places
+
+
+def random_view(scene: Scene, seed: int) -> Array:
+    """``T_world_camera`` of a hand-held camera that looks at one of the scene's places, from near or far."""
+    rng = np.random.default_rng([seed, 2])
+    place = scene.places[int(rng.integers(len(scene.places)))] if scene.places else Place(scene.middle, 0.5)
+    target = place.centre + rng.uniform(-0.7, 0.7, 3) * [place.reach, place.reach, 0.1]
+    distance = rng.uniform(0.55, 1.6) + (rng.uniform(0, 1.5) if rng.random() < 0.4 else 0.0)
+    low, high = _inside(scene)
+    for _ in range(20):
+        azimuth, elevation = rng.uniform(0, 2 * np.pi), rng.uniform(np.radians(8), np.radians(60))
+        away = [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+        eye = target + distance * np.array(away)
+        if (eye > low).all() and (eye < high).all():
+            break
+    eye = np.clip(eye, low, high)
+    roll = turn("z", float(rng.normal(0, 5.0)))
+    return looking(eye, target, np.array([0.0, 0.0, 1.0])) @ roll
+
+
+def _inside(scene: Scene) -> tuple[Array, Array]:
+    """The corners of the room's free space, a little inside the walls."""
+    bounds = np.array([mesh.bounds for mesh in scene.backdrop])
+    low, high = bounds[:, 0].min(0), bounds[:, 1].max(0)
+    margin = np.array([0.35, 0.35, 0.25])
+    return low + margin, high - margin
