@@ -61,8 +61,11 @@ class Door(Node):
 
     # What a subclass fills in
 
-    def compute(self, stamp_ns: int, payload: Any) -> None:
-        """Read → compute → write for one frame; runs on the worker. `DroppedError` or ValueError if it cannot be."""
+    def compute(self, stamp_ns: int, payload: Any) -> bool:
+        """Read → compute → write for one frame; runs on the worker. `DroppedError` or ValueError if it cannot be.
+
+        True when that was all; False when the frame goes on to another worker, which calls `conclude`.
+        """
         raise NotImplementedError
 
     def adopt(self) -> None:
@@ -135,17 +138,29 @@ class Door(Node):
         except ValueError as error:
             raise DroppedError(f"malformed_{topic}", str(error)) from error
 
-    def _work(self, job: tuple[int, Any]) -> None:
-        stamp_ns, payload = job
+    def read_aside(self, topic: str, decode: Callable[..., Any], message: Any) -> Any:
+        """The word of a message that is no frame by itself; None, logged throttled, if it breaks its contract."""
         try:
-            self.compute(stamp_ns, payload)
+            return decode(message)
+        except ValueError as error:
+            self.throttled.warn(f"malformed_{topic}", f"{topic} ignored: {error}")
+            return None
+
+    def conclude(self, stamp_ns: int, work: Callable[[], bool]) -> None:
+        """Do the last work on a frame and settle it in the books."""
+        try:
+            done = work()
         except DroppedError as dropped:
             self.drop(stamp_ns, dropped.reason, str(dropped))
         except ValueError as error:
             self.drop(stamp_ns, "refused", str(error))
         else:
-            self.ledger.publish(stamp_ns)
-            self._finished.publish(to_msg.finished(self.get_name(), stamp_ns))
+            if done:
+                self.ledger.publish(stamp_ns)
+                self._finished.publish(to_msg.finished(self.get_name(), stamp_ns))
+
+    def _work(self, job: tuple[int, Any]) -> None:
+        self.conclude(job[0], partial(self.compute, *job))
 
     def _overtaken(self, job: tuple[int, Any]) -> None:
         self.drop(job[0], "overtaken")  # by a newer frame: usual where the camera is faster than the room

@@ -247,9 +247,10 @@ def _numbers(names: Labels) -> dict[str, int]:
 
 
 def _number(label: str, numbers: Mapping[str, int]) -> int:
-    if label not in numbers:
+    """The id of a label. A class without a name is called by its number on the way in, and so on the way out."""
+    if label not in numbers and not (label.isdecimal() and int(label) < SUPPORT_ID):
         raise ValueError(f"label {label!r}: expected one of the {len(numbers)} published labels")
-    return numbers[label]
+    return numbers[label] if label in numbers else int(label)
 
 
 def view(frame: Frame) -> PointCloud2:

@@ -48,7 +48,7 @@ class DetectorNode(Door):
         self.accept(stamp_ns)
         self.worker.put((stamp_ns, message))
 
-    def compute(self, stamp_ns: int, payload: Any) -> None:
+    def compute(self, stamp_ns: int, payload: Any) -> bool:
         """One image."""
         image = self.read("image", from_msg.image, payload)
         with self.ledger.timed("detect"):
@@ -56,6 +56,7 @@ class DetectorNode(Door):
         self._table.publish(to_msg.detections_table(detections, self._names))
         if self._array is not None:
             self._array.publish(to_msg.detection_array(detections))
+        return True
 
 
 def main() -> int:

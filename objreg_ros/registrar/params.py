@@ -3,8 +3,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+import numpy as np
+
+from objreg_ros.geometry import Array, pose, rotation_from_quaternion
 from objreg_ros.params import Params, param
 
 
@@ -62,3 +66,31 @@ class RegistrarParams(Params):
     max_gravity_error: float = param(5.0, "largest angle between the gravities", "deg", ge=0.0, le=180.0)
     max_translation: float = param(5.0, "largest distance between the two cameras", "m", ge=0.0)
     max_slack_sigma: float = param(0.10, "largest standard deviation along any translation", "m", ge=0.0)
+
+
+@dataclass(frozen=True)
+class RegistrarNodeParams(Params):
+    """How the registrar's node brings its inputs together."""
+
+    odom_slop: float = param(0.02, "largest distance in time between a frame and its odometry", "s", ge=0.0)
+    T_base_camera: tuple[float, ...] = param(
+        (), "where the camera's optical frame is on the body of the odometry: x y z qx qy qz qw; empty: there"
+    )
+    search_seconds: float = param(0.0, "longest search for one keyframe; 0: as long as it takes", "s", ge=0.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if len(self.T_base_camera) not in (0, 7):
+            raise ValueError(f"T_base_camera: expected x y z qx qy qz qw or nothing, got {self.T_base_camera}")
+
+    @property
+    def mounting(self) -> Array | None:
+        """``T_base_camera`` as a (4, 4) pose, None where none is set; ValueError for a quaternion of length 0."""
+        if not self.T_base_camera:
+            return None
+        return pose(rotation_from_quaternion(np.array(self.T_base_camera[3:])), np.array(self.T_base_camera[:3]))
+
+    @property
+    def limit(self) -> float:
+        """The longest search in seconds, infinity if there is no limit."""
+        return self.search_seconds or math.inf

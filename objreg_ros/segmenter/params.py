@@ -31,3 +31,14 @@ class SegmenterParams(Params):
     def limits(self) -> tuple[float, float]:
         """The passthrough limits (z_max, y_max) in metres that hold for the preset."""
         return (PAPER_Z_MAX, PAPER_Y_MAX) if self.preset == "paper" else (self.z_max, self.y_max)
+
+
+@dataclass(frozen=True)
+class SegmenterNodeParams(Params):
+    """How the segmenter's node brings its inputs together."""
+
+    source: str = param(
+        "auto", "where depth comes from; auto takes what speaks first", choices=("auto", "points", "depth")
+    )
+    slop: float = param(0.02, "largest distance in time between depth and its detections or colour", "s", ge=0.0)
+    colour: bool = param(True, "take the colour of the points from `image` when depth comes as an image")

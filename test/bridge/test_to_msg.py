@@ -147,6 +147,11 @@ def test_a_label_that_was_not_published_is_refused_with_its_name() -> None:
         to_msg.objects(frame_of(cloud_of("dog", 1, 3)), NAMES)
 
 
+def test_a_class_without_a_name_keeps_its_number() -> None:
+    objects, _ = from_msg.objects(to_msg.objects(frame_of(cloud_of("17", 1, 3)), NAMES), NAMES)
+    assert objects[0].label == "17"
+
+
 @pytest.mark.parametrize("coloured", [True, False])
 def test_objects_and_their_support_come_back_as_they_were(coloured: bool) -> None:
     sent = frame_of(

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A door with several inputs that belong together by their time."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from objreg_ros.bridge.door import Door
+from objreg_ros.bridge.sync import Stream, Synchroniser
+from objreg_ros.params import Params
+
+EARLY = 100  # messages that are kept until it is known how they are matched
+
+
+class MatchingDoor(Door):
+    """Hands a `Match` to the worker for every message of the first stream that found its partners.
+
+    That first stream is what the books count. `begin` says how streams are matched; what was fed before then waits.
+    """
+
+    def __init__(self, name: str, *kinds: type[Params]) -> None:
+        super().__init__(name, *kinds)
+        self._early: deque[tuple[str, int, Any]] = deque(maxlen=EARLY)
+        self._sync: Synchroniser | None = None
+        self._reference = ""
+
+    def begin(self, streams: Sequence[Stream]) -> None:
+        """Start matching; what was fed to streams that are not among these is forgotten."""
+        self._reference = streams[0].name
+        self._sync = Synchroniser(streams, self._unmatched)
+        while self._early:
+            self.feed(*self._early.popleft())
+
+    @property
+    def begun(self) -> bool:
+        """Whether it is known how the streams are matched."""
+        return self._sync is not None
+
+    def feed(self, name: str, stamp_ns: int, payload: Any) -> None:
+        """One message of a stream."""
+        if self._sync is None:
+            self._early.append((name, stamp_ns, payload))
+        elif name in self._sync.queues:
+            if name == self._reference:
+                self.accept(stamp_ns)
+            for match in self._sync.add(name, stamp_ns, payload):
+                self.worker.put((match.stamp_ns, match))
+
+    def _unmatched(self, name: str, stamp_ns: int, why: str) -> None:
+        if name == self._reference:
+            self.drop(stamp_ns, why)
+
+    def extra_diagnostics(self) -> Mapping[str, object]:
+        """What the other streams have brought, and how much of it found no partner."""
+        queues = {} if self._sync is None else self._sync.queues
+        others = {name: queue for name, queue in queues.items() if name != self._reference}
+        unused = {
+            f"{name} {why}": count for name, queue in others.items() for why, count in sorted(queue.dropped.items())
+        }
+        return {**{f"{name} received": queue.received for name, queue in others.items()}, **unused}

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The door of the segmenter: ``points``, or ``depth/image`` with ``camera_info`` and ``image``, and
+``detections_table`` in; ``objects``, ``view``, ``view/camera_info`` and ``gravity`` out."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+from geometry_msgs.msg import Vector3Stamped
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
+from std_msgs.msg import String
+
+from objreg_ros.bridge import from_msg, qos, to_msg
+from objreg_ros.bridge.matching import MatchingDoor
+from objreg_ros.bridge.spin import run
+from objreg_ros.bridge.sync import Match, Need, Stream
+from objreg_ros.data import DepthImage, Frame
+from objreg_ros.segmenter.organise import organise
+from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
+from objreg_ros.segmenter.segment import Segmenter
+
+POINTS = {"points": PointCloud2}
+DEPTH = {"depth/image": Image, "depth/image/compressedDepth": CompressedImage}
+SOURCES = {"auto": {**POINTS, **DEPTH}, "points": POINTS, "depth": DEPTH}
+IMAGES = {"image": Image, "image/compressed": CompressedImage}
+
+
+class SegmenterNode(MatchingDoor):
+    """Segments every depth image or cloud that has detections; a frame goes out also where there is no object."""
+
+    def __init__(self) -> None:
+        super().__init__("segmenter", SegmenterParams, SegmenterNodeParams)
+        self._inputs = self.settings.of(SegmenterNodeParams)
+        self._segmenter = Segmenter(self.settings.of(SegmenterParams))
+        self._segmenter.warm()
+        self._camera_info: Any = None
+        self._objects = self.create_publisher(PointCloud2, "objects", qos.room())
+        self._view = self.create_publisher(PointCloud2, "view", qos.room())
+        self._view_info = self.create_publisher(CameraInfo, "view/camera_info", qos.room())
+        self._gravity = self.create_publisher(Vector3Stamped, "gravity", qos.room())
+        self._listen()
+
+    def _listen(self) -> None:
+        self.listen(String, "labels", self._hear_labels, qos.latched())
+        self.listen(CameraInfo, "camera_info", self._hear_camera, self.sensor(), watched="camera_info")
+        if self._inputs.colour and self._inputs.source != "points":
+            self.listen_to_first("image", IMAGES, self._hear_image, self.sensor())
+        self.listen_to_first("depth", SOURCES[self._inputs.source], self._hear_depth, self.sensor())
+        self.listen(PointCloud2, "detections_table", self._hear_detections, qos.room(), watched="detections_table")
+        self.expect("detections_table", "detections_table")
+
+    def adopt(self) -> None:
+        """Live parameters hold from the next frame on."""
+        self._segmenter.params = self.settings.of(SegmenterParams)
+
+    # Hear
+
+    def _hear_labels(self, message: Any) -> None:
+        names = self.read_aside("labels", from_msg.labels, message)
+        if names is not None:
+            self.feed("labels", 0, names)
+
+    def _hear_camera(self, message: Any) -> None:
+        self._camera_info = message
+        self.feed("camera_info", from_msg.stamp_ns(message), message)
+
+    def _hear_image(self, _: str, message: Any) -> None:
+        self.feed("image", from_msg.stamp_ns(message), message)
+
+    def _hear_depth(self, topic: str, message: Any) -> None:
+        if not self.begun:
+            self._choose(topic)
+        self.feed("depth", from_msg.stamp_ns(message), message)
+
+    def _hear_detections(self, message: Any) -> None:
+        self.feed("detections", from_msg.stamp_ns(message), message)
+
+    def _choose(self, topic: str) -> None:
+        """Depth has spoken: now it is known what goes with it."""
+        slop_ns = round(self._inputs.slop * 1e9)
+        streams = [Stream("depth"), Stream("detections", slop_ns=slop_ns), Stream("labels", Need.LATCHED)]
+        if topic in DEPTH:
+            streams.append(Stream("camera_info", Need.LATCHED))
+            streams.append(Stream("image", Need.OPTIONAL, slop_ns))
+            self.expect("camera_info", "camera_info")
+        self.get_logger().info(f"depth comes from {self.resolve_topic_name(topic)}")
+        self.begin(streams)
+
+    # Compute
+
+    def compute(self, stamp_ns: int, payload: Match) -> bool:
+        """One depth image or cloud with its detections."""
+        depth = self._depth(payload)
+        names = payload["labels"]
+        shape = depth.depth.shape
+        detections = self.read("detections", from_msg.detections, payload["detections"], names, shape)
+        with self.ledger.timed("segment"):
+            frame = self._segmenter.segment(detections, depth)
+        self._publish(frame, names)
+        return True
+
+    def _depth(self, match: Match) -> DepthImage:
+        if "camera_info" in match.payloads:
+            return self.read("depth", from_msg.depth_image, match["depth"], match["camera_info"], match["image"])
+        cloud = self.read("points", from_msg.point_cloud, match["depth"])
+        camera = None if self._camera_info is None else from_msg.intrinsics(self._camera_info)
+        with self.ledger.timed("organise"):
+            return organise(cloud, camera)
+
+    def _publish(self, frame: Frame, names: to_msg.Labels) -> None:
+        self._objects.publish(to_msg.objects(frame, names))
+        self._view.publish(to_msg.view(frame))
+        self._view_info.publish(to_msg.view_camera_info(frame))
+        self._gravity.publish(to_msg.gravity(frame))
+
+
+def main() -> int:
+    """The executable ``segmenter``."""
+    return run(SegmenterNode)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

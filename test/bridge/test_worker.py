@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import threading
+
+from objreg_ros.bridge.worker import Worker
+
+PATIENCE = 10.0  # seconds; a test that gets there has failed
+
+
+class Bench:
+    """A worker whose job is held until it is let go."""
+
+    def __init__(self) -> None:
+        self.begun, self.go, self.failed = threading.Event(), threading.Event(), threading.Event()
+        self.done: list[str] = []
+        self.replaced: list[str] = []
+        self.error: BaseException | None = None
+        self.worker: Worker[str] = Worker(self.work, self.replaced.append, self.fail)
+
+    def work(self, job: str) -> None:
+        self.begun.set()
+        assert self.go.wait(PATIENCE)
+        if job == "bug":
+            raise RuntimeError("a bug")
+        self.done.append(job)
+
+    def fail(self, error: BaseException) -> None:
+        self.error = error
+        self.failed.set()
+
+
+def test_while_one_job_is_in_hand_the_newest_of_the_others_waits_and_the_rest_is_handed_back() -> None:
+    bench = Bench()
+    bench.worker.put("first")
+    assert bench.begun.wait(PATIENCE)
+    for job in ("second", "third", "fourth"):
+        bench.worker.put(job)
+    assert bench.replaced == ["second", "third"]
+    bench.begun.clear()
+    bench.go.set()
+    assert bench.begun.wait(PATIENCE)
+    bench.worker.close()
+    assert bench.done == ["first", "fourth"]
+
+
+def test_jobs_that_come_one_at_a_time_are_all_done() -> None:
+    done: list[int] = []
+    came = threading.Semaphore(0)
+    replaced: list[int] = []
+
+    def work(job: int) -> None:
+        done.append(job)
+        came.release()
+
+    worker: Worker[int] = Worker(work, replaced.append, print)
+    for job in range(1, 50):
+        worker.put(job)
+        assert came.acquire(timeout=PATIENCE)
+    worker.close()
+    assert done == list(range(1, 50)) and not replaced
+
+
+def test_what_the_work_raises_is_not_swallowed() -> None:
+    bench = Bench()
+    bench.go.set()
+    bench.worker.put("bug")
+    assert bench.failed.wait(PATIENCE) and str(bench.error) == "a bug"
+
+
+def test_closing_leaves_the_job_that_waits_undone() -> None:
+    bench = Bench()
+    bench.worker.put("first")
+    assert bench.begun.wait(PATIENCE)
+    bench.worker.put("second")
+    threading.Timer(0.05, bench.go.set).start()
+    bench.worker.close()
+    assert bench.done == ["first"]
+
+
+def test_a_job_that_has_not_begun_can_be_taken_back() -> None:
+    bench = Bench()
+    bench.worker.put("first")
+    assert bench.begun.wait(PATIENCE)
+    bench.worker.put("second")
+    assert bench.worker.clear() == "second" and bench.worker.clear() is None
+    bench.go.set()
+    bench.worker.close()
+    assert bench.done == ["first"] and not bench.replaced

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from objreg_ros import share
+
+
+@pytest.fixture
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The package as it lies in <prefix>/lib/python3.x/site-packages, without a checkout around it."""
+    package = tmp_path / "prefix" / "lib" / "python3.x" / "site-packages" / "objreg_ros"
+    package.mkdir(parents=True)
+    monkeypatch.setattr(share, "__file__", str(package / "share.py"))
+    monkeypatch.setattr(sys, "prefix", str(tmp_path / "nothing"))
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+    return tmp_path
+
+
+def put(folder: Path, relative: str) -> Path:
+    path = folder / "share" / "objreg_ros" / relative
+    path.parent.mkdir(parents=True)
+    path.touch()
+    return path
+
+
+def test_a_checkout_is_served_from_itself(repository: Path) -> None:
+    assert share.find("package.xml") == repository / "package.xml"
+
+
+def test_files_beside_a_pip_installation_are_found(elsewhere: Path) -> None:
+    expected = put(elsewhere / "prefix", "config/a.xml")
+    assert share.find("config/a.xml") == expected
+
+
+def test_a_colcon_workspace_is_found_by_its_prefix(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = put(elsewhere / "workspace", "config/a.xml")
+    put(elsewhere / "prefix", "config/a.xml")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", f"/opt/ros/jazzy:{elsewhere / 'workspace'}")
+    assert share.find("config/a.xml") == expected
+
+
+def test_what_is_nowhere_is_refused_with_every_place_that_was_tried(elsewhere: Path) -> None:
+    with pytest.raises(FileNotFoundError, match=r"config/b\.xml: expected it at one of .*prefix/share/objreg_ros"):
+        share.find("config/b.xml")
+
+
+def test_a_model_is_a_path_or_a_name_in_the_users_folder_or_ours(
+    elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_DATA_HOME", str(elsewhere / "share"))
+    ours = put(elsewhere / "prefix", "models/a.onnx")
+    assert share.model("a.onnx") == ours
+    users = put(elsewhere, "models/a.onnx")
+    assert share.model("a.onnx") == users
+    assert share.model(str(ours)) == ours
