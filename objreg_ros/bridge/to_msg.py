@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import json
 from array import array
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Point, Pose, Quaternion, Transform, TransformStamped, Vector3, Vector3Stamped
+from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Transform, TransformStamped, Vector3, Vector3Stamped
 from nav_msgs.msg import Odometry as OdometryMsg
+from nav_msgs.msg import Path
 from numpy.typing import NDArray
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2, PointField
@@ -299,14 +300,19 @@ def constraint(closure: LoopClosure) -> OdometryMsg:
 def transforms(closure: LoopClosure) -> list[TransformStamped]:
     """What each object of a closure says by itself; the child frame is ``"<moment of to>/<label>"``."""
     parent, child = moment(closure.frame_id, closure.from_ns), moment(closure.frame_id, closure.to_ns)
-    return [
-        TransformStamped(
-            header=header(closure.to_ns, parent),
-            child_frame_id=f"{child}/{match.label}",
-            transform=Transform(translation=_vector(match.T_from_to[:3, 3]), rotation=_quaternion(match.T_from_to)),
-        )
-        for match in closure.matches
-    ]
+    return [transform(match.T_from_to, closure.to_ns, parent, f"{child}/{match.label}") for match in closure.matches]
+
+
+def transform(T_parent_child: Array, stamp_ns: int, parent: str, child: str) -> TransformStamped:
+    """The pose of a frame in another."""
+    motion = Transform(translation=_vector(T_parent_child[:3, 3]), rotation=_quaternion(T_parent_child))
+    return TransformStamped(header=header(stamp_ns, parent), child_frame_id=child, transform=motion)
+
+
+def path(poses: Iterable[tuple[int, Array]], stamp_ns: int, frame_id: str) -> Path:
+    """Stamps in nanoseconds and poses (4, 4) in ``frame_id``, as they are known at ``stamp_ns``."""
+    stamped = [PoseStamped(header=header(when, frame_id), pose=pose(T)) for when, T in poses]
+    return Path(header=header(stamp_ns, frame_id), poses=stamped)
 
 
 def _vector(xyz: Array) -> Vector3:

@@ -209,6 +209,14 @@ def test_each_object_of_a_closure_is_one_transform_that_names_it() -> None:
     assert np.allclose(from_msg.odometry(message).T_odom_body, T, atol=1e-12)
 
 
+def test_a_path_keeps_the_time_and_the_place_of_each_pose() -> None:
+    T = pose(rotation_from_vector(np.array([0.0, 0.0, 0.5])), np.array([3.0, 2.0, 1.0]))
+    message = to_msg.path([(STAMP, np.eye(4)), (STAMP + 5, T)], STAMP + 9, "map")
+    assert [from_msg.stamp_ns(item) for item in (message, *message.poses)] == [STAMP + 9, STAMP, STAMP + 5]
+    assert {item.header.frame_id for item in (message, *message.poses)} == {"map"}
+    assert np.allclose(from_msg.odometry(message.poses[1]).T_odom_body, T, atol=1e-12)
+
+
 def test_odometry_comes_back_as_it_was() -> None:
     T = pose(rotation_from_vector(np.array([3.0, 0.5, 0.2])), np.array([3.0, 2.0, 1.0]))
     back = from_msg.odometry(to_msg.odometry(Odometry(T_odom_body=T, stamp_ns=STAMP, child_frame_id="kinect")))
