@@ -5,6 +5,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.geometry import pose, rotation_from_quaternion
 from objreg_ros.params import Params, param
 
 
@@ -25,3 +29,26 @@ class MapperParams(Params):
     max_residual: float = param(
         5.0, "a constraint farther than this from all the others is pruned", "standard deviations", ge=1.0
     )
+
+
+@dataclass(frozen=True)
+class MapperNodeParams(Params):
+    """Frames and files of the mapper's node."""
+
+    map_frame: str = param("map", "the frame of the corrected map")
+    T_base_camera: tuple[float, ...] = param(
+        (), "where the camera's optical frame is on the body of the odometry: x y z qx qy qz qw; empty: there"
+    )
+    graph_path: str = param("objreg_map.g2o", "where ~/save writes the pose graph")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if len(self.T_base_camera) not in (0, 7):
+            raise ValueError(f"T_base_camera: expected x y z qx qy qz qw or nothing, got {self.T_base_camera}")
+
+    @property
+    def mounting(self) -> Array:
+        """``T_base_camera`` as a (4, 4) pose; ValueError for a quaternion of length 0."""
+        if not self.T_base_camera:
+            return np.eye(4)
+        return pose(rotation_from_quaternion(np.array(self.T_base_camera[3:])), np.array(self.T_base_camera[:3]))

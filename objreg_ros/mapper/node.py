@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The door of the mapper: ``odom`` and ``constraints`` in; ``path`` and ``correction`` (map → odom, also as TF) out."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from geometry_msgs.msg import TransformStamped
+from nav_msgs.msg import Odometry as OdometryMsg
+from nav_msgs.msg import Path as PathMsg
+from std_srvs.srv import SetBool, Trigger
+
+from objreg_ros.bridge import from_msg, qos, to_msg
+from objreg_ros.bridge.door import Door
+from objreg_ros.bridge.spin import run
+from objreg_ros.data import LoopClosure, Odometry
+from objreg_ros.mapper.adapters.g2o import graph_text
+from objreg_ros.mapper.params import MapperNodeParams, MapperParams
+from objreg_ros.mapper.pose_graph import PoseGraph, Summary
+
+try:
+    from tf2_ros import TransformBroadcaster
+except ImportError:  # optional: the topic carries the same
+    TransformBroadcaster = None
+
+KEPT_CONSTRAINTS = 1000  # as many as the registrar keeps for a mapper that comes late
+
+
+class MapperNode(Door):
+    """Keeps the pose graph, solves it whenever a constraint came in. The books count constraints.
+
+    The worker solves a snapshot, so that odometry never waits; ``_graph_lock`` guards what both threads touch.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("mapper", MapperParams, MapperNodeParams)
+        self._inputs = self.settings.of(MapperNodeParams)
+        self._graph_lock = threading.Lock()
+        self._waiting: list[LoopClosure] = []
+        self._enabled, self._odometry_count, self._odom_frame = True, 0, "odom"
+        self._start_anew()
+        self._path = self.create_publisher(PathMsg, "path", qos.latched())
+        self._correction = self.create_publisher(TransformStamped, "correction", qos.latched())
+        self._broadcaster = None if TransformBroadcaster is None else TransformBroadcaster(self)
+        self._serve()
+        self.listen(OdometryMsg, "odom", self._hear_odometry, self.sensor(), watched="odom")
+        self.listen(OdometryMsg, "constraints", self._hear_constraint, qos.latched(KEPT_CONSTRAINTS))
+        self.expect("odom", "odom")
+
+    def _serve(self) -> None:
+        self.create_service(Trigger, "~/reset", self._reset)
+        self.create_service(Trigger, "~/save", self._save)
+        self.create_service(SetBool, "~/enable", self._enable)
+
+    def _start_anew(self) -> None:
+        self._graph = PoseGraph(self.settings.of(MapperParams), self._inputs.mounting)
+        self._summary = Summary(0, (), ())
+
+    # Odometry
+
+    def _hear_odometry(self, message: Any) -> None:
+        odometry = self.read_aside("odom", from_msg.odometry, message)
+        if odometry is None or not self._advances(odometry):
+            return
+        self._odometry_count += 1
+        self._odom_frame = odometry.frame_id
+        with self._graph_lock:
+            new_keyframe = self._graph.add_odometry(odometry)
+        if new_keyframe:
+            self._publish_path(odometry.stamp_ns)
+        self._publish_correction(odometry.stamp_ns)
+        self._tie_what_waits()
+
+    def _advances(self, odometry: Odometry) -> bool:
+        """Whether time goes on; a jump back (a looped bag) starts a new map, a repeated stamp is passed over."""
+        known = self._graph.odometry.stamps_ns
+        if known and odometry.stamp_ns < known[-1]:
+            self.get_logger().warning(f"time jumped back by {(known[-1] - odometry.stamp_ns) / 1e9:.3f} s: a new map")
+            with self._graph_lock:
+                self._start_anew()
+        return not known or odometry.stamp_ns != known[-1]
+
+    # Constraints
+
+    def _hear_constraint(self, message: Any) -> None:
+        closure = self.read_aside("constraints", from_msg.loop_closure, message)
+        stamp_ns = from_msg.stamp_ns(message) if closure is None else closure.to_ns
+        self.accept(stamp_ns)
+        if closure is None:
+            self.drop(stamp_ns, "malformed_constraints")
+        elif not self._enabled:
+            self.drop(stamp_ns, "disabled")
+        else:
+            self._waiting.append(closure)
+            self._tie_what_waits()
+
+    def _tie_what_waits(self) -> None:
+        """Odometry and constraints come in any order: a constraint waits until odometry covers both its moments."""
+        waiting, self._waiting = self._waiting, []
+        for closure in waiting:
+            with self._graph_lock:
+                tied = self._graph.add_closure(closure)
+            if tied:
+                self.worker.put((closure.to_ns, None))
+            elif self._came_too_early(closure):
+                self.drop(closure.to_ns, "before_odometry", "odometry begins after the first moment of the constraint")
+            else:
+                self._waiting.append(closure)
+
+    def _came_too_early(self, closure: LoopClosure) -> bool:
+        known = self._graph.odometry.stamps_ns
+        return bool(known) and min(closure.from_ns, closure.to_ns) < known[0]
+
+    def _overtaken(self, job: tuple[int, Any]) -> None:
+        self.conclude(job[0], lambda: True)  # the newer job solves the graph with this constraint in it
+
+    def compute(self, stamp_ns: int, payload: None) -> bool:
+        """Solve the graph as it is now."""
+        with self._graph_lock:
+            graph, problem = self._graph, self._graph.problem()
+        with self.ledger.timed("optimise"):
+            solution = problem.solve()
+        with self._graph_lock:
+            if graph is self._graph:
+                self._summary = graph.adopt(problem, solution)
+        self._publish_path(stamp_ns)
+        self._correction.publish(
+            self._correction_message(stamp_ns)
+        )  # as TF only with odometry: its time must not go back
+        return True
+
+    # Publish
+
+    def _publish_path(self, stamp_ns: int) -> None:
+        with self._graph_lock:
+            path = self._graph.path()
+        self._path.publish(to_msg.path(path, stamp_ns, self._inputs.map_frame))
+
+    def _publish_correction(self, stamp_ns: int) -> None:
+        message = self._correction_message(stamp_ns)
+        self._correction.publish(message)
+        if self._broadcaster is not None:
+            self._broadcaster.sendTransform(message)
+
+    def _correction_message(self, stamp_ns: int) -> TransformStamped:
+        with self._graph_lock:
+            T_map_odom = self._graph.T_map_odom
+        return to_msg.transform(T_map_odom, stamp_ns, self._inputs.map_frame, self._odom_frame)
+
+    def extra_diagnostics(self) -> Mapping[str, object]:
+        """What the last solution believed."""
+        return {
+            "odometry": self._odometry_count,
+            "keyframes": len(self._graph.keyframes),
+            "constraints kept": len(self._summary.kept),
+            "constraints pruned": len(self._summary.pruned),
+            "constraints without odometry": len(self._waiting),
+        }
+
+    # Services
+
+    def _reset(self, _: Any, response: Any) -> Any:
+        with self._graph_lock:
+            self._start_anew()
+        response.success, response.message = True, "started a new map"
+        return response
+
+    def _save(self, _: Any, response: Any) -> Any:
+        with self._graph_lock:
+            poses = [T for _, T in self._graph.path()]
+            text = graph_text(poses, [(tie.k1, tie.k2, tie.constraint) for tie in self._graph.ties])
+        path = Path(self._inputs.graph_path).expanduser().absolute()
+        try:
+            path.write_text(text, encoding="ascii")
+        except OSError as error:
+            response.success, response.message = False, str(error)
+        else:
+            response.success, response.message = True, str(path)
+        return response
+
+    def _enable(self, request: Any, response: Any) -> Any:
+        self._enabled = request.data
+        response.success, response.message = True, "enabled" if request.data else "constraints are dropped as disabled"
+        return response
+
+
+def main() -> int:
+    """The executable ``mapper``."""
+    return run(MapperNode)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The mapper behind its door: messages in, messages out."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+rclpy = pytest.importorskip("rclpy", reason="the door needs ROS 2")
+
+from geometry_msgs.msg import TransformStamped  # noqa: E402
+from nav_msgs.msg import Odometry as OdometryMsg  # noqa: E402
+from nav_msgs.msg import Path as PathMsg  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from std_srvs.srv import SetBool, Trigger  # noqa: E402
+
+from objreg_ros.bridge import from_msg, qos, to_msg  # noqa: E402
+from objreg_ros.data import LoopClosure  # noqa: E402
+from objreg_ros.geometry import pose, rotation_from_vector  # noqa: E402
+from objreg_ros.mapper.node import MapperNode  # noqa: E402
+
+from .bent import SECOND, bent, closure, odometry, square  # noqa: E402
+
+TRUE = square(laps=2)
+BENT = bent(TRUE)
+HALF = len(TRUE) // 2
+ROUND_TRIP = [closure(TRUE, k, k + HALF) for k in range(3, HALF, 20)]
+
+
+class Outside:
+    """What stands outside the door: publishes odometry and constraints, and hears the path and the correction."""
+
+    def __init__(self, door: MapperNode) -> None:
+        self.door = door
+        self.node = rclpy.create_node("outside")
+        self.paths: list[Any] = []
+        self.corrections: list[Any] = []
+        self.odom = self.node.create_publisher(OdometryMsg, "odom", qos.room(1000))
+        self.constraints = self.node.create_publisher(OdometryMsg, "constraints", qos.latched(100))
+        self.node.create_subscription(PathMsg, "path", self.paths.append, qos.latched())
+        self.node.create_subscription(TransformStamped, "correction", self.corrections.append, qos.latched())
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(door)
+        self.executor.add_node(self.node)
+        self.wait(lambda: self.odom.get_subscription_count() and self.constraints.get_subscription_count())
+
+    def wait(self, done: Callable[[], Any], seconds: float = 20.0) -> None:
+        end = time.monotonic() + seconds
+        while not done():
+            assert time.monotonic() < end, f"nothing came; the books say {self.door.ledger.balance()}"
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def drive(self, poses: list[np.ndarray]) -> None:
+        """Odometry in the camera's stead: one message at a time, so that none is lost on the way."""
+        for count, word in enumerate(odometry(poses), start=1):
+            self.odom.publish(to_msg.odometry(word))
+            self.wait(lambda count=count: self.door.extra_diagnostics()["odometry"] >= count)
+
+    def send(self, closures: list[LoopClosure]) -> None:
+        for word in closures:
+            self.constraints.publish(to_msg.constraint(word))
+
+    def settled(self) -> bool:
+        balance = self.door.ledger.balance()
+        return balance.received > 0 and balance.waiting == 0
+
+
+@pytest.fixture
+def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Outside]:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    rclpy.init(args=["--ros-args", "-p", f"graph_path:={tmp_path}/map.g2o"], domain_id=100 + os.getpid() % 100)
+    around = Outside(MapperNode())
+    yield around
+    around.executor.shutdown()
+    around.door.close()
+    around.node.destroy_node()
+    rclpy.try_shutdown()
+
+
+def end_of(path: Any) -> np.ndarray:
+    return from_msg.odometry(path.poses[-1]).T_odom_body
+
+
+def test_the_path_ends_where_the_walk_began_once_constraints_are_in(outside: Outside) -> None:
+    outside.send(ROUND_TRIP[:1])  # before its odometry: it waits
+    outside.drive(BENT)
+    outside.send(ROUND_TRIP[1:])
+    outside.wait(lambda: outside.door.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP))
+    outside.wait(outside.settled)
+    outside.wait(lambda: np.linalg.norm(end_of(outside.paths[-1])[:3, 3]) < 0.3 * np.linalg.norm(BENT[-1][:3, 3]))
+    assert outside.paths[-1].header.frame_id == "map"
+    assert outside.door.ledger.balance().published == len(ROUND_TRIP)
+
+
+def test_the_correction_carries_odom_to_map(outside: Outside) -> None:
+    outside.drive(BENT)
+    outside.send(ROUND_TRIP)
+    outside.wait(lambda: outside.door.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP))
+
+    def end() -> np.ndarray:
+        return from_msg.odometry(outside.corrections[-1]).T_odom_body @ BENT[-1]
+
+    outside.wait(lambda: np.linalg.norm(end()[:3, 3]) < 0.3 * np.linalg.norm(BENT[-1][:3, 3]))
+    assert (outside.corrections[-1].header.frame_id, outside.corrections[-1].child_frame_id) == ("map", "odom")
+
+
+def test_a_wrong_constraint_is_pruned_and_told(outside: Outside) -> None:
+    off = pose(rotation_from_vector(np.array([0.0, 0.0, 1.2])), np.array([0.8, 0.6, 0.0]))
+    outside.drive(BENT)
+    outside.send([*ROUND_TRIP, closure(TRUE, 10, 90, off)])
+    outside.wait(lambda: outside.door.extra_diagnostics()["constraints pruned"] == 1)
+    assert outside.door.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP)
+
+
+def test_what_cannot_be_used_is_dropped_by_reason(outside: Outside) -> None:
+    malformed = to_msg.constraint(ROUND_TRIP[0])
+    malformed.header.frame_id = "camera"
+    outside.constraints.publish(malformed)
+    outside.drive(BENT[:20])
+    outside.send([closure(TRUE, -30, 10)])
+    outside.wait(lambda: outside.door.ledger.balance().received == 2 and outside.settled())
+    assert outside.door.ledger.balance().dropped == {"malformed_constraints": 1, "before_odometry": 1}
+
+
+def test_a_jump_back_in_time_starts_a_new_map(outside: Outside) -> None:
+    outside.drive(BENT[:40])
+    keyframes = outside.door.extra_diagnostics()["keyframes"]
+    outside.odom.publish(to_msg.odometry(odometry(BENT)[0]))
+    outside.wait(lambda: outside.door.extra_diagnostics()["keyframes"] == 1)
+    assert keyframes > 3
+
+
+def test_the_services_answer(outside: Outside, tmp_path: Path) -> None:
+    outside.drive(BENT[:40])
+    door = outside.door
+    assert door._save(None, Trigger.Response()).message == str(tmp_path / "map.g2o")
+    text = (tmp_path / "map.g2o").read_text()
+    assert text.count("VERTEX_SE3:QUAT") == len(door._graph.keyframes) == text.count("EDGE_SE3:QUAT") + 1
+    assert door._enable(SetBool.Request(data=False), SetBool.Response()).success
+    outside.send(ROUND_TRIP[:1])
+    outside.wait(lambda: door.ledger.balance().dropped == {"disabled": 1})
+    assert door._reset(None, Trigger.Response()).success
+    assert door.extra_diagnostics()["keyframes"] == 0
+
+
+def test_a_stamp_that_repeats_is_passed_over(outside: Outside) -> None:
+    outside.drive(BENT[:5])
+    outside.odom.publish(to_msg.odometry(odometry(BENT)[4]))
+    outside.odom.publish(to_msg.odometry(odometry(BENT)[5]))
+    outside.wait(lambda: outside.door.extra_diagnostics()["odometry"] == 6)
+    assert outside.door._graph.odometry.stamps_ns[-1] == SECOND // 2
