@@ -9,6 +9,7 @@ import pytest
 from objreg_ros.data import DepthImage, Detections, PointFlag
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
+
 from .scenes import SMALL, Scene
 
 NOISE = 0.0015
