@@ -3,18 +3,24 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
 from objreg_ros.data import Array, DepthImage, PointFlag
 from objreg_ros.segmenter.boxes import Box, expanded
-from objreg_ros.segmenter.components import connect
+from objreg_ros.segmenter.components import Parts, connect, grow, measure
+from objreg_ros.segmenter.creases import find_creases, find_steps
 from objreg_ros.segmenter.extract import Pixels, extract
 from objreg_ros.segmenter.params import SegmenterParams
+from objreg_ros.segmenter.selection import Window, select
 from objreg_ros.segmenter.support import Ground, fit_plane, tolerance
 from objreg_ros.segmenter.surface import Surface, reduce
 
 FINE = 2  # pixels per cell around a box
-LEVEL = np.cos(np.radians(45.0))  # a cell at the support's height that is tilted more than this is of the object
+LEVEL = np.cos(np.radians(15.0))  # a cell near the support's height that is tilted more than this is of the object
+BUMP = 0.5
+GROWTH = 8  # rounds that parts grow over valleys
+MAX_PARTS = 24
 OWN_TOP = 0.65  # a level part with more of it in the box is a top of the object, not what it stands on
 LEAK = 0.08  # an object with more of it outside its box is cut by the box
 NEAR_BORDER = 0.012  # of the image's size
@@ -31,50 +37,68 @@ def isolate(image: DepthImage, box: Box, ground: Ground, params: SegmenterParams
     step = FINE if min(box[2] - box[0], box[3] - box[1]) >= 8 * FINE else 1
     around = expanded(box, params.margin, step, height, width)
     surface = reduce(image.depth, image.intrinsics, around, step, (params.z_min, z_max, y_max), jump)
-    inside = _inside(surface, box)
-    level, supported = _support_cells(surface, box, ground, params.height)
-    labels, count = connect(surface.depth, (surface.depth > 0) & ~level, jump)
-    best, flags = _choose(labels, count, inside)
-    chosen = labels == best if best else np.zeros_like(inside)
+    valley = find_creases(surface, params.crease, jump)
+    level, supported = _support_cells(surface, valley, box, ground, params.height)
+    window = _cells_of(box, surface)
+    parts = _parts(surface, (surface.depth > 0) & ~level, valley, window, jump)
+    selected = select(parts, window)
+    chosen = np.isin(parts.labels, selected) if selected else np.zeros_like(level)
     pixels = extract(image, box, surface, chosen, jump)
-    if not supported:
-        flags |= PointFlag.UNSUPPORTED
+    flags = PointFlag(0) if supported else PointFlag.UNSUPPORTED
+    index = np.array(selected, int) - 1
+    if selected and parts.inside[index].sum() < (1 - LEAK) * parts.total[index].sum():
+        flags |= PointFlag.CUT_BY_BOX
     if _touches_border(pixels, height, width):
         flags |= PointFlag.CUT_BY_IMAGE
-    if _wall_like(surface, chosen, inside):
+    if _wall_like(surface, chosen, window):
         flags |= PointFlag.WALL_LIKE
     return pixels, flags
 
 
-def _inside(surface: Surface, box: Box) -> Array:
-    """(h, w) bool: the cells whose middle lies in ``box``."""
+def _parts(surface: Surface, keep: Array, valley: Array, window: Window, jump: tuple[float, float]) -> Parts:
+    """The parts of the ``keep`` cells, cut at depth jumps and valleys."""
+    steps = find_steps(surface.depth, BUMP, jump)
+    labels, count = connect(surface.depth, keep & ~valley & ~steps, jump)
+    grow(labels, surface.depth, keep, jump, GROWTH)
+    return measure(labels, count, window, surface.depth, jump, MAX_PARTS)
+
+
+def _cells_of(box: Box, surface: Surface) -> Window:
+    """The cells of ``surface`` whose middle lies in ``box``: left, top, right, bottom; at least one cell."""
     h, w = surface.depth.shape
-    u = surface.left + np.arange(w) * surface.step + surface.step / 2
-    v = surface.top + np.arange(h) * surface.step + surface.step / 2
-    return ((v >= box[1]) & (v < box[3]))[:, None] & ((u >= box[0]) & (u < box[2]))[None, :]
+    step = surface.step
+    left, right = (round((u - surface.left) / step) for u in (box[0], box[2]))
+    top, bottom = (round((v - surface.top) / step) for v in (box[1], box[3]))
+    left, top = min(left, w - 1), min(top, h - 1)
+    return left, top, max(left + 1, min(right, w)), max(top + 1, min(bottom, h))
 
 
-def _support_cells(surface: Surface, box: Box, ground: Ground, base: float) -> tuple[Array, bool]:
+def _support_cells(surface: Surface, valley: Array, box: Box, ground: Ground, base: float) -> tuple[Array, bool]:
     """The cells of the support surfaces here, and whether there is one."""
     level = np.zeros(surface.depth.shape, bool)
     up = ground.up
     if up is None:
         return level, False
     rows, cols = _coarse_index(surface, ground.surface)
-    window = _window(box, ground.surface)
+    coarse_box = _window(box, ground.surface)
     cosine = surface.normals @ up.astype(np.float32)
-    flat = (surface.depth > 0) & ((cosine > LEVEL) | (surface.normals[..., 2] == 0))
+    known = surface.depth > 0
     points = surface.points
+    loose = tolerance(surface.depth)
     found = False
     for support in ground.supports:
-        own = support.parts_within(window, OWN_TOP)[np.ix_(rows, cols)]
-        height = support.plane.height(points)
-        near = flat & ~own & (np.abs(height) < 2 * tolerance(surface.depth))
-        plane = fit_plane(points[near & (cosine > 0.9)], up)
-        if plane is None or np.count_nonzero(near) < 40:
+        here = (support.parts > 0) & ~support.parts_within(coarse_box, OWN_TOP)
+        here = cv2.dilate(here.view(np.uint8), np.ones((7, 7), np.uint8))[np.ix_(rows, cols)] > 0
+        near = known & here & (cosine > 0.9) & (np.abs(support.plane.height(points)) < 2 * loose)
+        if np.count_nonzero(near) < 40:
+            continue
+        plane = fit_plane(points[near], up)
+        if plane is None:
             continue
         height = plane.height(points)
-        level |= flat & ~own & (np.abs(height) < base + 0.8 * tolerance(surface.depth))
+        spread = 1.48 * float(np.median(np.abs(height[near]) / loose[near]))
+        tight = np.minimum(base + 2.5 * spread * loose, loose)
+        level |= known & here & ((np.abs(height) < tight) | (~valley & (cosine > LEVEL) & (np.abs(height) < loose)))
         found = True
     return level, found
 
@@ -119,7 +143,7 @@ def _touches_border(pixels: Pixels, height: int, width: int) -> bool:
     return bool(low[0] < du or low[1] < dv or high[0] >= width - du or high[1] >= height - dv)
 
 
-def _wall_like(surface: Surface, chosen: Array, inside: Array) -> bool:
+def _wall_like(surface: Surface, chosen: Array, window: Window) -> bool:
     """Whether the chosen cells are flat and their plane goes on around the box."""
     points = surface.points
     patch = points[chosen].astype(np.float64)
@@ -128,7 +152,8 @@ def _wall_like(surface: Surface, chosen: Array, inside: Array) -> bool:
     centre = patch.mean(axis=0)
     normal = np.linalg.eigh((patch - centre).T @ (patch - centre))[1][:, 0]
     on_plane = (surface.depth > 0) & (np.abs((points - centre) @ normal) < 2 * tolerance(surface.depth))
-    ring = ~inside & (surface.depth > 0)
+    ring = surface.depth > 0
+    ring[window[1] : window[3], window[0] : window[2]] = False
     if np.count_nonzero(ring) < 50:
         return False
     return bool(on_plane[chosen].mean() > 0.85 and on_plane[ring].mean() > 0.4)

@@ -77,7 +77,7 @@ def find_supports(
     area = surface.areas(camera)
     supports: list[Support] = []
     for _ in range(MAX_SUPPORTS):
-        found = _largest(points, height, area, free, surface.depth, up, jump)
+        found = _largest(surface, points, height, area, free, up, jump)
         if found is None or found.area < min_area:
             break
         supports.append(found)
@@ -86,8 +86,9 @@ def find_supports(
 
 
 def _largest(
-    points: Array, height: Array, area: Array, free: Array, depth: Array, up: Array, jump: tuple[float, float]
+    surface: Surface, points: Array, height: Array, area: Array, free: Array, up: Array, jump: tuple[float, float]
 ) -> Support | None:
+    depth = surface.depth
     if np.count_nonzero(free) < 30:
         return None
     h = height[free]
@@ -102,7 +103,7 @@ def _largest(
             break
         plane = fitted
     cells = free & (np.abs(plane.height(points)) < tolerance(depth))
-    return Support(plane, connect(depth, cells, jump)[0], float(area[cells].sum()))
+    return Support(plane, connect(surface.depth, cells, jump)[0], float(area[cells].sum()))
 
 
 def fit_plane(points: Array, up: Array) -> Plane | None:

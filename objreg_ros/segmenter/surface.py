@@ -109,7 +109,7 @@ def _normals(depth, x, y, fx, fy, bounds, normals):  # type: ignore[no-untyped-d
             z = depth[i, j]
             if z <= 0:
                 continue
-            jump = (bounds[3] + bounds[4] * z * z) * REACH
+            jump = bounds[3] + bounds[4] * z * z
             across = _slope(depth, i, j, 0, 1, z, jump)
             down = _slope(depth, i, j, 1, 0, z, jump)
             if across != across or down != down:
@@ -125,7 +125,10 @@ def _normals(depth, x, y, fx, fy, bounds, normals):  # type: ignore[no-untyped-d
 
 @numba.njit(cache=True, fastmath=EXACT, inline="always")
 def _slope(depth, i, j, di, dj, z, jump):  # type: ignore[no-untyped-def]
-    """Change of inverse depth per cell along (di, dj), the mean of three parallel lines; NaN where there is none."""
+    """Change of inverse depth per cell along (di, dj), the mean of three parallel lines; NaN where there is none.
+
+    Where a line bends or breaks in its middle, only its flatter half counts, so that edges stay sharp.
+    """
     h, w = depth.shape
     total, span = np.float32(0), 0
     for side in range(-1, 2):
@@ -135,17 +138,18 @@ def _slope(depth, i, j, di, dj, z, jump):  # type: ignore[no-untyped-def]
         middle = depth[a, b]
         if not (abs(middle - z) < jump):
             continue
-        p, q = i + side * dj + REACH * di, j + side * di + REACH * dj
-        r, s = i + side * dj - REACH * di, j + side * di - REACH * dj
-        ahead = p < h and q < w and abs(depth[p, q] - z) < jump
-        behind = r >= 0 and s >= 0 and abs(depth[r, s] - z) < jump
-        if ahead and behind:
-            total += np.float32(1) / depth[p, q] - np.float32(1) / depth[r, s]
+        p, q = a + REACH * di, b + REACH * dj
+        r, s = a - REACH * di, b - REACH * dj
+        after = depth[p, q] if p < h and q < w else np.float32(0)
+        before = depth[r, s] if r >= 0 and s >= 0 else np.float32(0)
+        ahead, behind = abs(after - middle), abs(middle - before)
+        if after > 0 and before > 0 and abs(after + before - 2 * middle) < jump:
+            total += np.float32(1) / after - np.float32(1) / before
             span += 2 * REACH
-        elif ahead:
-            total += np.float32(1) / depth[p, q] - np.float32(1) / middle
+        elif after > 0 and ahead < 3 * jump and (ahead < behind or before <= 0):
+            total += np.float32(1) / after - np.float32(1) / middle
             span += REACH
-        elif behind:
-            total += np.float32(1) / middle - np.float32(1) / depth[r, s]
+        elif before > 0 and behind < 3 * jump:
+            total += np.float32(1) / middle - np.float32(1) / before
             span += REACH
     return total / span if span > 0 else np.float32(np.nan)
