@@ -21,21 +21,30 @@ class RegistrarParams(Params):
     )
     seed: int = param(0, "seed of everything that draws at random", ge=0)
 
+    store: str = param("", "the SQLite file that remembers; empty: memory only, forgotten at the end")
+    max_views: int = param(8, "views of one object that are kept, the most diverse", ge=1)
+    landmark_radius: float = param(0.10, "an object seen again within this is the same one", "m", ge=0.0)
+
     # What becomes a keyframe, and what it keeps.
     keyframe_translation: float = param(0.15, "motion that ends a keyframe", "m", ge=0.0)
     keyframe_rotation: float = param(8.0, "rotation that ends a keyframe", "deg", ge=0.0, le=180.0)
     keyframe_seconds: float = param(1.0, "longest time that a keyframe spans", "s", ge=0.0)
     keyframe_min_objects: int = param(1, "least number of objects of a keyframe", ge=1)
+    keyframe_frames: int = param(4, "most frames that are fused into one keyframe", ge=1, le=30)
+    object_voxel: float = param(0.004, "edge of a voxel when sightings of an object are fused", "m", ge=0.001, le=0.05)
     context_radius: float = param(1.0, "how far around an object the context reaches", "m", ge=0.1)
     context_voxel: float = param(0.03, "edge of a voxel of the context", "m", ge=0.005, le=0.2)
     context_range: float = param(4.0, "context farther from the camera is left out", "m", ge=0.5)
 
     # Which stored keyframes a new one is compared with.
     label_groups: tuple[str, ...] = param(
-        ("cup mouse bottle bowl vase", "book remote phone", "tv laptop"),
+        ("cup mouse bottle", "book remote cell_phone", "tv laptop"),
         "labels that detectors confuse: one group an item, spaces between (an underscore for a space in a name)",
     )
     min_gap: float = param(2.0, "least time between the two moments of a constraint", "s", ge=0.0)
+    odometry_radius: float = param(1.0, "stored objects of the session farther than this are not tried", "m", ge=0.0)
+    odometry_drift: float = param(0.1, "growth of that radius for each metre of path since then", "m/m", ge=0.0)
+    thin_seconds: float = param(1.0, "closures whose both ends are nearer than this are one closure", "s", ge=0.0)
     candidates: int = param(6, "stored keyframes that are tried for each new one, best first", ge=1, le=100)
 
     # How a pose is found and looked at.
@@ -66,6 +75,14 @@ class RegistrarParams(Params):
     max_gravity_error: float = param(5.0, "largest angle between the gravities", "deg", ge=0.0, le=180.0)
     max_translation: float = param(5.0, "largest distance between the two cameras", "m", ge=0.0)
     max_slack_sigma: float = param(0.10, "largest standard deviation along any translation", "m", ge=0.0)
+    odometry_sigmas: float = param(4.0, "largest distance from odometry in its standard deviations", ge=0.0)
+
+    # How wrong an accepted pose may be; config/covariance.yaml says how these were calibrated.
+    covariance_scale: float = param(4.0, "factor of the covariance of a registration", ge=0.0)
+    covariance_floor_translation: float = param(0.02, "least standard deviation of each axis", "m", ge=1e-4)
+    covariance_floor_rotation: float = param(0.6, "least standard deviation of each axis", "deg", ge=1e-3)
+    slack_translation: float = param(0.5, "standard deviation along a free direction of translation", "m", ge=0.0)
+    slack_rotation: float = param(60.0, "standard deviation about a free axis", "deg", ge=0.0)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From a stretch to a keyframe: objects seen from several frames become one cloud each, views become context."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from objreg_ros.data import Array, Frame, ObjectCloud, PointFlag
+from objreg_ros.geometry import inverse, pose, rotate, rotation_from_vector, transform, vector_from_rotation
+from objreg_ros.registrar.keyframe import Context, Keyframe, KeyObject
+from objreg_ros.registrar.keyframes import Stretch
+from objreg_ros.registrar.labels import LabelGroups
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.tracking import view_normals
+
+CUT = np.uint16(PointFlag.CUT_BY_IMAGE | PointFlag.CUT_BY_BOX)
+CENTRE_SPREAD = 0.05  # m: how far the middle of one small object wanders between neighbouring frames
+
+
+def fuse(stretch: Stretch, params: RegistrarParams) -> Keyframe:
+    """The keyframe of a stretch, in the camera frame of its reference frame; its ids are 0 until a store gives them."""
+    chosen = reference_index(stretch.frames)
+    reference = stretch.frames[chosen]
+    T_reference_first = inverse(stretch.T_first_frame[chosen])
+    motions = [T_reference_first @ T for T in stretch.T_first_frame]
+    objects = fuse_objects(stretch.frames, motions, params)
+    return Keyframe(
+        keyframe_id=0,
+        session=stretch.session,
+        stamp_ns=reference.stamp_ns,
+        frame_id=reference.frame_id,
+        objects=objects,
+        context=fuse_context(stretch.frames, motions, objects, params),
+        view=reference.view,
+        gravity=reference.gravity,
+        gravity_confidence=reference.gravity_confidence,
+        T_odom_camera=_rigid(stretch.T_session_first @ stretch.T_first_frame[chosen]),
+    )
+
+
+def reference_index(frames: Sequence[Frame]) -> int:
+    """The frame that shows most: objects first, then how sharp its grey is. The earliest of equals."""
+    worth = [(len(f.objects), _sharpness(f.view.grey)) for f in frames]
+    return max(range(len(frames)), key=lambda i: (*worth[i], -i))
+
+
+def fuse_objects(
+    frames: Sequence[Frame], T_reference_frame: Sequence[Array], params: RegistrarParams
+) -> tuple[KeyObject, ...]:
+    """Every object once: the same label group at the same place is the same object, seen from several sides."""
+    groups = LabelGroups(params.label_groups)
+    tracks: list[_Track] = []
+    for frame, T in zip(frames, T_reference_frame, strict=True):
+        free = list(tracks)
+        for item in frame.objects:
+            sighting = _moved(item, T)
+            track = _nearest(sighting, free, groups)
+            if track is None:
+                tracks.append(_Track([sighting]))
+            else:
+                free.remove(track)
+                track.sightings.append(sighting)
+    return tuple(track.fused(number, params.object_voxel) for number, track in enumerate(tracks, start=1))
+
+
+def fuse_context(
+    frames: Sequence[Frame], T_reference_frame: Sequence[Array], objects: Sequence[KeyObject], params: RegistrarParams
+) -> Context:
+    """What the views saw within the context's radius of any object, thinned to voxels, with the mean normals."""
+    xyz, normals = [], []
+    for frame, T in zip(frames, T_reference_frame, strict=True):
+        surface = view_normals(frame.view.xyz)
+        known = surface.any(axis=-1) & (frame.view.xyz[..., 2] < params.context_range)
+        xyz.append(transform(T, frame.view.xyz[known]))
+        normals.append(rotate(T, surface[known]))
+    points, directions = np.concatenate(xyz), np.concatenate(normals)
+    near = _near(points, [item.centroid for item in objects], params.context_radius)
+    return Context(
+        **dict(zip(("xyz", "normals"), thin(points[near], directions[near], params.context_voxel), strict=True))
+    )
+
+
+def thin(xyz: Array, normals: Array, voxel: float) -> tuple[Array, Array]:
+    """The mean point and the mean, normalised normal of each occupied voxel, in a fixed order."""
+    if len(xyz) == 0:
+        return xyz, normals
+    inverse_index, count = _voxels(xyz, voxel)
+    mean = np.stack([np.bincount(inverse_index, xyz[:, k]) / count for k in range(3)], axis=1)
+    sums = np.stack([np.bincount(inverse_index, normals[:, k]) for k in range(3)], axis=1)
+    length = np.linalg.norm(sums, axis=1, keepdims=True)
+    return mean.astype(np.float32), (sums / np.maximum(length, 1e-9)).astype(np.float32)
+
+
+@dataclass(slots=True, eq=False)
+class _Track:
+    """The sightings of one object, all in the reference frame."""
+
+    sightings: list[ObjectCloud] = field(default_factory=list)
+
+    def fused(self, instance: int, voxel: float) -> KeyObject:
+        best = max(self.sightings, key=lambda s: s.score)
+        whole = [s for s in self.sightings if not (s.has(PointFlag.CUT_BY_IMAGE) or s.has(PointFlag.CUT_BY_BOX))]
+        kept = whole or self.sightings
+        votes: Counter[str] = Counter()
+        for sighting in self.sightings:
+            votes[sighting.label] += round(1000 * sighting.score)
+        label = max(votes, key=lambda name: (votes[name], name))
+        return KeyObject(cloud=_merge(kept, label, best, instance, voxel), sightings=len(self.sightings))
+
+
+def _merge(sightings: Sequence[ObjectCloud], label: str, best: ObjectCloud, instance: int, voxel: float) -> ObjectCloud:
+    """The first point of each voxel: a point keeps its own colour, normal and flags."""
+    xyz = np.concatenate([s.xyz for s in sightings])
+    first = np.sort(np.unique(_keys(xyz, voxel), return_index=True)[1])
+    coloured = [s.rgb for s in sightings if s.rgb is not None]
+    return ObjectCloud(
+        label=label,
+        score=best.score,
+        instance=instance,
+        xyz=xyz[first],
+        normals=np.concatenate([s.normals for s in sightings])[first],
+        rgb=np.concatenate(coloured)[first] if len(coloured) == len(sightings) else None,
+        flags=np.concatenate([s.flags for s in sightings])[first],
+        density=best.density,
+    )
+
+
+def _nearest(item: ObjectCloud, tracks: Sequence[_Track], groups: LabelGroups) -> _Track | None:
+    middle, extent = _box(item)
+    best, best_distance = None, np.inf
+    for track in tracks:
+        last = track.sightings[-1]
+        if groups.of(last.label) != groups.of(item.label):
+            continue
+        last_middle, last_extent = _box(last)
+        distance = float(np.linalg.norm(middle - last_middle))
+        if distance < min(best_distance, CENTRE_SPREAD + 0.25 * min(extent, last_extent)):
+            best, best_distance = track, distance
+    return best
+
+
+def _box(item: ObjectCloud) -> tuple[Array, float]:
+    low, high = item.xyz.min(axis=0), item.xyz.max(axis=0)
+    return (low + high) / 2.0, float(np.linalg.norm(high - low))
+
+
+def _moved(item: ObjectCloud, T: Array) -> ObjectCloud:
+    return ObjectCloud(
+        label=item.label,
+        score=item.score,
+        instance=item.instance,
+        xyz=transform(T, item.xyz),
+        normals=rotate(T, item.normals),
+        rgb=item.rgb,
+        flags=item.flags,
+        density=item.density,
+    )
+
+
+def _near(points: Array, centres: Sequence[Array], radius: float) -> Array:
+    near = np.zeros(len(points), bool)
+    for centre in centres:
+        near |= np.square(points - centre.astype(np.float32)).sum(axis=1) < radius**2
+    return near
+
+
+def _keys(xyz: Array, voxel: float) -> Array:
+    """One integer per point: its voxel among 2^21 along each axis."""
+    cell = np.floor(xyz / voxel).astype(np.int64) + (1 << 20)
+    return np.asarray((cell[:, 0] << 42) | (cell[:, 1] << 21) | cell[:, 2])
+
+
+def _voxels(xyz: Array, voxel: float) -> tuple[Array, Array]:
+    _, index, count = np.unique(_keys(xyz, voxel), return_inverse=True, return_counts=True)
+    return index.reshape(-1), count
+
+
+def _sharpness(grey: Array | None) -> float:
+    """The mean squared difference of neighbours: blur by motion takes it away."""
+    if grey is None:
+        return 0.0
+    pixels = grey.astype(np.float32)
+    return float(np.square(np.diff(pixels, axis=0)).mean() + np.square(np.diff(pixels, axis=1)).mean())
+
+
+def _rigid(T: Array) -> Array:
+    """The pose with its rotation made orthonormal again after many products."""
+    return pose(rotation_from_vector(vector_from_rotation(T[:3, :3])), T[:3, 3])

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Keyframer: when frames become a keyframe."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from objreg_ros.data import Frame
+from objreg_ros.registrar.keyframes import Keyframer, Stretch
+from objreg_ros.registrar.params import RegistrarParams
+
+from .samples import box, frame, moved, scene_view
+
+PARAMS = RegistrarParams(keyframe_translation=0.1, keyframe_rotation=10.0, keyframe_seconds=1.0, keyframe_frames=4)
+CUP = (box("cup", (0, 0, 1)),)
+
+
+def _run(keyframer: Keyframer, frames: list[Frame]) -> list[Stretch]:
+    ended = [keyframer.add(item) for item in frames] + [keyframer.finish()]
+    return [stretch for stretch in ended if stretch is not None]
+
+
+def test_a_moving_camera_makes_a_keyframe_each_time_it_has_moved_enough() -> None:
+    frames = [frame(0.1 * i, CUP, moved(0.03 * i)) for i in range(13)]
+    stretches = _run(Keyframer(PARAMS), frames)
+    assert [round(s.T_session_first[0, 3], 2) for s in stretches] == [0.0, 0.12, 0.24, 0.36]
+    assert [len(s.frames) for s in stretches] == [4, 4, 4, 1]
+    assert np.allclose(stretches[1].T_first_frame[-1], moved(0.09))
+
+
+def test_a_camera_that_rests_makes_one_keyframe_until_something_new_comes() -> None:
+    rest = [frame(0.2 * i, CUP, np.eye(4)) for i in range(20)]
+    new = [frame(4.0 + 0.2 * i, (*CUP, box("book", (0.5, 0, 1))), np.eye(4)) for i in range(20)]
+    stretches = _run(Keyframer(PARAMS), rest + new)
+    assert [len(s.frames[-1].objects) for s in stretches] == [1, 2]
+
+
+def test_frames_without_objects_make_no_keyframe() -> None:
+    assert _run(Keyframer(PARAMS), [frame(0.1 * i, (), moved(0.1 * i)) for i in range(10)]) == []
+
+
+def test_without_odometry_the_views_give_the_motion() -> None:
+    frames = [frame(0.1 * i, CUP, None, scene_view(moved(0.03 * i))) for i in range(6)]
+    stretches = _run(Keyframer(PARAMS), frames)
+    assert len(stretches) == 2 and {s.session for s in stretches} == {0}
+    assert np.allclose(stretches[1].T_session_first, moved(0.12), atol=0.005)
+
+
+def test_a_lost_track_and_a_jump_back_in_time_begin_a_new_session() -> None:
+    blind = frame(
+        0.1,
+        CUP,
+        None,
+        type(scene_view())(
+            xyz=np.full((120, 160, 3), np.nan, np.float32), grey=None, intrinsics=scene_view().intrinsics
+        ),
+    )
+    sessions = [s.session for s in _run(Keyframer(PARAMS), [frame(0.0, CUP), blind])]
+    assert sessions == [0, 1]
+    looped = [frame(5.0, CUP, np.eye(4)), frame(1.0, CUP, np.eye(4)), frame(1.1, CUP, np.eye(4))]
+    assert [s.session for s in _run(Keyframer(PARAMS), looped)] == [0, 1]
+
+
+def test_odometry_that_appears_begins_its_own_session() -> None:
+    stretches = _run(Keyframer(PARAMS), [frame(0.0, CUP), frame(0.1, CUP, moved(7.0)), frame(0.2, CUP, moved(7.5))])
+    assert [s.session for s in stretches] == [0, 1, 1]
+    assert np.allclose(stretches[-1].T_session_first, moved(7.5))

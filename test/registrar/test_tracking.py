@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tracking: the motion between two views."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from objreg_ros.data import View
+from objreg_ros.geometry import pose, pose_error, rotation_from_vector
+from objreg_ros.registrar.tracking import surface_of, view_motion, view_normals
+
+from .samples import CAMERA, moved, scene_view
+
+MOTIONS = [
+    pose(rotation_from_vector(np.array([0.0, 0.02, 0.0])), np.array([0.02, 0.0, 0.01])),
+    pose(rotation_from_vector(np.array([0.02, -0.02, 0.02])), np.array([-0.03, 0.02, 0.0])),
+]
+
+
+@pytest.mark.parametrize("T", MOTIONS)
+def test_a_small_motion_is_found_to_a_millimetre(T: np.ndarray) -> None:
+    found = view_motion(scene_view(T), surface_of(scene_view()))
+    assert found is not None
+    rotation, distance = pose_error(found, T)
+    assert rotation < 0.1 and distance < 0.3
+
+
+def test_grey_holds_where_a_plain_wall_would_slide() -> None:
+    v, u = np.mgrid[0:120, 0:160].astype(np.float32)
+
+    def wall(shift: float) -> View:
+        x, y = (u - CAMERA.cx) / CAMERA.fx * 2.0, (v - CAMERA.cy) / CAMERA.fy * 2.0
+        grey = 128 + 50 * np.sin(9 * (x + shift)) + 50 * np.sin(11 * y)
+        xyz = np.stack([x, y, np.full_like(x, 2.0)], axis=-1).astype(np.float32)
+        return View(xyz=xyz, grey=grey.astype(np.uint8), intrinsics=CAMERA)
+
+    found = view_motion(wall(0.02), surface_of(wall(0.0)))
+    assert found is not None and pose_error(found, moved(0.02))[1] < 0.3
+
+
+def test_a_guess_makes_a_larger_motion_reachable() -> None:
+    T = pose(rotation_from_vector(np.array([0.0, 0.3, 0.0])), np.array([0.3, 0.0, 0.0]))
+    found = view_motion(scene_view(T), surface_of(scene_view()), T @ MOTIONS[0])
+    assert found is not None and pose_error(found, T)[0] < 0.2
+
+
+def test_two_views_of_different_scenes_have_no_motion() -> None:
+    nothing = View(xyz=np.full((120, 160, 3), np.nan, np.float32), grey=None, intrinsics=CAMERA)
+    assert view_motion(scene_view(), surface_of(nothing)) is None
+    assert view_motion(nothing, surface_of(scene_view())) is None
+
+
+def test_normals_face_the_camera_and_are_unknown_beside_a_jump() -> None:
+    xyz = scene_view().xyz.copy()
+    xyz[:, :80] *= 0.5
+    normals = view_normals(xyz)
+    assert np.allclose(np.linalg.norm(normals[10:50, 100:150], axis=-1), 1, atol=1e-5)
+    assert (normals * xyz).sum(axis=-1).max() <= 0
+    assert not normals[:, 79:81].any()
