@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Keyframes and sightings as rows of the store, and back. Arrays become compressed, self-describing blobs."""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from objreg_ros.data import Array, Intrinsics, ObjectCloud, View
+from objreg_ros.geometry import back_project
+from objreg_ros.registrar.keyframe import Context, Keyframe, KeyObject
+from objreg_ros.registrar.sighting import Sighting
+
+Row = dict[str, Any]
+
+
+def pack(*arrays: Array | None) -> bytes:
+    """Arrays, some of them None, as one compressed blob: a line of JSON with dtypes and shapes, then the bytes."""
+    header = [None if a is None else [a.dtype.str, list(a.shape)] for a in arrays]
+    body = b"".join(np.ascontiguousarray(a).tobytes() for a in arrays if a is not None)
+    return zlib.compress(json.dumps(header).encode() + b"\n" + body, level=1)
+
+
+def unpack(blob: bytes) -> tuple[Any, ...]:
+    """The arrays of `pack`; ValueError if the blob is damaged."""
+    try:
+        header, body = zlib.decompress(blob).split(b"\n", 1)
+        arrays: list[Array | None] = []
+        offset = 0
+        for entry in json.loads(header):
+            if entry is None:
+                arrays.append(None)
+                continue
+            dtype, shape = np.dtype(entry[0]), tuple(entry[1])
+            array = np.frombuffer(body, dtype, int(np.prod(shape)), offset).reshape(shape)
+            offset += array.nbytes
+            arrays.append(array)
+    except (zlib.error, ValueError, TypeError, IndexError) as error:
+        raise ValueError(f"expected a packed blob, got {len(blob)} damaged bytes ({error})") from error
+    return tuple(arrays)
+
+
+def keyframe_row(keyframe: Keyframe, travelled: float) -> Row:
+    """The columns of a keyframe."""
+    view = keyframe.view
+    camera = {name: getattr(view.intrinsics, name) for name in Intrinsics.__slots__}  # type: ignore[attr-defined]
+    return {
+        "id": keyframe.keyframe_id,
+        "session": keyframe.session,
+        "stamp_ns": keyframe.stamp_ns,
+        "frame_id": keyframe.frame_id,
+        "travelled": travelled,
+        "T_odom_camera": _bytes(keyframe.T_odom_camera),
+        "gravity": _bytes(keyframe.gravity),
+        "gravity_confidence": keyframe.gravity_confidence,
+        "camera": json.dumps(camera),
+        "view": pack(view.xyz[..., 2], view.grey),
+        "context": pack(keyframe.context.xyz, keyframe.context.normals),
+    }
+
+
+def object_row(item: KeyObject, sighting: Sighting) -> Row:
+    """The columns of one object of a keyframe but its id."""
+    cloud = item.cloud
+    return {
+        "keyframe": sighting.keyframe_id,
+        "instance": cloud.instance,
+        "landmark": sighting.landmark,
+        "label": cloud.label,
+        "score": cloud.score,
+        "sightings": item.sightings,
+        "density": cloud.density,
+        "position": _bytes(sighting.position),
+        "camera": _bytes(sighting.camera),
+        "R_landmark_session": _bytes(sighting.R_landmark_session),
+        "descriptor": sighting.descriptor.astype(np.float32).tobytes(),
+        "cloud": pack(cloud.xyz, cloud.normals, cloud.rgb, cloud.flags),
+    }
+
+
+def keyframe_from_rows(row: Mapping[str, Any], objects: Sequence[Mapping[str, Any]]) -> Keyframe:
+    """A keyframe from its row and the rows of its objects. ValueError if a blob is damaged."""
+    camera = Intrinsics(**json.loads(row["camera"]))
+    depth, grey = unpack(row["view"])
+    xyz = back_project(depth, camera.fx, camera.fy, camera.cx, camera.cy)
+    context_xyz, context_normals = unpack(row["context"])
+    return Keyframe(
+        keyframe_id=row["id"],
+        session=row["session"],
+        stamp_ns=row["stamp_ns"],
+        frame_id=row["frame_id"],
+        objects=tuple(_object(item) for item in objects),
+        context=Context(xyz=context_xyz, normals=context_normals),
+        view=View(xyz=xyz, grey=grey, intrinsics=camera),
+        gravity=_array(row["gravity"], (3,)),
+        gravity_confidence=row["gravity_confidence"],
+        T_odom_camera=_array(row["T_odom_camera"], (4, 4)),
+    )
+
+
+def sighting_from_row(row: Mapping[str, Any]) -> Sighting:
+    """A sighting from the row of its object joined with that of its keyframe."""
+    return Sighting(
+        keyframe_id=row["keyframe"],
+        session=row["session"],
+        stamp_ns=row["stamp_ns"],
+        instance=row["instance"],
+        label=row["label"],
+        score=row["score"],
+        descriptor=np.frombuffer(row["descriptor"], np.float32),
+        position=np.frombuffer(row["position"], float),
+        camera=np.frombuffer(row["camera"], float),
+        travelled=row["travelled"],
+        landmark=row["landmark"],
+        R_landmark_session=np.frombuffer(row["R_landmark_session"], float).reshape(3, 3),
+    )
+
+
+def _object(row: Mapping[str, Any]) -> KeyObject:
+    xyz, normals, rgb, flags = unpack(row["cloud"])
+    cloud = ObjectCloud(
+        label=row["label"],
+        score=row["score"],
+        instance=row["instance"],
+        xyz=xyz,
+        normals=normals,
+        rgb=rgb,
+        flags=flags,
+        density=row["density"],
+    )
+    return KeyObject(cloud=cloud, sightings=row["sightings"])
+
+
+def _bytes(array: Array | None) -> bytes | None:
+    return None if array is None else np.ascontiguousarray(array, float).tobytes()
+
+
+def _array(blob: bytes | None, shape: tuple[int, ...]) -> Array | None:
+    return None if blob is None else np.frombuffer(blob, float).reshape(shape)

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which stored keyframes may show the same place as a new one: by what their objects are and how they look.
+
+The index holds one row an object, in one block a label group, so a query touches only objects that could be the same.
+Objects vote for their keyframes: the nearer the descriptors and the rarer the label, the more. Odometry takes out what
+cannot be there: stored objects of the same session farther away than its uncertainty has grown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.registrar.descriptor import SIZE
+from objreg_ros.registrar.labels import LabelGroups
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.sighting import Sighting
+
+LIKENESS = 0.5  # distance of descriptors at which a vote falls to 0.6
+SHORTLIST = 64  # votes that one object may give
+
+
+@dataclass(slots=True, eq=False)
+class _Block:
+    """The rows of one label group in columns that grow by doubling."""
+
+    size: int = 0
+    descriptor: Array = field(default_factory=lambda: np.zeros((64, SIZE), np.float32))
+    half_norm: Array = field(default_factory=lambda: np.zeros(64, np.float32))
+    position: Array = field(default_factory=lambda: np.zeros((64, 3), np.float32))
+    travelled: Array = field(default_factory=lambda: np.zeros(64, np.float32))
+    stamp_ns: Array = field(default_factory=lambda: np.zeros(64, np.int64))
+    session: Array = field(default_factory=lambda: np.zeros(64, np.int32))
+    keyframe_id: Array = field(default_factory=lambda: np.zeros(64, np.int64))
+
+    COLUMNS = ("descriptor", "half_norm", "position", "travelled", "stamp_ns", "session", "keyframe_id")
+
+    def append(self, row: Sighting) -> None:
+        if self.size == len(self.keyframe_id):
+            for name in self.COLUMNS:
+                column = getattr(self, name)
+                setattr(self, name, np.concatenate([column, np.zeros_like(column)]))
+        i, self.size = self.size, self.size + 1
+        self.descriptor[i], self.half_norm[i] = row.descriptor, 0.5 * float(row.descriptor @ row.descriptor)
+        self.position[i], self.travelled[i], self.stamp_ns[i] = row.position, row.travelled, row.stamp_ns
+        self.session[i], self.keyframe_id[i] = row.session, row.keyframe_id
+
+    def remove(self, keyframe_ids: Iterable[int]) -> None:
+        kept = np.flatnonzero(~np.isin(self.keyframe_id[: self.size], list(keyframe_ids)))
+        for name in self.COLUMNS:
+            column = getattr(self, name)
+            column[: len(kept)] = column[kept]
+        self.size = len(kept)
+
+
+class Index:
+    """The objects of a store in memory, about 140 bytes each."""
+
+    def __init__(self, params: RegistrarParams) -> None:
+        self._params = params
+        self._groups = LabelGroups(params.label_groups)
+        self._blocks: dict[str, _Block] = {}
+
+    def __len__(self) -> int:
+        return sum(block.size for block in self._blocks.values())
+
+    def add(self, sightings: Iterable[Sighting]) -> None:
+        """Add the objects of a keyframe."""
+        for sighting in sightings:
+            self._blocks.setdefault(self._groups.of(sighting.label), _Block()).append(sighting)
+
+    def remove(self, keyframe_ids: Sequence[int]) -> None:
+        """Forget every object of these keyframes."""
+        for block in self._blocks.values():
+            block.remove(keyframe_ids)
+
+    def query(self, sightings: Sequence[Sighting]) -> list[tuple[int, float]]:
+        """(keyframe_id, votes) for the objects of a new keyframe, best first, at most ``candidates``; may be empty."""
+        votes: dict[int, float] = {}
+        moments: dict[int, int] = {}
+        for sighting in sightings:
+            for keyframe_id, stamp_ns, vote in self._votes(sighting):
+                votes[keyframe_id] = votes.get(keyframe_id, 0.0) + vote
+                moments[keyframe_id] = stamp_ns
+        return self._spread(sorted(votes.items(), key=lambda item: (-item[1], item[0])), moments)
+
+    def _votes(self, row: Sighting) -> list[tuple[int, int, float]]:
+        """At most one vote a keyframe: its likest object's."""
+        block = self._blocks.get(self._groups.of(row.label))
+        if block is None or block.size == 0:
+            return []
+        n = block.size
+        likeness = block.descriptor[:n] @ row.descriptor - block.half_norm[:n]
+        likeness[~self._allowed(block, row)] = -np.inf
+        best = np.argpartition(-likeness, SHORTLIST)[:SHORTLIST] if n > SHORTLIST else np.arange(n)
+        best = best[np.isfinite(likeness[best])]
+        best = best[np.lexsort((block.keyframe_id[best], -likeness[best]))]
+        squared = np.maximum(float(row.descriptor @ row.descriptor) - 2.0 * likeness[best].astype(float), 0.0)
+        vote = np.exp(-0.5 * squared / LIKENESS**2) * np.log(2.0 + len(self) / n)
+        ids, first = np.unique(block.keyframe_id[best], return_index=True)
+        return [(int(k), int(block.stamp_ns[best[i]]), float(vote[i])) for k, i in zip(ids, first, strict=True)]
+
+    def _allowed(self, block: _Block, row: Sighting) -> Array:
+        n, params = block.size, self._params
+        apart = np.abs(block.stamp_ns[:n] - row.stamp_ns) >= round(1e9 * params.min_gap)
+        reach = params.odometry_radius + params.odometry_drift * np.abs(row.travelled - block.travelled[:n])
+        gone = np.square(block.position[:n] - row.position.astype(np.float32)).sum(axis=1) > np.square(reach)
+        return np.asarray(apart & ~(gone & (block.session[:n] == row.session)))
+
+    def _spread(self, ranked: list[tuple[int, float]], moments: dict[int, int]) -> list[tuple[int, float]]:
+        """The best of each moment first: neighbours of a chosen keyframe come after every other place."""
+        chosen: list[tuple[int, float]] = []
+        later: list[tuple[int, float]] = []
+        spacing = round(0.5e9 * self._params.thin_seconds)
+        for item in ranked:
+            near = any(abs(moments[item[0]] - moments[k]) < spacing for k, _ in chosen)
+            (later if near else chosen).append(item)
+            if len(chosen) == self._params.candidates:
+                break
+        return (chosen + later)[: self._params.candidates]

@@ -1,0 +1,258 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the registrar remembers, in one SQLite file: keyframes, their objects and closures.
+
+What `Store.add` has returned from is on the disk: the file is in WAL mode with full synchronisation, and a keyframe
+with its objects and closures is one transaction, so a process that is killed at any moment leaves whole keyframes.
+Memory is bounded: only the last few keyframes that were used stay decoded.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sqlite3
+from collections import OrderedDict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from objreg_ros.data import LoopClosure
+from objreg_ros.registrar.codec import keyframe_from_rows, keyframe_row, object_row, sighting_from_row
+from objreg_ros.registrar.keyframe import Keyframe
+from objreg_ros.registrar.sighting import Sighting
+
+MAGIC = b"SQLite format 3\0"
+APPLICATION_ID = 0x4F424A52  # "OBJR" at byte 68 of the file
+SCHEMA_VERSION = 1  # at byte 60
+CACHED = 64  # decoded keyframes in memory, about 1 MB each
+SCHEMA = """
+CREATE TABLE keyframe (
+  id INTEGER PRIMARY KEY AUTOINCREMENT, session INTEGER NOT NULL, stamp_ns INTEGER NOT NULL, frame_id TEXT NOT NULL,
+  travelled REAL NOT NULL, T_odom_camera BLOB, gravity BLOB, gravity_confidence REAL NOT NULL,
+  camera TEXT NOT NULL, view BLOB NOT NULL, context BLOB NOT NULL);
+CREATE TABLE object (
+  id INTEGER PRIMARY KEY, keyframe INTEGER NOT NULL REFERENCES keyframe ON DELETE CASCADE,
+  instance INTEGER NOT NULL, landmark INTEGER NOT NULL, label TEXT NOT NULL, score REAL NOT NULL,
+  sightings INTEGER NOT NULL, density REAL NOT NULL, position BLOB NOT NULL, camera BLOB NOT NULL,
+  R_landmark_session BLOB NOT NULL, descriptor BLOB NOT NULL, cloud BLOB NOT NULL);
+CREATE INDEX object_of_keyframe ON object (keyframe);
+CREATE INDEX object_of_landmark ON object (landmark);
+CREATE TABLE closure (
+  id INTEGER PRIMARY KEY, from_ns INTEGER NOT NULL, to_ns INTEGER NOT NULL, frame_id TEXT NOT NULL,
+  T_from_to BLOB NOT NULL, covariance BLOB NOT NULL, labels TEXT NOT NULL, evidence TEXT NOT NULL);
+"""
+SIGHTINGS = (
+    "SELECT object.keyframe, session, stamp_ns, instance, label, score, descriptor, position, object.camera,"
+    " travelled, landmark, R_landmark_session FROM object JOIN keyframe ON keyframe.id = object.keyframe"
+)
+
+
+class StoreError(OSError):
+    """A file that is no store, is damaged, or was written by a newer version. It has not been touched."""
+
+
+class Store:
+    """The store at ``path``, made if it is not there; in memory only if the path is empty. StoreError if it is bad."""
+
+    def __init__(self, path: str | Path = "") -> None:
+        self.path = str(path)
+        if not self.path:
+            self._connection = _connect(":memory:")
+            self._connection.executescript(_birth())
+        else:
+            if not Path(self.path).exists():
+                _create(Path(self.path))
+            _check(Path(self.path))
+            self._connection = _connect(self.path)
+        self._connection.execute("PRAGMA journal_mode = WAL")
+        self._cache: OrderedDict[int, Keyframe] = OrderedDict()
+
+    def add(
+        self,
+        keyframe: Keyframe,
+        sightings: Sequence[Sighting],
+        closures: Iterable[LoopClosure] = (),
+        merged: Mapping[int, int] | None = None,
+    ) -> None:
+        """Write a keyframe under its id (see `next_keyframe`), its objects and closures in one transaction.
+
+        ``merged`` says which landmarks became which: known objects that turned out to be the same.
+        """
+        with self._connection as transaction:
+            _insert(transaction, "keyframe", keyframe_row(keyframe, sightings[0].travelled if sightings else 0.0))
+            for item, sighting in zip(keyframe.objects, sightings, strict=True):
+                _insert(transaction, "object", object_row(item, sighting))
+            for closure in closures:
+                _insert(transaction, "closure", _closure_row(closure))
+            for old, new in (merged or {}).items():
+                transaction.execute("UPDATE object SET landmark = ? WHERE landmark = ?", (new, old))
+        self._remember(keyframe)
+
+    def keyframe(self, keyframe_id: int) -> Keyframe:
+        """A stored keyframe; KeyError if it is not there, StoreError if it is damaged."""
+        if keyframe_id in self._cache:
+            self._cache.move_to_end(keyframe_id)
+            return self._cache[keyframe_id]
+        row = self._connection.execute("SELECT * FROM keyframe WHERE id = ?", (keyframe_id,)).fetchone()
+        if row is None:
+            raise KeyError(keyframe_id)
+        objects = self._connection.execute("SELECT * FROM object WHERE keyframe = ? ORDER BY id", (keyframe_id,))
+        try:
+            keyframe = keyframe_from_rows(row, objects.fetchall())
+        except ValueError as error:
+            raise StoreError(f"{self.path}: keyframe {keyframe_id}: {error}") from error
+        self._remember(keyframe)
+        return keyframe
+
+    def sightings(self, keyframe_id: int | None = None) -> Iterator[Sighting]:
+        """Every stored object without its points, or those of one keyframe, oldest first."""
+        only = "" if keyframe_id is None else f" WHERE object.keyframe = {int(keyframe_id)}"
+        return map(sighting_from_row, self._connection.execute(f"{SIGHTINGS}{only} ORDER BY object.id"))
+
+    def closures(self) -> Iterator[LoopClosure]:
+        """Every stored closure, oldest first, without the registrations of its objects."""
+        return map(_closure, self._connection.execute("SELECT * FROM closure ORDER BY id"))
+
+    def keyframe_ids(self) -> list[int]:
+        """The ids of the stored keyframes, oldest first."""
+        return [row[0] for row in self._connection.execute("SELECT id FROM keyframe ORDER BY id")]
+
+    def remove(self, keyframe_ids: Sequence[int]) -> None:
+        """Forget keyframes and their objects; their closures stay."""
+        with self._connection as transaction:
+            transaction.executemany("DELETE FROM keyframe WHERE id = ?", [(k,) for k in keyframe_ids])
+        for keyframe_id in keyframe_ids:
+            self._cache.pop(keyframe_id, None)
+
+    def clear(self) -> None:
+        """Forget everything."""
+        with self._connection as transaction:
+            for table in ("closure", "object", "keyframe"):
+                transaction.execute(f"DELETE FROM {table}")
+        self._cache.clear()
+
+    def next_keyframe(self) -> int:
+        """An id that no keyframe ever had here."""
+        highest = self._connection.execute("SELECT seq FROM sqlite_sequence WHERE name = 'keyframe'").fetchone()
+        return 1 + (int(highest[0]) if highest else 0)
+
+    def next_session(self) -> int:
+        """The number of a session that nothing is stored of yet."""
+        return int(self._one("SELECT COALESCE(MAX(session), -1) + 1 FROM keyframe"))
+
+    def counts(self) -> dict[str, int]:
+        """How many keyframes, objects, landmarks, sessions and closures there are."""
+        return {
+            "keyframes": self._one("SELECT COUNT(*) FROM keyframe"),
+            "objects": self._one("SELECT COUNT(*) FROM object"),
+            "landmarks": self._one("SELECT COUNT(DISTINCT landmark) FROM object"),
+            "sessions": self._one("SELECT COUNT(DISTINCT session) FROM keyframe"),
+            "closures": self._one("SELECT COUNT(*) FROM closure"),
+        }
+
+    def save(self, path: str | Path = "") -> str:
+        """Fold the write-ahead log into the file, or write a copy to ``path``. Returns where it is."""
+        if path:
+            with closing(sqlite3.connect(path)) as copy:
+                self._connection.backup(copy)
+            return str(path)
+        self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        return self.path
+
+    def close(self) -> None:
+        """End it; everything that was added is already written."""
+        self._connection.close()
+
+    def _one(self, query: str) -> int:
+        return int(self._connection.execute(query).fetchone()[0])
+
+    def _remember(self, keyframe: Keyframe) -> None:
+        self._cache[keyframe.keyframe_id] = keyframe
+        while len(self._cache) > CACHED:
+            self._cache.popitem(last=False)
+
+
+def _connect(path: str) -> sqlite3.Connection:
+    connection = sqlite3.connect(path, check_same_thread=False, timeout=5.0)
+    connection.row_factory = sqlite3.Row
+    connection.execute("PRAGMA foreign_keys = ON")
+    connection.execute("PRAGMA synchronous = FULL")
+    return connection
+
+
+def _create(path: Path) -> None:
+    """An empty store, made beside its place and moved there: a process that is killed here leaves no half of one."""
+    beside = path.with_name(f"{path.name}.new{os.getpid()}")
+    beside.unlink(missing_ok=True)
+    with closing(sqlite3.connect(beside)) as connection:
+        connection.executescript(_birth())
+    os.replace(beside, path)
+
+
+def _birth() -> str:
+    return f"PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {SCHEMA_VERSION}; {SCHEMA}"
+
+
+def _check(path: Path) -> None:
+    """StoreError unless the file is a whole store of a version that is understood. It is only read."""
+    with path.open("rb") as file:
+        header = file.read(100)
+    if len(header) < 100 or not header.startswith(MAGIC):
+        raise StoreError(f"{path}: expected a store of objreg_ros, got a file of another kind; it was left as it is")
+    version, application = (int.from_bytes(header[at : at + 4], "big") for at in (60, 68))
+    if application != APPLICATION_ID:
+        raise StoreError(f"{path}: expected a store of objreg_ros, got another SQLite database; it was left as it is")
+    if version > SCHEMA_VERSION:
+        raise StoreError(
+            f"{path}: expected schema version {SCHEMA_VERSION} or older, got {version}; it was left as it is. "
+            "Use the newer objreg_ros that wrote it, or another path"
+        )
+    found = _damage(path)
+    if found:
+        raise StoreError(f"{path}: expected an intact store, got: {found}; it was left as it is. Use another path")
+
+
+def _damage(path: Path) -> str:
+    """What is wrong with the pages of a database, empty if nothing. Opens it for reading only."""
+    unwritten_log = path.with_name(path.name + "-wal").exists()
+    mode = "mode=ro" if unwritten_log else "mode=ro&immutable=1"
+    try:
+        with closing(sqlite3.connect(f"{path.resolve().as_uri()}?{mode}", uri=True)) as connection:
+            found = str(connection.execute("PRAGMA quick_check(1)").fetchone()[0])
+    except sqlite3.DatabaseError as error:
+        return str(error)
+    return "" if found == "ok" else found
+
+
+def _insert(transaction: sqlite3.Connection, table: str, row: Mapping[str, Any]) -> int:
+    names, marks = ", ".join(row), ", ".join("?" * len(row))
+    return int(
+        transaction.execute(f"INSERT INTO {table} ({names}) VALUES ({marks})", tuple(row.values())).lastrowid or 0
+    )
+
+
+def _closure_row(closure: LoopClosure) -> dict[str, Any]:
+    return {
+        "from_ns": closure.from_ns,
+        "to_ns": closure.to_ns,
+        "frame_id": closure.frame_id,
+        "T_from_to": np.ascontiguousarray(closure.T_from_to).tobytes(),
+        "covariance": np.ascontiguousarray(closure.covariance).tobytes(),
+        "labels": json.dumps(closure.labels),
+        "evidence": json.dumps(closure.evidence),
+    }
+
+
+def _closure(row: Mapping[str, Any]) -> LoopClosure:
+    return LoopClosure(
+        from_ns=row["from_ns"],
+        to_ns=row["to_ns"],
+        frame_id=row["frame_id"],
+        T_from_to=np.frombuffer(row["T_from_to"]).reshape(4, 4),
+        covariance=np.frombuffer(row["covariance"]).reshape(6, 6),
+        labels=tuple(json.loads(row["labels"])),
+        evidence=json.loads(row["evidence"]),
+    )

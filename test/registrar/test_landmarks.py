@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Landmarks: ids that stay, and which views of an object are kept."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from objreg_ros.data import ObjectCloud
+from objreg_ros.registrar.landmarks import Landmarks, Link
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.sighting import Sighting, sightings_of
+
+from .samples import box, keyframe, moved
+
+PARAMS = RegistrarParams(max_views=3)
+CUP, BOOK = box("cup", (0, 0, 1)), box("book", (0.5, 0, 1))
+
+
+def _seen(number: int, *objects: ObjectCloud, session: int = 0, x: float = 0.0) -> tuple[Sighting, ...]:
+    return sightings_of(keyframe(number, number, objects, session, moved(x)), travelled=0.0)
+
+
+def _take(landmarks: Landmarks, sightings: tuple[Sighting, ...], links: list[Link] | None = None) -> list[int]:
+    named, merged = landmarks.assign(sightings, links or [])
+    landmarks.add(named, merged)
+    return [sighting.landmark for sighting in named]
+
+
+def test_an_object_at_the_same_place_of_a_session_keeps_its_id() -> None:
+    landmarks = Landmarks(PARAMS)
+    assert _take(landmarks, _seen(1, CUP, BOOK)) == [1, 2]
+    assert _take(landmarks, _seen(2, BOOK, box("mouse", (-0.3, 0, 1)), x=0.3)) == [3, 1]
+
+
+def test_two_objects_of_one_keyframe_are_never_one_landmark() -> None:
+    landmarks = Landmarks(PARAMS)
+    _take(landmarks, _seen(1, CUP))
+    assert _take(landmarks, _seen(2, CUP, box("cup", (0.02, 0, 1)))) == [1, 2]
+
+
+def test_another_session_sees_new_objects_until_a_closure_says_otherwise() -> None:
+    landmarks = Landmarks(PARAMS)
+    first = _seen(1, CUP)
+    _take(landmarks, first)
+    assert _take(landmarks, _seen(2, CUP, session=1)) == [2]
+    stored, _ = landmarks.assign(first)
+    link = Link(index=0, of=stored[0], R_there_here=np.eye(3))
+    assert _take(landmarks, _seen(3, CUP, session=1), [link]) == [1]
+    assert [(known.landmark, known.sightings) for known in landmarks.known()] == [(1, 3)]
+
+
+def test_known_landmarks_come_with_the_label_most_voted_for() -> None:
+    landmarks = Landmarks(PARAMS)
+    for number, label in enumerate(("mouse", "cup", "cup"), start=1):
+        _take(landmarks, _seen(number, box(label, (0, 0, 1))))
+    (known,) = landmarks.known()
+    assert (known.label, known.sightings) == ("cup", 3) and np.allclose(known.position, (0, 0, 1), atol=0.01)
+
+
+def test_of_many_views_of_an_object_the_most_diverse_stay() -> None:
+    landmarks = Landmarks(PARAMS)
+    for number, x in enumerate((0.0, 0.01, 0.02, 1.0, -1.0), start=1):
+        _take(landmarks, _seen(number, box("cup", (-x, 0, 1)), x=x))
+    spare = landmarks.surplus([1])
+    assert len(spare) == 2 and set(spare) <= {1, 2, 3}
+    landmarks.forget(spare)
+    assert landmarks.surplus([1]) == [] and landmarks.known()[0].sightings == 3
+
+
+def test_a_keyframe_stays_while_one_of_its_objects_needs_it() -> None:
+    landmarks = Landmarks(PARAMS)
+    _take(landmarks, _seen(1, CUP, BOOK))
+    for number in range(2, 7):
+        _take(landmarks, _seen(number, CUP))
+    assert 1 not in landmarks.surplus([1, 2])
+
+
+def test_landmarks_are_the_same_after_a_restart() -> None:
+    landmarks = Landmarks(PARAMS)
+    named, _ = landmarks.assign(_seen(1, CUP, BOOK))
+    again = Landmarks(PARAMS, named)
+    assert _take(again, _seen(2, BOOK)) == [2] and _take(again, _seen(3, box("chair", (2, 0, 2)))) == [3]
