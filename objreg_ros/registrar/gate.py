@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where a closure is accepted, and the only place.
+
+Fit error, ICP fitness and scores of objects alone all accept wrong poses. What refuses them is the whole view: free
+space looked at both ways and the high-passed grey, then agreement of independent evidence, then what cannot be.
+Publishing nothing is better than a false closure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from objreg_ros.data import Array, Reason
+from objreg_ros.geometry import pose_error
+from objreg_ros.registrar.candidate import Candidate
+from objreg_ros.registrar.covariance import covariance_of, worst_translation
+from objreg_ros.registrar.params import RegistrarParams
+
+Refusal = tuple[Reason, str]
+
+
+def judge(
+    candidates: Sequence[Candidate], params: RegistrarParams, prior: tuple[Array, float, float] | None = None
+) -> Candidate | Refusal:
+    """The first candidate that nothing speaks against, or the refusal of the best one.
+
+    ``prior`` is odometry's ``T_target_source`` with its standard deviations in degrees and centimetres, or None.
+    """
+    if not candidates:
+        return Reason.NO_HYPOTHESIS, "no chain proposed a pose"
+    refusals = []
+    for candidate in candidates:
+        refusal = refuse(candidate, params, prior)
+        if refusal is None:
+            return candidate
+        refusals.append(refusal)
+    return refusals[0]
+
+
+def refuse(
+    candidate: Candidate, params: RegistrarParams, prior: tuple[Array, float, float] | None = None
+) -> Refusal | None:
+    """Why this candidate is no closure, with the numbers; None if it is one."""
+    for check in CHECKS:
+        refusal = check(candidate, params)
+        if refusal is not None:
+            return refusal
+    return None if prior is None else _odometry(candidate, params, *prior)
+
+
+def _converged(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
+    if candidate.alignment.converged:
+        return None
+    return Reason.NOT_CONVERGED, f"{candidate.alignment.iterations} iterations"
+
+
+def _plausible(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
+    moved = float(np.linalg.norm(candidate.T_target_source[:3, 3]))
+    if moved <= params.max_translation:
+        return None
+    return Reason.IMPLAUSIBLE_MOTION, f"{moved:.2f} m > {params.max_translation:.2f} m"
+
+
+def _gravity(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
+    error = candidate.gravity_error_deg
+    if error is None or error <= params.max_gravity_error:
+        return None
+    return Reason.GRAVITY, f"{error:.1f} deg > {params.max_gravity_error:.1f} deg"
+
+
+def _overlap(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
+    seen = candidate.verification
+    if seen.tested < params.min_tested:
+        return Reason.LOW_OVERLAP, f"{seen.tested} pixels tested < {params.min_tested}"
+    if seen.inliers < params.min_inliers:
+        return Reason.LOW_OVERLAP, f"inliers {seen.inliers:.2f} < {params.min_inliers:.2f}"
+    return None
+
+
+def _free_space(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
+    violations = candidate.verification.violations
+    if violations <= params.max_violations:
+        return None
+    return Reason.FREE_SPACE, f"violations {violations:.3f} > {params.max_violations:.3f}"
+
+
+def _texture(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
+    texture = candidate.verification.texture
+    if texture is None or texture >= params.min_texture:
+        return None
+    return Reason.TEXTURE, f"correlation {texture:.2f} < {params.min_texture:.2f}"
+
+
+def _score(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
+    seen = candidate.verification
+    if seen.score >= params.min_score:
+        return None
+    return Reason.LOW_OVERLAP, f"score {seen.score:.2f} < {params.min_score:.2f}"
+
+
+def _agreement(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
+    """Independent chains, or several objects, must say the same."""
+    chains, explained = len(candidate.agreeing_chains), len(candidate.explained)
+    if chains >= params.min_chains or explained >= params.min_objects:
+        return None
+    reason = Reason.CHAINS_DISAGREE if explained else Reason.FEW_OBJECTS
+    return reason, f"{chains} chains < {params.min_chains} and {explained} objects < {params.min_objects}"
+
+
+def _stationary(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
+    """What moved is outvoted by what stayed; if most moved, nothing is known."""
+    moved, stayed = len(candidate.moved), len(candidate.explained)
+    if moved <= stayed:
+        return None
+    return Reason.MOVED, f"{moved} objects moved, {stayed} stayed"
+
+
+def _held(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
+    sigma = worst_translation(covariance_of(candidate.alignment, params))
+    if sigma <= params.max_slack_sigma:
+        return None
+    return Reason.SLACK, f"sigma {sigma:.3f} m > {params.max_slack_sigma:.3f} m"
+
+
+def _odometry(
+    candidate: Candidate, params: RegistrarParams, T_prior: Array, rotation_sigma: float, translation_sigma: float
+) -> Refusal | None:
+    rotation, translation = pose_error(candidate.T_target_source, T_prior)
+    allowed = params.odometry_sigmas
+    if rotation <= allowed * rotation_sigma and translation <= allowed * translation_sigma:
+        return None
+    return Reason.ODOMETRY, (
+        f"{rotation:.1f} deg {translation:.0f} cm from odometry, "
+        f"expected {allowed * rotation_sigma:.1f} deg {allowed * translation_sigma:.0f} cm at most"
+    )
+
+
+Check = Callable[[Candidate, RegistrarParams], Refusal | None]
+CHECKS: tuple[Check, ...] = (
+    _converged,
+    _plausible,
+    _gravity,
+    _overlap,
+    _free_space,
+    _texture,
+    _score,
+    _agreement,
+    _stationary,
+    _held,
+)

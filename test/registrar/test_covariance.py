@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Covariance: floored, scaled, and open where the data are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from objreg_ros.registrar.covariance import covariance_of, worst_translation
+from objreg_ros.registrar.params import RegistrarParams
+
+from .samples import candidate
+
+PARAMS = RegistrarParams(
+    covariance_scale=4.0, covariance_floor_translation=0.01, covariance_floor_rotation=0.5, slack_translation=0.5
+)
+
+
+def test_much_information_ends_at_the_floor() -> None:
+    C = covariance_of(candidate(information=1e12 * np.eye(6)).alignment, PARAMS)
+    assert np.sqrt(np.diag(C)) == pytest.approx([0.01] * 3 + [np.radians(0.5)] * 3, rel=1e-3)
+
+
+def test_little_information_is_scaled() -> None:
+    C = covariance_of(candidate(information=100.0 * np.eye(6)).alignment, PARAMS)
+    assert C[0, 0] == pytest.approx(4.0 / 100.0 + 0.01**2)
+
+
+def test_no_information_is_a_large_covariance_and_not_an_error() -> None:
+    C = covariance_of(candidate(information=np.zeros((6, 6))).alignment, PARAMS)
+    assert np.isfinite(C).all() and np.linalg.eigvalsh(C).min() > 1.0
+
+
+def test_a_free_axis_is_open_and_the_others_are_not() -> None:
+    yaw = np.zeros((1, 6))
+    yaw[0, 4] = 1.0
+    C = covariance_of(candidate(information=1e9 * np.eye(6), slack=yaw).alignment, PARAMS)
+    assert np.sqrt(C[4, 4]) > np.radians(50) and np.sqrt(C[3, 3]) < np.radians(1)
+
+
+def test_a_slide_shows_in_the_worst_translation() -> None:
+    slide = np.array([[0.6, 0.8, 0, 0, 0, 0]])
+    C = covariance_of(candidate(information=1e9 * np.eye(6), slack=slide).alignment, PARAMS)
+    assert worst_translation(C) == pytest.approx(0.5, rel=0.01)

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The gate: what it lets through, and why it refuses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from objreg_ros.data import Reason
+from objreg_ros.registrar.candidate import ObjectPair
+from objreg_ros.registrar.gate import judge, refuse
+from objreg_ros.registrar.params import RegistrarParams
+
+from .samples import candidate, moved
+
+PARAMS = RegistrarParams()
+CUP = ObjectPair(0, 0, "cup")
+
+
+def test_a_candidate_that_nothing_speaks_against_is_accepted() -> None:
+    assert refuse(candidate(), PARAMS) is None
+
+
+@pytest.mark.parametrize(
+    ("evidence", "reason"),
+    [
+        ({"converged": False}, Reason.NOT_CONVERGED),
+        ({"T": moved(100.0)}, Reason.IMPLAUSIBLE_MOTION),
+        ({"gravity_error_deg": 30.0}, Reason.GRAVITY),
+        ({"tested": 20}, Reason.LOW_OVERLAP),
+        ({"inliers": 0.1}, Reason.LOW_OVERLAP),
+        ({"violations": 0.5}, Reason.FREE_SPACE),
+        ({"texture": -0.2}, Reason.TEXTURE),
+        ({"score": -1.0}, Reason.LOW_OVERLAP),
+        ({"agreeing_chains": ("objects",), "explained": (CUP,)}, Reason.CHAINS_DISAGREE),
+        ({"agreeing_chains": ("features",), "explained": ()}, Reason.FEW_OBJECTS),
+        ({"explained": (), "moved": (CUP,)}, Reason.MOVED),
+        ({"information": np.diag([1.0, 1e5, 1e5, 1e5, 1e5, 1e5])}, Reason.SLACK),
+        ({"slack": np.eye(6)[:1]}, Reason.SLACK),
+    ],
+)
+def test_each_kind_of_evidence_alone_can_refuse(evidence: dict[str, object], reason: Reason) -> None:
+    refusal = refuse(candidate(**evidence), PARAMS)
+    assert refusal is not None and refusal[0] is reason
+    assert any(letter.isdigit() for letter in refusal[1])
+
+
+def test_a_candidate_without_grey_or_gravity_is_judged_by_the_rest() -> None:
+    assert refuse(candidate(texture=None, gravity_error_deg=None), PARAMS) is None
+
+
+def test_one_object_closes_a_loop_when_independent_chains_agree() -> None:
+    assert refuse(candidate(explained=(CUP,)), PARAMS) is None
+
+
+def test_two_objects_make_up_for_a_chain_that_is_alone() -> None:
+    assert refuse(candidate(agreeing_chains=("features",)), PARAMS) is None
+
+
+def test_a_moved_object_is_outvoted_by_those_that_stayed() -> None:
+    assert refuse(candidate(moved=(ObjectPair(2, 2, "bottle"),)), PARAMS) is None
+
+
+def test_a_pose_far_from_tight_odometry_is_refused() -> None:
+    near, far = (moved(0.05), 1.0, 5.0), (moved(1.0), 1.0, 5.0)
+    assert refuse(candidate(), PARAMS, near) is None
+    refusal = refuse(candidate(), PARAMS, far)
+    assert refusal is not None and refusal[0] is Reason.ODOMETRY
+
+
+def test_the_second_candidate_is_taken_when_the_first_is_refused() -> None:
+    good = candidate()
+    assert judge((candidate(violations=0.4), good), PARAMS) is good
+
+
+def test_the_refusal_is_that_of_the_best_candidate() -> None:
+    verdict = judge((candidate(violations=0.4), candidate(texture=-1.0)), PARAMS)
+    assert isinstance(verdict, tuple) and verdict[0] is Reason.FREE_SPACE
+
+
+def test_no_candidate_at_all_is_no_hypothesis() -> None:
+    verdict = judge((), PARAMS)
+    assert isinstance(verdict, tuple) and verdict[0] is Reason.NO_HYPOTHESIS
