@@ -1,0 +1,253 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The room's one verb: frames in, closures and refusals out.
+
+`Registrar.track` is the part for every frame, `Registrar.search` the part for every keyframe; they may run in two
+threads, each in one. `Registrar.process` is both in a row: the same frames always give the same closures.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from objreg_ros.data import Array, Frame, LoopClosure, ObjectMatch, Reason, Rejected
+from objreg_ros.registrar.candidate import Candidate
+from objreg_ros.registrar.covariance import covariance_of
+from objreg_ros.registrar.engine import Engine
+from objreg_ros.registrar.fusion import fuse
+from objreg_ros.registrar.gate import Refusal, judge
+from objreg_ros.registrar.keyframe import Keyframe
+from objreg_ros.registrar.keyframes import Keyframer, Stretch
+from objreg_ros.registrar.landmarks import Landmark, Landmarks, Link
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.retrieve import Index
+from objreg_ros.registrar.sighting import Sighting, sightings_of
+from objreg_ros.registrar.store import Store
+from objreg_ros.registrar.thinning import Thinning
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What became of a frame: accepted closures, refusals with reasons, and the keyframe that it completed, if any."""
+
+    closures: tuple[LoopClosure, ...] = ()
+    rejected: tuple[Rejected, ...] = ()
+    keyframe_ns: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Accepted:
+    target: Keyframe
+    candidate: Candidate
+
+
+class Registrar:
+    """Finds the loops. Holds the store at ``params.store`` until `close`; StoreError (an OSError) if that is bad."""
+
+    def __init__(self, params: RegistrarParams) -> None:
+        self.params = params
+        self._engine = Engine(params)
+        self._store = Store(params.store)
+        self._lock = threading.RLock()
+        self._start()
+
+    def _start(self) -> None:
+        """Everything that lives in memory, from what is in the store."""
+        self._keyframer = Keyframer(self.params)
+        self._first_session = self._store.next_session()
+        self._index = Index(self.params)
+        self._index.add(self._store.sightings())
+        self._landmarks = Landmarks(self.params, self._store.sightings())
+        self._thinning = Thinning(self.params.thin_seconds, ((c.from_ns, c.to_ns) for c in self._store.closures()))
+        self._path = _Path()
+
+    @property
+    def landmarks(self) -> tuple[Landmark, ...]:
+        """Every known object with its id, label and position in the frame of its session, the oldest first."""
+        with self._lock:
+            return self._landmarks.known()
+
+    def counts(self) -> dict[str, int]:
+        """How many keyframes, objects, landmarks, sessions and closures the store holds."""
+        with self._lock:
+            return self._store.counts()
+
+    def process(self, frame: Frame) -> Outcome:
+        """Take in one frame: `track`, and `search` when it completed a keyframe."""
+        stretch = self.track(frame)
+        return Outcome() if stretch is None else self.search(stretch)
+
+    def finish(self) -> Outcome:
+        """Search for the keyframe that was still being collected: the end of a recording."""
+        stretch = self._keyframer.finish()
+        return Outcome() if stretch is None else self.search(stretch)
+
+    def track(self, frame: Frame) -> Stretch | None:
+        """Follow the camera; returns the stretch of frames that became a keyframe with this one, mostly None."""
+        return self._keyframer.add(frame)
+
+    def search(self, stretch: Stretch, seconds: float = np.inf) -> Outcome:
+        """Make a keyframe of the stretch, look for places that it shows again, and remember it.
+
+        The likeliest places come first; those that are not reached within ``seconds`` are refused as over budget.
+        Without a limit the outcome depends on the frames alone.
+        """
+        deadline = time.monotonic() + seconds
+        with self._lock:
+            keyframe = fuse(stretch, self.params)
+            keyframe = keyframe.numbered(self._store.next_keyframe(), self._first_session + stretch.session)
+            sightings = sightings_of(keyframe, self._path.reach(keyframe))
+            accepted, rejected = self._try_places(keyframe, sightings, deadline)
+            closures = self._remember(keyframe, sightings, accepted)
+            return Outcome(closures=closures, rejected=rejected, keyframe_ns=keyframe.stamp_ns)
+
+    def reset(self) -> None:
+        """Forget everything, in the store too."""
+        with self._lock:
+            self._store.clear()
+            self._start()
+
+    def save(self, path: str = "") -> str:
+        """Bring the store's file up to date, or write a copy of it to ``path``; returns where it is."""
+        with self._lock:
+            return self._store.save(path)
+
+    def close(self) -> None:
+        """Let go of the store."""
+        with self._lock:
+            self._store.close()
+
+    def _try_places(
+        self, keyframe: Keyframe, sightings: Sequence[Sighting], deadline: float
+    ) -> tuple[list[_Accepted], tuple[Rejected, ...]]:
+        """Try the stored keyframes that may show the same place, the likeliest first."""
+        accepted: list[_Accepted] = []
+        rejected: list[Rejected] = []
+        refuse = _refuser(rejected, keyframe)
+        ranked = self._index.query(sightings)
+        if not ranked:
+            refuse(keyframe.stamp_ns, (Reason.NO_CANDIDATE, "no stored keyframe has such objects"))
+        for keyframe_id, _ in ranked:
+            target = self._store.keyframe(keyframe_id)
+            verdict = self._try_place(keyframe, target, deadline)
+            if isinstance(verdict, Candidate):
+                accepted.append(_Accepted(target=target, candidate=verdict))
+                self._thinning.accept(target.stamp_ns, keyframe.stamp_ns)
+            else:
+                refuse(target.stamp_ns, verdict)
+        return accepted, tuple(rejected)
+
+    def _try_place(self, keyframe: Keyframe, target: Keyframe, deadline: float) -> Candidate | Refusal:
+        if self._thinning.redundant(target.stamp_ns, keyframe.stamp_ns):
+            return Reason.REDUNDANT, "a closure of the same two moments was accepted"
+        if time.monotonic() > deadline:
+            return Reason.OVER_BUDGET, "not reached in time"
+        return judge(self._engine.propose(keyframe, target), self.params)
+
+    def _remember(
+        self, keyframe: Keyframe, sightings: Sequence[Sighting], accepted: Sequence[_Accepted]
+    ) -> tuple[LoopClosure, ...]:
+        """Give the objects their landmarks, write everything down, and forget what has become superfluous."""
+        links = [link for item in accepted for link in self._links(keyframe, item)]
+        named, merged = self._landmarks.assign(sightings, links)
+        closures = tuple(closure_of(keyframe, named, item, self.params) for item in accepted)
+        self._store.add(keyframe, named, closures, merged)
+        self._landmarks.add(named, merged)
+        self._index.add(named)
+        spare = self._landmarks.surplus(sighting.landmark for sighting in named)
+        if spare:
+            self._store.remove(spare)
+            self._index.remove(spare)
+            self._landmarks.forget(spare)
+        return closures
+
+    def _links(self, keyframe: Keyframe, item: _Accepted) -> list[Link]:
+        stored = {sighting.instance: sighting for sighting in self._store.sightings(item.target.keyframe_id)}
+        R_there_here = _rotation(item.target) @ item.candidate.T_target_source[:3, :3] @ _rotation(keyframe).T
+        return [
+            Link(
+                index=pair.source, of=stored[item.target.objects[pair.target].cloud.instance], R_there_here=R_there_here
+            )
+            for pair in item.candidate.explained
+        ]
+
+
+class _Path:
+    """How far the camera has gone in its session, over the keyframes."""
+
+    def __init__(self) -> None:
+        self._session = -1
+        self._position = np.zeros(3)
+        self._travelled = 0.0
+
+    def reach(self, keyframe: Keyframe) -> float:
+        """Go on to a keyframe; returns the m of path until there."""
+        position = np.zeros(3) if keyframe.T_odom_camera is None else keyframe.T_odom_camera[:3, 3]
+        if keyframe.session != self._session:
+            self._session, self._travelled = keyframe.session, 0.0
+        else:
+            self._travelled += float(np.linalg.norm(position - self._position))
+        self._position = np.array(position)
+        return self._travelled
+
+
+def closure_of(
+    keyframe: Keyframe, sightings: Sequence[Sighting], item: _Accepted, params: RegistrarParams
+) -> LoopClosure:
+    """The constraint of an accepted candidate; ``sightings`` are the keyframe's, with their landmarks."""
+    candidate = item.candidate
+    matches = tuple(
+        ObjectMatch(
+            label=pair.label,
+            object_id=sightings[pair.source].landmark,
+            T_from_to=candidate.T_target_source,
+            overlap=candidate.alignment.overlap,
+        )
+        for pair in candidate.explained
+    )
+    return LoopClosure(
+        from_ns=item.target.stamp_ns,
+        to_ns=keyframe.stamp_ns,
+        T_from_to=candidate.T_target_source,
+        covariance=covariance_of(candidate.alignment, params),
+        labels=tuple(dict.fromkeys(match.label for match in matches)) or tuple(dict.fromkeys(keyframe.labels)),
+        matches=matches,
+        evidence=_evidence(candidate),
+        frame_id=keyframe.frame_id,
+    )
+
+
+def _refuser(rejected: list[Rejected], keyframe: Keyframe) -> Callable[[int, Refusal], None]:
+    def refuse(from_ns: int, refusal: Refusal) -> None:
+        reason, detail = refusal
+        rejected.append(Rejected(reason=reason, from_ns=from_ns, to_ns=keyframe.stamp_ns, detail=detail))
+
+    return refuse
+
+
+def _evidence(candidate: Candidate) -> dict[str, float]:
+    """The numbers of the verification, for whoever wants to look at a closure."""
+    seen, aligned = candidate.verification, candidate.alignment
+    numbers: dict[str, float | None] = {
+        "score": seen.score,
+        "inliers": seen.inliers,
+        "violations": seen.violations,
+        "occluded": seen.occluded,
+        "texture": seen.texture,
+        "tested": seen.tested,
+        "overlap": aligned.overlap,
+        "rmse": aligned.rmse,
+        "chains": len(candidate.agreeing_chains),
+        "explained": len(candidate.explained),
+        "moved": len(candidate.moved),
+        "gravity_error_deg": candidate.gravity_error_deg,
+    }
+    return {name: float(number) for name, number in numbers.items() if number is not None}
+
+
+def _rotation(keyframe: Keyframe) -> Array:
+    return np.eye(3) if keyframe.T_odom_camera is None else keyframe.T_odom_camera[:3, :3]

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The whole room: frames of a known room in, closures and refusals out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from objreg_ros.data import Array, Frame, LoopClosure, Reason, Rejected
+from objreg_ros.geometry import inverse, pose_error
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.registrar import Registrar
+
+from . import rooms
+
+PARAMS = RegistrarParams()
+HERE = rooms.look_at((0.2, 0.0, 1.3), (1.8, 0.0, 0.75))
+BESIDE = rooms.look_at((0.35, 0.25, 1.25), (1.8, 0.0, 0.75))
+AWAY = rooms.look_at((0.2, 0.0, 1.3), (2.8, -1.4, 1.0))
+
+
+def _frame(seconds: float, T_world_camera: Array, odometry: bool = False) -> Frame:
+    seen = rooms.keyframe(T_world_camera, seed=round(10 * seconds))
+    return Frame(
+        objects=tuple(item.cloud for item in seen.objects),
+        support=None,
+        view=seen.view,
+        gravity=seen.gravity,
+        gravity_confidence=1.0,
+        T_odom_camera=T_world_camera if odometry else None,
+        stamp_ns=round(1e9 * seconds),
+    )
+
+
+def _run(registrar: Registrar, *frames: Frame) -> tuple[list[LoopClosure], list[Rejected]]:
+    outcomes = [registrar.process(frame) for frame in frames] + [registrar.finish()]
+    return [c for o in outcomes for c in o.closures], [r for o in outcomes for r in o.rejected]
+
+
+@pytest.fixture(scope="module")
+def revisit() -> tuple[list[LoopClosure], list[Rejected], Registrar]:
+    """A place, a place beside it, and the first place again half a minute later."""
+    registrar = Registrar(PARAMS)
+    closures, rejected = _run(registrar, _frame(0, HERE, True), _frame(1, AWAY, True), _frame(30, BESIDE, True))
+    return closures, rejected, registrar
+
+
+def test_a_place_that_is_seen_again_closes_a_loop_at_the_true_pose(
+    revisit: tuple[list[LoopClosure], list[Rejected], Registrar],
+) -> None:
+    closure = next(c for c in revisit[0] if c.from_ns == 0)
+    assert closure.to_ns == 30_000_000_000
+    rotation, distance = pose_error(closure.T_from_to, inverse(HERE) @ BESIDE)
+    assert rotation < 1.0 and distance < 2.0
+    assert closure.labels and closure.evidence["score"] > 0
+
+
+def test_its_objects_are_matched_under_ids_that_were_known_before(
+    revisit: tuple[list[LoopClosure], list[Rejected], Registrar],
+) -> None:
+    closure = next(c for c in revisit[0] if c.from_ns == 0)
+    known = {landmark.landmark: landmark for landmark in revisit[2].landmarks}
+    assert closure.matches and all(match.object_id in known for match in closure.matches)
+    assert all(known[match.object_id].sightings >= 2 for match in closure.matches)
+
+
+def test_the_first_keyframe_has_no_candidate(revisit: tuple[list[LoopClosure], list[Rejected], Registrar]) -> None:
+    assert revisit[1][0].reason is Reason.NO_CANDIDATE and revisit[1][0].to_ns == 0
+
+
+def test_the_same_frames_give_the_same_closures() -> None:
+    frames = (_frame(0, HERE), _frame(30, BESIDE))
+    first, second = (_run(Registrar(PARAMS), *frames)[0] for _ in range(2))
+    assert len(first) == len(second) == 1
+    assert np.array_equal(first[0].T_from_to, second[0].T_from_to)
+    assert np.array_equal(first[0].covariance, second[0].covariance)
+
+
+def test_a_store_brings_an_earlier_session_back(tmp_path: Path) -> None:
+    params = PARAMS.replaced(store=str(tmp_path / "place.db"))
+    earlier = Registrar(params)
+    _run(earlier, _frame(0, HERE))
+    earlier.close()
+    later = Registrar(params)
+    closures, _ = _run(later, _frame(100, BESIDE))
+    assert [c.from_ns for c in closures] == [0]
+    assert later.counts()["sessions"] == 2 and later.counts()["closures"] == 1
+
+
+def test_a_search_without_time_refuses_as_over_budget_and_remembers_the_keyframe() -> None:
+    registrar = Registrar(PARAMS)
+    _run(registrar, _frame(0, HERE))
+    assert registrar.track(_frame(30, BESIDE)) is None
+    stretch = registrar.track(_frame(60, AWAY))
+    assert stretch is not None
+    outcome = registrar.search(stretch, seconds=0.0)
+    assert [r.reason for r in outcome.rejected] == [Reason.OVER_BUDGET] and outcome.closures == ()
+    assert registrar.counts()["keyframes"] == 2
+
+
+def test_reset_forgets_and_starts_again() -> None:
+    registrar = Registrar(PARAMS)
+    _run(registrar, _frame(0, HERE))
+    registrar.reset()
+    assert registrar.landmarks == () and registrar.counts()["keyframes"] == 0
+    closures, _ = _run(registrar, _frame(30, BESIDE))
+    assert closures == []
+
+
+def test_save_writes_a_copy_that_another_registrar_opens(tmp_path: Path) -> None:
+    registrar = Registrar(PARAMS)
+    _run(registrar, _frame(0, HERE))
+    path = registrar.save(str(tmp_path / "copy.db"))
+    assert Registrar(PARAMS.replaced(store=path)).counts()["keyframes"] == 1
