@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command `objreg`: one file a subcommand, imported only when it is called.
+
+``cli/<name>.py`` holds the command ``<name>`` (dashes become underscores) as the function ``command``.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import click
+
+# What `objreg --help` says without importing a command. A name without its file is not shown.
+SUMMARIES = {
+    "demo": "Run a recording through the live graph and show what came out.",
+    "inspect": "Say what is in a recording and what the graph would use.",
+    "offline": "Run a recording through the three rooms without ROS.",
+    "replay": "Publish a recording into the live graph.",
+    "export": "Write a recording as rosbag2.",
+    "simulate": "Make a recording with exact ground truth.",
+    "fetch-model": "Get a detector model.",
+    "report": "Draw pictures and tables of a run.",
+    "params": "Show every parameter, or write the files that are made from them.",
+}
+FOLDER = Path(__file__).parent
+BROKEN, INTERRUPTED = 1, 130
+
+
+class LazyGroup(click.Group):
+    """A group that imports a command when it is called, so that `--help` is quick."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """The commands whose files are there."""
+        return [name for name in SUMMARIES if (FOLDER / f"{_module(name)}.py").exists()]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command, imported; None if there is none of this name."""
+        if cmd_name not in self.list_commands(ctx):
+            return None
+        return import_module(f"objreg_ros.cli.{_module(cmd_name)}").command  # type: ignore[no-any-return]
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The list of `--help`, from the summaries."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, SUMMARIES[name]) for name in self.list_commands(ctx)])
+
+
+def _module(name: str) -> str:
+    return name.replace("-", "_")
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+def group() -> None:
+    """Object-level loop closure: recordings, offline runs and the live graph."""
+
+
+def main(*arguments: Any) -> None:
+    """The executable. A broken input is one line on stderr and exit 1; anything else is a bug and shows itself."""
+    try:
+        code = group.main(args=list(arguments) or None, standalone_mode=False)
+        sys.exit(code if isinstance(code, int) else 0)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(error.exit_code)
+    except (OSError, ValueError) as error:
+        click.echo(f"objreg: {error}", err=True)
+        sys.exit(BROKEN)
+    except (KeyboardInterrupt, click.Abort):
+        sys.exit(INTERRUPTED)

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`objreg offline`: a recording through the three rooms without ROS."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+from tqdm import tqdm
+
+from objreg_ros.cli import options
+from objreg_ros.cli.settings import Settings, read_settings
+from objreg_ros.detector.params import DetectorParams
+from objreg_ros.offline import Run, Timing, build_rooms, run_offline
+from objreg_ros.recording import Record, Recording, open_recording
+from objreg_ros.recording.drift import ODOM, with_drifting_odometry
+from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
+from objreg_ros.truth import Truth
+
+DRIFT = "drift:"
+
+
+@click.command()
+@options.recording
+@options.model
+@options.labels
+@click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the outcome here.")
+@click.option("--max-frames", type=click.IntRange(min=1), help="Stop after so many frames.")
+@click.option(
+    "--odometry",
+    metavar="TOPIC|none|drift:SEED",
+    help="Another topic, no odometry, or a synthetic one that drifts away from the recording's ground truth.",
+)
+@options.params
+@options.change
+@options.remap
+def command(
+    recording: Path,
+    model: str | None,
+    labels: str | None,
+    json_file: Path | None,
+    max_frames: int | None,
+    odometry: str | None,
+    params_file: Path | None,
+    changes: tuple[str, ...],
+    remaps: tuple[str, ...],
+) -> None:
+    """Run RECORDING (rosbag1, rosbag2 or a TUM RGB-D folder) through detector, segmenter and registrar without ROS.
+
+    Deterministic, and as fast as the CPU goes. Prints what came out and, where the recording has ground truth, the
+    true error of every constraint.
+    """
+    settings = read_settings(params_file, [*changes, *_model_changes(model, labels)])
+    with open_recording(recording) as source:
+        inputs = _inputs(source, remaps, odometry)
+        truth = Truth.of(source, inputs.ground_truth)
+        run = _run(source, inputs, settings, max_frames, odometry)
+    summary = run.summary(truth)
+    if json_file is not None:
+        json_file.write_text(json.dumps({"recording": str(recording), "odometry": inputs.odom, **summary}, indent=1))
+    _say(run, summary)
+
+
+def _model_changes(model: str | None, labels: str | None) -> list[str]:
+    named = {"detector.model": model, "detector.labels": labels}
+    return [f"{name}={value}" for name, value in named.items() if value]
+
+
+def _inputs(source: Recording, remaps: tuple[str, ...], odometry: str | None) -> Inputs:
+    asked = parse_remaps(remaps)
+    if odometry is not None:
+        asked["odom"] = "" if odometry == "none" or odometry.startswith(DRIFT) else odometry
+    inputs = choose_inputs(source.topics, asked)
+    if not inputs.complete:
+        there = ", ".join(f"{topic.name} ({topic.msgtype})" for topic in source.topics.values()) or "no topics"
+        raise ValueError(f"{source.path}: expected {inputs.missing}, got {there}; choose with --remap input:=/topic")
+    if (odometry or "").startswith(DRIFT):
+        if inputs.ground_truth is None:
+            raise ValueError(f"{source.path}: --odometry {odometry} needs a ground truth, and there is none")
+        return Inputs(**{**inputs.chosen(), "odom": ODOM})
+    return inputs
+
+
+def _run(source: Recording, inputs: Inputs, settings: Settings, max_frames: int | None, odometry: str | None) -> Run:
+    node = settings.of("segmenter", SegmenterNodeParams)
+    timing = Timing(slop_ns=round(node.slop * 1e9))
+    rooms, close = build_rooms(
+        settings.of("detector", DetectorParams),
+        settings.of("segmenter", SegmenterParams),
+        settings.of("registrar", RegistrarParams),
+    )
+    try:
+        frames = source.topics[inputs.depth or inputs.points or ""].count
+        with tqdm(total=min(frames, max_frames or frames), unit="frame", disable=None, leave=False) as bar:
+            records = _records(source, inputs, odometry)
+            return run_offline(records, rooms, inputs, timing, max_frames, lambda count: bar.update(count - bar.n))
+    finally:
+        close()
+
+
+def _records(source: Recording, inputs: Inputs, odometry: str | None) -> Iterator[Record]:
+    records = source.records(set(inputs.chosen().values()))
+    if odometry is None or not odometry.startswith(DRIFT) or inputs.ground_truth is None:
+        return records
+    seed = odometry.removeprefix(DRIFT)
+    if not seed.isdigit():
+        raise ValueError(f"--odometry: expected drift: and a seed like drift:1, got {odometry!r}")
+    return with_drifting_odometry(records, inputs.ground_truth, int(seed))
+
+
+def _say(run: Run, summary: dict) -> None:
+    click.echo(
+        f"{run.frames} frames, {run.detections} detections, {run.objects} objects, {len(run.closures)} constraints"
+    )
+    for title in ("rejected", "dropped"):
+        for reason, count in summary[title].items():
+            click.echo(f"  {title} {reason}: {count}")
+    for complaint in run.complaints.values():
+        click.echo(f"  first of them: {complaint}")
+    for stage, ms in summary["stage_ms"].items():
+        click.echo(f"  {stage}: {ms['p50']:.1f} ms median, {ms['p95']:.1f} ms p95")
+    truth = summary["truth"]
+    if truth["count"]:
+        degrees, centimetres = truth["rotation_deg"], truth["translation_cm"]
+        click.echo(f"  true error: {degrees['median']:.2f}° {centimetres['median']:.1f} cm median, "
+                   f"{degrees['max']:.2f}° {centimetres['max']:.1f} cm at most")  # fmt: skip
+        shares = ", ".join(f"{truth[name]} {name}" for name in ("strict", "loose", "false"))
+        click.echo(f"  of {truth['count']} constraints: {shares}")

@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+recording = click.argument("recording", type=click.Path(path_type=Path))
+remap = click.option("--remap", "remaps", multiple=True, metavar="INPUT:=TOPIC", help="Take an input from this topic.")
+params = click.option(
+    "--params",
+    "params_file",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="ROS 2 parameter file, like config/objreg.yaml.",
+)
+change = click.option("--set", "changes", multiple=True, metavar="NODE.NAME=VALUE", help="Change one parameter.")
+model = click.option("--model", help="ONNX model: a path or the name of an installed one.")
+labels = click.option("--labels", help="Text file of labels, one a line.")

@@ -1,0 +1,318 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A recording through the three rooms without ROS: deterministic, as fast as the CPU goes.
+
+The inputs are decoded and brought together by the code that the nodes use, so the same recording gives the same
+constraints here and in the live graph.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+
+from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.sync import Match, Need, Stream, Synchroniser
+from objreg_ros.data import (
+    Array,
+    ColourImage,
+    DepthImage,
+    Detections,
+    Frame,
+    LoopClosure,
+    ObjectCloud,
+    PointCloud,
+    Rejected,
+)
+from objreg_ros.detector.params import DetectorParams
+from objreg_ros.recording.inputs import Inputs
+from objreg_ros.recording.record import Record
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.segmenter.params import SegmenterParams
+from objreg_ros.truth import Error, Truth, summarise
+
+Word = TypeVar("Word")
+
+ODOM_DEPTH = 1000  # odometry is small and many times as frequent as frames
+
+
+class Detects(Protocol):
+    """What the first room does."""
+
+    def detect(self, image: ColourImage) -> Detections: ...
+
+
+class Segments(Protocol):
+    """What the second room does."""
+
+    def segment(self, detections: Detections, depth: DepthImage) -> Frame: ...
+
+
+class Outcome(Protocol):
+    """What the third room says of a frame."""
+
+    @property
+    def closures(self) -> tuple[LoopClosure, ...]: ...
+
+    @property
+    def rejected(self) -> tuple[Rejected, ...]: ...
+
+
+class Registers(Protocol):
+    """What the third room does."""
+
+    def process(self, frame: Frame) -> Outcome: ...
+
+    def finish(self) -> Outcome: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Rooms:
+    """The three rooms, and how a cloud becomes a depth image."""
+
+    detector: Detects
+    segmenter: Segments
+    registrar: Registers
+    organise: Callable[[PointCloud, Any], DepthImage]
+
+
+def build_rooms(
+    detector: DetectorParams, segmenter: SegmenterParams, registrar: RegistrarParams
+) -> tuple[Rooms, Callable[[], None]]:
+    """The rooms by their parameters, and what closes them. OSError and ValueError as the rooms raise them."""
+    from objreg_ros import share
+    from objreg_ros.detector.mobilenet_ssd import Detector
+    from objreg_ros.registrar.registrar import Registrar
+    from objreg_ros.segmenter.organise import organise
+    from objreg_ros.segmenter.segment import Segmenter
+
+    labels = Path(detector.labels).expanduser() if detector.labels else None
+    detects = Detector(detector, share.model(detector.model), labels)
+    segments = Segmenter(segmenter)
+    segments.warm()
+    registers = Registrar(registrar)
+    return Rooms(detects, segments, registers, organise), registers.close
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """How the inputs are brought together, as the nodes' parameters say; ``T_base_camera`` as the registrar's."""
+
+    slop_ns: int = 20_000_000
+    odom_slop_ns: int = 20_000_000
+    T_base_camera: Array | None = None
+
+
+@dataclass
+class Run:
+    """What came out of a run."""
+
+    frames: int = 0
+    detections: int = 0
+    objects: int = 0
+    closures: list[LoopClosure] = field(default_factory=list)
+    rejected: Counter[str] = field(default_factory=Counter)
+    dropped: Counter[str] = field(default_factory=Counter)
+    complaints: dict[str, str] = field(default_factory=dict)  # the first of each kind
+    stage_s: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+
+    def errors(self, truth: Truth) -> list[Error]:
+        """The true error of every closure that the truth tells of."""
+        return [error for closure in self.closures if (error := truth.error(closure)) is not None]
+
+    def summary(self, truth: Truth) -> dict[str, Any]:
+        """The run as JSON; the keys are stable."""
+        return {
+            "frames": self.frames,
+            "detections": self.detections,
+            "objects": self.objects,
+            "constraints": [constraint(closure) for closure in self.closures],
+            "rejected": dict(sorted(self.rejected.items())),
+            "dropped": dict(sorted(self.dropped.items())),
+            "stage_ms": {stage: percentiles_ms(seconds) for stage, seconds in self.stage_s.items()},
+            "truth": summarise(self.errors(truth)),
+        }
+
+
+def constraint(closure: LoopClosure) -> dict[str, Any]:
+    """A closure as JSON."""
+    return {
+        "from_ns": closure.from_ns,
+        "to_ns": closure.to_ns,
+        "T_from_to": closure.T_from_to.tolist(),
+        "covariance": closure.covariance.tolist(),
+        "labels": list(closure.labels),
+    }
+
+
+def percentiles_ms(seconds: list[float]) -> dict[str, float]:
+    """The median and the 95th percentile in milliseconds."""
+    p50, p95 = np.percentile(seconds, (50, 95)) * 1e3
+    return {"p50": round(float(p50), 3), "p95": round(float(p95), 3)}
+
+
+class Line:
+    """The three rooms in a row. Give it messages in order of time, then `finish`."""
+
+    def __init__(self, rooms: Rooms, inputs: Inputs, timing: Timing, max_frames: int | None = None) -> None:
+        self.run = Run()
+        self._rooms, self._timing, self._max_frames = rooms, timing, max_frames
+        self._from_points = inputs.points is not None
+        self._camera_info: Any = None
+        self._views = Synchroniser(self._streams(), self._unmatched)
+        odom = Stream("odom", Need.OPTIONAL, timing.odom_slop_ns, ODOM_DEPTH)
+        self._frames = Synchroniser([Stream("frame"), odom], self._unmatched)
+
+    def _streams(self) -> list[Stream]:
+        streams = [Stream("depth"), Stream("detections", slop_ns=self._timing.slop_ns)]
+        if self._from_points:
+            return streams
+        colour = Stream("image", Need.OPTIONAL, self._timing.slop_ns)
+        return [*streams, Stream("camera_info", Need.LATCHED), colour]
+
+    @property
+    def full(self) -> bool:
+        """Whether as many frames have gone through as were asked for."""
+        return self._max_frames is not None and self.run.frames >= self._max_frames
+
+    def take(self, name: str, message: Any) -> None:
+        """One message of an input of the graph. One that breaks its contract is counted as dropped."""
+        stamp_ns = from_msg.stamp_ns(message)
+        if name == "image":
+            self._take_image(stamp_ns, message)
+        elif name == "camera_info":
+            self._camera_info = message
+            self._feed(name, stamp_ns, message)
+        elif name in ("depth", "points"):
+            self._feed("depth", stamp_ns, message)
+        elif name == "odom":
+            self._track(self._frames.add("odom", stamp_ns, message))
+
+    def finish(self) -> Run:
+        """Let out what waits."""
+        self._segment(self._views.flush())
+        self._track(self._frames.flush())
+        self._note(self._rooms.registrar.finish())
+        return self.run
+
+    def _take_image(self, stamp_ns: int, message: Any) -> None:
+        detections = self._kept("image", partial(self._detect, message))
+        if detections is not None:
+            self._feed("image", stamp_ns, message)
+            self._feed("detections", stamp_ns, detections)
+
+    def _detect(self, message: Any) -> Detections:
+        with self._timed("decode"):
+            image = from_msg.image(message)
+        with self._timed("detect"):
+            return self._rooms.detector.detect(image)
+
+    def _feed(self, name: str, stamp_ns: int, payload: Any) -> None:
+        if name in self._views.queues:
+            self._segment(self._views.add(name, stamp_ns, payload))
+
+    def _segment(self, matches: Iterable[Match]) -> None:
+        for match in matches:
+            frame = self._kept("depth", partial(self._frame, match))
+            if frame is not None:
+                self.run.detections += len(match["detections"])
+                self.run.objects += len(frame.objects)
+                self._track(self._frames.add("frame", frame.stamp_ns, frame))
+
+    def _frame(self, match: Match) -> Frame:
+        with self._timed("decode"):
+            depth = self._depth(match)
+        with self._timed("segment"):
+            return as_sent(self._rooms.segmenter.segment(match["detections"], depth))
+
+    def _depth(self, match: Match) -> DepthImage:
+        if not self._from_points:
+            return from_msg.depth_image(match["depth"], match["camera_info"], match["image"])
+        camera = None if self._camera_info is None else from_msg.intrinsics(self._camera_info)
+        return self._rooms.organise(from_msg.point_cloud(match["depth"]), camera)
+
+    def _track(self, matches: Iterable[Match]) -> None:
+        for match in matches:
+            if self.full:
+                return
+            frame = with_odometry(match["frame"], match["odom"], self._timing.T_base_camera)
+            self.run.frames += 1
+            with self._timed("register"):
+                outcome = self._rooms.registrar.process(frame)
+            self._note(outcome)
+
+    def _note(self, outcome: Outcome) -> None:
+        self.run.closures += outcome.closures
+        self.run.rejected.update(refusal.reason.value for refusal in outcome.rejected)
+
+    def _unmatched(self, name: str, stamp_ns: int, why: str) -> None:
+        if name in ("depth", "frame"):
+            self.run.dropped[f"{name}_{why}"] += 1
+
+    def _kept(self, name: str, work: Callable[[], Word]) -> Word | None:
+        """What the work gives; None, counted as dropped, where a message breaks its contract."""
+        try:
+            return work()
+        except ValueError as error:
+            self.run.dropped[f"malformed_{name}"] += 1
+            self.run.complaints.setdefault(f"malformed_{name}", str(error))
+            return None
+
+    @contextmanager
+    def _timed(self, stage: str) -> Iterator[None]:
+        start = time.perf_counter()
+        yield
+        self.run.stage_s[stage].append(time.perf_counter() - start)
+
+
+def run_offline(
+    records: Iterable[Record],
+    rooms: Rooms,
+    inputs: Inputs,
+    timing: Timing | None = None,
+    max_frames: int | None = None,
+    on_frame: Callable[[int], None] = lambda frames: None,
+) -> Run:
+    """Drive the rooms with a recording's records; ``on_frame`` hears how many frames are through."""
+    line = Line(rooms, inputs, timing or Timing(), max_frames)
+    name_of = {topic: name for name, topic in inputs.chosen().items()}
+    for record in records:
+        if record.topic in name_of:
+            line.take(name_of[record.topic], record.message)
+            on_frame(line.run.frames)
+        if line.full:
+            break
+    return line.finish()
+
+
+def with_odometry(frame: Frame, odom: Any, T_base_camera: Array | None) -> Frame:
+    """The frame with the pose that an odometry message (or None) gives its camera."""
+    if odom is None:
+        return frame
+    T_odom_body = from_msg.odometry(odom).T_odom_body
+    return replace(frame, T_odom_camera=T_odom_body if T_base_camera is None else T_odom_body @ T_base_camera)
+
+
+def as_sent(frame: Frame) -> Frame:
+    """The frame with the numbers that survive the wire, where they are float32 and gravity is one vector."""
+    falls, confidence = None, 0.0
+    if frame.gravity is not None:
+        falls, confidence = from_msg.split_gravity(frame.gravity * frame.gravity_confidence)
+    return replace(
+        frame,
+        objects=tuple(_rounded(cloud) for cloud in frame.objects),
+        support=None if frame.support is None else _rounded(frame.support),
+        gravity=falls,
+        gravity_confidence=confidence,
+    )
+
+
+def _rounded(cloud: ObjectCloud) -> ObjectCloud:
+    return replace(cloud, score=float(np.float32(cloud.score)), density=float(np.float32(cloud.density)))

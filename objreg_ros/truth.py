@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How wrong a constraint truly is, by the ground truth of its recording.
+
+The truth is the pose of the colour camera's optical frame in the world over time. The error of a closure is that of
+``T_from_to`` against ``inverse(T_world_from) @ T_world_to``: degrees and centimetres.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from objreg_ros.bridge import from_msg
+from objreg_ros.data import Array, LoopClosure
+from objreg_ros.geometry import interpolate, inverse, pose_error
+from objreg_ros.recording.record import Recording
+
+STRICT = (3.0, 5.0)  # degrees, centimetres
+LOOSE = (5.0, 10.0)
+FALSE = (8.0, 15.0)  # worse than this in either is a false constraint
+MAX_GAP_NS = 200_000_000  # the truth is not interpolated over more than this
+
+Error = tuple[float, float]
+
+
+class Truth:
+    """The true path of the camera. Stamps must increase; later poses of an earlier time are left out."""
+
+    def __init__(self, poses: Iterable[tuple[int, Array]]) -> None:
+        self.stamps_ns: list[int] = []
+        self.poses: list[Array] = []
+        for stamp_ns, T_world_camera in poses:
+            if not self.stamps_ns or stamp_ns > self.stamps_ns[-1]:
+                self.stamps_ns.append(stamp_ns)
+                self.poses.append(T_world_camera)
+
+    @classmethod
+    def of(cls, recording: Recording, topic: str | None) -> Truth:
+        """The truth on a topic of a recording; without poses if ``topic`` is None."""
+        records = recording.records([topic]) if topic else ()
+        words = (from_msg.odometry(record.message) for record in records)
+        return cls((word.stamp_ns, word.T_odom_body) for word in words)
+
+    def at(self, stamp_ns: int) -> Array | None:
+        """``T_world_camera`` at a moment; None before the first, after the last and within a gap."""
+        after = bisect_left(self.stamps_ns, stamp_ns)
+        if after < len(self.stamps_ns) and self.stamps_ns[after] == stamp_ns:
+            return self.poses[after]
+        if not 0 < after < len(self.stamps_ns):
+            return None
+        start, end = self.stamps_ns[after - 1], self.stamps_ns[after]
+        if end - start > MAX_GAP_NS:
+            return None
+        return interpolate(self.poses[after - 1], self.poses[after], (stamp_ns - start) / (end - start))
+
+    def between(self, from_ns: int, to_ns: int) -> Array | None:
+        """The true ``T_from_to`` of two moments; None where the truth does not tell."""
+        T_world_from, T_world_to = self.at(from_ns), self.at(to_ns)
+        return None if T_world_from is None or T_world_to is None else inverse(T_world_from) @ T_world_to
+
+    def error(self, closure: LoopClosure) -> Error | None:
+        """(degrees, centimetres) between a closure and the truth; None where the truth does not tell."""
+        T_from_to = self.between(closure.from_ns, closure.to_ns)
+        return None if T_from_to is None else pose_error(closure.T_from_to, T_from_to)
+
+
+def within(error: Error, bound: Error) -> bool:
+    """Whether both parts of an error are within a bound."""
+    return error[0] <= bound[0] and error[1] <= bound[1]
+
+
+def summarise(errors: Sequence[Error]) -> dict[str, Any]:
+    """The errors of closures as the JSON of an offline run shows them; the spreads are None without any."""
+    rotation, translation = (spread([error[i] for error in errors]) for i in (0, 1))
+    return {
+        "rotation_deg": rotation,
+        "translation_cm": translation,
+        "strict": sum(within(error, STRICT) for error in errors),
+        "loose": sum(within(error, LOOSE) for error in errors),
+        "false": sum(not within(error, FALSE) for error in errors),
+        "count": len(errors),
+    }
+
+
+def spread(values: Sequence[float]) -> dict[str, float | None]:
+    """Median, 95th percentile and maximum; None without values."""
+    if not values:
+        return {"median": None, "p95": None, "max": None}
+    median, p95, largest = (float(v) for v in np.percentile(values, (50, 95, 100)))
+    return {"median": median, "p95": p95, "max": largest}

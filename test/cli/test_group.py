@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from objreg_ros.cli import FOLDER, SUMMARIES, group, main
+
+
+def test_help_shows_every_command_that_is_there_and_imports_none() -> None:
+    code = (
+        "import sys; from click.testing import CliRunner; from objreg_ros.cli import group;"
+        "print(CliRunner().invoke(group, ['--help']).output);"
+        "heavy = {'numpy', 'cv2', 'rosbags', 'rclpy', 'open3d'} & set(sys.modules); assert not heavy, heavy"
+    )
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert "offline" in shown and SUMMARIES["offline"] in shown
+
+
+@pytest.mark.parametrize("name", [name for name in SUMMARIES if (FOLDER / f"{name.replace('-', '_')}.py").exists()])
+def test_every_command_has_its_help(name: str) -> None:
+    result = CliRunner().invoke(group, [name, "--help"])
+    assert result.exit_code == 0 and "Usage:" in result.output
+
+
+def test_every_file_of_a_command_is_in_the_list() -> None:
+    modules = [path.stem for path in FOLDER.glob("*.py")]
+    with_command = [name for name in modules if "\ndef command(" in (FOLDER / f"{name}.py").read_text()]
+    assert {name.replace("_", "-") for name in with_command} <= set(SUMMARIES)
+
+
+def test_an_unknown_command_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main("fly")
+    assert end.value.code == 2 and "No such command 'fly'" in capsys.readouterr().err
+
+
+def test_a_broken_input_is_one_line_and_exit_1(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main("offline", "/nowhere/at/all")
+    error = capsys.readouterr().err
+    assert end.value.code == 1 and error.count("\n") == 1 and error.startswith("objreg: /nowhere/at/all: no such file")
+
+
+def test_the_group_is_a_click_group() -> None:
+    assert isinstance(group, click.Group)

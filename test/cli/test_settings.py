@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from objreg_ros.cli.settings import NODES, Settings, names_of, read_settings
+from objreg_ros.detector.params import DetectorParams
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
+
+
+def test_without_anything_the_defaults_hold() -> None:
+    settings = read_settings(None, ())
+    assert settings.of("detector", DetectorParams) == DetectorParams()
+    assert settings.of("segmenter", SegmenterNodeParams) == SegmenterNodeParams()
+
+
+def test_a_parameter_file_is_read_as_ros_reads_it(tmp_path: Path) -> None:
+    file = tmp_path / "p.yaml"
+    file.write_text(
+        "/**:\n  ros__parameters: {use_sim_time: true}\n"
+        "segmenter:\n  ros__parameters: {z_max: 3, slop: 0.5}\n"
+        "/detector:\n  ros__parameters: {threshold: 0.25}\n"
+    )
+    settings = read_settings(file, ())
+    assert settings.of("segmenter", SegmenterParams).z_max == 3.0
+    assert settings.of("segmenter", SegmenterNodeParams).slop == 0.5
+    assert settings.of("detector", DetectorParams).threshold == 0.25
+
+
+def test_a_change_wins_over_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "p.yaml"
+    file.write_text("registrar:\n  ros__parameters: {method: objreg, seed: 1}\n")
+    registrar = read_settings(file, ["registrar.method=paper", "registrar.seed=7"]).of("registrar", RegistrarParams)
+    assert (registrar.method, registrar.seed) == ("paper", 7)
+
+
+def test_text_stays_text_and_lists_are_lists() -> None:
+    changes = ["detector.model=1e3", "detector.ignore=dining table, person", "detector.label_offset=1"]
+    detector = read_settings(None, changes).of("detector", DetectorParams)
+    assert (detector.model, detector.ignore, detector.label_offset) == ("1e3", ("dining table", "person"), "1")
+    assert read_settings(None, ["detector.ignore=[]"]).of("detector", DetectorParams).ignore == ()
+
+
+@pytest.mark.parametrize("change", ["method=paper", "registrar.method", "lidar.range=3", "registrar=1"])
+def test_a_change_of_another_form_is_refused(change: str) -> None:
+    with pytest.raises(ValueError, match=r"--set: expected node\.parameter=value"):
+        read_settings(None, [change])
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        ("registrar.metod=paper", "registrar: no parameter metod"),
+        ("registrar.method=magic", "expected one of objreg, paper, got 'magic'"),
+        ("detector.threshold=2", "expected 0 … 1, got 2.0"),
+        ("detector.threads=many", "expected int, got 'many'"),
+    ],
+)
+def test_a_value_that_cannot_be_is_refused(change: str, complaint: str) -> None:
+    with pytest.raises(ValueError, match=complaint):
+        read_settings(None, [change])
+
+
+@pytest.mark.parametrize("text", ["a: [", "detector: 3", "detector: {threshold: 0.2}", "- 1"])
+def test_a_file_of_another_form_is_refused(text: str, tmp_path: Path) -> None:
+    (tmp_path / "p.yaml").write_text(text)
+    with pytest.raises(ValueError, match="expected a ROS 2 parameter file"):
+        read_settings(tmp_path / "p.yaml", ())
+
+
+@pytest.mark.parametrize("node", NODES)
+def test_no_two_classes_of_a_node_share_a_name(node: str) -> None:
+    names = [name for kind in NODES[node] for name in names_of(kind)]
+    assert len(names) == len(set(names))
+
+
+def test_settings_of_an_unknown_parameter_are_refused() -> None:
+    with pytest.raises(ValueError, match="no parameter speed"):
+        Settings({"detector": {"speed": 1}})

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rooms that say simple things, for tests of what lies between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from objreg_ros.data import (
+    ColourImage,
+    DepthImage,
+    Detections,
+    Frame,
+    LoopClosure,
+    ObjectCloud,
+    PointCloud,
+    Reason,
+    Rejected,
+    View,
+)
+from objreg_ros.geometry import back_project, inverse
+from objreg_ros.offline import Rooms
+
+
+@dataclass
+class Outcome:
+    closures: tuple[LoopClosure, ...] = ()
+    rejected: tuple[Rejected, ...] = ()
+
+
+class OneBox:
+    """Sees one cup in every image."""
+
+    def detect(self, image: ColourImage) -> Detections:
+        height, width = image.rgb.shape[:2]
+        return Detections(
+            xyxy=np.array([[1, 1, 9, 9]], np.float32),
+            score=np.array([0.5], np.float32),
+            label=("cup",),
+            image_hw=(height, width),
+            stamp_ns=image.stamp_ns,
+        )
+
+
+class OneCloud:
+    """Cuts one point out of every depth image."""
+
+    def segment(self, detections: Detections, depth: DepthImage) -> Frame:
+        cloud = ObjectCloud(
+            label=detections.label[0],
+            score=0.1,
+            instance=1,
+            xyz=np.array([[0, 0, depth.depth[5, 5]]], np.float32),
+            normals=np.array([[0, 0, -1]], np.float32),
+            rgb=None if depth.rgb is None else depth.rgb[5:6, 5],
+            flags=np.zeros(1, np.uint16),
+            density=0.1,
+        )
+        camera = depth.intrinsics
+        xyz = back_project(depth.depth, camera.fx, camera.fy, camera.cx, camera.cy)
+        return Frame(
+            objects=(cloud,),
+            support=None,
+            view=View(xyz=xyz, grey=None, intrinsics=camera),
+            gravity=np.array([0.0, 1.0, 0.0]),
+            gravity_confidence=0.3,
+            T_odom_camera=None,
+            stamp_ns=depth.stamp_ns,
+        )
+
+
+@dataclass
+class Chain:
+    """Closes every frame with the one before by odometry, and refuses where there is none; remembers its frames."""
+
+    frames: list[Frame] = field(default_factory=list)
+    finished: bool = False
+
+    def process(self, frame: Frame) -> Outcome:
+        self.frames.append(frame)
+        if len(self.frames) < 2:
+            return Outcome()
+        before = self.frames[-2]
+        if frame.T_odom_camera is None or before.T_odom_camera is None:
+            refused = Rejected(
+                reason=Reason.NO_CANDIDATE, from_ns=before.stamp_ns, to_ns=frame.stamp_ns, detail="no odometry"
+            )
+            return Outcome(rejected=(refused,))
+        T_from_to = inverse(before.T_odom_camera) @ frame.T_odom_camera
+        closure = LoopClosure(
+            from_ns=before.stamp_ns, to_ns=frame.stamp_ns, T_from_to=T_from_to, covariance=np.eye(6), labels=("cup",)
+        )
+        return Outcome(closures=(closure,))
+
+    def finish(self) -> Outcome:
+        self.finished = True
+        return Outcome()
+
+
+def no_clouds(cloud: PointCloud, camera: object) -> DepthImage:
+    raise AssertionError("no cloud was sent")
+
+
+def simple_rooms() -> tuple[Rooms, Chain]:
+    chain = Chain()
+    return Rooms(OneBox(), OneCloud(), chain, no_clouds), chain

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from recording.folders import CAMERA, records
+from simple_rooms import simple_rooms
+
+from objreg_ros.data import DepthImage
+from objreg_ros.offline import Timing, as_sent, run_offline
+from objreg_ros.recording import Record, messages
+from objreg_ros.recording.inputs import Inputs
+from objreg_ros.truth import Truth
+
+INPUTS = Inputs(image="/image", depth="/depth/image", camera_info="/camera_info", odom="/odom")
+MS = 1_000_000
+
+
+def test_every_frame_goes_through_with_its_odometry() -> None:
+    rooms, chain = simple_rooms()
+    run = run_offline(records(4), rooms, INPUTS)
+    assert (run.frames, run.detections, run.objects, len(run.closures)) == (4, 4, 4, 3)
+    assert [frame.T_odom_camera[0, 3] for frame in chain.frames] == pytest.approx([0, 0.1, 0.2, 0.3])
+    assert chain.finished and not run.dropped
+
+
+def test_colour_reaches_the_segmenter_registered_to_depth() -> None:
+    rooms, chain = simple_rooms()
+    run_offline(records(3), rooms, INPUTS)
+    assert [frame.objects[0].rgb.tolist() for frame in chain.frames] == [[[i, 20, 30]] for i in range(3)]
+    assert [round(float(frame.objects[0].xyz[0, 2]), 3) for frame in chain.frames] == [1.0, 1.001, 1.002]
+
+
+def test_without_odometry_frames_go_through_without_it() -> None:
+    rooms, chain = simple_rooms()
+    run = run_offline(records(3), rooms, Inputs(image="/image", depth="/depth/image", camera_info="/camera_info"))
+    assert run.frames == 3 and all(frame.T_odom_camera is None for frame in chain.frames)
+    assert run.rejected == {"no_candidate": 2}
+
+
+def test_a_run_can_stop_early() -> None:
+    rooms, chain = simple_rooms()
+    run = run_offline(records(9), rooms, INPUTS, max_frames=4)
+    assert run.frames == len(chain.frames) == 4 and chain.finished
+
+
+def without(topic: str, stamp_ns: int) -> Iterator[Record]:
+    return (record for record in records(4) if (record.topic, record.stamp_ns) != (topic, stamp_ns))
+
+
+def test_a_depth_image_without_colour_is_dropped_with_a_reason() -> None:
+    rooms, chain = simple_rooms()
+    run = run_offline(without("/image", 1100 * MS), rooms, INPUTS)
+    assert [frame.stamp_ns // MS for frame in chain.frames] == [1000, 1200, 1300]
+    assert run.dropped == {"depth_unmatched": 1}
+
+
+def test_a_frame_whose_odometry_was_lost_goes_through_without() -> None:
+    rooms, chain = simple_rooms()
+    run_offline(without("/odom", 1100 * MS), rooms, INPUTS)
+    assert [frame.T_odom_camera is None for frame in chain.frames] == [False, True, False, False]
+
+
+def test_the_mounting_of_the_camera_is_applied() -> None:
+    rooms, chain = simple_rooms()
+    T_base_camera = np.eye(4)
+    T_base_camera[2, 3] = 0.7
+    run_offline(records(2), rooms, INPUTS, Timing(T_base_camera=T_base_camera))
+    assert [frame.T_odom_camera[2, 3] for frame in chain.frames] == [0.7, 0.7]
+
+
+def broken() -> Iterator[Record]:
+    for record in records(3):
+        message = record.message
+        if record.stamp_ns == 1100 * MS and record.topic == "/depth/image":
+            message.data = message.data[:-10]
+        if record.stamp_ns == 1200 * MS and record.topic == "/image":
+            message.encoding = "bayer"
+        yield Record.of(record.topic, message, record.stamp_ns)
+
+
+def test_broken_messages_are_counted_and_the_run_goes_on() -> None:
+    rooms, chain = simple_rooms()
+    run = run_offline(broken(), rooms, INPUTS)
+    assert len(chain.frames) == 1
+    assert run.dropped == {"malformed_depth": 1, "malformed_image": 1, "depth_unmatched": 1}
+    assert "got 'bayer'" in run.complaints["malformed_image"]
+
+
+def test_a_bug_in_a_room_is_not_taken_for_a_broken_message() -> None:
+    rooms, chain = simple_rooms()
+
+    def fail(frame: object) -> None:
+        raise ValueError("a bug")
+
+    chain.process = fail  # type: ignore[method-assign, assignment]
+    with pytest.raises(ValueError, match="a bug"):
+        run_offline(records(2), rooms, INPUTS)
+
+
+def test_the_same_recording_gives_the_same_json() -> None:
+    truth = Truth([(10**9, np.eye(4)), (11 * 10**8, np.eye(4))])
+    texts = []
+    for _ in range(2):
+        rooms, _ = simple_rooms()
+        summary = run_offline(records(4), rooms, INPUTS).summary(truth)
+        assert set(summary.pop("stage_ms")) == {"decode", "detect", "segment", "register"}
+        texts.append(json.dumps(summary))
+    assert texts[0] == texts[1]
+
+
+def test_the_json_has_the_keys_that_others_rely_on() -> None:
+    rooms, _ = simple_rooms()
+    summary = run_offline(records(4), rooms, INPUTS).summary(Truth([(10**9, np.eye(4)), (11 * 10**8, np.eye(4))]))
+    wanted = {"frames", "detections", "objects", "constraints", "rejected", "stage_ms", "truth"}
+    assert wanted <= set(summary)
+    assert set(summary["constraints"][0]) == {"from_ns", "to_ns", "T_from_to", "covariance", "labels"}
+    assert summary["truth"]["count"] == 1 and summary["truth"]["translation_cm"]["max"] == pytest.approx(10)
+
+
+def test_what_the_wire_rounds_is_rounded() -> None:
+    rooms, chain = simple_rooms()
+    run_offline(records(1), rooms, INPUTS)
+    frame = chain.frames[0]
+    assert frame.objects[0].density == float(np.float32(0.1)) != 0.1
+    again = as_sent(frame)
+    assert np.array_equal(again.gravity, frame.gravity) and again.gravity_confidence == frame.gravity_confidence
+
+
+def test_points_go_through_the_organiser() -> None:
+    rooms, _ = simple_rooms()
+    rows = np.zeros((48, 64), [("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
+    rows["z"] = 2
+    seen = []
+
+    def organise(cloud, camera):  # type: ignore[no-untyped-def]
+        seen.append(camera)
+        depth = np.ascontiguousarray(cloud.xyz[..., 2])
+        return DepthImage(depth=depth, rgb=None, intrinsics=CAMERA, stamp_ns=cloud.stamp_ns)
+
+    object.__setattr__(rooms, "organise", organise)
+    clouds = [r for r in records(2) if r.topic != "/depth/image"]
+    for stamp_ns in (10**9, 11 * 10**8):
+        clouds.append(Record.of("/points", messages.point_cloud(rows, stamp_ns, "camera"), stamp_ns))
+    run = run_offline(clouds, rooms, Inputs(image="/image", points="/points", camera_info="/camera_info"))
+    assert run.frames == 2 and seen[0].fx == CAMERA.fx

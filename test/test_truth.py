@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from objreg_ros.data import LoopClosure
+from objreg_ros.geometry import inverse, pose, rotation_from_vector
+from objreg_ros.truth import Truth, summarise
+
+MS = 1_000_000
+
+
+def at(x: float, yaw: float = 0.0) -> np.ndarray:
+    return pose(rotation_from_vector(np.array([0, 0, yaw])), np.array([x, 0.0, 0.0]))
+
+
+def closure(T_from_to: np.ndarray, from_ns: int = 0, to_ns: int = 100 * MS) -> LoopClosure:
+    return LoopClosure(from_ns=from_ns, to_ns=to_ns, T_from_to=T_from_to, covariance=np.eye(6), labels=())
+
+
+def test_the_truth_between_two_moments_is_the_relative_pose() -> None:
+    truth = Truth([(0, at(1, 0.3)), (100 * MS, at(2, 0.5))])
+    T_from_to = truth.between(0, 100 * MS)
+    assert T_from_to is not None and np.allclose(T_from_to, inverse(at(1, 0.3)) @ at(2, 0.5))
+    assert truth.error(closure(T_from_to)) == pytest.approx((0, 0), abs=1e-6)
+
+
+def test_an_error_is_told_in_degrees_and_centimetres() -> None:
+    truth = Truth([(0, at(0)), (100 * MS, at(1))])
+    assert truth.error(closure(at(1.02, np.radians(2)))) == pytest.approx((2, 2))
+
+
+def test_a_closure_the_other_way_round_is_wrong() -> None:
+    truth = Truth([(0, at(0)), (100 * MS, at(1))])
+    error = truth.error(closure(at(-1)))
+    assert error is not None and error[1] == pytest.approx(200)
+
+
+def test_between_two_poses_the_truth_is_interpolated() -> None:
+    truth = Truth([(0, at(0, 0)), (100 * MS, at(1, 0.4))])
+    T = truth.at(25 * MS)
+    assert T is not None and np.allclose(T, at(0.25, 0.1))
+
+
+@pytest.mark.parametrize("stamp_ms", [-1, 101, 250, 401])
+def test_where_the_truth_does_not_tell_there_is_no_error(stamp_ms: int) -> None:
+    truth = Truth([(0, at(0)), (100 * MS, at(1)), (400 * MS, at(2))])
+    assert truth.at(stamp_ms * MS) is None
+    assert truth.error(closure(at(0), 0, stamp_ms * MS)) is None
+
+
+def test_a_truth_without_poses_tells_nothing() -> None:
+    assert Truth([]).error(closure(at(0))) is None
+
+
+def test_a_pose_of_an_earlier_time_is_left_out() -> None:
+    truth = Truth([(100, at(1)), (50, at(5)), (100, at(6)), (200, at(2))])
+    assert truth.stamps_ns == [100, 200]
+
+
+def test_a_summary_counts_what_is_strict_loose_and_false() -> None:
+    errors = [(1.0, 1.0), (3.0, 5.0), (3.1, 5.0), (5.0, 10.0), (6.0, 6.0), (8.0, 15.0), (8.1, 1.0), (1.0, 15.1)]
+    summary = summarise(errors)
+    assert (summary["strict"], summary["loose"], summary["false"], summary["count"]) == (2, 4, 2, 8)
+    assert summary["rotation_deg"]["max"] == 8.1 and summary["translation_cm"]["median"] == 5.5
+
+
+def test_a_summary_of_nothing_has_no_numbers() -> None:
+    summary = summarise([])
+    assert summary["count"] == 0 and summary["rotation_deg"] == {"median": None, "p95": None, "max": None}
