@@ -17,7 +17,7 @@ from objreg_ros.offline import Run, Timing, build_rooms, run_offline
 from objreg_ros.recording import Record, Recording, open_recording
 from objreg_ros.recording.drift import ODOM, with_drifting_odometry
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
-from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_ros.truth import Truth
 
@@ -86,8 +86,7 @@ def _inputs(source: Recording, remaps: tuple[str, ...], odometry: str | None) ->
 
 
 def _run(source: Recording, inputs: Inputs, settings: Settings, max_frames: int | None, odometry: str | None) -> Run:
-    node = settings.of("segmenter", SegmenterNodeParams)
-    timing = Timing(slop_ns=round(node.slop * 1e9))
+    timing = _timing(settings)
     rooms, close = build_rooms(
         settings.of("detector", DetectorParams),
         settings.of("segmenter", SegmenterParams),
@@ -100,6 +99,11 @@ def _run(source: Recording, inputs: Inputs, settings: Settings, max_frames: int 
             return run_offline(records, rooms, inputs, timing, max_frames, lambda count: bar.update(count - bar.n))
     finally:
         close()
+
+
+def _timing(settings: Settings) -> Timing:
+    segmenter, registrar = settings.of("segmenter", SegmenterNodeParams), settings.of("registrar", RegistrarNodeParams)
+    return Timing(round(segmenter.slop * 1e9), round(registrar.odom_slop * 1e9), registrar.mounting)
 
 
 def _records(source: Recording, inputs: Inputs, odometry: str | None) -> Iterator[Record]:

@@ -11,8 +11,9 @@ import yaml
 
 from objreg_ros.bridge.params import DoorParams
 from objreg_ros.detector.params import DetectorParams
+from objreg_ros.mapper.params import MapperNodeParams, MapperParams
 from objreg_ros.params import Declaration, Params
-from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 
 Kind = TypeVar("Kind", bound=Params)
@@ -20,7 +21,8 @@ Kind = TypeVar("Kind", bound=Params)
 NODES: dict[str, tuple[type[Params], ...]] = {
     "detector": (DetectorParams, DoorParams),
     "segmenter": (SegmenterParams, SegmenterNodeParams, DoorParams),
-    "registrar": (RegistrarParams, DoorParams),
+    "registrar": (RegistrarParams, RegistrarNodeParams, DoorParams),
+    "mapper": (MapperParams, MapperNodeParams, DoorParams),
 }
 KEY = "ros__parameters"
 EVERYWHERE = ("use_sim_time",)  # what rclpy itself declares

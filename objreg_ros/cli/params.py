@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`objreg params`: every parameter, and the two files that are made from them."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import click
+
+from objreg_ros.bridge.params import DoorParams
+from objreg_ros.cli.settings import KEY, NODES
+from objreg_ros.params import Declaration, Params
+
+YAML_FILE, README = "config/objreg.yaml", "README.md"
+BEGIN, END = "<!-- parameters: objreg params --write -->", "<!-- /parameters -->"
+WIDTH = 120
+
+
+@click.command()
+@click.option("--table", "form", flag_value="table", default="table", help="The table of the README (the default).")
+@click.option("--yaml", "form", flag_value="yaml", help="A ROS 2 parameter file with every default.")
+@click.option("--write", is_flag=True, help=f"Write {YAML_FILE} and the table in {README} of this checkout again.")
+def command(form: str, write: bool) -> None:
+    """Show every parameter of every node with its default, range and meaning."""
+    if write:
+        for file in write_files(Path(__file__).resolve().parents[2]):
+            click.echo(f"wrote {file}")
+    else:
+        click.echo(yaml_text() if form == "yaml" else table_text(), nl=False)
+
+
+def write_files(repository: Path) -> list[Path]:
+    """Write the files that are made from the parameters; FileNotFoundError outside of a checkout."""
+    readme = repository / README
+    if not readme.is_file():
+        raise FileNotFoundError(f"{readme}: expected a checkout of the repository; --yaml and --table print instead")
+    files = {repository / YAML_FILE: yaml_text(), readme: readme_text(readme.read_text())}
+    for file, text in files.items():
+        file.write_text(text)
+    return list(files)
+
+
+def readme_text(old: str) -> str:
+    """The README with the table of now between its marks; ValueError if it has none."""
+    before, begin, rest = old.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        raise ValueError(f"{README}: expected the marks {BEGIN} and {END}")
+    return f"{before}{BEGIN}\n{table_text()}{END}{after}"
+
+
+def yaml_text() -> str:
+    """A ROS 2 parameter file with every node's defaults, each with what it means."""
+    lines = ["# Made by `objreg params --write` from the code: change defaults there, and copies of this file here."]
+    for node, kinds in NODES.items():
+        lines += ["", f"{node}:", f"  {KEY}:"]
+        lines += [line for kind in kinds for declaration in kind.declarations() for line in _yaml_lines(declaration)]
+    return "\n".join(lines) + "\n"
+
+
+def _yaml_lines(declaration: Declaration) -> list[str]:
+    remark = textwrap.wrap(_remark(declaration), WIDTH - 6)
+    setting = f"{declaration.name}: {yaml_value(declaration.default)}"
+    if declaration.default == ():  # a parameter file cannot hold an empty list
+        setting = f"# {setting}"
+    return [*(f"    # {line}" for line in remark), f"    {setting}"]
+
+
+def _remark(declaration: Declaration) -> str:
+    notes = [declaration.unit, declaration.range_text, "" if declaration.live else "read-only"]
+    told = ", ".join(note for note in notes if note)
+    return f"{declaration.doc} ({told})" if told else declaration.doc
+
+
+def yaml_value(value: Any) -> str:
+    """A value as YAML that ROS reads back in the same type."""
+    if isinstance(value, tuple):
+        return f"[{', '.join(yaml_value(item) for item in value)}]"
+    if isinstance(value, float):
+        mantissa, e, exponent = repr(value).partition("e")
+        return f"{mantissa if '.' in mantissa else mantissa + '.0'}{e}{exponent}"
+    return json.dumps(value, ensure_ascii=False)
+
+
+def table_text() -> str:
+    """The parameters as Markdown tables, one a node; what every node has comes last."""
+    own = {node: [kind for kind in kinds if kind is not DoorParams] for node, kinds in NODES.items()}
+    sections = [line for node, kinds in own.items() for line in _section(f"`{node}`", kinds)]
+    return "\n".join([*sections, *_section("Every node", [DoorParams])]) + "\n"
+
+
+def _section(title: str, kinds: list[type[Params]]) -> Iterator[str]:
+    yield from (
+        f"### {title}",
+        "",
+        "| parameter | default | unit | range | live | |",
+        "| --- | --- | --- | --- | --- | --- |",
+    )
+    for kind in kinds:
+        yield from (_row(declaration) for declaration in kind.declarations())
+    yield ""
+
+
+def _row(declaration: Declaration) -> str:
+    default = yaml_value(declaration.default)
+    cells = [f"`{declaration.name}`", f"`{default}`", declaration.unit, declaration.range_text,
+             "yes" if declaration.live else "", declaration.doc]  # fmt: skip
+    return f"| {' | '.join(cell.replace('|', '/') for cell in cells)} |"

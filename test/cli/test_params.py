@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+from click.testing import CliRunner
+
+from objreg_ros.cli.params import (
+    BEGIN,
+    END,
+    YAML_FILE,
+    command,
+    readme_text,
+    table_text,
+    write_files,
+    yaml_text,
+    yaml_value,
+)
+from objreg_ros.cli.settings import KEY, NODES, read_settings
+
+STALE = "made from the parameters and stale; `objreg params --write` makes it again"
+
+
+def test_the_parameter_file_is_that_of_the_code(repository: Path) -> None:
+    assert (repository / YAML_FILE).read_text() == yaml_text(), f"{YAML_FILE} is {STALE}"
+
+
+def test_the_table_of_the_readme_is_that_of_the_code(repository: Path) -> None:
+    text = (repository / "README.md").read_text()
+    assert readme_text(text) == text, f"the table of README.md is {STALE}"
+
+
+def test_every_node_has_every_parameter_in_the_file_with_its_default() -> None:
+    content = yaml.safe_load(yaml_text())
+    for node, kinds in NODES.items():
+        for declaration in (d for kind in kinds for d in kind.declarations()):
+            if declaration.default == ():
+                assert declaration.name not in content[node][KEY]
+            else:
+                assert declaration.check(content[node][KEY][declaration.name]) == declaration.default
+
+
+def test_the_file_says_what_the_defaults_say(tmp_path: Path) -> None:
+    (tmp_path / "p.yaml").write_text(yaml_text())
+    settings, defaults = read_settings(tmp_path / "p.yaml", ()), read_settings(None, ())
+    for node, kinds in NODES.items():
+        assert [settings.of(node, kind) for kind in kinds] == [defaults.of(node, kind) for kind in kinds]
+
+
+@pytest.mark.parametrize("value", [1.0, 1e-7, 1e22, 0.1, -3.0, 5, True, "", "a: #b", "1", ("x y", "z"), (1.0, 2.5)])
+def test_a_value_is_read_back_in_its_type(value: object) -> None:
+    back = yaml.safe_load(yaml_value(value))
+    back = tuple(back) if isinstance(back, list) else back
+    assert back == value and type(back) is type(value)
+
+
+def test_a_readme_without_marks_is_refused() -> None:
+    with pytest.raises(ValueError, match="expected the marks"):
+        readme_text("# Title\n")
+
+
+def test_only_what_is_between_the_marks_changes(tmp_path: Path) -> None:
+    (tmp_path / "config").mkdir()
+    (tmp_path / "README.md").write_text(f"before\n{BEGIN}\nOBSOLETE\n{END}\nafter\n")
+    write_files(tmp_path)
+    text = (tmp_path / "README.md").read_text()
+    assert (
+        text.startswith(f"before\n{BEGIN}\n### `detector`") and text.endswith(f"{END}\nafter\n") and "OBSOLETE" not in text
+    )
+
+
+def test_outside_of_a_checkout_nothing_is_written(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="expected a checkout"):
+        write_files(tmp_path)
+
+
+def test_the_command_shows_both_forms() -> None:
+    assert CliRunner().invoke(command, ["--yaml"]).output == yaml_text()
+    assert CliRunner().invoke(command, []).output == table_text()
