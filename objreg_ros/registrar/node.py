@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The door of the registrar: ``objects``, ``view``, ``view/camera_info``, ``gravity``, ``labels`` and ``odom`` in;
+``constraints``, ``transforms`` and ``markers`` out."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections import Counter
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from geometry_msgs.msg import TransformStamped, Vector3Stamped
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import CameraInfo, PointCloud2
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, Trigger
+from visualization_msgs.msg import MarkerArray
+
+from objreg_ros.bridge import from_msg, qos, to_msg
+from objreg_ros.bridge.door import DroppedError
+from objreg_ros.bridge.markers import Scene
+from objreg_ros.bridge.matching import MatchingDoor
+from objreg_ros.bridge.spin import run
+from objreg_ros.bridge.sync import Match, Need, Stream
+from objreg_ros.bridge.worker import Worker
+from objreg_ros.data import Frame
+from objreg_ros.registrar.params import RegistrarNodeParams, RegistrarParams
+from objreg_ros.registrar.registrar import Outcome, Registrar, Stretch
+
+KEPT_CONSTRAINTS = 1000  # what a mapper that comes late still gets
+
+
+class RegistrarNode(MatchingDoor):
+    """Follows every frame; searches, in a second worker, for the places that a keyframe shows again.
+
+    A frame that completes a keyframe is in the books until its search is over.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("registrar", RegistrarParams, RegistrarNodeParams)
+        inputs = self.settings.of(RegistrarNodeParams)
+        self._T_base_camera, self._seconds = inputs.mounting, inputs.limit
+        self._registrar = Registrar(self.settings.of(RegistrarParams))
+        self._tracking = threading.Lock()
+        self._enabled = True
+        self._counts = dict(self._registrar.counts())
+        self._accepted, self._refused = 0, Counter[str]()
+        self._scene, self._odom_frame = Scene(), "odom"
+        self.searcher: Worker[tuple[int, Stretch]] = Worker(self._search, self._overtaken, self.failure.set_exception)
+        self._announce()
+        self._serve()
+        self._listen(round(inputs.odom_slop * 1e9))
+
+    def _announce(self) -> None:
+        self._constraints = self.create_publisher(Odometry, "constraints", qos.latched(KEPT_CONSTRAINTS))
+        self._transforms = self.create_publisher(TransformStamped, "transforms", qos.room(depth=100))
+        self._markers = self.create_publisher(MarkerArray, "markers", qos.latched())
+
+    def _serve(self) -> None:
+        self.create_service(Trigger, "~/reset", self._reset)
+        self.create_service(Trigger, "~/save", self._save)
+        self.create_service(SetBool, "~/enable", self._enable)
+
+    def _listen(self, odom_slop_ns: int) -> None:
+        room = {"objects": PointCloud2, "view": PointCloud2, "view/camera_info": CameraInfo, "gravity": Vector3Stamped}
+        self.listen(String, "labels", self._hear_labels, qos.latched())
+        self.listen(Odometry, "odom", self._hear("odom"), self.sensor())
+        for topic, kind in room.items():
+            self.listen(kind, topic, self._hear(topic), qos.room(), watched=topic)
+        self.expect("objects", "objects")
+        exact = [Stream(topic) for topic in room]
+        self.begin([*exact, Stream("labels", Need.LATCHED), Stream("odom", Need.OPTIONAL, odom_slop_ns, depth=1000)])
+
+    # Hear
+
+    def _hear_labels(self, message: Any) -> None:
+        names = self.read_aside("labels", from_msg.labels, message)
+        if names is not None:
+            self.feed("labels", 0, names)
+
+    def _hear(self, topic: str) -> Callable[[Any], None]:
+        return lambda message: self.feed(topic, from_msg.stamp_ns(message), message)
+
+    # Compute
+
+    def compute(self, stamp_ns: int, payload: Match) -> bool:
+        """Follow one frame; a keyframe goes on to the searcher."""
+        if not self._enabled:
+            raise DroppedError("disabled", "")
+        frame = self._frame(payload)
+        self._scene.see(frame)
+        with self._tracking, self.ledger.timed("track"):
+            stretch = self._registrar.track(frame)
+        if stretch is not None:
+            self.searcher.put((stamp_ns, stretch))
+        return stretch is None
+
+    def _frame(self, match: Match) -> Frame:
+        odom = match["odom"]
+        if odom is not None:
+            self._odom_frame = odom.header.frame_id
+        topics = ("objects", "view", "view/camera_info", "gravity", "labels", "odom")
+        return self.read("frame", from_msg.frame, *(match[topic] for topic in topics), self._T_base_camera)
+
+    def _search(self, job: tuple[int, Stretch]) -> None:
+        self.conclude(job[0], lambda: self._find(job[1]))
+
+    def _find(self, stretch: Stretch) -> bool:
+        with self.ledger.timed("search"):
+            outcome = self._registrar.search(stretch, self._seconds)
+        self._publish(outcome)
+        return True
+
+    def _publish(self, outcome: Outcome) -> None:
+        for closure in outcome.closures:
+            self._constraints.publish(to_msg.constraint(closure))
+            for transform in to_msg.transforms(closure):
+                self._transforms.publish(transform)
+        self._accepted += len(outcome.closures)
+        self._refused.update(refusal.reason.value for refusal in outcome.rejected)
+        self._counts = dict(self._registrar.counts())
+        if outcome.keyframe_ns is not None:
+            self._scene.settle(outcome.keyframe_ns, outcome.closures, outcome.rejected)
+            self._show(outcome.keyframe_ns)
+
+    def _show(self, stamp_ns: int) -> None:
+        objects = [(known.landmark, known.label, known.position) for known in self._registrar.landmarks]
+        self._markers.publish(self._scene.markers(objects, stamp_ns, self._odom_frame))
+
+    def extra_diagnostics(self) -> Mapping[str, object]:
+        """What is stored, what was accepted, and what was refused by reason."""
+        stored = {f"stored {what}": count for what, count in self._counts.items()}
+        refused = {f"rejected: {reason}": count for reason, count in sorted(self._refused.items())}
+        return {**super().extra_diagnostics(), **stored, "constraints": self._accepted, **refused}
+
+    # Services
+
+    def _reset(self, _: Any, response: Any) -> Any:
+        with self._tracking:
+            self._registrar.reset()
+        self._scene.clear()
+        self._counts = dict(self._registrar.counts())
+        response.success, response.message = True, "forgot every keyframe"
+        return response
+
+    def _save(self, _: Any, response: Any) -> Any:
+        """Also ends the keyframe in hand: what the last frames closed is published before the answer."""
+        with self._tracking:
+            self._publish(self._registrar.finish())
+        try:
+            response.success, response.message = True, self._registrar.save()
+        except OSError as error:
+            response.success, response.message = False, str(error)
+        return response
+
+    def _enable(self, request: Any, response: Any) -> Any:
+        self._enabled = request.data
+        response.success, response.message = True, "enabled" if request.data else "frames are dropped as disabled"
+        return response
+
+    def close(self) -> None:
+        """End both workers, let go of the store."""
+        self.worker.close()
+        self.searcher.close()
+        self._registrar.close()
+        super().close()
+
+
+def main() -> int:
+    """The executable ``registrar``."""
+    return run(RegistrarNode)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
