@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Node processes of this package on a ROS domain of their own, and a listener that speaks to them."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from std_msgs.msg import Header
+
+from objreg_ros.bridge import from_msg, profile, qos
+from objreg_ros.bridge.diagnostics import balance_of
+from objreg_ros.bridge.ledger import Balance
+
+START_S = 60.0  # a first start compiles kernels
+ANSWER_S = 20.0
+REPOSITORY = Path(__file__).resolve().parents[2]
+
+
+class Graph:
+    """Starts nodes, publishes to them and waits for what they say. Frames are answered one by one: nothing is lost."""
+
+    def __init__(self, domain: int, folder: Path) -> None:
+        self.domain, self.folder = domain, folder
+        self.processes: dict[str, subprocess.Popen[bytes]] = {}
+        os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+        profile.apply()
+        self.context = Context()
+        self.context.init(domain_id=domain)
+        self.node = Node("listener", context=self.context)
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor.add_node(self.node)
+        self.publishers: dict[str, Any] = {}
+        self.heard: defaultdict[str, list[Any]] = defaultdict(list)
+        self.books: dict[str, Balance] = {}
+        self.node.create_subscription(DiagnosticArray, "/diagnostics", self._take_books, qos.room())
+
+    # Processes
+
+    def command(self, room: str, *ros_args: str) -> list[str]:
+        arguments = [word for pair in ros_args for word in pair.split(" ", 1)]
+        return [sys.executable, "-m", f"objreg_ros.{room}.node", "--ros-args", *arguments]
+
+    def environment(self) -> dict[str, str]:
+        return {**os.environ, "ROS_DOMAIN_ID": str(self.domain), "PYTHONPATH": str(REPOSITORY)}
+
+    def start(self, name: str, room: str, *ros_args: str) -> None:
+        """Start a node as a process; its output goes to `log`."""
+        with self._log(name).open("wb") as log:
+            self.processes[name] = subprocess.Popen(
+                self.command(room, *ros_args), env=self.environment(), stdout=log, stderr=log, cwd=self.folder
+            )
+
+    def log(self, name: str) -> str:
+        return self._log(name).read_text()
+
+    def _log(self, name: str) -> Path:
+        return self.folder / f"{name.replace('/', '_')}.log"
+
+    def alive(self, name: str) -> bool:
+        return self.processes[name].poll() is None
+
+    def stop(self, name: str, how: signal.Signals = signal.SIGINT) -> int:
+        """End a node as a user would; its exit status."""
+        process = self.processes.pop(name)
+        process.send_signal(how)
+        try:
+            return process.wait(ANSWER_S)
+        finally:
+            process.kill()
+
+    def close(self) -> None:
+        for name in list(self.processes):
+            self.stop(name, signal.SIGKILL)
+        self.executor.shutdown()
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+    # Messages
+
+    def wait_for(self, true: Callable[[], bool], seconds: float = ANSWER_S, what: str = "") -> None:
+        """Let messages come in until something is true; an AssertionError with the logs if it does not become so."""
+        deadline = time.monotonic() + seconds
+        while not true():
+            assert time.monotonic() < deadline, f"waited {seconds} s for {what}\n{self._logs()}"
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def hear(self, kind: type, topic: str, profile: Any = None) -> None:
+        """Collect the messages of a topic in ``heard``."""
+        self.node.create_subscription(kind, topic, self.heard[topic].append, profile or qos.room(depth=1000))
+
+    def publish(self, topic: str, message: Any, listeners: int = 1) -> None:
+        """Publish once the nodes listen."""
+        if topic not in self.publishers:
+            reliable = qos.latched() if topic.endswith("labels") else qos.room()
+            self.publishers[topic] = self.node.create_publisher(type(message), topic, reliable)
+            publisher = self.publishers[topic]
+            enough = lambda: publisher.get_subscription_count() >= listeners  # noqa: E731
+            self.wait_for(enough, START_S, f"{listeners} listeners on {topic}")
+        self.publishers[topic].publish(message)
+
+    def answer(self, node: str, stamp_ns: int, topic: str = "finished") -> str:
+        """What became of a frame at a node: "published", or "dropped <reason>"."""
+        found: list[Header] = []
+
+        def there() -> bool:
+            found[:] = [m for m in self.heard[topic] if self._is_of(m, node, stamp_ns)]
+            return bool(found)
+
+        self.wait_for(there, what=f"{node} to finish {stamp_ns} ns")
+        return found[-1].frame_id.removeprefix(f"{node} ")
+
+    @staticmethod
+    def _is_of(message: Header, node: str, stamp_ns: int) -> bool:
+        return message.frame_id.startswith(f"{node} ") and from_msg.stamp_ns(message) == stamp_ns
+
+    def balance(self, name: str, received: int) -> Balance:
+        """The books of a node once it has told that it received so many."""
+        self.wait_for(
+            lambda: name in self.books and self.books[name].received == received and not self.books[name].waiting,
+            what=f"{name} to report {received} frames, got {self.books.get(name)}",
+        )
+        return self.books[name]
+
+    def _take_books(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            self.books[status.name.removesuffix(": frames")] = balance_of(status)
+
+    def _logs(self) -> str:
+        return "\n".join(f"--- {name}\n{self.log(name)}" for name in self.processes)

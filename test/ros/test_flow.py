@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames through three live nodes: whatever goes in comes out, or is dropped with a reason."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from geometry_msgs.msg import Vector3Stamped
+from sensor_msgs.msg import CameraInfo, PointCloud2
+from std_msgs.msg import Header
+from std_srvs.srv import SetBool, Trigger
+
+from objreg_ros.bridge import from_msg, qos
+
+from .graph import ANSWER_S, REPOSITORY, START_S, Graph
+from .moments import Moment, drawn, recorded
+
+pytestmark = pytest.mark.ros
+
+SHARED = Path(os.environ.get("OBJREG_SHARED", REPOSITORY.parent / "shared"))
+KITCHEN, COCO = SHARED / "data" / "redkitchen_a", SHARED / "models" / "ssd_mobilenet_v1_coco_int8.onnx"
+ROOMS = ("detector", "segmenter", "registrar")
+WIRE = {"objects": PointCloud2, "view": PointCloud2, "view/camera_info": CameraInfo, "gravity": Vector3Stamped}
+
+
+@pytest.fixture(scope="module")
+def moments() -> list[Moment]:
+    return recorded(KITCHEN, count=12, step=5) if KITCHEN.is_dir() and COCO.is_file() else list(drawn(12))
+
+
+@pytest.fixture(scope="module")
+def running(graph: Graph, tiny_model: Path) -> Graph:
+    """The three nodes, loss-free."""
+    model = COCO if KITCHEN.is_dir() and COCO.is_file() else tiny_model
+    graph.start("/detector", "detector", f"-p model:={model}", "-p threshold:=0.4", "-p reliable:=true")
+    graph.start("/segmenter", "segmenter", "-p reliable:=true")
+    graph.start("/registrar", "registrar", "-p reliable:=true")
+    graph.hear(Header, "finished")
+    for topic, kind in WIRE.items():
+        graph.hear(kind, topic)
+    graph.hear(PointCloud2, "detections_table")
+    return graph
+
+
+def feed(graph: Graph, moment: Moment) -> None:
+    for topic, message in moment.messages.items():
+        graph.publish(topic, message, listeners=2 if topic == "image" else 1)
+
+
+def call(graph: Graph, kind: type, name: str, **values: object) -> tuple[bool, str]:
+    client = graph.node.create_client(kind, name)
+    graph.wait_for(client.service_is_ready, START_S, name)
+    future = client.call_async(kind.Request(**values))
+    graph.wait_for(future.done, ANSWER_S, f"the answer of {name}")
+    return future.result().success, future.result().message
+
+
+def test_every_frame_passes_three_nodes_and_every_node_balances_its_books(
+    running: Graph, moments: list[Moment]
+) -> None:
+    for moment in moments:
+        feed(running, moment)
+        assert [running.answer(room, moment.stamp_ns) for room in ROOMS] == ["published"] * 3, running.log("/registrar")
+    for room in ROOMS:
+        books = running.balance(f"/{room}", received=len(moments))
+        assert (books.published, books.dropped, books.lost) == (len(moments), {}, 0), room
+    stamps = [moment.stamp_ns for moment in moments]
+    for topic in WIRE:
+        assert [from_msg.stamp_ns(message) for message in running.heard[topic]] == stamps, topic
+    assert sum(message.width for message in running.heard["objects"]) > 0
+
+
+def test_a_jump_back_in_time_goes_on_like_a_looped_bag(running: Graph, moments: list[Moment]) -> None:
+    before = len(running.heard["objects"])
+    for moment in moments[:3]:
+        running.heard["finished"].clear()
+        feed(running, moment)
+        assert [running.answer(room, moment.stamp_ns) for room in ROOMS] == ["published"] * 3
+    assert len(running.heard["objects"]) == before + 3
+
+
+def test_a_disabled_registrar_drops_its_frames_as_disabled_until_it_is_enabled(
+    running: Graph, moments: list[Moment]
+) -> None:
+    for on, expected in ((False, "dropped disabled"), (True, "published")):
+        assert call(running, SetBool, "registrar/enable", data=on)[0]
+        running.heard["finished"].clear()
+        feed(running, moments[3])
+        assert running.answer("registrar", moments[3].stamp_ns) == expected
+
+
+def test_the_registrar_saves_and_forgets_on_demand(running: Graph) -> None:
+    assert call(running, Trigger, "registrar/save")[0]
+    assert call(running, Trigger, "registrar/reset") == (True, "forgot every keyframe")
+
+
+def test_a_late_subscriber_still_gets_the_labels(running: Graph) -> None:
+    from std_msgs.msg import String
+
+    running.hear(String, "labels", qos.latched())
+    running.wait_for(lambda: bool(running.heard["labels"]), what="labels")
+    assert "cup" in from_msg.labels(running.heard["labels"][0]).values()
+
+
+def test_an_interrupt_ends_every_node_with_status_0(running: Graph) -> None:
+    assert {name: running.stop(name) for name in list(running.processes)} == {f"/{room}": 0 for room in ROOMS}

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Messages that no node may trust: each is dropped with its reason, said in the log, and the next good one passes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from sensor_msgs.msg import Image, PointCloud2
+from std_msgs.msg import Header
+
+from objreg_ros.bridge import to_msg
+from objreg_ros.data import Detections, PointCloud
+from objreg_ros.geometry import back_project
+
+from .graph import Graph
+from .moments import CAMERA, SECOND
+
+pytestmark = pytest.mark.ros
+
+STEP = SECOND // 10
+NAMES = {0: "cup"}
+
+
+@pytest.fixture(scope="module")
+def running(graph: Graph, tiny_model: Path) -> Graph:
+    """A detector, a segmenter of clouds, and one of depth images."""
+    graph.start("/detector", "detector", f"-p model:={tiny_model}", "-p reliable:=true")
+    graph.start("/clouds/segmenter", "segmenter", "-r __ns:=/clouds", "-p reliable:=true")
+    graph.start("/depths/segmenter", "segmenter", "-r __ns:=/depths", "-p reliable:=true", "-p colour:=false")
+    for topic in ("finished", "clouds/finished", "depths/finished"):
+        graph.hear(Header, topic)
+    return graph
+
+
+@pytest.fixture
+def stamp_ns(counter: list[int] = [SECOND]) -> int:  # noqa: B006  one clock for the module
+    counter[0] += 10 * STEP
+    return counter[0]
+
+
+def image(stamp_ns: int) -> Image:
+    """A good picture."""
+    return Image(header=to_msg.header(stamp_ns, "eye"), height=6, width=8, encoding="mono8", step=8, data=bytes(48))
+
+
+def table(stamp_ns: int) -> PointCloud2:
+    """Detections of one cup."""
+    box = np.array([[100, 70, 220, 170]], np.float32)
+    one = np.ones(1, np.float32)
+    seen = Detections(xyxy=box, score=one, label=("cup",), image_hw=(240, 320), stamp_ns=stamp_ns)
+    return to_msg.detections_table(seen, NAMES)
+
+
+def depths() -> np.ndarray:
+    depth = np.full((CAMERA.height, CAMERA.width), 1.2, np.float32)
+    depth[90:150, 120:200] -= 0.2
+    return depth
+
+
+def cloud(stamp_ns: int, xyz: np.ndarray | None = None) -> PointCloud2:
+    """A good cloud."""
+    points = back_project(depths(), CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy) if xyz is None else xyz
+    return to_msg.points(PointCloud(xyz=points.astype(np.float32), rgb=None, stamp_ns=stamp_ns, frame_id="eye"))
+
+
+def changed(message: Any, **values: Any) -> Any:
+    for name, value in values.items():
+        setattr(message, name, value)
+    return message
+
+
+def without_z(stamp_ns: int) -> PointCloud2:
+    message = cloud(stamp_ns)
+    message.fields = message.fields[:2]
+    return message
+
+
+IMAGES: dict[str, tuple[Callable[[int], Image], str]] = {
+    "an unknown encoding": (lambda t: changed(image(t), encoding="yuv9"), "got 'yuv9'"),
+    "an empty image": (lambda t: changed(image(t), height=0, width=0, step=0, data=b""), "expected pixels, got 0 × 0"),
+    "a truncated image": (lambda t: changed(image(t), data=bytes(40)), "expected 48 bytes for 8 × 6, got 40"),
+}
+
+CLOUDS: dict[str, tuple[Callable[[int], PointCloud2], str, str]] = {
+    "a truncated cloud": (lambda t: changed(cloud(t), data=bytes(1000)), "malformed_points", "got 1000; truncated?"),
+    "a missing field": (without_z, "malformed_points", "expected the fields x, y, z"),
+    "an empty cloud": (
+        lambda t: changed(cloud(t), height=0, width=0),
+        "malformed_points",
+        "expected points, got 0 × 0",
+    ),
+    "a NaN-only cloud": (lambda t: cloud(t, np.full((240, 320, 3), np.nan)), "refused", "cloud"),
+    "a 1 × N cloud without a camera": (lambda t: cloud(t, np.ones((1, 500, 3))), "refused", "camera_info"),
+}
+
+
+@pytest.mark.parametrize("case", IMAGES)
+def test_the_detector_drops_a_bad_image_and_goes_on(running: Graph, stamp_ns: int, case: str) -> None:
+    make, text = IMAGES[case]
+    running.publish("image", make(stamp_ns))
+    assert running.answer("detector", stamp_ns) == "dropped malformed_image"
+    running.publish("image", image(stamp_ns + STEP))
+    assert running.answer("detector", stamp_ns + STEP) == "published"
+    if case == "an unknown encoding":  # the first of its reason; the others are throttled
+        assert text in running.log("/detector")
+
+
+@pytest.mark.parametrize("case", CLOUDS)
+def test_the_segmenter_drops_a_bad_cloud_and_goes_on(running: Graph, stamp_ns: int, case: str) -> None:
+    make, reason, _ = CLOUDS[case]
+    running.publish("clouds/labels", to_msg.labels(NAMES))
+    for message, stamp, expected in (
+        (make(stamp_ns), stamp_ns, f"dropped {reason}"),
+        (cloud(stamp_ns + STEP), stamp_ns + STEP, "published"),
+    ):
+        running.publish("clouds/points", message)
+        running.publish("clouds/detections_table", table(stamp))
+        assert running.answer("segmenter", stamp, "clouds/finished") == expected, running.log("/clouds/segmenter")
+
+
+def test_the_log_says_what_was_expected_and_what_came(running: Graph) -> None:
+    log = running.log("/clouds/segmenter")
+    assert "frame dropped, malformed points: " in log and "frame dropped, refused: " in log
+    assert CLOUDS["a truncated cloud"][2] in log
+
+
+def test_the_segmenter_drops_bad_depth_and_detections_and_goes_on(running: Graph, stamp_ns: int) -> None:
+    def depth(stamp: int) -> Image:
+        return Image(
+            header=to_msg.header(stamp, "eye"), height=240, width=320, encoding="32FC1", step=1280,
+            data=to_msg._bytes(depths()),
+        )  # fmt: skip
+
+    running.publish("depths/labels", to_msg.labels(NAMES))
+    running.publish("depths/camera_info", to_msg.camera_info(CAMERA, stamp_ns, "eye"))
+    cases = (
+        (changed(depth(stamp_ns), encoding="bgr8"), table(stamp_ns), "dropped malformed_depth"),
+        (depth(stamp_ns + STEP), changed(table(stamp_ns + STEP), data=b"", width=1), "dropped malformed_detections"),
+        (depth(stamp_ns + 2 * STEP), table(stamp_ns + 2 * STEP), "published"),
+    )
+    for k, (picture, detections, expected) in enumerate(cases):
+        running.publish("depths/depth/image", picture)
+        running.publish("depths/detections_table", detections)
+        assert running.answer("segmenter", stamp_ns + k * STEP, "depths/finished") == expected
+
+
+def test_depth_without_detections_is_dropped_as_unmatched_once_newer_ones_came(running: Graph, stamp_ns: int) -> None:
+    running.publish("clouds/points", cloud(stamp_ns))
+    running.publish("clouds/points", cloud(stamp_ns + STEP))
+    running.publish("clouds/detections_table", table(stamp_ns + STEP))
+    assert running.answer("segmenter", stamp_ns, "clouds/finished") == "dropped unmatched"
+    assert running.answer("segmenter", stamp_ns + STEP, "clouds/finished") == "published"
+
+
+def test_every_node_is_still_there_and_its_books_balance(running: Graph) -> None:
+    for name in running.processes:
+        assert running.alive(name), running.log(name)
+    books = running.balance("/detector", received=2 * len(IMAGES))
+    assert books.published == len(IMAGES) and books.dropped == {"malformed_image": len(IMAGES)}
+    books = running.balance("/clouds/segmenter", received=2 * len(CLOUDS) + 2)
+    assert books.dropped == {"malformed_points": 3, "refused": 2, "unmatched": 1}
