@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The three nodes: ``ros2 launch objreg_ros objreg.launch.py image:=/kinect/rgb points:=/kinect/points``.
+
+Every argument is optional. No parameter's default is repeated here; what is not said is as in the code.
+"""
+
+import sys
+
+from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+from launch import LaunchContext, LaunchDescription
+from objreg_ros.bridge import profile
+
+ROOMS = ("detector", "segmenter", "registrar")
+
+TOPICS = {
+    "image": "colour image; its compressed form is looked for at <image>/compressed",
+    "points": "PointCloud2, organised or not",
+    "depth/image": "depth image, instead of points; its compressed form is at <depth/image>/compressedDepth",
+    "camera_info": "camera of the depth image",
+    "odom": "odometry of the camera's body",
+}
+COMPRESSED = {"image/compressed": "image", "depth/image/compressedDepth": "depth/image"}
+
+OPTIONS = {
+    "params_file": "YAML of parameters, in the form of config/objreg.yaml",
+    "namespace": "namespace of the nodes and of their topics",
+    "model": "ONNX model of the detector",
+    "use_sim_time": "true to follow /clock",
+    "reliable": "true to ask cameras for reliable delivery",
+}
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Arguments, a line about the transport, and the nodes."""
+    options = [DeclareLaunchArgument(name, default_value="", description=text) for name, text in OPTIONS.items()]
+    topics = [DeclareLaunchArgument(name, default_value=name, description=text) for name, text in TOPICS.items()]
+    return LaunchDescription([*options, *topics, LogInfo(msg=profile.apply()), OpaqueFunction(function=_nodes)])
+
+
+def _nodes(context: LaunchContext) -> list[Node]:
+    said = {name: LaunchConfiguration(name).perform(context) for name in (*OPTIONS, *TOPICS)}
+    return [
+        Node(
+            executable=sys.executable,
+            arguments=["-m", f"objreg_ros.{room}.node"],
+            name=room,
+            namespace=said["namespace"],
+            parameters=_parameters(room, said),
+            remappings=_remappings(said),
+            output="screen",
+        )
+        for room in ROOMS
+    ]
+
+
+def _parameters(room: str, said: dict[str, str]) -> list:
+    """The user's file, and over it what was said on the command line."""
+    values = {name: said[name].lower() == "true" for name in ("use_sim_time", "reliable") if said[name]}
+    if room == "detector" and said["model"]:
+        values["model"] = said["model"]
+    return [given for given in (said["params_file"], values) if given]
+
+
+def _remappings(said: dict[str, str]) -> list[tuple[str, str]]:
+    raw = {name: said[name] for name in TOPICS}
+    compressed = {name: f"{said[of]}/{name.rpartition('/')[2]}" for name, of in COMPRESSED.items()}
+    return [(name, topic) for name, topic in {**raw, **compressed}.items() if name != topic]
