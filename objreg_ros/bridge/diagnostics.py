@@ -12,6 +12,7 @@ from std_msgs.msg import Header
 from objreg_ros.bridge.ledger import Balance
 
 DROPPED = "dropped: "
+LOST = "lost in transport: "
 LATENCY = "latency "
 
 
@@ -45,7 +46,7 @@ def _counts(balance: Balance, rate_hz: float) -> dict[str, object]:
         "published": balance.published,
         "waiting": balance.waiting,
         **{f"{DROPPED}{reason}": count for reason, count in sorted(balance.dropped.items())},
-        "lost in transport": balance.lost,
+        **{f"{LOST}{topic}": count for topic, count in sorted(balance.lost.items())},
         "rate [Hz]": f"{rate_hz:.2f}",
         **latencies,
     }
@@ -59,10 +60,14 @@ def balance_of(status: DiagnosticStatus) -> Balance:
         received=int(values["received"]),
         published=int(values["published"]),
         waiting=int(values["waiting"]),
-        dropped={key.removeprefix(DROPPED): int(value) for key, value in values.items() if key.startswith(DROPPED)},
-        lost=int(values["lost in transport"]),
+        dropped=_counts_of(values, DROPPED),
+        lost=_counts_of(values, LOST),
         stage_ms={
             stage: (float(values[f"{LATENCY}{stage} p50 [ms]"]), float(values[f"{LATENCY}{stage} p95 [ms]"]))
             for stage in stages
         },
     )
+
+
+def _counts_of(values: Mapping[str, str], prefix: str) -> dict[str, int]:
+    return {key.removeprefix(prefix): int(value) for key, value in values.items() if key.startswith(prefix)}

@@ -11,7 +11,6 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
@@ -23,6 +22,7 @@ from objreg_ros.bridge import qos, to_msg
 from objreg_ros.bridge.diagnostics import diagnostic
 from objreg_ros.bridge.ledger import Ledger
 from objreg_ros.bridge.log import ThrottledLog
+from objreg_ros.bridge.missed import Missed
 from objreg_ros.bridge.parameters import Parameters
 from objreg_ros.bridge.params import DoorParams
 from objreg_ros.bridge.watch import Watch
@@ -53,7 +53,7 @@ class Door(Node):
         self.failure: Future = Future()
         self.throttled = ThrottledLog(self.get_logger().warning)
         self.watch = Watch(self.count_publishers, self.settings.of(DoorParams).silence)
-        self.worker: Worker[tuple[int, Any]] = Worker(self._work, self._overtaken, self.failure.set_exception)
+        self.worker: Worker[tuple[int, Any]] = Worker(self._work, self._overtaken, self.fail)
         self._finished = self.create_publisher(Header, "finished", qos.room(depth=1000))
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", qos.room())
         self._last = (time.monotonic(), 0)
@@ -82,12 +82,18 @@ class Door(Node):
     ) -> Subscription:
         """Subscribe; ``watched`` is the input of `expect` that this topic belongs to."""
 
-        def hear(message: Any) -> None:
+        missed = Missed()
+
+        def hear(message: Any, info: Mapping[str, Any]) -> None:
+            self._note_loss(topic, missed.before(info["publication_sequence_number"]))
             self.watch.hear(watched)
             heard(message)
 
-        events = SubscriptionEventCallbacks(message_lost=self._lose)
-        return self.create_subscription(kind, topic, hear, profile, event_callbacks=events)
+        return self.create_subscription(kind, topic, hear, profile)  # type: ignore[arg-type]  # takes both forms
+
+    def _note_loss(self, topic: str, count: int) -> None:
+        if count and self.count_publishers(self.resolve_topic_name(topic)) == 1:  # several count each for itself
+            self.ledger.lose(topic, count)
 
     def listen_to_first(
         self, name: str, topics: Mapping[str, type], heard: Callable[[str, Any], None], profile: QoSProfile
@@ -105,9 +111,6 @@ class Door(Node):
         for topic, kind in topics.items():
             opened[topic] = self.listen(kind, topic, partial(hear, topic), profile, watched=name)
         self.expect(name, *topics)
-
-    def _lose(self, event: Any) -> None:
-        self.ledger.lose(event.total_count_change)
 
     def expect(self, name: str, *topics: str) -> None:
         """Warn when none of ``topics`` speaks."""
@@ -170,7 +173,7 @@ class Door(Node):
     def _report(self) -> None:
         silent = self.watch.silent()
         for name, advice in silent.items():
-            self.throttled.warn(name, advice)
+            self.throttled.remind(name, advice)
         balance = self.ledger.balance()
         (then, before), now = self._last, time.monotonic()
         self._last = (now, balance.received)
@@ -189,6 +192,11 @@ class Door(Node):
     def set_parameters(self, parameter_list: Sequence[Parameter]) -> list[SetParametersResult]:
         """One by one, each as in `set_parameters_atomically`."""
         return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
+
+    def fail(self, error: BaseException) -> None:
+        """A worker met a bug: end the node with it. What fails because ROS is already down is not one."""
+        if self.context.ok():
+            self.failure.set_exception(error)
 
     def close(self) -> None:
         """End the worker and the node."""

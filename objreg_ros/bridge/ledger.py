@@ -27,7 +27,7 @@ class Balance:
     published: int
     waiting: int
     dropped: dict[str, int]
-    lost: int  # messages that the transport says it lost before they reached us
+    lost: dict[str, int]  # topic → messages that were sent and never reached us
     stage_ms: dict[str, tuple[float, float]] = field(default_factory=dict)  # stage → (p50, p95)
 
 
@@ -37,8 +37,9 @@ class Ledger:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._arrived: defaultdict[int, list[float]] = defaultdict(list)
-        self._received = self._published = self._lost = 0
+        self._received = self._published = 0
         self._dropped: Counter[str] = Counter()
+        self._lost: Counter[str] = Counter()
         self._stages: defaultdict[str, deque[float]] = defaultdict(lambda: deque(maxlen=RECENT))
 
     def receive(self, stamp_ns: int) -> None:
@@ -59,10 +60,10 @@ class Ledger:
             self._settle(stamp_ns)
             self._dropped[reason] += 1
 
-    def lose(self, count: int) -> None:
-        """The transport lost messages."""
+    def lose(self, topic: str, count: int) -> None:
+        """The transport lost messages of a topic."""
         with self._lock:
-            self._lost += count
+            self._lost[topic] += count
 
     def waits(self, stamp_ns: int) -> bool:
         """Whether a frame of this stamp is neither published nor dropped yet."""
@@ -91,7 +92,7 @@ class Ledger:
                 published=self._published,
                 waiting=waiting,
                 dropped=dict(self._dropped),
-                lost=self._lost,
+                lost=dict(self._lost),
                 stage_ms=stage_ms,
             )
 

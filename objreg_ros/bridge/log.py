@@ -24,10 +24,23 @@ class ThrottledLog:
     def warn(self, reason: str, text: str) -> None:
         """One more of ``reason``; ``text`` is what the log shows if it is time to say it."""
         with self._lock:
-            now = self._clock()
-            if now - self._said_at.get(reason, -float("inf")) < self._period_s:
+            due = self._due(reason)
+            silent = self._silent.pop(reason, 0) if due else 0
+            if not due:
                 self._silent[reason] = self._silent.get(reason, 0) + 1
-                return
-            self._said_at[reason] = now
-            silent = self._silent.pop(reason, 0)
-        self._write(f"{text} (and {silent} more since the last such line)" if silent else text)
+        if due:
+            self._write(f"{text} (and {silent} more since the last such line)" if silent else text)
+
+    def remind(self, reason: str, text: str) -> None:
+        """Something is still so; how often it was asked does not matter."""
+        with self._lock:
+            due = self._due(reason)
+        if due:
+            self._write(text)
+
+    def _due(self, reason: str) -> bool:
+        now = self._clock()
+        if now - self._said_at.get(reason, -float("inf")) < self._period_s:
+            return False
+        self._said_at[reason] = now
+        return True

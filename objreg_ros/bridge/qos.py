@@ -9,10 +9,10 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 def sensor(reliable: bool) -> QoSProfile:
     """What a camera sends. Best effort matches every publisher; reliable only reliable ones, and loses nothing.
 
-    Five messages deep: the newest wins in our own queue, where what it replaces is counted, and not inside DDS.
+    Ten messages deep: the newest wins in our own queue, where what it replaces is counted, and not inside DDS.
     """
     reliability = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
-    return QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=5, reliability=reliability)
+    return QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=10, reliability=reliability)
 
 
 def room(depth: int = 20) -> QoSProfile:

@@ -47,7 +47,7 @@ class RegistrarNode(MatchingDoor):
         self._counts = dict(self._registrar.counts())
         self._accepted, self._refused = 0, Counter[str]()
         self._scene, self._odom_frame = Scene(), "odom"
-        self.searcher: Worker[tuple[int, Stretch]] = Worker(self._search, self._overtaken, self.failure.set_exception)
+        self.searcher: Worker[tuple[int, Stretch]] = Worker(self._search, self._overtaken, self.fail)
         self._announce()
         self._serve()
         self._listen(round(inputs.odom_slop * 1e9))

@@ -16,7 +16,7 @@ BOOKS = Balance(
     published=6,
     waiting=1,
     dropped={"overtaken": 2, "malformed_image": 1},
-    lost=3,
+    lost={"image": 3},
     stage_ms={"detect": (8.25, 9.5), "total": (10.0, 20.0)},
 )
 

@@ -45,9 +45,9 @@ def test_drops_are_counted_by_reason_and_losses_apart() -> None:
     for stamp_ns, reason in enumerate(("overtaken", "malformed_image", "overtaken")):
         ledger.receive(stamp_ns)
         ledger.drop(stamp_ns, reason)
-    ledger.lose(4)
+    ledger.lose("image", 4)
     books = ledger.balance()
-    assert books.dropped == {"overtaken": 2, "malformed_image": 1} and books.lost == 4
+    assert books.dropped == {"overtaken": 2, "malformed_image": 1} and books.lost == {"image": 4}
 
 
 def test_percentiles_are_those_of_the_durations() -> None:

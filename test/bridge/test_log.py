@@ -21,6 +21,16 @@ def test_the_first_of_each_reason_is_said_at_once() -> None:
     assert lines == ["one", "two"]
 
 
+def test_a_reminder_comes_once_a_period_and_is_not_counted() -> None:
+    lines: list[str] = []
+    clock = Watch()
+    log = ThrottledLog(lines.append, period_s=5.0, clock=clock)
+    for _ in range(11):
+        log.remind("a", "still so")
+        clock.now += 1.0
+    assert lines == ["still so"] * 3
+
+
 def test_repetitions_are_silent_for_a_period_and_then_counted() -> None:
     lines: list[str] = []
     clock = Watch()
