@@ -120,7 +120,7 @@ def _of_one_material(vertices: Array, normals: Array, uv: Array, faces: Array, m
 
 
 # Each side of a box: outward normal, then the directions in which u and v of its picture grow as seen from outside.
-BOX_SIDES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int], tuple[int, int, int]]] = {
+BOX_SIDES = {
     "front": ((0, -1, 0), (1, 0, 0), (0, 0, -1)),
     "right": ((1, 0, 0), (0, 1, 0), (0, 0, -1)),
     "back": ((0, 1, 0), (-1, 0, 0), (0, 0, -1)),
@@ -128,6 +128,11 @@ BOX_SIDES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int], tuple[int
     "top": ((0, 0, 1), (1, 0, 0), (0, -1, 0)),
     "bottom": ((0, 0, -1), (1, 0, 0), (0, 1, 0)),
 }
+_AXES = np.array(list(BOX_SIDES.values()), float)
+_CORNERS = np.stack(
+    [_AXES[:, 0] + a * _AXES[:, 1] + b * _AXES[:, 2] for a, b in ((-1, -1), (-1, 1), (1, 1), (1, -1))], 1
+)
+_CORNER_UV = np.array([(0, 1), (0, 3), (2, 3), (2, 1)])  # where a corner's u and v stand in a Rect
 
 
 def box(
@@ -142,26 +147,31 @@ def box(
     ``atlas`` gives the part of the texture (u0, v0, u1, v1) of each side (else the whole texture); ``tile``
     metres per texture repeats the texture instead. ``taper`` draws the top in by that share.
     """
-    half = np.asarray(size, float) / 2
-    parts = []
-    for side, (normal, right, down) in BOX_SIDES.items():
-        n, u, v = (np.asarray(axis, float) for axis in (normal, right, down))
-        corners = np.array([(n - u - v), (n - u + v), (n + u + v), (n + u - v)]) * half
-        corners[:, :2] *= np.where(corners[:, 2:] > 0, 1.0 - taper, 1.0)
-        width, height = 2 * abs(u @ half), 2 * abs(v @ half)
-        u0, v0, u1, v1 = (0.0, 0.0, width / tile, height / tile) if tile else (atlas or {}).get(side, UNIT)
-        uv = np.array([(u0, v0), (u0, v1), (u1, v1), (u1, v0)])
-        face_normal = np.cross(corners[2] - corners[0], corners[3] - corners[1])
-        parts.append(
-            _of_one_material(
-                corners + np.array([0, 0, half[2]]),
-                np.tile(face_normal, (4, 1)),
-                uv,
-                np.array([[0, 1, 2], [0, 2, 3]]),
-                material,
-            )
-        )
-    return merge(parts)
+    extent = np.asarray(size, float)
+    if tile:
+        spans = np.abs(_AXES[:, 1:] @ extent) / tile
+        rects = np.concatenate([np.zeros((6, 2)), spans], axis=1)
+    else:
+        rects = np.array([(atlas or {}).get(side, UNIT) for side in BOX_SIDES])
+    return boxes(extent[None], np.zeros((1, 3)), rects[None], material, taper)
+
+
+def boxes(sizes: Array, feet: Array, rects: Array, material: Material, taper: float = 0.0) -> Mesh:
+    """Many boxes at once: ``sizes (N, 3)``, the middle of each one's foot ``feet (N, 3)``, ``rects (N, S, 4)``.
+
+    Only the first S of `BOX_SIDES` are made.
+    """
+    sides = rects.shape[1]
+    corners = _CORNERS[None, :sides] * (sizes / 2)[:, None, None]
+    corners[..., :2] *= np.where(_CORNERS[:sides, :, 2:] > 0, 1.0 - taper, 1.0)
+    a, b = corners[:, :, 2] - corners[:, :, 0], corners[:, :, 3] - corners[:, :, 1]
+    corners += (feet + sizes * [0.0, 0.0, 0.5])[:, None, None]
+    normals = np.repeat(np.cross(a, b)[:, :, None], 4, axis=2)
+    faces = 4 * np.arange(len(sizes) * sides)[:, None, None] + np.array([[0, 1, 2], [0, 2, 3]])
+    uv = rects[:, :, _CORNER_UV]
+    return _of_one_material(
+        corners.reshape(-1, 3), normals.reshape(-1, 3), uv.reshape(-1, 2), faces.reshape(-1, 3), material
+    )
 
 
 def sheet(points: Array, material: Material, uv: Rect = UNIT, closed: bool = False) -> Mesh:

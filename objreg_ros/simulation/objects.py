@@ -15,7 +15,7 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.simulation import print_design, texture
 from objreg_ros.simulation.chair import chair
-from objreg_ros.simulation.mesh import Material, Mesh, box, cushion, disc, merge, revolve, sheet, tube
+from objreg_ros.simulation.mesh import Material, Mesh, box, boxes, cushion, disc, merge, revolve, sheet, tube
 from objreg_ros.simulation.model import ObjectModel, Symmetry, half_turns, revolution, turn
 
 Random = np.random.Generator
@@ -238,8 +238,7 @@ def keyboard(rng: Random) -> ObjectModel:
     key_colour = body_colour if same else texture.grey(rng, 0.03, 0.98)
     legends = Material(_legends(rng, key_colour), specular=0.06, gloss=4)
     body = box(size, _plastic(rng, body_colour))
-    keys = [_key(rng, place, pitch, deck, size, margin, legends) for place in _key_places(rows, columns)]
-    mesh = merge([body, *keys])
+    mesh = merge([body, _keys(_key_places(rows, columns), pitch, size, margin, legends)])
     slope = rng.uniform(0, 0.14)
     lift = (mesh.vertices[:, 1:2] + size[1] / 2) * slope * (mesh.vertices[:, 2:] > 1e-4)
     mesh.vertices[:, 2:] += lift
@@ -263,35 +262,16 @@ def _key_places(rows: int, columns: float) -> list[tuple[float, int, float]]:
     return places
 
 
-def _key(
-    rng: Random,
-    place: tuple[float, int, float],
-    pitch: float,
-    deck: float,
-    size: Array,
-    margin: float,
-    legends: Material,
-) -> Mesh:
-    left, row, wide = place
+def _keys(places: list[tuple[float, int, float]], pitch: float, size: Array, margin: float, legends: Material) -> Mesh:
+    """All keys on a deck of ``size``: each a frustum without a bottom, with one of 16 x 16 legends on top."""
+    left, row, wide = np.array(places).T
+    sizes = np.stack([(wide - 0.14) * pitch, np.full_like(wide, 0.86 * pitch), np.full_like(wide, 0.004)], -1)
     x = -size[0] / 2 + margin + (left + wide / 2) * pitch
     y = -size[1] / 2 + margin + (row + 0.5) * pitch
-    u, v = (int(left * 2.7) % 16) / 16, (row * 3 + int(left) // 5) % 16 / 16
-    blank, legend = (0.01, 0.01, 0.03, 0.03), (u, v, u + 1 / 16, v + 1 / 16)
-    atlas = dict.fromkeys(("front", "right", "back", "left", "bottom"), blank) | {"top": legend}
-    mesh = box(((wide - 0.14) * pitch, 0.86 * pitch, 0.004), legends, atlas, taper=0.12)
-    return _without_bottom(mesh).moved(x, y, deck)
-
-
-def _without_bottom(mesh: Mesh) -> Mesh:
-    """A box without the side that nobody sees."""
-    return Mesh(
-        vertices=mesh.vertices[:-4],
-        normals=mesh.normals[:-4],
-        uv=mesh.uv[:-4],
-        faces=mesh.faces[:-2],
-        material=mesh.material[:-2],
-        materials=mesh.materials,
-    )
+    u, v = (left * 2.7 // 1 % 16) / 16, ((row * 3 + left // 5) % 16) / 16
+    blank = np.broadcast_to([0.01, 0.01, 0.03, 0.03], (len(places), 4, 4))
+    rects = np.concatenate([blank, np.stack([u, v, u + 1 / 16, v + 1 / 16], -1)[:, None]], axis=1)
+    return boxes(sizes, np.stack([x, y, np.full_like(x, size[2])], -1), rects, legends, taper=0.12)
 
 
 def _legends(rng: Random, key: texture.Colour, size: int = 256) -> Array:

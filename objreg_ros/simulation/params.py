@@ -50,15 +50,16 @@ class StressParams(Params):
     depth_bias: float = param(0.0, "depth is scaled by 1 plus this", ge=-0.2, le=0.2)
     warp: float = param(0.0, "low-frequency depth error at 1 m; grows with the square of distance", "m", ge=0.0, le=0.1)
     ragged: float = param(0.0, "added jitter of depth edges", "px", ge=0.0, le=8.0)
+    occluders: int = param(0, "things added to every table, close to what stands there", ge=0, le=30)
     motion_blur: float = param(0.0, "length of the colour image's motion blur", "px", ge=0.0, le=64.0)
 
 
 @dataclass(frozen=True)
 class OdometryParams(Params):
-    """How odometry drifts: random walks that have these standard deviations after a distance."""
+    """How odometry drifts; the model stands in `objreg_ros.simulation.odometry`."""
 
     distance_drift: float = param(0.02, "drift of position, share of the distance moved", ge=0.0, le=1.0)
     turn_drift: float = param(1.0, "drift of heading per metre moved", "deg/m", ge=0.0, le=90.0)
-    tilt_drift: float = param(
-        0.1, "drift of roll and pitch per metre moved; gravity is observed, so it is small", "deg/m", ge=0
+    tilt_error: float = param(
+        0.3, "error of roll and pitch; it does not grow, gravity is observed", "deg", ge=0.0, le=45.0
     )

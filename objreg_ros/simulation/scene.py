@@ -100,30 +100,43 @@ def place_on(model: ObjectModel, T_world_surface: Array, x: float, y: float, yaw
 
 
 def spread(
-    rng: Random, models: Sequence[ObjectModel], board: Board, gap: float = 0.01
+    rng: Random, models: Sequence[ObjectModel], board: Board, gap: float = 0.01, beside: int = 0
 ) -> list[tuple[ObjectModel, Array]]:
     """Lay models on a board at random without overlap: each with its pose in the board's furniture frame.
 
-    What finds no room after some trials is left out.
+    The last ``beside`` of them go close to those before. What finds no room after some trials is left out.
     """
     x0, y0, height, half_x, half_y = board
     laid: list[tuple[ObjectModel, Array]] = []
     taken: list[tuple[float, float, float]] = []
     surface = pose(np.eye(3), np.array([x0, y0, height]))
-    for model in models:
+    for k, model in enumerate(models):
         rest = int(rng.integers(1, len(model.rests) + 1)) if model.rests and rng.random() < 0.2 else 0
         radius = _footprint(model, rest)
-        if model.size[2] > 2.0 or radius > 1.3 * max(half_x, half_y):
+        room = (max(half_x - 0.7 * radius, 0.0), max(half_y - 0.7 * radius, 0.0))
+        close = taken if k >= len(models) - beside else []
+        if radius > 1.3 * max(half_x, half_y):
             continue
         for _ in range(12):
-            room_x, room_y = max(half_x - 0.7 * radius, 0.0), max(half_y - 0.7 * radius, 0.0)
-            x, y = rng.uniform(-room_x, room_x), rng.uniform(-room_y, room_y)
+            x, y = _spot(rng, room, radius, close)
             if all(np.hypot(x - a, y - b) > radius + r + gap for a, b, r in taken):
                 yaw = rng.uniform(0, 2 * np.pi) if rng.random() < 0.7 else rng.normal(0, 0.3)
                 laid.append((model, place_on(model, surface, x, y, yaw, rest)))
                 taken.append((x, y, radius))
                 break
     return laid
+
+
+def _spot(
+    rng: Random, room: tuple[float, float], radius: float, close: Sequence[tuple[float, float, float]]
+) -> tuple[float, float]:
+    """A spot within the half widths ``room``; where there are any, beside one of ``close`` (x, y, radius)."""
+    if not close:
+        return float(rng.uniform(-room[0], room[0])), float(rng.uniform(-room[1], room[1]))
+    a, b, r = close[int(rng.integers(len(close)))]
+    angle, reach = rng.uniform(0, 2 * np.pi), r + radius + 0.03
+    x, y = a + reach * np.cos(angle), b + reach * np.sin(angle)
+    return float(np.clip(x, -room[0], room[0])), float(np.clip(y, -room[1], room[1]))
 
 
 def _footprint(model: ObjectModel, rest: int) -> float:

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""objreg simulate: make a recording with ground truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+from tqdm import tqdm
+
+from objreg_ros.data import Intrinsics
+from objreg_ros.params import Params
+from objreg_ros.simulation.camera import CAMERAS
+from objreg_ros.simulation.params import ColourParams, DepthParams, OdometryParams, StressParams
+from objreg_ros.simulation.scenarios import SCENARIOS
+from objreg_ros.simulation.write import Sensors
+from objreg_ros.simulation.write import simulate as write_recording
+
+SECTIONS: dict[str, type[Params]] = {
+    "depth": DepthParams,
+    "colour": ColourParams,
+    "stress": StressParams,
+    "odometry": OdometryParams,
+}
+HARD = {"depth_bias": 0.005, "warp": 0.003, "ragged": 0.9, "motion_blur": 4.0, "occluders": 5}
+
+
+def _list(context: click.Context, _: click.Parameter, wanted: bool) -> None:
+    if wanted:
+        click.echo(parameter_table())
+        context.exit()
+
+
+@click.command()
+@click.argument("out", type=click.Path(path_type=Path))
+@click.option("--scenario", type=click.Choice(list(SCENARIOS)), default="loop", show_default=True, help="What happens.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Fixes everything.")
+@click.option("--frames", type=click.IntRange(2), default=600, show_default=True, help="Number of image pairs.")
+@click.option("--rate", type=click.FloatRange(1.0, 240.0), default=30.0, show_default=True, help="Frames per second.")
+@click.option("--intrinsics", default="kinect", show_default=True, help=f"{', '.join(CAMERAS)}, or fx,fy,cx,cy.")
+@click.option("--size", help="WIDTHxHEIGHT in pixels; a named camera is scaled to it.")
+@click.option("--points", is_flag=True, help="Also write an organised PointCloud2 (9.8 MB a frame at 640x480).")
+@click.option("--jpeg", is_flag=True, help="Write image/compressed (jpeg) instead of image.")
+@click.option("--stress", is_flag=True, help="Bias, warp and rag the depth, blur the colour, crowd the tables.")
+@click.option("--set", "settings", multiple=True, metavar="SECTION.NAME=VALUE", help="See --list.")
+@click.option("--list", is_flag=True, is_eager=True, expose_value=False, callback=_list, help="List the parameters.")
+def simulate(
+    out: Path,
+    scenario: str,
+    seed: int,
+    frames: int,
+    rate: float,
+    intrinsics: str,
+    size: str | None,
+    points: bool,
+    jpeg: bool,
+    stress: bool,
+    settings: tuple[str, ...],
+) -> None:
+    """Simulate a Kinect that is carried through a room, and write OUT, a rosbag2 folder (mcap) with OUT/truth in it."""
+    try:
+        sensors = sensors_of(camera_of(intrinsics, size), stress, settings)
+        with tqdm(total=frames, unit="frame", desc=scenario, disable=None) as bar:
+            story = write_recording(
+                out, scenario, seed, frames, rate, sensors, points, jpeg, progress=lambda n: bar.update(n - bar.n)
+            )
+    except (ValueError, FileExistsError) as error:
+        raise click.ClickException(str(error)) from error
+    click.echo(f"{out}: {scenario}, seed {seed}, {frames} frames at {story.rate:.1f} Hz, truth in {out / 'truth'}")
+    if story.rate < rate - 1e-6:
+        click.echo(f"note: {frames} frames are few for this way, so they are {story.rate:.1f} Hz apart, not {rate:g}")
+
+
+def camera_of(name: str, size: str | None) -> Intrinsics:
+    """The camera of a name or of four numbers, scaled to ``size`` if it is given; ValueError says what is expected."""
+    width, height = _size_of(size) if size else (0, 0)
+    if name in CAMERAS:
+        camera = CAMERAS[name]
+        return _scaled(camera, width, height) if size else camera
+    try:
+        fx, fy, cx, cy = (float(part) for part in name.split(","))
+    except ValueError:
+        raise ValueError(f"intrinsics: expected {', '.join(CAMERAS)} or fx,fy,cx,cy in pixels, got {name!r}") from None
+    if not size:
+        width, height = round(2 * cx + 1), round(2 * cy + 1)
+    return Intrinsics(fx=fx, fy=fy, cx=cx, cy=cy, width=width, height=height)
+
+
+def _size_of(size: str) -> tuple[int, int]:
+    parts = size.lower().split("x")
+    if len(parts) != 2 or not all(part.isdigit() and 16 <= int(part) <= 4096 for part in parts):
+        raise ValueError(f"size: expected WIDTHxHEIGHT, each 16 to 4096 px, got {size!r}")
+    return int(parts[0]), int(parts[1])
+
+
+def _scaled(camera: Intrinsics, width: int, height: int) -> Intrinsics:
+    """The camera with as wide a view in another resolution."""
+    x, y = width / camera.width, height / camera.height
+    cx, cy = (camera.cx + 0.5) * x - 0.5, (camera.cy + 0.5) * y - 0.5
+    return Intrinsics(fx=camera.fx * x, fy=camera.fy * y, cx=cx, cy=cy, width=width, height=height)
+
+
+def sensors_of(camera: Intrinsics, stress: bool, settings: tuple[str, ...]) -> Sensors:
+    """The sensors with every ``section.name=value`` applied; ValueError for one that there is not or out of range."""
+    values: dict[str, dict[str, object]] = {section: {} for section in SECTIONS}
+    values["stress"].update(HARD if stress else {})
+    for setting in settings:
+        key, _, text = setting.partition("=")
+        section, _, name = key.partition(".")
+        if section not in SECTIONS or not text:
+            raise ValueError(
+                f"set: expected SECTION.NAME=VALUE with a section of {', '.join(SECTIONS)}, got {setting!r}"
+            )
+        values[section][name] = _parsed(SECTIONS[section], name, text)
+    made = {section: SECTIONS[section].from_mapping(chosen) for section, chosen in values.items()}
+    return Sensors(camera, **made)  # type: ignore[arg-type]
+
+
+def _parsed(section: type[Params], name: str, text: str) -> object:
+    """A value from text as its parameter wants it; left as text where that fails, for the parameter to refuse."""
+    declaration = next((d for d in section.declarations() if d.name == name), None)
+    if declaration is None:
+        return text
+    try:
+        if declaration.many:
+            return tuple(declaration.kind(part) for part in text.split(","))
+        return declaration.kind(text)
+    except ValueError:
+        return text
+
+
+def parameter_table() -> str:
+    """One line for every parameter: name, default, unit, range, meaning."""
+    lines = []
+    for section, kind in SECTIONS.items():
+        for d in kind.declarations():
+            about = " ".join(part for part in (f"[{d.unit}]" if d.unit else "", d.range_text) if part)
+            lines.append(f"{section}.{d.name} = {d.default}  {about}\n    {d.doc}")
+    return "\n".join(lines)

@@ -1,0 +1,278 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Stories for recordings: a furnished room with several places, and how a camera is carried through it.
+
+| scenario | what happens |
+| --- | --- |
+| `orbit` | once around a table and a little further |
+| `loop` | a table, then another place out of sight of it, then the table again from a little aside |
+| `opposite` | the same, but the table is seen again from its other side |
+| `look-alikes` | two tables alike with things of the same classes on them: first one, then the other, then the first |
+| `moved` | like `loop`, but the things on the table were rearranged while nobody looked |
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.geometry import transform
+from objreg_ros.simulation import distractors, furniture
+from objreg_ros.simulation.furniture import Furniture
+from objreg_ros.simulation.model import ObjectModel, turn
+from objreg_ros.simulation.objects import make_object
+from objreg_ros.simulation.scene import Place, Placed, Scene, furnished, number, place_on, spread
+from objreg_ros.simulation.trajectory import Hand, Waypoint, around, carried
+
+Random = np.random.Generator
+Laid = list[tuple[ObjectModel, Array]]
+
+ROOM_HALF = (4.4, 3.2)
+TABLE_CLASSES = ("cereal_box", "soda_can", "bowl", "book", "cap", "flashlight", "keyboard", "monitor")
+HALF_WIDTH_OF_TABLES = 0.8
+OCCLUDERS = ("mug", "bottle", "carton", "vase", "tin", "plant", "ball")
+Plot = tuple[tuple[Scene, ...], list[Waypoint], float]
+"""The scenes, the camera's way, and the share of the way after which the second scene takes over."""
+
+
+@dataclass(frozen=True, eq=False)
+class Story:
+    """``scenes``; for every frame the number of its scene and its pose ``T_world_camera (N, 4, 4)``; the rate in Hz."""
+
+    scenes: tuple[Scene, ...]
+    scene_of: Array
+    T_world_camera: Array
+    rate: float
+
+    def __len__(self) -> int:
+        return len(self.T_world_camera)
+
+
+@dataclass(frozen=True, eq=False)
+class _Setting:
+    """A room with its places: the tables' poses, what lies on each, and everything else that stands about."""
+
+    scene: Scene
+    tables: tuple[tuple[Furniture, Array], ...]
+    on_table: tuple[Laid, ...]
+    others: Laid
+
+    def scene_with(self, on_table: tuple[Laid, ...]) -> Scene:
+        return self.scene.with_objects(number([*(item for laid in on_table for item in laid), *self.others]))
+
+    def centre(self, k: int) -> Array:
+        """The middle of table ``k``, just above its top."""
+        piece, T = self.tables[k]
+        return transform(T, np.array([0.0, 0.0, piece.boards[0][2] + 0.08]))
+
+
+def _table_with(rng: Random, piece: Furniture, T: Array, models: list[ObjectModel], occluders: int) -> Laid:
+    """Models at random on a table, and small things close beside them."""
+    kinds = rng.choice(OCCLUDERS, occluders)
+    more = [distractors.make_distractor(str(kind), int(rng.integers(2**31))) for kind in kinds]
+    return [(model, T @ P) for model, P in spread(rng, [*models, *more], piece.boards[0], 0.02, beside=occluders)]
+
+
+def _things(rng: Random, count: int, extra: int) -> list[ObjectModel]:
+    """``count`` objects of different classes where possible, and ``extra`` distractors; the large ones first."""
+    labels = [*rng.permutation(TABLE_CLASSES), *rng.choice(TABLE_CLASSES, max(0, count - len(TABLE_CLASSES)))][:count]
+    models = [make_object(str(label), int(rng.integers(2**31))) for label in labels]
+    kinds = rng.choice(list(distractors.FAMILIES), extra)
+    models += [distractors.make_distractor(str(kind), int(rng.integers(2**31))) for kind in kinds]
+    return sorted(models, key=lambda model: -model.radius)
+
+
+def _chairs_at(rng: Random, piece: Furniture, T: Array, count: int) -> Laid:
+    """Chairs at the long sides of a table, turned to it."""
+    _, half_y = piece.boards[0][3:]
+    laid: Laid = []
+    for side in rng.permutation([-1, 1])[:count]:
+        model = make_object("chair", int(rng.integers(2**31)))
+        yaw = (0.0 if side > 0 else np.pi) + rng.normal(0, 0.25)
+        local = place_on(model, np.eye(4), rng.uniform(-0.35, 0.35), side * (half_y + rng.uniform(0.2, 0.4)), yaw)
+        laid.append((model, T @ local))
+    return laid
+
+
+def _setting(rng: Random, occluders: int, alike: bool = False) -> _Setting:
+    """A room with two tables far apart, furniture along the walls, chairs, and things on everything."""
+    room = furniture.room(rng, ROOM_HALF)
+    tables = _two_tables(rng, alike)
+    walls = _along_the_walls(rng)
+    models = _things(rng, int(rng.integers(5, 8)), int(rng.integers(1, 4)))
+    second = _look_alikes(rng, models) if alike else _things(rng, int(rng.integers(4, 8)), int(rng.integers(1, 4)))
+    both = zip(tables, (models, second), strict=True)
+    laid = tuple(_table_with(rng, piece, T, m, occluders) for (piece, T), m in both)
+    others = [item for piece, T in tables for item in _chairs_at(rng, piece, T, int(rng.integers(1, 3)))]
+    for piece, T in walls:
+        for board in piece.boards[:4]:
+            others += [(m, T @ P) for m, P in spread(rng, _things(rng, 3, 2), board)]
+    scene = furnished(rng, [*tables, *walls], room, lamp_count=3)
+    return _Setting(replace(scene, places=_places(tables)), tables, laid, others)
+
+
+def _two_tables(rng: Random, alike: bool) -> tuple[tuple[Furniture, Array], ...]:
+    """A table on the left and one on the right of the room; the same piece twice if they are ``alike``."""
+    size = (float(rng.uniform(1.2, 2 * HALF_WIDTH_OF_TABLES)), float(rng.uniform(0.7, 0.9)))
+    first = furniture.table(rng, size)
+    second = first if alike else furniture.table(rng, (1.3, 0.75))
+    out = []
+    for piece, side in ((first, -1.0), (second, 1.0)):
+        T = turn("z", float(rng.normal(0, 12)) + (90.0 if alike and side > 0 else 0.0))
+        T[:2, 3] = [side * rng.uniform(1.9, 2.2), rng.uniform(-0.4, 0.4)]
+        out.append((piece, T))
+    return tuple(out)
+
+
+def _look_alikes(rng: Random, models: list[ObjectModel]) -> list[ObjectModel]:
+    """Objects of the same classes: every third the very same model, the others another instance of its class."""
+    out = []
+    for k, model in enumerate(models):
+        kind = model.label
+        seed = int(rng.integers(2**31))
+        if k % 3 == 0:
+            out.append(model)
+        elif kind in distractors.FAMILIES:
+            out.append(distractors.make_distractor(kind, seed))
+        else:
+            out.append(make_object(kind, seed))
+    return out
+
+
+def _along_the_walls(rng: Random) -> list[tuple[Furniture, Array]]:
+    """Shelves and cupboards against the walls, their backs to them."""
+    x, y = ROOM_HALF
+    spots = [(0, -2.6, y), (0, 0.2, y), (0, 2.8, y), (180, -2.4, y), (180, 2.2, y), (90, 0.0, x), (270, 0.3, x)]
+    kinds = (furniture.shelf, furniture.cupboard, furniture.sofa)
+    out = []
+    for degrees, along, reach in spots:
+        if rng.random() < 0.25:
+            continue
+        piece = kinds[int(rng.choice(3, p=[0.5, 0.35, 0.15]))](rng)
+        T = turn("z", degrees)
+        T[:3, 3] = T[:3, :3] @ [along, reach - float(piece.mesh.bounds[1, 1]) - 0.02, 0.0]
+        out.append((piece, T))
+    return out
+
+
+def _places(tables: tuple[tuple[Furniture, Array], ...]) -> tuple[Place, ...]:
+    return tuple(Place(transform(T, np.array([0, 0, p.boards[0][2] + 0.08])), p.boards[0][3]) for p, T in tables)
+
+
+@dataclass(frozen=True)
+class _Look:
+    """How a table is looked at: from which azimuths in degrees, how far and how high above its top in metres."""
+
+    start: float
+    stop: float
+    radius: float
+    height: float
+
+    @classmethod
+    def at_random(cls, rng: Random, start: float, sweep: float) -> _Look:
+        return cls(start, start + sweep, float(rng.uniform(1.05, 1.3)), float(rng.uniform(0.5, 0.75)))
+
+    def waypoints(self, centre: Array) -> list[Waypoint]:
+        return around(centre, self.radius, self.height, self.start, self.stop)
+
+
+def _there_and_back(setting: _Setting, first: _Look, away: _Look, again: _Look) -> list[Waypoint]:
+    a, b = setting.centre(0), setting.centre(1)
+    visits = [first.waypoints(a), away.waypoints(b), again.waypoints(a)]
+    ways = [_between(before[-1], after[0]) for before, after in pairwise(visits)]
+    return [*visits[0], *ways[0], *visits[1], *ways[1], *visits[2]]
+
+
+def _between(before: Waypoint, after: Waypoint) -> list[Waypoint]:
+    """On the way from one place to another the camera is held level and pans along the walls."""
+    out = []
+    start, stop = before.target - before.eye, after.target - after.eye
+    turned = np.unwrap([np.arctan2(start[1], start[0]), np.arctan2(stop[1], stop[0])])
+    for f in (0.3, 0.7):
+        eye = (1 - f) * before.eye + f * after.eye
+        azimuth = (1 - f) * turned[0] + f * turned[1]
+        out.append(Waypoint(eye, eye + np.array([np.cos(azimuth), np.sin(azimuth), -0.2])))
+    return out
+
+
+def _facing(setting: _Setting, k: int) -> float:
+    """The azimuth in degrees from which table ``k`` is seen with one's back to the other table."""
+    towards = setting.centre(1 - k) - setting.centre(k)
+    return float(np.degrees(np.arctan2(towards[1], towards[0])))
+
+
+def _visits(rng: Random, setting: _Setting, aside: float) -> list[Waypoint]:
+    """A look at the first table, one at the second, and one at the first again, ``aside`` degrees further around."""
+    sign = float(rng.choice([-1, 1]))
+    front = _facing(setting, 0)
+    first = _Look.at_random(rng, front - sign * 70, sign * 40)
+    away = _Look.at_random(rng, _facing(setting, 1) + sign * 30, -sign * 40)
+    again = _Look.at_random(rng, front - sign * 50 + sign * aside, -sign * 25)
+    return _there_and_back(setting, first, away, again)
+
+
+def _orbit(rng: Random, occluders: int) -> Plot:
+    setting = _setting(rng, occluders)
+    start = float(rng.uniform(0, 360))
+    look = _Look.at_random(rng, start, float(rng.choice([-1, 1])) * 385)
+    way = around(setting.centre(0), look.radius, look.height, look.start, look.stop, count=40)
+    return (setting.scene_with(setting.on_table),), way, 1.0
+
+
+def _loop(rng: Random, occluders: int) -> Plot:
+    setting = _setting(rng, occluders)
+    return (setting.scene_with(setting.on_table),), _visits(rng, setting, float(rng.uniform(15, 35))), 1.0
+
+
+def _opposite(rng: Random, occluders: int) -> Plot:
+    setting = _setting(rng, occluders)
+    return (setting.scene_with(setting.on_table),), _visits(rng, setting, float(rng.uniform(150, 180))), 1.0
+
+
+def _alike(rng: Random, occluders: int) -> Plot:
+    setting = _setting(rng, occluders, alike=True)
+    return (setting.scene_with(setting.on_table),), _visits(rng, setting, float(rng.uniform(15, 35))), 1.0
+
+
+def _moved(rng: Random, occluders: int) -> Plot:
+    setting = _setting(rng, occluders)
+    way = _visits(rng, setting, float(rng.uniform(15, 35)))
+    piece, T = setting.tables[0]
+    again = _table_with(rng, piece, T, [model for model, _ in setting.on_table[0]], 0)
+    before = setting.scene_with(setting.on_table)
+    return (before, _same_numbers(before, setting.scene_with((again, *setting.on_table[1:])))), way, 0.5
+
+
+def _same_numbers(before: Scene, after: Scene) -> Scene:
+    """The scene with every model's instance number of ``before``: rearranged things keep their numbers."""
+    numbers = {id(o.model): o.instance for o in before.objects}
+    return after.with_objects([Placed(numbers[id(o.model)], o.model, o.T_world_object) for o in after.objects])
+
+
+SCENARIOS: dict[str, Callable[[Random, int], Plot]] = {
+    "orbit": _orbit,
+    "loop": _loop,
+    "opposite": _opposite,
+    "look-alikes": _alike,
+    "moved": _moved,
+}
+
+
+def make_story(
+    scenario: str, seed: int, frames: int = 600, rate: float = 30.0, occluders: int = 0, hand: Hand | None = None
+) -> Story:
+    """The story of a scenario; everything follows from its arguments. ValueError if there is no such scenario.
+
+    ``occluders`` are things added to every table. ``rate`` in Hz comes down
+    where so few frames would make the camera faster than a hand moves it.
+    """
+    if scenario not in SCENARIOS:
+        raise ValueError(f"expected one of {', '.join(SCENARIOS)}, got {scenario!r}")
+    rng = np.random.default_rng([seed, 31, list(SCENARIOS).index(scenario)])
+    scenes, waypoints, change = SCENARIOS[scenario](rng, occluders)
+    poses, rate = carried(waypoints, frames, rate, rng, hand or Hand())
+    scene_of = (np.arange(frames) >= change * frames).astype(int) if len(scenes) > 1 else np.zeros(frames, int)
+    return Story(scenes, scene_of, poses, rate)

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Writes a story as an ordinary rosbag2 recording (mcap), with its truth beside it.
+
+| topic | type | what |
+| --- | --- | --- |
+| `/image` (`/image/compressed`) | sensor_msgs/Image rgb8 (CompressedImage, jpeg) | colour |
+| `/depth/image` | sensor_msgs/Image 16UC1 | depth in mm, registered to colour, 0 where there is none |
+| `/camera_info` | sensor_msgs/CameraInfo | the camera of both |
+| `/points` (optional) | sensor_msgs/PointCloud2 | organised x y z rgb, NaN where there is no depth |
+| `/odom` | nav_msgs/Odometry | drifting pose of `camera` in `odom` |
+| `/ground_truth` | geometry_msgs/PoseStamped | true pose of the camera in `world` |
+
+The folder also gets `truth/`, see `objreg_ros.simulation.truth`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from objreg_ros.data import Array, Intrinsics
+from objreg_ros.geometry import back_project
+from objreg_ros.recording import Record, messages, write_rosbag2
+from objreg_ros.simulation.camera import KINECT
+from objreg_ros.simulation.odometry import drifted
+from objreg_ros.simulation.params import ColourParams, DepthParams, OdometryParams, StressParams
+from objreg_ros.simulation.render import Rendering, render
+from objreg_ros.simulation.scenarios import Story, make_story
+from objreg_ros.simulation.truth import TruthWriter
+
+START_NS = 1_700_000_000_000_000_000
+"""When simulated recordings begin: a fixed moment, so that the same seed gives the same bytes."""
+CAMERA_FRAME, ODOM_FRAME, WORLD_FRAME = "camera", "odom", "world"
+JPEG_QUALITY = 90
+POINT = np.dtype(
+    {"names": ["x", "y", "z", "rgb"], "formats": ["<f4", "<f4", "<f4", "<u4"], "offsets": [0, 4, 8, 16], "itemsize": 32}
+)
+"""The layout of a point of `depth_image_proc` and the Kinect's drivers."""
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """The camera of a recording and everything that is wrong with it."""
+
+    intrinsics: Intrinsics = KINECT
+    depth: DepthParams = field(default_factory=DepthParams)
+    colour: ColourParams = field(default_factory=ColourParams)
+    stress: StressParams = field(default_factory=StressParams)
+    odometry: OdometryParams = field(default_factory=OdometryParams)
+
+
+def simulate(
+    path: Path | str,
+    scenario: str = "loop",
+    seed: int = 0,
+    frames: int = 600,
+    rate: float = 30.0,
+    sensors: Sensors | None = None,
+    points: bool = False,
+    jpeg: bool = False,
+    threads: int = 2,
+    progress: Callable[[int], object] = lambda done: None,
+) -> Story:
+    """Write the recording of a scenario to a new folder; its story comes back.
+
+    ``progress`` is called with the number of frames that are done. Everything in the messages and in the truth follows
+    from the arguments, ``threads`` and ``progress`` aside. ValueError for a scenario that there is not, FileExistsError
+    for a folder that is already there.
+    """
+    sensors = sensors or Sensors()
+    if Path(path).exists():
+        raise FileExistsError(f"{path}: expected a new folder, got one that exists; choose another name or remove it")
+    story = make_story(scenario, seed, frames, rate, sensors.stress.occluders)
+    truth = TruthWriter(story, scenario, seed, sensors.intrinsics)
+    T_odom_camera, covariance = drifted(story.T_world_camera, sensors.odometry, seed)
+
+    def records() -> Iterator[Record]:
+        for k in range(frames):
+            stamp_ns = START_NS + round(k * 1e9 / story.rate)
+            image = _frame(story, k, seed, sensors, threads)
+            truth.add(stamp_ns, int(story.scene_of[k]), image)
+            yield from _camera_records(image, stamp_ns, points, jpeg)
+            yield from _pose_records(image.T_world_camera, T_odom_camera[k], covariance[k], stamp_ns)
+            progress(k + 1)
+
+    write_rosbag2(path, records())
+    truth.write(Path(path))
+    return story
+
+
+def _frame(story: Story, k: int, seed: int, sensors: Sensors, threads: int) -> Rendering:
+    scene = story.scenes[int(story.scene_of[k])]
+    noise_seed = int(np.random.default_rng([seed, 41, k]).integers(2**31))
+    of = (sensors.depth, sensors.colour, sensors.stress)
+    return render(scene, story.T_world_camera[k], sensors.intrinsics, noise_seed, *of, threads=threads)
+
+
+def _camera_records(image: Rendering, stamp_ns: int, points: bool, jpeg: bool) -> Iterator[Record]:
+    assert image.rgb is not None
+    millimetres = np.rint(image.depth * 1000.0).astype(np.uint16)
+    colour = _compressed(image.rgb, stamp_ns) if jpeg else messages.image(image.rgb, "rgb8", stamp_ns, CAMERA_FRAME)
+    yield Record.of("/camera_info", messages.camera_info(image.intrinsics, stamp_ns, CAMERA_FRAME), stamp_ns)
+    yield Record.of("/image/compressed" if jpeg else "/image", colour, stamp_ns)
+    yield Record.of("/depth/image", messages.image(millimetres, "16UC1", stamp_ns, CAMERA_FRAME), stamp_ns)
+    if points:
+        yield Record.of("/points", messages.point_cloud(organised(image), stamp_ns, CAMERA_FRAME), stamp_ns)
+
+
+def _pose_records(T_world_camera: Array, T_odom_camera: Array, covariance: Array, stamp_ns: int) -> Iterator[Record]:
+    odometry = messages.odometry(T_odom_camera, covariance, stamp_ns, ODOM_FRAME, CAMERA_FRAME)
+    yield Record.of("/odom", odometry, stamp_ns)
+    yield Record.of("/ground_truth", messages.pose_stamped(T_world_camera, stamp_ns, WORLD_FRAME), stamp_ns)
+
+
+def _compressed(rgb: Array, stamp_ns: int) -> object:
+    """sensor_msgs/CompressedImage."""
+    jpeg = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1]
+    header = messages.header(stamp_ns, CAMERA_FRAME)
+    return messages.message(
+        "sensor_msgs/CompressedImage", header=header, format="rgb8; jpeg compressed bgr8", data=jpeg
+    )
+
+
+def organised(image: Rendering) -> Array:
+    """(H, W) records x y z rgb of the measured points in the camera frame, NaN where there is no depth."""
+    assert image.rgb is not None
+    i = image.intrinsics
+    xyz = back_project(image.depth, i.fx, i.fy, i.cx, i.cy)
+    xyz[image.depth == 0] = np.nan
+    records = np.zeros(image.depth.shape, POINT)
+    for k, name in enumerate("xyz"):
+        records[name] = xyz[..., k]
+    red, green, blue = (image.rgb[..., k].astype(np.uint32) for k in range(3))
+    records["rgb"] = red << 16 | green << 8 | blue
+    return records

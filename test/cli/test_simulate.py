@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command that makes recordings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from objreg_ros.cli.simulate import camera_of, sensors_of, simulate
+from objreg_ros.simulation.camera import KINECT
+from objreg_ros.simulation.truth import read_truth
+
+
+def test_the_command_writes_a_recording_and_says_what_it_is(tmp_path: Path) -> None:
+    out = tmp_path / "bag"
+    options = ["--scenario", "orbit", "--seed", "3", "--frames", "2", "--size", "160x120", "--jpeg"]
+    result = CliRunner().invoke(simulate, [str(out), *options])
+    assert result.exit_code == 0, result.output
+    assert "orbit, seed 3, 2 frames" in result.output
+    assert read_truth(out).intrinsics.width == 160
+
+
+def test_a_folder_that_exists_ends_with_one_line_and_exit_1(tmp_path: Path) -> None:
+    result = CliRunner().invoke(simulate, [str(tmp_path), "--frames", "2"])
+    assert result.exit_code == 1 and "expected a new folder" in result.output and "Traceback" not in result.output
+
+
+def test_a_named_camera_keeps_its_view_at_another_size() -> None:
+    small = camera_of("kinect", "320x240")
+    assert (small.width, small.fx) == (320, 262.5)
+    assert -0.5 - small.cx == (-0.5 - KINECT.cx) / 2
+
+
+def test_four_numbers_make_a_camera() -> None:
+    camera = camera_of("500,510,319.5,239.5", None)
+    assert (camera.fx, camera.fy, camera.width, camera.height) == (500.0, 510.0, 640, 480)
+
+
+@pytest.mark.parametrize(("name", "size"), [("kinnect", None), ("1,2,3", None), ("kinect", "640"), ("kinect", "9x9")])
+def test_a_camera_that_makes_no_sense_is_refused_with_what_was_expected(name: str, size: str | None) -> None:
+    with pytest.raises(ValueError, match="expected"):
+        camera_of(name, size)
+
+
+def test_parameters_are_set_by_section_and_name() -> None:
+    sensors = sensors_of(KINECT, False, ("depth.noise_floor=0.002", "colour.tint=1.1,1,0.9", "stress.occluders=3"))
+    assert sensors.depth.noise_floor == 0.002
+    assert sensors.colour.tint == (1.1, 1.0, 0.9)
+    assert sensors.stress.occluders == 3
+
+
+@pytest.mark.parametrize("setting", ["depth.noise=1", "depht.near=1", "depth.near", "depth.near=x", "depth.far=-1"])
+def test_a_parameter_that_is_not_there_or_out_of_range_is_refused(setting: str) -> None:
+    with pytest.raises(ValueError, match=r"expected|no parameter"):
+        sensors_of(KINECT, False, (setting,))
+
+
+def test_stress_makes_the_depth_worse() -> None:
+    assert sensors_of(KINECT, True, ()).stress.warp > 0
+    assert sensors_of(KINECT, True, ("stress.warp=0",)).stress.warp == 0
+
+
+def test_the_list_of_parameters_needs_no_folder() -> None:
+    result = CliRunner().invoke(simulate, ["--list"])
+    assert result.exit_code == 0 and "odometry.turn_drift = 1.0" in result.output

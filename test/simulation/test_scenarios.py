@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Stories: what each scenario promises."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from objreg_ros.data import Intrinsics
+from objreg_ros.geometry import rotation_angle
+from objreg_ros.simulation.render import render
+from objreg_ros.simulation.scenarios import SCENARIOS, Story, make_story
+from objreg_ros.simulation.scene import Scene
+from objreg_ros.simulation.trajectory import speeds
+
+SMALL = Intrinsics(fx=131.25, fy=131.25, cx=79.5, cy=59.5, width=160, height=120)
+
+
+def seen_on_the_first_table(story: Story, k: int) -> set[int]:
+    """Instances that frame ``k`` shows and that stand at the first place of the story."""
+    scene = story.scenes[story.scene_of[k]]
+    place = scene.places[0]
+    seen = render(scene, story.T_world_camera[k], SMALL, with_colour=False).seen
+    return {
+        o.instance
+        for o in seen
+        if np.linalg.norm(o.T_world_object[:2, 3] - place.centre[:2]) < place.reach
+        and abs(o.T_world_object[2, 3] - place.centre[2]) < 0.2
+    }
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_a_story_moves_at_the_speed_of_a_hand(scenario: str) -> None:
+    story = make_story(scenario, 1, frames=120)
+    moved, turned = speeds(story.T_world_camera, story.rate)
+    assert moved.max() < 0.55 and turned.max() < 45.0
+
+
+@pytest.mark.parametrize("scenario", ["loop", "opposite", "look-alikes", "moved"])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_first_table_is_left_out_of_sight_and_seen_again(scenario: str, seed: int) -> None:
+    story = make_story(scenario, seed, frames=60)
+    first, away, again = (seen_on_the_first_table(story, k) for k in (2, 30, 57))
+    assert len(first & again) >= 3
+    assert not away
+
+
+def test_opposite_returns_from_the_other_side_and_loop_from_nearby() -> None:
+    for scenario, low, high in (("opposite", 120.0, 180.0), ("loop", 0.0, 70.0)):
+        T = make_story(scenario, 4, frames=60).T_world_camera
+        turned = np.degrees(rotation_angle(T[2, :3, :3].T @ T[57, :3, :3]))
+        assert low < turned < high
+
+
+def test_look_alikes_have_the_same_classes_on_both_tables_in_different_places() -> None:
+    scene = make_story("look-alikes", 3, frames=10).scenes[0]
+    labels = []
+    for place in scene.places:
+        near = [o for o in scene.objects if np.linalg.norm(o.T_world_object[:3, 3] - place.centre) < place.reach]
+        labels.append({o.label for o in near if not o.is_distractor and o.label != "chair"})
+    assert len(labels[0] & labels[1]) >= 3
+
+
+def test_moved_rearranges_the_first_table_only_and_while_it_is_out_of_sight() -> None:
+    story = make_story("moved", 2, frames=60)
+    before, after = ({o.instance: o for o in scene.objects} for scene in story.scenes)
+    shifted = {
+        k for k in before.keys() & after.keys() if not np.array_equal(before[k].T_world_object, after[k].T_world_object)
+    }
+    change = int(np.argmax(story.scene_of))
+    assert len(shifted) >= 3 and before[min(shifted)].model is after[min(shifted)].model
+    for k in (change - 1, change):
+        scene = story.scenes[story.scene_of[k]]
+        seen = render(scene, story.T_world_camera[k], SMALL, with_colour=False).seen
+        assert not shifted & {o.instance for o in seen}
+
+
+def test_occluders_crowd_the_tables() -> None:
+    plain, crowded = (make_story("loop", 5, frames=10, occluders=n).scenes[0] for n in (0, 8))
+    assert crowd(crowded) > crowd(plain) + 3
+
+
+def crowd(scene: Scene) -> int:
+    """How many things stand on the two tables."""
+    on = [p.centre for p in scene.places]
+    return sum(min(float(np.linalg.norm(o.T_world_object[:3, 3] - c)) for c in on) < 0.8 for o in scene.objects)
+
+
+def test_an_unknown_scenario_is_refused_with_those_there_are() -> None:
+    with pytest.raises(ValueError, match="expected one of orbit, loop"):
+        make_story("maze", 0)

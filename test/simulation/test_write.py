@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Written recordings: topics, truth, and the same bytes from the same seed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from objreg_ros.data import Intrinsics
+from objreg_ros.recording import open_recording
+from objreg_ros.simulation.truth import read_truth
+from objreg_ros.simulation.write import Sensors, simulate
+
+SMALL = Sensors(intrinsics=Intrinsics(fx=131.25, fy=131.25, cx=79.5, cy=59.5, width=160, height=120))
+FRAMES = 4
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("simulated") / "loop"
+    simulate(path, "loop", seed=8, frames=FRAMES, sensors=SMALL, points=True)
+    return path
+
+
+def test_a_recording_has_the_graphs_topics_once_per_frame(recorded: Path) -> None:
+    with open_recording(recorded) as recording:
+        counts = {name: topic.count for name, topic in recording.topics.items()}
+    topics = ("/image", "/depth/image", "/camera_info", "/points", "/odom", "/ground_truth")
+    assert counts == dict.fromkeys(topics, FRAMES)
+
+
+def test_all_messages_of_a_frame_carry_its_time_and_their_frames(recorded: Path) -> None:
+    truth = read_truth(recorded)
+    stamps: dict[str, list[int]] = {}
+    frames = {}
+    with open_recording(recorded) as recording:
+        for record in recording.records():
+            header = record.message.header
+            stamps.setdefault(record.topic, []).append(header.stamp.sec * 10**9 + header.stamp.nanosec)
+            frames[record.topic] = header.frame_id
+    assert all(times == [frame.stamp_ns for frame in truth.frames] for times in stamps.values())
+    assert frames["/image"] == frames["/depth/image"] == frames["/points"] == "camera"
+    assert frames["/odom"] == "odom" and frames["/ground_truth"] == "world"
+
+
+def test_the_points_are_the_depth_image_seen_through_the_camera(recorded: Path) -> None:
+    with open_recording(recorded) as recording:
+        depth = next(recording.records(["/depth/image"])).message
+        cloud = next(recording.records(["/points"])).message
+    z_mm = np.frombuffer(depth.data.tobytes(), np.uint16).reshape(120, 160)
+    points = np.frombuffer(cloud.data.tobytes(), np.float32).reshape(120, 160, 8)
+    valid = z_mm > 0
+    np.testing.assert_allclose(points[valid][:, 2], z_mm[valid] / 1000.0, atol=5.1e-4)
+    rows, columns = np.nonzero(valid)
+    np.testing.assert_allclose(points[valid][:, 0], (columns - 79.5) / 131.25 * points[valid][:, 2], atol=1e-4)
+    np.testing.assert_allclose(points[valid][:, 1], (rows - 59.5) / 131.25 * points[valid][:, 2], atol=1e-4)
+    assert np.isnan(points[~valid][:, :3]).all()
+
+
+def test_the_truth_has_boxes_around_the_masks_and_poses_where_the_depth_is(recorded: Path) -> None:
+    truth = read_truth(recorded)
+    assert truth.scenario == "loop" and truth.seed == 8 and len(truth.frames) == FRAMES
+    frame = truth.frames[0]
+    mask = truth.mask(frame.stamp_ns)
+    assert frame.seen
+    for sight in frame.seen:
+        rows, columns = np.nonzero(mask == sight.object.instance)
+        assert sight.xyxy.tolist() == [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
+        assert sight.T_camera_object[2, 3] > 0.1
+
+
+def test_the_same_seed_writes_the_same_bytes(recorded: Path, tmp_path: Path) -> None:
+    again = tmp_path / "loop"
+    simulate(again, "loop", seed=8, frames=FRAMES, sensors=SMALL, points=True, threads=1)
+    with open_recording(recorded) as one, open_recording(again) as two:
+        for a, b in zip(one.records(), two.records(), strict=True):
+            assert (a.topic, a.stamp_ns, a.cdr) == (b.topic, b.stamp_ns, b.cdr)
+    for name in ("frames.jsonl", "masks.zip"):
+        assert (recorded / "truth" / name).read_bytes() == (again / "truth" / name).read_bytes()
+
+
+def test_colour_can_be_compressed(tmp_path: Path) -> None:
+    simulate(tmp_path / "jpeg", "orbit", seed=1, frames=2, sensors=SMALL, jpeg=True)
+    with open_recording(tmp_path / "jpeg") as recording:
+        picture = next(recording.records(["/image/compressed"])).message
+        assert "/image" not in recording.topics and "/points" not in recording.topics
+    assert cv2.imdecode(np.frombuffer(picture.data.tobytes(), np.uint8), cv2.IMREAD_COLOR).shape == (120, 160, 3)
+
+
+def test_a_folder_that_exists_is_refused_and_kept(recorded: Path) -> None:
+    with pytest.raises(FileExistsError, match="expected a new folder"):
+        simulate(recorded, "loop", frames=2, sensors=SMALL)
+    assert read_truth(recorded).frames
+
+
+def test_a_recording_without_truth_says_where_it_comes_from(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="objreg simulate"):
+        read_truth(tmp_path)
