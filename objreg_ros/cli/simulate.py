@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""objreg simulate: make a recording with ground truth."""
+"""`objreg simulate`: a recording with ground truth."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from objreg_ros.params import Params
 from objreg_ros.simulation.camera import CAMERAS
 from objreg_ros.simulation.params import ColourParams, DepthParams, OdometryParams, StressParams
 from objreg_ros.simulation.scenarios import SCENARIOS
-from objreg_ros.simulation.write import Sensors
-from objreg_ros.simulation.write import simulate as write_recording
+from objreg_ros.simulation.write import Sensors, simulate
 
 SECTIONS: dict[str, type[Params]] = {
     "depth": DepthParams,
@@ -44,7 +43,7 @@ def _list(context: click.Context, _: click.Parameter, wanted: bool) -> None:
 @click.option("--stress", is_flag=True, help="Bias, warp and rag the depth, blur the colour, crowd the tables.")
 @click.option("--set", "settings", multiple=True, metavar="SECTION.NAME=VALUE", help="See --list.")
 @click.option("--list", is_flag=True, is_eager=True, expose_value=False, callback=_list, help="List the parameters.")
-def simulate(
+def command(
     out: Path,
     scenario: str,
     seed: int,
@@ -58,14 +57,11 @@ def simulate(
     settings: tuple[str, ...],
 ) -> None:
     """Simulate a Kinect that is carried through a room, and write OUT, a rosbag2 folder (mcap) with OUT/truth in it."""
-    try:
-        sensors = sensors_of(camera_of(intrinsics, size), stress, settings)
-        with tqdm(total=frames, unit="frame", desc=scenario, disable=None) as bar:
-            story = write_recording(
-                out, scenario, seed, frames, rate, sensors, points, jpeg, progress=lambda n: bar.update(n - bar.n)
-            )
-    except (ValueError, FileExistsError) as error:
-        raise click.ClickException(str(error)) from error
+    sensors = sensors_of(camera_of(intrinsics, size), stress, settings)
+    with tqdm(total=frames, unit="frame", desc=scenario, disable=None) as bar:
+        story = simulate(
+            out, scenario, seed, frames, rate, sensors, points, jpeg, progress=lambda n: bar.update(n - bar.n)
+        )
     click.echo(f"{out}: {scenario}, seed {seed}, {frames} frames at {story.rate:.1f} Hz, truth in {out / 'truth'}")
     if story.rate < rate - 1e-6:
         click.echo(f"note: {frames} frames are few for this way, so they are {story.rate:.1f} Hz apart, not {rate:g}")

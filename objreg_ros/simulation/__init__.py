@@ -25,8 +25,8 @@ Scenes of your own: ``scene.furnished(rng, pieces, room)`` for the room, ``scene
 for the objects, ``scene.place_on(model, T_world_surface, x, y, yaw)`` to stand one on a surface, and
 ``Scene.with_objects`` to change what stands there. `light.looking` gives a camera pose from eye and target.
 
-Recordings: ``write.simulate(path, scenario, seed, frames)`` (the command `objreg simulate`) writes a rosbag2 folder with
-``truth/`` in it, which ``truth.read_truth(path) -> Truth`` reads: boxes, masks, poses of camera and objects, symmetries.
+Recordings: ``write.simulate(path, scenario, seed, frames)`` (command `objreg simulate`) writes a rosbag2 folder with
+``truth/`` in it. ``truth.read_truth(path) -> Truth`` reads that: boxes, masks, poses of camera and objects, symmetries.
 ``scenarios.make_story(scenario, seed, frames) -> Story`` gives scenes and camera poses without rendering them, and
 ``odometry.drifted`` the poses by drifting odometry.
 
