@@ -119,6 +119,8 @@ class Run:
     objects: int = 0
     closures: list[LoopClosure] = field(default_factory=list)
     rejected: Counter[str] = field(default_factory=Counter)
+    refusals: list[Rejected] = field(default_factory=list)
+    glimpses: list[dict[str, Any]] = field(default_factory=list)  # `glimpse` of every frame
     dropped: Counter[str] = field(default_factory=Counter)
     complaints: dict[str, str] = field(default_factory=dict)  # the first of each kind
     stage_s: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
@@ -138,6 +140,8 @@ class Run:
             "dropped": dict(sorted(self.dropped.items())),
             "stage_ms": {stage: percentiles_ms(seconds) for stage, seconds in self.stage_s.items()},
             "truth": summarise(self.errors(truth)),
+            "refusals": [refusal(rejected) for rejected in self.refusals],
+            "glimpses": self.glimpses,
         }
 
 
@@ -149,6 +153,24 @@ def constraint(closure: LoopClosure) -> dict[str, Any]:
         "T_from_to": closure.T_from_to.tolist(),
         "covariance": closure.covariance.tolist(),
         "labels": list(closure.labels),
+    }
+
+
+def refusal(rejected: Rejected) -> dict[str, Any]:
+    """A refused candidate as JSON."""
+    moments = {"from_ns": rejected.from_ns, "to_ns": rejected.to_ns}
+    return {"reason": rejected.reason.value, **moments, "detail": rejected.detail}
+
+
+def glimpse(frame: Frame, labels: tuple[str, ...]) -> dict[str, Any]:
+    """A frame as JSON: when, from where, what was detected, and where in the camera the middle of each object is."""
+    return {
+        "stamp_ns": frame.stamp_ns,
+        "T_odom_camera": None if frame.T_odom_camera is None else frame.T_odom_camera.tolist(),
+        "labels": list(labels),
+        "objects": [
+            [o.label, np.median(o.xyz, axis=0).astype(float).round(4).tolist()] for o in frame.objects if len(o)
+        ],
     }
 
 
@@ -166,6 +188,7 @@ class Line:
         self._rooms, self._timing, self._max_frames = rooms, timing, max_frames
         self._from_points = inputs.points is not None
         self._camera_info: Any = None
+        self._labels: dict[int, tuple[str, ...]] = {}  # what was detected in the frames that are under way
         self._views = Synchroniser(self._streams(), self._unmatched)
         odom = Stream("odom", Need.OPTIONAL, timing.odom_slop_ns, ODOM_DEPTH)
         self._frames = Synchroniser([Stream("frame"), odom], self._unmatched)
@@ -224,6 +247,7 @@ class Line:
             if frame is not None:
                 self.run.detections += len(match["detections"])
                 self.run.objects += len(frame.objects)
+                self._labels[frame.stamp_ns] = match["detections"].label
                 self._track(self._frames.add("frame", frame.stamp_ns, frame))
 
     def _frame(self, match: Match) -> Frame:
@@ -244,12 +268,14 @@ class Line:
                 return
             frame = with_odometry(match["frame"], match["odom"], self._timing.T_base_camera)
             self.run.frames += 1
+            self.run.glimpses.append(glimpse(frame, self._labels.pop(frame.stamp_ns, ())))
             with self._timed("register"):
                 outcome = self._rooms.registrar.process(frame)
             self._note(outcome)
 
     def _note(self, outcome: Outcome) -> None:
         self.run.closures += outcome.closures
+        self.run.refusals += outcome.rejected
         self.run.rejected.update(refusal.reason.value for refusal in outcome.rejected)
 
     def _unmatched(self, name: str, stamp_ns: int, why: str) -> None:

@@ -147,3 +147,19 @@ def test_points_go_through_the_organiser() -> None:
         clouds.append(Record.of("/points", messages.point_cloud(rows, stamp_ns, "camera"), stamp_ns))
     run = run_offline(clouds, rooms, Inputs(image="/image", points="/points", camera_info="/camera_info"))
     assert run.frames == 2 and seen[0].fx == CAMERA.fx
+
+
+def test_the_json_tells_of_every_frame_and_every_refusal() -> None:
+    rooms, _ = simple_rooms()
+    run = run_offline(records(4), rooms, INPUTS)
+    summary = json.loads(json.dumps(run.summary(Truth([]))))
+    assert [row["T_odom_camera"][0][3] for row in summary["glimpses"]] == pytest.approx([0, 0.1, 0.2, 0.3])
+    assert summary["glimpses"][2]["labels"] == ["cup"]
+    assert summary["glimpses"][2]["objects"] == [["cup", [0.0, 0.0, 1.002]]]
+
+
+def test_the_json_tells_of_every_refusal() -> None:
+    rooms, _ = simple_rooms()
+    run = run_offline(without("/odom", 1100 * MS), rooms, INPUTS)
+    expected = {"reason": "no_candidate", "from_ns": 1100 * MS, "to_ns": 1200 * MS, "detail": "no odometry"}
+    assert run.summary(Truth([]))["refusals"][1] == expected
