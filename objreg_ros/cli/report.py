@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`objreg report`: pictures and tables of runs on one page."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import click
+
+from objreg_ros.cli import offline
+from objreg_ros.report.write import write_report
+
+
+@click.command()
+@click.argument("runs", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RUN.json|REC…")
+@click.option("--out", default="report.html", type=click.Path(dir_okay=False, path_type=Path), help="The page.")
+@click.option("--model", help="ONNX model for recordings: a path or the name of an installed one.")
+@click.option("--odometry", metavar="TOPIC|none|drift:SEED", help="For recordings: as in `objreg offline`.")
+@click.pass_context
+def command(context: click.Context, runs: tuple[Path, ...], out: Path, model: str | None, odometry: str | None) -> None:
+    """Write one HTML page about runs: the JSON of `objreg offline`, or recordings, which are run now.
+
+    It opens offline and holds the trajectory against the truth, a timeline of closures and refusals, pictures of
+    registrations, the object map and the times.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        files = []
+        for number, run in enumerate(runs):
+            file = run if run.suffix == ".json" else Path(folder, f"{number}.json")
+            if file is not run:
+                context.invoke(offline.command, recording=run, model=model, odometry=odometry, json_file=file)
+            files.append(file)
+        write_report(out, files)
+    click.echo(f"wrote {out}")

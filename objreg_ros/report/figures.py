@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The figures of a report: the way, its error over time, the timeline, the object map."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+
+from objreg_ros.data import Array, LoopClosure
+from objreg_ros.report.drawing import Plot
+from objreg_ros.report.story import Story, Tracks
+
+LANE = 18  # px of one row of the timeline
+MOST_LABELS = 9  # rows of detections; the rarer labels share one more
+SERIES = 8  # colours of labels on the page
+
+
+class Ground:
+    """The plane in which a way is drawn: the two directions in which it extends the most."""
+
+    def __init__(self, xyz: Array) -> None:
+        self.middle = xyz.mean(axis=0)
+        axes = np.linalg.svd(xyz - self.middle, full_matrices=True)[2][:2]
+        self.axes = axes * np.where(axes[np.arange(2), np.abs(axes).argmax(axis=1)] < 0, -1.0, 1.0)[:, None]
+
+    def flat(self, xyz: Array) -> Array:
+        """(N, 2) of (N, 3)."""
+        return (xyz - self.middle) @ self.axes.T
+
+
+def way(story: Story, tracks: Tracks) -> str:
+    """Odometry, corrected and true way from above, and the closures as links on the corrected one."""
+    ground = Ground(tracks.corrected if tracks.true is None else tracks.true)
+    lines = {"odometry": tracks.odometry, "corrected": tracks.corrected}
+    flat = {name: ground.flat(xyz) for name, xyz in lines.items()}
+    if tracks.true is not None:
+        flat = {"true": ground.flat(tracks.true), **flat}
+    plot = Plot.equal(np.concatenate(list(flat.values())))
+    plot.x_axis("m")
+    plot.y_axis("m")
+    for name, xy in flat.items():
+        plot.line(xy, name, name)
+    for closure in story.closures:
+        ends = [flat["corrected"][_index(tracks, stamp)] for stamp in (closure.from_ns, closure.to_ns)]
+        plot.line(np.array(ends), f"link {verdict(story, closure)}", closure_words(story, closure))
+    x, y = flat["corrected"][0]
+    plot.dot(x, y, "start", "start", radius=4)
+    plot.text(plot.x(x) + 8, plot.y(y) - 6, "start")
+    return plot.svg("the way of the camera from above: true, by odometry, and corrected")
+
+
+def error_over_time(story: Story, tracks: Tracks) -> str:
+    """The distance from the truth, before and after."""
+    if tracks.odometry_error is None or tracks.corrected_error is None:
+        return ""
+    times = (tracks.stamps_ns - story.start_ns) * 1e-9
+    errors = {"odometry": 100 * tracks.odometry_error, "corrected": 100 * tracks.corrected_error}
+    top = max(float(error.max()) for error in errors.values())
+    plot = Plot((float(times[0]), float(times[-1]) + 1e-9), (0.0, 1.08 * max(top, 1.0)), height=220)
+    plot.x_axis("s")
+    plot.y_axis("cm")
+    for name, error in errors.items():
+        plot.line(np.column_stack([times, error]), name, name)
+    return plot.svg("the distance from the truth over time, before and after")
+
+
+def timeline(story: Story) -> str:
+    """Rows over time: detections by label, closures as bows, refusals by reason."""
+    names = [label for label, _ in Counter(label for g in story.glimpses for label in g.labels).most_common()]
+    labels, rare = names[:MOST_LABELS], names[MOST_LABELS:]
+    reasons = [reason for reason, _ in Counter(refusal.reason for refusal in story.refusals).most_common()]
+    rows = [*labels, *(["other labels"] if rare else []), "closures", *(reason.value for reason in reasons)]
+    heights = {name: 3 * LANE if name == "closures" else LANE for name in rows}
+    level = dict(zip(rows, np.cumsum(list(heights.values())) - LANE / 2, strict=True))
+    total = sum(heights.values())
+    end = max((story.seconds(moment) for moment in _moments(story)), default=1.0)
+    plot = Plot((0.0, end + 1e-9), (-float(total), 0.0), height=total + 46, left=150)
+    plot.x_axis("s")
+    for name in rows:
+        plot.text(plot.left - 8, plot.y(-level[name]) + 4, name.replace("_", " "), "end")
+    row_of = {name: level.get(name, level.get("other labels", 0.0)) for name in names}
+    _draw_detections(plot, story, row_of)
+    _draw_closures(plot, story, level["closures"])
+    for refusal in story.refusals:
+        words = f"{refusal.detail} ({story.seconds(refusal.from_ns):.1f} s, {story.seconds(refusal.to_ns):.1f} s)"
+        plot.dot(story.seconds(refusal.to_ns), -level[refusal.reason.value], "refused", words)
+    return plot.svg("detections, closures and refusals over time")
+
+
+def object_map(story: Story, corrected: bool) -> str:
+    """Every sighting of an object from above, by odometry or in the corrected map, and the camera's way."""
+    seen = story.objects()
+    places = [row[2] for row in seen]
+    tracks = story.tracks()
+    if tracks is None or not seen:
+        return ""
+    poses = story.graph.corrected(story.graph.odometry.stamps_ns)
+    ground = Ground(np.array([T[:3, 3] for T in poses]))
+    line = poses if corrected else story.graph.odometry.poses
+    xy = ground.flat(np.array([row[2 if corrected else 1] for row in seen]))
+    both = np.concatenate([ground.flat(np.array(places)), ground.flat(np.array([row[1] for row in seen]))])
+    plot = Plot.equal(np.concatenate([both, ground.flat(np.array([T[:3, 3] for T in poses]))]), width=510, most=440)
+    plot.x_axis("m")
+    plot.y_axis("m")
+    plot.line(ground.flat(np.array([T[:3, 3] for T in line])), "faint")
+    order = [label for label, _ in Counter(row[0] for row in seen).most_common()]
+    for (label, *_), (x, y) in zip(seen, xy, strict=True):
+        plot.dot(x, y, f"series-{min(order.index(label), SERIES - 1)}", label, radius=2.2)
+    for label, (x, y) in heaps([row[0] for row in seen], xy):
+        plot.text(plot.x(x), plot.y(y) - 8, label, "middle", "name")
+    return plot.svg("objects from above" + (", corrected" if corrected else ", by odometry"))
+
+
+def heaps(labels: Sequence[str], xy: Array, radius: float = 0.5, least: int = 4) -> list[tuple[str, Array]]:
+    """(label, middle) of the places where one label was seen at least so often, for the names on the map."""
+    found: list[tuple[str, Array]] = []
+    for label in dict.fromkeys(labels):
+        rest = xy[[name == label for name in labels]]
+        while len(rest) >= least:
+            distances = np.linalg.norm(rest[:, None] - rest[None], axis=2)
+            near = distances[(distances < radius).sum(axis=1).argmax()] < radius
+            if near.sum() < least:
+                break
+            found.append((label, rest[near].mean(axis=0)))
+            rest = rest[np.linalg.norm(rest - rest[near].mean(axis=0), axis=1) > radius]
+    return found
+
+
+def verdict(story: Story, closure: LoopClosure) -> str:
+    """The CSS class of a closure."""
+    return "false" if story.is_false(closure) else "accepted"
+
+
+def closure_words(story: Story, closure: LoopClosure) -> str:
+    """A closure in one line."""
+    times = f"{story.seconds(closure.from_ns):.1f} s ↔ {story.seconds(closure.to_ns):.1f} s"
+    error = story.error(closure)
+    truth = "" if error is None else f", off by {error[0]:.1f}° and {error[1]:.1f} cm"
+    return f"{times}, {', '.join(closure.labels) or 'no labels'}{truth}"
+
+
+def _index(tracks: Tracks, stamp_ns: int) -> int:
+    return int(np.abs(tracks.stamps_ns - stamp_ns).argmin())
+
+
+def _moments(story: Story) -> list[int]:
+    moments = [glimpse.stamp_ns for glimpse in story.glimpses]
+    return moments + [c.to_ns for c in story.closures] + [r.to_ns for r in story.refusals]
+
+
+def _draw_detections(plot: Plot, story: Story, level: dict[str, float]) -> None:
+    """A bar for every stretch of frames in which a label was detected."""
+    stamps = [glimpse.stamp_ns for glimpse in story.glimpses]
+    pause = 2.5 * float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
+    for label, row in level.items():
+        seen = np.array([g.stamp_ns for g in story.glimpses if label in g.labels])
+        for stretch in np.split(seen, np.flatnonzero(np.diff(seen) > pause) + 1):
+            times = [story.seconds(int(stretch[i])) for i in (0, -1)]
+            plot.bar(times[0], times[1], -row, "seen", f"{label}, {times[0]:.1f} to {times[1]:.1f} s")
+
+
+def _draw_closures(plot: Plot, story: Story, row: float) -> None:
+    longest = max((abs(c.to_ns - c.from_ns) for c in story.closures), default=1)
+    for closure in story.closures:
+        start, end = sorted(story.seconds(stamp) for stamp in (closure.from_ns, closure.to_ns))
+        rise = 2.4 * LANE * abs(closure.to_ns - closure.from_ns) / longest
+        style = verdict(story, closure)
+        plot.arc(start, end, -row, rise, style, closure_words(story, closure))
+        for moment in (start, end):
+            plot.dot(moment, -row, style, closure_words(story, closure), radius=2.5)

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a report tells of: the JSON of a run, mapped, beside the truth of its recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from objreg_ros.data import Array, LoopClosure, Odometry, Reason, Rejected
+from objreg_ros.geometry import transform
+from objreg_ros.mapper.pose_graph import PoseGraph
+from objreg_ros.report.trajectory_error import absolute_errors, align
+from objreg_ros.truth import FALSE, Error, Truth, within
+
+
+@dataclass(frozen=True, slots=True)
+class Glimpse:
+    """One frame: when, from where (None without odometry), the labels detected, and objects by label and position.
+
+    Positions (3,) are the middles of the objects in the camera, m.
+    """
+
+    stamp_ns: int
+    T_odom_camera: Array | None = None
+    labels: tuple[str, ...] = ()
+    objects: tuple[tuple[str, Array], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Tracks:
+    """The camera's way three times over, at ``stamps_ns``: positions (N, 3) m in one frame, the true ones or None.
+
+    ``odometry_error`` and ``corrected_error`` (N,) m are the distances from the truth, None without it.
+    """
+
+    stamps_ns: Array
+    odometry: Array
+    corrected: Array
+    true: Array | None
+    odometry_error: Array | None = None
+    corrected_error: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Story:
+    """Everything that the sections of a report draw from."""
+
+    name: str
+    summary: Mapping[str, Any]
+    truth: Truth
+    glimpses: tuple[Glimpse, ...] = ()
+    closures: tuple[LoopClosure, ...] = ()
+    refusals: tuple[Rejected, ...] = ()
+    graph: PoseGraph = field(default_factory=PoseGraph)
+    pruned: tuple[LoopClosure, ...] = ()
+
+    @classmethod
+    def of(cls, name: str, summary: Mapping[str, Any], truth: Truth) -> Story:
+        """The story of a run's JSON; the map is made here. Keys that are missing leave their section out."""
+        glimpses = tuple(_glimpse(row) for row in summary.get("glimpses", ()))
+        closures = tuple(_closure(row) for row in summary.get("constraints", ()))
+        graph = mapped(glimpses, closures)
+        refusals = tuple(_refusal(row) for row in summary.get("refusals", ()))
+        return cls(name, summary, truth, glimpses, closures, refusals, graph, graph.optimise().pruned)
+
+    @property
+    def start_ns(self) -> int:
+        """The first moment of the run."""
+        moments = [glimpse.stamp_ns for glimpse in self.glimpses] or [closure.from_ns for closure in self.closures]
+        return min(moments, default=0)
+
+    def seconds(self, stamp_ns: int) -> float:
+        """The time since the first moment."""
+        return (stamp_ns - self.start_ns) * 1e-9
+
+    def error(self, closure: LoopClosure) -> Error | None:
+        """The true error of a closure (degrees, centimetres); None where truth does not tell."""
+        return self.truth.error(closure)
+
+    def is_false(self, closure: LoopClosure) -> bool:
+        """Whether truth says that a closure is wrong; False where it does not tell."""
+        error = self.error(closure)
+        return error is not None and not within(error, FALSE)
+
+    def tracks(self) -> Tracks | None:
+        """Odometry, corrected and true way, over each other; None without odometry."""
+        stamps, odometry, corrected = poses_before_and_after(self.graph)
+        if not stamps:
+            return None
+        true = [self.truth.at(stamp) for stamp in stamps]
+        known = [k for k, T in enumerate(true) if T is not None]
+        if len(known) < 3:
+            return Tracks(np.array(stamps), positions(odometry), positions(corrected), None)
+        stamps = [stamps[k] for k in known]
+        odometry, corrected = [odometry[k] for k in known], [corrected[k] for k in known]
+        targets = [T for T in true if T is not None]
+        return Tracks(
+            np.array(stamps),
+            _laid_over(odometry, targets),
+            _laid_over(corrected, targets),
+            positions(targets),
+            absolute_errors(odometry, targets),
+            absolute_errors(corrected, targets),
+        )
+
+    def objects(self) -> list[tuple[str, Array, Array]]:
+        """(label, position by odometry, position in the map) of every object seen with odometry."""
+        seen = [glimpse for glimpse in self.glimpses if glimpse.T_odom_camera is not None and glimpse.objects]
+        corrected = self.graph.corrected(glimpse.stamp_ns for glimpse in seen)
+        return [
+            (label, transform(glimpse.T_odom_camera, xyz), transform(T_map_camera, xyz))
+            for glimpse, T_map_camera in zip(seen, corrected, strict=True)
+            for label, xyz in glimpse.objects
+            if glimpse.T_odom_camera is not None
+        ]
+
+
+def mapped(glimpses: Sequence[Glimpse], closures: Sequence[LoopClosure]) -> PoseGraph:
+    """The pose graph of the frames that have odometry, with every closure between them."""
+    graph = PoseGraph()
+    for glimpse in glimpses:
+        if glimpse.T_odom_camera is not None:
+            graph.add_odometry(Odometry(T_odom_body=glimpse.T_odom_camera, stamp_ns=glimpse.stamp_ns))
+    for closure in closures:
+        graph.add_closure(closure)
+    return graph
+
+
+def poses_before_and_after(graph: PoseGraph) -> tuple[list[int], list[Array], list[Array]]:
+    """Stamps, and the poses at them by odometry and in the map."""
+    stamps = list(graph.odometry.stamps_ns)
+    return stamps, list(graph.odometry.poses), graph.corrected(stamps)
+
+
+def positions(poses: Sequence[Array]) -> Array:
+    """(N, 3) of N poses."""
+    return np.array([T[:3, 3] for T in poses]).reshape(-1, 3)
+
+
+def _laid_over(poses: Sequence[Array], true: Sequence[Array]) -> Array:
+    return transform(align(positions(poses), positions(true)), positions(poses))
+
+
+def _glimpse(row: Mapping[str, Any]) -> Glimpse:
+    pose = row.get("T_odom_camera")
+    return Glimpse(
+        stamp_ns=int(row["stamp_ns"]),
+        T_odom_camera=None if pose is None else np.array(pose, float),
+        labels=tuple(row.get("labels", ())),
+        objects=tuple((label, np.array(xyz, float)) for label, xyz in row.get("objects", ())),
+    )
+
+
+def _closure(row: Mapping[str, Any]) -> LoopClosure:
+    return LoopClosure(
+        from_ns=int(row["from_ns"]),
+        to_ns=int(row["to_ns"]),
+        T_from_to=np.array(row["T_from_to"], float),
+        covariance=np.array(row["covariance"], float),
+        labels=tuple(row["labels"]),
+    )
+
+
+def _refusal(row: Mapping[str, Any]) -> Rejected:
+    return Rejected(
+        reason=Reason(row["reason"]), from_ns=int(row["from_ns"]), to_ns=int(row["to_ns"]), detail=row["detail"]
+    )

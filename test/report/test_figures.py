@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Figures hold what they should, each once."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+import numpy as np
+
+from objreg_ros.report import figures
+from objreg_ros.report.story import Story
+
+from .runs import TRUTH, summary
+
+STORY = Story.of("walk", summary(false=True), TRUTH)
+
+
+def count(svg: str, style: str) -> int:
+    return sum(style in (child.get("class") or "").split() for child in ElementTree.fromstring(svg))
+
+
+def test_the_way_shows_three_lines_and_a_link_a_closure() -> None:
+    svg = figures.way(STORY, STORY.tracks())
+    assert [count(svg, style) for style in ("true", "odometry", "corrected", "link", "false")] == [1, 1, 1, 5, 1]
+    assert "off by 0.0° and 50.0 cm" in svg
+
+
+def test_the_error_has_two_lines_with_truth() -> None:
+    svg = figures.error_over_time(STORY, STORY.tracks())
+    assert count(svg, "odometry") == count(svg, "corrected") == 1
+
+
+def test_the_timeline_has_a_dot_a_refusal_and_a_row_a_reason() -> None:
+    svg = figures.timeline(STORY)
+    assert count(svg, "refused") == 3
+    assert "texture disagrees" in svg and "no candidate" in svg
+    assert count(svg, "seen") > 3  # the cups and the book come and go
+
+
+def test_the_map_names_every_object_once() -> None:
+    svg = figures.object_map(STORY, corrected=True)
+    names = [node.text for node in ElementTree.fromstring(svg) if node.get("class") == "name"]
+    assert sorted(names) == ["book", "cup", "cup"]
+
+
+def test_heaps_of_one_label_are_told_apart_and_strays_have_no_name() -> None:
+    xy = np.array([[0.0, 0.0]] * 5 + [[3.0, 0.0]] * 5 + [[9.0, 9.0]])
+    assert [tuple(place) for _, place in figures.heaps(["cup"] * 11, xy)] == [(0.0, 0.0), (3.0, 0.0)]
+
+
+def test_the_ground_is_the_plane_of_the_way() -> None:
+    angles = np.linspace(0, 2 * np.pi, 50)
+    xyz = np.column_stack([2 * np.cos(angles), np.full(50, 0.7), np.sin(angles)])
+    np.testing.assert_allclose(np.ptp(figures.Ground(xyz).flat(xyz), axis=0), [4.0, 2.0], atol=0.02)

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One page that needs nothing else."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+
+from objreg_ros.data import Reason
+from objreg_ros.report.page import MEANINGS, page
+from objreg_ros.report.story import Story
+from objreg_ros.truth import Truth
+
+from .runs import TRUTH, summary
+
+VOID = {"meta", "img", "br"}
+
+
+class Balance(HTMLParser):
+    """Counts what is opened and not closed."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def test_the_page_is_well_formed_and_loads_nothing() -> None:
+    text = page([(Story.of("walk", summary(), TRUTH), None)])
+    parser = Balance()
+    parser.feed(text)
+    assert parser.open == []
+    assert not re.search(r"https?://|<script|<link|url\(", text)
+    assert "prefers-color-scheme: dark" in text
+
+
+def test_the_head_tells_of_false_constraints_and_of_the_error() -> None:
+    text = page([(Story.of("walk", summary(false=True), TRUTH), None)])
+    assert "truth finds 1 of them false" in text and "less than odometry" in text
+    assert "no truth to judge" in page([(Story.of("walk", summary(), Truth([])), None)])
+
+
+def test_every_reason_has_its_meaning() -> None:
+    assert set(MEANINGS) == {reason.value for reason in Reason}
+
+
+def test_a_run_that_closed_nothing_says_so() -> None:
+    told = {"frames": 3, "constraints": []}
+    assert "No loop was closed" in page([(Story.of("empty", told, Truth([])), None)])
+
+
+def test_names_are_escaped() -> None:
+    assert "<b>" not in page([(Story.of("<b>", summary(), TRUTH), None)])

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a story knows of a run."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from objreg_ros.report.story import Story
+from objreg_ros.truth import Truth
+
+from .runs import TRUTH, summary
+
+
+def test_closures_bend_the_way_back_to_the_truth() -> None:
+    tracks = Story.of("walk", summary(), TRUTH).tracks()
+    before, after = (np.sqrt(np.mean(error**2)) for error in (tracks.odometry_error, tracks.corrected_error))
+    assert after < 0.5 * before
+    np.testing.assert_allclose(np.linalg.norm(tracks.corrected - tracks.true, axis=1), tracks.corrected_error)
+
+
+def test_a_false_closure_is_known_by_the_truth_and_pruned_by_the_map() -> None:
+    story = Story.of("walk", summary(false=True), TRUTH)
+    assert [story.is_false(closure) for closure in story.closures] == [False] * 4 + [True]
+    assert story.pruned == story.closures[-1:]
+
+
+def test_without_truth_nothing_is_false_and_there_are_no_errors() -> None:
+    story = Story.of("walk", summary(false=True), Truth([]))
+    assert not any(story.is_false(closure) for closure in story.closures)
+    assert story.tracks().true is None and story.tracks().corrected_error is None
+
+
+def test_without_odometry_there_are_no_tracks_and_no_object_map() -> None:
+    told = summary()
+    for row in told["glimpses"]:
+        row["T_odom_camera"] = None
+    story = Story.of("walk", told, TRUTH)
+    assert story.tracks() is None and story.objects() == []
+
+
+def test_one_object_is_one_place_in_the_map_and_several_by_odometry() -> None:
+    seen = [row for row in Story.of("walk", summary(), TRUTH).objects() if row[0] == "book"]
+    by_odometry, in_map = (np.linalg.norm(np.std([row[i] for row in seen], axis=0)) for i in (1, 2))
+    assert in_map < 0.5 * by_odometry
+
+
+def test_an_older_json_without_frames_is_told_all_the_same() -> None:
+    told = {key: value for key, value in summary().items() if key not in ("glimpses", "refusals")}
+    story = Story.of("walk", told, TRUTH)
+    assert len(story.closures) == 4 and story.tracks() is None
+    assert story.seconds(story.closures[0].to_ns) == pytest.approx(6.0)

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From files to the page."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from objreg_ros.report.write import write_report
+
+from .runs import summary
+
+
+def test_a_report_is_written_from_json_alone(tmp_path: Path) -> None:
+    (tmp_path / "run.json").write_text(json.dumps(summary()))
+    write_report(tmp_path / "out.html", [tmp_path / "run.json"] * 2)
+    assert (tmp_path / "out.html").read_text().count("<article>") == 2
+
+
+def test_the_recording_of_a_run_gives_truth_and_pictures(tmp_path: Path, shared: Path) -> None:
+    place = shared / "data" / "redkitchen_a"
+    (tmp_path / "run.json").write_text(json.dumps({**summary(), "recording": str(place)}))
+    write_report(tmp_path / "out.html", [tmp_path / "run.json"])
+    text = (tmp_path / "out.html").read_text()
+    assert "<h1>redkitchen_a</h1>" in text and text.count("data:image/jpeg") >= 12
+
+
+@pytest.mark.parametrize("text", ["", "[1]", '{"frames": 3}'])
+def test_what_is_no_run_is_refused_by_name(tmp_path: Path, text: str) -> None:
+    (tmp_path / "run.json").write_text(text)
+    with pytest.raises(ValueError, match=r"run\.json: expected the JSON of `objreg offline --json`"):
+        write_report(tmp_path / "out.html", [tmp_path / "run.json"])
