@@ -44,7 +44,7 @@ def unpack(blob: bytes) -> tuple[Any, ...]:
     return tuple(arrays)
 
 
-def keyframe_row(keyframe: Keyframe, travelled: float) -> Row:
+def keyframe_row(keyframe: Keyframe, sightings: Sequence[Sighting]) -> Row:
     """The columns of a keyframe."""
     view = keyframe.view
     camera = {name: getattr(view.intrinsics, name) for name in Intrinsics.__slots__}  # type: ignore[attr-defined]
@@ -53,8 +53,10 @@ def keyframe_row(keyframe: Keyframe, travelled: float) -> Row:
         "session": keyframe.session,
         "stamp_ns": keyframe.stamp_ns,
         "frame_id": keyframe.frame_id,
-        "travelled": travelled,
+        "travelled": sightings[0].travelled if sightings else 0.0,
+        "turned": sightings[0].turned if sightings else 0.0,
         "T_odom_camera": _bytes(keyframe.T_odom_camera),
+        "by_odometry": keyframe.by_odometry,
         "gravity": _bytes(keyframe.gravity),
         "gravity_confidence": keyframe.gravity_confidence,
         "camera": json.dumps(camera),
@@ -99,6 +101,7 @@ def keyframe_from_rows(row: Mapping[str, Any], objects: Sequence[Mapping[str, An
         gravity=_array(row["gravity"], (3,)),
         gravity_confidence=row["gravity_confidence"],
         T_odom_camera=_array(row["T_odom_camera"], (4, 4)),
+        by_odometry=bool(row["by_odometry"]),
     )
 
 
@@ -115,6 +118,7 @@ def sighting_from_row(row: Mapping[str, Any]) -> Sighting:
         position=np.frombuffer(row["position"], float),
         camera=np.frombuffer(row["camera"], float),
         travelled=row["travelled"],
+        turned=row["turned"],
         landmark=row["landmark"],
         R_landmark_session=np.frombuffer(row["R_landmark_session"], float).reshape(3, 3),
     )

@@ -39,6 +39,7 @@ def fuse(stretch: Stretch, params: RegistrarParams) -> Keyframe:
         gravity=reference.gravity,
         gravity_confidence=reference.gravity_confidence,
         T_odom_camera=_rigid(stretch.T_session_first @ stretch.T_first_frame[chosen]),
+        by_odometry=stretch.by_odometry,
     )
 
 

@@ -12,22 +12,18 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from objreg_ros.data import Array, Reason
+from objreg_ros.data import Reason
 from objreg_ros.geometry import pose_error
 from objreg_ros.registrar.candidate import Candidate
 from objreg_ros.registrar.covariance import covariance_of, worst_translation
+from objreg_ros.registrar.odometry import Prior
 from objreg_ros.registrar.params import RegistrarParams
 
 Refusal = tuple[Reason, str]
 
 
-def judge(
-    candidates: Sequence[Candidate], params: RegistrarParams, prior: tuple[Array, float, float] | None = None
-) -> Candidate | Refusal:
-    """The first candidate that nothing speaks against, or the refusal of the best one.
-
-    ``prior`` is odometry's ``T_target_source`` with its standard deviations in degrees and centimetres, or None.
-    """
+def judge(candidates: Sequence[Candidate], params: RegistrarParams, prior: Prior | None = None) -> Candidate | Refusal:
+    """The first candidate that nothing speaks against, or the refusal of the best one."""
     if not candidates:
         return Reason.NO_HYPOTHESIS, "no chain proposed a pose"
     refusals = []
@@ -39,15 +35,13 @@ def judge(
     return refusals[0]
 
 
-def refuse(
-    candidate: Candidate, params: RegistrarParams, prior: tuple[Array, float, float] | None = None
-) -> Refusal | None:
+def refuse(candidate: Candidate, params: RegistrarParams, prior: Prior | None = None) -> Refusal | None:
     """Why this candidate is no closure, with the numbers; None if it is one."""
     for check in CHECKS:
         refusal = check(candidate, params)
         if refusal is not None:
             return refusal
-    return None if prior is None else _odometry(candidate, params, *prior)
+    return None if prior is None else _odometry(candidate, params, prior)
 
 
 def _converged(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
@@ -124,16 +118,15 @@ def _held(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
     return Reason.SLACK, f"sigma {sigma:.3f} m > {params.max_slack_sigma:.3f} m"
 
 
-def _odometry(
-    candidate: Candidate, params: RegistrarParams, T_prior: Array, rotation_sigma: float, translation_sigma: float
-) -> Refusal | None:
-    rotation, translation = pose_error(candidate.T_target_source, T_prior)
-    allowed = params.odometry_sigmas
-    if rotation <= allowed * rotation_sigma and translation <= allowed * translation_sigma:
+def _odometry(candidate: Candidate, params: RegistrarParams, prior: Prior) -> Refusal | None:
+    rotation, translation = pose_error(candidate.T_target_source, prior.T_target_source)
+    most_rotation = params.odometry_sigmas * prior.rotation_deg
+    most_translation = params.odometry_sigmas * 100.0 * prior.translation_m
+    if not prior.trusted or (rotation <= most_rotation and translation <= most_translation):
         return None
     return Reason.ODOMETRY, (
         f"{rotation:.1f} deg {translation:.0f} cm from odometry, "
-        f"expected {allowed * rotation_sigma:.1f} deg {allowed * translation_sigma:.0f} cm at most"
+        f"expected {most_rotation:.1f} deg {most_translation:.0f} cm at most"
     )
 
 

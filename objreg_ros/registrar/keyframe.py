@@ -52,8 +52,9 @@ class Keyframe:
     """A moment with its objects, context and view, all in the camera frame of the reference frame at ``stamp_ns``.
 
     ``keyframe_id`` is unique in a store and grows with time, ``session`` counts the runs that wrote into it;
-    ``gravity (3,)`` is of length 1 or None; ``T_odom_camera`` is the odometry's pose of the reference frame or None,
-    and says something about another keyframe of the same session only.
+    ``gravity (3,)`` is of length 1 or None; ``T_odom_camera`` is the pose of the reference frame in the
+    frame of its session, and says something about another keyframe of the same session only: the odometry's where
+    ``by_odometry``, else that of our own tracking, which may slip unnoticed.
     """
 
     keyframe_id: int
@@ -66,6 +67,7 @@ class Keyframe:
     gravity: Array | None
     gravity_confidence: float
     T_odom_camera: Array | None
+    by_odometry: bool = False
 
     @property
     def labels(self) -> tuple[str, ...]:

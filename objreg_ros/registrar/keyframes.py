@@ -31,6 +31,7 @@ class Stretch:
     T_first_frame: tuple[Array, ...]
     T_session_first: Array
     session: int
+    by_odometry: bool = False
 
 
 @dataclass(slots=True, eq=False)
@@ -94,6 +95,7 @@ class Keyframer:
             T_first_frame=tuple(stretch.motions),
             T_session_first=stretch.T_session_first,
             session=self._session,
+            by_odometry=stretch.by_odometry,
         )
 
     def _begin(self, frame: Frame, T_session_frame: Array | None = None, by_odometry: bool = False) -> None:

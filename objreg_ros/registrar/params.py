@@ -43,7 +43,12 @@ class RegistrarParams(Params):
     )
     min_gap: float = param(2.0, "least time between the two moments of a constraint", "s", ge=0.0)
     odometry_radius: float = param(1.0, "stored objects of the session farther than this are not tried", "m", ge=0.0)
-    odometry_drift: float = param(0.1, "growth of that radius for each metre of path since then", "m/m", ge=0.0)
+    odometry_translation_noise: float = param(0.03, "standard deviation of odometry over no distance", "m", ge=0.0)
+    odometry_rotation_noise: float = param(1.0, "standard deviation of odometry over no distance", "deg", ge=0.0)
+    odometry_drift: float = param(0.1, "growth of the first two with each metre of path", "m/m", ge=0.0)
+    odometry_rotation_drift: float = param(0.05, "growth of the third with each degree turned", "deg/deg", ge=0.0)
+    prior_translation: float = param(0.20, "odometry less certain than this proposes no pose", "m", ge=0.0)
+    prior_rotation: float = param(6.0, "odometry less certain than this proposes no pose", "deg", ge=0.0)
     thin_seconds: float = param(1.0, "closures whose both ends are nearer than this are one closure", "s", ge=0.0)
     candidates: int = param(6, "stored keyframes that are tried for each new one, best first", ge=1, le=100)
 

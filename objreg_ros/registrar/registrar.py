@@ -23,8 +23,9 @@ from objreg_ros.registrar.gate import Refusal, judge
 from objreg_ros.registrar.keyframe import Keyframe
 from objreg_ros.registrar.keyframes import Keyframer, Stretch
 from objreg_ros.registrar.landmarks import Landmark, Landmarks, Link
+from objreg_ros.registrar.odometry import Path
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.retrieve import Index
+from objreg_ros.registrar.retrieve import Index, Place
 from objreg_ros.registrar.sighting import Sighting, sightings_of
 from objreg_ros.registrar.store import Store
 from objreg_ros.registrar.thinning import Thinning
@@ -62,14 +63,14 @@ class Registrar:
         self._index = Index(self.params)
         self._index.add(self._store.sightings())
         self._landmarks = Landmarks(self.params, self._store.sightings())
+        self._known = self._landmarks.known()
         self._thinning = Thinning(self.params.thin_seconds, ((c.from_ns, c.to_ns) for c in self._store.closures()))
-        self._path = _Path()
+        self._path = Path()
 
     @property
     def landmarks(self) -> tuple[Landmark, ...]:
         """Every known object with its id, label and position in the frame of its session, the oldest first."""
-        with self._lock:
-            return self._landmarks.known()
+        return self._known
 
     def counts(self) -> dict[str, int]:
         """How many keyframes, objects, landmarks, sessions and closures the store holds."""
@@ -100,7 +101,8 @@ class Registrar:
         with self._lock:
             keyframe = fuse(stretch, self.params)
             keyframe = keyframe.numbered(self._store.next_keyframe(), self._first_session + stretch.session)
-            sightings = sightings_of(keyframe, self._path.reach(keyframe))
+            self._path.follow(keyframe)
+            sightings = sightings_of(keyframe, self._path.travelled, self._path.turned)
             accepted, rejected = self._try_places(keyframe, sightings, deadline)
             closures = self._remember(keyframe, sightings, accepted)
             return Outcome(closures=closures, rejected=rejected, keyframe_ns=keyframe.stamp_ns)
@@ -128,25 +130,35 @@ class Registrar:
         accepted: list[_Accepted] = []
         rejected: list[Rejected] = []
         refuse = _refuser(rejected, keyframe)
-        ranked = self._index.query(sightings)
-        if not ranked:
+        places = self._index.query(sightings)
+        if not places:
             refuse(keyframe.stamp_ns, (Reason.NO_CANDIDATE, "no stored keyframe has such objects"))
-        for keyframe_id, _ in ranked:
-            target = self._store.keyframe(keyframe_id)
-            verdict = self._try_place(keyframe, target, deadline)
-            if isinstance(verdict, Candidate):
-                accepted.append(_Accepted(target=target, candidate=verdict))
-                self._thinning.accept(target.stamp_ns, keyframe.stamp_ns)
+        tries = self.params.candidates
+        for place in places:
+            if self._thinning.redundant(place.stamp_ns, keyframe.stamp_ns):
+                refuse(place.stamp_ns, (Reason.REDUNDANT, "a closure of the same two moments was accepted"))
+            elif tries == 0:
+                break
             else:
-                refuse(target.stamp_ns, verdict)
+                tries -= 1
+                verdict = self._try_place(keyframe, place, deadline)
+                if isinstance(verdict, _Accepted):
+                    accepted.append(verdict)
+                else:
+                    refuse(place.stamp_ns, verdict)
         return accepted, tuple(rejected)
 
-    def _try_place(self, keyframe: Keyframe, target: Keyframe, deadline: float) -> Candidate | Refusal:
-        if self._thinning.redundant(target.stamp_ns, keyframe.stamp_ns):
-            return Reason.REDUNDANT, "a closure of the same two moments was accepted"
+    def _try_place(self, keyframe: Keyframe, place: Place, deadline: float) -> _Accepted | Refusal:
         if time.monotonic() > deadline:
             return Reason.OVER_BUDGET, "not reached in time"
-        return judge(self._engine.propose(keyframe, target), self.params)
+        target = self._store.keyframe(place.keyframe_id)
+        prior = self._path.prior(keyframe, target, place.travelled, place.turned, self.params)
+        start = prior.T_target_source if prior is not None and prior.tight(self.params) else None
+        verdict = judge(self._engine.propose(keyframe, target, start), self.params, prior)
+        if not isinstance(verdict, Candidate):
+            return verdict
+        self._thinning.accept(target.stamp_ns, keyframe.stamp_ns)
+        return _Accepted(target=target, candidate=verdict)
 
     def _remember(
         self, keyframe: Keyframe, sightings: Sequence[Sighting], accepted: Sequence[_Accepted]
@@ -157,6 +169,7 @@ class Registrar:
         closures = tuple(closure_of(keyframe, named, item, self.params) for item in accepted)
         self._store.add(keyframe, named, closures, merged)
         self._landmarks.add(named, merged)
+        self._known = self._landmarks.known()
         self._index.add(named)
         spare = self._landmarks.surplus(sighting.landmark for sighting in named)
         if spare:
@@ -174,25 +187,6 @@ class Registrar:
             )
             for pair in item.candidate.explained
         ]
-
-
-class _Path:
-    """How far the camera has gone in its session, over the keyframes."""
-
-    def __init__(self) -> None:
-        self._session = -1
-        self._position = np.zeros(3)
-        self._travelled = 0.0
-
-    def reach(self, keyframe: Keyframe) -> float:
-        """Go on to a keyframe; returns the m of path until there."""
-        position = np.zeros(3) if keyframe.T_odom_camera is None else keyframe.T_odom_camera[:3, 3]
-        if keyframe.session != self._session:
-            self._session, self._travelled = keyframe.session, 0.0
-        else:
-            self._travelled += float(np.linalg.norm(position - self._position))
-        self._position = np.array(position)
-        return self._travelled
 
 
 def closure_of(

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,17 @@ from objreg_ros.registrar.sighting import Sighting
 
 LIKENESS = 0.5  # distance of descriptors at which a vote falls to 0.6
 SHORTLIST = 64  # votes that one object may give
+SPARE = 4  # keyframes that a query names for each one that is tried
+
+
+class Place(NamedTuple):
+    """A stored keyframe that may show what a new one shows, with the votes of its objects."""
+
+    keyframe_id: int
+    stamp_ns: int
+    travelled: float
+    turned: float
+    votes: float
 
 
 @dataclass(slots=True, eq=False)
@@ -31,12 +43,13 @@ class _Block:
     descriptor: Array = field(default_factory=lambda: np.zeros((64, SIZE), np.float32))
     half_norm: Array = field(default_factory=lambda: np.zeros(64, np.float32))
     position: Array = field(default_factory=lambda: np.zeros((64, 3), np.float32))
-    travelled: Array = field(default_factory=lambda: np.zeros(64, np.float32))
+    travelled: Array = field(default_factory=lambda: np.zeros(64))
+    turned: Array = field(default_factory=lambda: np.zeros(64))
     stamp_ns: Array = field(default_factory=lambda: np.zeros(64, np.int64))
     session: Array = field(default_factory=lambda: np.zeros(64, np.int32))
     keyframe_id: Array = field(default_factory=lambda: np.zeros(64, np.int64))
 
-    COLUMNS = ("descriptor", "half_norm", "position", "travelled", "stamp_ns", "session", "keyframe_id")
+    COLUMNS = ("descriptor", "half_norm", "position", "travelled", "turned", "stamp_ns", "session", "keyframe_id")
 
     def append(self, row: Sighting) -> None:
         if self.size == len(self.keyframe_id):
@@ -46,7 +59,7 @@ class _Block:
         i, self.size = self.size, self.size + 1
         self.descriptor[i], self.half_norm[i] = row.descriptor, 0.5 * float(row.descriptor @ row.descriptor)
         self.position[i], self.travelled[i], self.stamp_ns[i] = row.position, row.travelled, row.stamp_ns
-        self.session[i], self.keyframe_id[i] = row.session, row.keyframe_id
+        self.turned[i], self.session[i], self.keyframe_id[i] = row.turned, row.session, row.keyframe_id
 
     def remove(self, keyframe_ids: Iterable[int]) -> None:
         kept = np.flatnonzero(~np.isin(self.keyframe_id[: self.size], list(keyframe_ids)))
@@ -77,17 +90,21 @@ class Index:
         for block in self._blocks.values():
             block.remove(keyframe_ids)
 
-    def query(self, sightings: Sequence[Sighting]) -> list[tuple[int, float]]:
-        """(keyframe_id, votes) for the objects of a new keyframe, best first, at most ``candidates``; may be empty."""
-        votes: dict[int, float] = {}
-        moments: dict[int, int] = {}
-        for sighting in sightings:
-            for keyframe_id, stamp_ns, vote in self._votes(sighting):
-                votes[keyframe_id] = votes.get(keyframe_id, 0.0) + vote
-                moments[keyframe_id] = stamp_ns
-        return self._spread(sorted(votes.items(), key=lambda item: (-item[1], item[0])), moments)
+    def query(self, sightings: Sequence[Sighting]) -> list[Place]:
+        """Places for the objects of a new keyframe, the most promising first; may be empty.
 
-    def _votes(self, row: Sighting) -> list[tuple[int, int, float]]:
+        There are more than ``candidates``, so that those which turn out to be redundant have successors.
+        """
+        found: dict[int, Place] = {}
+        for sighting in sightings:
+            for place in self._votes(sighting):
+                before = found.get(place.keyframe_id)
+                found[place.keyframe_id] = place._replace(votes=place.votes + (before.votes if before else 0.0))
+        places = list(found.values())
+        places.sort(key=lambda place: (-place.votes, place.keyframe_id))
+        return self._spread(places[: SPARE * self._params.candidates])
+
+    def _votes(self, row: Sighting) -> list[Place]:
         """At most one vote a keyframe: its likest object's."""
         block = self._blocks.get(self._groups.of(row.label))
         if block is None or block.size == 0:
@@ -101,7 +118,9 @@ class Index:
         squared = np.maximum(float(row.descriptor @ row.descriptor) - 2.0 * likeness[best].astype(float), 0.0)
         vote = np.exp(-0.5 * squared / LIKENESS**2) * np.log(2.0 + len(self) / n)
         ids, first = np.unique(block.keyframe_id[best], return_index=True)
-        return [(int(k), int(block.stamp_ns[best[i]]), float(vote[i])) for k, i in zip(ids, first, strict=True)]
+        rows = best[first]
+        columns = (ids, block.stamp_ns[rows], block.travelled[rows], block.turned[rows], vote[first])
+        return [Place(*values) for values in zip(*(column.tolist() for column in columns), strict=True)]
 
     def _allowed(self, block: _Block, row: Sighting) -> Array:
         n, params = block.size, self._params
@@ -110,14 +129,12 @@ class Index:
         gone = np.square(block.position[:n] - row.position.astype(np.float32)).sum(axis=1) > np.square(reach)
         return np.asarray(apart & ~(gone & (block.session[:n] == row.session)))
 
-    def _spread(self, ranked: list[tuple[int, float]], moments: dict[int, int]) -> list[tuple[int, float]]:
+    def _spread(self, places: list[Place]) -> list[Place]:
         """The best of each moment first: neighbours of a chosen keyframe come after every other place."""
-        chosen: list[tuple[int, float]] = []
-        later: list[tuple[int, float]] = []
-        spacing = round(0.5e9 * self._params.thin_seconds)
-        for item in ranked:
-            near = any(abs(moments[item[0]] - moments[k]) < spacing for k, _ in chosen)
-            (later if near else chosen).append(item)
-            if len(chosen) == self._params.candidates:
-                break
-        return (chosen + later)[: self._params.candidates]
+        chosen: list[Place] = []
+        later: list[Place] = []
+        spacing = round(1e9 * self._params.thin_seconds)
+        for place in places:
+            near = any(abs(place.stamp_ns - other.stamp_ns) < spacing for other in chosen)
+            (later if near else chosen).append(place)
+        return chosen + later

@@ -31,7 +31,8 @@ CACHED = 64  # decoded keyframes in memory, about 1 MB each
 SCHEMA = """
 CREATE TABLE keyframe (
   id INTEGER PRIMARY KEY AUTOINCREMENT, session INTEGER NOT NULL, stamp_ns INTEGER NOT NULL, frame_id TEXT NOT NULL,
-  travelled REAL NOT NULL, T_odom_camera BLOB, gravity BLOB, gravity_confidence REAL NOT NULL,
+  travelled REAL NOT NULL, turned REAL NOT NULL, T_odom_camera BLOB, by_odometry INTEGER NOT NULL,
+  gravity BLOB, gravity_confidence REAL NOT NULL,
   camera TEXT NOT NULL, view BLOB NOT NULL, context BLOB NOT NULL);
 CREATE TABLE object (
   id INTEGER PRIMARY KEY, keyframe INTEGER NOT NULL REFERENCES keyframe ON DELETE CASCADE,
@@ -46,7 +47,7 @@ CREATE TABLE closure (
 """
 SIGHTINGS = (
     "SELECT object.keyframe, session, stamp_ns, instance, label, score, descriptor, position, object.camera,"
-    " travelled, landmark, R_landmark_session FROM object JOIN keyframe ON keyframe.id = object.keyframe"
+    " travelled, turned, landmark, R_landmark_session FROM object JOIN keyframe ON keyframe.id = object.keyframe"
 )
 
 
@@ -82,7 +83,7 @@ class Store:
         ``merged`` says which landmarks became which: known objects that turned out to be the same.
         """
         with self._connection as transaction:
-            _insert(transaction, "keyframe", keyframe_row(keyframe, sightings[0].travelled if sightings else 0.0))
+            _insert(transaction, "keyframe", keyframe_row(keyframe, sightings))
             for item, sighting in zip(keyframe.objects, sightings, strict=True):
                 _insert(transaction, "object", object_row(item, sighting))
             for closure in closures:

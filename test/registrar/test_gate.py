@@ -9,6 +9,7 @@ import pytest
 from objreg_ros.data import Reason
 from objreg_ros.registrar.candidate import ObjectPair
 from objreg_ros.registrar.gate import judge, refuse
+from objreg_ros.registrar.odometry import Prior
 from objreg_ros.registrar.params import RegistrarParams
 
 from .samples import candidate, moved
@@ -61,10 +62,14 @@ def test_a_moved_object_is_outvoted_by_those_that_stayed() -> None:
     assert refuse(candidate(moved=(ObjectPair(2, 2, "bottle"),)), PARAMS) is None
 
 
-def test_a_pose_far_from_tight_odometry_is_refused() -> None:
-    near, far = (moved(0.05), 1.0, 5.0), (moved(1.0), 1.0, 5.0)
-    assert refuse(candidate(), PARAMS, near) is None
-    refusal = refuse(candidate(), PARAMS, far)
+def _prior(x: float, trusted: bool = True) -> Prior:
+    return Prior(T_target_source=moved(x), rotation_deg=1.0, translation_m=0.05, trusted=trusted)
+
+
+def test_a_pose_far_from_odometry_is_refused_unless_it_is_our_own_tracking() -> None:
+    assert refuse(candidate(), PARAMS, _prior(0.05)) is None
+    assert refuse(candidate(), PARAMS, _prior(1.0, trusted=False)) is None
+    refusal = refuse(candidate(), PARAMS, _prior(1.0))
     assert refusal is not None and refusal[0] is Reason.ODOMETRY
 
 

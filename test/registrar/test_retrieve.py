@@ -31,7 +31,7 @@ CUP, BOOK, CHAIR = box("cup", (0, 0, 1)), box("book", (0.3, 0, 1), 0.2), box("ch
 
 def test_a_place_with_the_same_objects_comes_first() -> None:
     index = _index(_seen(1, 0, CHAIR), _seen(2, 10, CUP, BOOK), _seen(3, 20, BOOK))
-    found = [number for number, _ in index.query(_seen(9, 100, CUP, BOOK))]
+    found = [place.keyframe_id for place in index.query(_seen(9, 100, CUP, BOOK))]
     assert found == [2, 3]
 
 
@@ -42,37 +42,37 @@ def test_an_empty_index_and_a_keyframe_of_unknown_objects_find_nothing() -> None
 
 def test_confusable_labels_find_each_other() -> None:
     index = _index(_seen(1, 0, CUP))
-    assert [k for k, _ in index.query(_seen(9, 100, box("mouse", (0, 0, 1))))] == [1]
+    assert [place.keyframe_id for place in index.query(_seen(9, 100, box("mouse", (0, 0, 1))))] == [1]
 
 
 def test_what_was_seen_a_moment_ago_is_no_loop() -> None:
     index = _index(_seen(1, 0, CUP), _seen(2, 9.5, CUP))
-    assert [k for k, _ in index.query(_seen(9, 10, CUP))] == [1]
+    assert [place.keyframe_id for place in index.query(_seen(9, 10, CUP))] == [1]
 
 
 def test_odometry_takes_out_what_cannot_be_there_in_the_same_session_only() -> None:
     params = PARAMS.replaced(odometry_radius=1.0, odometry_drift=0.1)
     index = _index(_seen(1, 0, CUP, x=8.0), _seen(2, 10, CUP, session=1, x=8.0), params=params)
-    assert [k for k, _ in index.query(_seen(9, 30, CUP))] == [2]
+    assert [place.keyframe_id for place in index.query(_seen(9, 30, CUP))] == [2]
     wide = _index(_seen(1, 0, CUP, x=8.0), params=params.replaced(odometry_drift=1.0))
-    assert [k for k, _ in wide.query(_seen(9, 30, CUP))] == [1]
+    assert [place.keyframe_id for place in wide.query(_seen(9, 30, CUP))] == [1]
 
 
 def test_an_object_of_another_size_or_colour_gets_a_lower_vote() -> None:
     index = _index(_seen(1, 0, box("box", (0, 0, 1), 0.4)), _seen(2, 10, box("box", (0, 0, 1), 0.1)))
     ranked = index.query(_seen(9, 100, box("box", (0, 0, 1), 0.1)))
-    assert [k for k, _ in ranked] == [2, 1] and ranked[0][1] > 2 * ranked[1][1]
+    assert [place.keyframe_id for place in ranked] == [2, 1] and ranked[0].votes > 2 * ranked[1].votes
 
 
 def test_neighbours_of_a_chosen_keyframe_give_way_to_other_moments() -> None:
     index = _index(_seen(1, 0.0, CUP), _seen(2, 0.1, CUP), _seen(3, 0.2, CUP), _seen(4, 10, CUP))
-    assert [k for k, _ in index.query(_seen(9, 100, CUP))] == [1, 4, 2]
+    assert [place.keyframe_id for place in index.query(_seen(9, 100, CUP))] == [1, 4, 2, 3]
 
 
 def test_a_removed_keyframe_is_not_found_again() -> None:
     index = _index(_seen(1, 0, CUP), _seen(2, 10, CUP, BOOK))
     index.remove([2])
-    assert len(index) == 1 and [k for k, _ in index.query(_seen(9, 100, CUP, BOOK))] == [1]
+    assert len(index) == 1 and [place.keyframe_id for place in index.query(_seen(9, 100, CUP, BOOK))] == [1]
 
 
 def test_many_objects_give_the_same_answer_in_any_growth_of_the_index() -> None:
@@ -81,4 +81,4 @@ def test_many_objects_give_the_same_answer_in_any_growth_of_the_index() -> None:
     many = [_seen(i, 10.0 * i, box("box", (0, 0, 1), float(size))) for i, size in enumerate(sizes)]
     index = _index(*many, params=PARAMS.replaced(candidates=1))
     wanted = int(np.argmin(np.abs(sizes - 0.3)))
-    assert index.query(_seen(999, 1e5, box("box", (0, 0, 1), float(sizes[wanted]))))[0][0] == wanted
+    assert index.query(_seen(999, 1e5, box("box", (0, 0, 1), float(sizes[wanted]))))[0].keyframe_id == wanted

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What odometry says of two keyframes of one session, and how far it may be wrong by then."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.geometry import inverse, rotation_angle
+from objreg_ros.registrar.keyframe import Keyframe
+from objreg_ros.registrar.params import RegistrarParams
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Prior:
+    """``T_target_source`` as odometry expects it, with standard deviations that grow with the path in between.
+
+    ``trusted`` is False where the pose comes from our own tracking, which may have slipped unnoticed: then it may
+    propose, but nothing is refused because of it.
+    """
+
+    T_target_source: Array
+    rotation_deg: float
+    translation_m: float
+    trusted: bool
+
+    def tight(self, params: RegistrarParams) -> bool:
+        """Whether a registration may start from it."""
+        return self.translation_m <= params.prior_translation and self.rotation_deg <= params.prior_rotation
+
+
+class Path:
+    """The camera's way through a session, over the keyframes: how far it has gone and turned."""
+
+    def __init__(self) -> None:
+        self._session: int | None = None
+        self._T_session_camera: Array = np.eye(4)
+        self.travelled = 0.0
+        self.turned = 0.0
+
+    def follow(self, keyframe: Keyframe) -> None:
+        """Go on to a keyframe; another session starts at 0."""
+        T_session_camera = np.eye(4) if keyframe.T_odom_camera is None else keyframe.T_odom_camera
+        if keyframe.session != self._session:
+            self._session, self.travelled, self.turned = keyframe.session, 0.0, 0.0
+        else:
+            motion = inverse(self._T_session_camera) @ T_session_camera
+            self.travelled += float(np.linalg.norm(motion[:3, 3]))
+            self.turned += float(np.degrees(rotation_angle(motion[:3, :3])))
+        self._T_session_camera = T_session_camera
+
+    def prior(
+        self, source: Keyframe, target: Keyframe, travelled: float, turned: float, params: RegistrarParams
+    ) -> Prior | None:
+        """What is expected between the newest keyframe and one at which the path was ``travelled`` and ``turned`` long.
+
+        None where the two are of different sessions.
+        """
+        if source.session != target.session or source.T_odom_camera is None or target.T_odom_camera is None:
+            return None
+        way, turn = self.travelled - travelled, self.turned - turned
+        return Prior(
+            T_target_source=inverse(target.T_odom_camera) @ source.T_odom_camera,
+            rotation_deg=params.odometry_rotation_noise + params.odometry_rotation_drift * turn,
+            translation_m=params.odometry_translation_noise + params.odometry_drift * way,
+            trusted=source.by_odometry and target.by_odometry,
+        )
