@@ -53,7 +53,8 @@ class Graph:
         return [sys.executable, "-m", f"objreg_ros.{room}.node", "--ros-args", *arguments]
 
     def environment(self) -> dict[str, str]:
-        return {**os.environ, "ROS_DOMAIN_ID": str(self.domain), "PYTHONPATH": str(REPOSITORY)}
+        path = os.pathsep.join(filter(None, (str(REPOSITORY), os.environ.get("PYTHONPATH"))))
+        return {**os.environ, "ROS_DOMAIN_ID": str(self.domain), "PYTHONPATH": path}
 
     def start(self, name: str, room: str, *ros_args: str) -> None:
         """Start a node as a process; its output goes to `log`."""

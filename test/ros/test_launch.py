@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The launch files: what they make of their arguments, and that the nodes come up and go down with them."""
+
+from __future__ import annotations
+
+import runpy
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("launch_ros", reason="launch and launch_ros are not installed")
+
+from .graph import START_S, Graph
+
+pytestmark = pytest.mark.ros
+
+PROGRAM = """
+import sys
+from launch import LaunchDescription, LaunchService
+from launch.actions import IncludeLaunchDescription
+from launch.launch_description_sources import PythonLaunchDescriptionSource
+source = PythonLaunchDescriptionSource(sys.argv[1])
+arguments = [tuple(word.split(":=", 1)) for word in sys.argv[2:]]
+service = LaunchService()
+service.include_launch_description(LaunchDescription([IncludeLaunchDescription(source, launch_arguments=arguments)]))
+sys.exit(service.run())
+"""
+
+
+@pytest.fixture
+def said(repository: Path) -> dict[str, Any]:
+    """The arguments of objreg.launch.py when nothing is said."""
+    file = launch_file(repository)
+    return dict.fromkeys(file["OPTIONS"], "") | {topic: topic for topic in file["TOPICS"]}
+
+
+def launch_file(repository: Path) -> dict[str, Any]:
+    return runpy.run_path(str(repository / "launch" / "objreg.launch.py"))
+
+
+def test_without_arguments_no_parameter_is_set_and_nothing_is_remapped(repository: Path, said: dict[str, Any]) -> None:
+    file = launch_file(repository)
+    assert file["_remappings"](said) == [] and all(file["_parameters"](room, said) == [] for room in file["ROOMS"])
+
+
+def test_an_image_is_remapped_with_its_compressed_form(repository: Path, said: dict[str, Any]) -> None:
+    rules = launch_file(repository)["_remappings"]({**said, "image": "/kinect/rgb"})
+    assert rules == [("image", "/kinect/rgb"), ("image/compressed", "/kinect/rgb/compressed")]
+
+
+def test_what_is_said_goes_over_the_users_file_and_only_the_detector_has_a_model(
+    repository: Path, said: dict[str, Any]
+) -> None:
+    parameters = launch_file(repository)["_parameters"]
+    given = {**said, "params_file": "my.yaml", "model": "my.onnx", "reliable": "true"}
+    assert parameters("detector", given) == ["my.yaml", {"reliable": True, "model": "my.onnx"}]
+    assert parameters("segmenter", given) == ["my.yaml", {"reliable": True}]
+
+
+def test_the_nodes_of_a_launch_live_in_its_namespace_and_end_with_it(
+    graph: Graph, repository: Path, tiny_model: Path, tmp_path: Path
+) -> None:
+    command = [sys.executable, "-c", PROGRAM, str(repository / "launch" / "objreg.launch.py")]
+    with (tmp_path / "log").open("w") as log:
+        launched = subprocess.Popen(
+            [*command, "namespace:=robot", f"model:={tiny_model}", "use_sim_time:=false"],
+            env={**graph.environment(), "ROS_LOG_DIR": str(tmp_path)}, cwd=repository, stdout=log, stderr=log,
+        )  # fmt: skip
+    try:
+        names = {f"/robot/{room}" for room in ("detector", "segmenter", "registrar")}
+        graph.wait_for(lambda: names <= set(graph.books), START_S, f"diagnostics of {names}")
+    finally:
+        launched.send_signal(signal.SIGINT)
+        launched.wait(START_S)
+    said = (tmp_path / "log").read_text()
+    assert said.count("process has finished cleanly") == 3, said
