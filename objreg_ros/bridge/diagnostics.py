@@ -14,6 +14,7 @@ from objreg_ros.bridge.ledger import Balance
 DROPPED = "dropped: "
 LOST = "lost in transport: "
 LATENCY = "latency "
+REJECTED = "rejected: "
 
 
 def diagnostic(

@@ -18,6 +18,7 @@ from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import MarkerArray
 
 from objreg_ros.bridge import from_msg, qos, to_msg
+from objreg_ros.bridge.diagnostics import REJECTED
 from objreg_ros.bridge.door import DroppedError
 from objreg_ros.bridge.markers import Scene
 from objreg_ros.bridge.matching import MatchingDoor
@@ -131,7 +132,7 @@ class RegistrarNode(MatchingDoor):
     def extra_diagnostics(self) -> Mapping[str, object]:
         """What is stored, what was accepted, and what was refused by reason."""
         stored = {f"stored {what}": count for what, count in self._counts.items()}
-        refused = {f"rejected: {reason}": count for reason, count in sorted(self._refused.items())}
+        refused = {f"{REJECTED}{reason}": count for reason, count in sorted(self._refused.items())}
         return {**super().extra_diagnostics(), **stored, "constraints": self._accepted, **refused}
 
     # Services

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A node that listens to the whole graph: what came out, the books of every node, the frame with most objects."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import Odometry
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from objreg_ros.bridge import from_msg, qos
+from objreg_ros.bridge.diagnostics import REJECTED, balance_of
+from objreg_ros.bridge.ledger import Balance
+from objreg_ros.data import Detections, LoopClosure, ObjectCloud
+
+RECENT = 100  # detections that wait for their objects
+KEPT_CONSTRAINTS = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """One frame as the graph saw it."""
+
+    detections: Detections
+    objects: tuple[ObjectCloud, ...]
+    stamp_ns: int
+
+
+class Collector(Node):
+    """Collects while `spin_until` runs."""
+
+    def __init__(self, context: Context) -> None:
+        super().__init__("collector", context=context)
+        self.books: dict[str, Balance] = {}
+        self.rejected: dict[str, int] = {}
+        self.closures: list[LoopClosure] = []
+        self.sight: Sight | None = None
+        self._names: Mapping[int, str] = {}
+        self._recent: deque[Detections] = deque(maxlen=RECENT)
+        self._executor = SingleThreadedExecutor(context=context)
+        self._executor.add_node(self)
+        self._listen()
+
+    def _listen(self) -> None:
+        self.create_subscription(DiagnosticArray, "/diagnostics", self._hear_books, qos.room(depth=100))
+        self.create_subscription(Odometry, "constraints", self._hear_constraint, qos.latched(KEPT_CONSTRAINTS))
+        self.create_subscription(String, "labels", self._hear_labels, qos.latched())
+        self.create_subscription(PointCloud2, "detections_table", self._hear_detections, qos.room())
+        self.create_subscription(PointCloud2, "objects", self._hear_objects, qos.room())
+
+    def spin_until(self, true: Callable[[], bool], seconds: float) -> bool:
+        """Let messages come in until something is true or the time is over; whether it became true."""
+        deadline = time.monotonic() + seconds
+        while not true() and time.monotonic() < deadline:
+            self._executor.spin_once(timeout_sec=0.05)
+        return true()
+
+    def call(self, service: str, seconds: float) -> str:
+        """Call a Trigger service; its message, empty if it did not answer in time."""
+        client = self.create_client(Trigger, service)
+        if not self.spin_until(client.service_is_ready, seconds):
+            return ""
+        future = client.call_async(Trigger.Request())
+        return str(future.result().message) if self.spin_until(future.done, seconds) else ""
+
+    def close(self) -> None:
+        """End the node."""
+        self._executor.shutdown()
+        self.destroy_node()
+
+    def _hear_books(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.hardware_id == "objreg_ros":
+                self.books[status.name.removesuffix(": frames")] = balance_of(status)
+                refused = {v.key: int(v.value) for v in status.values if v.key.startswith(REJECTED)}
+                self.rejected.update({key.removeprefix(REJECTED): count for key, count in refused.items()})
+
+    def _hear_constraint(self, message: Any) -> None:
+        self.closures.append(from_msg.loop_closure(message))
+
+    def _hear_labels(self, message: Any) -> None:
+        self._names = from_msg.labels(message)
+
+    def _hear_detections(self, message: Any) -> None:
+        if message.width:
+            self._recent.append(from_msg.detections(message, self._names))
+
+    def _hear_objects(self, message: Any) -> None:
+        """Keep the frame with the most objects, and of those the latest."""
+        if not self._recent:
+            return
+        stamp_ns = from_msg.stamp_ns(message)
+        objects, _ = from_msg.objects(message, self._names)
+        if self.sight is None or len(objects) >= len(self.sight.objects):
+            seen = min(self._recent, key=lambda detections: abs(detections.stamp_ns - stamp_ns))
+            self.sight = Sight(seen, objects, stamp_ns)

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A recording through the live graph: three node processes, a player process, and a subscriber in this one."""
+
+from __future__ import annotations
+
+import os
+import random
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from objreg_ros.bridge.ledger import Balance
+from objreg_ros.cli.processes import Processes
+from objreg_ros.data import LoopClosure
+
+if TYPE_CHECKING:
+    from objreg_ros.bridge.collector import Collector, Sight
+
+ROOMS = ("detector", "segmenter", "registrar")
+START_S = 180.0  # a first start compiles kernels
+DRAIN_S = 120.0  # the last searches
+QUIET_S = 3.0  # nothing moved for so long: all is through
+
+
+@dataclass(frozen=True, slots=True)
+class Live:
+    """What came out of the live graph; ``books`` by node."""
+
+    books: Mapping[str, Balance]
+    rejected: Mapping[str, int]
+    closures: tuple[LoopClosure, ...]
+    sight: Sight | None
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """How the graph is started: ROS arguments of each node, and the player's options."""
+
+    node_args: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    replay_args: Sequence[str] = ()
+
+
+def run_live(recording: Path, setup: Setup, folder: Path, say: Callable[[str], None]) -> Live:
+    """Play a recording through the graph on a ROS domain of its own; ValueError if a process fails."""
+    environment = private_environment()
+    with Processes(folder, environment) as processes, _listening(environment) as collector:
+        for room in ROOMS:
+            arguments = ["--ros-args", *setup.node_args.get(room, ())] if setup.node_args.get(room) else []
+            processes.start(room, f"objreg_ros.{room}.node", arguments)
+        say("starting three nodes (the first time compiles for a minute)")
+        _wait_for_nodes(collector, processes)
+        say("playing")
+        player = processes.start(
+            "player", "objreg_ros.cli", ["replay", str(recording), *setup.replay_args], quiet=False
+        )
+        collector.spin_until(lambda: player.poll() is not None, float("inf"))
+        processes.require_alive()
+        say("waiting for the last frames")
+        _drain(collector)
+        books = {name.strip("/"): balance for name, balance in collector.books.items()}
+        return Live(books, collector.rejected, tuple(collector.closures), collector.sight)
+
+
+def private_environment() -> dict[str, str]:
+    """This process's environment with the DDS profile, and a domain of its own unless the user named one."""
+    from objreg_ros.bridge import profile
+
+    environment = dict(os.environ)
+    profile.apply(environment)
+    environment.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    environment.setdefault("ROS_DOMAIN_ID", str(random.randint(1, 100)))
+    return environment
+
+
+@contextmanager
+def _listening(environment: Mapping[str, str]) -> Iterator[Collector]:
+    """The collector for the time of a with block."""
+    os.environ.update(environment)  # DDS reads it here
+    from rclpy.context import Context
+
+    from objreg_ros.bridge.collector import Collector
+
+    context = Context()
+    context.init()
+    collector = Collector(context)
+    try:
+        yield collector
+    finally:
+        collector.close()
+        context.try_shutdown()
+
+
+def _wait_for_nodes(collector: Collector, processes: Processes) -> None:
+    def there() -> bool:
+        processes.require_alive()
+        return {f"/{room}" for room in ROOMS} <= set(collector.books)
+
+    if not collector.spin_until(there, START_S):
+        raise ValueError(f"expected {', '.join(ROOMS)} to report within {START_S:.0f} s, got {sorted(collector.books)}")
+
+
+def _drain(collector: Collector) -> None:
+    """Until no books move any more; then the registrar ends the keyframe in hand."""
+    while collector.spin_until(_movement(collector), _patience(collector)):
+        pass
+    collector.call("registrar/save", DRAIN_S)
+    collector.spin_until(_movement(collector), QUIET_S)
+
+
+def _movement(collector: Collector) -> Callable[[], bool]:
+    state = _state(collector)
+    return lambda: _state(collector) != state
+
+
+def _state(collector: Collector) -> Any:
+    return {name: (books.published, books.dropped) for name, books in collector.books.items()}
+
+
+def _patience(collector: Collector) -> float:
+    """A frame that is worked on may take long; one that waits for a partner may wait for ever."""
+    working = any(collector.books[f"/{room}"].waiting for room in ("detector", "registrar"))
+    return DRAIN_S if working else QUIET_S

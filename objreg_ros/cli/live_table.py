@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The table at the end of a live run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from objreg_ros.bridge.ledger import Balance
+from objreg_ros.cli.live import ROOMS, Live
+
+
+def lines(live: Live, sent: Mapping[str, int], truth: Mapping[str, Any]) -> Iterator[str]:
+    """The table, line by line.
+
+    ``sent`` is how many frames were sent to each node, ``truth`` as `objreg_ros.truth.summarise` gives it.
+    """
+    yield f"{'frames':<12}{'sent':>7}{'in':>7}{'out':>7}{'waiting':>9}  dropped"
+    for room in ROOMS:
+        yield _frames(room, sent[room], live.books[room])
+    yield ""
+    yield f"{'latency':<12}{'stage':<12}{'p50 ms':>9}{'p95 ms':>9}"
+    for room in ROOMS:
+        yield from _latencies(room, live.books[room])
+    yield ""
+    yield f"constraints: {len(live.closures)}"
+    yield f"rejected: {_counts(live.rejected)}"
+    yield _errors(truth)
+
+
+def _frames(room: str, sent: int, books: Balance) -> str:
+    dropped = dict(books.dropped)
+    if sent > books.received:
+        dropped["lost on the way"] = sent - books.received
+    return f"{room:<12}{sent:>7}{books.received:>7}{books.published:>7}{books.waiting:>9}  {_counts(dropped)}"
+
+
+def _counts(counts: Mapping[str, int]) -> str:
+    return ", ".join(f"{count} {reason}" for reason, count in sorted(counts.items())) or "–"
+
+
+def _latencies(room: str, books: Balance) -> Iterator[str]:
+    for stage, (p50, p95) in sorted(books.stage_ms.items(), key=lambda item: item[0] == "total"):
+        yield f"{room:<12}{stage:<12}{p50:>9.1f}{p95:>9.1f}"
+
+
+def _errors(truth: Mapping[str, Any]) -> str:
+    if not truth["count"]:
+        return "true error: no constraint, or no ground truth"
+    degrees, centimetres = truth["rotation_deg"], truth["translation_cm"]
+    return (
+        f"true error: {degrees['median']:.2f}° {centimetres['median']:.1f} cm median, "
+        f"{degrees['max']:.2f}° {centimetres['max']:.1f} cm at most; of {truth['count']} constraints "
+        f"{truth['strict']} within 3° and 5 cm, {truth['loose']} within 5° and 10 cm, {truth['false']} false"
+    )
+
+
+def require_balance(live: Live, sent: Mapping[str, int]) -> None:
+    """ValueError if a node received more than was sent to it, or if in is not out + waiting + dropped."""
+    for room in ROOMS:
+        books = live.books[room]
+        ended = books.published + books.waiting + sum(books.dropped.values())
+        if books.received != ended or books.received > sent[room]:
+            raise ValueError(
+                f"{room}: expected in = out + waiting + dropped and no more than the {sent[room]} that were sent, "
+                f"got {books.received} in and {ended} accounted for"
+            )

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Two pictures of a live run: what the graph saw in one frame, and the way with its closures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from objreg_ros.data import Array, Detections, Intrinsics, LoopClosure, ObjectCloud
+from objreg_ros.truth import FALSE, Truth, within
+
+GOLDEN_ANGLE = 137.508  # degrees of hue between one object and the next: neighbours never look alike
+RIGHT, WRONG, WAY = "#1a8a3c", "#d03b3b", "#8b8a83"
+
+
+def draw_sight(
+    file: Path, rgb: Array, camera: Intrinsics, detections: Detections, objects: Sequence[ObjectCloud]
+) -> None:
+    """Write the picture of one frame: boxes with names, and the points of each object in its colour."""
+    picture = np.ascontiguousarray(rgb[..., ::-1])
+    for item in objects:
+        _draw_points(picture, item.xyz, camera, _colour(item.instance))
+    for box, score, label in zip(detections.xyxy, detections.score, detections.label, strict=True):
+        _draw_box(picture, box, f"{label} {score:.2f}")
+    if not cv2.imwrite(str(file), picture):
+        raise OSError(f"{file}: expected a place that can be written to")
+
+
+def _colour(instance: int) -> tuple[int, int, int]:
+    hsv = np.array([[[int(instance * GOLDEN_ANGLE % 360 / 2), 200, 255]]], np.uint8)
+    b, g, r = (int(value) for value in cv2.cvtColor(hsv, cv2.COLOR_HSV2BGR)[0, 0])
+    return b, g, r
+
+
+def _draw_points(picture: Array, xyz: Array, camera: Intrinsics, colour: tuple[int, int, int]) -> None:
+    """Half transparent, so that what is under the points stays visible."""
+    x, y, z = xyz[xyz[:, 2] > 0].T
+    u = np.rint(camera.fx * x / z + camera.cx).astype(int)
+    v = np.rint(camera.fy * y / z + camera.cy).astype(int)
+    inside = (u >= 0) & (u < picture.shape[1]) & (v >= 0) & (v < picture.shape[0])
+    u, v = u[inside], v[inside]
+    picture[v, u] = (0.4 * picture[v, u] + 0.6 * np.array(colour)).astype(np.uint8)
+
+
+def _draw_box(picture: Array, xyxy: Array, name: str) -> None:
+    x_min, y_min, x_max, y_max = (round(float(value)) for value in xyxy)
+    cv2.rectangle(picture, (x_min, y_min), (x_max, y_max), (255, 255, 255), 1, cv2.LINE_AA)
+    for ink, width in (((0, 0, 0), 3), ((255, 255, 255), 1)):
+        place = (x_min + 3, max(y_min, 0) + 13)
+        cv2.putText(picture, name, place, cv2.FONT_HERSHEY_SIMPLEX, 0.42, ink, width, cv2.LINE_AA)
+
+
+def draw_way(file: Path, truth: Truth, closures: Sequence[LoopClosure]) -> None:
+    """Write the camera's way from above with its closures, green where they are true and red where they are false.
+
+    The plane is that of the two directions in which the way extends most. ValueError where the truth has no poses.
+    """
+    if not truth.poses:
+        raise ValueError("expected a recording with ground truth to draw its way")
+    from matplotlib.figure import Figure
+
+    positions = np.array([T[:3, 3] for T in truth.poses])
+    axes = np.linalg.svd(positions - positions.mean(axis=0), full_matrices=False)[2][:2]
+    figure = Figure(figsize=(8, 6), layout="constrained")
+    plot = figure.add_subplot(aspect="equal", xlabel="m", ylabel="m")
+    plot.plot(*(axes @ (positions - positions.mean(axis=0)).T), color=WAY, linewidth=1.5, label="way of the camera")
+    for closure in closures:
+        _draw_closure(plot, truth, closure, axes, positions.mean(axis=0))
+    plot.set_title(f"{len(closures)} constraints, green where true, red where false")
+    figure.savefig(file, dpi=120)
+
+
+def _draw_closure(plot: object, truth: Truth, closure: LoopClosure, axes: Array, middle: Array) -> None:
+    ends = [truth.at(stamp_ns) for stamp_ns in (closure.from_ns, closure.to_ns)]
+    error = truth.error(closure)
+    if error is None or any(end is None for end in ends):
+        return
+    flat = axes @ (np.array([T[:3, 3] for T in ends if T is not None]) - middle).T
+    colour = RIGHT if within(error, FALSE) else WRONG
+    plot.plot(*flat, color=colour, marker="o", markersize=3, linewidth=1.0)  # type: ignore[attr-defined]
