@@ -65,7 +65,7 @@ def fuse_objects(
             else:
                 free.remove(track)
                 track.sightings.append(sighting)
-    return tuple(track.fused(number, params.object_voxel) for number, track in enumerate(tracks, start=1))
+    return tuple(track.fused(number, params) for number, track in enumerate(tracks, start=1))
 
 
 def fuse_context(
@@ -102,7 +102,7 @@ class _Track:
 
     sightings: list[ObjectCloud] = field(default_factory=list)
 
-    def fused(self, instance: int, voxel: float) -> KeyObject:
+    def fused(self, instance: int, params: RegistrarParams) -> KeyObject:
         best = max(self.sightings, key=lambda s: s.score)
         whole = [s for s in self.sightings if not (s.has(PointFlag.CUT_BY_IMAGE) or s.has(PointFlag.CUT_BY_BOX))]
         kept = whole or self.sightings
@@ -110,13 +110,16 @@ class _Track:
         for sighting in self.sightings:
             votes[sighting.label] += round(1000 * sighting.score)
         label = max(votes, key=lambda name: (votes[name], name))
-        return KeyObject(cloud=_merge(kept, label, best, instance, voxel), sightings=len(self.sightings))
+        return KeyObject(cloud=_merge(kept, label, best, instance, params), sightings=len(self.sightings))
 
 
-def _merge(sightings: Sequence[ObjectCloud], label: str, best: ObjectCloud, instance: int, voxel: float) -> ObjectCloud:
-    """The first point of each voxel: a point keeps its own colour, normal and flags."""
+def _merge(
+    sightings: Sequence[ObjectCloud], label: str, best: ObjectCloud, instance: int, params: RegistrarParams
+) -> ObjectCloud:
+    """The first point of each voxel, and of those every so many: a point keeps its own colour, normal and flags."""
     xyz = np.concatenate([s.xyz for s in sightings])
-    first = np.sort(np.unique(_keys(xyz, voxel), return_index=True)[1])
+    first = np.unique(_keys(xyz, params.object_voxel), return_index=True)[1]
+    first = first[:: 1 + (len(first) - 1) // params.object_points]
     coloured = [s.rgb for s in sightings if s.rgb is not None]
     return ObjectCloud(
         label=label,

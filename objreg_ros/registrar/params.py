@@ -32,6 +32,7 @@ class RegistrarParams(Params):
     keyframe_min_objects: int = param(1, "least number of objects of a keyframe", ge=1)
     keyframe_frames: int = param(4, "most frames that are fused into one keyframe", ge=1, le=30)
     object_voxel: float = param(0.004, "edge of a voxel when sightings of an object are fused", "m", ge=0.001, le=0.05)
+    object_points: int = param(4000, "most points of an object that are kept", ge=100)
     context_radius: float = param(1.0, "how far around an object the context reaches", "m", ge=0.1)
     context_voxel: float = param(0.03, "edge of a voxel of the context", "m", ge=0.005, le=0.2)
     context_range: float = param(4.0, "context farther from the camera is left out", "m", ge=0.5)
@@ -68,6 +69,11 @@ class RegistrarParams(Params):
     agreement_rotation: float = param(5.0, "chains agree within this rotation", "deg", ge=0.0)
     agreement_translation: float = param(0.15, "chains agree within this distance", "m", ge=0.0)
     explained_distance: float = param(0.12, "an object is explained when the middles are this close", "m", ge=0.0)
+
+    # The founding method.
+    paper_distance: float = param(0.10, "pairs of points farther apart are rejected", "m", ge=0.001)
+    paper_iterations: int = param(100, "most iterations", ge=1)
+    paper_tolerance: float = param(1e-6, "change of the mean distance that ends the iterations", "m", ge=0.0)
 
     # What decides a closure. Below score_alone a closure needs agreement of chains or objects.
     min_tested: int = param(600, "least number of pixels that both views must see", ge=1)

@@ -24,6 +24,7 @@ from objreg_ros.registrar.keyframe import Keyframe
 from objreg_ros.registrar.keyframes import Keyframer, Stretch
 from objreg_ros.registrar.landmarks import Landmark, Landmarks, Link
 from objreg_ros.registrar.odometry import Path
+from objreg_ros.registrar.paper import PaperEngine
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.retrieve import Index, Place
 from objreg_ros.registrar.sighting import Sighting, sightings_of
@@ -51,7 +52,7 @@ class Registrar:
 
     def __init__(self, params: RegistrarParams) -> None:
         self.params = params
-        self._engine = Engine(params)
+        self._engine = PaperEngine(params) if params.method == "paper" else Engine(params)
         self._store = Store(params.store)
         self._lock = threading.RLock()
         self._start()

@@ -19,7 +19,8 @@ class Sighting:
 
     ``position (3,)`` of the object and ``camera (3,)`` of the camera, m; ``travelled`` m and ``turned`` degrees of the
     camera's path in the session until then; ``landmark`` the id that the object has wherever it is seen, 0 before it
-    has one; ``R_landmark_session (3, 3)`` turns this session's axes into those of the session that saw the landmark first.
+    has one; ``R_landmark_session (3, 3)`` turns this session's axes into those of the session that saw the landmark
+    first.
     """
 
     keyframe_id: int

@@ -90,3 +90,9 @@ def test_the_context_stays_within_its_radius_of_the_objects() -> None:
     )
     context = fuse(stretch, PARAMS.replaced(context_radius=0.5)).context
     assert len(context) > 0 and np.linalg.norm(context.xyz - (0, 0, 1.8), axis=1).max() < 0.56
+
+
+def test_a_large_object_is_thinned_to_the_points_that_are_kept() -> None:
+    many = cloud("chair", np.random.default_rng(0).random((5000, 3)))
+    (item,) = fuse_objects((frame(0, (many,)),), (np.eye(4),), PARAMS.replaced(object_points=1000))
+    assert 800 < len(item.cloud) <= 1000 and np.allclose(item.centroid, 0.5, atol=0.03)

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The founding method: exact where it can be, honest where it cannot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector, transform
+from objreg_ros.registrar.covariance import covariance_of
+from objreg_ros.registrar.paper import PaperEngine, register
+from objreg_ros.registrar.params import RegistrarParams
+
+from . import rooms
+
+PARAMS = RegistrarParams(method="paper")
+
+
+def _corner() -> np.ndarray:
+    """Points on three faces of a box: no motion leaves them upon themselves."""
+    u, v = np.random.default_rng(0).uniform(0.0, 0.2, (2, 900))
+    faces = [np.stack([u, 0.7 * v, 0 * u], 1), np.stack([u, 0 * u, v], 1), np.stack([0 * u, 0.6 * u, 0.8 * v], 1)]
+    return np.add(np.concatenate(faces), (0.1, -0.05, 1.0))
+
+
+@pytest.mark.parametrize("angle", [0.05, -0.1])
+def test_a_small_motion_of_the_same_points_is_found_exactly(angle: float) -> None:
+    T = pose(rotation_from_vector(np.array([0.0, angle, 0.02])), np.array([0.01, -0.01, 0.005]))
+    about = pose(np.eye(3), np.array([0.1, 0.0, 1.0]))
+    T = about @ T @ inverse(about)
+    source = _corner()
+    found = register(source, transform(T, source), np.eye(4), PARAMS)
+    assert found is not None and found.converged
+    rotation, distance = pose_error(found.T_target_source, T)
+    assert rotation < 0.1 and distance < 0.1 and found.rmse < 1e-3
+
+
+def test_a_start_from_the_truth_stays_there_and_its_covariance_is_valid() -> None:
+    T = pose(rotation_from_vector(np.array([0.0, 2.0, 0.0])), np.array([1.0, 0.0, 2.0]))
+    found = register(_corner(), transform(T, _corner()), T, PARAMS)
+    assert found is not None and np.allclose(found.T_target_source, T, atol=1e-9)
+    assert np.linalg.eigvalsh(covariance_of(found, PARAMS)).min() > 0
+
+
+def test_points_out_of_reach_of_each_other_give_nothing() -> None:
+    assert register(_corner(), np.add(_corner(), 5.0), np.eye(4), PARAMS) is None
+
+
+def test_correspondences_are_one_to_one() -> None:
+    source = np.array(
+        [[0, 0, 1], [0.001, 0, 1], [0.002, 0, 1]] + [[0.1 * i, 0.1 * i * i, 1] for i in range(1, 9)], float
+    )
+    target = source[2:]
+    found = register(source, target, np.eye(4), PARAMS.replaced(paper_distance=0.05))
+    assert found is not None and found.inliers == len(target)
+
+
+def test_it_proposes_one_pose_for_each_pair_of_one_label_with_the_evidence_of_the_views() -> None:
+    source, target = (rooms.keyframe(rooms.seen_from(angle)) for angle in (2.0, 0.0))
+    source, target = replace(source, keyframe_id=1), replace(target, keyframe_id=2)
+    found = PaperEngine(PARAMS).propose(source, target)
+    assert 1 <= len(found) <= len(target.objects)
+    assert {candidate.chain for candidate in found} == {"paper"}
+    scores = [candidate.verification.score for candidate in found]
+    assert scores == sorted(scores, reverse=True)
