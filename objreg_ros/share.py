@@ -34,10 +34,14 @@ def find(relative: str) -> Path:
     raise FileNotFoundError(f"{relative}: expected it at one of {places}; is {NAME} installed?")
 
 
+def user_models() -> Path:
+    """The folder of the user's own models, by the XDG base directory specification; it need not exist."""
+    return Path(os.environ.get("XDG_DATA_HOME") or "~/.local/share").expanduser() / NAME / "models"
+
+
 def model(name: str) -> Path:
     """A model by its path, or by its file name in the user's data folder or in models/; else FileNotFoundError."""
-    data = Path(os.environ.get("XDG_DATA_HOME", "~/.local/share")).expanduser() / NAME / "models" / name
-    for path in (Path(name).expanduser(), data):
+    for path in (Path(name).expanduser(), user_models() / name):
         if path.is_file():
             return path
     return find(f"models/{name}")
