@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Average precision of a detector against known boxes (Everingham et al., "The PASCAL VOC Challenge", 2010), with the
+area under the whole interpolated curve, as VOC since 2010 and COCO take it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from objreg_ros.data import Array, Detections
+from objreg_ros.detector.boxes import iou
+
+
+@dataclass(frozen=True)
+class TrueBoxes:
+    """What is in one image: ``xyxy (N, 4) float32`` pixels, N names, and ``difficult (N,) bool``.
+
+    A difficult box need not be found, and finding it is no error.
+    """
+
+    xyxy: Array
+    label: tuple[str, ...]
+    difficult: Array
+
+
+def average_precision(
+    seen: Sequence[Detections], truth: Sequence[TrueBoxes], label: str, least_iou: float = 0.5
+) -> float | None:
+    """The average precision 0..1 of one label over a set of images; None when no image has the label to be found.
+
+    Every box of ``truth`` is found at most once, by the best scored detection that overlaps it by ``least_iou``.
+    """
+    rows = [_judge(one, known, label, least_iou) for one, known in zip(seen, truth, strict=True)]
+    score, verdict = (np.concatenate(part) if rows else np.zeros(0) for part in zip(*rows, strict=True))
+    wanted = sum(_wanted(known, label) for known in truth)
+    if wanted == 0:
+        return None
+    counted = verdict >= 0
+    right = verdict[counted][np.argsort(-score[counted], kind="stable")]
+    found = np.cumsum(right)
+    return _area(found / wanted, found / np.arange(1, len(right) + 1))
+
+
+def _wanted(known: TrueBoxes, label: str) -> int:
+    of_label = np.array([name == label for name in known.label], bool)
+    return int((of_label & ~known.difficult).sum())
+
+
+def _judge(seen: Detections, known: TrueBoxes, label: str, least_iou: float) -> tuple[Array, Array]:
+    """Scores and verdicts (1 right, 0 wrong, -1 not counted) of the detections of ``label`` in one image."""
+    mine = np.flatnonzero([name == label for name in seen.label])
+    true = np.flatnonzero([name == label for name in known.label])
+    difficult = known.difficult[true]
+    overlap = iou(seen.xyxy[mine], known.xyxy[true])
+    free = ~difficult
+    verdict = np.zeros(len(mine), int)
+    for row in np.argsort(-seen.score[mine], kind="stable"):
+        candidates = np.where(free & (overlap[row] >= least_iou), overlap[row], -1)
+        if candidates.max(initial=-1) >= 0:
+            free[candidates.argmax()] = False
+            verdict[row] = 1
+        elif (overlap[row][difficult] >= least_iou).any():
+            verdict[row] = -1
+    return seen.score[mine].astype(float), verdict
+
+
+def _area(recall: Array, precision: Array) -> float:
+    """The area under precision over recall, precision made monotone from the right."""
+    envelope = np.maximum.accumulate(precision[::-1])[::-1]
+    return float((np.diff(recall, prepend=0.0) * envelope).sum())
