@@ -56,20 +56,26 @@ class StoreError(OSError):
 
 
 class Store:
-    """The store at ``path``, made if it is not there; in memory only if the path is empty. StoreError if it is bad."""
+    """The store at ``path``, made if it is not there; in memory only if the path is empty. StoreError if it is bad.
 
-    def __init__(self, path: str | Path = "") -> None:
+    With ``read_only`` nothing is made or changed, and a path without a store is a StoreError too.
+    """
+
+    def __init__(self, path: str | Path = "", read_only: bool = False) -> None:
         self.path = str(path)
-        if not self.path:
+        self._cache: OrderedDict[int, Keyframe] = OrderedDict()
+        if not self.path and not read_only:
             self._connection = _connect(":memory:")
             self._connection.executescript(_birth())
-        else:
-            if not Path(self.path).exists():
-                _create(Path(self.path))
-            _check(Path(self.path))
-            self._connection = _connect(self.path)
-        self._connection.execute("PRAGMA journal_mode = WAL")
-        self._cache: OrderedDict[int, Keyframe] = OrderedDict()
+            return
+        if not Path(self.path).is_file():
+            if read_only:
+                raise StoreError(f"{self.path}: expected a store of objreg_ros, got no file")
+            _create(Path(self.path))
+        _check(Path(self.path))
+        self._connection = _connect(_read_only_uri(Path(self.path)) if read_only else self.path)
+        if not read_only:
+            self._connection.execute("PRAGMA journal_mode = WAL")
 
     def add(
         self,
@@ -177,7 +183,7 @@ class Store:
 
 
 def _connect(path: str) -> sqlite3.Connection:
-    connection = sqlite3.connect(path, check_same_thread=False, timeout=5.0)
+    connection = sqlite3.connect(path, check_same_thread=False, timeout=5.0, uri=path.startswith("file:"))
     connection.row_factory = sqlite3.Row
     connection.execute("PRAGMA foreign_keys = ON")
     connection.execute("PRAGMA synchronous = FULL")
@@ -216,12 +222,16 @@ def _check(path: Path) -> None:
         raise StoreError(f"{path}: expected an intact store, got: {found}; it was left as it is. Use another path")
 
 
+def _read_only_uri(path: Path) -> str:
+    """Without a log beside it the file is all there is, and no helper files are made to read it."""
+    mode = "mode=ro" if path.with_name(path.name + "-wal").exists() else "mode=ro&immutable=1"
+    return f"{path.resolve().as_uri()}?{mode}"
+
+
 def _damage(path: Path) -> str:
     """What is wrong with the pages of a database, empty if nothing. Opens it for reading only."""
-    unwritten_log = path.with_name(path.name + "-wal").exists()
-    mode = "mode=ro" if unwritten_log else "mode=ro&immutable=1"
     try:
-        with closing(sqlite3.connect(f"{path.resolve().as_uri()}?{mode}", uri=True)) as connection:
+        with closing(sqlite3.connect(_read_only_uri(path), uri=True)) as connection:
             found = str(connection.execute("PRAGMA quick_check(1)").fetchone()[0])
     except sqlite3.DatabaseError as error:
         return str(error)

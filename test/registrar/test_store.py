@@ -134,6 +134,26 @@ def test_only_the_last_few_keyframes_stay_in_memory(monkeypatch: pytest.MonkeyPa
     assert len(store._cache) == 3
 
 
+def test_a_store_that_is_only_read_is_not_changed(tmp_path: Path) -> None:
+    path = tmp_path / "place.db"
+    store = Store(path)
+    _add(store)
+    store.close()
+    before = path.read_bytes()
+    reader = Store(path, read_only=True)
+    assert reader.keyframe(1).labels == ("cup",)
+    with pytest.raises(sqlite3.OperationalError):
+        _add(reader)
+    reader.close()
+    assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["place.db"]
+
+
+def test_a_missing_store_is_not_made_by_reading(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="got no file"):
+        Store(tmp_path / "nothing.db", read_only=True)
+    assert not list(tmp_path.iterdir())
+
+
 def _refused(path: Path, match: str) -> None:
     before = path.read_bytes()
     with pytest.raises(StoreError, match=match):

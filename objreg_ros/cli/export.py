@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`objreg export`: the objects of a store as PLY and JSON."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+from tqdm import tqdm
+
+from objreg_ros.registrar.export import export
+
+
+@click.command()
+@click.argument("store", type=click.Path(path_type=Path))
+@click.argument("folder", type=click.Path(file_okay=False, path_type=Path))
+def command(store: Path, folder: Path) -> None:
+    """Write the objects, contexts and closures of STORE into FOLDER, as PLY clouds and one map.json.
+
+    Clouds are in metres, in the frame of the session (of its odometry, or of its first camera). STORE is not changed.
+    """
+    written = 0
+    for _ in tqdm(export(store, folder), desc="write", unit=" files", disable=None):
+        written += 1
+    click.echo(f"wrote {written} files into {folder}")

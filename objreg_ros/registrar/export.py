@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A store as files that other programs read: PLY clouds and one JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from objreg_ros.data import Array, LoopClosure
+from objreg_ros.geometry import rotate, transform
+from objreg_ros.registrar.keyframe import Keyframe, KeyObject
+from objreg_ros.registrar.sighting import Sighting
+from objreg_ros.registrar.store import Store
+
+
+def export(path: str | Path, folder: str | Path) -> Iterator[Path]:
+    """Write the store at ``path`` into ``folder`` and yield each file as it is written. The store is not changed.
+
+    ``objects/<landmark>_<label>/keyframe_<id>.ply`` is one view of an object and ``contexts/keyframe_<id>.ply`` what
+    was around it, both in m in the frame of the session; ``map.json`` holds keyframes, objects and closures. StoreError
+    (an OSError) if it is no store or damaged.
+    """
+    store = Store(path, read_only=True)
+    try:
+        folder = Path(folder)
+        keyframes = []
+        for keyframe_id in store.keyframe_ids():
+            keyframe, sightings = store.keyframe(keyframe_id), list(store.sightings(keyframe_id))
+            yield from _write_clouds(folder, keyframe, sightings)
+            keyframes.append(_keyframe_json(keyframe, sightings))
+        closures = [_closure_json(closure) for closure in store.closures()]
+        yield _write_json(folder / "map.json", {"keyframes": keyframes, "closures": closures})
+    finally:
+        store.close()
+
+
+def write_ply(path: Path, xyz: Array, normals: Array, rgb: Array | None) -> Path:
+    """Write points as binary little-endian PLY with normals and, if there are any, colours."""
+    fields = [(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz")]
+    fields += [(name, "u1") for name in ("red", "green", "blue")] if rgb is not None else []
+    table = np.zeros(len(xyz), fields)
+    for k, name in enumerate(("x", "y", "z")):
+        table[name], table["n" + name] = xyz[:, k], normals[:, k]
+    for k, name in enumerate(("red", "green", "blue") if rgb is not None else ()):
+        table[name] = rgb[:, k]  # type: ignore[index]
+    kinds = {"<f4": "float", "u1": "uchar"}
+    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(xyz)}"]
+    header += [f"property {kinds[kind]} {name}" for name, kind in fields] + ["end_header", ""]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes("\n".join(header).encode() + table.tobytes())
+    return path
+
+
+def _write_clouds(folder: Path, keyframe: Keyframe, sightings: list[Sighting]) -> Iterator[Path]:
+    T = np.eye(4) if keyframe.T_odom_camera is None else keyframe.T_odom_camera
+    name = f"keyframe_{keyframe.keyframe_id:06d}.ply"
+    for item, sighting in zip(keyframe.objects, sightings, strict=True):
+        place = folder / "objects" / f"{sighting.landmark:05d}_{_file_name(item.label)}"
+        yield _write_object(place / name, T, item)
+    context = keyframe.context
+    yield write_ply(folder / "contexts" / name, transform(T, context.xyz), rotate(T, context.normals), None)
+
+
+def _write_object(path: Path, T: Array, item: KeyObject) -> Path:
+    return write_ply(path, transform(T, item.cloud.xyz), rotate(T, item.cloud.normals), item.cloud.rgb)
+
+
+def _keyframe_json(keyframe: Keyframe, sightings: list[Sighting]) -> dict[str, Any]:
+    return {
+        "id": keyframe.keyframe_id,
+        "session": keyframe.session,
+        "stamp_ns": keyframe.stamp_ns,
+        "frame_id": keyframe.frame_id,
+        "T_session_camera": None if keyframe.T_odom_camera is None else keyframe.T_odom_camera.tolist(),
+        "by_odometry": keyframe.by_odometry,
+        "gravity": None if keyframe.gravity is None else keyframe.gravity.tolist(),
+        "objects": [
+            {
+                "landmark": sighting.landmark,
+                "label": sighting.label,
+                "score": sighting.score,
+                "position": sighting.position.tolist(),
+                "points": len(item.cloud),
+            }
+            for item, sighting in zip(keyframe.objects, sightings, strict=True)
+        ],
+    }
+
+
+def _closure_json(closure: LoopClosure) -> dict[str, Any]:
+    return {
+        "from_ns": closure.from_ns,
+        "to_ns": closure.to_ns,
+        "T_from_to": closure.T_from_to.tolist(),
+        "covariance": closure.covariance.tolist(),
+        "labels": list(closure.labels),
+        "evidence": closure.evidence,
+    }
+
+
+def _write_json(path: Path, content: dict[str, Any]) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    return path
+
+
+def _file_name(label: str) -> str:
+    return "".join(letter if letter.isalnum() else "_" for letter in label)

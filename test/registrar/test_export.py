@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Exported files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from objreg_ros.data import LoopClosure
+from objreg_ros.registrar.export import export, write_ply
+from objreg_ros.registrar.sighting import sightings_of
+from objreg_ros.registrar.store import Store
+
+from .samples import box, keyframe, moved
+
+
+def _read_ply(path: Path) -> np.ndarray:
+    header, body = path.read_bytes().split(b"end_header\n", 1)
+    kinds = {b"float": "<f4", b"uchar": "u1"}
+    fields = [(line.split()[2].decode(), kinds[line.split()[1]]) for line in header.split(b"\n") if b"property" in line]
+    return np.frombuffer(body, fields)
+
+
+def test_points_normals_and_colours_are_written(tmp_path: Path) -> None:
+    item = box("cup", (0, 0, 1))
+    table = _read_ply(write_ply(tmp_path / "a.ply", item.xyz, item.normals, item.rgb))
+    assert np.array_equal(np.stack([table["x"], table["y"], table["z"]], axis=1), item.xyz)
+    assert np.array_equal(table["nz"], item.normals[:, 2]) and np.array_equal(table["red"], item.rgb[:, 0])
+    assert "red" not in (_read_ply(write_ply(tmp_path / "b.ply", item.xyz, item.normals, None)).dtype.names or ())
+
+
+def test_a_store_becomes_clouds_in_the_frame_of_the_session_and_a_map(tmp_path: Path) -> None:
+    store = Store(tmp_path / "place.db")
+    taken = keyframe(1, 2.0, (box("cell phone", (0, 0, 1)),), T_odom_camera=moved(5.0))
+    (sighting,) = sightings_of(taken)
+    closure = LoopClosure(from_ns=1, to_ns=2, T_from_to=moved(0.3), covariance=np.eye(6), labels=("cup",))
+    store.add(taken, [sighting.of_landmark(7, np.eye(3))], [closure])
+    store.close()
+    files = list(export(tmp_path / "place.db", tmp_path / "out"))
+    assert [str(f.relative_to(tmp_path / "out")) for f in files] == [
+        "objects/00007_cell_phone/keyframe_000001.ply",
+        "contexts/keyframe_000001.ply",
+        "map.json",
+    ]
+    assert abs(float(_read_ply(files[0])["x"].mean()) - 5.0) < 0.05
+    content = json.loads(files[2].read_text())
+    assert content["keyframes"][0]["objects"][0]["landmark"] == 7 and content["closures"][0]["to_ns"] == 2
