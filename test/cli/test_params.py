@@ -67,7 +67,9 @@ def test_only_what_is_between_the_marks_changes(tmp_path: Path) -> None:
     write_files(tmp_path)
     text = (tmp_path / "README.md").read_text()
     assert (
-        text.startswith(f"before\n{BEGIN}\n### `detector`") and text.endswith(f"{END}\nafter\n") and "OBSOLETE" not in text
+        text.startswith(f"before\n{BEGIN}\n### `detector`")
+        and text.endswith(f"{END}\nafter\n")
+        and "OBSOLETE" not in text
     )
 
 

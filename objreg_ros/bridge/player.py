@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Publishes recorded messages into the live graph: at their own pace, or as fast as the graph takes them."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Header
+
+from objreg_ros.bridge import from_msg, qos, to_msg
+from objreg_ros.bridge.receipts import DEPTH, IMAGE, ORDER, Receipts
+
+QUEUE = 20  # messages of a topic that wait in DDS for a slow reader
+ASK_AGAIN_S = 2.0  # how often a play that waits looks whether the nodes are still there
+SETTLE_S = 3.0  # for the nodes to find each other, after we have found them
+# One image and one depth are on their way at a time, so that none is overtaken. Where the graph stays silent, it may
+# wait for what comes next (slow odometry, say): a second goes after 1 s of silence, a third after 10 s.
+SILENCE_S = (1.0, 10.0, 30.0)
+LAST_S = 5.0  # how long to wait at the end for depth that is newer than any image: it has no partner
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """One message to publish: where, when it was recorded, and its CDR bytes.
+
+    A lossless play follows an image or a depth (``kind``) by the stamp in its header.
+    """
+
+    topic: str
+    stamp_ns: int
+    cdr: bytes
+    kind: str = ""
+    header_ns: int = 0
+
+
+class Player(Node):
+    """A node that plays items on ``topics`` (topic → type like ``sensor_msgs/msg/Image``)."""
+
+    def __init__(self, topics: Mapping[str, str], clock: bool = False) -> None:
+        super().__init__("player")
+        self._publishers_of = {topic: self._advertise(topic, kind) for topic, kind in topics.items()}
+        self._ticks = self.create_publisher(Clock, "/clock", qos.room()) if clock else None
+        self._receipts: Receipts | None = None
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self)
+        self._heard = self._asked = 0.0
+        self.published: Counter[str] = Counter()
+        self.lost: list[int] = []
+
+    def _advertise(self, topic: str, kind: str) -> Publisher:
+        return self.create_publisher(message_type(kind), topic, qos.room(depth=QUEUE))
+
+    # Who listens
+
+    def wait_for_listeners(self, topics: Iterable[str], seconds: float) -> list[str]:
+        """Wait until somebody subscribes to each of ``topics``; those that nobody heard of within ``seconds``."""
+        wanted = [self._publishers_of[topic] for topic in topics]
+        deadline = time.monotonic() + seconds
+        while any(p.get_subscription_count() == 0 for p in wanted) and time.monotonic() < deadline:
+            self._executor.spin_once(timeout_sec=0.05)
+        return [p.topic_name for p in wanted if p.get_subscription_count() == 0]
+
+    def listen_to_receipts(self, seconds: float) -> Receipts:
+        """Wait for the nodes that receipt frames; ValueError if there are none within ``seconds``."""
+        self.create_subscription(Header, "finished", self._hear, qos.room(depth=1000))
+        deadline = time.monotonic() + seconds
+        while not set(ORDER) <= self._receipting() and time.monotonic() < deadline:
+            self._executor.spin_once(timeout_sec=0.05)
+        nodes = self._receipting() & set(ORDER)
+        if not nodes:
+            raise ValueError("lossless: expected the nodes to publish `finished`, got none; are they running here?")
+        self._wait_until(time.monotonic() + SETTLE_S)
+        self._receipts = Receipts(nodes)
+        return self._receipts
+
+    def _receipting(self) -> set[str]:
+        return {info.node_name for info in self.get_publishers_info_by_topic(self.resolve_topic_name("finished"))}
+
+    def _hear(self, receipt: Header) -> None:
+        self._heard = time.monotonic()
+        if self._receipts is not None:
+            self._receipts.hear(receipt.frame_id, from_msg.stamp_ns(receipt))
+
+    # Play
+
+    def play(self, items: Iterable[Item], rate: float | None, on_item: Callable[[Item], None]) -> None:
+        """Publish items in order: at ``rate`` times their own pace, or at once if it is None."""
+        start_ns, start = None, 0.0
+        for item in items:
+            if start_ns is None:
+                start_ns, start = item.stamp_ns, time.monotonic()
+            if rate is not None:
+                self._wait_until(start + (item.stamp_ns - start_ns) * 1e-9 / rate)
+            self._publish(item)
+            on_item(item)
+
+    def play_lossless(self, items: Iterable[Item], patience: float, on_item: Callable[[Item], None]) -> None:
+        """Publish items in order, a frame only when the graph has room for it; returns when all are through.
+
+        When no receipt comes for ``patience`` seconds, what is on its way goes to ``lost`` and the play goes on.
+        ValueError when a node has ended.
+        """
+        receipts = self._receipts
+        if receipts is None:
+            raise ValueError("expected listen_to_receipts before a lossless play")
+        newest_image_ns = 0
+        for item in items:
+            if item.kind:
+                self._wait_for_room(receipts, item.kind, patience)
+                receipts.send(item.kind, item.header_ns)
+            if item.kind == IMAGE:
+                newest_image_ns = item.header_ns
+            self._publish(item)
+            on_item(item)
+        self._wait_for_end(receipts, newest_image_ns, patience)
+
+    def _wait_for_room(self, receipts: Receipts, kind: str, patience: float) -> None:
+        self._heard = time.monotonic()
+        while receipts.waiting(kind) > sum(self._silence > seconds for seconds in SILENCE_S):
+            self._attend(receipts, patience)
+
+    def _wait_for_end(self, receipts: Receipts, newest_image_ns: int, patience: float) -> None:
+        self._heard = time.monotonic()
+        while waiting := receipts.waiting(IMAGE) + receipts.waiting(DEPTH):
+            alone = receipts.waiting(DEPTH, after_ns=newest_image_ns) == waiting
+            self._attend(receipts, min(patience, LAST_S) if alone else patience)
+
+    @property
+    def _silence(self) -> float:
+        """Seconds without a receipt."""
+        return time.monotonic() - self._heard
+
+    def _attend(self, receipts: Receipts, patience: float) -> None:
+        """Let receipts come in; see what is lost, and whether the nodes are still there."""
+        self._executor.spin_once(timeout_sec=0.05)
+        if self._silence > patience:
+            self.lost += receipts.give_up()
+        if time.monotonic() - self._asked > ASK_AGAIN_S:
+            self._asked = time.monotonic()
+            self._require(receipts.nodes)
+
+    def _require(self, nodes: Iterable[str]) -> None:
+        ended = set(nodes) - self._receipting()
+        if ended:
+            raise ValueError(f"lossless: {', '.join(sorted(ended))} has ended and takes no more frames; see its log")
+
+    def _wait_until(self, moment: float) -> None:
+        while (left := moment - time.monotonic()) > 0:
+            self._executor.spin_once(timeout_sec=left)
+
+    def _publish(self, item: Item) -> None:
+        if self._ticks is not None:
+            self._ticks.publish(to_msg.clock(item.stamp_ns))
+        self._publishers_of[item.topic].publish(item.cdr)
+        self.published[item.topic] += 1
+
+    def close(self) -> None:
+        """End the node."""
+        self._executor.shutdown()
+        self.destroy_node()
+
+
+def message_type(kind: str) -> Any:
+    """The class of a type like ``sensor_msgs/msg/Image``; ValueError if its package is not installed."""
+    package, _, name = kind.replace("/msg/", "/").partition("/")
+    try:
+        return getattr(import_module(f"{package}.msg"), name)
+    except (ImportError, AttributeError) as error:
+        raise ValueError(f"{kind}: expected an installed message type, got none; leave its topic out") from error

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`objreg replay`: a recording into the live graph."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+from tqdm import tqdm
+
+from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.receipts import DEPTH, IMAGE, Receipts
+from objreg_ros.cli import options
+from objreg_ros.recording import Recording, open_recording
+from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
+from objreg_ros.recording.replay import Selection, graph_names, read_ahead, recorded_names
+
+if TYPE_CHECKING:
+    from objreg_ros.bridge.player import Item, Player
+
+
+@click.command(context_settings={"ignore_unknown_options": True})
+@options.recording
+@click.option("--rate", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True, help="Speed.")
+@click.option("--loop", is_flag=True, help="Begin again at the end, with the same stamps.")
+@click.option("--clock", is_flag=True, help="Publish /clock (for nodes with use_sim_time).")
+@click.option("--start", type=click.FloatRange(min=0), default=0.0, help="Seconds from the start to begin at.")
+@click.option("--end", type=click.FloatRange(min=0), help="Seconds from the start to end at.")
+@click.option("--lossless", is_flag=True, help="As fast as the nodes take every frame, and none is lost.")
+@click.option("--all", "everything", is_flag=True, help="Every topic under its own name, not only the graph's inputs.")
+@click.option("--wait", type=click.FloatRange(min=0), default=10.0, show_default=True, help="Seconds for subscribers.")
+@click.option(
+    "--patience", type=click.FloatRange(min=0), default=300.0, show_default=True, help="Seconds for a frame, lossless."
+)
+@options.remap
+@click.argument("ros_args", nargs=-1, type=click.UNPROCESSED)
+def command(
+    recording: Path,
+    rate: float,
+    loop: bool,
+    clock: bool,
+    start: float,
+    end: float | None,
+    lossless: bool,
+    everything: bool,
+    wait: float,
+    patience: float,
+    remaps: tuple[str, ...],
+    ros_args: tuple[str, ...],
+) -> None:
+    """Publish RECORDING under the names that the nodes listen to.
+
+    Arguments behind -- go to ROS, like -- --ros-args -r __ns:=/robot.
+    """
+    import rclpy
+
+    from objreg_ros.bridge import profile
+    from objreg_ros.bridge.player import Player
+
+    with open_recording(recording) as source:
+        inputs = choose_inputs(source.topics, parse_remaps(remaps))
+        names = recorded_names(source) if everything else graph_names(source, inputs)
+        if not names:
+            raise ValueError(f"{recording}: expected topics that the graph can use, got {', '.join(source.topics)}")
+        selection = Selection(names, start, end)
+        click.echo(profile.apply(), err=True)
+        rclpy.init(args=list(ros_args))
+        player = Player({out: source.topics[topic].msgtype for topic, out in names.items()}, clock)
+        try:
+            _prepare(player, inputs, names, wait)
+            receipts = player.listen_to_receipts(wait) if lossless else None
+            while True:
+                _play_once(player, source, selection, inputs, None if lossless else rate, receipts, patience)
+                if not loop:
+                    break
+        finally:
+            player.close()
+            rclpy.try_shutdown()
+        _say(player, receipts)
+
+
+def _prepare(player: Player, inputs: Inputs, names: dict[str, str], wait: float) -> None:
+    needed = [names[topic] for topic in (inputs.image, inputs.depth or inputs.points) if topic in names]
+    for topic in player.wait_for_listeners(needed, wait):
+        click.echo(f"nobody listens to {topic}", err=True)
+
+
+def _play_once(
+    player: Player,
+    source: Recording,
+    selection: Selection,
+    inputs: Inputs,
+    rate: float | None,
+    receipts: Receipts | None,
+    patience: float,
+) -> None:
+    items = read_ahead(_items(source, selection, inputs))
+    with tqdm(total=selection.count(source), unit="message", disable=None, leave=False) as bar:
+        if receipts is None:
+            player.play(items, rate, lambda item: _advance(bar))
+        else:
+            player.play_lossless(items, patience, lambda item: _advance(bar))
+
+
+def _advance(bar: tqdm) -> None:
+    bar.update(1)
+
+
+def _items(source: Recording, selection: Selection, inputs: Inputs) -> Iterator[Item]:
+    from objreg_ros.bridge.player import Item
+
+    kinds = {inputs.image: IMAGE, inputs.depth: DEPTH, inputs.points: DEPTH}
+    for record in selection.records(source):
+        name, kind = selection.names[record.topic], kinds.get(record.topic, "")
+        header_ns = from_msg.stamp_ns(record.message) if kind else 0
+        yield Item(name, record.stamp_ns, record.cdr, kind, header_ns)
+
+
+def _say(player: Player, receipts: Receipts | None) -> None:
+    for topic, count in sorted(player.published.items()):
+        click.echo(f"{count} {topic}")
+    if receipts is not None:
+        for node, outcomes in receipts.outcomes.items():
+            click.echo(f"{node}: " + ", ".join(f"{count} {verdict}" for verdict, count in sorted(outcomes.items())))
+    if player.lost:
+        click.echo(f"{len(player.lost)} frames without a receipt, the first of {player.lost[0]} ns")

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a replay publishes: which topics of a recording under which names, from when to when, how often."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import TypeVar
+
+from objreg_ros.recording.inputs import GRAPH_TOPICS, Inputs
+from objreg_ros.recording.record import Record, Recording
+
+Item = TypeVar("Item")
+
+COMPRESSED = {"image": "image/compressed", "depth": "depth/image/compressedDepth"}
+AHEAD = 30  # records that are read before they are due
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """What is played: ``names`` says under which name each topic goes out; times in seconds from the start."""
+
+    names: dict[str, str]
+    start: float = 0.0
+    end: float | None = None
+
+    def records(self, recording: Recording) -> Iterator[Record]:
+        """The selected records, in order of time."""
+        start_ns = recording.start_ns + round(self.start * 1e9)
+        end_ns = None if self.end is None else recording.start_ns + round(self.end * 1e9)
+        return recording.records(set(self.names), start_ns, end_ns)
+
+    def count(self, recording: Recording) -> int:
+        """About how many records these are: exact for the whole recording, else by share of time."""
+        whole = sum(recording.topics[topic].count for topic in self.names)
+        length = recording.seconds
+        end = length if self.end is None else min(self.end, length)
+        return whole if length == 0 else round(whole * max(0.0, min(1.0, (end - self.start) / length)))
+
+
+def graph_names(recording: Recording, inputs: Inputs) -> dict[str, str]:
+    """Each chosen input under the name that the nodes listen to."""
+    return {topic: _graph_name(recording, name, topic) for name, topic in inputs.chosen().items()}
+
+
+def _graph_name(recording: Recording, name: str, topic: str) -> str:
+    compressed = recording.topics[topic].msgtype.endswith("CompressedImage")
+    return COMPRESSED[name] if compressed else GRAPH_TOPICS[name]
+
+
+def recorded_names(recording: Recording) -> dict[str, str]:
+    """Every topic under its own name."""
+    return {topic: topic for topic in recording.topics}
+
+
+def read_ahead(items: Iterable[Item], ahead: int = AHEAD) -> Iterator[Item]:
+    """The same items, made in a thread of their own before they are wanted. What making them raises is raised here."""
+    ready: queue.Queue[tuple[Item | None, BaseException | None]] = queue.Queue(ahead)
+    stopped = threading.Event()
+    thread = threading.Thread(target=_read, args=(items, ready, stopped), name="read ahead", daemon=True)
+    thread.start()
+    try:
+        while True:
+            item, error = ready.get()
+            if error is not None:
+                raise error
+            if item is None:
+                return
+            yield item
+    finally:
+        stopped.set()
+        thread.join()
+
+
+def _read(
+    items: Iterable[Item], ready: queue.Queue[tuple[Item | None, BaseException | None]], stopped: threading.Event
+) -> None:
+    try:
+        for item in items:
+            if not _put(ready, (item, None), stopped):
+                return
+        _put(ready, (None, None), stopped)
+    except BaseException as error:
+        _put(ready, (None, error), stopped)
+
+
+def _put(ready: queue.Queue[Item], item: Item, stopped: threading.Event) -> bool:
+    """Put as soon as there is room; False if nobody wants it any more."""
+    while not stopped.is_set():
+        try:
+            ready.put(item, timeout=0.1)
+            return True
+        except queue.Full:
+            continue
+    return False

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from objreg_ros.recording import Recording, open_recording
+from objreg_ros.recording.inputs import Inputs, choose_inputs
+from objreg_ros.recording.record import Topic
+from objreg_ros.recording.replay import Selection, graph_names, read_ahead, recorded_names
+
+from .folders import tum_folder
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Recording:
+    return open_recording(tum_folder(tmp_path, frames=11))
+
+
+def test_inputs_go_out_under_the_names_of_the_graph(recording: Recording) -> None:
+    assert graph_names(recording, choose_inputs(recording.topics)) == {
+        "/image": "image",
+        "/depth/image": "depth/image",
+        "/camera_info": "camera_info",
+        "/ground_truth": "ground_truth",
+    }
+
+
+def test_compressed_inputs_go_out_where_compressed_ones_are_heard(recording: Recording) -> None:
+    recording.topics = {name: Topic(name, "sensor_msgs/msg/CompressedImage", 1) for name in ("/jpeg", "/png")}
+    names = graph_names(recording, Inputs(image="/jpeg", depth="/png"))
+    assert names == {"/jpeg": "image/compressed", "/png": "depth/image/compressedDepth"}
+
+
+def test_everything_goes_out_under_its_own_name(recording: Recording) -> None:
+    assert recorded_names(recording)["/depth/image"] == "/depth/image"
+
+
+def test_a_selection_is_a_part_in_time_of_some_topics(recording: Recording) -> None:
+    selection = Selection({"/image": "image"}, start=0.2, end=0.5)
+    assert [r.stamp_ns // 10**6 for r in selection.records(recording)] == [200, 300, 400]
+    assert selection.count(recording) == 3
+    assert Selection({"/image": "image"}).count(recording) == 11
+    assert Selection({"/image": "image"}, start=99).count(recording) == 0
+
+
+def test_reading_ahead_changes_nothing() -> None:
+    assert list(read_ahead(range(1000), ahead=3)) == list(range(1000))
+
+
+def test_reading_ahead_reads_before_it_is_asked() -> None:
+    read: list[int] = []
+
+    def source() -> Iterator[int]:
+        for i in range(100):
+            read.append(i)
+            yield i
+
+    items = read_ahead(source(), ahead=5)
+    assert next(items) == 0
+    deadline = time.monotonic() + 10
+    while len(read) < 6 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert 6 <= len(read) <= 8
+    items.close()  # type: ignore[attr-defined]
+
+
+def test_an_error_of_the_reader_is_raised_where_the_items_are_used() -> None:
+    def source() -> Iterator[int]:
+        yield 1
+        raise OSError("a broken file")
+
+    items = read_ahead(source())
+    assert next(items) == 1
+    with pytest.raises(OSError, match="a broken file"):
+        next(items)
+
+
+def test_a_reader_that_nobody_wants_any_more_ends() -> None:
+    items = read_ahead(iter(range(10**9)), ahead=2)
+    next(items)
+    items.close()  # type: ignore[attr-defined]
+    assert not [thread for thread in threading.enumerate() if thread.name == "read ahead"]

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`objreg replay` into the three nodes, each a process."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from nav_msgs.msg import Odometry
+from recording.folders import tum_folder
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Image
+
+from objreg_ros.bridge import from_msg, qos
+
+from .graph import START_S, Graph
+
+pytestmark = pytest.mark.ros
+ROOMS = ("detector", "segmenter", "registrar")
+
+
+def objreg(graph: Graph, *words: str, seconds: float = 600) -> str:
+    """The output of the command, while messages come in."""
+    command = [sys.executable, "-m", "objreg_ros.cli", *words]
+    with subprocess.Popen(command, env=graph.environment(), stdout=subprocess.PIPE, text=True) as process:
+        graph.wait_for(lambda: process.poll() is not None, seconds, " ".join(words))
+        assert process.stdout is not None
+        output = process.stdout.read()
+    assert process.returncode == 0, output
+    return output
+
+
+def start(graph: Graph, model: Path, *detector: str) -> None:
+    graph.start("detector", "detector", f"-p model:={model}", *detector)
+    graph.start("segmenter", "segmenter")
+    graph.start("registrar", "registrar")
+
+
+@pytest.fixture
+def fresh(domain: int, tmp_path: Path) -> Iterator[Graph]:
+    made = Graph(domain, tmp_path)
+    yield made
+    made.close()
+
+
+def test_a_lossless_replay_brings_every_frame_through_every_node(
+    fresh: Graph, tiny_model: Path, tmp_path: Path
+) -> None:
+    start(fresh, tiny_model)
+    folder = tum_folder(tmp_path / "tum", frames=12)
+    output = objreg(fresh, "replay", str(folder), "--lossless", "--wait", str(START_S))
+    assert "12 image" in output
+    for room in ROOMS:
+        assert f"{room}: 12 published\n" in output
+        books = fresh.balance(f"/{room}", received=12)
+        assert (books.published, books.dropped, books.lost) == (12, {}, 0)
+
+
+def test_depth_with_stamps_of_its_own_goes_through_but_for_the_last(
+    fresh: Graph, tiny_model: Path, tmp_path: Path
+) -> None:
+    start(fresh, tiny_model)
+    folder = tum_folder(tmp_path / "tum", frames=6, lag=0.004)
+    output = objreg(fresh, "replay", str(folder), "--lossless", "--wait", str(START_S))
+    assert "registrar: 5 published\n" in output  # the last depth is newer than any image, so another may come
+    assert "1 frames without a receipt, the first of 504000000 ns" in output
+
+
+def test_a_paced_replay_keeps_its_pace_and_tells_the_time(fresh: Graph, tmp_path: Path) -> None:
+    fresh.hear(Clock, "/clock")
+    fresh.hear(Image, "image")
+    fresh.hear(Image, "depth/image")
+    folder = tum_folder(tmp_path / "tum", frames=11)
+    output = objreg(fresh, "replay", str(folder), "--clock", "--rate", "2", "--start", "0.2", "--wait", str(START_S))
+    assert "9 image" in output and "9 depth/image" in output
+    times = [from_msg.stamp_ns(m.clock) for m in fresh.heard["/clock"]]
+    assert times == sorted(times) and times[-1] == 10**9
+
+
+def test_a_lossless_replay_without_nodes_says_so(fresh: Graph, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "objreg_ros.cli", "replay", str(tum_folder(tmp_path / "tum")), "--lossless"]
+    done = subprocess.run([*command, "--wait", "0"], env=fresh.environment(), capture_output=True, text=True)
+    assert done.returncode == 1 and "expected the nodes to publish `finished`, got none" in done.stderr
+
+
+@pytest.mark.slow
+def test_a_recording_gives_the_same_constraints_live_and_offline(fresh: Graph, shared: Path, tmp_path: Path) -> None:
+    kitchen, model = shared / "data/redkitchen_a", shared / "models/ssd_mobilenet_v1_coco_int8.onnx"
+    fresh.hear(Odometry, "constraints", qos.latched(1000))
+    start(fresh, model, "-p threshold:=0.4")
+    objreg(fresh, "replay", str(kitchen), "--lossless", "--end", "4", "--wait", str(START_S))
+    words = ("offline", str(kitchen), "--model", str(model), "--set", "detector.threshold=0.4", "--max-frames", "60")
+    objreg(fresh, *words, "--json", str(tmp_path / "out.json"))
+    offline = json.loads((tmp_path / "out.json").read_text())["constraints"]
+    live = [from_msg.loop_closure(message) for message in fresh.heard["constraints"]]
+    expected = [(c["from_ns"], c["to_ns"]) for c in offline]
+    assert expected and [(c.from_ns, c.to_ns) for c in live] == expected
+    for mine, theirs in zip(live, offline, strict=True):
+        assert np.allclose(mine.T_from_to, theirs["T_from_to"], atol=1e-9)
+        assert np.allclose(mine.covariance, theirs["covariance"], rtol=1e-9)
