@@ -198,7 +198,7 @@ def _flat(x: float, width: float, bottom: float, tall: float, material: Material
 
 
 def _window(rng: Random, x: float, width: float) -> list[Mesh]:
-    light = Material(texture.speckled(rng, (235, 240, 250), 0.02), emission=rng.uniform(0.5, 1.5))
+    light = Material(texture.speckled(rng, (235, 240, 250), 0.02), emission=rng.uniform(0.5, 1.5), depth_loss=0.85)
     bars = Material(texture.speckled(rng, texture.grey(rng, 0.6, 1.0), 0.02))
     parts = [_flat(x, width, 0.95, 1.15, light)]
     for place in (0.0, 0.5, 1.0):

@@ -27,13 +27,14 @@ class Material:
     """How a surface looks: ``texture (S, S, 3) uint8`` sRGB with S a power of two, and its response to light.
 
     ``specular`` 0..1 is the strength of highlights, ``gloss`` the base-2 logarithm of their exponent, ``emission`` the
-    share of the texture that shines by itself.
+    share of the texture that shines by itself, ``depth_loss`` the share of it where a depth sensor sees nothing.
     """
 
     texture: Array
     specular: float = 0.05
     gloss: int = 4
     emission: float = 0.0
+    depth_loss: float = 0.0
 
     def __post_init__(self) -> None:
         shape = self.texture.shape

@@ -2,8 +2,10 @@
 """What a structured-light sensor makes of true depth: noise, steps, shadows, lost and mixed pixels.
 
 The axial noise is that of Nguyen, Izadi and Lovell, "Modeling Kinect sensor noise for improved 3D reconstruction and
-tracking" (2012): 0.0012 + 0.0019 (z - 0.4)^2 metres. Steps grow with the square of depth, because disparity is measured
-in eighths of a pixel. Points that the projector does not reach (it sits a baseline to the right) have no depth.
+tracking" (2012): 0.0012 + 0.0019 (z - 0.4)^2 metres. It is correlated between neighbours, more along a row than across,
+as that of real Kinect clouds is, because the sensor matches windows of several pixels. Steps grow with the square of
+depth, because disparity is measured in eighths of a pixel. Points that the projector does not reach (it sits a baseline
+to the right) have no depth, nor have blotches of surfaces that shine.
 """
 
 from __future__ import annotations
@@ -15,11 +17,18 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.simulation.params import DepthParams, StressParams
 from objreg_ros.simulation.raster import Projection
+from objreg_ros.simulation.surfaces import Surfaces
 
 JUMP_SHARE = 0.02
 """Neighbours whose depths differ by more than this share are an edge."""
 LATTICE_PX = 3
-"""Edges wander together over about as many pixels: the sensor matches small windows."""
+"""Edges wander together over about as many pixels."""
+NOISE_CELL_PX = (3, 6)
+"""Rows and columns over which noise is alike."""
+WHITE_SHARE = 0.1
+"""Share of the noise's variance that differs from pixel to pixel."""
+BLOTCH_PX = 24
+"""Size of the holes in surfaces that reflect badly."""
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
@@ -58,6 +67,25 @@ def _wander(seed, y, x):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, nogil=True)
+def _noise_row(seed, y, cell_y, cell_x, out):  # type: ignore[no-untyped-def]
+    """Lattice values for row ``y`` of smooth noise: ``out[j]`` belongs to column ``j * cell_x``. Variance about 1."""
+    i = y // cell_y
+    a = np.float32(y - i * cell_y) / np.float32(cell_y)
+    for j in range(out.shape[0]):
+        low, high = normal(_hash(seed, i * 8192 + j)), normal(_hash(seed, (i + 1) * 8192 + j))
+        # linear interpolation in both directions takes 2/3 of the deviation away
+        out[j] = ((np.float32(1) - a) * low + a * high) * np.float32(1.5)
+
+
+@nb.njit(cache=True, nogil=True, inline="always")
+def _at(row, x, cell):  # type: ignore[no-untyped-def]
+    """The value of a noise row at column ``x``."""
+    j = x // cell
+    b = np.float32(x - j * cell) / np.float32(cell)
+    return (np.float32(1) - b) * row[j] + b * row[j + 1]
+
+
+@nb.njit(cache=True, nogil=True)
 def _shadow_row(nearness, y, shift, out):  # type: ignore[no-untyped-def]
     """Mark the pixels of a row that the projector does not reach; ``shift`` is focal length times baseline.
 
@@ -73,15 +101,23 @@ def _shadow_row(nearness, y, shift, out):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
-def _sense(nearness, triangle, inverse_depth, y_first, y_last, camera, numbers, seed, warp, depth):  # type: ignore[no-untyped-def]
+def _sense(  # type: ignore[no-untyped-def]
+    nearness, triangle, inverse_depth, loss, y_first, y_last, camera, numbers, seed, warp, depth
+):  # fmt: skip
     """Measure the rows y_first..y_last of ``depth``; see `sense_depth`. ``numbers`` are the parameters in order."""
     fx, fy, cx, cy = camera
     floor, growth, quantum, baseline, near, far, dropout, grazing, jitter, edge_dropout, mixed, bias = numbers
     height, width = nearness.shape
     shadow = np.zeros(width, np.bool_)
     one, jump = np.float32(1.0), np.float32(JUMP_SHARE)
+    cell_y, cell_x = NOISE_CELL_PX
+    smooth = np.empty(width // cell_x + 2, np.float32)
+    blotch = np.empty(width // BLOTCH_PX + 2, np.float32)
+    common, single = np.float32(np.sqrt(1 - WHITE_SHARE)), np.float32(np.sqrt(WHITE_SHARE))
     for y in range(y_first, y_last):
         _shadow_row(nearness, y, fx * baseline, shadow)
+        _noise_row(seed + 6, y, cell_y, cell_x, smooth)
+        _noise_row(seed + 7, y, BLOTCH_PX, BLOTCH_PX, blotch)
         up, down = max(y - 2, 0), min(y + 2, height - 1)
         dy = (np.float32(y) - cy) / fy
         for x in range(width):
@@ -117,9 +153,14 @@ def _sense(nearness, triangle, inverse_depth, y_first, y_last, camera, numbers, 
             lost = dropout + max(np.float32(0.0), (grazing - cosine) * np.float32(5.0))
             if uniform(_hash(seed + 5, y * width + x)) < lost:
                 continue
+            if loss[f] > 0:  # in blotches: the logistic curve makes normal numbers nearly uniform
+                level = _at(blotch, x, BLOTCH_PX) + np.float32(0.4) * normal(bits)
+                if one / (one + np.exp(np.float32(-1.6) * level)) < loss[f]:
+                    continue
             z = one / nearest
+            error = common * _at(smooth, x, cell_x) + single * normal(bits)
             beyond = z - np.float32(0.4)
-            z = z * (one + bias) + warp[y, x] * z * z + normal(bits) * (floor + growth * beyond * beyond)
+            z = z * (one + bias) + warp[y, x] * z * z + error * (floor + growth * beyond * beyond)
             step = quantum * z * z
             if step > 0:
                 z = np.rint(z / step) * step
@@ -139,7 +180,10 @@ def warp_field(seed: int, shape: tuple[int, int], strength: float) -> Array:
 class DepthSensor:
     """The sensor for one image: knows its parameters and its seed, measures any rows."""
 
-    def __init__(self, params: DepthParams, stress: StressParams, seed: int, shape: tuple[int, int]) -> None:
+    def __init__(
+        self, params: DepthParams, stress: StressParams, seed: int, shape: tuple[int, int], surfaces: Surfaces
+    ) -> None:
+        self.loss = surfaces.loss
         p = params
         values = (p.noise_floor, p.noise_growth, p.quantum, p.baseline, p.near, p.far, p.dropout, p.grazing_cosine)
         edges = (p.edge_jitter + stress.ragged, p.edge_dropout, p.mixed, stress.depth_bias)
@@ -153,4 +197,15 @@ class DepthSensor:
         """Measure ``rows`` of ``depth (H, W) float32`` m, 0 where nothing is, from the rasteriser's buffers."""
         i = projection.intrinsics
         camera = tuple(np.float32(v) for v in (i.fx, i.fy, i.cx, i.cy))
-        _sense(nearness, triangle, projection.inverse_depth, *rows, camera, self.numbers, self.seed, self.warp, depth)
+        _sense(
+            nearness,
+            triangle,
+            projection.inverse_depth,
+            self.loss,
+            *rows,
+            camera,
+            self.numbers,
+            self.seed,
+            self.warp,
+            depth,
+        )

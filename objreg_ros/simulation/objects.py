@@ -27,7 +27,9 @@ def _plastic(rng: Random, colour: texture.Colour | None = None) -> Material:
 
 
 def _metal(rng: Random) -> Material:
-    return Material(texture.brushed(rng), specular=rng.uniform(0.3, 0.7), gloss=int(rng.integers(4, 7)))
+    return Material(
+        texture.brushed(rng), specular=rng.uniform(0.3, 0.7), gloss=int(rng.integers(4, 7)), depth_loss=0.08
+    )
 
 
 def soda_can(rng: Random) -> ObjectModel:
@@ -307,10 +309,15 @@ def monitor(rng: Random) -> ObjectModel:
 
 def _glass(rng: Random, width: float, height: float, bezel: float) -> Mesh:
     """The screen of a monitor, just in front of its shell."""
+    loss = float(rng.choice([0.0, 0.3, 0.7], p=[0.4, 0.4, 0.2]))
     if rng.random() < 0.6:
-        pane = Material(print_design.screen(rng), specular=0.1, gloss=6, emission=rng.uniform(0.5, 1.0))
+        pane = Material(
+            print_design.screen(rng), specular=0.1, gloss=6, emission=rng.uniform(0.5, 1.0), depth_loss=loss
+        )
     else:
-        pane = Material(texture.speckled(rng, texture.grey(rng, 0.02, 0.09), 0.02), specular=0.35, gloss=6)
+        pane = Material(
+            texture.speckled(rng, texture.grey(rng, 0.02, 0.09), 0.02), specular=0.35, gloss=6, depth_loss=loss
+        )
     chin = bezel * rng.choice([1.0, 2.0])
     x, low, high = width / 2 - bezel, chin, height - bezel
     corners = np.array([[(-x, 0, high), (x, 0, high)], [(-x, 0, low), (x, 0, low)]])

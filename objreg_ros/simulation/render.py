@@ -89,7 +89,7 @@ def render(
     projection = Projection(*mesh, T_world_camera, intrinsics)
     nearness, triangle = np.empty(shape, np.float32), np.empty(shape, np.int32)
     measured, light = np.empty(shape, np.float32), np.empty((*shape, 3), np.uint16)
-    sensor = DepthSensor(depth or DepthParams(), stress, seed, shape)
+    sensor = DepthSensor(depth or DepthParams(), stress, seed, shape, surfaces)
     maps = scene.shadows if with_colour else None
 
     def draw(first: int, last: int) -> None:
@@ -112,7 +112,8 @@ def _in_bands(work: Callable[[int, int], None], height: int, threads: int) -> No
     if threads <= 1:
         work(0, height)
         return
-    edges = np.linspace(0, height, BANDS + 1).astype(int)
+    edges = np.linspace(0, height // 2, BANDS + 1).astype(int) * 2  # shading goes by pairs of rows
+    edges[-1] = height
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(work, edges[:-1].tolist(), edges[1:].tolist()))
 

@@ -110,7 +110,7 @@ def _setting(rng: Random, occluders: int, alike: bool = False) -> _Setting:
     for piece, T in walls:
         for board in piece.boards[:4]:
             others += [(m, T @ P) for m, P in spread(rng, _things(rng, 3, 2), board)]
-    scene = furnished(rng, [*tables, *walls], room, lamp_count=3)
+    scene = furnished(rng, [*tables, *walls], room, lamp_count=2)
     return _Setting(replace(scene, places=_places(tables)), tables, laid, others)
 
 

@@ -9,14 +9,15 @@ from functools import cached_property
 
 import numpy as np
 
-from objreg_ros.data import Array
-from objreg_ros.geometry import pose
+from objreg_ros.data import Array, Intrinsics
+from objreg_ros.geometry import inverse, pose, transform
 from objreg_ros.simulation import distractors, furniture
 from objreg_ros.simulation.furniture import Furniture, Room
 from objreg_ros.simulation.light import Lamp, ShadowMaps, looking, shadow_maps
 from objreg_ros.simulation.mesh import Mesh
 from objreg_ros.simulation.model import ObjectModel, turn
 from objreg_ros.simulation.objects import LABELS, make_object
+from objreg_ros.simulation.raster import rasterise
 from objreg_ros.simulation.surfaces import Surfaces, flatten
 
 Random = np.random.Generator
@@ -87,6 +88,10 @@ class Scene:
         instance = self.surfaces.instance
         first = {o.instance: int(np.argmax(instance == o.instance)) for o in self.objects}
         return {o.instance: (first[o.instance], first[o.instance] + len(o.model.mesh.faces)) for o in self.objects}
+
+    def prepare(self) -> None:
+        """Make everything that is the same in all images of the scene, so that several threads can share it."""
+        _ = self.surfaces, self.shadows, self.face_range
 
     def with_objects(self, objects: Sequence[Placed]) -> Scene:
         """The same room with other objects in it."""
@@ -265,21 +270,52 @@ def _chairs(
 
 
 def random_view(scene: Scene, seed: int) -> Array:
-    """``T_world_camera`` of a hand-held camera that looks at one of the scene's places, from near or far."""
+    """``T_world_camera`` of a hand-held camera that looks at something in the scene, from near or far.
+
+    It looks past one of the objects of the nine classes, at 30 to 350 px, unless that stands too well hidden.
+    """
     rng = np.random.default_rng([seed, 2])
-    place = scene.places[int(rng.integers(len(scene.places)))] if scene.places else Place(scene.middle, 0.5)
-    target = place.centre + rng.uniform(-0.7, 0.7, 3) * [place.reach, place.reach, 0.1]
-    distance = rng.uniform(0.55, 1.6) + (rng.uniform(0, 1.5) if rng.random() < 0.4 else 0.0)
-    low, high = _inside(scene)
-    for _ in range(20):
-        azimuth, elevation = rng.uniform(0, 2 * np.pi), rng.uniform(np.radians(8), np.radians(60))
-        away = [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
-        eye = target + distance * np.array(away)
-        if (eye > low).all() and (eye < high).all():
+    wanted = [o for o in scene.objects if not o.is_distractor] or list(scene.objects)
+    view = _view_of(scene, scene.middle, 0.5, rng)
+    for _ in range(VIEW_TRIALS if wanted else 0):
+        label = str(rng.choice(sorted({o.label for o in wanted})))
+        target = [o for o in wanted if o.label == label][int(rng.integers(sum(o.label == label for o in wanted)))]
+        extent = float(np.linalg.norm(target.model.size))
+        centre = transform(target.T_world_object, target.model.mesh.vertices.astype(float)).mean(0)
+        view = _view_of(scene, centre, extent, rng)
+        if _shows(scene, view, target.instance):
             break
-    eye = np.clip(eye, low, high)
-    roll = turn("z", float(rng.normal(0, 5.0)))
-    return looking(eye, target, np.array([0.0, 0.0, 1.0])) @ roll
+    return view
+
+
+VIEW_TRIALS = 12
+SKETCH = Intrinsics(fx=65.6, fy=65.6, cx=39.5, cy=29.5, width=80, height=60)
+"""A camera of few pixels that finds out whether a view is any good."""
+
+
+def _view_of(scene: Scene, centre: Array, extent: float, rng: Random) -> Array:
+    """A view past ``centre``, at which something of this extent in metres is 30 to 350 px large."""
+    pixels = np.exp(rng.uniform(np.log(30.0), np.log(350.0)))
+    distance = float(np.clip(525.0 * extent / pixels, 0.5, 4.0))
+    low, high = _inside(scene)
+    azimuth, elevation = rng.uniform(0, 2 * np.pi), np.radians(rng.uniform(5, 65))
+    away = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+    eye = np.clip(centre + distance * away, low, high)
+    aside = rng.normal(0, 0.14, 3) * np.linalg.norm(eye - centre)
+    return looking(eye, centre + aside, np.array([0.0, 0.0, 1.0])) @ turn("z", float(rng.normal(0, 5.0)))
+
+
+def _shows(scene: Scene, T_world_camera: Array, instance: int) -> bool:
+    """Whether an instance can be made out from a view that is not blocked by something right before it."""
+    s = scene.surfaces
+    depth, triangle = rasterise(s.vertices, s.faces, s.open_surface, T_world_camera, SKETCH)
+    mask = np.where(triangle >= 0, s.instance[triangle], 0) == instance
+    first, last = scene.face_range[instance]
+    seen = s.vertices[s.faces[first:last]].reshape(-1, 3)
+    in_camera = transform(inverse(T_world_camera), seen)
+    uv = in_camera[:, :2] / np.maximum(in_camera[:, 2:], 0.1)
+    outline = float(np.prod(np.ptp(uv, axis=0))) * SKETCH.fx * SKETCH.fy
+    return bool(mask.sum() > max(1.0, 0.25 * outline) and np.quantile(depth, 0.05) > 0.3)
 
 
 def _inside(scene: Scene) -> tuple[Array, Array]:

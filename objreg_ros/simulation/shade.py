@@ -37,12 +37,13 @@ def _lit(moments, rotation, position, pinhole, reference, k, px, py, pz, floor):
     a, b = v - np.float32(i), u - np.float32(j)
     w00, w01 = (np.float32(1) - a) * (np.float32(1) - b), (np.float32(1) - a) * b
     w10, w11 = a * (np.float32(1) - b), a * b
-    m = moments[k]
-    mean = w00 * m[i, j, 0] + w01 * m[i, j + 1, 0] + w10 * m[i + 1, j, 0] + w11 * m[i + 1, j + 1, 0]
+    mean = w00 * moments[k, i, j, 0] + w01 * moments[k, i, j + 1, 0]
+    mean += w10 * moments[k, i + 1, j, 0] + w11 * moments[k, i + 1, j + 1, 0]
     excess = z - reference[k] - mean - np.float32(0.006)
     if excess <= 0:
         return np.float32(1.0)
-    square = w00 * m[i, j, 1] + w01 * m[i, j + 1, 1] + w10 * m[i + 1, j, 1] + w11 * m[i + 1, j + 1, 1]
+    square = w00 * moments[k, i, j, 1] + w01 * moments[k, i, j + 1, 1]
+    square += w10 * moments[k, i + 1, j, 1] + w11 * moments[k, i + 1, j + 1, 1]
     variance = max(square - mean * mean, floor)
     share = variance / (variance + excess * excess)
     return max(np.float32(0.0), (share - np.float32(0.15)) * np.float32(1.0 / 0.85))  # less light bleeding
@@ -68,23 +69,66 @@ def _texel(texels, start, size, u, v, out):  # type: ignore[no-untyped-def]
         out[c] = value * value
 
 
+@nb.njit(cache=True, nogil=True, inline="always", error_model="numpy", fastmath=FAST)
+def _illuminate(  # type: ignore[no-untyped-def]
+    px, py, pz, nx, ny, nz, vx, vy, vz, specular, gloss, lamp_position, lamp_colour, ambient,
+    moments, rotation, position, pinhole, reference, light, at,
+):  # fmt: skip
+    """Light on a point with normal n seen along v: row ``at`` of ``light`` gets diffuse light and highlight, 3 each."""
+    zero, one = np.float32(0.0), np.float32(1.0)
+    opening = _lit(moments, rotation, position, pinhole, reference, 0, px, py, pz, np.float32(2e-3))
+    up = (np.float32(0.75) + np.float32(0.25) * nz) * (np.float32(0.3) + np.float32(0.7) * opening)
+    for c in range(3):
+        light[at, c], light[at, 3 + c] = ambient[c] * up, zero
+    for k in range(lamp_position.shape[0]):
+        lx, ly, lz = lamp_position[k, 0] - px, lamp_position[k, 1] - py, lamp_position[k, 2] - pz
+        cosine = nx * lx + ny * ly + nz * lz
+        if cosine <= 0:
+            continue
+        square = lx * lx + ly * ly + lz * lz
+        inverse = one / np.sqrt(square)
+        cosine *= inverse
+        strength = np.float32(5.0) / (one + square)
+        strength *= _lit(moments, rotation, position, pinhole, reference, k + 1, px, py, pz, np.float32(2e-5))
+        for c in range(3):
+            light[at, c] += lamp_colour[k, c] * strength * cosine
+        if specular < np.float32(0.01):
+            continue
+        hx, hy, hz = lx * inverse - vx, ly * inverse - vy, lz * inverse - vz
+        h = max(zero, (nx * hx + ny * hy + nz * hz) / np.sqrt(hx * hx + hy * hy + hz * hz + np.float32(1e-12)))
+        for _ in range(gloss):
+            h *= h
+        peak = specular * h * strength * np.float32(1 << gloss) * np.float32(0.08)
+        for c in range(3):
+            light[at, 3 + c] += lamp_colour[k, c] * peak
+
+
 @nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _shade(  # type: ignore[no-untyped-def]
     nearness, triangle, y_first, y_last, camera, R, eye, bounds, edges,
     faces, normals, uv, material, detail, open_surface, texels, level_start, texture_size, response,
-    lamp_position, lamp_colour, ambient, maps_moments, maps_rotation, maps_position, maps_pinhole, maps_reference, out,
+    lamp_position, lamp_colour, ambient, moments, rotation, position, pinhole, reference, out,
 ):  # fmt: skip
-    """Colour the rows y_first..y_last; see `shade`."""
+    """Colour the rows y_first..y_last; see `shade`.
+
+    Light changes slowly over a face: it is found for every second pixel of every second row, and for the others only
+    where they see another face than that one. ``y_first`` is even.
+    """
     fx, fy, cx, cy = camera
+    width = triangle.shape[1]
     albedo = np.empty(3, np.float32)
-    light = np.empty(3, np.float32)
-    shine = np.empty(3, np.float32)
-    zero, one = np.float32(0.0), np.float32(1.0)
+    own = (width + 1) // 2  # the last row of ``lights`` is for a pixel that keeps its light to itself
+    lights = np.empty((own + 1, 6), np.float32)
+    lit_face = np.full(own, -1, np.int32)
+    one = np.float32(1.0)
     for y in range(y_first, y_last):
         dy = (np.float32(y) - cy) / fy
-        for x in range(triangle.shape[1]):
+        for x in range(width):
             f = triangle[y, x]
+            keeps = ((x | y) & 1) == 0
             if f < 0:
+                if keeps:
+                    lit_face[x >> 1] = -1
                 out[y, x, 0], out[y, x, 1], out[y, x, 2] = 0, 0, 0
                 continue
             z = one / nearness[y, x]
@@ -94,7 +138,6 @@ def _shade(  # type: ignore[no-untyped-def]
                 R[1, 0] * dx + R[1, 1] * dy + R[1, 2],
                 R[2, 0] * dx + R[2, 1] * dy + R[2, 2],
             )
-            px, py, pz = eye[0] + z * rx, eye[1] + z * ry, eye[2] + z * rz
             ox, oy = np.float32(x - bounds[f, 0]), np.float32(y - bounds[f, 1])
             b0 = (edges[f, 0, 0] + edges[f, 0, 1] * ox + edges[f, 0, 2] * oy) * z
             b1 = (edges[f, 1, 0] + edges[f, 1, 1] * ox + edges[f, 1, 2] * oy) * z
@@ -104,65 +147,37 @@ def _shade(  # type: ignore[no-untyped-def]
             ny = b0 * normals[v0, 1] + b1 * normals[v1, 1] + b2 * normals[v2, 1]
             nz = b0 * normals[v0, 2] + b1 * normals[v1, 2] + b2 * normals[v2, 2]
             ray = one / np.sqrt(rx * rx + ry * ry + rz * rz)
-            facing = nx * rx + ny * ry + nz * rz
             norm = one / np.sqrt(nx * nx + ny * ny + nz * nz + np.float32(1e-12))
+            facing = (nx * rx + ny * ry + nz * rz) * norm
             if open_surface[f] and facing > 0:
                 norm = -norm
-            nx, ny, nz = nx * norm, ny * norm, nz * norm
-            # texture, at the mip level whose texels are about as large as the pixel
             m = material[f]
+            # texture, at the mip level whose texels are about as large as the pixel
             size = texture_size[m]
-            slant = max(abs(facing * norm) * ray, np.float32(0.1))
-            spread = detail[f] * np.float32(size) * z / (fx * np.sqrt(slant))
+            spread = detail[f] * np.float32(size) * z / fx
+            spread *= spread / max(abs(facing) * ray, np.float32(0.1))
             level = 0
-            while spread > np.float32(1.4) and level < LEVELS - 1 and size > 1:
-                spread *= np.float32(0.5)
+            while spread > np.float32(2.0) and level < LEVELS - 1 and size > 1:
+                spread *= np.float32(0.25)
                 size >>= 1
                 level += 1
             tu = b0 * uv[v0, 0] + b1 * uv[v1, 0] + b2 * uv[v2, 0]
             tv = b0 * uv[v0, 1] + b1 * uv[v1, 1] + b2 * uv[v2, 1]
             _texel(texels, level_start[m, level], size, tu, tv, albedo)
-            # light
-            opening = _lit(
-                maps_moments,
-                maps_rotation,
-                maps_position,
-                maps_pinhole,
-                maps_reference,
-                0,
-                px,
-                py,
-                pz,
-                np.float32(2e-3),
-            )
-            up = (np.float32(0.75) + np.float32(0.25) * nz) * (np.float32(0.3) + np.float32(0.7) * opening)
-            for c in range(3):
-                light[c] = ambient[c] * up
-                shine[c] = zero
-            specular, gloss = response[m, 0], int(response[m, 1])
-            for k in range(lamp_position.shape[0]):
-                lx, ly, lz = lamp_position[k, 0] - px, lamp_position[k, 1] - py, lamp_position[k, 2] - pz
-                square = lx * lx + ly * ly + lz * lz
-                inverse = one / np.sqrt(square)
-                cosine = (nx * lx + ny * ly + nz * lz) * inverse
-                if cosine <= 0:
-                    continue
-                strength = np.float32(5.0) / (one + square)
-                strength *= _lit(
-                    maps_moments, maps_rotation, maps_position, maps_pinhole, maps_reference, k + 1, px, py, pz,
-                    np.float32(2e-5),
+            j = x >> 1
+            shared = not keeps and lit_face[j] == f
+            at = j if keeps or shared else own
+            if not shared:
+                _illuminate(
+                    eye[0] + z * rx, eye[1] + z * ry, eye[2] + z * rz, nx * norm, ny * norm, nz * norm,
+                    rx * ray, ry * ray, rz * ray, response[m, 0], int(response[m, 1]),
+                    lamp_position, lamp_colour, ambient,
+                    moments, rotation, position, pinhole, reference, lights, at,
                 )  # fmt: skip
-                hx, hy, hz = lx * inverse - rx * ray, ly * inverse - ry * ray, lz * inverse - rz * ray
-                h = max(zero, (nx * hx + ny * hy + nz * hz) / np.sqrt(hx * hx + hy * hy + hz * hz + np.float32(1e-12)))
-                for _ in range(gloss):
-                    h *= h
-                peak = specular * h * strength * np.float32(1 << gloss) * np.float32(0.08)
-                for c in range(3):
-                    light[c] += lamp_colour[k, c] * strength * cosine
-                    shine[c] += lamp_colour[k, c] * peak
-            emission = response[m, 2]
+            if keeps:
+                lit_face[j] = f
             for c in range(3):
-                value = albedo[c] * (light[c] + emission) + shine[c]
+                value = albedo[c] * (lights[at, c] + response[m, 2]) + lights[at, 3 + c]
                 out[y, x, c] = np.uint16(min(np.float32(65535.0), np.sqrt(value) * np.float32(LIGHT_SCALE)))
 
 
@@ -178,7 +193,10 @@ def shade(
     rows: tuple[int, int],
     out: Array,
 ) -> None:
-    """Colour ``rows`` of ``out (H, W, 3) uint16`` as sqrt(linear light) * LIGHT_SCALE from the rasteriser's buffers."""
+    """Colour ``rows`` of ``out (H, W, 3) uint16`` as sqrt(linear light) * LIGHT_SCALE from the rasteriser's buffers.
+
+    The first row is even.
+    """
     s, i = surfaces, projection.intrinsics
     camera = (np.float32(i.fx), np.float32(i.fy), np.float32(i.cx), np.float32(i.cy))
     R, eye = T_world_camera[:3, :3].astype(np.float32), T_world_camera[:3, 3].astype(np.float32)

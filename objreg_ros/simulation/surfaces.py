@@ -21,7 +21,7 @@ class Surfaces:
     ``vertices``, ``normals (V, 3)``, ``uv (V, 2)`` float32; ``faces (F, 3) int32``; ``open_surface (F,) bool``;
     ``instance (F,) uint16`` (0 for the room); ``material (F,) int32``; ``detail (F,) float32`` textures per metre;
     ``casts_shadow (F,) bool``; ``texels (N, 4) uint8``; ``level_start (M, LEVELS) int32``; ``texture_size (M,) int32``;
-    ``response (M, 3) float32`` specular, gloss, emission.
+    ``response (M, 3) float32`` specular, gloss, emission; ``loss (F,) float32`` the share of a face without depth.
     """
 
     vertices: Array
@@ -37,6 +37,7 @@ class Surfaces:
     level_start: Array
     texture_size: Array
     response: Array
+    loss: Array
 
 
 def flatten(meshes: Sequence[Mesh], instances: Sequence[int], casts_shadow: Sequence[bool]) -> Surfaces:
@@ -59,6 +60,7 @@ def flatten(meshes: Sequence[Mesh], instances: Sequence[int], casts_shadow: Sequ
         level_start=starts,
         texture_size=sizes,
         response=response,
+        loss=np.array([m.depth_loss for m in whole.materials], np.float32)[whole.material],
     )
 
 

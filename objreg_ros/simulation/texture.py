@@ -29,7 +29,7 @@ def vivid(rng: np.random.Generator) -> Colour:
 
 def muted(rng: np.random.Generator) -> Colour:
     """A colour of paint, cloth or plastic: any hue, mostly weak."""
-    return hsv(rng.random(), rng.beta(1.2, 2.5), rng.uniform(0.15, 0.95))
+    return hsv(rng.random(), rng.beta(1.0, 2.8), rng.uniform(0.12, 0.95))
 
 
 def grey(rng: np.random.Generator, low: float = 0.05, high: float = 0.95) -> Colour:
@@ -91,7 +91,10 @@ def wood(rng: np.random.Generator, size: int = 256) -> Array:
     hue, value = rng.uniform(0.04, 0.12), rng.uniform(0.25, 0.9)
     light = hsv(hue, rng.uniform(0.25, 0.65), value)
     dark = hsv(hue - 0.01, rng.uniform(0.4, 0.75), value * rng.uniform(0.5, 0.85))
-    warp = noise(rng, size, 3) * rng.uniform(2, 8) + np.linspace(0, rng.uniform(6, 30), size)[:, None]
+    knots = noise(rng, size, 2) * rng.uniform(0.5, 5)
+    stretched = cv2.resize(noise(rng, size, 6)[:, : size // 8], (size, size), interpolation=cv2.INTER_CUBIC)
+    rings = 2 * np.pi * round(rng.uniform(2, 9)) * np.arange(size)[:, None] / size
+    warp = knots * rng.random() ** 2 + 2.5 * stretched + rings
     fibres = cv2.resize(rng.uniform(-1, 1, (size, 8)).astype(np.float32), (size, size))
     picture = mixed(light, dark, 0.5 + 0.32 * np.sin(warp) + 0.22 * fibres)
     return planks(rng, picture) if rng.random() < 0.35 else picture

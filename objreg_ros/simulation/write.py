@@ -15,7 +15,9 @@ The folder also gets `truth/`, see `objreg_ros.simulation.truth`.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -75,13 +77,14 @@ def simulate(
     if Path(path).exists():
         raise FileExistsError(f"{path}: expected a new folder, got one that exists; choose another name or remove it")
     story = make_story(scenario, seed, frames, rate, sensors.stress.occluders)
+    for scene in story.scenes:
+        scene.prepare()
     truth = TruthWriter(story, scenario, seed, sensors.intrinsics)
     T_odom_camera, covariance = drifted(story.T_world_camera, sensors.odometry, seed)
 
     def records() -> Iterator[Record]:
-        for k in range(frames):
+        for k, image in enumerate(_rendered(story, seed, sensors, threads)):
             stamp_ns = START_NS + round(k * 1e9 / story.rate)
-            image = _frame(story, k, seed, sensors, threads)
             truth.add(stamp_ns, int(story.scene_of[k]), image)
             yield from _camera_records(image, stamp_ns, points, jpeg)
             yield from _pose_records(image.T_world_camera, T_odom_camera[k], covariance[k], stamp_ns)
@@ -92,11 +95,23 @@ def simulate(
     return story
 
 
-def _frame(story: Story, k: int, seed: int, sensors: Sensors, threads: int) -> Rendering:
+def _rendered(story: Story, seed: int, sensors: Sensors, threads: int) -> Iterator[Rendering]:
+    """Every frame in order; ``threads`` of them are in the making at once, and as many more may wait."""
+    with ThreadPoolExecutor(threads) as pool:
+        ahead: deque[Future[Rendering]] = deque()
+        for k in range(len(story)):
+            ahead.append(pool.submit(_frame, story, k, seed, sensors))
+            if len(ahead) > 2 * threads:
+                yield ahead.popleft().result()
+        while ahead:
+            yield ahead.popleft().result()
+
+
+def _frame(story: Story, k: int, seed: int, sensors: Sensors) -> Rendering:
     scene = story.scenes[int(story.scene_of[k])]
     noise_seed = int(np.random.default_rng([seed, 41, k]).integers(2**31))
     of = (sensors.depth, sensors.colour, sensors.stress)
-    return render(scene, story.T_world_camera[k], sensors.intrinsics, noise_seed, *of, threads=threads)
+    return render(scene, story.T_world_camera[k], sensors.intrinsics, noise_seed, *of)
 
 
 def _camera_records(image: Rendering, stamp_ns: int, points: bool, jpeg: bool) -> Iterator[Record]:
