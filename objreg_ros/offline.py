@@ -90,6 +90,7 @@ def build_rooms(
     from objreg_ros import share
     from objreg_ros.detector.mobilenet_ssd import Detector
     from objreg_ros.registrar.registrar import Registrar
+    from objreg_ros.registrar.warm import warm
     from objreg_ros.segmenter.organise import organise
     from objreg_ros.segmenter.segment import Segmenter
 
@@ -97,6 +98,7 @@ def build_rooms(
     detects = Detector(detector, share.model(detector.model), labels)
     segments = Segmenter(segmenter)
     segments.warm()
+    warm(registrar)
     registers = Registrar(registrar)
     return Rooms(detects, segments, registers, organise), registers.close
 

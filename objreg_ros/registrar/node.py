@@ -28,6 +28,7 @@ from objreg_ros.bridge.worker import Worker
 from objreg_ros.data import Frame
 from objreg_ros.registrar.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.registrar.registrar import Outcome, Registrar, Stretch
+from objreg_ros.registrar.warm import warm
 
 KEPT_CONSTRAINTS = 1000  # what a mapper that comes late still gets
 
@@ -42,6 +43,7 @@ class RegistrarNode(MatchingDoor):
         super().__init__("registrar", RegistrarParams, RegistrarNodeParams)
         inputs = self.settings.of(RegistrarNodeParams)
         self._T_base_camera, self._seconds = inputs.mounting, inputs.limit
+        warm(self.settings.of(RegistrarParams))
         self._registrar = Registrar(self.settings.of(RegistrarParams))
         self._tracking = threading.Lock()
         self._enabled = True

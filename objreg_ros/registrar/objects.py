@@ -64,7 +64,7 @@ def _keep_gone(distances: Array, source: Prepared, target: Prepared, T: Array, p
 
 def is_gone(owner: Prepared, index: int, other: Prepared, T_other_owner: Array, params: RegistrarParams) -> bool:
     """Whether the other view looks through most of an object where it would stand."""
-    points = owner.keyframe.objects[index].cloud.xyz[::4]
+    points = np.ascontiguousarray(owner.keyframe.objects[index].cloud.xyz[::4])
     sight = other.sight
     counts = count(
         points,
