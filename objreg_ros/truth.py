@@ -44,6 +44,12 @@ class Truth:
         words = (from_msg.odometry(record.message) for record in records)
         return cls((word.stamp_ns, word.T_odom_body) for word in words)
 
+    @property
+    def length(self) -> float:
+        """How far the camera went, in metres."""
+        positions = np.array([T[:3, 3] for T in self.poses]).reshape(-1, 3)
+        return float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
+
     def at(self, stamp_ns: int) -> Array | None:
         """``T_world_camera`` at a moment; None before the first, after the last and within a gap."""
         after = bisect_left(self.stamps_ns, stamp_ns)

@@ -59,6 +59,11 @@ def test_a_pose_of_an_earlier_time_is_left_out() -> None:
     assert truth.stamps_ns == [100, 200]
 
 
+def test_the_length_of_the_way_is_told() -> None:
+    assert Truth([(0, at(0)), (1, at(1)), (2, at(-0.5))]).length == pytest.approx(2.5)
+    assert Truth([]).length == 0
+
+
 def test_a_summary_counts_what_is_strict_loose_and_false() -> None:
     errors = [(1.0, 1.0), (3.0, 5.0), (3.1, 5.0), (5.0, 10.0), (6.0, 6.0), (8.0, 15.0), (8.1, 1.0), (1.0, 15.1)]
     summary = summarise(errors)

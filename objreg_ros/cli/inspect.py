@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`objreg inspect`: what is in a recording and what the graph would use."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+import click
+
+from objreg_ros.cli import options
+from objreg_ros.recording import Recording, open_recording
+from objreg_ros.recording.inputs import GRAPH_TOPICS, Inputs, choose_inputs, parse_remaps
+from objreg_ros.recording.summary import describe_topics, warnings
+from objreg_ros.truth import Truth
+
+
+@click.command()
+@options.recording
+@options.remap
+def command(recording: Path, remaps: tuple[str, ...]) -> None:
+    """Say what is in RECORDING, which topics the graph would use, and what would go wrong."""
+    with open_recording(recording) as source:
+        inputs = choose_inputs(source.topics, parse_remaps(remaps))
+        _say_what_it_is(source)
+        _say_topics(source)
+        _say_inputs(inputs)
+        _say_truth(source, inputs)
+        for warning in warnings(source, inputs):
+            click.echo(f"! {warning}")
+
+
+def _say_what_it_is(source: Recording) -> None:
+    start = datetime.fromtimestamp(source.start_ns * 1e-9, UTC)
+    records = sum(topic.count for topic in source.topics.values())
+    click.echo(
+        f"{source.path}: {source.kind}, {source.seconds:.2f} s from {start:%Y-%m-%d %H:%M:%S} UTC, {records} records\n"
+    )
+
+
+def _say_topics(source: Recording) -> None:
+    rows = [
+        (line.topic, line.msgtype.replace("/msg/", "/"), str(line.count), _rate(line.rate), line.what)
+        for line in describe_topics(source)
+    ]
+    click.echo(columns(("topic", "type", "count", "Hz", "first message"), rows) + "\n")
+
+
+def _rate(rate: float | None) -> str:
+    return "" if rate is None else f"{rate:.1f}"
+
+
+def _say_inputs(inputs: Inputs) -> None:
+    chosen = inputs.chosen()
+    rows = [(GRAPH_TOPICS[name], chosen.get(name, "-")) for name in GRAPH_TOPICS]
+    click.echo(columns(("input of the graph", "topic that it would use"), rows) + "\n")
+
+
+def _say_truth(source: Recording, inputs: Inputs) -> None:
+    truth = Truth.of(source, inputs.ground_truth)
+    if truth.poses:
+        click.echo(f"ground truth: {len(truth.poses)} poses, {truth.length:.2f} m\n")
+
+
+def columns(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table in plain text, two spaces between the columns."""
+    widths = [max(len(row[i]) for row in (head, *rows)) for i in range(len(head))]
+    lines = [head, ["-" * width for width in widths], *rows]
+    return "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines
+    )

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is in a recording, what the graph would use of it, and what would go wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.layout import table
+from objreg_ros.data import Intrinsics
+from objreg_ros.recording.inputs import Inputs
+from objreg_ros.recording.record import Recording
+
+SAMPLE = 60  # messages of colour and depth whose stamps are compared
+NEAR_NS = 20_000_000  # how far apart colour and depth may be for the nodes' default slop
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One topic: how often it came, and what its first message is."""
+
+    topic: str
+    msgtype: str
+    count: int
+    rate: float | None
+    what: str
+
+
+def describe_topics(recording: Recording) -> list[Line]:
+    """A line a topic, in order of name. The rate is None for fewer than two messages."""
+    lines = []
+    for topic in recording.topics.values():
+        rate = (topic.count - 1) / recording.seconds if topic.count > 1 and recording.seconds > 0 else None
+        lines.append(Line(topic.name, topic.msgtype, topic.count, rate, _what(recording, topic.name, topic.msgtype)))
+    return lines
+
+
+def _what(recording: Recording, name: str, msgtype: str) -> str:
+    describe = DESCRIBE.get(msgtype)
+    record = next(recording.records([name]), None) if describe else None
+    if describe is None or record is None:
+        return ""
+    try:
+        return describe(record.message)
+    except ValueError as error:
+        return f"not readable: {error}"
+
+
+def _image(message: Any) -> str:
+    return f"{message.width} × {message.height} {message.encoding}, {message.header.frame_id}"
+
+
+def _compressed(message: Any) -> str:
+    return f"{message.format}, {message.header.frame_id}"
+
+
+def _cloud(message: Any) -> str:
+    names = " ".join(table(message).dtype.names or ())
+    kind = "organised" if min(message.width, message.height) > 1 else "not organised"
+    size = f"{message.width} × {message.height}"
+    return f"{size} {kind}, {names}, {message.point_step} bytes a point, {message.header.frame_id}"
+
+
+def _camera(message: Any) -> str:
+    camera = from_msg.intrinsics(message)
+    numbers = " ".join(f"{name} {getattr(camera, name):.1f}" for name in ("fx", "fy", "cx", "cy"))
+    return f"{camera.width} × {camera.height} {numbers}{', distorted' if _is_distorted(message) else ''}"
+
+
+def _is_distorted(message: Any) -> bool:
+    return bool(np.any(np.asarray(getattr(message, "d", getattr(message, "D", ())))))
+
+
+def _pose(message: Any) -> str:
+    word = from_msg.odometry(message)
+    return f"{word.frame_id} → {word.child_frame_id or 'pose'}"
+
+
+DESCRIBE: dict[str, Callable[[Any], str]] = {
+    "sensor_msgs/msg/Image": _image,
+    "sensor_msgs/msg/CompressedImage": _compressed,
+    "sensor_msgs/msg/PointCloud2": _cloud,
+    "sensor_msgs/msg/CameraInfo": _camera,
+    "nav_msgs/msg/Odometry": _pose,
+    "geometry_msgs/msg/PoseStamped": _pose,
+    "geometry_msgs/msg/PoseWithCovarianceStamped": _pose,
+    "geometry_msgs/msg/TransformStamped": _pose,
+}
+
+
+def warnings(recording: Recording, inputs: Inputs) -> list[str]:
+    """What would go wrong or be missed, in words, and what to do; empty if nothing."""
+    found = list(recording.notes)
+    if inputs.missing:
+        found.append(
+            f"the graph cannot run: expected {inputs.missing}; if it is there, name it with --remap input:=/topic"
+        )
+    if inputs.odom is None:
+        found.append("no odometry: the registrar follows the camera by itself, and the gate is less strict")
+    if inputs.ground_truth is None:
+        found.append("no ground truth: the true error of constraints cannot be told")
+    return [*found, *_first_messages(recording, inputs), *_stamps(recording, inputs)]
+
+
+def _first_messages(recording: Recording, inputs: Inputs) -> list[str]:
+    """What the nodes would say of the first messages."""
+    found: list[str] = []
+    colour = _try(found, "image", recording, inputs.image, lambda m: from_msg.image(m).rgb.shape[:2])
+    depth = _try(found, "depth", recording, inputs.depth, lambda m: from_msg.depth(m).shape)
+    cloud = _try(found, "points", recording, inputs.points, from_msg.point_cloud)
+    camera: Intrinsics | None = _try(found, "camera_info", recording, inputs.camera_info, from_msg.intrinsics)
+    if camera and depth and depth != (camera.height, camera.width):
+        found.append(f"depth has {_size(depth)} pixels and its camera_info {camera.width} × {camera.height}")
+    if colour and depth and colour != depth:
+        found.append(
+            f"colour has {_size(colour)} pixels and depth {_size(depth)}: they must show the same field of view"
+        )
+    if cloud is not None and not cloud.organised and camera is None:
+        found.append("points are not organised and there is no camera_info to project them with")
+    return found
+
+
+def _try(
+    found: list[str], name: str, recording: Recording, topic: str | None, decode: Callable[[Any], Any]
+) -> Any | None:
+    record = next(recording.records([topic]), None) if topic else None
+    try:
+        return None if record is None else decode(record.message)
+    except ValueError as error:
+        found.append(f"{name}: {error}")
+        return None
+
+
+def _size(hw: tuple[int, int]) -> str:
+    return f"{hw[1]} × {hw[0]}"
+
+
+def _stamps(recording: Recording, inputs: Inputs) -> list[str]:
+    """Whether the stamps in the headers let colour and depth be brought together."""
+    colour, depth = (_header_stamps(recording, topic) for topic in (inputs.image, inputs.depth or inputs.points))
+    found = []
+    for name, stamps in (("colour", colour), ("depth", depth)):
+        if (np.diff(stamps) < 0).any():
+            found.append(f"the stamps of {name} go back in time: what waits is dropped there")
+    if len(colour) and len(depth):
+        apart = float(np.median(np.abs(depth[:, None] - colour[None, :]).min(axis=1)))
+        if apart > NEAR_NS:
+            found.append(f"colour and depth are {apart * 1e-6:.0f} ms apart: raise segmenter.slop above that")
+    return found
+
+
+def _header_stamps(recording: Recording, topic: str | None) -> np.ndarray:
+    records = islice(recording.records([topic]), SAMPLE) if topic else ()
+    return np.array([from_msg.stamp_ns(record.message) for record in records], np.int64)

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from recording.folders import tum_folder
+
+from objreg_ros.cli.inspect import columns, command
+
+
+def test_a_recording_is_told_with_its_inputs_and_its_truth(tmp_path: Path) -> None:
+    result = CliRunner().invoke(command, [str(tum_folder(tmp_path))])
+    assert result.exit_code == 0
+    for text in ("TUM RGB-D folder, 0.20 s", "sensor_msgs/Image", "64 × 48 16UC1, camera", "3 poses, 1.00 m"):
+        assert text in result.output
+    assert "! no odometry" in result.output
+
+
+def test_a_remap_shows_in_the_inputs(tmp_path: Path) -> None:
+    result = CliRunner().invoke(command, [str(tum_folder(tmp_path)), "--remap", "depth:="])
+    assert "! the graph cannot run: expected points or a depth image" in result.output
+
+
+def test_a_real_bag_is_told(shared: Path) -> None:
+    result = CliRunner().invoke(command, [str(shared / "data/bag_soda_can/perception_tutorial.bag")])
+    assert "640 × 480 organised, x y z rgb, 32 bytes a point" in result.output
+    assert "expected a colour image" in result.output
+
+
+def test_nothing_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="no such file"):
+        CliRunner().invoke(command, [str(tmp_path / "x")], catch_exceptions=False)
+
+
+def test_columns_line_up() -> None:
+    assert columns(("a", "b"), [("long", "x")]) == "a     b\n----  -\nlong  x"

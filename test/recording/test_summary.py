@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from objreg_ros.data import Intrinsics
+from objreg_ros.recording import Record, Recording, messages, open_recording, write_rosbag2
+from objreg_ros.recording.inputs import choose_inputs
+from objreg_ros.recording.summary import describe_topics, warnings
+
+from .folders import CAMERA, records, tum_folder
+
+
+def bag(path: Path, items: Iterator[Record] | list[Record]) -> Recording:
+    write_rosbag2(path, items)
+    return open_recording(path)
+
+
+def said(recording: Recording) -> str:
+    return "\n".join(warnings(recording, choose_inputs(recording.topics)))
+
+
+def depth_and_colour(depth: np.ndarray, encoding: str, camera: Intrinsics = CAMERA, later: int = 0) -> list[Record]:
+    rgb = np.zeros((48, 64, 3), np.uint8)
+    return [
+        Record.of("/camera_info", messages.camera_info(camera, 5, "c"), 5),
+        Record.of("/image", messages.image(rgb, "rgb8", 5, "c"), 5),
+        Record.of("/depth/image", messages.image(depth, encoding, 5 + later, "c"), 5),
+    ]
+
+
+METRE = np.full((48, 64), 1000, np.uint16)
+
+
+def test_every_topic_is_told_with_its_rate_and_its_first_message(tmp_path: Path) -> None:
+    lines = {line.topic: line for line in describe_topics(bag(tmp_path / "bag", records(11)))}
+    assert lines["/image"].rate == pytest.approx(10, rel=1e-6) and lines["/image"].count == 11
+    assert lines["/image"].what == "64 × 48 rgb8, camera"
+    assert lines["/camera_info"].what == "64 × 48 fx 50.0 fy 50.0 cx 31.5 cy 23.5"
+    assert lines["/odom"].what == "odom → camera"
+
+
+def test_a_cloud_is_told_with_its_fields(tmp_path: Path) -> None:
+    rows = np.zeros((2, 3), [("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
+    cloud = Record.of("/points", messages.point_cloud(rows, 5, "c"), 5)
+    (line,) = describe_topics(bag(tmp_path / "bag", [cloud]))
+    assert line.what == "3 × 2 organised, x y z, 12 bytes a point, c" and line.rate is None
+
+
+def test_a_good_recording_has_no_warning_but_of_its_missing_truth(tmp_path: Path) -> None:
+    assert said(bag(tmp_path / "bag", records())) == "no ground truth: the true error of constraints cannot be told"
+
+
+def test_what_keeps_the_graph_from_running_is_said(tmp_path: Path) -> None:
+    recording = bag(tmp_path / "bag", [r for r in records() if r.topic in ("/image", "/depth/image")])
+    assert "the graph cannot run: expected the camera_info of the depth image" in said(recording)
+
+
+def test_depth_that_does_not_fit_its_camera_is_said(tmp_path: Path) -> None:
+    large = Intrinsics(fx=100.0, fy=100.0, cx=64.0, cy=48.0, width=128, height=96)
+    recording = bag(tmp_path / "bag", depth_and_colour(METRE, "16UC1", large))
+    assert "depth has 64 × 48 pixels and its camera_info 128 × 96" in said(recording)
+
+
+def test_depth_of_another_size_than_colour_is_said(tmp_path: Path) -> None:
+    small = Intrinsics(fx=25.0, fy=25.0, cx=15.5, cy=11.5, width=32, height=24)
+    recording = bag(tmp_path / "bag", depth_and_colour(METRE[::2, ::2], "16UC1", small))
+    assert "colour has 64 × 48 pixels and depth 32 × 24" in said(recording)
+
+
+def test_an_encoding_that_no_node_reads_is_said(tmp_path: Path) -> None:
+    recording = bag(tmp_path / "bag", depth_and_colour(METRE, "12UC7"))
+    assert "depth: expected an encoding of 16UC1, mono16, 32FC1, got '12UC7'" in said(recording)
+
+
+def test_stamps_that_do_not_meet_are_said(tmp_path: Path) -> None:
+    recording = bag(tmp_path / "bag", depth_and_colour(METRE, "16UC1", later=50_000_000))
+    assert "colour and depth are 50 ms apart: raise segmenter.slop" in said(recording)
+
+
+def test_stamps_that_go_back_are_said(tmp_path: Path) -> None:
+    rgb = np.zeros((4, 4, 3), np.uint8)
+    pictures = [Record.of("/image", messages.image(rgb, "rgb8", t, "c"), 9 + i) for i, t in enumerate((7, 8, 5))]
+    assert "the stamps of colour go back in time" in said(bag(tmp_path / "bag", pictures))
+
+
+def test_what_the_reader_assumed_is_passed_on(tmp_path: Path) -> None:
+    (tum_folder(tmp_path, scale=5000) / "camera.yaml").unlink()
+    assert "default camera" in said(open_recording(tmp_path))
