@@ -30,11 +30,3 @@ def _box(row: Array) -> Box:
 def is_empty(box: Box) -> bool:
     """Whether no pixel lies in ``box``."""
     return box[2] <= box[0] or box[3] <= box[1]
-
-
-def expanded(box: Box, margin: float, step: int, height: int, width: int) -> Box:
-    """``box`` with ``margin`` of its size around it, within the image, starting on multiples of ``step`` pixels."""
-    x0, y0, x1, y1 = box
-    dx, dy = int(margin * (x1 - x0)) + 4 * step, int(margin * (y1 - y0)) + 4 * step
-    left, top = max(0, x0 - dx) // step * step, max(0, y0 - dy) // step * step
-    return left, top, min(width, x1 + dx), min(height, y1 + dy)

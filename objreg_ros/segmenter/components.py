@@ -7,24 +7,21 @@ links that reach over small holes in the depth.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numba
 import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.segmenter.surface import EXACT
 
-LINKS = np.array([(0, -1), (-1, 0), (-1, -1), (-1, 1), (0, -2), (-2, 0)])
-
 
 def connect(depth: Array, keep: Array, jump: tuple[float, float]) -> tuple[Array, int]:
     """The parts of the cells ``keep (h, w) bool``: labels (h, w) int32, 0 where not kept, else 1 … count; and count.
 
-    Two cells are linked where their ``depth (h, w)`` differs by less than a + b z² of ``jump`` = (a, b).
+    Neighbours are linked where their ``depth (h, w)`` differs by less than a + b z² of ``jump`` = (a, b); so are cells
+    with one cell without depth between them.
     """
     labels = np.empty(depth.shape, np.int32)
-    count = _connect(depth, keep, np.float32(jump[0]), np.float32(jump[1]), LINKS, labels)
+    count = _connect(depth, keep, np.float32(jump[0]), np.float32(jump[1]), labels)
     return labels, int(count)
 
 
@@ -36,24 +33,30 @@ def _root(parent, k):  # type: ignore[no-untyped-def]
     return k
 
 
+@numba.njit(cache=True, inline="always")
+def _join(parent, k, other):  # type: ignore[no-untyped-def]
+    r, s = _root(parent, k), _root(parent, other)
+    parent[max(r, s)] = min(r, s)
+
+
 @numba.njit(cache=True, fastmath=EXACT)
-def _connect(depth, keep, a, b, links, labels):  # type: ignore[no-untyped-def]
+def _connect(depth, keep, a, b, labels):  # type: ignore[no-untyped-def]
     h, w = depth.shape
-    parent = np.arange(h * w, dtype=np.int32)
+    parent = np.empty(h * w, np.int32)
     for i in range(h):
         for j in range(w):
+            k = np.int32(i * w + j)
+            parent[k] = k
             if not keep[i, j]:
                 continue
             z = depth[i, j]
             jump = a + b * z * z
-            for k in range(len(links)):
-                p, q = i + links[k, 0], j + links[k, 1]
-                if p >= 0 and q >= 0 and q < w and keep[p, q] and abs(depth[p, q] - z) < jump:
-                    r, s = _root(parent, np.int32(i * w + j)), _root(parent, np.int32(p * w + q))
-                    if r < s:
-                        parent[s] = r
-                    elif s < r:
-                        parent[r] = s
+            back = 2 if j > 1 and depth[i, j - 1] == 0 else 1
+            if j >= back and keep[i, j - back] and abs(depth[i, j - back] - z) < jump:
+                parent[k] = _root(parent, np.int32(k - back))
+            back = 2 if i > 1 and depth[i - 1, j] == 0 else 1
+            if i >= back and keep[i - back, j] and abs(depth[i - back, j] - z) < jump:
+                _join(parent, k, np.int32(k - back * w))
     return _number(parent, keep, labels)
 
 
@@ -107,71 +110,5 @@ def _grow(labels, depth, keep, a, b, rounds):  # type: ignore[no-untyped-def]
                     cells.append((np.int32(i), np.int32(j), label))
         if len(cells) == 0:
             return
-        for i, j, label in cells:
-            labels[i, j] = label
-
-
-@dataclass(frozen=True, slots=True)
-class Parts:
-    """K connected parts of a surface, largest in the box first, numbered from 1 in ``labels (h, w) int32``.
-
-    ``total`` and ``inside (K,)`` count the cells of a part and those in the box; ``weight (K,)`` those in the box, the
-    middle more than the rim; ``extent (K, 4)`` is left, top, right, bottom in cells, half open; ``contact (K, K)``
-    counts the neighbouring cells of two parts without a depth jump between them.
-    """
-
-    labels: Array
-    total: Array
-    inside: Array
-    weight: Array
-    extent: Array
-    contact: Array
-
-    def __len__(self) -> int:
-        return len(self.total)
-
-
-def measure(
-    labels: Array, count: int, window: tuple[int, int, int, int], depth: Array, jump: tuple[float, float], limit: int
-) -> Parts:
-    """The ``limit`` largest parts of ``labels`` by their cells in ``window`` (left, top, right, bottom, half open)."""
-    left, top, right, bottom = window
-    inside = np.bincount(labels[top:bottom, left:right].ravel(), minlength=count + 1)
-    inside[0] = 0
-    order = np.argsort(-inside, kind="stable")[:limit]
-    order = order[inside[order] > 0]
-    number = np.zeros(count + 1, np.int32)
-    number[order] = np.arange(1, len(order) + 1)
-    renamed = number[labels]
-    k = len(order) + 1
-    counts, extent = np.zeros((k, 3), np.float64), np.zeros((k, 4), np.int64)
-    contact = np.zeros((k, k), np.int64)
-    _measure(renamed, np.array(window), depth, np.float32(jump[0]), np.float32(jump[1]), counts, extent, contact)
-    return Parts(renamed, counts[1:, 0], counts[1:, 1], counts[1:, 2], extent[1:], contact[1:, 1:])
-
-
-@numba.njit(cache=True, fastmath=EXACT)
-def _measure(labels, window, depth, a, b, counts, extent, contact):  # type: ignore[no-untyped-def]
-    h, w = labels.shape
-    left, top, right, bottom = window
-    for i in range(h):
-        for j in range(w):
-            k = labels[i, j]
-            if k == 0:
-                continue
-            if counts[k, 0] == 0:
-                extent[k, 0], extent[k, 1], extent[k, 2], extent[k, 3] = j, i, j + 1, i + 1
-            counts[k, 0] += 1
-            extent[k, 0], extent[k, 2] = min(extent[k, 0], j), max(extent[k, 2], j + 1)
-            extent[k, 3] = i + 1
-            if i >= top and i < bottom and j >= left and j < right:
-                off_v = abs(2 * i + 1 - top - bottom) / (bottom - top)
-                off_u = abs(2 * j + 1 - left - right) / (right - left)
-                counts[k, 1] += 1
-                counts[k, 2] += 1 - 0.7 * max(off_u, off_v)
-            jump = a + b * depth[i, j] * depth[i, j]
-            for p, q in ((i, j + 1), (i + 1, j)):
-                other = labels[p, q] if p < h and q < w else 0
-                if other > 0 and other != k and abs(depth[p, q] - depth[i, j]) < jump:
-                    contact[k, other] += 1
-                    contact[other, k] += 1
+        for v, u, name in cells:
+            labels[v, u] = name

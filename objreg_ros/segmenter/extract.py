@@ -79,18 +79,18 @@ def _gather(depth, x0, y0, mask, cell_normals, grid, lens, a, b, uv, xyz, normal
     area = 0.0
     n = 0
     for v in range(h):
-        i = min((v + y0 - top) // step, cell_normals.shape[0] - 1)
+        i = min((v + y0 - top) // step, cell_normals.shape[1] - 1)
         y = (v + y0 - lens[3]) / lens[1]
         for u in range(w):
             if not mask[v, u] or _neighbours(mask, v, u) < MIN_NEIGHBOURS:
                 continue
             z = depth[v + y0, u + x0]
             x = (u + x0 - lens[2]) / lens[0]
-            j = min((u + x0 - left) // step, cell_normals.shape[1] - 1)
+            j = min((u + x0 - left) // step, cell_normals.shape[2] - 1)
             uv[n, 0], uv[n, 1] = u + x0, v + y0
             xyz[n, 0], xyz[n, 1], xyz[n, 2] = x * z, y * z, z
             for k in range(3):
-                normals[n, k] = cell_normals[i, j, k]
+                normals[n, k] = cell_normals[k, i, j]
             edge[n] = EDGE if _at_jump(depth, v + y0, u + x0, a + b * z * z) else 0
             cosine = abs(x * normals[n, 0] + y * normals[n, 1] + normals[n, 2])
             area += z * z / (lens[0] * lens[1] * (max(cosine, 0.1) if cosine > 0 else 0.7))

@@ -1,29 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One object out of its box: what stands on the support, in one piece, most of it in the box."""
+"""One object out of its box: what stands on the support, in the parts that the box asks for."""
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
 from objreg_ros.data import Array, DepthImage, PointFlag
-from objreg_ros.segmenter.boxes import Box, expanded
-from objreg_ros.segmenter.components import Parts, connect, grow, measure
-from objreg_ros.segmenter.creases import find_creases, find_steps
+from objreg_ros.segmenter.boxes import Box
+from objreg_ros.segmenter.components import connect, grow
 from objreg_ros.segmenter.extract import Pixels, extract
+from objreg_ros.segmenter.holes import fill_holes
+from objreg_ros.segmenter.level import support_cells
 from objreg_ros.segmenter.params import SegmenterParams
-from objreg_ros.segmenter.selection import Window, select
-from objreg_ros.segmenter.support import Ground, fit_plane, tolerance
-from objreg_ros.segmenter.surface import Surface, reduce
+from objreg_ros.segmenter.parts import Parts, measure
+from objreg_ros.segmenter.seams import find_seams
+from objreg_ros.segmenter.selection import select
+from objreg_ros.segmenter.support import Ground, tolerance
+from objreg_ros.segmenter.surface import Surface, Window
 
-FINE = 2  # pixels per cell around a box
-LEVEL = np.cos(np.radians(15.0))  # a cell near the support's height that is tilted more than this is of the object
-BUMP = 0.5
-GROWTH = 8  # rounds that parts grow over valleys
-MAX_PARTS = 24
-OWN_TOP = 0.65  # a level part with more of it in the box is a top of the object, not what it stands on
+MIN_PART = 10  # cells; what is smaller joins a neighbour
+GROWTH = 12  # rounds that parts grow over seams
+MAX_PARTS = 32
 LEAK = 0.08  # an object with more of it outside its box is cut by the box
 NEAR_BORDER = 0.012  # of the image's size
+FLAT = 0.85  # share of a wall-like object's cells on one plane
+WALL_AROUND = 0.4  # share of the cells around it on the same plane
 
 
 def isolate(image: DepthImage, box: Box, ground: Ground, params: SegmenterParams) -> tuple[Pixels, PointFlag]:
@@ -31,108 +32,59 @@ def isolate(image: DepthImage, box: Box, ground: Ground, params: SegmenterParams
 
     ``box`` must not be empty. No pixel outside the box comes back; no object gives no pixels.
     """
-    height, width = image.depth.shape
-    z_max, y_max = params.limits
     jump = (params.jump, params.jump_z2)
-    step = FINE if min(box[2] - box[0], box[3] - box[1]) >= 8 * FINE else 1
-    around = expanded(box, params.margin, step, height, width)
-    surface = reduce(image.depth, image.intrinsics, around, step, (params.z_min, z_max, y_max), jump)
-    valley = find_creases(surface, params.crease, jump)
-    level, supported = _support_cells(surface, valley, box, ground, params.height)
-    window = _cells_of(box, surface)
-    parts = _parts(surface, (surface.depth > 0) & ~level, valley, window, jump)
-    selected = select(parts, window)
-    chosen = np.isin(parts.labels, selected) if selected else np.zeros_like(level)
-    pixels = extract(image, box, surface, chosen, jump)
+    window = _cells(box, ground.surface)
+    crop = _expanded(window, params.margin, ground.surface)
+    around = ground.surface.crop(crop)
+    level, supported = support_cells(around, window, ground, params.height)
+    here = (window[0] - crop[0], window[1] - crop[1], window[2] - crop[0], window[3] - crop[1])
+    keep = (around.depth > 0) & ~level
+    labels, count = connect(around.depth, keep & ~find_seams(around, params.crease, jump), jump)
+    labels[np.bincount(labels.ravel(), minlength=count + 1)[labels] < MIN_PART] = 0
+    grow(labels, around.depth, keep, jump, GROWTH)
+    parts = measure(labels, count, here, around, image.rgb, jump, MAX_PARTS)
+    selected = select(parts, here)
+    chosen = _chosen(parts, selected)
+    fill_holes(chosen, around.depth, jump)
+    pixels = extract(image, box, around, chosen, jump)
     flags = PointFlag(0) if supported else PointFlag.UNSUPPORTED
-    index = np.array(selected, int) - 1
-    if selected and parts.inside[index].sum() < (1 - LEAK) * parts.total[index].sum():
-        flags |= PointFlag.CUT_BY_BOX
-    if _touches_border(pixels, height, width):
-        flags |= PointFlag.CUT_BY_IMAGE
-    if _wall_like(surface, chosen, window):
-        flags |= PointFlag.WALL_LIKE
+    flags |= _flags(image, pixels, around, chosen, here)
     return pixels, flags
 
 
-def _parts(surface: Surface, keep: Array, valley: Array, window: Window, jump: tuple[float, float]) -> Parts:
-    """The parts of the ``keep`` cells, cut at depth jumps and valleys."""
-    steps = find_steps(surface.depth, BUMP, jump)
-    labels, count = connect(surface.depth, keep & ~valley & ~steps, jump)
-    grow(labels, surface.depth, keep, jump, GROWTH)
-    return measure(labels, count, window, surface.depth, jump, MAX_PARTS)
+def _chosen(parts: Parts, selected: list[int]) -> Array:
+    """(h, w) bool: the cells of the parts with these numbers."""
+    table = np.zeros(len(parts) + 1, np.bool_)
+    table[selected] = True
+    return table[parts.labels]
 
 
-def _cells_of(box: Box, surface: Surface) -> Window:
-    """The cells of ``surface`` whose middle lies in ``box``: left, top, right, bottom; at least one cell."""
+def _cells(box: Box, surface: Surface) -> Window:
+    """The cells of the whole frame whose middle lies in ``box``; at least one cell."""
     h, w = surface.depth.shape
-    step = surface.step
-    left, right = (round((u - surface.left) / step) for u in (box[0], box[2]))
-    top, bottom = (round((v - surface.top) / step) for v in (box[1], box[3]))
+    left, top, right, bottom = (round(edge / surface.step) for edge in box)
     left, top = min(left, w - 1), min(top, h - 1)
     return left, top, max(left + 1, min(right, w)), max(top + 1, min(bottom, h))
 
 
-def _support_cells(surface: Surface, valley: Array, box: Box, ground: Ground, base: float) -> tuple[Array, bool]:
-    """The cells of the support surfaces here, and whether there is one."""
-    level = np.zeros(surface.depth.shape, bool)
-    up = ground.up
-    if up is None:
-        return level, False
-    rows, cols = _coarse_index(surface, ground.surface)
-    coarse_box = _window(box, ground.surface)
-    cosine = surface.normals @ up.astype(np.float32)
-    known = surface.depth > 0
-    points = surface.points
-    loose = tolerance(surface.depth)
-    found = False
-    for support in ground.supports:
-        here = (support.parts > 0) & ~support.parts_within(coarse_box, OWN_TOP)
-        here = cv2.dilate(here.view(np.uint8), np.ones((7, 7), np.uint8))[np.ix_(rows, cols)] > 0
-        near = known & here & (cosine > 0.9) & (np.abs(support.plane.height(points)) < 2 * loose)
-        if np.count_nonzero(near) < 40:
-            continue
-        plane = fit_plane(points[near], up)
-        if plane is None:
-            continue
-        height = plane.height(points)
-        spread = 1.48 * float(np.median(np.abs(height[near]) / loose[near]))
-        tight = np.minimum(base + 2.5 * spread * loose, loose)
-        level |= known & here & ((np.abs(height) < tight) | (~valley & (cosine > LEVEL) & (np.abs(height) < loose)))
-        found = True
-    return level, found
+def _expanded(window: Window, margin: float, surface: Surface) -> Window:
+    """``window`` with ``margin`` of its size around it, and at least four cells, within the frame."""
+    h, w = surface.depth.shape
+    dx, dy = int(margin * (window[2] - window[0])) + 4, int(margin * (window[3] - window[1])) + 4
+    return max(0, window[0] - dx), max(0, window[1] - dy), min(w, window[2] + dx), min(h, window[3] + dy)
 
 
-def _coarse_index(fine: Surface, coarse: Surface) -> tuple[Array, Array]:
-    """The rows and columns of ``coarse`` that the rows and columns of ``fine`` lie in."""
-    h, w = fine.depth.shape
-    rows = (fine.top + np.arange(h) * fine.step - coarse.top) // coarse.step
-    cols = (fine.left + np.arange(w) * fine.step - coarse.left) // coarse.step
-    return np.minimum(rows, coarse.depth.shape[0] - 1), np.minimum(cols, coarse.depth.shape[1] - 1)
-
-
-def _window(box: Box, coarse: Surface) -> tuple[slice, slice]:
-    """The cells of ``coarse`` that ``box`` touches."""
-    x0, y0, x1, y1 = box
-    return slice(y0 // coarse.step, -(-y1 // coarse.step)), slice(x0 // coarse.step, -(-x1 // coarse.step))
-
-
-def _choose(labels: Array, count: int, inside: Array) -> tuple[int, PointFlag]:
-    """The label of the part with most of the box's middle; 0 if there is none. And whether the box cuts it."""
-    if count == 0 or not inside.any():
-        return 0, PointFlag(0)
-    rows, cols = np.nonzero(inside)
-    v = np.abs(rows - rows.mean()) / max(1.0, np.ptp(rows) / 2)
-    u = np.abs(cols - cols.mean()) / max(1.0, np.ptp(cols) / 2)
-    here = labels[inside]
-    weight = np.bincount(here, weights=1.0 - 0.7 * np.maximum(u, v), minlength=count + 1)
-    total = np.bincount(labels.ravel(), minlength=count + 1)
-    share = np.bincount(here, minlength=count + 1) / np.maximum(total, 1)
-    weight[0] = 0
-    best = int((weight * share).argmax())
-    if weight[best] <= 0:
-        return 0, PointFlag(0)
-    return best, PointFlag.CUT_BY_BOX if share[best] < 1 - LEAK else PointFlag(0)
+def _flags(image: DepthImage, pixels: Pixels, around: Surface, chosen: Array, here: Window) -> PointFlag:
+    """What else is known of a whole object."""
+    flags = PointFlag(0)
+    inside = np.count_nonzero(chosen[here[1] : here[3], here[0] : here[2]])
+    if inside < (1 - LEAK) * np.count_nonzero(chosen):
+        flags |= PointFlag.CUT_BY_BOX
+    if _touches_border(pixels, *image.depth.shape):
+        flags |= PointFlag.CUT_BY_IMAGE
+    if _wall_like(around, chosen, here):
+        flags |= PointFlag.WALL_LIKE
+    return flags
 
 
 def _touches_border(pixels: Pixels, height: int, width: int) -> bool:
@@ -143,17 +95,17 @@ def _touches_border(pixels: Pixels, height: int, width: int) -> bool:
     return bool(low[0] < du or low[1] < dv or high[0] >= width - du or high[1] >= height - dv)
 
 
-def _wall_like(surface: Surface, chosen: Array, window: Window) -> bool:
+def _wall_like(around: Surface, chosen: Array, here: Window) -> bool:
     """Whether the chosen cells are flat and their plane goes on around the box."""
-    points = surface.points
-    patch = points[chosen].astype(np.float64)
-    if len(patch) < 50:
+    points = around.points[::2, ::2]
+    patch = points[chosen[::2, ::2]].astype(np.float64)
+    known = around.depth[::2, ::2] > 0
+    ring = known.copy()
+    ring[here[1] // 2 : -(-here[3] // 2), here[0] // 2 : -(-here[2] // 2)] = False
+    if len(patch) < 30 or np.count_nonzero(ring) < 30:
         return False
     centre = patch.mean(axis=0)
-    normal = np.linalg.eigh((patch - centre).T @ (patch - centre))[1][:, 0]
-    on_plane = (surface.depth > 0) & (np.abs((points - centre) @ normal) < 2 * tolerance(surface.depth))
-    ring = surface.depth > 0
-    ring[window[1] : window[3], window[0] : window[2]] = False
-    if np.count_nonzero(ring) < 50:
-        return False
-    return bool(on_plane[chosen].mean() > 0.85 and on_plane[ring].mean() > 0.4)
+    normal = np.linalg.eigh((patch - centre).T @ (patch - centre))[1][:, 0].astype(np.float32)
+    off = np.abs(points @ normal - centre.astype(np.float32) @ normal)
+    on_plane = known & (off < 2 * tolerance(around.depth[::2, ::2]))
+    return bool(on_plane[chosen[::2, ::2]].mean() > FLAT and on_plane[ring].mean() > WALL_AROUND)

@@ -13,11 +13,11 @@ from objreg_ros.segmenter.gravity import CAMERA_UP, estimate_up
 from objreg_ros.segmenter.isolate import isolate
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.support import Ground, find_supports
-from objreg_ros.segmenter.surface import Surface, reduce
+from objreg_ros.segmenter.surface import Surface, cell_size, reduce
 from objreg_ros.segmenter.view import reduced_view
 
-COARSE = 4  # pixels per cell of the whole frame: gravity and support surfaces
-GIVEN_UP_CONE_DEG = 15.0  # how far level surfaces may be from a gravity that is given
+COARSE = 2  # every so many cells tell gravity and the support surfaces
+NORMALS = 4000  # that tell gravity
 
 
 class Segmenter:
@@ -72,14 +72,13 @@ class Segmenter:
 
     def _ground(self, depth: DepthImage, gravity: Array | None) -> Ground:
         params = self.params
-        height, width = depth.depth.shape
-        step = COARSE if min(height, width) >= 16 * COARSE else 1
         z_max, y_max = params.limits
         limits, jump = (params.z_min, z_max, y_max), (params.jump, params.jump_z2)
-        surface = reduce(depth.depth, depth.intrinsics, (0, 0, width, height), step, limits, jump)
-        up, confidence = _up(surface, gravity, params.up_tilt)
-        supports = [] if up is None else find_supports(surface, depth.intrinsics, up, params.support_area, jump)
-        return Ground(up, confidence, supports, surface)
+        surface = reduce(depth.depth, depth.intrinsics, cell_size(*depth.depth.shape), limits, jump)
+        coarse = surface.every(COARSE)
+        up, confidence = _up(coarse, gravity, params.up_tilt)
+        supports = [] if up is None else find_supports(coarse, depth.intrinsics, up, params.support_area, jump)
+        return Ground(up, confidence, supports, surface, coarse)
 
 
 def _up(surface: Surface, gravity: Array | None, tilt_deg: float) -> tuple[Array | None, float]:
@@ -88,9 +87,9 @@ def _up(surface: Surface, gravity: Array | None, tilt_deg: float) -> tuple[Array
         if not np.isfinite(length) or length < 1e-6:
             raise ValueError(f"gravity: expected a direction of non-zero length, got {np.asarray(gravity).tolist()}")
         return -np.asarray(gravity, np.float64) / length, 1.0
-    normals = surface.normals.reshape(-1, 3)
-    known = normals[normals[:, 2] != 0]
-    return estimate_up(known[:: max(1, len(known) // 4000)], CAMERA_UP, tilt_deg)
+    normals = surface.normals.reshape(3, -1)
+    known = normals[:, normals[2] != 0]
+    return estimate_up(known[:, :: max(1, known.shape[1] // NORMALS)].T, CAMERA_UP, tilt_deg)
 
 
 def _object(
@@ -113,17 +112,17 @@ def _support_cloud(ground: Ground, depth: DepthImage) -> ObjectCloud | None:
     """The cells of all support surfaces, one point each; None where there is none."""
     if not ground.supports:
         return None
-    surface = ground.surface
+    surface = ground.coarse
     cells = np.any([support.parts > 0 for support in ground.supports], axis=0)
     rows, cols = np.nonzero(cells)
-    v, u = surface.top + rows * surface.step + surface.step // 2, surface.left + cols * surface.step + surface.step // 2
+    v, u = rows * surface.step, cols * surface.step
     area = sum(support.area for support in ground.supports)
     return ObjectCloud(
         label="support",
         score=1.0,
         instance=0,
         xyz=np.ascontiguousarray(surface.points[cells]),
-        normals=np.ascontiguousarray(surface.normals[cells]),
+        normals=np.ascontiguousarray(surface.normals[:, cells].T),
         rgb=None if depth.rgb is None else depth.rgb[v, u],
         flags=np.zeros(len(rows), np.uint16),
         density=len(rows) / max(area, 1e-9),

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is known of the connected parts in and around a box: size, place, and how they lie to each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.segmenter.surface import EXACT, Surface, Window
+
+ACROSS = 3  # cells over which two parts are neighbours
+RIM = 0.7  # how much less a cell at the rim of the box counts than one in its middle
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """K connected parts of a surface, the largest in the box first, numbered from 1 in ``labels (h, w) int32``.
+
+    Of each part: ``total`` and ``inside (K,)`` its cells and those in the box, ``weight (K,)`` those in the box where
+    the middle counts more than the rim, ``extent (K, 4)`` left, top, right, bottom in cells, half open, ``size (K,)``
+    the length in metres of the box's longer side at the part's depth, ``colour (K, 3)`` the mean, or None. Of each
+    pair: ``touching (K, K)`` the cells in which they are neighbours without a depth jump, ``gap (K, K)`` m the least
+    distance over a border, ``front (K, 1 + K)`` the cells in which the first hides the second, whose column 0 is
+    everything that is no part; ``hidden (K,)`` the cells in which a part is hidden by anything.
+    """
+
+    labels: Array
+    total: Array
+    inside: Array
+    weight: Array
+    extent: Array
+    size: Array
+    colour: Array | None
+    touching: Array
+    gap: Array
+    front: Array
+    hidden: Array
+
+    def __len__(self) -> int:
+        return len(self.total)
+
+    @property
+    def pure(self) -> Array:
+        """(K,) which share of each part lies in the box."""
+        return self.inside / self.total
+
+    @property
+    def figure(self) -> Array:
+        """(K,) which share of each part's depth jumps is its own silhouette; 1 where it has none."""
+        front = self.front.sum(axis=1)
+        return (front + 1) / (front + self.hidden + 1)
+
+
+def measure(
+    labels: Array,
+    count: int,
+    window: Window,
+    surface: Surface,
+    rgb: Array | None,
+    jump: tuple[float, float],
+    limit: int,
+) -> Parts:
+    """The ``limit`` largest parts of ``labels (h, w) int32``, 0 … ``count``, by their cells in ``window``.
+
+    ``rgb (H, W, 3) uint8`` is the whole picture, or None.
+    """
+    left, top, right, bottom = window
+    inside = np.bincount(labels[top:bottom, left:right].ravel(), minlength=count + 1)
+    inside[0] = 0
+    order = np.argsort(-inside, kind="stable")[:limit]
+    order = order[inside[order] > 0]
+    number = np.zeros(count + 1, np.int32)
+    number[order] = np.arange(1, len(order) + 1)
+    renamed = number[labels]
+    k = len(order) + 1
+    counts, extent = np.zeros((k, 4)), np.zeros((k, 4), np.int64)
+    touching, front, gap = np.zeros((k, k), np.int64), np.zeros((k, k), np.int64), np.full((k, k), np.inf, np.float32)
+    bounds = np.array(jump, np.float32)
+    _count(renamed, np.array(window), surface.depth, counts, extent)
+    _compare(renamed, surface.depth, surface.x, surface.y, bounds, touching, front, gap)
+    total = counts[1:, 0]
+    cell = float(surface.x[1] - surface.x[0]) if len(surface.x) > 1 else 0.0
+    size = max(right - left, bottom - top) * cell * counts[1:, 3] / total
+    return Parts(
+        labels=renamed,
+        total=total,
+        inside=counts[1:, 1],
+        weight=counts[1:, 2],
+        extent=extent[1:],
+        size=size,
+        colour=None if rgb is None else _colours(renamed, rgb, surface, k)[1:],
+        touching=touching[1:, 1:],
+        gap=np.sqrt(gap[1:, 1:]),
+        front=front[1:],
+        hidden=front[:, 1:].sum(axis=0),
+    )
+
+
+def _colours(labels: Array, rgb: Array, surface: Surface, count: int) -> Array:
+    """(count, 3) the mean colour of each label."""
+    sums = np.zeros((count, 4))
+    _sum_colours(labels, rgb, surface.left, surface.top, surface.step, sums)
+    return sums[:, :3] / np.maximum(sums[:, 3:], 1)
+
+
+@numba.njit(cache=True)
+def _sum_colours(labels, rgb, left, top, step, sums):  # type: ignore[no-untyped-def]
+    for i in range(labels.shape[0]):
+        for j in range(labels.shape[1]):
+            k = labels[i, j]
+            if k > 0:
+                v, u = top + i * step, left + j * step
+                for c in range(3):
+                    sums[k, c] += rgb[v, u, c]
+                sums[k, 3] += 1
+
+
+@numba.njit(cache=True, fastmath=EXACT)
+def _count(labels, window, depth, counts, extent):  # type: ignore[no-untyped-def]
+    h, w = labels.shape
+    left, top, right, bottom = window
+    for i in range(h):
+        off_v = abs(2 * i + 1 - top - bottom) / (bottom - top)
+        for j in range(w):
+            k = labels[i, j]
+            if k == 0:
+                continue
+            if counts[k, 0] == 0:
+                extent[k, 0], extent[k, 1], extent[k, 2] = j, i, j + 1
+            counts[k, 0] += 1
+            counts[k, 3] += depth[i, j]
+            extent[k, 0], extent[k, 2] = min(extent[k, 0], j), max(extent[k, 2], j + 1)
+            extent[k, 3] = i + 1
+            if i >= top and i < bottom and j >= left and j < right:
+                off_u = abs(2 * j + 1 - left - right) / (right - left)
+                counts[k, 1] += 1
+                counts[k, 2] += 1 - RIM * max(off_u, off_v)
+
+
+@numba.njit(cache=True, fastmath=EXACT)
+def _compare(labels, depth, x, y, bounds, touching, front, gap):  # type: ignore[no-untyped-def]
+    """Fill the tables of pairs from the cells next to each other; ``gap`` gets squares of metres."""
+    h, w = labels.shape
+    for i in range(h):
+        for j in range(w):
+            s = depth[i, j]
+            if s <= 0:
+                continue
+            k = labels[i, j]
+            jump = bounds[0] + bounds[1] * s * s
+            for n in range(2 * ACROSS):
+                p, q = (i + n // 2 + 1, j) if n % 2 == 0 else (i, j + n // 2 + 1)
+                if p >= h or q >= w or depth[p, q] <= 0 or labels[p, q] == k:
+                    continue
+                o, t = labels[p, q], depth[p, q]
+                if k > 0 and o > 0:
+                    square = (x[q] * t - x[j] * s) ** 2 + (y[p] * t - y[i] * s) ** 2 + (t - s) ** 2
+                    gap[k, o] = min(gap[k, o], square)
+                    gap[o, k] = gap[k, o]
+                if n < 2 and abs(t - s) < jump:
+                    touching[k, o] += 1
+                    touching[o, k] += 1
+                elif n < 4 and t - s >= jump:
+                    front[k, o] += 1
+                elif n < 4 and s - t >= jump:
+                    front[o, k] += 1
