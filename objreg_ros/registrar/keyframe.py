@@ -46,6 +46,11 @@ class KeyObject:
         low, high = self.cloud.xyz.min(axis=0), self.cloud.xyz.max(axis=0)
         return np.asarray((low + high) / 2.0, float)
 
+    @property
+    def extent(self) -> float:
+        """The diagonal of its bounding box in m."""
+        return float(np.linalg.norm(np.ptp(self.cloud.xyz, axis=0)))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Keyframe:

@@ -18,6 +18,8 @@ from objreg_ros.registrar.labels import LabelGroups
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.sighting import Sighting
 
+MIDDLE_WANDERS = 0.2  # of the extent
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Landmark:
@@ -124,11 +126,17 @@ class Landmarks:
                 continue
             if self._groups.of(last.label) != self._groups.of(sighting.label):
                 continue
-            reach = self._params.landmark_radius + self._params.odometry_drift * (sighting.travelled - last.travelled)
             distance = float(np.linalg.norm(sighting.position - last.position))
-            if distance < min(best_distance, reach, 2 * self._params.landmark_radius):
+            if distance < min(best_distance, self._reach(sighting, last)):
                 best, best_distance = number, distance
         return best
+
+    def _reach(self, sighting: Sighting, last: Sighting) -> float:
+        """How far apart two sightings of one object may be: the middle of a large one wanders with the side seen."""
+        params = self._params
+        drift = params.odometry_drift * abs(sighting.travelled - last.travelled)
+        wander = MIDDLE_WANDERS * min(sighting.extent, last.extent)
+        return params.landmark_radius + wander + min(drift, params.landmark_radius)
 
     def _axes(self, sighting: Sighting, claims: Sequence[Link], here: int) -> Array:
         if claims:

@@ -23,6 +23,7 @@ class RegistrarParams(Params):
 
     store: str = param("", "the SQLite file that remembers; empty: memory only, forgotten at the end")
     max_views: int = param(8, "views of one object that are kept, the most diverse", ge=1)
+    max_keyframes: int = param(20000, "most keyframes that are kept; the oldest go first", ge=1)
     landmark_radius: float = param(0.10, "an object seen again within this is the same one", "m", ge=0.0)
 
     # What becomes a keyframe, and what it keeps.

@@ -173,6 +173,7 @@ class Registrar:
         self._known = self._landmarks.known()
         self._index.add(named)
         spare = self._landmarks.surplus(sighting.landmark for sighting in named)
+        spare += [k for k in self._store.beyond(self.params.max_keyframes) if k not in spare]
         if spare:
             self._store.remove(spare)
             self._index.remove(spare)

@@ -17,10 +17,10 @@ from objreg_ros.registrar.keyframe import Keyframe
 class Sighting:
     """Object ``instance`` of a keyframe, in the frame of its session.
 
-    ``position (3,)`` of the object and ``camera (3,)`` of the camera, m; ``travelled`` m and ``turned`` degrees of the
-    camera's path in the session until then; ``landmark`` the id that the object has wherever it is seen, 0 before it
-    has one; ``R_landmark_session (3, 3)`` turns this session's axes into those of the session that saw the landmark
-    first.
+    ``extent`` m of the object, ``position (3,)`` of its middle and ``camera (3,)`` of the camera, m; ``travelled`` m
+    and ``turned`` degrees of the camera's path in the session until then; ``landmark`` the id that the object has
+    wherever it is seen, 0 before it has one; ``R_landmark_session (3, 3)`` turns this session's axes into those of the
+    session that saw the landmark first.
     """
 
     keyframe_id: int
@@ -29,6 +29,7 @@ class Sighting:
     instance: int
     label: str
     score: float
+    extent: float
     descriptor: Array
     position: Array
     camera: Array
@@ -58,6 +59,7 @@ def sightings_of(keyframe: Keyframe, travelled: float = 0.0, turned: float = 0.0
             instance=item.cloud.instance,
             label=item.label,
             score=item.cloud.score,
+            extent=item.extent,
             descriptor=describe(item.cloud),
             position=transform(T_session_camera, item.centroid),
             camera=np.array(T_session_camera[:3, 3]),

@@ -37,7 +37,7 @@ CREATE TABLE keyframe (
 CREATE TABLE object (
   id INTEGER PRIMARY KEY, keyframe INTEGER NOT NULL REFERENCES keyframe ON DELETE CASCADE,
   instance INTEGER NOT NULL, landmark INTEGER NOT NULL, label TEXT NOT NULL, score REAL NOT NULL,
-  sightings INTEGER NOT NULL, density REAL NOT NULL, position BLOB NOT NULL, camera BLOB NOT NULL,
+  extent REAL NOT NULL, sightings INTEGER NOT NULL, density REAL NOT NULL, position BLOB NOT NULL, camera BLOB NOT NULL,
   R_landmark_session BLOB NOT NULL, descriptor BLOB NOT NULL, cloud BLOB NOT NULL);
 CREATE INDEX object_of_keyframe ON object (keyframe);
 CREATE INDEX object_of_landmark ON object (landmark);
@@ -46,13 +46,14 @@ CREATE TABLE closure (
   T_from_to BLOB NOT NULL, covariance BLOB NOT NULL, labels TEXT NOT NULL, evidence TEXT NOT NULL);
 """
 SIGHTINGS = (
-    "SELECT object.keyframe, session, stamp_ns, instance, label, score, descriptor, position, object.camera,"
-    " travelled, turned, landmark, R_landmark_session FROM object JOIN keyframe ON keyframe.id = object.keyframe"
+    "SELECT object.keyframe, session, stamp_ns, instance, label, score, extent, descriptor, position,"
+    " object.camera, travelled, turned, landmark, R_landmark_session"
+    " FROM object JOIN keyframe ON keyframe.id = object.keyframe"
 )
 
 
 class StoreError(OSError):
-    """A file that is no store, is damaged, or was written by a newer version. It has not been touched."""
+    """A file that is no store, is damaged or newer (it has not been touched), or that cannot be written."""
 
 
 class Store:
@@ -86,16 +87,22 @@ class Store:
     ) -> None:
         """Write a keyframe under its id (see `next_keyframe`), its objects and closures in one transaction.
 
-        ``merged`` says which landmarks became which: known objects that turned out to be the same.
+        ``merged`` says which landmarks became which: known objects that turned out to be the same. StoreError where it
+        cannot be written: then nothing of it is.
         """
-        with self._connection as transaction:
-            _insert(transaction, "keyframe", keyframe_row(keyframe, sightings))
-            for item, sighting in zip(keyframe.objects, sightings, strict=True):
-                _insert(transaction, "object", object_row(item, sighting))
-            for closure in closures:
-                _insert(transaction, "closure", _closure_row(closure))
-            for old, new in (merged or {}).items():
-                transaction.execute("UPDATE object SET landmark = ? WHERE landmark = ?", (new, old))
+        try:
+            with self._connection as transaction:
+                _insert(transaction, "keyframe", keyframe_row(keyframe, sightings))
+                for item, sighting in zip(keyframe.objects, sightings, strict=True):
+                    _insert(transaction, "object", object_row(item, sighting))
+                for closure in closures:
+                    _insert(transaction, "closure", _closure_row(closure))
+                for old, new in (merged or {}).items():
+                    transaction.execute("UPDATE object SET landmark = ? WHERE landmark = ?", (new, old))
+        except sqlite3.Error as error:
+            raise StoreError(
+                f"{self.path or 'memory'}: cannot write keyframe {keyframe.keyframe_id}: {error}"
+            ) from error
         self._remember(keyframe)
 
     def keyframe(self, keyframe_id: int) -> Keyframe:
@@ -126,6 +133,11 @@ class Store:
     def keyframe_ids(self) -> list[int]:
         """The ids of the stored keyframes, oldest first."""
         return [row[0] for row in self._connection.execute("SELECT id FROM keyframe ORDER BY id")]
+
+    def beyond(self, most: int) -> list[int]:
+        """The ids of the oldest keyframes, those that are more than ``most``."""
+        query = "SELECT id FROM keyframe ORDER BY id DESC LIMIT -1 OFFSET ?"
+        return [row[0] for row in self._connection.execute(query, (most,))]
 
     def remove(self, keyframe_ids: Sequence[int]) -> None:
         """Forget keyframes and their objects; their closures stay."""

@@ -100,6 +100,14 @@ def test_a_search_without_time_refuses_as_over_budget_and_remembers_the_keyframe
     assert registrar.counts()["keyframes"] == 2
 
 
+def test_the_oldest_keyframe_goes_when_there_are_too_many() -> None:
+    registrar = Registrar(PARAMS.replaced(max_keyframes=2))
+    _run(registrar, *(_frame(10 * i, pose, True) for i, pose in enumerate((HERE, AWAY, BESIDE))))
+    assert registrar.counts()["keyframes"] == 2
+    closures, _ = _run(registrar, _frame(60, HERE, True))
+    assert all(c.from_ns > 0 for c in closures)
+
+
 def test_reset_forgets_and_starts_again() -> None:
     registrar = Registrar(PARAMS)
     _run(registrar, _frame(0, HERE))

@@ -111,6 +111,21 @@ def test_a_closure_comes_back_with_its_covariance(tmp_path: Path) -> None:
     assert (back.labels, back.evidence) == (("cup",), {"score": 0.5})
 
 
+def test_what_cannot_be_written_is_a_store_error_and_leaves_the_store_as_it_was() -> None:
+    store = Store()
+    number = _add(store)
+    twice = keyframe(number)
+    with pytest.raises(StoreError, match="cannot write keyframe 1"):
+        store.add(twice, sightings_of(twice))
+    assert store.counts()["objects"] == 1
+
+
+def test_the_oldest_keyframes_are_those_beyond_a_number() -> None:
+    store = Store()
+    numbers = [_add(store, float(i)) for i in range(5)]
+    assert store.beyond(3) == [numbers[1], numbers[0]] and store.beyond(9) == []
+
+
 def test_clearing_forgets_all_but_the_ids() -> None:
     store = Store()
     _add(store)
@@ -142,7 +157,7 @@ def test_a_store_that_is_only_read_is_not_changed(tmp_path: Path) -> None:
     before = path.read_bytes()
     reader = Store(path, read_only=True)
     assert reader.keyframe(1).labels == ("cup",)
-    with pytest.raises(sqlite3.OperationalError):
+    with pytest.raises(StoreError, match="readonly"):
         _add(reader)
     reader.close()
     assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["place.db"]

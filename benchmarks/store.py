@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the store costs: inserting and querying at 10^2 to 10^5 objects, size on disk, memory; and kill -9.
+
+    python benchmarks/store.py --json OUT [--quick] [--kills N]
+
+``sizes``: for each number of stored objects ``insert_ms`` (one keyframe, on the disk), ``query_ms`` (one object against
+the index), ``keyframe_query_ms`` (all objects of a keyframe), each with p50 and p95, ``open_s``, ``disk_mb``,
+``memory_mb``. ``kills``: how often a writing process was killed at a random moment, what it had acknowledged, what was
+lost. The content is made up, of the size that a Kinect gives; all objects are of one of nine labels.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from tqdm import tqdm
+
+from objreg_ros.data import Intrinsics, ObjectCloud, View
+from objreg_ros.registrar.descriptor import SIZE
+from objreg_ros.registrar.keyframe import Context, Keyframe, KeyObject
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.retrieve import Index
+from objreg_ros.registrar.sighting import Sighting, sightings_of
+from objreg_ros.registrar.store import Store
+
+CAMERA = Intrinsics(fx=131.25, fy=131.25, cx=79.625, cy=59.625, width=160, height=120)
+LABELS = ("cup", "book", "chair", "tv", "keyboard", "bottle", "bowl", "mouse", "laptop")
+PER_KEYFRAME = 8
+SIZES = (100, 1_000, 10_000, 100_000)
+SAMPLES = 60
+WRITER = "import sys; from benchmarks.store import write_forever; write_forever(sys.argv[1], int(sys.argv[2]))"
+REPOSITORY = Path(__file__).resolve().parents[1]
+
+
+def make_keyframe(number: int, draw: np.random.Generator) -> Keyframe:
+    """A keyframe of made-up objects, a context of 6000 points and a noisy view."""
+    objects = tuple(_make_object(i + 1, draw) for i in range(PER_KEYFRAME))
+    depth = (2.0 + 0.01 * draw.normal(size=(120, 160))).astype(np.float32)
+    v, u = np.mgrid[0:120, 0:160].astype(np.float32)
+    xyz = np.stack([(u - CAMERA.cx) / CAMERA.fx * depth, (v - CAMERA.cy) / CAMERA.fy * depth, depth], axis=-1)
+    context = draw.normal(size=(6000, 3)).astype(np.float32)
+    return Keyframe(
+        keyframe_id=number,
+        session=0,
+        stamp_ns=number * 10**9,
+        frame_id="camera",
+        objects=objects,
+        context=Context(xyz=context, normals=context / np.linalg.norm(context, axis=1, keepdims=True)),
+        view=View(xyz=xyz, grey=draw.integers(0, 255, (120, 160), np.uint8), intrinsics=CAMERA),
+        gravity=np.array([0.0, 1.0, 0.0]),
+        gravity_confidence=1.0,
+        T_odom_camera=np.eye(4),
+    )
+
+
+def write_forever(path: str, seed: int) -> None:
+    """Add keyframes and say the id of each that is written, until killed."""
+    draw, store = np.random.default_rng(seed), Store(path)
+    pattern = make_keyframe(0, draw)
+    while True:
+        keyframe = replace(pattern, keyframe_id=store.next_keyframe())
+        store.add(keyframe, sightings_of(keyframe))
+        print(keyframe.keyframe_id, flush=True)
+
+
+def measure_size(objects: int, folder: Path) -> dict[str, Any]:
+    """The costs at one number of stored objects."""
+    path, draw = folder / f"{objects}.db", np.random.default_rng(0)
+    _fill(path, objects, draw)
+    before, began = _resident_mb(), time.perf_counter()
+    with closing(Store(path)) as store:
+        index = Index(RegistrarParams(min_gap=0.0))
+        index.add(store.sightings())
+        opened, memory = time.perf_counter() - began, _resident_mb() - before
+        asked = [sightings_of(make_keyframe(10**6 + i, draw)) for i in range(SAMPLES)]
+        single = [_ms(index.query, [row]) for rows in asked for row in rows[:4]]
+        whole = [_ms(index.query, rows) for rows in asked]
+        keyframes = [make_keyframe(store.next_keyframe() + i, draw) for i in range(SAMPLES // 3)]
+        insert = [_ms(store.add, keyframe, sightings_of(keyframe)) for keyframe in keyframes]
+    return {
+        "insert_ms": _percentiles(insert),
+        "query_ms": _percentiles(single),
+        "keyframe_query_ms": _percentiles(whole),
+        "open_s": opened,
+        "disk_mb": path.stat().st_size / 1e6,
+        "memory_mb": memory,
+    }
+
+
+def measure_kills(kills: int, folder: Path) -> dict[str, int]:
+    """Kill writers at random moments; every id that they said must be there, whole, afterwards."""
+    path, draw = folder / "killed.db", random.Random(0)
+    acknowledged: set[int] = set()
+    environment = {**os.environ, "PYTHONPATH": str(REPOSITORY)}
+    for k in tqdm(range(kills), desc="kill -9"):
+        command = [sys.executable, "-c", WRITER, str(path), str(k)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment, cwd=REPOSITORY) as writer:
+            assert writer.stdout is not None
+            first = writer.stdout.readline()
+            time.sleep(draw.uniform(0.0, 0.08))
+            writer.send_signal(signal.SIGKILL)
+            acknowledged |= {int(line) for line in (first + writer.stdout.read()).split("\n")[:-1]}
+        if k % 20 == 19 or k == kills - 1:
+            lost = _lost(path, acknowledged)
+            if lost:
+                break
+    return {"kills": k + 1, "acknowledged": len(acknowledged), "lost": len(lost)}
+
+
+def _lost(path: Path, acknowledged: set[int]) -> set[int]:
+    with closing(Store(path)) as store:
+        there = set(store.keyframe_ids())
+        whole = {number for number in acknowledged & there if len(store.keyframe(number).objects) == PER_KEYFRAME}
+    return acknowledged - whole
+
+
+def _fill(path: Path, objects: int, draw: np.random.Generator) -> None:
+    """A store of that many objects: 32 real keyframes, then copies of their rows with other descriptors."""
+    keyframes, made = objects // PER_KEYFRAME, min(32, objects // PER_KEYFRAME)
+    with closing(Store(path)) as store:
+        for number in range(1, made + 1):
+            keyframe = make_keyframe(number, draw)
+            store.add(keyframe, [_landmark(s, i) for i, s in enumerate(sightings_of(keyframe))])
+        connection = store._connection
+        names = [row[1] for row in connection.execute("PRAGMA table_info(keyframe)")]
+        changed = {"id": "id + :shift", "stamp_ns": "stamp_ns + :shift * 1000000000"}
+        copies = ", ".join(changed.get(name, name) for name in names)
+        with connection as transaction:
+            for shift in range(made, keyframes, made):
+                transaction.execute(
+                    f"INSERT INTO keyframe SELECT {copies} FROM keyframe WHERE id <= {made}", {"shift": shift}
+                )
+                _copy_objects(transaction, shift, made, draw)
+
+
+def _copy_objects(transaction: Any, shift: int, made: int, draw: np.random.Generator) -> None:
+    rows = [dict(row) for row in transaction.execute("SELECT * FROM object WHERE keyframe <= ?", (made,))]
+    for row in rows:
+        descriptor = np.frombuffer(row["descriptor"], np.float32) + draw.normal(0, 0.3, SIZE).astype(np.float32)
+        row.update(id=None, keyframe=row["keyframe"] + shift, descriptor=descriptor.tobytes())
+    marks = ", ".join(f":{name}" for name in rows[0])
+    transaction.executemany(f"INSERT INTO object VALUES ({marks})", rows)
+
+
+def _landmark(sighting: Sighting, number: int) -> Sighting:
+    return sighting.of_landmark(number + 1, np.eye(3))
+
+
+def _make_object(instance: int, draw: np.random.Generator) -> KeyObject:
+    xyz = (draw.random((1500, 3)) * draw.uniform(0.05, 0.5, 3)).astype(np.float32)
+    cloud = ObjectCloud(
+        label=LABELS[draw.integers(len(LABELS))],
+        score=0.8,
+        instance=instance,
+        xyz=xyz,
+        normals=xyz,
+        rgb=draw.integers(0, 255, (1500, 3), np.uint8),
+        flags=np.zeros(1500, np.uint16),
+        density=1e5,
+    )
+    return KeyObject(cloud=cloud)
+
+
+def _ms(call: Callable[..., Any], *arguments: Any) -> float:
+    began = time.perf_counter()
+    call(*arguments)
+    return 1e3 * (time.perf_counter() - began)
+
+
+def _percentiles(values: list[float]) -> dict[str, float]:
+    return {"p50": float(np.percentile(values, 50)), "p95": float(np.percentile(values, 95))}
+
+
+def _resident_mb() -> float:
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+@click.command(help=__doc__)
+@click.option("--json", "out", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
+@click.option("--quick", is_flag=True, help="Up to 10^4 objects and 10 kills.")
+@click.option("--kills", type=click.IntRange(min=0), default=200, show_default=True)
+def main(out: Path | None, quick: bool, kills: int) -> None:
+    """Measure and print."""
+    sizes = SIZES[:3] if quick else SIZES
+    with tempfile.TemporaryDirectory() as folder:
+        figures: dict[str, Any] = {"sizes": {}}
+        for objects in tqdm(sizes, desc="sizes"):
+            figures["sizes"][str(objects)] = measure_size(objects, Path(folder))
+            (Path(folder) / f"{objects}.db").unlink()
+        count = min(kills, 10) if quick else kills
+        figures["kills"] = measure_kills(count, Path(folder)) if count else None
+    print(json.dumps(figures, indent=1))
+    if out is not None:
+        out.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
