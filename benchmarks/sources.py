@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings as the benchmarks need them: every frame through detector and segmenter once, with odometry and truth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from peers import Shot
+
+from objreg_ros import share
+from objreg_ros.data import Array, ColourImage, Detections, Frame, LoopClosure, Rejected
+from objreg_ros.detector.mobilenet_ssd import Detector
+from objreg_ros.detector.params import DetectorParams
+from objreg_ros.geometry import pose, rotation_between
+from objreg_ros.offline import Rooms, run_offline
+from objreg_ros.recording import Recording, open_recording
+from objreg_ros.recording.inputs import choose_inputs
+from objreg_ros.report.pictures import Album
+from objreg_ros.segmenter.organise import organise
+from objreg_ros.segmenter.params import SegmenterParams
+from objreg_ros.segmenter.segment import Segmenter
+from objreg_ros.simulation.odometry import drifted
+from objreg_ros.simulation.params import OdometryParams
+from objreg_ros.simulation.truth import read_truth
+from objreg_ros.truth import Truth
+
+TRUE_BOXES = "truth"  # in a model's stead
+LEAST_VISIBLE = 0.3
+
+
+@dataclass
+class Outcome:
+    """No closures and no refusals."""
+
+    closures: tuple[LoopClosure, ...] = ()
+    rejected: tuple[Rejected, ...] = ()
+
+
+@dataclass
+class Collector:
+    """In the registrar's stead: keeps the frames."""
+
+    frames: list[Frame] = field(default_factory=list)
+
+    def process(self, frame: Frame) -> Outcome:
+        """Keep it."""
+        self.frames.append(frame)
+        return Outcome()
+
+    def finish(self) -> Outcome:
+        """Nothing is left."""
+        return Outcome()
+
+
+class Remembered:
+    """A detector that can be asked again what it saw."""
+
+    def __init__(self, detector: Any) -> None:
+        self._detector = detector
+        self.seen: dict[int, Detections] = {}
+
+    def detect(self, image: ColourImage) -> Detections:
+        """As the detector says."""
+        self.seen[image.stamp_ns] = self._detector.detect(image)
+        return self.seen[image.stamp_ns]
+
+
+class TrueBoxes:
+    """In the detector's stead: the boxes that the truth of a simulated recording knows, distractors left out."""
+
+    def __init__(self, recording: Path) -> None:
+        self._frames = {frame.stamp_ns: frame for frame in read_truth(recording).frames}
+
+    def detect(self, image: ColourImage) -> Detections:
+        """The objects of which at least `LEAST_VISIBLE` is seen."""
+        frame = self._frames.get(image.stamp_ns)
+        seen = [
+            sight
+            for sight in (frame.seen if frame else ())
+            if sight.visibility >= LEAST_VISIBLE and not sight.object.is_distractor
+        ]
+        return Detections(
+            xyxy=np.array([sight.xyxy for sight in seen], np.float32).reshape(-1, 4),
+            score=np.ones(len(seen), np.float32),
+            label=tuple(sight.object.label for sight in seen),
+            image_hw=image.rgb.shape[:2],
+            stamp_ns=image.stamp_ns,
+            frame_id=image.frame_id,
+        )
+
+
+@dataclass
+class Source:
+    """A recording with its frames, its truth and its pictures."""
+
+    frames: list[Frame]
+    truth: Truth
+    album: Album
+    detections: dict[int, Detections]
+
+    def shot(self, frame: Frame) -> Shot:
+        """The whole image of a frame, and its objects by the founding filter."""
+        image = self.album.at(frame.stamp_ns)
+        if image is None:
+            raise ValueError(f"expected colour and depth at {frame.stamp_ns} ns, got none")
+        seen = self.detections.get(frame.stamp_ns)
+        if seen is None:
+            return Shot(image)
+        return Shot(image, Segmenter(SegmenterParams(preset="paper")).segment(seen, image).objects)
+
+
+@contextmanager
+def read_source(path: Path, model: str, seed: int) -> Iterator[Source]:
+    """A recording, open. Without odometry of its own it gets one that drifts from its ground truth, by ``seed``."""
+    with open_recording(path) as recording:
+        inputs = choose_inputs(recording.topics)
+        truth = Truth.of(recording, inputs.ground_truth)
+        if not truth.stamps_ns:
+            raise ValueError(f"{path}: expected a recording with ground truth, got none")
+        frames, seen = _frames(recording, model)
+        if inputs.odom is None:
+            frames = with_drift(frames, truth, seed)
+        yield Source(frames, truth, Album(recording, inputs), seen)
+
+
+def _frames(recording: Recording, model: str) -> tuple[list[Frame], dict[int, Detections]]:
+    inputs = choose_inputs(recording.topics)
+    detector = Remembered(TrueBoxes(recording.path) if model == TRUE_BOXES else _detector(model))
+    collector, segmenter = Collector(), Segmenter(SegmenterParams())
+    records = recording.records(set(inputs.chosen().values()))
+    run_offline(records, Rooms(detector, segmenter, collector, organise), inputs)
+    return collector.frames, detector.seen
+
+
+def _detector(model: str) -> Detector:
+    params = DetectorParams(model=model) if model else DetectorParams()
+    return Detector(params, share.model(params.model))
+
+
+def with_drift(frames: list[Frame], truth: Truth, seed: int) -> list[Frame]:
+    """The frames with the simulator's drifting odometry (2 % and 1 degree a metre), made of their true poses."""
+    known = [frame for frame in frames if truth.at(frame.stamp_ns) is not None]
+    true = np.array([truth.at(frame.stamp_ns) for frame in known])
+    level = np.array([_levelling(known, true) @ T for T in true])
+    poses, _ = drifted(level, OdometryParams(), seed)
+    return [replace(frame, T_odom_camera=T) for frame, T in zip(known, poses, strict=True)]
+
+
+def _levelling(frames: list[Frame], true: Array) -> Array:
+    """The rotation (4, 4) that puts up, as the frames felt it, along z; upright cameras where none felt it."""
+    pairs = list(zip(frames, true, strict=True))
+    falls = [T[:3, :3] @ frame.gravity for frame, T in pairs if frame.gravity is not None]
+    down = np.median(falls, axis=0) if falls else np.mean([T[:3, 1] for _, T in pairs], axis=0)
+    return pose(rotation_between(-down, np.array([0.0, 0.0, 1.0])), np.zeros(3))
