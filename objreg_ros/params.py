@@ -37,9 +37,10 @@ class Declaration:
     def check(self, value: Any) -> Any:
         """The value in its declared type; ValueError with expected and got if it is not that or out of range."""
         if self.many:
-            if not isinstance(value, list | tuple) and not hasattr(value, "tolist"):
+            items = value.tolist() if hasattr(value, "tolist") else value
+            if not isinstance(items, list | tuple):
                 raise ValueError(f"{self.name}: expected a list of {self.kind.__name__}, got {value!r}")
-            return tuple(self._check_one(item) for item in value)
+            return tuple(self._check_one(item) for item in items)
         return self._check_one(value)
 
     def _check_one(self, value: Any) -> Any:
