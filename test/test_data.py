@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from dataclasses import FrozenInstanceError, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from objreg_ros import data
+from objreg_ros.data import PointFlag
+
+NAN = np.float32(np.nan)
+CAMERA = data.Intrinsics(fx=50.0, fy=60.0, cx=31.5, cy=23.5, width=64, height=48)
+
+
+def floats(*shape: int) -> np.ndarray:
+    return np.zeros(shape, np.float32)
+
+
+def cloud(**changes: Any) -> data.ObjectCloud:
+    values = {"label": "cup", "score": 0.5, "instance": 1, "xyz": floats(4, 3), "normals": floats(4, 3), "rgb": None,
+              "flags": np.zeros(4, np.uint16), "density": 1.0, **changes}  # fmt: skip
+    return data.ObjectCloud(**values)
+
+
+def view(**changes: Any) -> data.View:
+    return data.View(**{"xyz": floats(48, 64, 3), "grey": None, "intrinsics": CAMERA, **changes})
+
+
+def frame(**changes: Any) -> data.Frame:
+    values = {"objects": (cloud(),), "support": None, "view": view(), "gravity": None, "gravity_confidence": 0.0,
+              "T_odom_camera": None, "stamp_ns": 5, **changes}  # fmt: skip
+    return data.Frame(**values)
+
+
+def detections(**changes: Any) -> data.Detections:
+    values = {
+        "xyxy": floats(2, 4),
+        "score": floats(2),
+        "label": ("a", "b"),
+        "image_hw": (48, 64),
+        "stamp_ns": 5,
+        **changes,
+    }
+    return data.Detections(**values)
+
+
+def closure(**changes: Any) -> data.LoopClosure:
+    values = {"from_ns": 1, "to_ns": 2, "T_from_to": np.eye(4), "covariance": np.eye(6), "labels": (), **changes}
+    return data.LoopClosure(**values)
+
+
+def alignment(**changes: Any) -> data.Alignment:
+    values = {"T_target_source": np.eye(4), "information": np.eye(6), "inliers": 3, "overlap": 0.5, "rmse": 0.1,
+              "iterations": 2, "converged": True, **changes}  # fmt: skip
+    return data.Alignment(**values)
+
+
+def depth_image(**changes: Any) -> data.DepthImage:
+    return data.DepthImage(**{"depth": floats(48, 64), "rgb": None, "intrinsics": CAMERA, "stamp_ns": 5, **changes})
+
+
+def point_cloud(**changes: Any) -> data.PointCloud:
+    return data.PointCloud(**{"xyz": floats(1, 7, 3), "rgb": None, "stamp_ns": 5, **changes})
+
+
+WORDS = (cloud, view, frame, detections, closure, alignment, depth_image, point_cloud)
+
+
+@pytest.mark.parametrize("make", WORDS)
+def test_a_word_is_frozen_and_its_arrays_are_read_only(make: Any) -> None:
+    word = make()
+    fields = data.as_dict(word)
+    with pytest.raises(FrozenInstanceError):
+        setattr(word, next(iter(fields)), None)
+    for array in (value for value in fields.values() if isinstance(value, np.ndarray) and value.size):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 1
+
+
+def test_the_array_that_was_given_stays_writable() -> None:
+    xyz = floats(4, 3)
+    word = cloud(xyz=xyz)
+    xyz[0, 0] = 7
+    assert word.xyz[0, 0] == 7  # a view: nothing was copied
+
+
+R_MIRRORED = np.diag([1.0, 1.0, -1.0, 1.0])
+R_SCALED = np.diag([1.1, 1.1, 1.1, 1.0])
+NOT_POSITIVE = np.diag([1.0, 1, 1, 1, 1, 0])
+NOT_SYMMETRIC = np.eye(6) + np.eye(6, k=1)
+
+
+@pytest.mark.parametrize(
+    ("make", "changes", "complaint"),
+    [
+        (cloud, {"xyz": np.zeros((4, 3))}, ".xyz: expected float32 of shape (M, 3), got float64 of shape (4, 3)"),
+        (cloud, {"xyz": floats(4, 2)}, "got float32 of shape (4, 2)"),
+        (cloud, {"xyz": [[0, 0, 0]]}, "got list"),
+        (cloud, {"normals": floats(3, 3)}, "ObjectCloud.normals: expected float32 of shape (M, 3) with {'M': 4}"),
+        (cloud, {"flags": np.zeros(4, np.int64)}, "ObjectCloud.flags: expected uint16"),
+        (cloud, {"rgb": np.zeros((4, 3), np.float32)}, "ObjectCloud.rgb: expected uint8"),
+        (cloud, {"xyz": np.full((4, 3), NAN)}, "expected finite points of 'cup'"),
+        (view, {"xyz": floats(24, 64, 3)}, "View.xyz: expected float32 of shape (h, w, 3)"),
+        (view, {"grey": np.zeros((48, 64, 3), np.uint8)}, "View.grey: expected uint8 of shape (h, w)"),
+        (frame, {"gravity": np.array([0, 2.0, 0])}, "expected gravity of length 1, got 2.0"),
+        (frame, {"gravity": floats(3)}, "Frame.gravity: expected float64 of shape (3,)"),
+        (frame, {"T_odom_camera": R_MIRRORED}, "Frame.T_odom_camera: expected a rigid motion"),
+        (frame, {"T_odom_camera": np.full((4, 4), np.nan)}, "expected a rigid motion"),
+        (detections, {"score": floats(3)}, "Detections.score: expected float32 of shape (N,) with {'N': 2}"),
+        (detections, {"xyxy": np.full((2, 4), NAN)}, "expected finite boxes"),
+        (detections, {"score": np.array([0.5, 1.5], np.float32)}, "expected scores in 0..1"),
+        (detections, {"score": np.full(2, NAN)}, "expected scores in 0..1"),
+        (detections, {"image_hw": (0, 64)}, "expected an image size above 0 px"),
+        (closure, {"T_from_to": R_SCALED}, "LoopClosure.T_from_to: expected a rigid motion"),
+        (closure, {"covariance": NOT_POSITIVE}, "expected a positive definite covariance"),
+        (closure, {"covariance": NOT_SYMMETRIC}, "expected a finite, symmetric covariance"),
+        (closure, {"covariance": np.full((6, 6), np.nan)}, "expected a finite, symmetric covariance"),
+        (closure, {"covariance": np.eye(3)}, "LoopClosure.covariance: expected float64 of shape (6, 6)"),
+        (alignment, {"slack": np.zeros((1, 3))}, "Alignment.slack: expected float64 of shape (any, 6)"),
+        (depth_image, {"depth": floats(64, 48)}, "DepthImage.depth: expected float32 of shape (H, W)"),
+        (depth_image, {"rgb": np.zeros((24, 32, 3), np.uint8)}, "DepthImage.rgb: expected uint8 of shape (H, W, 3)"),
+        (point_cloud, {"rgb": np.zeros((7, 1, 3), np.uint8)}, "PointCloud.rgb: expected uint8 of shape (H, W, 3)"),
+    ],
+)  # fmt: skip
+def test_a_broken_word_is_refused_with_expected_and_got(make: Any, changes: dict, complaint: str) -> None:
+    with pytest.raises(ValueError) as refused:
+        make(**changes)
+    assert complaint in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "change", [{"fx": 0.0}, {"fy": -1.0}, {"cx": float("nan")}, {"width": 0}, {"height": -3}, {"fx": float("inf")}]
+)
+def test_a_camera_that_cannot_be_is_refused(change: dict) -> None:
+    with pytest.raises(ValueError, match="Intrinsics: expected"):
+        replace(CAMERA, **change)
+
+
+@pytest.mark.parametrize("step", [1, 2, 3, 4, 5])
+def test_a_reduced_camera_sees_the_rays_of_the_pixels_that_it_keeps(step: int) -> None:
+    small = CAMERA.scaled(step)
+    columns, rows = np.arange(CAMERA.width)[step // 2 :: step], np.arange(CAMERA.height)[step // 2 :: step]
+    assert (small.width, small.height) == (len(columns), len(rows))
+    assert np.allclose((np.arange(small.width) - small.cx) / small.fx, (columns - CAMERA.cx) / CAMERA.fx)
+    assert np.allclose((np.arange(small.height) - small.cy) / small.fy, (rows - CAMERA.cy) / CAMERA.fy)
+
+
+def test_no_objects_and_no_points_are_allowed() -> None:
+    nothing = detections(xyxy=floats(0, 4), score=floats(0), label=())
+    empty = cloud(xyz=floats(0, 3), normals=floats(0, 3), flags=np.zeros(0, np.uint16))
+    assert len(nothing) == len(empty) == 0 and frame(objects=()).objects == ()
+
+
+def test_an_object_has_a_flag_when_all_its_points_have_it() -> None:
+    both = np.full(4, PointFlag.CUT_BY_BOX | PointFlag.WALL_LIKE, np.uint16)
+    some = both.copy()
+    some[0] = PointFlag.WALL_LIKE
+    assert cloud(flags=both).has(PointFlag.CUT_BY_BOX) and cloud(flags=some).has(PointFlag.WALL_LIKE)
+    assert not cloud(flags=some).has(PointFlag.CUT_BY_BOX) and not cloud(flags=both).has(PointFlag.EDGE)
+    empty = cloud(xyz=floats(0, 3), normals=floats(0, 3), flags=np.zeros(0, np.uint16))
+    assert not empty.has(PointFlag.EDGE)
+
+
+def test_a_cloud_of_one_row_is_not_organised() -> None:
+    assert not point_cloud().organised and point_cloud(xyz=floats(2, 3, 3)).organised
+
+
+def test_words_are_compared_by_identity() -> None:
+    assert closure() != closure()
+
+
+def test_an_almost_symmetric_covariance_is_good_enough() -> None:
+    covariance = np.eye(6)
+    covariance[0, 1] = 1e-9
+    assert closure(covariance=covariance).covariance[0, 1] == 1e-9
+
+
+def test_a_word_keeps_its_fields_by_name() -> None:
+    assert list(data.as_dict(closure())) == [
+        "from_ns", "to_ns", "T_from_to", "covariance", "labels", "matches", "evidence", "frame_id"
+    ]  # fmt: skip
