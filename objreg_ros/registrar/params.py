@@ -60,6 +60,8 @@ class RegistrarParams(Params):
     feature_matches: int = param(500, "most matches of local features that are considered", ge=10)
     centroid_tolerance: float = param(0.12, "how far the middle of one object may differ between views", "m", ge=0.01)
     seeds_per_chain: int = param(40, "hypotheses that each chain proposes", ge=1)
+    grid_cell: float = param(0.05, "cell of the grid that knows the closest point", "m", ge=0.01, le=0.2)
+    grid_reach: float = param(0.20, "how far from a surface its grid reaches", "m", ge=0.02)
     refined_per_chain: int = param(4, "hypotheses of each chain that are refined", ge=1)
     quick_sample: int = param(500, "points a side that rank the hypotheses", ge=50)
     reaches: tuple[float, ...] = param((0.12, 0.05), "correspondence distances of the refinement", "m")

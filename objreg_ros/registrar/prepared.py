@@ -10,6 +10,7 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.registrar.features import Features, describe
+from objreg_ros.registrar.icp import Surface, prepare_surface
 from objreg_ros.registrar.keyframe import Keyframe
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.refine import Cloud, prepare_cloud
@@ -23,6 +24,9 @@ class Prepared:
     keyframe: Keyframe
     sight: Sight
     features: Features
+    xyz: Array
+    normals: Array
+    surface: Surface
     cloud: Cloud | None
     up: Array | None
     groups: tuple[str, ...]
@@ -37,6 +41,9 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
     return Prepared(
         keyframe=keyframe,
         sight=prepare_sight(keyframe.view, params.context_range, params.detail_sigma, params.seed),
+        xyz=xyz,
+        normals=normals,
+        surface=prepare_surface(context.xyz, context.normals, params.grid_cell, params.grid_reach),
         features=describe(xyz, normals, params.feature_radius),
         cloud=prepare_cloud(context.xyz, params.context_voxel),
         up=None if keyframe.gravity is None else -np.asarray(keyframe.gravity, float),

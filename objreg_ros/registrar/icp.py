@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A fast, robust point-to-plane ICP for many hypotheses: the closest point is looked up in a grid, not searched.
+
+Chen and Medioni, "Object modelling by registration of multiple range images" (1992), with a shrinking Tukey weight and
+compatible normals. It brings a hypothesis to its basin in under a millisecond; `refine.py` finishes the best few.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from objreg_ros.data import Array
+
+MOST_CELLS = 4_000_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Surface:
+    """Oriented points (N, 3) float32 with a grid that holds, in each cell, which of them is closest (-1: none near)."""
+
+    xyz: Array
+    normals: Array
+    closest: Array
+    low: Array
+    cell: float
+
+    def __len__(self) -> int:
+        return len(self.xyz)
+
+
+def prepare_surface(xyz: Array, normals: Array, cell: float, reach: float) -> Surface:
+    """A surface whose grid knows the closest point out to ``reach`` m; ``cell`` m grows where the cloud is very large."""
+    usable = np.abs(normals).sum(axis=1) > 0.5
+    xyz, normals = np.ascontiguousarray(xyz[usable], np.float32), np.ascontiguousarray(normals[usable], np.float32)
+    if len(xyz) == 0:
+        nothing = np.full((1, 1, 1), -1, np.int32)
+        return Surface(xyz=xyz, normals=normals, closest=nothing, low=np.zeros(3, np.float32), cell=cell)
+    low, size = xyz.min(axis=0) - reach, np.ptp(xyz, axis=0) + 2.0 * reach
+    while np.prod(size / cell + 1.0) > MOST_CELLS:
+        cell *= 1.25
+    shape = np.ceil(size / cell).astype(np.int64) + 1
+    closest = _closest(xyz, low, np.float32(cell), shape, np.float32(reach))
+    return Surface(xyz=xyz, normals=normals, closest=closest, low=low, cell=cell)
+
+
+def align(
+    xyz: Array, normals: Array, surface: Surface, T: Array, reach: float, last_reach: float, iterations: int
+) -> tuple[Array, Array, Array]:
+    """Bring many poses (K, 4, 4) of oriented points (M, 3) to the surface, each to its own basin.
+
+    Returns the poses (K, 4, 4), the share of points with a partner within ``last_reach`` m (K,) and their rmse (K,) m.
+    """
+    if len(T) == 0 or len(xyz) == 0 or len(surface) == 0:
+        return np.array(T, float).reshape(-1, 4, 4), np.zeros(len(T)), np.full(len(T), np.inf)
+    poses = np.ascontiguousarray(T, np.float64).copy()
+    share, rmse = _align(
+        xyz, normals, surface.xyz, surface.normals, surface.closest, surface.low, surface.cell,
+        poses, reach, last_reach, iterations,
+    )  # fmt: skip
+    return poses, share, rmse
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _closest(xyz, low, cell, shape, reach):  # type: ignore[no-untyped-def]
+    """Fill the grid: every point claims the cells around it that no other point is closer to."""
+    closest = np.full((shape[0], shape[1], shape[2]), -1, np.int32)
+    distance = np.full((shape[0], shape[1], shape[2]), np.float32(1e9), np.float32)
+    half = np.float32(0.5)
+    steps = int(reach / cell)
+    most = (reach / cell) ** 2
+    for i in range(len(xyz)):
+        x, y, z = (xyz[i, 0] - low[0]) / cell, (xyz[i, 1] - low[1]) / cell, (xyz[i, 2] - low[2]) / cell
+        a0, b0, c0 = int(x), int(y), int(z)
+        for a in range(max(0, a0 - steps), min(shape[0], a0 + steps + 1)):
+            da = (a + half - x) ** 2
+            for b in range(max(0, b0 - steps), min(shape[1], b0 + steps + 1)):
+                db = da + (b + half - y) ** 2
+                if db > most:
+                    continue
+                for c in range(max(0, c0 - steps), min(shape[2], c0 + steps + 1)):
+                    d = db + (c + half - z) ** 2
+                    if d < distance[a, b, c] and d <= most:
+                        distance[a, b, c] = d
+                        closest[a, b, c] = i
+    return closest
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _normal_equations(P, N, Q, M, closest, low, cell, T, reach, H, g):  # type: ignore[no-untyped-def]
+    """Fill H (6, 6) and g (6,) of the step [t r] at pose T; returns the points within ``reach`` and their squared error."""
+    H[:], g[:] = 0.0, 0.0
+    J = np.empty(6)
+    count, squared = 0, 0.0
+    for i in range(len(P)):
+        x = T[0, 0] * P[i, 0] + T[0, 1] * P[i, 1] + T[0, 2] * P[i, 2] + T[0, 3]
+        y = T[1, 0] * P[i, 0] + T[1, 1] * P[i, 1] + T[1, 2] * P[i, 2] + T[1, 3]
+        z = T[2, 0] * P[i, 0] + T[2, 1] * P[i, 1] + T[2, 2] * P[i, 2] + T[2, 3]
+        a, b, c = int((x - low[0]) / cell), int((y - low[1]) / cell), int((z - low[2]) / cell)
+        if x < low[0] or y < low[1] or z < low[2]:
+            continue
+        if a >= closest.shape[0] or b >= closest.shape[1] or c >= closest.shape[2]:
+            continue
+        j = closest[a, b, c]
+        if j < 0:
+            continue
+        dx, dy, dz = x - Q[j, 0], y - Q[j, 1], z - Q[j, 2]
+        d2 = dx * dx + dy * dy + dz * dz
+        if d2 > reach * reach:
+            continue
+        nx, ny, nz = M[j, 0], M[j, 1], M[j, 2]
+        facing = (
+            nx * (T[0, 0] * N[i, 0] + T[0, 1] * N[i, 1] + T[0, 2] * N[i, 2])
+            + ny * (T[1, 0] * N[i, 0] + T[1, 1] * N[i, 1] + T[1, 2] * N[i, 2])
+            + nz * (T[2, 0] * N[i, 0] + T[2, 1] * N[i, 1] + T[2, 2] * N[i, 2])
+        )
+        if facing < 0.6:
+            continue
+        w = (1.0 - d2 / (reach * reach)) ** 2
+        r = nx * dx + ny * dy + nz * dz
+        J[0], J[1], J[2] = nx, ny, nz
+        J[3], J[4], J[5] = y * nz - z * ny, z * nx - x * nz, x * ny - y * nx
+        for k in range(6):
+            g[k] += w * J[k] * r
+            for m in range(k + 1):
+                H[k, m] += w * J[k] * J[m]
+        count += 1
+        squared += r * r
+    for k in range(6):
+        for m in range(k):
+            H[m, k] = H[k, m]
+    return count, squared
+
+
+@numba.njit(cache=True, nogil=True)
+def _stepped(T, step):  # type: ignore[no-untyped-def]
+    """The pose after a left step [t r]."""
+    angle = np.sqrt(step[3] ** 2 + step[4] ** 2 + step[5] ** 2)
+    R = np.eye(3)
+    if angle > 1e-12:
+        x, y, z = step[3] / angle, step[4] / angle, step[5] / angle
+        K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        R = R + np.sin(angle) * K + (1.0 - np.cos(angle)) * (K @ K)
+    out = np.eye(4)
+    out[:3, :3] = R @ np.ascontiguousarray(T[:3, :3])
+    out[:3, 3] = R @ np.ascontiguousarray(T[:3, 3]) + step[:3]
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _align(P, N, Q, M, closest, low, cell, poses, reach, last_reach, iterations):  # type: ignore[no-untyped-def]
+    share, rmse = np.zeros(len(poses)), np.full(len(poses), np.inf)
+    H, g = np.empty((6, 6)), np.empty(6)
+    for k in range(len(poses)):
+        for iteration in range(iterations):
+            now = reach * (last_reach / reach) ** (iteration / max(1, iterations - 3))
+            count, _ = _normal_equations(P, N, Q, M, closest, low, cell, poses[k], max(now, last_reach), H, g)
+            if count < 20:
+                break
+            for a in range(6):
+                H[a, a] += 1e-3 + 1e-6 * H[a, a]
+            step = -np.linalg.solve(H, g)
+            poses[k] = _stepped(poses[k], step)
+            if now <= last_reach and np.abs(step).max() < 2e-4:
+                break
+        count, squared = _normal_equations(P, N, Q, M, closest, low, cell, poses[k], last_reach, H, g)
+        share[k] = count / len(P)
+        rmse[k] = np.sqrt(squared / max(1, count))
+    return share, rmse
