@@ -14,7 +14,8 @@ from objreg_ros.data import Array
 from objreg_ros.geometry import rotation_angle
 from objreg_ros.registrar.candidate import Candidate
 from objreg_ros.registrar.consensus import distinct
-from objreg_ros.registrar.hypotheses import Hypothesis, from_centroids, from_features, from_prior
+from objreg_ros.registrar.hypotheses import Hypothesis, from_centroids, from_features, from_objects, from_prior
+from objreg_ros.registrar.icp import align
 from objreg_ros.registrar.keyframe import Keyframe
 from objreg_ros.registrar.objects import explain
 from objreg_ros.registrar.params import RegistrarParams
@@ -46,7 +47,7 @@ class Engine:
         ``T_target_source_prior (4, 4)`` is what odometry expects, given only where it is tight enough to start from.
         """
         pair = Pair(source=self._pantry.get(source), target=self._pantry.get(target))
-        if pair.source.cloud is None or pair.target.cloud is None:
+        if min(len(pair.source.xyz), len(pair.target.xyz)) < self._params.min_points:
             return ()
         seeds = self._seeds(pair, T_target_source_prior)
         candidates = [self._judge(pair, seed) for seed in seeds]
@@ -55,24 +56,32 @@ class Engine:
     def _seeds(self, pair: Pair, prior: Array | None) -> list[Hypothesis]:
         """The hypotheses of each chain that the views like best."""
         source, target, params = pair.source, pair.target, self._params
-        chains = [from_prior(prior), from_centroids(source, target, params), from_features(source, target, params)]
+        chains = [
+            from_prior(prior),
+            from_centroids(source, target, params),
+            from_objects(source, target, params),
+            from_features(source, target, params),
+        ]
         return [seed for chain in chains for seed in self._best(pair, chain)]
 
     def _best(self, pair: Pair, chain: list[Hypothesis]) -> list[Hypothesis]:
-        """The hypotheses of one chain that look best from both views, distinct, at most ``refined_per_chain``."""
+        """The hypotheses of one chain, brought to their basins, that look best from both views, distinct."""
         if not chain:
             return []
-        T = np.array([seed.T_target_source for seed in chain])
-        source, target = pair.source.sight, pair.target.sight
-        V = np.array([verify(source, target, pose, self._params, self._params.quick_sample).score for pose in T])
-        chosen = distinct(T, V, pair.source.middle, self._params.refined_per_chain, np.radians(5.0), 0.10)
-        return [chain[k] for k in chosen]
+        params, source, target = self._params, pair.source, pair.target
+        few = slice(params.quick_points)
+        T, _, _ = align(
+            source.xyz[few], source.normals[few], target.surface, np.array([seed.T_target_source for seed in chain]),
+            params.reaches[0], params.reaches[1], params.iterations,
+        )  # fmt: skip
+        V = np.array([verify(source.sight, target.sight, pose, params, params.quick_sample).score for pose in T])
+        chosen = distinct(T, V, source.middle, params.refined_per_chain, np.radians(5.0), 0.10)
+        return [replace(chain[k], T_target_source=T[k]) for k in chosen]
 
     def _judge(self, pair: Pair, seed: Hypothesis) -> Candidate:
         """Refine a hypothesis and gather the evidence."""
         params, source, target = self._params, pair.source, pair.target
-        assert source.cloud is not None and target.cloud is not None
-        alignment = refine(source.cloud, target.cloud, seed.T_target_source, params.reaches, params.iterations)
+        alignment = refine(source, target, seed.T_target_source, params)
         T = alignment.T_target_source
         explained, moved = explain(source, target, T, params)
         return Candidate(

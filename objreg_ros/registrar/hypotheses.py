@@ -8,10 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from objreg_ros.data import Array
+from objreg_ros.geometry import pose, rotation_between, rotation_from_vector
 from objreg_ros.registrar.consensus import Matches, poses
 from objreg_ros.registrar.features import match
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
+from objreg_ros.registrar.verify import verify
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -39,7 +41,7 @@ def from_features(source: Prepared, target: Prepared, params: RegistrarParams) -
 
 def from_centroids(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Hypothesis]:
     """Poses from the middles of object pairs and triples; every assignment among look-alikes is tried."""
-    pairs = [(i, j) for i, a in enumerate(source.groups) for j, b in enumerate(target.groups) if a == b]
+    pairs = look_alikes(source, target)
     if len(pairs) < 2 or source.up is None or target.up is None:
         return []
     a, b = np.array(pairs).T
@@ -53,6 +55,27 @@ def from_centroids(source: Prepared, target: Prepared, params: RegistrarParams) 
     )
     found = poses(matches, source.up, target.up, params.centroid_tolerance, 0.15, params.seeds_per_chain)
     return [Hypothesis(T_target_source=T, chain="centroids", worth=worth) for T, worth in found]
+
+
+def from_objects(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Hypothesis]:
+    """Poses that lay one object upon one of its kind and turn about gravity, every yaw; those the views like best."""
+    if source.up is None or target.up is None:
+        return []
+    pairs = look_alikes(source, target)
+    upright = rotation_between(source.up, target.up)
+    turns = [
+        rotation_from_vector(yaw * target.up) @ upright
+        for yaw in np.linspace(0.0, 2.0 * np.pi, params.yaw_steps, endpoint=False)
+    ]
+    T = [pose(R, target.centroids[j] - R @ source.centroids[i]) for i, j in pairs for R in turns]
+    worth = np.array([verify(source.sight, target.sight, each, params, params.glance).score for each in T])
+    best = np.argsort(-worth, kind="stable")[: params.seeds_per_object_chain]
+    return [Hypothesis(T_target_source=T[k], chain="objects", worth=float(worth[k])) for k in best]
+
+
+def look_alikes(source: Prepared, target: Prepared) -> list[tuple[int, int]]:
+    """Indices of all objects of source and target that a detector may call by one name."""
+    return [(i, j) for i, a in enumerate(source.groups) for j, b in enumerate(target.groups) if a == b]
 
 
 def from_prior(T_target_source: Array | None) -> list[Hypothesis]:

@@ -8,6 +8,7 @@ compatible normals. It brings a hypothesis to its basin in under a millisecond; 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -32,7 +33,7 @@ class Surface:
 
 
 def prepare_surface(xyz: Array, normals: Array, cell: float, reach: float) -> Surface:
-    """A surface whose grid knows the closest point out to ``reach`` m; ``cell`` m grows where the cloud is very large."""
+    """A surface whose grid knows the closest point out to ``reach`` m; ``cell`` m grows for a very large cloud."""
     usable = np.abs(normals).sum(axis=1) > 0.5
     xyz, normals = np.ascontiguousarray(xyz[usable], np.float32), np.ascontiguousarray(normals[usable], np.float32)
     if len(xyz) == 0:
@@ -63,6 +64,26 @@ def align(
     return poses, share, rmse
 
 
+class Fit(NamedTuple):
+    """How a pose fits: ``H (6, 6)`` of a left step [t r], the weight and number of pairs, m, and their extent in m."""
+
+    H: Array
+    weight: float
+    inliers: int
+    rmse: float
+    extent: float
+
+
+def fit(xyz: Array, normals: Array, surface: Surface, T: Array, reach: float) -> Fit:
+    """The fit of one pose (4, 4): what of the points (M, 3) has a partner within ``reach`` m."""
+    H, g = np.zeros((6, 6)), np.zeros(6)
+    count, weight, squared, spread = _normal_equations(
+        xyz, normals, surface.xyz, surface.normals, surface.closest, surface.low, surface.cell, T, reach, H, g
+    )
+    rmse = float(np.sqrt(squared / max(1e-9, weight)))
+    return Fit(H, float(weight), int(count), rmse, max(0.05, float(np.sqrt(spread))))
+
+
 @numba.njit(cache=True, nogil=True, fastmath=True)
 def _closest(xyz, low, cell, shape, reach):  # type: ignore[no-untyped-def]
     """Fill the grid: every point claims the cells around it that no other point is closer to."""
@@ -90,10 +111,11 @@ def _closest(xyz, low, cell, shape, reach):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
 def _normal_equations(P, N, Q, M, closest, low, cell, T, reach, H, g):  # type: ignore[no-untyped-def]
-    """Fill H (6, 6) and g (6,) of the step [t r] at pose T; returns the points within ``reach`` and their squared error."""
+    """Fill H (6, 6) and g (6,) of the step [t r] at pose T; returns pairs, their weight, error and spread."""
     H[:], g[:] = 0.0, 0.0
     J = np.empty(6)
-    count, squared = 0, 0.0
+    count, weight, squared = 0, 1e-9, 0.0
+    sums, squares = np.zeros(3), 0.0
     for i in range(len(P)):
         x = T[0, 0] * P[i, 0] + T[0, 1] * P[i, 1] + T[0, 2] * P[i, 2] + T[0, 3]
         y = T[1, 0] * P[i, 0] + T[1, 1] * P[i, 1] + T[1, 2] * P[i, 2] + T[1, 3]
@@ -127,11 +149,17 @@ def _normal_equations(P, N, Q, M, closest, low, cell, T, reach, H, g):  # type: 
             for m in range(k + 1):
                 H[k, m] += w * J[k] * J[m]
         count += 1
-        squared += r * r
+        weight += w
+        squared += w * r * r
+        sums[0] += w * x
+        sums[1] += w * y
+        sums[2] += w * z
+        squares += w * (x * x + y * y + z * z)
     for k in range(6):
         for m in range(k):
             H[m, k] = H[k, m]
-    return count, squared
+    spread = squares / weight - (sums[0] ** 2 + sums[1] ** 2 + sums[2] ** 2) / weight**2
+    return count, weight, squared, max(0.0, spread)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -156,7 +184,7 @@ def _align(P, N, Q, M, closest, low, cell, poses, reach, last_reach, iterations)
     for k in range(len(poses)):
         for iteration in range(iterations):
             now = reach * (last_reach / reach) ** (iteration / max(1, iterations - 3))
-            count, _ = _normal_equations(P, N, Q, M, closest, low, cell, poses[k], max(now, last_reach), H, g)
+            count, _, _, _ = _normal_equations(P, N, Q, M, closest, low, cell, poses[k], max(now, last_reach), H, g)
             if count < 20:
                 break
             for a in range(6):
@@ -165,7 +193,7 @@ def _align(P, N, Q, M, closest, low, cell, poses, reach, last_reach, iterations)
             poses[k] = _stepped(poses[k], step)
             if now <= last_reach and np.abs(step).max() < 2e-4:
                 break
-        count, squared = _normal_equations(P, N, Q, M, closest, low, cell, poses[k], last_reach, H, g)
+        count, weight, squared, _ = _normal_equations(P, N, Q, M, closest, low, cell, poses[k], last_reach, H, g)
         share[k] = count / len(P)
-        rmse[k] = np.sqrt(squared / max(1, count))
+        rmse[k] = np.sqrt(squared / weight)
     return share, rmse

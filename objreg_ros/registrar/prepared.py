@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A keyframe made ready for registration, once: its sight, its features, its cloud."""
+"""A keyframe made ready for registration, once: its sight, its surface, its features."""
 
 from __future__ import annotations
 
@@ -10,24 +10,29 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.registrar.features import Features, describe
+from objreg_ros.registrar.fusion import thin
 from objreg_ros.registrar.icp import Surface, prepare_surface
 from objreg_ros.registrar.keyframe import Keyframe
+from objreg_ros.registrar.labels import LabelGroups
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.refine import Cloud, prepare_cloud
+from objreg_ros.registrar.tracking import view_normals
 from objreg_ros.registrar.visibility import Sight, prepare_sight
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Prepared:
-    """``up (3,)`` against gravity or None; ``groups`` the confusable group of each object, ``centroids (K, 3)``."""
+    """All that was seen, thinned: ``surface`` to be aligned to, ``xyz`` and ``normals (M, 3)`` to align with.
+
+    ``up (3,)`` is against gravity, or None; ``groups`` the confusable group of each object, ``centroids (K, 3)`` their
+    middles; ``middle (3,)`` that of everything: where poses are compared.
+    """
 
     keyframe: Keyframe
     sight: Sight
+    surface: Surface
     features: Features
     xyz: Array
     normals: Array
-    surface: Surface
-    cloud: Cloud | None
     up: Array | None
     groups: tuple[str, ...]
     centroids: Array
@@ -36,44 +41,37 @@ class Prepared:
 
 def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
     """Everything about one keyframe that does not depend on its partner."""
-    context = keyframe.context
-    xyz, normals = thin(context.xyz, context.normals, params.feature_voxel)
+    fine = thin(*seen(keyframe, params), params.surface_voxel)
+    coarse = thin(*fine, params.feature_voxel)
+    groups = LabelGroups(params.label_groups)
     return Prepared(
         keyframe=keyframe,
         sight=prepare_sight(keyframe.view, params.context_range, params.detail_sigma, params.seed),
-        xyz=xyz,
-        normals=normals,
-        surface=prepare_surface(context.xyz, context.normals, params.grid_cell, params.grid_reach),
-        features=describe(xyz, normals, params.feature_radius),
-        cloud=prepare_cloud(context.xyz, params.context_voxel),
+        surface=prepare_surface(*fine, params.grid_cell, params.grid_reach),
+        features=describe(*coarse, params.feature_radius),
+        **_shuffled(*coarse, params.seed),
         up=None if keyframe.gravity is None else -np.asarray(keyframe.gravity, float),
-        groups=tuple(group_of(label, params.label_groups) for label in keyframe.labels),
+        groups=tuple(groups.of(label) for label in keyframe.labels),
         centroids=np.array([item.centroid for item in keyframe.objects]).reshape(-1, 3),
-        middle=np.asarray(context.xyz.mean(axis=0) if len(context) else np.zeros(3), float),
+        middle=np.asarray(coarse[0].mean(axis=0) if len(coarse[0]) else np.zeros(3), float),
     )
 
 
-def group_of(label: str, groups: tuple[str, ...]) -> str:
-    """The group of labels that a detector confuses with ``label``, or the label itself."""
-    word = label.replace(" ", "_")
-    return next((group for group in groups if word in group.split()), label)
+def seen(keyframe: Keyframe, params: RegistrarParams) -> tuple[Array, Array]:
+    """Points (N, 3) and normals (N, 3) of the whole view and of the context beyond it.
+
+    The whole view, not only what is near the objects: walls and furniture hold a pose that a table would let slide.
+    """
+    view, normals = keyframe.view.xyz, view_normals(keyframe.view.xyz)
+    known = normals.any(axis=-1) & (view[..., 2] < params.context_range)
+    context = keyframe.context
+    return np.concatenate([view[known], context.xyz]), np.concatenate([normals[known], context.normals])
 
 
-def thin(xyz: Array, normals: Array, voxel: float) -> tuple[Array, Array]:
-    """One mean point and one mean unit normal a voxel, in a fixed order."""
-    if len(xyz) == 0:
-        return xyz, normals
-    _, owner, counts = np.unique(
-        np.floor(xyz / voxel).astype(np.int64), axis=0, return_inverse=True, return_counts=True
-    )
-    owner = owner.ravel()
-    points, directions = np.zeros((len(counts), 3)), np.zeros((len(counts), 3))
-    for k in range(3):
-        points[:, k] = np.bincount(owner, xyz[:, k]) / counts
-        directions[:, k] = np.bincount(owner, normals[:, k])
-    lengths = np.linalg.norm(directions, axis=1, keepdims=True)
-    directions = np.where(lengths > 1e-6, directions / np.maximum(lengths, 1e-6), 0.0)
-    return points.astype(np.float32), directions.astype(np.float32)
+def _shuffled(xyz: Array, normals: Array, seed: int) -> dict[str, Array]:
+    """The points that have a normal, in a fixed random order: the first n are a fair sample."""
+    order = np.random.default_rng(seed).permutation(np.flatnonzero(normals.any(axis=1)))
+    return {"xyz": np.ascontiguousarray(xyz[order]), "normals": np.ascontiguousarray(normals[order])}
 
 
 class Pantry:

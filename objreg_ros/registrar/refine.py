@@ -1,81 +1,63 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Refinement of a pose in 6 DoF on the context: generalised ICP of small_gicp, from coarse to fine correspondences.
-
-Segal, Haehnel and Thrun, "Generalized-ICP" (2009). The shrinking correspondence distance is the robust kernel: what
-does not fit drops out. This is the one file that knows small_gicp.
-"""
+"""The end of a registration: 6 DoF on everything that was seen, what it is worth, and where it may still slide."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 import numpy as np
-import small_gicp
 
 from objreg_ros.data import Alignment, Array
-
-NEIGHBOURS = 12
-
-
-class Cloud(NamedTuple):
-    """Points ready for refinement: a small_gicp cloud with covariances, and its tree."""
-
-    points: Any
-    tree: Any
-
-    def __len__(self) -> int:
-        return int(self.points.size())
+from objreg_ros.geometry import skew, transform
+from objreg_ros.registrar.icp import Fit, align, fit
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.prepared import Prepared
 
 
-def prepare_cloud(xyz: Array, voxel: float) -> Cloud | None:
-    """Thin points (N, 3) to ``voxel`` m and estimate their covariances; None with fewer than 30 left."""
-    if len(xyz) < 30:
-        return None
-    points, tree = small_gicp.preprocess_points(xyz.astype(np.float64), voxel, NEIGHBOURS, 1)
-    return Cloud(points, tree) if points.size() >= 30 else None
+def refine(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> Alignment:
+    """Refine a pose that is in its basin; ``converged`` is False where next to nothing holds it.
 
-
-def refine(
-    source: Cloud, target: Cloud, T_target_source: Array, reaches: tuple[float, ...], iterations: int
-) -> Alignment:
-    """Refine a pose; ``reaches`` m are the correspondence distances of the rounds, coarse to fine.
-
-    ``overlap`` of what comes back is the share of source points with a partner in the last round. An optimiser that
-    walked away comes back with ``converged`` False, and the pose that it ended at.
+    The information counts only what lies on different patches of surface as independent, because the noise of
+    neighbouring points is not.
     """
-    result = None
-    for reach in reaches:
-        result = small_gicp.align(
-            target.points,
-            source.points,
-            target.tree,
-            T_target_source,
-            registration_type="GICP",
-            max_correspondence_distance=reach,
-            num_threads=1,
-            max_iterations=iterations,
-        )
-        T_target_source = result.T_target_source
-    assert result is not None, "refine: expected at least one reach, got none"
-    inliers = int(result.num_inliers)
+    _, reach, last = params.reaches
+    points = (source.xyz, source.normals, target.surface)
+    T = align(*points, T_target_source[None], reach, last, params.iterations)[0][0]
+    found = fit(*points, T, last)
     return Alignment(
-        T_target_source=np.ascontiguousarray(T_target_source, np.float64),
-        information=in_target(np.asarray(result.H), T_target_source),
-        inliers=inliers,
-        overlap=inliers / len(source),
-        rmse=float(np.sqrt(2.0 * result.error / max(1, inliers))),
-        iterations=int(result.iterations),
-        converged=bool(result.converged) and inliers > 0,
+        T_target_source=T,
+        information=about_camera(found.H, T) / max(found.rmse, params.surface_noise) ** 2,
+        inliers=found.inliers,
+        overlap=found.inliers / max(1, len(source.xyz)),
+        rmse=found.rmse,
+        iterations=params.iterations,
+        converged=found.inliers >= params.min_points,
+        slack=slack(found, T, transform(T, source.middle), params.slack_share),
     )
 
 
-def in_target(information: Array, T_target_source: Array) -> Array:
-    """small_gicp's (6, 6) information of a step [r t] along the source's axes, as ours: [t r] along the target's.
+def about_camera(H: Array, T_target_source: Array) -> Array:
+    """The information of a left step [t r], which turns about the target camera, as that of the source camera's pose.
 
-    The rotation stays about the source camera, as in a ROS pose with covariance.
+    ROS poses with covariance mean the latter: translation of the child's origin, rotation about it, fixed axes.
     """
-    swap = np.r_[3:6, 0:3]
-    R = T_target_source[:3, :3]
-    J = np.zeros((6, 6))
-    J[:3, :3], J[3:, 3:] = R.T, R.T
-    return np.asarray(J.T @ information[np.ix_(swap, swap)] @ J)
+    A = np.eye(6)
+    A[:3, 3:] = skew(T_target_source[:3, 3])
+    return np.asarray(A.T @ H @ A)
+
+
+def slack(found: Fit, T_target_source: Array, middle: Array, least_share: float) -> Array:
+    """Unit directions (K, 6) [t r] of the source camera's pose that less than ``least_share`` of the surface resists.
+
+    The motion is looked at about the ``middle (3,)`` of what was seen, with rotations scaled by its extent, so that a
+    turn and a shift are comparable. A wall alone leaves three, a corridor one, a room none.
+    """
+    if found.inliers == 0:
+        return np.eye(6)
+    B = np.eye(6)  # from a step about the middle, rotation scaled, to a left step
+    B[3:, 3:] /= found.extent
+    B[:3, 3:] = skew(middle) / found.extent
+    values, vectors = np.linalg.eigh(B.T @ found.H @ B / found.weight)
+    loose = vectors[:, values < least_share]
+    to_camera = np.eye(6)
+    to_camera[:3, 3:] = -skew(T_target_source[:3, 3])
+    directions = (to_camera @ B @ loose).T
+    return np.asarray(directions / np.linalg.norm(directions, axis=1, keepdims=True)).reshape(-1, 6)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from objreg_ros.data import View
 from objreg_ros.geometry import inverse, pose_error
 from objreg_ros.registrar.engine import Engine
 from objreg_ros.registrar.keyframe import Context
@@ -80,5 +81,6 @@ def test_without_gravity_and_grey_there_is_still_a_pose(engine: Engine) -> None:
 def test_an_empty_keyframe_proposes_nothing(engine: Engine) -> None:
     full = keyframe(seen_from(0.0))
     nothing = np.zeros((0, 3), np.float32)
-    empty = replace(full, objects=(), context=Context(xyz=nothing, normals=nothing))
+    dark = View(xyz=np.full_like(full.view.xyz, np.nan), grey=None, intrinsics=full.view.intrinsics)
+    empty = replace(full, objects=(), context=Context(xyz=nothing, normals=nothing), view=dark)
     assert engine.propose(full, empty) == () == engine.propose(empty, full)

@@ -7,7 +7,7 @@ import numpy as np
 
 from objreg_ros.geometry import inverse, pose, rotate, rotation_from_vector, transform
 from objreg_ros.registrar.features import describe, match
-from objreg_ros.registrar.prepared import thin
+from objreg_ros.registrar.fusion import thin
 
 from .rooms import keyframe, seen_from
 
