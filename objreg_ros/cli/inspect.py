@@ -8,19 +8,30 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import click
+import cv2
+import numpy as np
 
 from objreg_ros.cli import options
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import GRAPH_TOPICS, Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.summary import describe_topics, warnings
+from objreg_ros.registrar.store import is_store
+from objreg_ros.registrar.survey import describe, draw, survey
 from objreg_ros.truth import Truth
 
 
 @click.command()
 @options.recording
 @options.remap
-def command(recording: Path, remaps: tuple[str, ...]) -> None:
-    """Say what is in RECORDING, which topics the graph would use, and what would go wrong."""
+@click.option("--picture", type=click.Path(dir_okay=False, path_type=Path), help="Draw the objects of a store (PNG).")
+def command(recording: Path, remaps: tuple[str, ...], picture: Path | None) -> None:
+    """Say what is in RECORDING, which topics the graph would use, and what would go wrong.
+
+    RECORDING may also be a store of the registrar: then its sessions, labels and objects are told.
+    """
+    if is_store(recording):
+        _say_store(recording, picture)
+        return
     with open_recording(recording) as source:
         inputs = choose_inputs(source.topics, parse_remaps(remaps))
         _say_what_it_is(source)
@@ -29,6 +40,13 @@ def command(recording: Path, remaps: tuple[str, ...]) -> None:
         _say_truth(source, inputs)
         for warning in warnings(source, inputs):
             click.echo(f"! {warning}")
+
+
+def _say_store(store: Path, picture: Path | None) -> None:
+    click.echo(describe(store))
+    if picture is not None:
+        cv2.imwrite(str(picture), np.ascontiguousarray(draw(survey(store))[..., ::-1]))
+        click.echo(f"  drawn into {picture}")
 
 
 def _say_what_it_is(source: Recording) -> None:

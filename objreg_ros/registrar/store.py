@@ -194,6 +194,15 @@ class Store:
             self._cache.popitem(last=False)
 
 
+def is_store(path: str | Path) -> bool:
+    """Whether the file at ``path`` bears the mark of a store, of any version and in any state."""
+    if not Path(path).is_file():
+        return False
+    with Path(path).open("rb") as file:
+        header = file.read(100)
+    return header.startswith(MAGIC) and int.from_bytes(header[68:72], "big") == APPLICATION_ID
+
+
 def _connect(path: str) -> sqlite3.Connection:
     connection = sqlite3.connect(path, check_same_thread=False, timeout=5.0, uri=path.startswith("file:"))
     connection.row_factory = sqlite3.Row
@@ -221,8 +230,8 @@ def _check(path: Path) -> None:
         header = file.read(100)
     if len(header) < 100 or not header.startswith(MAGIC):
         raise StoreError(f"{path}: expected a store of objreg_ros, got a file of another kind; it was left as it is")
-    version, application = (int.from_bytes(header[at : at + 4], "big") for at in (60, 68))
-    if application != APPLICATION_ID:
+    version = int.from_bytes(header[60:64], "big")
+    if not is_store(path):
         raise StoreError(f"{path}: expected a store of objreg_ros, got another SQLite database; it was left as it is")
     if version > SCHEMA_VERSION:
         raise StoreError(

@@ -11,7 +11,7 @@ import pytest
 from objreg_ros.registrar.landmarks import Landmarks
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.sighting import sightings_of
-from objreg_ros.registrar.store import Store, StoreError
+from objreg_ros.registrar.store import Store, StoreError, is_store
 from objreg_ros.registrar.survey import PANEL, describe, draw, survey
 
 from .samples import box, keyframe, moved
@@ -47,6 +47,12 @@ def test_a_picture_has_a_panel_for_each_session(place: Path) -> None:
     picture = draw(survey(place))
     assert picture.shape == (PANEL, 2 * PANEL, 3) and picture.dtype == np.uint8
     assert (picture[:, :PANEL] != 255).any() and (picture[:, PANEL:] != 255).any()
+
+
+def test_a_store_is_told_from_other_files(place: Path, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("no store")
+    assert is_store(place)
+    assert not is_store(tmp_path / "notes.txt") and not is_store(tmp_path) and not is_store(tmp_path / "nothing")
 
 
 def test_an_empty_store_has_a_description_and_a_picture(tmp_path: Path) -> None:
