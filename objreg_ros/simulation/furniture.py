@@ -19,12 +19,14 @@ Random = np.random.Generator
 class Furniture:
     """A piece that stands on z = 0 around the z axis: ``mesh``, and the ``boards`` that carry things.
 
-    A board is (centre x, centre y, height, half width, half depth) in metres; ``floor_radius`` keeps others away.
+    A board is (centre x, centre y, height, half width, half depth) in metres; ``floor_radius`` keeps others away;
+    ``clearance`` metres are free above a board.
     """
 
     mesh: Mesh
     boards: tuple[tuple[float, float, float, float, float], ...]
     floor_radius: float
+    clearance: float = np.inf
 
 
 def surface(rng: Random) -> Material:
@@ -87,7 +89,7 @@ def shelf(rng: Random) -> Furniture:
     parts += [box((thick, depth, height), wood, tile=0.8).moved(x=s * (width - thick) / 2) for s in (-1, 1)]
     parts.append(box((width, 0.006, height), wood, tile=0.8).moved(y=depth / 2))
     boards = tuple((0.0, -0.02, k * gap + thick, width / 2 - 0.04, depth / 2 - 0.03) for k in range(levels + 1))
-    return Furniture(merge(parts), boards, width / 2)
+    return Furniture(merge(parts), boards, width / 2, clearance=gap - thick - 0.01)
 
 
 def cupboard(rng: Random) -> Furniture:

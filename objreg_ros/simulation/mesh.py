@@ -22,6 +22,10 @@ CREASE_COSINE = 0.7
 """Neighbouring surfaces that turn by less than the angle of this cosine are shaded as one smooth surface."""
 
 
+SMALL_M = 0.08
+"""Rounded parts up to this size are made of fewer faces."""
+
+
 @dataclass(frozen=True, eq=False)
 class Material:
     """How a surface looks: ``texture (S, S, 3) uint8`` sRGB with S a power of two, and its response to light.
@@ -269,8 +273,9 @@ def tube(path: Array, radius: float | Array, material: Material, segments: int =
 def cushion(size: Sequence[float] | Array, material: Material, squareness: float = 4.0, tile: float = 0.3) -> Mesh:
     """A rounded box (superellipsoid, Barr 1981) of ``size`` on z = 0; 2 is an ellipsoid, above 8 nearly a box."""
     power = 2.0 / squareness
-    latitude = np.linspace(np.pi / 2, -np.pi / 2, 13)[:, None]
-    longitude = np.linspace(0, 2 * np.pi, 28, endpoint=False)[None, :]
+    segments = 28 if max(size) > SMALL_M else 12
+    latitude = np.linspace(np.pi / 2, -np.pi / 2, segments // 2 - 1)[:, None]
+    longitude = np.linspace(0, 2 * np.pi, segments, endpoint=False)[None, :]
     c, s = _signed_power(np.cos(latitude), power), _signed_power(np.sin(latitude), power)
     x = c * _signed_power(np.cos(longitude), power)
     y = c * _signed_power(np.sin(longitude), power)

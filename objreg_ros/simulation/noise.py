@@ -161,9 +161,8 @@ def _sense(  # type: ignore[no-untyped-def]
             error = common * _at(smooth, x, cell_x) + single * normal(bits)
             beyond = z - np.float32(0.4)
             z = z * (one + bias) + warp[y, x] * z * z + error * (floor + growth * beyond * beyond)
-            step = quantum * z * z
-            if step > 0:
-                z = np.rint(z / step) * step
+            if quantum > 0:  # equal steps of disparity, that is of 1/z
+                z = one / (max(np.rint(one / (z * quantum)), one) * quantum)
             if near <= z <= far:
                 depth[y, x] = z
 

@@ -109,7 +109,8 @@ def _setting(rng: Random, occluders: int, alike: bool = False) -> _Setting:
     others = [item for piece, T in tables for item in _chairs_at(rng, piece, T, int(rng.integers(1, 3)))]
     for piece, T in walls:
         for board in piece.boards[:4]:
-            others += [(m, T @ P) for m, P in spread(rng, _things(rng, 3, 2), board)]
+            few = _things(rng, 2, 1)
+            others += [(m, T @ P) for m, P in spread(rng, few, board, clearance=piece.clearance)]
     scene = furnished(rng, [*tables, *walls], room, lamp_count=2)
     return _Setting(replace(scene, places=_places(tables)), tables, laid, others)
 

@@ -105,11 +105,17 @@ def place_on(model: ObjectModel, T_world_surface: Array, x: float, y: float, yaw
 
 
 def spread(
-    rng: Random, models: Sequence[ObjectModel], board: Board, gap: float = 0.01, beside: int = 0
+    rng: Random,
+    models: Sequence[ObjectModel],
+    board: Board,
+    gap: float = 0.01,
+    beside: int = 0,
+    clearance: float = np.inf,
 ) -> list[tuple[ObjectModel, Array]]:
     """Lay models on a board at random without overlap: each with its pose in the board's furniture frame.
 
-    The last ``beside`` of them go close to those before. What finds no room after some trials is left out.
+    The last ``beside`` of them go close to those before. What finds no room after some trials, or is higher than
+    ``clearance``, is left out.
     """
     x0, y0, height, half_x, half_y = board
     laid: list[tuple[ObjectModel, Array]] = []
@@ -120,7 +126,7 @@ def spread(
         radius = _footprint(model, rest)
         room = (max(half_x - 0.7 * radius, 0.0), max(half_y - 0.7 * radius, 0.0))
         close = taken if k >= len(models) - beside else []
-        if radius > 1.3 * max(half_x, half_y):
+        if radius > 1.3 * max(half_x, half_y) or model.size[2] > clearance:
             continue
         for _ in range(12):
             x, y = _spot(rng, room, radius, close)
@@ -239,7 +245,8 @@ def _clutter(
     for piece, T in pieces:
         for board in piece.boards:
             count = int(rng.integers(4, 14)) if board[3] * board[4] > 0.12 else int(rng.integers(0, 6))
-            on_board = [(m, T @ P) for m, P in spread(rng, some_models(rng, count, share, labels), board)]
+            models = some_models(rng, count, share, labels)
+            on_board = [(m, T @ P) for m, P in spread(rng, models, board, clearance=piece.clearance)]
             laid += on_board
             if on_board:
                 centre = T[:3, :3] @ [board[0], board[1], board[2] + 0.08] + T[:3, 3]
