@@ -77,9 +77,26 @@ def simulate(
     if Path(path).exists():
         raise FileExistsError(f"{path}: expected a new folder, got one that exists; choose another name or remove it")
     story = make_story(scenario, seed, frames, rate, sensors.stress.occluders)
+    write_story(path, story, scenario, seed, sensors, points, jpeg, threads, progress)
+    return story
+
+
+def write_story(
+    path: Path | str,
+    story: Story,
+    name: str,
+    seed: int,
+    sensors: Sensors | None = None,
+    points: bool = False,
+    jpeg: bool = False,
+    threads: int = 2,
+    progress: Callable[[int], object] = lambda done: None,
+) -> None:
+    """As `simulate`, of a story of one's own; its truth calls it ``name``."""
+    sensors = sensors or Sensors()
     for scene in story.scenes:
         scene.prepare()
-    truth = TruthWriter(story, scenario, seed, sensors.intrinsics)
+    truth = TruthWriter(story, name, seed, sensors.intrinsics)
     T_odom_camera, covariance = drifted(story.T_world_camera, sensors.odometry, seed)
 
     def records() -> Iterator[Record]:
@@ -92,7 +109,6 @@ def simulate(
 
     write_rosbag2(path, records())
     truth.write(Path(path))
-    return story
 
 
 def _rendered(story: Story, seed: int, sensors: Sensors, threads: int) -> Iterator[Rendering]:
