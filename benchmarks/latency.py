@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The live graph at the camera's rate with 1, 4 and 8 objects in view: latency, processor, memory, and what was lost.
+
+Simulated recordings are played in real time through the three node processes. A frame's end-to-end latency is from the
+arrival of its image to the registrar's receipt for it; that of a frame that completed a keyframe includes the whole
+search for loops. The books say what every node dropped and why: in = out + dropped.
+
+    python benchmarks/latency.py --json latency.json
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import tempfile
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
+from objreg_ros.simulation import furniture
+from objreg_ros.simulation.objects import make_object
+from objreg_ros.simulation.scenarios import TABLE_CLASSES, Story
+from objreg_ros.simulation.scene import furnished, number, spread
+from objreg_ros.simulation.trajectory import Hand, around, carried
+from objreg_ros.simulation.write import write_story
+
+RATE_HZ = 30.0
+TICKS = os.sysconf("SC_CLK_TCK")
+
+
+def table_story(objects: int, frames: int, seed: int) -> Story:
+    """A camera that goes to and fro before a table with so many objects on it."""
+    rng = np.random.default_rng([seed, objects])
+    table, room = furniture.table(rng, (1.6, 0.9)), furniture.room(rng, (3.0, 3.0))
+    models = [make_object(TABLE_CLASSES[k % len(TABLE_CLASSES)], int(rng.integers(2**31))) for k in range(objects)]
+    laid = spread(rng, sorted(models, key=lambda model: -model.radius), table.boards[0], 0.03)
+    scene = furnished(rng, [(table, np.eye(4))], room).with_objects(number(laid))
+    centre = np.array([0.0, 0.0, table.boards[0][2] + 0.05])
+    way = [point for start, stop in ((-40, 40), (40, -40)) for point in around(centre, 1.3, 0.7, start, stop)]
+    poses, rate = carried(way, frames, RATE_HZ, rng, Hand())
+    return Story((scene,), np.zeros(frames, int), poses, rate)
+
+
+class Witness:
+    """Hears images and receipts, and remembers when."""
+
+    def __init__(self) -> None:
+        import rclpy
+        from rclpy.context import Context
+        from rclpy.executors import SingleThreadedExecutor
+        from sensor_msgs.msg import CompressedImage
+        from std_msgs.msg import Header
+
+        from objreg_ros.bridge import qos
+        from objreg_ros.bridge.from_msg import stamp_ns
+
+        self.seen: dict[int, float] = {}
+        self.done: dict[tuple[str, int], float] = {}
+        self._stamp_ns = stamp_ns
+        self._context = Context()
+        self._context.init()
+        self._node = rclpy.create_node("witness", context=self._context)
+        self._node.create_subscription(CompressedImage, "image/compressed", self._see, qos.sensor(True))
+        self._node.create_subscription(Header, "finished", self._finish, qos.room(depth=1000))
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._thread = threading.Thread(target=self._executor.spin, daemon=True)
+        self._thread.start()
+
+    def _see(self, message: Any) -> None:
+        self.seen[self._stamp_ns(message)] = time.perf_counter()
+
+    def _finish(self, receipt: Any) -> None:
+        node, verdict, *_ = receipt.frame_id.split(" ")
+        if verdict == "published":
+            self.done[node, self._stamp_ns(receipt)] = time.perf_counter()
+
+    def latency_ms(self, node: str) -> dict[str, float]:
+        """p50 and p95 from the image to the node's receipt, and of how many frames."""
+        times = [1e3 * (at - self.seen[stamp]) for (name, stamp), at in self.done.items() if name == node
+                 and stamp in self.seen]  # fmt: skip
+        if not times:
+            return {"frames": 0.0}
+        p50, p95 = np.percentile(times, (50, 95))
+        return {"frames": float(len(times)), "p50": round(float(p50), 2), "p95": round(float(p95), 2)}
+
+    def close(self) -> None:
+        """End the node."""
+        self._executor.shutdown()
+        self._thread.join(5.0)
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+
+class Meter:
+    """The processor time and the memory of the node processes that this one started, sampled each second."""
+
+    def __init__(self) -> None:
+        self.samples: dict[str, list[tuple[float, float, float]]] = {room: [] for room in ROOMS}
+        self._open = True
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        while self._open:
+            for pid in _children(os.getpid()):
+                room = next((room for room in ROOMS if f"objreg_ros.{room}.node" in _command(pid)), None)
+                sample = _sample(pid)
+                if room is not None and sample is not None:
+                    self.samples[room].append((time.monotonic(), *sample))
+            time.sleep(1.0)
+
+    def figures(self, seconds: float) -> dict[str, dict[str, float]]:
+        """Room → share of one core over the last ``seconds`` before the end, and the largest memory in MB."""
+        self._open = False
+        self._thread.join()
+        out = {}
+        for room, rows in self.samples.items():
+            if len(rows) < 2:
+                continue
+            recent = [row for row in rows if row[0] >= rows[-1][0] - seconds]
+            span = max(recent[-1][0] - recent[0][0], 1e-9)
+            cpu = 100 * (recent[-1][1] - recent[0][1]) / span
+            out[room] = {"cpu_percent": round(cpu, 1), "memory_mb": round(max(row[2] for row in rows), 1)}
+        return out
+
+
+def _children(parent: int) -> list[int]:
+    """The processes that this one started."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            text = stat.read_text()
+        except OSError:
+            continue  # it has just ended
+        if int(text.rpartition(")")[2].split()[1]) == parent:
+            found.append(int(stat.parent.name))
+    return found
+
+
+def _command(pid: int) -> str:
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_text()
+    except OSError:
+        return ""
+
+
+def _sample(pid: int) -> tuple[float, float] | None:
+    """Processor seconds and resident megabytes; None for a process that has ended."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    except OSError:
+        return None
+    return (int(fields[11]) + int(fields[12])) / TICKS, pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+@contextmanager
+def recorded(objects: int, frames: int, seed: int) -> Iterator[Path]:
+    """The recording of a table, gone afterwards."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, f"table_{objects}")
+        write_story(path, table_story(objects, frames, seed), "table", seed, jpeg=True)
+        yield path
+
+
+def books_of(live: Live) -> dict[str, Any]:
+    """What became of every frame at every node, and how long its stages took."""
+    return {
+        node: {
+            "received": balance.received,
+            "published": balance.published,
+            "dropped": balance.dropped,
+            "unaccounted": balance.received - balance.published - balance.waiting - sum(balance.dropped.values()),
+            "lost_in_transport": balance.lost,
+            "stage_ms": {stage: {"p50": p50, "p95": p95} for stage, (p50, p95) in balance.stage_ms.items()},
+        }
+        for node, balance in live.books.items()
+    }
+
+
+def measure(objects: int, frames: int, seed: int, node_args: Mapping[str, list[str]]) -> dict[str, Any]:
+    """One recording through the live graph."""
+    with recorded(objects, frames, seed) as path, tempfile.TemporaryDirectory() as logs:
+        witness, meter = Witness(), Meter()
+        try:
+            live = run_live(path, Setup(node_args=node_args), Path(logs), lambda words: click.echo(words, err=True))
+            usage = meter.figures(frames / RATE_HZ)
+            latency = {node: witness.latency_ms(node) for node in ROOMS}
+        finally:
+            witness.close()
+        return {"end_to_end_ms": latency, "books": books_of(live), "usage": usage, "constraints": len(live.closures)}
+
+
+@click.command()
+@click.option("--objects", default="1,4,8", show_default=True, help="Objects in view, one run each.")
+@click.option("--frames", default=300, show_default=True, help="Frames of a run, at 30 a second.")
+@click.option("--seed", default=0, show_default=True, help="Of the simulated recordings.")
+@click.option("--model", default="", help="ONNX model of the detector, if not the default.")
+@click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
+def main(objects: str, frames: int, seed: int, model: str, json_file: Path | None) -> None:
+    """Measure the live graph's latency."""
+    os.environ.setdefault("ROS_DOMAIN_ID", str(random.randint(1, 100)))  # the witness listens there too
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    node_args = {"detector": ["-p", f"model:={model}"]} if model else {}
+    rows = {}
+    for count in (int(text) for text in objects.split(",")):
+        rows[str(count)] = measure(count, frames, seed, node_args)
+        registrar, usage = rows[str(count)]["end_to_end_ms"]["registrar"], rows[str(count)]["usage"]
+        click.echo(f"{count} objects: end to end {registrar}, usage {usage}")
+    if json_file is not None:
+        json_file.write_text(json.dumps({"rate_hz": RATE_HZ, "objects": rows}, indent=1))
+
+
+if __name__ == "__main__":
+    main()
