@@ -68,7 +68,7 @@ def _head(story: Story, tracks: Tracks | None) -> str:
     judged = sum(story.error(closure) is not None for closure in story.closures)
     tiles = [
         _tile(f"{story.summary.get('frames', len(story.glimpses)):,}", "frames", _count_note(story)),
-        _tile(f"{len(story.closures)}", "constraints", f"{len(story.refusals)} candidates refused"),
+        _tile(f"{len(story.closures)}", "constraints", f"{_refused_count(story)} candidates refused"),
     ]
     if judged:
         tone = "bad" if false else "good"
@@ -92,8 +92,14 @@ def _tile(value: str, name: str, note: str, tone: str = "") -> str:
     )
 
 
+def _refused_count(story: Story) -> int:
+    return sum(story.summary.get("rejected", {}).values()) or len(story.refusals)
+
+
 def _count_note(story: Story) -> str:
-    return f"{story.summary.get('detections', 0):,} detections, {story.summary.get('objects', 0):,} objects"
+    if "detections" not in story.summary:
+        return "with colour and depth"
+    return f"{story.summary['detections']:,} detections, {story.summary.get('objects', 0):,} objects"
 
 
 def _change(before: float, after: float) -> str:

@@ -9,6 +9,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+from objreg_ros.bridge import from_msg
+from objreg_ros.recording import Recording
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.opening import open_recording
 from objreg_ros.report.page import page
@@ -18,7 +20,7 @@ from objreg_ros.truth import Truth
 
 
 def write_report(out: Path, runs: Sequence[Path]) -> None:
-    """Write one page about runs from the files of `objreg offline --json`.
+    """Write one page about runs from the files of `objreg offline --json`, or of `objreg demo`.
 
     The recording that a run names gives truth and pictures; where it is gone the page does without. ValueError for a
     file that is no run.
@@ -36,8 +38,28 @@ def _chapter(file: Path, stack: ExitStack) -> tuple[Story, Album | None]:
         return Story.of(file.stem, summary, Truth([])), None
     recording = stack.enter_context(open_recording(place))
     inputs = choose_inputs(recording.topics)
-    story = Story.of(place.resolve().name, summary, Truth.of(recording, inputs.ground_truth))
+    told = {"glimpses": _odometry(recording, inputs.odom), **_of_nodes(summary), **summary}
+    story = Story.of(place.resolve().name, told, Truth.of(recording, inputs.ground_truth))
     return story, Album(recording, inputs)
+
+
+def _odometry(recording: Recording, topic: str | None) -> list[dict[str, Any]]:
+    """Frames that are told by the odometry of the recording alone, for a run that did not tell of its frames."""
+    records = recording.records([topic]) if topic else ()
+    words = (from_msg.odometry(record.message) for record in records)
+    poses = {word.stamp_ns: word.T_odom_body for word in words}
+    return [{"stamp_ns": stamp, "T_odom_camera": T.tolist()} for stamp, T in sorted(poses.items())]
+
+
+def _of_nodes(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """What the books of live nodes tell: how many frames, and how long each stage took."""
+    nodes = summary.get("nodes", {})
+    stages = {
+        f"{node}: {stage}": {"p50": p50, "p95": p95}
+        for node, books in nodes.items()
+        for stage, (p50, p95) in books["stage_ms"].items()
+    }
+    return {"frames": nodes["segmenter"]["published"], "stage_ms": stages} if "segmenter" in nodes else {}
 
 
 def _read(file: Path) -> Mapping[str, Any]:

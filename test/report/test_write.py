@@ -7,7 +7,9 @@ import json
 from pathlib import Path
 
 import pytest
+from recording.folders import records
 
+from objreg_ros.recording import write_rosbag2
 from objreg_ros.report.write import write_report
 
 from .runs import summary
@@ -25,6 +27,17 @@ def test_the_recording_of_a_run_gives_truth_and_pictures(tmp_path: Path, shared:
     write_report(tmp_path / "out.html", [tmp_path / "run.json"])
     text = (tmp_path / "out.html").read_text()
     assert "<h1>redkitchen_a</h1>" in text and text.count("data:image/jpeg") >= 12
+
+
+def test_the_json_of_a_live_run_is_told_by_the_odometry_of_its_recording(tmp_path: Path) -> None:
+    write_rosbag2(tmp_path / "bag", records(30))
+    books = {"published": 29, "stage_ms": {"segment": [3.0, 5.0]}}
+    told = {"recording": str(tmp_path / "bag"), "constraints": [], "rejected": {}, "nodes": {"segmenter": books}}
+    (tmp_path / "demo.json").write_text(json.dumps(told))
+    write_report(tmp_path / "out.html", [tmp_path / "demo.json"])
+    text = (tmp_path / "out.html").read_text()
+    assert "the way of the camera from above" in text and "segmenter: segment" in text
+    assert ">29<" in text
 
 
 @pytest.mark.parametrize("text", ["", "[1]", '{"frames": 3}'])
