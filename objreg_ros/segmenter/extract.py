@@ -10,25 +10,30 @@ import numpy as np
 
 from objreg_ros.data import Array, DepthImage, PointFlag
 from objreg_ros.segmenter.boxes import Box
-from objreg_ros.segmenter.surface import EXACT, Surface
+from objreg_ros.segmenter.surface import EXACT, MIN_COSINE, Surface
 
 EDGE = int(PointFlag.EDGE)
+UNKNOWN_COSINE = np.float32(0.7)  # of a surface whose normal is not known
 MIN_NEIGHBOURS = 3  # of 8; a pixel with fewer in its object is an outlier
 
 
 @dataclass(frozen=True, slots=True)
 class Pixels:
-    """M pixels of one object: ``uv (M, 2) int32``, ``xyz`` and ``normals (M, 3) float32``, ``edge (M,) uint16`` flags
-    and the ``area`` of surface that they measure in m²."""
+    """M pixels of one object.
 
-    uv: Array
+    ``xyz`` and ``normals (M, 3) float32``, ``rgb (M, 3) uint8`` or None, ``edge (M,) uint16`` flags, the ``area`` of
+    surface that they measure in m², and ``bounds``, the box x0, y0, x1, y1 around them.
+    """
+
     xyz: Array
     normals: Array
+    rgb: Array | None
     edge: Array
     area: float
+    bounds: Box
 
     def __len__(self) -> int:
-        return len(self.uv)
+        return len(self.xyz)
 
 
 def extract(image: DepthImage, box: Box, surface: Surface, chosen: Array, jump: tuple[float, float]) -> Pixels:
@@ -36,64 +41,99 @@ def extract(image: DepthImage, box: Box, surface: Surface, chosen: Array, jump: 
     x0, y0, x1, y1 = box
     camera = image.intrinsics
     mask = np.zeros((y1 - y0, x1 - x0), np.bool_)
-    count = _mark(image.depth, x0, y0, surface.depth, surface.left, surface.top, surface.step, chosen, *jump, mask)
-    uv, edge = np.empty((count, 2), np.int32), np.empty(count, np.uint16)
-    xyz, normals = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
-    lens = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
+    a, b = np.float32(jump[0]), np.float32(jump[1])
     grid = (surface.left, surface.top, surface.step)
-    n, area = _gather(image.depth, x0, y0, mask, surface.normals, grid, lens, *jump, uv, xyz, normals, edge)
-    return Pixels(uv[:n], xyz[:n], normals[:n], edge[:n], float(area))
+    count = _mark(image.depth, x0, y0, surface.depth, grid, chosen, a, b, mask)
+    xyz, normals = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
+    edge, bounds = np.empty(count, np.uint16), np.empty(4, np.int64)
+    x, y = _slopes(x0, x1, camera.cx, camera.fx), _slopes(y0, y1, camera.cy, camera.fy)
+    kept = np.zeros_like(mask)
+    n, area = _gather(image.depth, x0, y0, mask, kept, surface.normals, grid, x, y, a, b, xyz, normals, edge, bounds)
+    rgb = None if image.rgb is None else _colours(image.rgb, x0, y0, kept, n)
+    area /= camera.fx * camera.fy
+    around = (int(bounds[0]), int(bounds[1]), int(bounds[2]), int(bounds[3]))
+    return Pixels(xyz[:n], normals[:n], rgb, edge[:n], area, around)
+
+
+def _slopes(first: int, last: int, centre: float, focal: float) -> Array:
+    return ((np.arange(first, last) - centre) / focal).astype(np.float32)
+
+
+def _colours(rgb: Array, x0: int, y0: int, mask: Array, count: int) -> Array:
+    out = np.empty((count, 3), np.uint8)
+    _pick(rgb, x0, y0, mask, out)
+    return out
+
+
+@numba.njit(cache=True)
+def _pick(rgb, x0, y0, mask, out):  # type: ignore[no-untyped-def]
+    n = 0
+    for v in range(mask.shape[0]):
+        for u in range(mask.shape[1]):
+            if mask[v, u]:
+                for k in range(3):
+                    out[n, k] = rgb[v + y0, u + x0, k]
+                n += 1
 
 
 @numba.njit(cache=True, fastmath=EXACT)
-def _mark(depth, x0, y0, cells, left, top, step, chosen, a, b, mask):  # type: ignore[no-untyped-def]
+def _mark(depth, x0, y0, cells, grid, chosen, a, b, mask):  # type: ignore[no-untyped-def]
     """Mark the pixels that belong to chosen cells: by their own cell, or by the nearest in depth around it."""
+    left, top, step = grid
     h, w = cells.shape
     count = 0
     for v in range(mask.shape[0]):
         i = min((v + y0 - top) // step, h - 1)
         for u in range(mask.shape[1]):
             z = depth[v + y0, u + x0]
-            j = min((u + x0 - left) // step, w - 1)
-            jump = a + b * z * z
             if not (z > 0):
                 continue
+            j = min((u + x0 - left) // step, w - 1)
+            jump = a + b * z * z
             if cells[i, j] > 0 and abs(cells[i, j] - z) < jump:
                 mask[v, u] = chosen[i, j]
             else:
-                nearest = jump
-                for p in range(max(0, i - 1), min(h, i + 2)):
-                    for q in range(max(0, j - 1), min(w, j + 2)):
-                        if cells[p, q] > 0 and abs(cells[p, q] - z) < nearest:
-                            nearest = abs(cells[p, q] - z)
-                            mask[v, u] = chosen[p, q]
+                mask[v, u] = _nearest(cells, chosen, i, j, z, jump)
             count += mask[v, u]
     return count
 
 
 @numba.njit(cache=True, fastmath=EXACT)
-def _gather(depth, x0, y0, mask, cell_normals, grid, lens, a, b, uv, xyz, normals, edge):  # type: ignore[no-untyped-def]
-    """Fill the outputs from the marked pixels that are no outliers; their number and the area that they measure."""
+def _nearest(cells, chosen, i, j, z, limit):  # type: ignore[no-untyped-def]
+    """Whether the cell nearest in depth to z around (i, j) is chosen; False for none within ``limit``."""
+    found = False
+    for p in range(max(0, i - 1), min(cells.shape[0], i + 2)):
+        for q in range(max(0, j - 1), min(cells.shape[1], j + 2)):
+            off = abs(cells[p, q] - z)
+            if cells[p, q] > 0 and off < limit:
+                limit = off
+                found = chosen[p, q]
+    return found
+
+
+@numba.njit(cache=True, fastmath=EXACT)
+def _gather(depth, x0, y0, mask, kept, cell_normals, grid, x, y, a, b, xyz, normals, edge, bounds):  # type: ignore[no-untyped-def]
+    """Fill the outputs from the marked pixels but for outliers, and ``kept``; their number, and the area times fx fy."""
     h, w = mask.shape
     left, top, step = grid
-    area = 0.0
-    n = 0
+    area, n = 0.0, 0
+    bounds[0], bounds[1], bounds[2], bounds[3] = x0 + w, y0 + h, x0, y0
     for v in range(h):
         i = min((v + y0 - top) // step, cell_normals.shape[1] - 1)
-        y = (v + y0 - lens[3]) / lens[1]
         for u in range(w):
             if not mask[v, u] or _neighbours(mask, v, u) < MIN_NEIGHBOURS:
                 continue
+            kept[v, u] = True
             z = depth[v + y0, u + x0]
-            x = (u + x0 - lens[2]) / lens[0]
             j = min((u + x0 - left) // step, cell_normals.shape[2] - 1)
-            uv[n, 0], uv[n, 1] = u + x0, v + y0
-            xyz[n, 0], xyz[n, 1], xyz[n, 2] = x * z, y * z, z
-            for k in range(3):
-                normals[n, k] = cell_normals[k, i, j]
-            edge[n] = EDGE if _at_jump(depth, v + y0, u + x0, a + b * z * z) else 0
-            cosine = abs(x * normals[n, 0] + y * normals[n, 1] + normals[n, 2])
-            area += z * z / (lens[0] * lens[1] * (max(cosine, 0.1) if cosine > 0 else 0.7))
+            n_x, n_y, n_z = cell_normals[0, i, j], cell_normals[1, i, j], cell_normals[2, i, j]
+            xyz[n, 0], xyz[n, 1], xyz[n, 2] = x[u] * z, y[v] * z, z
+            normals[n, 0], normals[n, 1], normals[n, 2] = n_x, n_y, n_z
+            edge[n] = EDGE if _at_jump(depth, v + y0, u + x0, 2 * (a + b * z * z)) else 0
+            cosine = abs(x[u] * n_x + y[v] * n_y + n_z)
+            area += z * z / (max(cosine, MIN_COSINE) if cosine > 0 else UNKNOWN_COSINE)
+            bounds[0], bounds[1] = min(bounds[0], u + x0), min(bounds[1], v + y0)
+            bounds[2], bounds[3] = max(bounds[2], u + x0 + 1), v + y0 + 1
             n += 1
     return n, area
 
@@ -111,11 +151,10 @@ def _neighbours(mask, v, u):  # type: ignore[no-untyped-def]
 def _at_jump(depth, v, u, jump):  # type: ignore[no-untyped-def]
     """Whether a pixel two rows or columns away has no depth or lies across a depth jump."""
     z = depth[v, u]
-    for k in range(4):
-        p = v + (2 if k == 0 else -2 if k == 1 else 0)
-        q = u + (2 if k == 2 else -2 if k == 3 else 0)
-        if p < 0 or q < 0 or p >= depth.shape[0] or q >= depth.shape[1]:
-            continue
-        if not (abs(depth[p, q] - z) < 2 * jump):
-            return True
-    return False
+    h, w = depth.shape
+    return (
+        (v >= 2 and not abs(depth[v - 2, u] - z) < jump)
+        or (v + 2 < h and not abs(depth[v + 2, u] - z) < jump)
+        or (u >= 2 and not abs(depth[v, u - 2] - z) < jump)
+        or (u + 2 < w and not abs(depth[v, u + 2] - z) < jump)
+    )

@@ -9,28 +9,28 @@ from objreg_ros.data import Array, DepthImage, PointFlag
 from objreg_ros.segmenter.boxes import Box
 from objreg_ros.segmenter.components import connect, grow
 from objreg_ros.segmenter.extract import Pixels, extract
+from objreg_ros.segmenter.flags import whole_flags
 from objreg_ros.segmenter.holes import fill_holes
 from objreg_ros.segmenter.level import support_cells
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.parts import Parts, measure
 from objreg_ros.segmenter.seams import find_seams
 from objreg_ros.segmenter.selection import select
-from objreg_ros.segmenter.support import Ground, tolerance
+from objreg_ros.segmenter.support import Ground
 from objreg_ros.segmenter.surface import Surface, Window
 
 MIN_PART = 10  # cells; what is smaller joins a neighbour
 GROWTH = 12  # rounds that parts grow over seams
 MAX_PARTS = 32
-LEAK = 0.08  # an object with more of it outside its box is cut by the box
-NEAR_BORDER = 0.012  # of the image's size
-FLAT = 0.85  # share of a wall-like object's cells on one plane
-WALL_AROUND = 0.4  # share of the cells around it on the same plane
 
 
-def isolate(image: DepthImage, box: Box, ground: Ground, params: SegmenterParams) -> tuple[Pixels, PointFlag]:
+def isolate(
+    image: DepthImage, box: Box, ground: Ground, taken: Array, params: SegmenterParams
+) -> tuple[Pixels, PointFlag]:
     """The pixels of the object that ``box`` shows, and the flags that hold for all of them.
 
-    ``box`` must not be empty. No pixel outside the box comes back; no object gives no pixels.
+    ``box`` must not be empty. No pixel outside the box comes back; no object gives no pixels. The cells of the object
+    are marked in ``taken (h, w) bool`` of the whole frame.
     """
     jump = (params.jump, params.jump_z2)
     window = _cells(box, ground.surface)
@@ -48,7 +48,8 @@ def isolate(image: DepthImage, box: Box, ground: Ground, params: SegmenterParams
     fill_holes(chosen, around.depth, jump)
     pixels = extract(image, box, around, chosen, jump)
     flags = PointFlag(0) if supported else PointFlag.UNSUPPORTED
-    flags |= _flags(image, pixels, around, chosen, here)
+    flags |= whole_flags(image, pixels, around, chosen, here)
+    taken[crop[1] : crop[3], crop[0] : crop[2]] |= chosen
     return pixels, flags
 
 
@@ -72,40 +73,3 @@ def _expanded(window: Window, margin: float, surface: Surface) -> Window:
     h, w = surface.depth.shape
     dx, dy = int(margin * (window[2] - window[0])) + 4, int(margin * (window[3] - window[1])) + 4
     return max(0, window[0] - dx), max(0, window[1] - dy), min(w, window[2] + dx), min(h, window[3] + dy)
-
-
-def _flags(image: DepthImage, pixels: Pixels, around: Surface, chosen: Array, here: Window) -> PointFlag:
-    """What else is known of a whole object."""
-    flags = PointFlag(0)
-    inside = np.count_nonzero(chosen[here[1] : here[3], here[0] : here[2]])
-    if inside < (1 - LEAK) * np.count_nonzero(chosen):
-        flags |= PointFlag.CUT_BY_BOX
-    if _touches_border(pixels, *image.depth.shape):
-        flags |= PointFlag.CUT_BY_IMAGE
-    if _wall_like(around, chosen, here):
-        flags |= PointFlag.WALL_LIKE
-    return flags
-
-
-def _touches_border(pixels: Pixels, height: int, width: int) -> bool:
-    if len(pixels) == 0:
-        return False
-    low, high = pixels.uv.min(axis=0), pixels.uv.max(axis=0)
-    du, dv = max(1, round(NEAR_BORDER * width)), max(1, round(NEAR_BORDER * height))
-    return bool(low[0] < du or low[1] < dv or high[0] >= width - du or high[1] >= height - dv)
-
-
-def _wall_like(around: Surface, chosen: Array, here: Window) -> bool:
-    """Whether the chosen cells are flat and their plane goes on around the box."""
-    points = around.points[::2, ::2]
-    patch = points[chosen[::2, ::2]].astype(np.float64)
-    known = around.depth[::2, ::2] > 0
-    ring = known.copy()
-    ring[here[1] // 2 : -(-here[3] // 2), here[0] // 2 : -(-here[2] // 2)] = False
-    if len(patch) < 30 or np.count_nonzero(ring) < 30:
-        return False
-    centre = patch.mean(axis=0)
-    normal = np.linalg.eigh((patch - centre).T @ (patch - centre))[1][:, 0].astype(np.float32)
-    off = np.abs(points @ normal - centre.astype(np.float32) @ normal)
-    on_plane = known & (off < 2 * tolerance(around.depth[::2, ::2]))
-    return bool(on_plane[chosen[::2, ::2]].mean() > FLAT and on_plane[ring].mean() > WALL_AROUND)

@@ -33,9 +33,11 @@ def cut(image: DepthImage, box: Box, params: SegmenterParams) -> Pixels:
     for rule in (_off_plane, _no_outlier):
         kept = rule(xyz) if len(xyz) >= params.min_points else np.zeros(len(xyz), bool)
         xyz, u, v = xyz[kept], u[kept], v[kept]
-    uv = np.stack([u + x0, v + y0], axis=-1).astype(np.int32)
+    u, v = u + x0, v + y0
     area = float((xyz[:, 2] ** 2).sum()) / (camera.fx * camera.fy)
-    return Pixels(uv, xyz, np.zeros_like(xyz), np.zeros(len(xyz), np.uint16), area)
+    bounds = (int(u.min()), int(v.min()), int(u.max()) + 1, int(v.max()) + 1) if len(u) > 0 else (x0, y0, x0, y0)
+    rgb = None if image.rgb is None else image.rgb[v, u]
+    return Pixels(xyz, np.zeros_like(xyz), rgb, np.zeros(len(xyz), np.uint16), area, bounds)
 
 
 def _off_plane(xyz: Array) -> Array:

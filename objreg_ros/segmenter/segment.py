@@ -9,7 +9,7 @@ from objreg_ros.data import Array, DepthImage, Detections, Frame, Intrinsics, Ob
 from objreg_ros.segmenter import boxes, paper
 from objreg_ros.segmenter.boxes import Box
 from objreg_ros.segmenter.extract import Pixels
-from objreg_ros.segmenter.gravity import CAMERA_UP, estimate_up
+from objreg_ros.segmenter.gravity import CAMERA_UP, estimate_up, known_normals
 from objreg_ros.segmenter.isolate import isolate
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.support import Ground, find_supports
@@ -17,7 +17,7 @@ from objreg_ros.segmenter.surface import Surface, cell_size, reduce
 from objreg_ros.segmenter.view import reduced_view
 
 COARSE = 2  # every so many cells tell gravity and the support surfaces
-NORMALS = 4000  # that tell gravity
+NORMALS = 3  # every so many of these tell gravity
 
 
 class Segmenter:
@@ -46,17 +46,18 @@ class Segmenter:
         """
         params = self.params
         ground = self._ground(depth, gravity)
+        taken = np.zeros(ground.surface.depth.shape, np.bool_)
         objects: list[ObjectCloud] = []
         for k, box in enumerate(boxes.pixel_boxes(detections, *depth.depth.shape)):
             if boxes.is_empty(box):
                 continue
-            pixels, flags = self._cut(depth, box, ground)
+            pixels, flags = self._cut(depth, box, ground, taken)
             if len(pixels) >= params.min_points:
                 label, score = detections.label[k], float(detections.score[k])
-                objects.append(_object(label, score, len(objects) + 1, pixels, flags, depth.rgb))
+                objects.append(_object(label, score, len(objects) + 1, pixels, flags))
         return Frame(
             objects=tuple(objects),
-            support=_support_cloud(ground, depth),
+            support=_support_cloud(ground, taken, depth),
             view=reduced_view(depth, params.view_step, params.z_min, params.limits[0]),
             gravity=None if ground.up is None else -ground.up,
             gravity_confidence=ground.confidence,
@@ -65,10 +66,10 @@ class Segmenter:
             frame_id=depth.frame_id,
         )
 
-    def _cut(self, depth: DepthImage, box: Box, ground: Ground) -> tuple[Pixels, PointFlag]:
+    def _cut(self, depth: DepthImage, box: Box, ground: Ground, taken: Array) -> tuple[Pixels, PointFlag]:
         if self.params.preset == "paper":
             return paper.cut(depth, box, self.params), PointFlag(0)
-        return isolate(depth, box, ground, self.params)
+        return isolate(depth, box, ground, taken, self.params)
 
     def _ground(self, depth: DepthImage, gravity: Array | None) -> Ground:
         params = self.params
@@ -87,43 +88,41 @@ def _up(surface: Surface, gravity: Array | None, tilt_deg: float) -> tuple[Array
         if not np.isfinite(length) or length < 1e-6:
             raise ValueError(f"gravity: expected a direction of non-zero length, got {np.asarray(gravity).tolist()}")
         return -np.asarray(gravity, np.float64) / length, 1.0
-    normals = surface.normals.reshape(3, -1)
-    known = normals[:, normals[2] != 0]
-    return estimate_up(known[:, :: max(1, known.shape[1] // NORMALS)].T, CAMERA_UP, tilt_deg)
+    return estimate_up(known_normals(surface.normals, NORMALS), CAMERA_UP, tilt_deg)
 
 
-def _object(
-    label: str, score: float, instance: int, pixels: Pixels, flags: PointFlag, rgb: Array | None
-) -> ObjectCloud:
-    u, v = pixels.uv.T
+def _object(label: str, score: float, instance: int, pixels: Pixels, flags: PointFlag) -> ObjectCloud:
     return ObjectCloud(
         label=label,
         score=score,
         instance=instance,
         xyz=pixels.xyz,
         normals=pixels.normals,
-        rgb=None if rgb is None else rgb[v, u],
+        rgb=pixels.rgb,
         flags=pixels.edge | np.uint16(flags),
         density=len(pixels) / max(pixels.area, 1e-9),
     )
 
 
-def _support_cloud(ground: Ground, depth: DepthImage) -> ObjectCloud | None:
-    """The cells of all support surfaces, one point each; None where there is none."""
-    if not ground.supports:
-        return None
+def _support_cloud(ground: Ground, taken: Array, depth: DepthImage) -> ObjectCloud | None:
+    """The coarse cells of the support surfaces that are of no object, one point each; None where there are none."""
     surface = ground.coarse
-    cells = np.any([support.parts > 0 for support in ground.supports], axis=0)
+    cells = np.zeros(surface.depth.shape, np.bool_)
+    for support in ground.supports:
+        cells |= support.parts > 0
+    cells &= ~taken[::COARSE, ::COARSE]
     rows, cols = np.nonzero(cells)
-    v, u = rows * surface.step, cols * surface.step
+    if len(rows) == 0:
+        return None
+    z = surface.depth[rows, cols]
     area = sum(support.area for support in ground.supports)
     return ObjectCloud(
         label="support",
         score=1.0,
         instance=0,
-        xyz=np.ascontiguousarray(surface.points[cells]),
-        normals=np.ascontiguousarray(surface.normals[:, cells].T),
-        rgb=None if depth.rgb is None else depth.rgb[v, u],
+        xyz=np.stack([surface.x[cols] * z, surface.y[rows] * z, z], axis=-1),
+        normals=np.ascontiguousarray(surface.normals[:, rows, cols].T),
+        rgb=None if depth.rgb is None else depth.rgb[rows * surface.step, cols * surface.step],
         flags=np.zeros(len(rows), np.uint16),
         density=len(rows) / max(area, 1e-9),
     )

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numba
 import numpy as np
 
@@ -41,17 +42,20 @@ def _back_project(depth, x, y, z_min, z_max, xyz):  # type: ignore[no-untyped-de
 
 def _grey(rgb: Array, step: int, height: int, width: int) -> Array:
     grey = np.empty((height, width), np.uint8)
-    _mean_grey(rgb, step, grey)
+    _mean(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY), step, grey)
     return grey
 
 
 @numba.njit(cache=True)
-def _mean_grey(rgb, step, grey):  # type: ignore[no-untyped-def]
+def _mean(full, step, grey):  # type: ignore[no-untyped-def]
+    total, count = np.empty(grey.shape[1], np.int32), np.empty(grey.shape[1], np.int32)
     for i in range(grey.shape[0]):
+        total[:], count[:] = 0, 0
+        for v in range(i * step, min((i + 1) * step, full.shape[0])):
+            for u in range(step):
+                row = full[v, u:]
+                for j in range(min(len(total), (len(row) + step - 1) // step)):
+                    total[j] += row[j * step]
+                    count[j] += 1
         for j in range(grey.shape[1]):
-            total, count = 0, 0
-            for v in range(i * step, min((i + 1) * step, rgb.shape[0])):
-                for u in range(j * step, min((j + 1) * step, rgb.shape[1])):
-                    total += 77 * rgb[v, u, 0] + 150 * rgb[v, u, 1] + 29 * rgb[v, u, 2]
-                    count += 256
-            grey[i, j] = total // count
+            grey[i, j] = total[j] // count[j]
