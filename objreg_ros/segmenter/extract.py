@@ -113,7 +113,7 @@ def _nearest(cells, chosen, i, j, z, limit):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=EXACT)
 def _gather(depth, x0, y0, mask, kept, cell_normals, grid, x, y, a, b, xyz, normals, edge, bounds):  # type: ignore[no-untyped-def]
-    """Fill the outputs from the marked pixels but for outliers, and ``kept``; their number, and the area times fx fy."""
+    """Fill the outputs from the marked pixels but for outliers, and ``kept``; their number and area times fx fy."""
     h, w = mask.shape
     left, top, step = grid
     area, n = 0.0, 0
