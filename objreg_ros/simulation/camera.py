@@ -8,7 +8,7 @@ import numba as nb
 import numpy as np
 
 from objreg_ros.data import Array, Intrinsics
-from objreg_ros.simulation.noise import _hash, normal
+from objreg_ros.simulation.noise import mixed_bits, normal
 from objreg_ros.simulation.params import ColourParams, StressParams
 from objreg_ros.simulation.shade import LIGHT_SCALE
 
@@ -32,14 +32,13 @@ def _develop(raw, y_first, y_last, gains, shot, read, vignetting, seed, rgb):  #
         for x in range(width):
             dx = np.float32(x) - np.float32(0.5) * width
             shade = one - vignetting * (dx * dx + dy * dy) * reach
-            bits = _hash(seed, y * width + x)
             for c in range(3):
                 value = np.float32(raw[y, x, c]) * gains[c] * shade
                 if value > knee:
                     over = (value - knee) * np.float32(5.0)
                     value = knee + np.float32(0.2) * over / (one + over)
                 sigma = np.sqrt(read * read + shot * shot * value)
-                value += sigma * normal(bits * np.uint64(2 * c + 1) ^ (bits >> np.uint64(7 * c)))
+                value += sigma * normal(mixed_bits(seed, 3 * (y * width + x) + c))
                 rgb[y, x, c] = np.uint8(min(max(value * white + np.float32(0.5), np.float32(0.0)), white))
 
 

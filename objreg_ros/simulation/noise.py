@@ -32,7 +32,7 @@ BLOTCH_PX = 24
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
-def _hash(a, b):  # type: ignore[no-untyped-def]
+def mixed_bits(a, b):  # type: ignore[no-untyped-def]
     """64 well mixed bits of two numbers (the finaliser of splitmix64, Steele et al. 2014)."""
     h = np.uint64(a) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(b) * np.uint64(0xD1B54A32D192ED03)
     h = (h ^ (h >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -60,8 +60,8 @@ def _wander(seed, y, x):  # type: ignore[no-untyped-def]
     cell = LATTICE_PX
     i, j = y // cell, x // cell
     a, b = np.float32(y - i * cell) / cell, np.float32(x - j * cell) / cell
-    g00, g01 = normal(_hash(seed, i * 8192 + j)), normal(_hash(seed, i * 8192 + j + 1))
-    g10, g11 = normal(_hash(seed, (i + 1) * 8192 + j)), normal(_hash(seed, (i + 1) * 8192 + j + 1))
+    g00, g01 = normal(mixed_bits(seed, i * 8192 + j)), normal(mixed_bits(seed, i * 8192 + j + 1))
+    g10, g11 = normal(mixed_bits(seed, (i + 1) * 8192 + j)), normal(mixed_bits(seed, (i + 1) * 8192 + j + 1))
     one = np.float32(1)
     return ((one - a) * ((one - b) * g00 + b * g01) + a * ((one - b) * g10 + b * g11)) * np.float32(1.5)
 
@@ -72,7 +72,7 @@ def _noise_row(seed, y, cell_y, cell_x, out):  # type: ignore[no-untyped-def]
     i = y // cell_y
     a = np.float32(y - i * cell_y) / np.float32(cell_y)
     for j in range(out.shape[0]):
-        low, high = normal(_hash(seed, i * 8192 + j)), normal(_hash(seed, (i + 1) * 8192 + j))
+        low, high = normal(mixed_bits(seed, i * 8192 + j)), normal(mixed_bits(seed, (i + 1) * 8192 + j))
         # linear interpolation in both directions takes 2/3 of the deviation away
         out[j] = ((np.float32(1) - a) * low + a * high) * np.float32(1.5)
 
@@ -125,7 +125,7 @@ def _sense(  # type: ignore[no-untyped-def]
             nearest = nearness[y, x]
             if nearest <= 0 or shadow[x]:
                 continue
-            bits = _hash(seed, y * width + x)
+            bits = mixed_bits(seed, y * width + x)
             left, right = nearness[y, max(x - 2, 0)], nearness[y, min(x + 2, width - 1)]
             above, below = nearness[up, x], nearness[down, x]
             low, high = min(min(left, right), min(above, below)), max(max(left, right), max(above, below))
@@ -134,7 +134,7 @@ def _sense(  # type: ignore[no-untyped-def]
                 # a slanted plane has the same second difference in 1/z everywhere: none
                 bend = max(abs(left + right - 2 * nearest), abs(above + below - 2 * nearest))
                 if bend > jump * nearest:
-                    luck = uniform(_hash(seed + 3, y * width + x))
+                    luck = uniform(mixed_bits(seed + 3, y * width + x))
                     if luck < edge_dropout:
                         continue
                     xx = min(max(x + int(np.rint(jitter * _wander(seed + 1, y, x))), 0), width - 1)
@@ -143,7 +143,7 @@ def _sense(  # type: ignore[no-untyped-def]
                         continue
                     nearest = nearness[yy, xx]
                     if luck > one - mixed:
-                        share = uniform(_hash(seed + 4, y * width + x))
+                        share = uniform(mixed_bits(seed + 4, y * width + x))
                         nearest = one / (share / max(low, np.float32(0.05)) + (one - share) / high)
             f = triangle[yy, xx]
             a, b = inverse_depth[f, 1] * fx, inverse_depth[f, 2] * fy
@@ -151,7 +151,7 @@ def _sense(  # type: ignore[no-untyped-def]
             c = nearness[yy, xx] - a * dx - b * dy
             cosine = nearness[yy, xx] / np.sqrt((a * a + b * b + c * c) * (one + dx * dx + dy * dy))
             lost = dropout + max(np.float32(0.0), (grazing - cosine) * np.float32(5.0))
-            if uniform(_hash(seed + 5, y * width + x)) < lost:
+            if uniform(mixed_bits(seed + 5, y * width + x)) < lost:
                 continue
             if loss[f] > 0:  # in blotches: the logistic curve makes normal numbers nearly uniform
                 level = _at(blotch, x, BLOTCH_PX) + np.float32(0.4) * normal(bits)

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Furniture, rooms and distractors: what stands on what, and closed walls."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from objreg_ros.data import Intrinsics
+from objreg_ros.simulation import distractors, furniture
+from objreg_ros.simulation.light import looking
+from objreg_ros.simulation.mesh import merge
+from objreg_ros.simulation.raster import rasterise
+
+WIDE = Intrinsics(fx=40.0, fy=40.0, cx=39.5, cy=29.5, width=80, height=60)
+
+
+@pytest.mark.parametrize("kind", [furniture.table, furniture.shelf, furniture.cupboard])
+def test_every_board_is_a_surface_of_its_piece(kind) -> None:  # type: ignore[no-untyped-def]
+    for seed in range(5):
+        piece = kind(np.random.default_rng(seed))
+        assert piece.mesh.bounds[0, 2] == pytest.approx(0.0, abs=1e-6) and piece.boards
+        flat = piece.mesh.vertices[piece.mesh.normals[:, 2] > 0.99][:, 2]
+        low, high = piece.mesh.bounds
+        for x, y, height, half_x, half_y in piece.boards:
+            assert np.abs(flat - height).min() < 2e-3
+            assert low[0] < x - half_x and x + half_x < high[0] and low[1] < y - half_y and y + half_y < high[1]
+
+
+def test_the_boards_of_a_shelf_leave_the_clearance_that_it_states() -> None:
+    piece = furniture.shelf(np.random.default_rng(0))
+    heights = sorted(board[2] for board in piece.boards)
+    assert min(np.diff(heights)) > piece.clearance > 0.2
+
+
+def test_a_room_is_closed_on_all_sides() -> None:
+    for seed in range(3):
+        room = furniture.room(np.random.default_rng(seed), (2.5, 2.0))
+        mesh = merge([room.mesh, room.ceiling])
+        for target in [(1, 0, 1.3), (-1, 0, 1.3), (0, 1, 1.3), (0, -1, 1.3), (0.1, 0, 9), (0.1, 0, -9)]:
+            view = looking(np.array([0.0, 0.0, 1.3]), np.array(target, float), np.array([0.0, 0.3, 1.0]))
+            depth, _ = rasterise(mesh.vertices, mesh.faces, mesh.open_surface, view, WIDE)
+            assert (depth > 0).all() and depth.max() < 4.0
+
+
+@pytest.mark.parametrize("kind", distractors.FAMILIES)
+def test_distractors_stand_on_the_ground_and_differ(kind: str) -> None:
+    first, again, other = (distractors.make_distractor(kind, seed) for seed in (1, 1, 2))
+    assert np.array_equal(first.mesh.vertices, again.mesh.vertices)
+    assert first.label == kind and not np.array_equal(first.size, other.size)
+    for model in (first, other):
+        assert model.mesh.bounds[0, 2] == pytest.approx(0.0, abs=5e-3) and 0.02 < model.size.max() < 0.6
+        assert np.isfinite(model.mesh.normals).all()
+
+
+def test_an_unknown_distractor_is_refused_with_those_there_are() -> None:
+    with pytest.raises(ValueError, match="expected one of mug"):
+        distractors.make_distractor("teapot", 0)
