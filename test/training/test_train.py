@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Training goes on after an interruption as if there had been none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+torch = pytest.importorskip("torch", reason="training needs torch")
+
+from training.priors import INPUT_HW, make_priors  # noqa: E402
+from training.train import Training, learning_rate  # noqa: E402
+
+
+def batch() -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    count = len(make_priors())
+    target = torch.zeros(2, count, dtype=torch.int64)
+    target[:, ::50] = 3
+    return torch.zeros(2, 3, *INPUT_HW, dtype=torch.uint8), target, torch.zeros(2, count, 4)
+
+
+def test_a_checkpoint_brings_back_weights_average_optimiser_and_step(tmp_path: Path) -> None:
+    torch.manual_seed(1)
+    torch.set_num_threads(1)
+    first = Training(1e-3, "command")
+    first.advance(batch(), steps=10)
+    first.save(tmp_path / "checkpoint.pt")
+    second = Training(1e-3, "command")
+    second.load(tmp_path / "checkpoint.pt")
+    assert first.advance(batch(), steps=10) == pytest.approx(second.advance(batch(), steps=10))
+    for a, b in zip(first.average.state_dict().values(), second.average.state_dict().values(), strict=True):
+        assert torch.allclose(a.float(), b.float())
+
+
+def test_the_learning_rate_rises_then_falls_to_a_hundredth() -> None:
+    rates = [learning_rate(step, 1000, 1.0) for step in range(1001)]
+    assert rates[0] < 0.01 and max(rates) == pytest.approx(0.92, abs=0.03) and rates[-1] == pytest.approx(0.01)

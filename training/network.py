@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A small MobileNet-SSD: depthwise separable convolutions (Howard et al., "MobileNets", 2017), five levels of SSD heads
+(Liu et al., "SSD", 2016), and a top-down path that gives the fine levels the context of the coarse ones (Lin et al.,
+"Feature Pyramid Networks", 2017), without which small objects have no surroundings to be told by.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from training.priors import PRIORS_PER_CELL
+
+STEM = ((16, 2), (32, 2), (32, 1))
+TO_STRIDE_8 = ((96, 2), (128, 1), (128, 1))
+TO_STRIDE_16 = ((256, 2), (256, 1), (256, 1), (256, 1), (256, 1))
+TO_STRIDE_32 = ((384, 2), (384, 1))
+TO_STRIDE_64 = ((256, 2),)
+TO_STRIDE_128 = ((128, 2),)
+HEAD_WIDTH = 96
+
+
+def convolution(inputs: int, outputs: int, kernel: int, stride: int = 1, groups: int = 1) -> nn.Sequential:
+    """Convolution, batch normalisation, ReLU."""
+    return nn.Sequential(
+        nn.Conv2d(inputs, outputs, kernel, stride, kernel // 2, groups=groups, bias=False),
+        nn.BatchNorm2d(outputs),
+        nn.ReLU(inplace=True),
+    )
+
+
+def separable(inputs: int, outputs: int, stride: int = 1) -> nn.Sequential:
+    """A depthwise 3 x 3 convolution and a pointwise one."""
+    return nn.Sequential(convolution(inputs, inputs, 3, stride, inputs), convolution(inputs, outputs, 1))
+
+
+def stage(inputs: int, blocks: tuple[tuple[int, int], ...]) -> nn.Sequential:
+    """Separable blocks of (width, stride), one after the other."""
+    widths = [inputs, *(width for width, _ in blocks)]
+    return nn.Sequential(*(separable(widths[i], width, stride) for i, (width, stride) in enumerate(blocks)))
+
+
+class MobileNetSsd(nn.Module):
+    """``(B, 3, H, W)`` in about -1..1 to ``loc (B, A, 4)`` and ``logits (B, A, 1 + C)``, background first."""
+
+    def __init__(self, classes: int) -> None:
+        super().__init__()
+        self.classes = classes
+        stem = nn.Sequential(convolution(3, STEM[0][0], 3, STEM[0][1]), stage(STEM[0][0], STEM[1:]))
+        plans = (TO_STRIDE_8, TO_STRIDE_16, TO_STRIDE_32, TO_STRIDE_64, TO_STRIDE_128)
+        widths = [STEM[-1][0], *(plan[-1][0] for plan in plans)]
+        self.stages = nn.ModuleList([stage(width, plan) for width, plan in zip(widths[:-1], plans, strict=True)])
+        self.stages[0] = nn.Sequential(stem, self.stages[0])
+        self.laterals = nn.ModuleList([nn.Conv2d(width, HEAD_WIDTH, 1) for width in widths[1:4]])
+        towers = [HEAD_WIDTH] * 3 + widths[4:]
+        self.towers = nn.ModuleList([separable(width, HEAD_WIDTH) for width in towers])
+        self.heads = nn.ModuleList([nn.Conv2d(HEAD_WIDTH, PRIORS_PER_CELL * (5 + classes), 1) for _ in towers])
+        self.apply(_initialise)
+        for head in self.heads:
+            _expect_background(head, classes)
+
+    def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
+        levels = []
+        for one in self.stages:
+            x = one(x)
+            levels.append(x)
+        rows = [
+            self._rows(head(tower(level)))
+            for head, tower, level in zip(self.heads, self.towers, self._top_down(levels), strict=True)
+        ]
+        joined = torch.cat(rows, dim=1)
+        return joined[..., :4], joined[..., 4:]
+
+    def _top_down(self, levels: list[Tensor]) -> list[Tensor]:
+        """The three finest levels with the context from above, the others as they are."""
+        coarse = self.laterals[2](levels[2])
+        merged = [coarse]
+        for level in (1, 0):
+            size = levels[level].shape[2:]
+            coarse = self.laterals[level](levels[level]) + functional.interpolate(coarse, size=size, mode="nearest")
+            merged.insert(0, coarse)
+        return merged + levels[3:]
+
+    def _rows(self, head: Tensor) -> Tensor:
+        """``(B, P (5 + C), h, w)`` to one row a prior, in the order of `training.priors.make_priors`."""
+        return head.permute(0, 2, 3, 1).reshape(head.shape[0], -1, 5 + self.classes)
+
+
+def _initialise(module: nn.Module) -> None:
+    if isinstance(module, nn.Conv2d):
+        nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")
+        if module.bias is not None:
+            nn.init.zeros_(module.bias)
+
+
+def _expect_background(head: nn.Module, classes: int) -> None:
+    """Start with small outputs and the background likely, as almost all priors are."""
+    assert isinstance(head, nn.Conv2d) and head.bias is not None
+    nn.init.normal_(head.weight, std=0.01)
+    bias = head.bias.data.view(PRIORS_PER_CELL, 5 + classes)
+    bias[:, 4] = 4.0

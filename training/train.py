@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Train the detector from random weights on shards of simulated pictures; start it again and it goes on.
+
+python -m training.train --data DATA --validation VALIDATION --out OUT --steps 9000
+"""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import math
+import os
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.utils.data import DataLoader
+
+from training.dataset import Example, Stream
+from training.export import export, provenance_of
+from training.labels import LABELS
+from training.multibox import multibox_loss
+from training.network import MobileNetSsd
+from training.validation import describe, validate_model
+
+WARM_UP_STEPS = 200
+AVERAGE_DECAY = 0.999
+WEIGHT_DECAY = 0.02
+GRADIENT_LIMIT = 10.0
+
+
+class Training:
+    """Everything that a checkpoint holds: the network, its running average, the optimiser and how far it is."""
+
+    def __init__(self, rate: float, command: str, half: bool = False, device: str = "cpu") -> None:
+        self.device = torch.device(device)
+        self.network = MobileNetSsd(len(LABELS)).to(self.device, memory_format=torch.channels_last)
+        self.average = copy.deepcopy(self.network).eval()
+        self.optimiser = torch.optim.AdamW(_groups(self.network), lr=rate)
+        self.rate, self.command, self.half = rate, command, half
+        self.step, self.seconds = 0, 0.0
+
+    def start_from(self, weights: Path) -> None:
+        """Begin with the weights of `training.pretrain`."""
+        for network in (self.network, self.average):
+            network.load_state_dict(torch.load(weights, map_location=self.device, weights_only=True))
+
+    def freeze_stem(self) -> None:
+        """Leave the first layers as they are: a fifth of the time for what changes least late in a training."""
+        self.network.stages[0][0].requires_grad_(False).eval()
+
+    def advance(self, batch: Example, steps: int) -> tuple[float, float]:
+        """One step on one batch; the location and the confidence loss."""
+        picture, target, offsets = (part.to(self.device, non_blocking=True) for part in batch)
+        for group in self.optimiser.param_groups:
+            group["lr"] = learning_rate(self.step, steps, self.rate)
+        x = picture.to(memory_format=torch.channels_last, dtype=torch.float32)
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=self.half):
+            loc, logits = self.network((x - 127.5) / 127.5)
+        location, confidence = multibox_loss(loc.float(), logits.float(), target, offsets)
+        self.optimiser.zero_grad(set_to_none=True)
+        (location + confidence).backward()
+        torch.nn.utils.clip_grad_norm_(self.network.parameters(), GRADIENT_LIMIT)
+        self.optimiser.step()
+        self.step += 1
+        self._update_average()
+        return float(location.detach()), float(confidence.detach())
+
+    @torch.no_grad()
+    def _update_average(self) -> None:
+        decay = min(AVERAGE_DECAY, (1 + self.step) / (20 + self.step))
+        for mean, value in zip(_state(self.average), _state(self.network), strict=True):
+            if mean.is_floating_point():
+                mean.lerp_(value, 1 - decay)
+            else:
+                mean.copy_(value)
+
+    def as_dict(self) -> dict[str, Any]:
+        """What goes into a checkpoint."""
+        return {
+            "network": self.network.state_dict(),
+            "average": self.average.state_dict(),
+            "optimiser": self.optimiser.state_dict(),
+            "step": self.step,
+            "seconds": self.seconds,
+            "command": self.command,
+        }
+
+    def save(self, path: Path) -> None:
+        """Write a checkpoint; an interruption leaves the one before."""
+        temporary = path.with_suffix(".part")
+        torch.save(self.as_dict(), temporary)
+        os.replace(temporary, path)
+
+    def load(self, path: Path) -> None:
+        """Go on from a checkpoint."""
+        content = torch.load(path, map_location=self.device, weights_only=True)
+        self.network.load_state_dict(content["network"])
+        self.average.load_state_dict(content["average"])
+        self.optimiser.load_state_dict(content["optimiser"])
+        self.step, self.seconds = content["step"], content["seconds"]
+
+
+def learning_rate(step: int, steps: int, top: float) -> float:
+    """A linear start, then half a cosine down to a hundredth."""
+    start = min(1.0, (step + 1) / WARM_UP_STEPS)
+    return top * start * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * min(1.0, step / steps))))
+
+
+def _groups(network: MobileNetSsd) -> list[dict[str, Any]]:
+    """Decay for the kernels only, not for biases and normalisation."""
+    kernels = [p for p in network.parameters() if p.ndim > 1]
+    others = [p for p in network.parameters() if p.ndim <= 1]
+    return [{"params": kernels, "weight_decay": WEIGHT_DECAY}, {"params": others, "weight_decay": 0.0}]
+
+
+def _state(network: MobileNetSsd) -> Iterator[Tensor]:
+    return iter(network.state_dict().values())
+
+
+def run(training: Training, arguments: argparse.Namespace) -> None:
+    """Train until the last step, with a checkpoint, an ONNX file and a validation every now and then."""
+    stream = Stream(arguments.data, seed=arguments.seed + training.step)
+    batches = iter(DataLoader(stream, batch_size=arguments.batch, num_workers=arguments.workers, prefetch_factor=4))
+    recent: list[tuple[float, float]] = []
+    begin = time.monotonic()
+    while training.step < arguments.steps:
+        recent.append(training.advance(next(batches), arguments.steps))
+        training.seconds, begin = training.seconds + time.monotonic() - begin, time.monotonic()
+        if training.step % 100 == 0:
+            location, confidence = (sum(part) / len(recent) for part in zip(*recent, strict=True))
+            recent.clear()
+            print(f"step {training.step} of {arguments.steps}, {training.seconds / 60:.1f} min: "
+                  f"location {location:.3f}, confidence {confidence:.3f}", flush=True)  # fmt: skip
+        if training.step % arguments.check_every == 0 or training.step == arguments.steps:
+            check(training, arguments)
+
+
+def check(training: Training, arguments: argparse.Namespace) -> None:
+    """Save what there is and say how good it is on the validation pictures."""
+    training.save(arguments.out / "checkpoint.pt")
+    model = arguments.out / "model.onnx"
+    export(copy.deepcopy(training.average).cpu(), model, provenance_of(training.as_dict()))
+    if arguments.validation is not None:
+        print(f"step {training.step}: {describe(validate_model(model, arguments.validation))}", flush=True)
+
+
+def parse(words: list[str]) -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--data", type=Path, required=True, help="folder of shards from training.render")
+    parser.add_argument("--validation", type=Path, help="folder of shards of other seeds")
+    parser.add_argument("--out", type=Path, required=True, help="folder for checkpoint.pt and model.onnx")
+    parser.add_argument("--backbone", type=Path, help="weights from training.pretrain to begin with")
+    parser.add_argument("--steps", type=int, default=9000)
+    parser.add_argument("--batch", type=int, default=16)
+    parser.add_argument("--rate", type=float, default=1.5e-3)
+    parser.add_argument(
+        "--device", default="cuda" if torch.cuda.is_available() else "cpu", help="a GPU where there is one"
+    )
+    parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--check-every", type=int, default=1000)
+    parser.add_argument("--bf16", action="store_true", help="compute in bfloat16 where the processor is faster so")
+    parser.add_argument("--freeze-stem", action="store_true", help="leave the first layers as they are")
+    parser.add_argument("--seed", type=int, default=0)
+    return parser.parse_args(words)
+
+
+def main() -> None:
+    """Start, or go on."""
+    arguments = parse(sys.argv[1:])
+    torch.manual_seed(arguments.seed)
+    torch.set_num_threads(arguments.threads)
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    command = "python -m training.train " + " ".join(sys.argv[1:])
+    training = Training(arguments.rate, command, arguments.bf16, arguments.device)
+    if (arguments.out / "checkpoint.pt").is_file():
+        training.load(arguments.out / "checkpoint.pt")
+        print(f"goes on at step {training.step}", flush=True)
+    elif arguments.backbone is not None:
+        training.start_from(arguments.backbone)
+    if arguments.freeze_stem:
+        training.freeze_stem()
+    run(training, arguments)
+
+
+if __name__ == "__main__":
+    main()
