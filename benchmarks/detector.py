@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How good and how fast the detector is.
+
+    python benchmarks/detector.py --seed 1 --json OUT [--quick] [--model MODEL] [--pictures FOLDER]
+
+``map50_sim``, ``ap50`` per label: average precision at IoU 0.5 (VOC, all points) on simulated pictures of scenes that
+no training has seen; which, and what counts as difficult, says ``training/validation.py``. ``ms_p50``, ``ms_p95``: one
+640 x 480 picture through `Detector.detect` with two threads, and the same of the COCO model in ``coco`` where it is at
+hand. ``real``: what is found on real pictures beside the project; ``found`` counts boxes by label; ``of_truth`` is how
+many of the labelled objects (YCB-Video) and ``of_coco`` how many of the COCO model's boxes of the same meaning are met
+by a box of the right label at IoU 0.5.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from collections import Counter
+from itertools import takewhile
+from pathlib import Path
+from typing import Any
+
+import click
+import cv2
+import numpy as np
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(REPOSITORY))
+
+from objreg_ros import share  # noqa: E402
+from objreg_ros.data import Array, ColourImage, Detections  # noqa: E402
+from objreg_ros.detector.boxes import iou  # noqa: E402
+from objreg_ros.detector.mobilenet_ssd import Detector  # noqa: E402
+from objreg_ros.detector.params import DetectorParams  # noqa: E402
+from training.samples import Sample  # noqa: E402
+from training.validation import RANKING, pictures, validate  # noqa: E402
+
+SHARED = Path(os.environ.get("OBJREG_SHARED", REPOSITORY.parent / "shared"))
+COCO_MODEL = SHARED / "models" / "ssd_mobilenet_v1_coco_int8.onnx"
+COCO_THRESHOLD = 0.4
+Met = dict[str, list[int]]
+SAME_MEANING = {"tv": "monitor", "keyboard": "keyboard", "book": "book", "chair": "chair", "bowl": "bowl"}
+"""The COCO labels that are one of ours."""
+YCB_MEANING = {"003_cracker_box": "cereal_box", "024_bowl": "bowl", "002_master_chef_can": "soda_can"}
+"""The YCB objects that are one of ours, or nearly: the can is a tin of coffee, wider than a drinks can."""
+REAL = {"ycb_video": "**/*-color.png", "fr2_desk_rgb": "*.jpg", "redkitchen_a": "rgb/*"}
+COUNTS = {"pictures": (600, 120), "timings": (200, 60), "redkitchen_a": (50, 8)}
+QUICK_S = 30.0
+"""A quick run stops making pictures after so long, whatever the machine."""
+
+
+def simulated(detector: Detector, seed: int, count: int, limit_s: float) -> dict[str, Any]:
+    """Average precision on up to ``count`` simulated pictures, as many as fit into the time."""
+    begin = time.monotonic()
+
+    def in_time(sample: Sample) -> bool:
+        return time.monotonic() - begin < limit_s
+
+    used = list(takewhile(in_time, pictures(seed, count)))
+    precisions = validate(detector, used)
+    return {"map50_sim": precisions.pop("mean"), "ap50": precisions, "pictures": len(used)}
+
+
+def timed(detectors: dict[str, Detector], count: int) -> dict[str, dict[str, float]]:
+    """Milliseconds of each detector on the same picture, in turns."""
+    rgb = next(pictures(seed=0, count=1)).rgb
+    image = ColourImage(rgb=rgb, stamp_ns=0)
+    spent: dict[str, list[float]] = {name: [] for name in detectors}
+    for _ in range(count):
+        for name, detector in detectors.items():
+            begin = time.perf_counter()
+            detector.detect(image)
+            spent[name].append((time.perf_counter() - begin) * 1e3)
+    return {
+        name: {f"ms_p{rank}": round(float(np.percentile(values, rank)), 2) for rank in (50, 95)}
+        for name, values in spent.items()
+    }
+
+
+def on_real(
+    detector: Detector, coco: Detector | None, folder: Path, count: int | None, out: Path | None
+) -> dict[str, Any]:
+    """What the detector finds on the pictures of one folder."""
+    paths = sorted(folder.glob(REAL[folder.name]))
+    paths = paths[:: max(1, len(paths) // count)][:count] if count else paths
+    found: Counter[str] = Counter()
+    of_truth: Met = {}
+    of_coco: Met = {}
+    for path in paths:
+        image = ColourImage(rgb=np.ascontiguousarray(np.asarray(cv2.imread(str(path)))[..., ::-1]), stamp_ns=0)
+        seen = detector.detect(image)
+        found.update(seen.label)
+        _count(of_truth, seen, *_ycb_truth(path))
+        if coco is not None:
+            _count(of_coco, seen, *_meaning(coco.detect(image)))
+        if out is not None:
+            _draw(image.rgb, seen, out / f"{folder.name}_{path.parent.name}_{path.stem}.jpg")
+    met = {"of_truth": _text(of_truth), "of_coco": _text(of_coco)}
+    return {"pictures": len(paths), "found": dict(sorted(found.items())), **{k: v for k, v in met.items() if v}}
+
+
+def _count(met: Met, seen: Detections, boxes: Array, labels: list[str]) -> None:
+    """Add, by label, how many of the boxes are met by a detection of their label, and how many there are."""
+    overlap = iou(boxes, seen.xyxy)
+    for row, label in zip(overlap, labels, strict=True):
+        counts = met.setdefault(label, [0, 0])
+        counts[0] += bool((row[[name == label for name in seen.label]] >= 0.5).any())
+        counts[1] += 1
+
+
+def _text(met: Met) -> dict[str, str]:
+    return {label: f"{right} of {total}" for label, (right, total) in sorted(met.items())}
+
+
+def _meaning(seen: Detections) -> tuple[Array, list[str]]:
+    """The COCO model's boxes whose label is one of ours, under our name."""
+    rows = [row for row, label in enumerate(seen.label) if label in SAME_MEANING]
+    return seen.xyxy[rows], [SAME_MEANING[seen.label[row]] for row in rows]
+
+
+def _ycb_truth(path: Path) -> tuple[Array, list[str]]:
+    """The labelled boxes beside a YCB-Video picture that are one of ours: ``name x_min y_min x_max y_max`` a line."""
+    file = path.with_name(path.name.replace("-color.png", "-box.txt"))
+    lines = file.read_text().split("\n") if file.suffix == ".txt" and file.is_file() else []
+    rows = [line.split() for line in lines if line.split() and line.split()[0] in YCB_MEANING]
+    boxes = np.array([[float(number) for number in row[1:5]] for row in rows], np.float32).reshape(-1, 4)
+    return boxes, [YCB_MEANING[row[0]] for row in rows]
+
+
+def _draw(rgb: Array, seen: Detections, path: Path) -> None:
+    """The picture with the boxes and their names."""
+    picture = np.ascontiguousarray(rgb[..., ::-1])
+    for (x0, y0, x1, y1), label, score in zip(seen.xyxy.astype(int).tolist(), seen.label, seen.score, strict=True):
+        cv2.rectangle(picture, (x0, y0), (x1, y1), (40, 220, 40), 2)
+        cv2.putText(picture, f"{label} {score:.2f}", (x0 + 2, y0 + 14), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (40, 220, 40), 1)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    cv2.imwrite(str(path), picture)
+
+
+@click.command()
+@click.option("--seed", type=int, default=1, help="Another seed gives other scenes.")
+@click.option("--json", "out", type=click.Path(path_type=Path), required=True, help="Where the figures go.")
+@click.option("--quick", is_flag=True, help="Fewer pictures: within 50 s.")
+@click.option("--model", default=DetectorParams().model, help="Another model.")
+@click.option("--pictures", "folder", type=click.Path(path_type=Path), help="Draw what is found on real pictures here.")
+def main(seed: int, out: Path, quick: bool, model: str, folder: Path | None) -> None:
+    """Measure the detector."""
+    path = share.model(model)
+    counts = {name: few if quick else many for name, (many, few) in COUNTS.items()}
+    figures = simulated(Detector(RANKING, path), seed, counts["pictures"], QUICK_S if quick else float("inf"))
+    ours = Detector(DetectorParams(threads=2), path)
+    coco = Detector(DetectorParams(threads=2, threshold=COCO_THRESHOLD), COCO_MODEL) if COCO_MODEL.is_file() else None
+    speed = timed({"ours": ours} | ({"coco": coco} if coco else {}), counts["timings"])
+    figures |= {"seed": seed, "model": path.name, **speed["ours"], "coco": speed.get("coco")}
+    figures["real"] = {
+        name: on_real(ours, coco, SHARED / "data" / name, counts.get(name), folder)
+        for name in REAL
+        if (SHARED / "data" / name).is_dir()
+    }
+    out.write_text(json.dumps(figures, indent=2) + "\n")
+    click.echo(json.dumps(figures, indent=2))
+
+
+if __name__ == "__main__":
+    main()
