@@ -21,7 +21,7 @@ from objreg_ros.bridge.receipts import DEPTH, IMAGE, ORDER, Receipts
 
 QUEUE = 20  # messages of a topic that wait in DDS for a slow reader
 ASK_AGAIN_S = 2.0  # how often a play that waits looks whether the nodes are still there
-SETTLE_S = 3.0  # for the nodes to find each other, after we have found them
+SETTLE_S = 3.0  # for the nodes to find us and each other, after we have found some of them
 # One image and one depth are on their way at a time, so that none is overtaken. Where the graph stays silent, it may
 # wait for what comes next (slow odometry, say): a second goes after 1 s of silence, a third after 10 s.
 SILENCE_S = (1.0, 10.0, 30.0)
@@ -67,6 +67,7 @@ class Player(Node):
         deadline = time.monotonic() + seconds
         while any(p.get_subscription_count() == 0 for p in wanted) and time.monotonic() < deadline:
             self._executor.spin_once(timeout_sec=0.05)
+        self._wait_until(time.monotonic() + SETTLE_S)
         return [p.topic_name for p in wanted if p.get_subscription_count() == 0]
 
     def listen_to_receipts(self, seconds: float) -> Receipts:
@@ -78,7 +79,6 @@ class Player(Node):
         nodes = self._receipting() & set(ORDER)
         if not nodes:
             raise ValueError("lossless: expected the nodes to publish `finished`, got none; are they running here?")
-        self._wait_until(time.monotonic() + SETTLE_S)
         self._receipts = Receipts(nodes)
         return self._receipts
 
