@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from collections.abc import Callable, Sequence
 
@@ -26,6 +27,7 @@ def run(make: Callable[[], Door], args: Sequence[str] | None = None) -> int:
         return 0
     finally:
         rclpy.try_shutdown()
+        gc.freeze()  # else Python looks through every object of every library once more before it ends
 
 
 def _serve(make: Callable[[], Door], transport: str) -> int:

@@ -23,8 +23,8 @@ from objreg_ros.bridge import from_msg, profile, qos
 from objreg_ros.bridge.diagnostics import balance_of
 from objreg_ros.bridge.ledger import Balance
 
-START_S = 60.0  # a first start compiles kernels
-ANSWER_S = 20.0
+START_S = 180.0  # a first start compiles kernels, on a machine that may be busy
+ANSWER_S = 60.0
 REPOSITORY = Path(__file__).resolve().parents[2]
 
 
