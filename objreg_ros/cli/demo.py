@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`objreg demo`: a recording through the live graph, at its real rate, with a table and pictures at the end."""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+from collections import Counter
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+
+from objreg_ros.bridge import from_msg
+from objreg_ros.cli import live_table, options
+from objreg_ros.cli.choice import Choice, as_rosbag2, best_at_hand
+from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
+from objreg_ros.data import ColourImage
+from objreg_ros.offline import constraint
+from objreg_ros.recording import Recording, open_recording
+from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
+from objreg_ros.report.live_pictures import draw_sight, draw_way
+from objreg_ros.truth import Truth, summarise
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """The command line."""
+
+    recording: Path | None
+    model: str | None
+    labels: str | None
+    params_file: Path | None
+    changes: tuple[str, ...]
+    remaps: tuple[str, ...]
+    seconds: float | None
+    rate: float
+    lossless: bool
+    out: Path
+
+
+@click.command()
+@click.argument("recording", type=click.Path(path_type=Path), required=False)
+@options.model
+@options.labels
+@options.params
+@options.change
+@options.remap
+@click.option("--seconds", type=click.FloatRange(min=0, min_open=True), help="Play only so much of it.")
+@click.option("--rate", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True, help="Speed.")
+@click.option("--lossless", is_flag=True, help="Wait for every frame instead of keeping the pace.")
+@click.option("--out", type=click.Path(file_okay=False, path_type=Path), default=Path("out/demo"), show_default=True)
+def command(**asked: Any) -> None:
+    """Play RECORDING (or the best one at hand) through three live nodes and show what came out.
+
+    Ends with the books of every node, latencies, constraints and their true error, and with pictures in the folder of
+    --out. A recording that is no rosbag2 is written as one first.
+    """
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that the with blocks end the nodes
+    run(Asked(**asked))
+
+
+def run(asked: Asked) -> None:
+    """The whole demo; ValueError or OSError if it cannot be, or if the books do not balance."""
+    choice = best_at_hand(asked.out) if asked.recording is None else Choice(asked.recording)
+    bag = as_rosbag2(choice.recording, asked.out, asked.seconds)
+    with open_recording(bag) as source:
+        inputs = choose_inputs(source.topics, parse_remaps(asked.remaps))
+        if not inputs.complete:
+            raise ValueError(f"{bag}: expected {inputs.missing}, got {', '.join(source.topics)}; see --remap")
+        live = run_live(bag, setup_of(choice, asked), asked.out / "logs", _say)
+        truth = Truth.of(source, inputs.ground_truth)
+        _write(asked.out / "demo.json", live, truth)
+        _draw(asked.out, live, truth, source, inputs)
+        sent = _sent(source, inputs, asked.seconds, live)
+    click.echo("\n".join(live_table.lines(live, sent, _errors(live, truth))))
+    live_table.require_balance(live, sent)
+
+
+def _say(text: str) -> None:
+    click.echo(text, err=True)
+
+
+def setup_of(choice: Choice, asked: Asked) -> Setup:
+    """The arguments of the nodes and of the player."""
+    everywhere = [] if asked.params_file is None else ["--params-file", str(asked.params_file)]
+    everywhere += ["-p", "reliable:=true"] if asked.lossless else []
+    node_args = {room: list(everywhere) for room in ROOMS}
+    node_args["detector"] += choice.detector_args
+    named = {"model": asked.model, "labels": asked.labels}
+    changes = [*(f"detector.{name}={value}" for name, value in named.items() if value), *asked.changes]
+    for change in changes:
+        room, name, value = _parse(change)
+        node_args[room] += ["-p", f"{name}:={value}"]
+    replay = ["--lossless"] if asked.lossless else ["--rate", str(asked.rate)]
+    replay += [] if asked.seconds is None else ["--end", str(asked.seconds)]
+    return Setup(node_args, [*replay, *(word for remap in asked.remaps for word in ("--remap", remap))])
+
+
+def _parse(change: str) -> tuple[str, str, str]:
+    path, _, value = change.partition("=")
+    room, _, name = path.partition(".")
+    if room not in ROOMS or not name or not value:
+        raise ValueError(f"--set: expected NODE.NAME=VALUE with a node of {', '.join(ROOMS)}, got {change!r}")
+    return room, name, value
+
+
+def _sent(source: Recording, inputs: Inputs, seconds: float | None, live: Live) -> dict[str, int]:
+    """How many frames were sent to each node."""
+    depth = inputs.depth or inputs.points
+    end_ns = None if seconds is None else source.start_ns + round(seconds * 1e9)
+    counts = Counter(record.topic for record in source.records({inputs.image or "", depth or ""}, end_ns=end_ns))
+    return {
+        "detector": counts[inputs.image or ""],
+        "segmenter": counts[depth or ""],
+        "registrar": live.books["segmenter"].published,
+    }
+
+
+def _errors(live: Live, truth: Truth) -> dict[str, Any]:
+    return summarise([error for closure in live.closures if (error := truth.error(closure)) is not None])
+
+
+def _write(file: Path, live: Live, truth: Truth) -> None:
+    """The run as JSON."""
+    summary = {
+        "nodes": {room: asdict(books) for room, books in live.books.items()},
+        "constraints": [constraint(closure) for closure in live.closures],
+        "rejected": dict(live.rejected),
+        "truth": _errors(live, truth),
+    }
+    file.write_text(json.dumps(summary, indent=1))
+
+
+def _draw(out: Path, live: Live, truth: Truth, source: Recording, inputs: Inputs) -> None:
+    if truth.poses:
+        draw_way(out / "way.png", truth, live.closures)
+        _say(f"drew {out / 'way.png'}")
+    image = None if live.sight is None else _image(source, inputs, live.sight.detections.stamp_ns)
+    if live.sight is not None and image is not None and inputs.camera_info is not None:
+        camera = from_msg.intrinsics(next(iter(source.records([inputs.camera_info]))).message)
+        draw_sight(out / "sight.png", image.rgb, camera, live.sight.detections, live.sight.objects)
+        _say(f"drew {out / 'sight.png'}")
+
+
+def _image(source: Recording, inputs: Inputs, stamp_ns: int) -> ColourImage | None:
+    """The colour image of one moment."""
+    messages = (record.message for record in source.records([inputs.image or ""]))
+    found = next((message for message in messages if from_msg.stamp_ns(message) == stamp_ns), None)
+    return None if found is None else from_msg.image(found)
