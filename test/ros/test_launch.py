@@ -14,6 +14,8 @@ import pytest
 
 pytest.importorskip("launch_ros", reason="launch and launch_ros are not installed")
 
+from recording.folders import tum_folder
+
 from .graph import START_S, Graph
 
 pytestmark = pytest.mark.ros
@@ -78,3 +80,17 @@ def test_the_nodes_of_a_launch_live_in_its_namespace_and_end_with_it(
         launched.wait(START_S)
     said = (tmp_path / "log").read_text()
     assert said.count("process has finished cleanly") == 3, said
+
+
+def test_a_replay_brings_every_frame_through_the_nodes_and_ends_the_launch(
+    graph: Graph, repository: Path, tiny_model: Path, tmp_path: Path
+) -> None:
+    folder = tum_folder(tmp_path / "tum", frames=5)
+    launched = subprocess.run(
+        [sys.executable, "-c", PROGRAM, str(repository / "launch" / "replay.launch.py"), f"recording:={folder}",
+         "lossless:=true", f"model:={tiny_model}"],
+        env={**graph.environment(), "ROS_LOG_DIR": str(tmp_path)}, cwd=repository, timeout=3 * START_S,
+        capture_output=True, text=True,
+    )  # fmt: skip
+    assert "registrar: 5 published" in launched.stdout, launched.stdout + launched.stderr
+    assert launched.stdout.count("process has finished cleanly") == 4
