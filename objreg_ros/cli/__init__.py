@@ -19,6 +19,7 @@ SUMMARIES = {
     "inspect": "Say what is in a recording and what the graph would use.",
     "offline": "Run a recording through the three rooms without ROS.",
     "replay": "Publish a recording into the live graph.",
+    "convert": "Write any recording as rosbag2.",
     "export": "Write the objects of a store as PLY and JSON.",
     "simulate": "Make a recording with exact ground truth.",
     "fetch-model": "Get a detector model.",

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`objreg convert`: any recording as rosbag2."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+from tqdm import tqdm
+
+from objreg_ros.cli import options
+from objreg_ros.recording import Record, Recording, open_recording, write_rosbag2
+from objreg_ros.recording.messages import standard_types
+from objreg_ros.recording.writer import STORAGES
+
+
+@click.command()
+@options.recording
+@click.argument("out", type=click.Path(path_type=Path))
+@click.option("--storage", type=click.Choice(list(STORAGES)), default="mcap", show_default=True)
+def command(recording: Path, out: Path, storage: str) -> None:
+    """Write RECORDING (rosbag1, rosbag2 or a TUM RGB-D folder) as the rosbag2 folder OUT.
+
+    Topics of a type that ROS 2 does not ship are left out, and named.
+    """
+    with open_recording(recording) as source:
+        kept = {topic.name for topic in source.topics.values() if topic.msgtype in standard_types().types}
+        for name in sorted(set(source.topics) - kept):
+            click.echo(f"left out: {name} ({source.topics[name].msgtype})", err=True)
+        count = write_rosbag2(out, _with_progress(source, kept), storage)
+    click.echo(f"{out}: {count} records")
+
+
+def _with_progress(source: Recording, topics: set[str]) -> Iterator[Record]:
+    total = sum(source.topics[name].count for name in topics)
+    yield from tqdm(source.records(topics), total=total, unit="record", disable=None, leave=False)

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from recording.folders import tum_folder
+
+from objreg_ros.bridge import from_msg
+from objreg_ros.cli.convert import command
+from objreg_ros.recording import open_recording
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_a_folder_becomes_a_rosbag2(storage: str, tmp_path: Path) -> None:
+    words = [str(tum_folder(tmp_path / "tum")), str(tmp_path / "bag"), "--storage", storage]
+    result = CliRunner().invoke(command, words)
+    assert result.exit_code == 0 and "12 records" in result.output
+    with open_recording(tmp_path / "bag") as bag:
+        assert bag.kind == f"rosbag2 ({storage})" and bag.topics["/image"].count == 3
+
+
+def test_a_rosbag1_becomes_a_rosbag2_with_the_same_points(shared: Path, tmp_path: Path) -> None:
+    bag = shared / "data/bag_soda_can/perception_tutorial.bag"
+    assert CliRunner().invoke(command, [str(bag), str(tmp_path / "bag")]).exit_code == 0
+    with open_recording(bag) as old, open_recording(tmp_path / "bag") as new:
+        before, after = next(old.records()), next(new.records())
+        assert before.stamp_ns == after.stamp_ns
+        clouds = [from_msg.point_cloud(record.message) for record in (before, after)]
+        assert clouds[0].xyz.tobytes() == clouds[1].xyz.tobytes() and clouds[0].stamp_ns == clouds[1].stamp_ns
+
+
+def test_what_is_there_is_not_overwritten(tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path)
+    with pytest.raises(FileExistsError, match="expected a new folder"):
+        CliRunner().invoke(command, [str(folder), str(folder)], catch_exceptions=False)

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from detector.tiny_model import save_constant_model, tf_outputs
+from recording.folders import tum_folder
+
+from objreg_ros.cli.offline import command
+
+KEYS = {"frames", "detections", "objects", "constraints", "rejected", "stage_ms", "truth"}
+
+
+@pytest.fixture(scope="session")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A detector that sees one cup in the middle of every picture."""
+    folder = tmp_path_factory.mktemp("model")
+    (folder / "labelmap.txt").write_text("cup\ntv\n")
+    return save_constant_model(folder / "tiny.onnx", tf_outputs([[0.3, 0.3, 0.7, 0.7]], [0], [0.9]))
+
+
+def offline(*words: object) -> str:
+    result = CliRunner().invoke(command, [str(word) for word in words], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def test_a_folder_goes_through_the_real_rooms_and_gives_its_json(model: Path, tmp_path: Path) -> None:
+    folder, file = tum_folder(tmp_path / "tum", frames=4), tmp_path / "out.json"
+    output = offline(folder, "--model", model, "--json", file)
+    assert "4 frames, 4 detections" in output
+    summary = json.loads(file.read_text())
+    assert set(summary) >= KEYS and summary["frames"] == 4 and summary["odometry"] is None
+    assert summary["stage_ms"].keys() == {"decode", "detect", "segment", "register"}
+
+
+def test_a_run_stops_early(model: Path, tmp_path: Path) -> None:
+    assert "2 frames" in offline(tum_folder(tmp_path, frames=4), "--model", model, "--max-frames", 2)
+
+
+def test_drifting_odometry_is_named_in_the_json(model: Path, tmp_path: Path) -> None:
+    folder, file = tum_folder(tmp_path / "tum", frames=3), tmp_path / "out.json"
+    offline(folder, "--model", model, "--json", file, "--odometry", "drift:3")
+    summary = json.loads(file.read_text())
+    assert summary["odometry"] == "/drifting_odom"
+    assert all(glimpse["T_odom_camera"] is not None for glimpse in summary["glimpses"])
+
+
+@pytest.mark.parametrize("odometry", ["drift:", "drift:x"])
+def test_a_drift_without_a_seed_is_refused(odometry: str, model: Path, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="expected drift: and a seed like drift:1"):
+        offline(tum_folder(tmp_path), "--model", model, "--odometry", odometry)
+
+
+def test_a_drift_away_from_no_truth_is_refused(model: Path, tmp_path: Path) -> None:
+    (tum_folder(tmp_path) / "groundtruth.txt").unlink()
+    with pytest.raises(ValueError, match="needs a ground truth, and there is none"):
+        offline(tmp_path, "--model", model, "--odometry", "drift:1")
+
+
+def test_what_is_missing_is_said_with_what_is_there(model: Path, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"expected a colour image, got .*/depth/image \(sensor_msgs/msg/Image\)"):
+        offline(tum_folder(tmp_path), "--model", model, "--remap", "image:=")
+
+
+def test_a_model_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="no_model"):
+        offline(tum_folder(tmp_path), "--model", "no_model.onnx")
+
+
+def test_a_parameter_reaches_its_room(model: Path, tmp_path: Path) -> None:
+    output = offline(tum_folder(tmp_path, frames=2), "--model", model, "--set", "detector.threshold=0.95")
+    assert "2 frames, 0 detections, 0 objects" in output
