@@ -14,6 +14,7 @@ from objreg_ros.report.story import Story, Tracks
 
 LANE = 18  # px of one row of the timeline
 MOST_LABELS = 9  # rows of detections; the rarer labels share one more
+LINE, LETTER = 13.0, 7.0  # px of a line of text and of a letter
 SERIES = 8  # colours of labels on the page
 
 
@@ -108,8 +109,9 @@ def object_map(story: Story, corrected: bool) -> str:
     order = [label for label, _ in Counter(row[0] for row in seen).most_common()]
     for (label, *_), (x, y) in zip(seen, xy, strict=True):
         plot.dot(x, y, f"series-{min(order.index(label), SERIES - 1)}", label, radius=2.2)
-    for label, (x, y) in heaps([row[0] for row in seen], xy):
-        plot.text(plot.x(x), plot.y(y) - 8, label, "middle", "name")
+    names = heaps([row[0] for row in seen], xy)
+    for label, (x_px, y_px) in apart([(label, (plot.x(x), plot.y(y) - 8)) for label, (x, y) in names]):
+        plot.text(x_px, y_px, label, "middle", "name")
     return plot.svg("objects from above" + (", corrected" if corrected else ", by odometry"))
 
 
@@ -126,6 +128,19 @@ def heaps(labels: Sequence[str], xy: Array, radius: float = 0.5, least: int = 4)
             found.append((label, rest[near].mean(axis=0)))
             rest = rest[np.linalg.norm(rest - rest[near].mean(axis=0), axis=1) > radius]
     return found
+
+
+def apart(names: Sequence[tuple[str, tuple[float, float]]]) -> list[tuple[str, tuple[float, float]]]:
+    """Names at pixels, each moved up until it covers none that is below it."""
+    placed: list[tuple[str, tuple[float, float]]] = []
+    for label, (x, y) in sorted(names, key=lambda item: -item[1][1]):
+        while any(
+            abs(y - other_y) < LINE and abs(x - other_x) < LETTER * (len(label) + len(other)) / 2
+            for other, (other_x, other_y) in placed
+        ):
+            y -= 1.0
+        placed.append((label, (x, y)))
+    return placed
 
 
 def verdict(story: Story, closure: LoopClosure) -> str:

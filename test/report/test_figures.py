@@ -48,6 +48,12 @@ def test_heaps_of_one_label_are_told_apart_and_strays_have_no_name() -> None:
     assert [tuple(place) for _, place in figures.heaps(["cup"] * 11, xy)] == [(0.0, 0.0), (3.0, 0.0)]
 
 
+def test_names_that_would_cover_each_other_are_moved_apart() -> None:
+    placed = dict(figures.apart([("cup", (100.0, 50.0)), ("book", (105.0, 52.0)), ("tv", (300.0, 50.0))]))
+    assert placed["book"] == (105.0, 52.0) and placed["tv"] == (300.0, 50.0)
+    assert placed["cup"][0] == 100.0 and placed["cup"][1] <= 52.0 - figures.LINE
+
+
 def test_the_ground_is_the_plane_of_the_way() -> None:
     angles = np.linspace(0, 2 * np.pi, 50)
     xyz = np.column_stack([2 * np.cos(angles), np.full(50, 0.7), np.sin(angles)])
