@@ -4,7 +4,8 @@
     python benchmarks/detector.py --seed 1 --json OUT [--quick] [--model MODEL] [--pictures FOLDER]
 
 ``map50_sim``, ``ap50`` per label: average precision at IoU 0.5 (VOC, all points) on simulated pictures of scenes that
-no training has seen; which, and what counts as difficult, says ``training/validation.py``. ``ms_p50``, ``ms_p95``: one
+no training has seen; which, and what counts as difficult, says ``training/validation.py``; ``map50_sim_large`` and
+``ap50_large`` the same for boxes of at least 64 x 64 pixels. ``ms_p50``, ``ms_p95``: one
 640 x 480 picture through `Detector.detect` with two threads, and the same of the COCO model in ``coco`` where it is at
 hand. ``real``: what is found on real pictures beside the project; ``found`` counts boxes by label; ``of_truth`` is how
 many of the labelled objects (YCB-Video) and ``of_coco`` how many of the COCO model's boxes of the same meaning are met
@@ -35,7 +36,7 @@ from objreg_ros.detector.boxes import iou  # noqa: E402
 from objreg_ros.detector.mobilenet_ssd import Detector  # noqa: E402
 from objreg_ros.detector.params import DetectorParams  # noqa: E402
 from training.samples import Sample  # noqa: E402
-from training.validation import RANKING, pictures, validate  # noqa: E402
+from training.validation import RANKING, look, pictures, precisions  # noqa: E402
 
 SHARED = Path(os.environ.get("OBJREG_SHARED", REPOSITORY.parent / "shared"))
 COCO_MODEL = SHARED / "models" / "ssd_mobilenet_v1_coco_int8.onnx"
@@ -47,6 +48,8 @@ YCB_MEANING = {"003_cracker_box": "cereal_box", "024_bowl": "bowl", "002_master_
 """The YCB objects that are one of ours, or nearly: the can is a tin of coffee, wider than a drinks can."""
 REAL = {"ycb_video": "**/*-color.png", "fr2_desk_rgb": "*.jpg", "redkitchen_a": "rgb/*"}
 COUNTS = {"pictures": (600, 120), "timings": (200, 60), "redkitchen_a": (50, 8)}
+LARGE_PX = 64.0**2
+"""Boxes of less than this area are not asked for in the figures that end in ``_large``."""
 QUICK_S = 30.0
 """A quick run stops making pictures after so long, whatever the machine."""
 
@@ -59,8 +62,17 @@ def simulated(detector: Detector, seed: int, count: int, limit_s: float) -> dict
         return time.monotonic() - begin < limit_s
 
     used = list(takewhile(in_time, pictures(seed, count)))
-    precisions = validate(detector, used)
-    return {"map50_sim": precisions.pop("mean"), "ap50": precisions, "pictures": len(used)}
+    seen, truth = look(detector, used)
+    ap50, larger = precisions(seen, truth), precisions(seen, truth, LARGE_PX)
+    wanted = sum(int((~known.difficult).sum()) for known in truth)
+    return {
+        "map50_sim": ap50.pop("mean"),
+        "ap50": ap50,
+        "map50_sim_large": larger.pop("mean"),
+        "ap50_large": larger,
+        "pictures": len(used),
+        "objects": wanted,
+    }
 
 
 def timed(detectors: dict[str, Detector], count: int) -> dict[str, dict[str, float]]:

@@ -171,14 +171,20 @@ def parse(words: list[str]) -> argparse.Namespace:
     return parser.parse_args(words)
 
 
+def recipe(arguments: argparse.Namespace) -> str:
+    """The command that does the same elsewhere: the options without this machine's folders."""
+    chosen = {name: value for name, value in vars(arguments).items() if not isinstance(value, Path | None)}
+    flags = [f"--{name.replace('_', '-')}" + ("" if value is True else f" {value}") for name, value in chosen.items()]
+    return " ".join(["python -m training.train", *(flag for flag in flags if not flag.endswith(" False"))])
+
+
 def main() -> None:
     """Start, or go on."""
     arguments = parse(sys.argv[1:])
     torch.manual_seed(arguments.seed)
     torch.set_num_threads(arguments.threads)
     arguments.out.mkdir(parents=True, exist_ok=True)
-    command = "python -m training.train " + " ".join(sys.argv[1:])
-    training = Training(arguments.rate, command, arguments.bf16, arguments.device)
+    training = Training(arguments.rate, recipe(arguments), arguments.bf16, arguments.device)
     if (arguments.out / "checkpoint.pt").is_file():
         training.load(arguments.out / "checkpoint.pt")
         print(f"goes on at step {training.step}", flush=True)

@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from itertools import count as count_from
 from pathlib import Path
 
 import numpy as np
 
-from objreg_ros.data import Array, ColourImage
+from objreg_ros.data import Array, ColourImage, Detections
+from objreg_ros.detector.boxes import area
 from objreg_ros.detector.mobilenet_ssd import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.report.average_precision import TrueBoxes, average_precision
@@ -67,22 +69,28 @@ def sample_of(rendering: Rendering) -> Sample:
     return Sample(rendering.rgb, boxes, np.array([LABELS.index(one.label) for one in seen], np.int64), difficult)
 
 
-def validate(detector: Detector, samples: Iterable[Sample]) -> dict[str, float]:
-    """Average precision at IoU 0.5 of every label that occurs, and ``mean``."""
+def look(detector: Detector, samples: Iterable[Sample]) -> tuple[list[Detections], list[TrueBoxes]]:
+    """What the detector sees in every picture, and what is there."""
     seen, truth = [], []
     for sample in samples:
         seen.append(detector.detect(ColourImage(rgb=sample.rgb, stamp_ns=0)))
         names = tuple(LABELS[index] for index in sample.classes)
         truth.append(TrueBoxes(sample.boxes, names, sample.difficult))
-    precisions = {label: average_precision(seen, truth, label) for label in LABELS}
-    known = {label: value for label, value in precisions.items() if value is not None}
+    return seen, truth
+
+
+def precisions(seen: list[Detections], truth: list[TrueBoxes], least_area_px: float = 0.0) -> dict[str, float]:
+    """Average precision at IoU 0.5 of every label that occurs, and ``mean``; smaller boxes become difficult."""
+    asked = [replace(known, difficult=known.difficult | (area(known.xyxy) < least_area_px)) for known in truth]
+    found = {label: average_precision(seen, asked, label) for label in LABELS}
+    known = {label: value for label, value in found.items() if value is not None}
     return known | {"mean": float(np.mean(list(known.values())))}
 
 
 def validate_model(model: Path, folder: Path) -> dict[str, float]:
-    """`validate` of a model file on a folder of shards."""
+    """`precisions` of a model file on a folder of shards."""
     shards = map(Shard, sorted(folder.glob("*.npz")))
-    return validate(Detector(RANKING, model), (shard[index] for shard in shards for index in range(len(shard))))
+    return precisions(*look(Detector(RANKING, model), (shard[k] for shard in shards for k in range(len(shard)))))
 
 
 def describe(precisions: dict[str, float]) -> str:

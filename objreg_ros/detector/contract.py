@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
@@ -116,13 +117,23 @@ class RawSsd:
 
     def read(self, outputs: list[Array], threshold: float) -> Candidates:
         """See `Contract`."""
-        offsets, logits = outputs[0][0], outputs[1][0].astype(np.float32)
-        logits = logits - logits.max(axis=1, keepdims=True)
-        exponent = np.exp(logits)
-        score = exponent[:, 1:] / exponent.sum(axis=1, keepdims=True)
+        likely = np.flatnonzero(_may_reach(outputs[1][0], threshold))
+        score = _softmax(outputs[1][0][likely].astype(np.float32))[:, 1:]
         rows, index = np.nonzero(score >= threshold)
-        xyxy = decode(offsets[rows].astype(np.float32), self.priors[rows], self.variances)
+        chosen = likely[rows]
+        xyxy = decode(outputs[0][0][chosen].astype(np.float32), self.priors[chosen], self.variances)
         return Candidates(xyxy, score[rows, index], index)
+
+
+def _may_reach(logits: Array, threshold: float) -> Array:
+    """Which rows ``(A,) bool`` may have a class of that softmax; the odds against the background rule most out."""
+    least = math.log(max(threshold, 1e-9) / max(1.0 - threshold, 1e-9)) - 1e-3
+    return logits[:, 1:].max(axis=1) - logits[:, 0] >= least
+
+
+def _softmax(logits: Array) -> Array:
+    exponent = np.exp(logits - logits.max(axis=1, keepdims=True, initial=-np.inf))
+    return exponent / exponent.sum(axis=1, keepdims=True)
 
 
 def _roles(outputs: tuple[Port, ...], probe: Mapping[str, Array]) -> dict[str, str]:

@@ -100,6 +100,16 @@ def test_one_prior_may_give_two_labels_below_one_half() -> None:
     assert contract.read([heads[name] for name in contract.names], 0.3).index.tolist() == [0, 1]
 
 
+@pytest.mark.parametrize("threshold", [0.0, 0.1, 0.5, 0.9])
+def test_no_row_that_reaches_the_threshold_is_lost_to_the_shortcut(threshold: float) -> None:
+    logits = np.random.default_rng(1).normal(0, 3, (1, 400, 4)).astype(np.float32)
+    heads = {"loc": np.zeros((1, 400, 4), np.float32), "logits": logits}
+    contract = raw(heads, raw_metadata(np.tile(PRIORS[:1], (400, 1)), ["a", "b", "c"]), labels=3)
+    exponent = np.exp(logits[0])
+    expected = (exponent[:, 1:] / exponent.sum(axis=1, keepdims=True) >= threshold).sum()
+    assert len(contract.read([heads["loc"], logits], threshold).index) == expected
+
+
 def test_priors_that_do_not_match_the_heads_are_refused() -> None:
     with pytest.raises(ValueError, match=r"from 1 priors and 2 labels, got loc \[1, 2, 4\]"):
         raw(HEADS, raw_metadata(PRIORS[:1], ["a", "b"]))

@@ -10,7 +10,7 @@ import pytest
 torch = pytest.importorskip("torch", reason="training needs torch")
 
 from training.priors import INPUT_HW, make_priors  # noqa: E402
-from training.train import Training, learning_rate  # noqa: E402
+from training.train import Training, learning_rate, parse, recipe  # noqa: E402
 
 
 def batch() -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
@@ -36,3 +36,8 @@ def test_a_checkpoint_brings_back_weights_average_optimiser_and_step(tmp_path: P
 def test_the_learning_rate_rises_then_falls_to_a_hundredth() -> None:
     rates = [learning_rate(step, 1000, 1.0) for step in range(1001)]
     assert rates[0] < 0.01 and max(rates) == pytest.approx(0.92, abs=0.03) and rates[-1] == pytest.approx(0.01)
+
+
+def test_the_recipe_in_the_model_names_no_folder_of_this_machine() -> None:
+    text = recipe(parse(["--data", "/home/me/data", "--out", "/home/me/out", "--steps", "12", "--freeze-stem"]))
+    assert "/home" not in text and "--steps 12" in text and text.endswith("--freeze-stem --seed 0")
