@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+
+import rclpy
+from std_msgs.msg import String
+
+from objreg_ros.bridge import qos
+from objreg_ros.bridge.door import Door, DroppedError
+
+
+@pytest.fixture
+def door() -> Iterator[Door]:
+    rclpy.init(args=[])
+    made = Door("door")
+    yield made
+    made.close()
+    rclpy.try_shutdown()
+
+
+def spin_until(door: Door, heard: list[Any], count: int) -> None:
+    for _ in range(400):
+        if len(heard) >= count:
+            return
+        rclpy.spin_once(door, timeout_sec=0.05)
+
+
+def refuse(message: Any) -> None:
+    raise ValueError(f"expected better than {message!r}")
+
+
+def test_a_message_that_breaks_its_contract_is_dropped_by_the_name_of_its_topic(door: Door) -> None:
+    with pytest.raises(DroppedError, match="expected better than 'x'") as dropped:
+        door.read("image", refuse, "x")
+    assert dropped.value.reason == "malformed_image"
+
+
+def test_a_message_aside_that_breaks_its_contract_is_nothing(door: Door) -> None:
+    assert door.read_aside("labels", refuse, "x") is None
+    assert door.read_aside("labels", str.upper, "x") == "X"
+
+
+def test_of_topics_that_carry_the_same_the_first_that_speaks_is_kept_and_the_others_are_closed(door: Door) -> None:
+    heard: list[tuple[str, str]] = []
+    door.listen_to_first(
+        "words", {"quiet": String, "loud": String}, lambda topic, m: heard.append((topic, m.data)), qos.room()
+    )
+    loud, quiet = (door.create_publisher(String, topic, qos.room()) for topic in ("loud", "quiet"))
+    spin_until(door, [] if loud.get_subscription_count() == 0 else [1], 1)
+    loud.publish(String(data="one"))
+    spin_until(door, heard, 1)
+    assert heard == [("loud", "one")]
+    assert door.count_subscribers("/quiet") == 0 and door.count_subscribers("/loud") == 1
+    quiet.publish(String(data="two"))
+    loud.publish(String(data="three"))
+    spin_until(door, heard, 2)
+    assert heard[1:] == [("loud", "three")]

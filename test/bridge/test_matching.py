@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+
+import rclpy
+
+from objreg_ros.bridge.door import DroppedError
+from objreg_ros.bridge.matching import MatchingDoor
+from objreg_ros.bridge.sync import Match, Need, Stream
+
+PATIENCE = 20.0  # seconds; a test that gets there has failed
+
+
+class Pairs(MatchingDoor):
+    """Takes pairs of ``a`` and ``b``; what to make of them is said by the payload of ``b``."""
+
+    def __init__(self) -> None:
+        super().__init__("pairs")
+        self.taken: list[tuple[Any, Any]] = []
+        self.done = threading.Semaphore(0)
+
+    def compute(self, stamp_ns: int, payload: Match) -> bool:
+        try:
+            self.taken.append((payload["a"], payload["b"]))
+            if isinstance(payload["b"], Exception):
+                raise payload["b"]
+            return True
+        finally:
+            self.done.release()
+
+    def wait(self, count: int = 1) -> None:
+        for _ in range(count):
+            assert self.done.acquire(timeout=PATIENCE)
+        self.worker.close()
+
+
+@pytest.fixture
+def door() -> Iterator[Pairs]:
+    rclpy.init(args=[])
+    made = Pairs()
+    yield made
+    made.close()
+    rclpy.try_shutdown()
+
+
+def test_a_frame_goes_to_the_worker_with_its_partner_and_is_booked_as_published(door: Pairs) -> None:
+    door.begin([Stream("a"), Stream("b")])
+    door.feed("a", 5, "a5")
+    door.feed("b", 5, "b5")
+    door.wait()
+    books = door.ledger.balance()
+    assert door.taken == [("a5", "b5")] and (books.received, books.published) == (1, 1)
+
+
+def test_what_comes_before_it_is_known_how_to_match_is_not_lost(door: Pairs) -> None:
+    door.feed("b", 5, "b5")
+    door.feed("elsewhere", 5, "x")
+    door.begin([Stream("a"), Stream("b")])
+    door.feed("a", 5, "a5")
+    door.wait()
+    assert door.taken == [("a5", "b5")]
+
+
+def test_a_frame_whose_partner_never_came_is_dropped_as_unmatched(door: Pairs) -> None:
+    door.begin([Stream("a"), Stream("b")])
+    door.feed("a", 5, "a5")
+    door.feed("b", 6, "b6")
+    books = door.ledger.balance()
+    assert (books.received, books.dropped, books.waiting) == (1, {"unmatched": 1}, 0)
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"), [(DroppedError("disabled", ""), "disabled"), (ValueError("a broken contract"), "refused")]
+)
+def test_what_the_work_refuses_is_dropped_with_its_reason(door: Pairs, error: Exception, reason: str) -> None:
+    door.begin([Stream("a"), Stream("b")])
+    door.feed("b", 5, error)
+    door.feed("a", 5, "a5")
+    door.wait()
+    assert door.ledger.balance().dropped == {reason: 1} and not door.failure.done()
+
+
+def test_a_bug_in_the_work_ends_the_node(door: Pairs) -> None:
+    door.begin([Stream("a"), Stream("b")])
+    door.feed("b", 5, TypeError("a bug"))
+    door.feed("a", 5, "a5")
+    door.wait()
+    assert isinstance(door.failure.exception(), TypeError)
+
+
+def test_diagnostics_tell_what_the_other_streams_brought(door: Pairs) -> None:
+    door.begin([Stream("a"), Stream("b"), Stream("c", Need.LATCHED)])
+    door.feed("c", 0, "c")
+    door.feed("b", 5, "b5")
+    door.feed("b", 6, "b6")
+    door.feed("a", 6, "a6")
+    door.wait()
+    told = door.extra_diagnostics()
+    assert told == {"b received": 2, "b unmatched": 1, "c received": 1}
