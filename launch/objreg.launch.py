@@ -18,11 +18,19 @@ ROOMS = ("detector", "segmenter", "registrar")
 TOPICS = {
     "image": "colour image; its compressed form is looked for at <image>/compressed",
     "points": "PointCloud2, organised or not",
-    "depth/image": "depth image, instead of points; its compressed form is at <depth/image>/compressedDepth",
+    "depth": "depth image, instead of points; its compressed form is looked for at <depth>/compressedDepth",
     "camera_info": "camera of the depth image",
     "odom": "odometry of the camera's body",
 }
-COMPRESSED = {"image/compressed": "image", "depth/image/compressedDepth": "depth/image"}
+REMAPPED = {  # what the nodes listen to → the argument that says where it is, and what is added to it
+    "image": ("image", ""),
+    "image/compressed": ("image", "/compressed"),
+    "points": ("points", ""),
+    "depth/image": ("depth", ""),
+    "depth/image/compressedDepth": ("depth", "/compressedDepth"),
+    "camera_info": ("camera_info", ""),
+    "odom": ("odom", ""),
+}
 
 OPTIONS = {
     "params_file": "YAML of parameters, in the form of config/objreg.yaml",
@@ -35,9 +43,9 @@ OPTIONS = {
 
 def generate_launch_description() -> LaunchDescription:
     """Arguments, a line about the transport, and the nodes."""
-    options = [DeclareLaunchArgument(name, default_value="", description=text) for name, text in OPTIONS.items()]
-    topics = [DeclareLaunchArgument(name, default_value=name, description=text) for name, text in TOPICS.items()]
-    return LaunchDescription([*options, *topics, LogInfo(msg=profile.apply()), OpaqueFunction(function=_nodes)])
+    said = {**OPTIONS, **TOPICS}
+    arguments = [DeclareLaunchArgument(name, default_value="", description=text) for name, text in said.items()]
+    return LaunchDescription([*arguments, LogInfo(msg=profile.apply()), OpaqueFunction(function=_nodes)])
 
 
 def _nodes(context: LaunchContext) -> list[Node]:
@@ -65,6 +73,4 @@ def _parameters(room: str, said: dict[str, str]) -> list:
 
 
 def _remappings(said: dict[str, str]) -> list[tuple[str, str]]:
-    raw = {name: said[name] for name in TOPICS}
-    compressed = {name: f"{said[of]}/{name.rpartition('/')[2]}" for name, of in COMPRESSED.items()}
-    return [(name, topic) for name, topic in {**raw, **compressed}.items() if name != topic]
+    return [(topic, f"{said[name]}{ending}") for topic, (name, ending) in REMAPPED.items() if said[name]]

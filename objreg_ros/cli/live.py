@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from objreg_ros.bridge.collector import Collector, Sight
 
 ROOMS = ("detector", "segmenter", "registrar")
-START_S = 180.0  # a first start compiles kernels
+START_S = 600.0  # a first start compiles kernels, on a machine that may be busy
 DRAIN_S = 120.0  # the last searches
 QUIET_S = 3.0  # nothing moved for so long: all is through
 

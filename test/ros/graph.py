@@ -23,7 +23,7 @@ from objreg_ros.bridge import from_msg, profile, qos
 from objreg_ros.bridge.diagnostics import balance_of
 from objreg_ros.bridge.ledger import Balance
 
-START_S = 180.0  # a first start compiles kernels, on a machine that may be busy
+START_S = 600.0  # a first start compiles kernels, on a machine that may be busy
 ANSWER_S = 60.0
 REPOSITORY = Path(__file__).resolve().parents[2]
 
@@ -95,6 +95,7 @@ class Graph:
         deadline = time.monotonic() + seconds
         while not true():
             assert time.monotonic() < deadline, f"waited {seconds} s for {what}\n{self._logs()}"
+            assert all(map(self.alive, self.processes)), f"a node ended while waiting for {what}\n{self._logs()}"
             self.executor.spin_once(timeout_sec=0.05)
 
     def hear(self, kind: type, topic: str, profile: Any = None) -> None:

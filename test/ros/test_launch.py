@@ -37,7 +37,7 @@ sys.exit(service.run())
 def said(repository: Path) -> dict[str, Any]:
     """The arguments of objreg.launch.py when nothing is said."""
     file = launch_file(repository)
-    return dict.fromkeys(file["OPTIONS"], "") | {topic: topic for topic in file["TOPICS"]}
+    return dict.fromkeys([*file["OPTIONS"], *file["TOPICS"]], "")
 
 
 def launch_file(repository: Path) -> dict[str, Any]:
@@ -50,8 +50,13 @@ def test_without_arguments_no_parameter_is_set_and_nothing_is_remapped(repositor
 
 
 def test_an_image_is_remapped_with_its_compressed_form(repository: Path, said: dict[str, Any]) -> None:
-    rules = launch_file(repository)["_remappings"]({**said, "image": "/kinect/rgb"})
-    assert rules == [("image", "/kinect/rgb"), ("image/compressed", "/kinect/rgb/compressed")]
+    rules = launch_file(repository)["_remappings"]({**said, "image": "/kinect/rgb", "depth": "/kinect/z"})
+    assert rules == [
+        ("image", "/kinect/rgb"),
+        ("image/compressed", "/kinect/rgb/compressed"),
+        ("depth/image", "/kinect/z"),
+        ("depth/image/compressedDepth", "/kinect/z/compressedDepth"),
+    ]
 
 
 def test_what_is_said_goes_over_the_users_file_and_only_the_detector_has_a_model(
