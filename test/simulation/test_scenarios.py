@@ -3,16 +3,20 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
 from objreg_ros.data import Intrinsics
 from objreg_ros.geometry import rotation_angle
+from objreg_ros.simulation import scenarios
 from objreg_ros.simulation.render import render
-from objreg_ros.simulation.scenarios import SCENARIOS, Story, make_story
+from objreg_ros.simulation.scenarios import SCENARIOS, Story
 from objreg_ros.simulation.scene import Scene
 from objreg_ros.simulation.trajectory import speeds
 
+make_story = cache(scenarios.make_story)  # making a room takes half a second
 SMALL = Intrinsics(fx=131.25, fy=131.25, cx=79.5, cy=59.5, width=160, height=120)
 
 
@@ -31,7 +35,7 @@ def seen_on_the_first_table(story: Story, k: int) -> set[int]:
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_a_story_moves_at_the_speed_of_a_hand(scenario: str) -> None:
-    story = make_story(scenario, 1, frames=120)
+    story = make_story(scenario, 0, frames=60)
     moved, turned = speeds(story.T_world_camera, story.rate)
     assert moved.max() < 0.55 and turned.max() < 45.0
 
@@ -47,13 +51,13 @@ def test_the_first_table_is_left_out_of_sight_and_seen_again(scenario: str, seed
 
 def test_opposite_returns_from_the_other_side_and_loop_from_nearby() -> None:
     for scenario, low, high in (("opposite", 120.0, 180.0), ("loop", 0.0, 70.0)):
-        T = make_story(scenario, 4, frames=60).T_world_camera
+        T = make_story(scenario, 0, frames=60).T_world_camera
         turned = np.degrees(rotation_angle(T[2, :3, :3].T @ T[57, :3, :3]))
         assert low < turned < high
 
 
 def test_look_alikes_have_the_same_classes_on_both_tables_in_different_places() -> None:
-    scene = make_story("look-alikes", 3, frames=10).scenes[0]
+    scene = make_story("look-alikes", 0, frames=60).scenes[0]
     labels = []
     for place in scene.places:
         near = [o for o in scene.objects if np.linalg.norm(o.T_world_object[:3, 3] - place.centre) < place.reach]
@@ -62,7 +66,7 @@ def test_look_alikes_have_the_same_classes_on_both_tables_in_different_places() 
 
 
 def test_moved_rearranges_the_first_table_only_and_while_it_is_out_of_sight() -> None:
-    story = make_story("moved", 2, frames=60)
+    story = make_story("moved", 1, frames=60)
     before, after = ({o.instance: o for o in scene.objects} for scene in story.scenes)
     shifted = {
         k for k in before.keys() & after.keys() if not np.array_equal(before[k].T_world_object, after[k].T_world_object)
@@ -76,7 +80,9 @@ def test_moved_rearranges_the_first_table_only_and_while_it_is_out_of_sight() ->
 
 
 def test_occluders_crowd_the_tables() -> None:
-    plain, crowded = (make_story("loop", 5, frames=10, occluders=n).scenes[0] for n in (0, 8))
+    plain, crowded = (
+        story.scenes[0] for story in (make_story("loop", 0, frames=60), make_story("loop", 0, frames=60, occluders=8))
+    )
     assert crowd(crowded) > crowd(plain) + 3
 
 

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How fast the simulator is, stage by stage and as a whole, and how its depth noise compares to the model's.
+
+    python benchmarks/simulation.py --json simulation.json [--quick]
+
+``stages``: milliseconds of processor time a frame (median) of one thread at 640x480 over the views of a `loop`.
+``frame_ms``: wall time of a whole frame with 1 and 2 threads, p50 and p95, and ``depth_only_ms``. ``recording_fps``:
+frames a second of a whole recording, everything included. ``noise``: standard deviation of a wall's depth in
+millimetres by distance, measured and by the model with its quantisation.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+import cv2
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.simulation.camera import KINECT, ColourSensor
+from objreg_ros.simulation.light import looking
+from objreg_ros.simulation.mesh import Material, box
+from objreg_ros.simulation.noise import DepthSensor
+from objreg_ros.simulation.params import ColourParams, DepthParams, StressParams
+from objreg_ros.simulation.raster import Projection
+from objreg_ros.simulation.render import render, see
+from objreg_ros.simulation.scenarios import Story, make_story
+from objreg_ros.simulation.scene import Scene
+from objreg_ros.simulation.shade import shade
+from objreg_ros.simulation.write import simulate
+
+SHAPE = (KINECT.height, KINECT.width)
+DISTANCES_M = (0.6, 1.0, 1.5, 2.0, 3.0, 4.0)
+
+
+class Stages:
+    """Processor time of named stages."""
+
+    def __init__(self) -> None:
+        self.ms: dict[str, list[float]] = {}
+
+    def take(self, name: str, work: Callable[[], Any]) -> Any:
+        """Do ``work`` and book its time."""
+        start = time.thread_time()
+        result = work()
+        self.ms.setdefault(name, []).append(1e3 * (time.thread_time() - start))
+        return result
+
+
+def one_frame(scene: Scene, T: Array, seed: int, stages: Stages) -> None:
+    """A frame like `render` makes it, by stages."""
+    s = scene.surfaces
+    nearness, triangle = np.empty(SHAPE, np.float32), np.empty(SHAPE, np.int32)
+    light, depth, rgb = np.empty((*SHAPE, 3), np.uint16), np.empty(SHAPE, np.float32), np.empty((*SHAPE, 3), np.uint8)
+    rows = (0, SHAPE[0])
+    projection = stages.take("set up", lambda: Projection(s.vertices, s.faces, s.open_surface, T, KINECT))
+    stages.take("raster", lambda: projection.fill(nearness, triangle, *rows))
+    lit = (s, T, scene.lamps, scene.ambient, scene.shadows, rows, light)
+    stages.take("shade", lambda: shade(projection, nearness, triangle, *lit))
+    sensor = DepthSensor(DepthParams(), StressParams(), seed, SHAPE, s)
+    stages.take("depth noise", lambda: sensor.sense(projection, nearness, triangle, rows, depth))
+    camera = ColourSensor(ColourParams(), StressParams(), seed)
+    raw, gains = stages.take("expose", lambda: camera.exposed(light))
+    stages.take("colour noise", lambda: camera.develop(raw, gains, rows, rgb))
+    instance = np.where(triangle >= 0, s.instance[triangle], 0).astype(np.uint16)
+    stages.take("truth", lambda: see(scene, instance, T, KINECT))
+
+
+def whole_frames(story: Story, views: Array, **options: Any) -> list[float]:
+    """Wall milliseconds of every view."""
+    out = []
+    for k, T in enumerate(views):
+        start = time.perf_counter()
+        render(story.scenes[0], T, seed=k, **options)
+        out.append(1e3 * (time.perf_counter() - start))
+    return out
+
+
+def recording_rate(frames: int) -> float:
+    """Frames a second of a whole recording, from nothing to the closed bag."""
+    with tempfile.TemporaryDirectory() as folder:
+        start = time.perf_counter()
+        simulate(Path(folder) / "loop", "loop", seed=1, frames=frames)
+        return frames / (time.perf_counter() - start)
+
+
+def wall_noise(metres: float) -> dict[str, float]:
+    """Standard deviation of the depth of a wall, in mm, and what the model says."""
+    grey = Material(np.full((4, 4, 3), 128, np.uint8))
+    scene = Scene((), (box((40.0, 1.0, 40.0), grey).moved(y=metres + 0.5, z=-20.0),), (), np.full(3, 0.5))
+    view = looking(np.zeros(3), np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+    depth = render(scene, view, with_colour=False).depth
+    model = np.hypot(0.0012 + 0.0019 * (metres - 0.4) ** 2, 0.00285 * metres**2 / np.sqrt(12))
+    return {"measured_mm": 1e3 * float(depth[depth > 0].std()), "model_mm": 1e3 * float(model)}
+
+
+def quantiles(ms: list[float]) -> dict[str, float]:
+    """p50 and p95."""
+    return {"p50": float(np.median(ms)), "p95": float(np.percentile(ms, 95))}
+
+
+@click.command()
+@click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
+@click.option("--quick", is_flag=True, help="Few frames: within half a minute.")
+def command(json_file: Path | None, quick: bool) -> None:
+    """Time the simulator and print a table."""
+    cv2.setNumThreads(1)
+    story = make_story("loop", 1, frames=60)
+    scene = story.scenes[0]
+    scene.prepare()
+    views = story.T_world_camera[:: 6 if quick else 2]
+    whole_frames(story, views[:1])  # compile
+    stages = Stages()
+    for k, T in enumerate(views):
+        one_frame(scene, T, k, stages)
+    figures = {
+        "triangles": len(scene.surfaces.faces),
+        "objects": len(scene.objects),
+        "stages": {name: float(np.median(ms)) for name, ms in stages.ms.items()},
+        "frame_ms": {str(n): quantiles(whole_frames(story, views, threads=n)) for n in (1, 2)},
+        "depth_only_ms": quantiles(whole_frames(story, views, with_colour=False)),
+        "recording_fps": recording_rate(60 if quick else 300),
+        "noise": {str(metres): wall_noise(metres) for metres in DISTANCES_M},
+    }
+    show(figures)
+    if json_file:
+        json_file.write_text(json.dumps(figures, indent=2) + "\n")
+
+
+def show(figures: dict[str, Any]) -> None:
+    """Print the figures."""
+    click.echo(f"{figures['objects']} objects, {figures['triangles']} triangles, 640x480")
+    for name, ms in figures["stages"].items():
+        click.echo(f"  {name:14s}{ms:7.2f} ms")
+    for n, ms in figures["frame_ms"].items():
+        click.echo(f"whole frame, {n} threads: {ms['p50']:.1f} ms (p95 {ms['p95']:.1f})")
+    click.echo(f"depth only: {figures['depth_only_ms']['p50']:.1f} ms")
+    click.echo(f"recording: {figures['recording_fps']:.1f} frames/s")
+    for metres, noise in figures["noise"].items():
+        click.echo(f"noise at {metres} m: {noise['measured_mm']:.2f} mm, model {noise['model_mm']:.2f} mm")
+
+
+if __name__ == "__main__":
+    command()
