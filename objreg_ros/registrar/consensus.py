@@ -14,7 +14,6 @@ import numba
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.geometry import rotation_angle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -61,14 +60,31 @@ def distinct(T: Array, worth: Array, middle: Array, limit: int, angle: float, di
     """Indices of the best poses (N, 4, 4) that differ by ``angle`` rad, or move ``middle (3,)`` by ``distance`` m."""
     order = np.argsort(-worth, kind="stable")
     centres = T[:, :3, :3] @ middle + T[:, :3, 3]
-    chosen: list[int] = []
+    return [int(k) for k in _distinct(T, centres, order, limit, np.cos(angle), distance)]
+
+
+@numba.njit(cache=True, nogil=True)
+def _distinct(T, centres, order, limit, cosine, distance):  # type: ignore[no-untyped-def]
+    chosen = np.empty(limit, np.int64)
+    n = 0
     for k in order:
-        near = [c for c in chosen if np.linalg.norm(centres[c] - centres[k]) < distance]
-        if not any(rotation_angle(T[c, :3, :3].T @ T[k, :3, :3]) < angle for c in near):
-            chosen.append(int(k))
-        if len(chosen) == limit:
-            break
-    return chosen
+        known = False
+        for m in range(n):
+            c = chosen[m]
+            trace, gap = 0.0, 0.0
+            for a in range(3):
+                gap += (centres[c, a] - centres[k, a]) ** 2
+                for b in range(3):
+                    trace += T[c, a, b] * T[k, a, b]
+            if gap < distance * distance and 0.5 * (trace - 1.0) > cosine:
+                known = True
+                break
+        if not known:
+            chosen[n] = k
+            n += 1
+            if n == limit:
+                break
+    return chosen[:n]
 
 
 @numba.njit(cache=True, nogil=True, inline="always")

@@ -21,7 +21,7 @@ from objreg_ros.registrar.objects import explain
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Pantry, Prepared
 from objreg_ros.registrar.refine import refine
-from objreg_ros.registrar.verify import verify
+from objreg_ros.registrar.verify import rank, verify
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -74,7 +74,7 @@ class Engine:
             source.xyz[few], source.normals[few], target.surface, np.array([seed.T_target_source for seed in chain]),
             params.reaches[0], params.reaches[1], params.iterations,
         )  # fmt: skip
-        V = np.array([verify(source.sight, target.sight, pose, params, params.quick_sample).score for pose in T])
+        V = rank(source.sight, target.sight, T, params, params.quick_sample)
         chosen = distinct(T, V, source.middle, params.refined_per_chain, np.radians(5.0), 0.10)
         return [replace(chain[k], T_target_source=T[k]) for k in chosen]
 

@@ -13,7 +13,7 @@ from objreg_ros.registrar.consensus import Matches, poses
 from objreg_ros.registrar.features import match
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
-from objreg_ros.registrar.verify import verify
+from objreg_ros.registrar.verify import rank
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -67,8 +67,8 @@ def from_objects(source: Prepared, target: Prepared, params: RegistrarParams) ->
         rotation_from_vector(yaw * target.up) @ upright
         for yaw in np.linspace(0.0, 2.0 * np.pi, params.yaw_steps, endpoint=False)
     ]
-    T = [pose(R, target.centroids[j] - R @ source.centroids[i]) for i, j in pairs for R in turns]
-    worth = np.array([verify(source.sight, target.sight, each, params, params.glance).score for each in T])
+    T = np.array([pose(R, target.centroids[j] - R @ source.centroids[i]) for i, j in pairs for R in turns])
+    worth = rank(source.sight, target.sight, T.reshape(-1, 4, 4), params, params.glance)
     best = np.argsort(-worth, kind="stable")[: params.seeds_per_object_chain]
     return [Hypothesis(T_target_source=T[k], chain="objects", worth=float(worth[k])) for k in best]
 

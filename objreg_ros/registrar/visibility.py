@@ -125,6 +125,15 @@ def count(points, shades, T, near, far, detail, camera, tolerance, growth):  # t
     return out
 
 
+@numba.njit(cache=True, nogil=True)
+def count_many(points, shades, T, near, far, detail, camera, tolerance, growth):  # type: ignore[no-untyped-def]
+    """`count` for many poses (K, 4, 4): (K, 10)."""
+    out = np.empty((len(T), 10))
+    for k in range(len(T)):
+        out[k] = count(points, shades, T[k], near, far, detail, camera, tolerance, growth)
+    return out
+
+
 def correlation(counts: Array) -> float:
     """The normalised correlation -1..1 of the shades in ``counts``; 0 with fewer than 30 of them or none that vary."""
     n = counts[SHADED]
