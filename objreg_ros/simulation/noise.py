@@ -100,14 +100,41 @@ def _shadow_row(nearness, y, shift, out):  # type: ignore[no-untyped-def]
             least = column
 
 
+@nb.njit(cache=True, nogil=True, inline="always")
+def _surroundings(nearness, y, x):  # type: ignore[no-untyped-def]
+    """Least and greatest 1/z two pixels away, and by how much 1/z bends here: a plane does not, however slanted."""
+    height, width = nearness.shape
+    left, right = nearness[y, max(x - 2, 0)], nearness[y, min(x + 2, width - 1)]
+    above, below = nearness[max(y - 2, 0), x], nearness[min(y + 2, height - 1), x]
+    twice = 2 * nearness[y, x]
+    bend = max(abs(left + right - twice), abs(above + below - twice))
+    return min(min(left, right), min(above, below)), max(max(left, right), max(above, below)), bend
+
+
+@nb.njit(cache=True, nogil=True, inline="always")
+def _wandered(seed, y, x, jitter, shape):  # type: ignore[no-untyped-def]
+    """The pixel whose depth is measured at an edge pixel: one nearby, and nearby for the neighbours too."""
+    xx = min(max(x + int(np.rint(jitter * _wander(seed + 1, y, x))), 0), shape[1] - 1)
+    yy = min(max(y + int(np.rint(jitter * _wander(seed + 2, y, x))), 0), shape[0] - 1)
+    return yy, xx
+
+
+@nb.njit(cache=True, nogil=True, inline="always")
+def _facing(nearest, inverse_depth, f, fx, fy, dx, dy):  # type: ignore[no-untyped-def]
+    """The cosine between the ray (dx, dy, 1) and the normal of face f, from the face's plane in 1/z."""
+    a, b = inverse_depth[f, 1] * fx, inverse_depth[f, 2] * fy
+    c = nearest - a * dx - b * dy
+    return nearest / np.sqrt((a * a + b * b + c * c) * (np.float32(1.0) + dx * dx + dy * dy))
+
+
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def _sense(  # type: ignore[no-untyped-def]
     nearness, triangle, inverse_depth, loss, y_first, y_last, camera, numbers, seed, warp, depth
 ):  # fmt: skip
-    """Measure the rows y_first..y_last of ``depth``; see `sense_depth`. ``numbers`` are the parameters in order."""
+    """Measure the rows y_first..y_last of ``depth``; see `DepthSensor`. ``numbers`` are the parameters in order."""
     fx, fy, cx, cy = camera
     floor, growth, quantum, baseline, near, far, dropout, grazing, jitter, edge_dropout, mixed, bias = numbers
-    height, width = nearness.shape
+    width = nearness.shape[1]
     shadow = np.zeros(width, np.bool_)
     one, jump = np.float32(1.0), np.float32(JUMP_SHARE)
     cell_y, cell_x = NOISE_CELL_PX
@@ -118,40 +145,29 @@ def _sense(  # type: ignore[no-untyped-def]
         _shadow_row(nearness, y, fx * baseline, shadow)
         _noise_row(seed + 6, y, cell_y, cell_x, smooth)
         _noise_row(seed + 7, y, BLOTCH_PX, BLOTCH_PX, blotch)
-        up, down = max(y - 2, 0), min(y + 2, height - 1)
         dy = (np.float32(y) - cy) / fy
         for x in range(width):
             depth[y, x] = 0
             nearest = nearness[y, x]
             if nearest <= 0 or shadow[x]:
                 continue
-            bits = mixed_bits(seed, y * width + x)
-            left, right = nearness[y, max(x - 2, 0)], nearness[y, min(x + 2, width - 1)]
-            above, below = nearness[up, x], nearness[down, x]
-            low, high = min(min(left, right), min(above, below)), max(max(left, right), max(above, below))
+            at = y * width + x
+            bits = mixed_bits(seed, at)
+            low, high, bend = _surroundings(nearness, y, x)
             yy, xx = y, x
-            if high - low > jump * nearest and jitter >= 0:
-                # a slanted plane has the same second difference in 1/z everywhere: none
-                bend = max(abs(left + right - 2 * nearest), abs(above + below - 2 * nearest))
-                if bend > jump * nearest:
-                    luck = uniform(mixed_bits(seed + 3, y * width + x))
-                    if luck < edge_dropout:
-                        continue
-                    xx = min(max(x + int(np.rint(jitter * _wander(seed + 1, y, x))), 0), width - 1)
-                    yy = min(max(y + int(np.rint(jitter * _wander(seed + 2, y, x))), 0), height - 1)
-                    if nearness[yy, xx] <= 0:
-                        continue
-                    nearest = nearness[yy, xx]
-                    if luck > one - mixed:
-                        share = uniform(mixed_bits(seed + 4, y * width + x))
-                        nearest = one / (share / max(low, np.float32(0.05)) + (one - share) / high)
+            if bend > jump * nearest and high - low > jump * nearest:
+                luck = uniform(mixed_bits(seed + 3, at))
+                yy, xx = _wandered(seed, y, x, jitter, nearness.shape)
+                if luck < edge_dropout or nearness[yy, xx] <= 0:
+                    continue
+                nearest = nearness[yy, xx]
+                if luck > one - mixed:
+                    share = uniform(mixed_bits(seed + 4, at))
+                    nearest = one / (share / max(low, np.float32(0.05)) + (one - share) / high)
             f = triangle[yy, xx]
-            a, b = inverse_depth[f, 1] * fx, inverse_depth[f, 2] * fy
-            dx = (np.float32(x) - cx) / fx
-            c = nearness[yy, xx] - a * dx - b * dy
-            cosine = nearness[yy, xx] / np.sqrt((a * a + b * b + c * c) * (one + dx * dx + dy * dy))
+            cosine = _facing(nearness[yy, xx], inverse_depth, f, fx, fy, (np.float32(x) - cx) / fx, dy)
             lost = dropout + max(np.float32(0.0), (grazing - cosine) * np.float32(5.0))
-            if uniform(mixed_bits(seed + 5, y * width + x)) < lost:
+            if uniform(mixed_bits(seed + 5, at)) < lost:
                 continue
             if loss[f] > 0:  # in blotches: the logistic curve makes normal numbers nearly uniform
                 level = _at(blotch, x, BLOTCH_PX) + np.float32(0.4) * normal(bits)

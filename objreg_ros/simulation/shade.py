@@ -50,6 +50,34 @@ def _lit(moments, rotation, position, pinhole, reference, k, px, py, pz, floor):
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
+def _weights(edges, bounds, f, x, y, z):  # type: ignore[no-untyped-def]
+    """The barycentric coordinates of a pixel of face f at depth z."""
+    ox, oy = np.float32(x - bounds[f, 0]), np.float32(y - bounds[f, 1])
+    b0 = (edges[f, 0, 0] + edges[f, 0, 1] * ox + edges[f, 0, 2] * oy) * z
+    b1 = (edges[f, 1, 0] + edges[f, 1, 1] * ox + edges[f, 1, 2] * oy) * z
+    return b0, b1, np.float32(1.0) - b0 - b1
+
+
+@nb.njit(cache=True, nogil=True, inline="always")
+def _blend(values, faces, f, b, c):  # type: ignore[no-untyped-def]
+    """Column c of the corners' values of face f at barycentric coordinates b."""
+    return b[0] * values[faces[f, 0], c] + b[1] * values[faces[f, 1], c] + b[2] * values[faces[f, 2], c]
+
+
+@nb.njit(cache=True, nogil=True, inline="always")
+def _mip_level(size, pixel, cosine):  # type: ignore[no-untyped-def]
+    """The mip level whose texels are about as large as a pixel of ``pixel`` textures, and the level's size."""
+    spread = pixel * np.float32(size)
+    spread *= spread / max(cosine, np.float32(0.1))
+    level = 0
+    while spread > np.float32(2.0) and level < LEVELS - 1 and size > 1:
+        spread *= np.float32(0.25)
+        size >>= 1
+        level += 1
+    return level, size
+
+
+@nb.njit(cache=True, nogil=True, inline="always")
 def _texel(texels, start, size, u, v, out):  # type: ignore[no-untyped-def]
     """Bilinear, repeating texture lookup of one mip level, squared to linear light."""
     mask = size - 1
@@ -133,36 +161,20 @@ def _shade(  # type: ignore[no-untyped-def]
                 continue
             z = one / nearness[y, x]
             dx = (np.float32(x) - cx) / fx
-            rx, ry, rz = (
-                R[0, 0] * dx + R[0, 1] * dy + R[0, 2],
-                R[1, 0] * dx + R[1, 1] * dy + R[1, 2],
-                R[2, 0] * dx + R[2, 1] * dy + R[2, 2],
-            )
-            ox, oy = np.float32(x - bounds[f, 0]), np.float32(y - bounds[f, 1])
-            b0 = (edges[f, 0, 0] + edges[f, 0, 1] * ox + edges[f, 0, 2] * oy) * z
-            b1 = (edges[f, 1, 0] + edges[f, 1, 1] * ox + edges[f, 1, 2] * oy) * z
-            b2 = one - b0 - b1
-            v0, v1, v2 = faces[f, 0], faces[f, 1], faces[f, 2]
-            nx = b0 * normals[v0, 0] + b1 * normals[v1, 0] + b2 * normals[v2, 0]
-            ny = b0 * normals[v0, 1] + b1 * normals[v1, 1] + b2 * normals[v2, 1]
-            nz = b0 * normals[v0, 2] + b1 * normals[v1, 2] + b2 * normals[v2, 2]
+            rx = R[0, 0] * dx + R[0, 1] * dy + R[0, 2]
+            ry = R[1, 0] * dx + R[1, 1] * dy + R[1, 2]
+            rz = R[2, 0] * dx + R[2, 1] * dy + R[2, 2]
+            b = _weights(edges, bounds, f, x, y, z)
+            nx, ny = _blend(normals, faces, f, b, 0), _blend(normals, faces, f, b, 1)
+            nz = _blend(normals, faces, f, b, 2)
             ray = one / np.sqrt(rx * rx + ry * ry + rz * rz)
             norm = one / np.sqrt(nx * nx + ny * ny + nz * nz + np.float32(1e-12))
             facing = (nx * rx + ny * ry + nz * rz) * norm
             if open_surface[f] and facing > 0:
                 norm = -norm
             m = material[f]
-            # texture, at the mip level whose texels are about as large as the pixel
-            size = texture_size[m]
-            spread = detail[f] * np.float32(size) * z / fx
-            spread *= spread / max(abs(facing) * ray, np.float32(0.1))
-            level = 0
-            while spread > np.float32(2.0) and level < LEVELS - 1 and size > 1:
-                spread *= np.float32(0.25)
-                size >>= 1
-                level += 1
-            tu = b0 * uv[v0, 0] + b1 * uv[v1, 0] + b2 * uv[v2, 0]
-            tv = b0 * uv[v0, 1] + b1 * uv[v1, 1] + b2 * uv[v2, 1]
+            level, size = _mip_level(texture_size[m], detail[f] * z / fx, abs(facing) * ray)
+            tu, tv = _blend(uv, faces, f, b, 0), _blend(uv, faces, f, b, 1)
             _texel(texels, level_start[m, level], size, tu, tv, albedo)
             j = x >> 1
             shared = not keeps and lit_face[j] == f
