@@ -21,6 +21,7 @@ from objreg_ros.segmenter.surface import Surface, Window
 
 MIN_PART = 10  # cells; what is smaller joins a neighbour
 GROWTH = 12  # rounds that parts grow over seams
+MAX_CELLS = 16000  # around a box; larger ones are looked at on the coarse grid
 MAX_PARTS = 32
 
 
@@ -33,9 +34,10 @@ def isolate(
     are marked in ``taken (h, w) bool`` of the whole frame.
     """
     jump = (params.jump, params.jump_z2)
-    window = _cells(box, ground.surface)
-    crop = _expanded(window, params.margin, ground.surface)
-    around = ground.surface.crop(crop)
+    grid = _grid(box, ground, params.margin)
+    window = _cells(box, grid)
+    crop = _expanded(window, params.margin, grid)
+    around = grid.crop(crop)
     level, supported = support_cells(around, window, ground, params.height)
     here = (window[0] - crop[0], window[1] - crop[1], window[2] - crop[0], window[3] - crop[1])
     keep = (around.depth > 0) & ~level
@@ -49,8 +51,16 @@ def isolate(
     pixels = extract(image, box, around, chosen, jump)
     flags = PointFlag(0) if supported else PointFlag.UNSUPPORTED
     flags |= whole_flags(image, pixels, around, chosen, here)
-    taken[crop[1] : crop[3], crop[0] : crop[2]] |= chosen
+    scale = grid.step // ground.surface.step
+    marks = taken[::scale, ::scale]
+    marks[crop[1] : crop[3], crop[0] : crop[2]] |= chosen
     return pixels, flags
+
+
+def _grid(box: Box, ground: Ground, margin: float) -> Surface:
+    """The grid of the frame on which a box has no more than MAX_CELLS with its margin, or the coarsest one."""
+    pixels = (box[2] - box[0]) * (box[3] - box[1]) * (1 + 2 * margin) ** 2
+    return ground.surface if pixels <= MAX_CELLS * ground.surface.step**2 else ground.coarse
 
 
 def _chosen(parts: Parts, selected: list[int]) -> Array:

@@ -54,7 +54,7 @@ def _beneath(support: Support, window: Window, around: Surface, coarse: Surface)
     A part that lies mostly in the window is a top of the object itself, unless more of its plane is seen around it, or
     nothing is seen below it.
     """
-    stride = coarse.step // around.step
+    stride = coarse.step // around.step  # 1 or more
     left, top = around.left // coarse.step, around.top // coarse.step
     h, w = around.depth.shape
     right, bottom = left + -(-(w + stride) // stride), top + -(-(h + stride) // stride)
