@@ -29,6 +29,7 @@ from sources import Source, read_source
 from objreg_ros.data import Array, Frame, LoopClosure, Odometry, Reason
 from objreg_ros.geometry import inverse, rotation_angle
 from objreg_ros.mapper.pose_graph import PoseGraph
+from objreg_ros.offline import constraint
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.report.revisits import Revisit, Seen, recall_by_view_change, revisits
@@ -149,6 +150,7 @@ def judged(result: Result, source: Source, found: Sequence[Revisit]) -> dict[str
         "pruned": pruned,
         "rotation_deg": _median([error[0] for error in errors]),
         "translation_cm": _median([error[1] for error in errors]),
+        "closures": [constraint(closure) for closure in result.closures],
     }
 
 
