@@ -21,10 +21,10 @@ class MapperParams(Params):
 
     # How odometry is believed: errors grow with the square root of the way, so a steady bias fits in over a long way.
     odometry_translation_error: float = param(
-        0.02, "standard deviation of odometry after one metre or one radian", "m", ge=1e-4
+        0.02, "error of position after one metre or one radian, one sigma", "m", ge=1e-4
     )
     odometry_rotation_error: float = param(
-        1.0, "standard deviation of odometry after one metre or one radian", "deg", ge=1e-3
+        1.0, "error of rotation after one metre or one radian, one sigma", "deg", ge=1e-3
     )
     max_residual: float = param(
         5.0, "a constraint farther than this from all the others is pruned", "standard deviations", ge=1.0

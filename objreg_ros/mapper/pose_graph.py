@@ -141,7 +141,7 @@ class PoseGraph:
         k1, k2 = len(self.keyframes) - 2, len(self.keyframes) - 1
         T_k1_k2 = inverse(self.keyframes.poses[k1]) @ self.keyframes.poses[k2]
         sigmas = (self.params.odometry_translation_error, np.radians(self.params.odometry_rotation_error))
-        variance = sum(_motion(T_k1_k2)) * np.repeat(np.square(sigmas), 3)
+        variance = sum(_motion(T_k1_k2)) * np.repeat(np.square(sigmas) / 3, 3)  # a third on each axis
         return Tie(k1, k2, Constraint(T_k1_k2, np.diag(variance)))
 
 
