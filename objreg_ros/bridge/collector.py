@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from rclpy.context import Context
@@ -45,6 +46,7 @@ class Collector(Node):
         self.rejected: dict[str, int] = {}
         self.closures: list[LoopClosure] = []
         self.sight: Sight | None = None
+        self.glimpses: dict[int, dict[str, Any]] = {}  # stamp → labels detected, middles of objects
         self._names: Mapping[int, str] = {}
         self._recent: deque[Detections] = deque(maxlen=RECENT)
         self._executor = SingleThreadedExecutor(context=context)
@@ -93,14 +95,21 @@ class Collector(Node):
 
     def _hear_detections(self, message: Any) -> None:
         if message.width:
-            self._recent.append(from_msg.detections(message, self._names))
+            detections = from_msg.detections(message, self._names)
+            self._recent.append(detections)
+            self._glimpse(detections.stamp_ns)["labels"] = list(detections.label)
 
     def _hear_objects(self, message: Any) -> None:
         """Keep the frame with the most objects, and of those the latest."""
-        if not self._recent:
-            return
         stamp_ns = from_msg.stamp_ns(message)
         objects, _ = from_msg.objects(message, self._names)
+        middles = [[item.label, np.median(item.xyz, axis=0).astype(float).round(4).tolist()] for item in objects]
+        self._glimpse(stamp_ns)["objects"] = middles
+        if not self._recent:
+            return
         if self.sight is None or len(objects) >= len(self.sight.objects):
             seen = min(self._recent, key=lambda detections: abs(detections.stamp_ns - stamp_ns))
             self.sight = Sight(seen, objects, stamp_ns)
+
+    def _glimpse(self, stamp_ns: int) -> dict[str, Any]:
+        return self.glimpses.setdefault(stamp_ns, {"stamp_ns": stamp_ns, "labels": [], "objects": []})

@@ -22,6 +22,7 @@ from objreg_ros.offline import constraint
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
 from objreg_ros.report.live_pictures import draw_sight, draw_way
+from objreg_ros.report.write import write_report
 from objreg_ros.truth import Truth, summarise
 
 
@@ -72,9 +73,11 @@ def run(asked: Asked) -> None:
             raise ValueError(f"{bag}: expected {inputs.missing}, got {', '.join(source.topics)}; see --remap")
         live = run_live(bag, setup_of(choice, asked), asked.out / "logs", _say)
         truth = Truth.of(source, inputs.ground_truth)
-        _write(asked.out / "demo.json", live, truth)
+        _write(asked.out / "demo.json", bag, live, truth)
         _draw(asked.out, live, truth, source, inputs)
         sent = _sent(source, inputs, asked.seconds, live)
+    write_report(asked.out / "report.html", [asked.out / "demo.json"])
+    _say(f"wrote {asked.out / 'report.html'}")
     click.echo("\n".join(live_table.lines(live, sent, _errors(live, truth))))
     live_table.require_balance(live, sent)
 
@@ -123,13 +126,15 @@ def _errors(live: Live, truth: Truth) -> dict[str, Any]:
     return summarise([error for closure in live.closures if (error := truth.error(closure)) is not None])
 
 
-def _write(file: Path, live: Live, truth: Truth) -> None:
+def _write(file: Path, bag: Path, live: Live, truth: Truth) -> None:
     """The run as JSON."""
     summary = {
+        "recording": str(bag),
         "nodes": {room: asdict(books) for room, books in live.books.items()},
         "constraints": [constraint(closure) for closure in live.closures],
         "rejected": dict(live.rejected),
         "truth": _errors(live, truth),
+        "glimpses": live.glimpses,
     }
     file.write_text(json.dumps(summary, indent=1))
 

@@ -26,12 +26,13 @@ QUIET_S = 3.0  # nothing moved for so long: all is through
 
 @dataclass(frozen=True, slots=True)
 class Live:
-    """What came out of the live graph; ``books`` by node."""
+    """What came out of the live graph; ``books`` by node, ``glimpses`` as in `offline`, without poses."""
 
     books: Mapping[str, Balance]
     rejected: Mapping[str, int]
     closures: tuple[LoopClosure, ...]
     sight: Sight | None
+    glimpses: tuple[Mapping[str, Any], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +61,8 @@ def run_live(recording: Path, setup: Setup, folder: Path, say: Callable[[str], N
         say("waiting for the last frames")
         _drain(collector)
         books = {name.strip("/"): balance for name, balance in collector.books.items()}
-        return Live(books, collector.rejected, tuple(collector.closures), collector.sight)
+        glimpses = tuple(glimpse for _, glimpse in sorted(collector.glimpses.items()))
+        return Live(books, collector.rejected, tuple(collector.closures), collector.sight, glimpses)
 
 
 def private_environment() -> dict[str, str]:

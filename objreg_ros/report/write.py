@@ -9,7 +9,10 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from objreg_ros.bridge import from_msg
+from objreg_ros.data import Array
 from objreg_ros.recording import Recording
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.opening import open_recording
@@ -17,6 +20,8 @@ from objreg_ros.report.page import page
 from objreg_ros.report.pictures import Album
 from objreg_ros.report.story import Story
 from objreg_ros.truth import Truth
+
+ODOMETRY_SLOP_NS = 20_000_000  # as the registrar's default
 
 
 def write_report(out: Path, runs: Sequence[Path]) -> None:
@@ -38,17 +43,35 @@ def _chapter(file: Path, stack: ExitStack) -> tuple[Story, Album | None]:
         return Story.of(file.stem, summary, Truth([])), None
     recording = stack.enter_context(open_recording(place))
     inputs = choose_inputs(recording.topics)
-    told = {"glimpses": _odometry(recording, inputs.odom), **_of_nodes(summary), **summary}
+    glimpses = _with_odometry(summary.get("glimpses", ()), recording, inputs.odom)
+    told = {**_of_nodes(summary), **summary, "glimpses": glimpses}
     story = Story.of(place.resolve().name, told, Truth.of(recording, inputs.ground_truth))
     return story, Album(recording, inputs)
 
 
-def _odometry(recording: Recording, topic: str | None) -> list[dict[str, Any]]:
-    """Frames that are told by the odometry of the recording alone, for a run that did not tell of its frames."""
+def _with_odometry(
+    glimpses: Sequence[Mapping[str, Any]], recording: Recording, topic: str | None
+) -> list[Mapping[str, Any]]:
+    """The frames of a run, those that were told without a pose with that of the recording's odometry.
+
+    Without any frame, the odometry alone.
+    """
+    if any("T_odom_camera" in row for row in glimpses):
+        return list(glimpses)
     records = recording.records([topic]) if topic else ()
     words = (from_msg.odometry(record.message) for record in records)
-    poses = {word.stamp_ns: word.T_odom_body for word in words}
-    return [{"stamp_ns": stamp, "T_odom_camera": T.tolist()} for stamp, T in sorted(poses.items())]
+    poses = {word.stamp_ns: word.T_odom_body.tolist() for word in words}
+    rows = glimpses or [{"stamp_ns": stamp} for stamp in sorted(poses)]
+    stamps = np.array(sorted(poses), np.int64)
+    return [{**row, "T_odom_camera": poses.get(_nearest(stamps, row["stamp_ns"]))} for row in rows]
+
+
+def _nearest(stamps: Array, stamp_ns: int) -> int:
+    """The stamp within `ODOMETRY_SLOP_NS`; -1 if there is none."""
+    if len(stamps) == 0:
+        return -1
+    nearest = int(stamps[np.abs(stamps - stamp_ns).argmin()])
+    return nearest if abs(nearest - stamp_ns) <= ODOMETRY_SLOP_NS else -1
 
 
 def _of_nodes(summary: Mapping[str, Any]) -> dict[str, Any]:

@@ -40,6 +40,17 @@ def test_the_json_of_a_live_run_is_told_by_the_odometry_of_its_recording(tmp_pat
     assert ">29<" in text
 
 
+def test_frames_without_a_pose_get_that_of_the_odometry_at_their_time(tmp_path: Path) -> None:
+    write_rosbag2(tmp_path / "bag", records(30))
+    stamps = [record.stamp_ns for record in records(30) if record.topic == "/odom"]
+    seen = [{"stamp_ns": stamp + 1_000_000, "labels": ["cup"], "objects": [["cup", [0, 0, 1]]]} for stamp in stamps]
+    told = {"recording": str(tmp_path / "bag"), "constraints": [], "glimpses": [*seen, {"stamp_ns": 5}]}
+    (tmp_path / "demo.json").write_text(json.dumps(told))
+    write_report(tmp_path / "out.html", [tmp_path / "demo.json"])
+    text = (tmp_path / "out.html").read_text()
+    assert "Object map" in text and "cup, " in text
+
+
 @pytest.mark.parametrize("text", ["", "[1]", '{"frames": 3}'])
 def test_what_is_no_run_is_refused_by_name(tmp_path: Path, text: str) -> None:
     (tmp_path / "run.json").write_text(text)
