@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING
 import click
 from tqdm import tqdm
 
-from objreg_ros.bridge import from_msg
 from objreg_ros.bridge.receipts import DEPTH, IMAGE, Receipts
 from objreg_ros.cli import options
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
+from objreg_ros.recording.messages import header_stamp_ns
 from objreg_ros.recording.replay import Selection, graph_names, read_ahead, recorded_names
 
 if TYPE_CHECKING:
     from objreg_ros.bridge.player import Item, Player
 
 
-@click.command(context_settings={"ignore_unknown_options": True})
+@click.command()
 @options.recording
 @click.option("--rate", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True, help="Speed.")
 @click.option("--loop", is_flag=True, help="Begin again at the end, with the same stamps.")
@@ -114,8 +114,8 @@ def _items(source: Recording, selection: Selection, inputs: Inputs) -> Iterator[
     kinds = {inputs.image: IMAGE, inputs.depth: DEPTH, inputs.points: DEPTH}
     for record in selection.records(source):
         name, kind = selection.names[record.topic], kinds.get(record.topic, "")
-        header_ns = from_msg.stamp_ns(record.message) if kind else 0
-        yield Item(name, record.stamp_ns, record.cdr, kind, header_ns)
+        cdr = record.cdr
+        yield Item(name, record.stamp_ns, cdr, kind, header_stamp_ns(cdr) if kind else 0)
 
 
 def _say(player: Player, receipts: Receipts | None) -> None:

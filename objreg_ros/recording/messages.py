@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import struct
 from collections.abc import Sequence
 from functools import cache
 from typing import Any
@@ -18,6 +19,8 @@ from objreg_ros.data import Intrinsics
 from objreg_ros.geometry import quaternion_from_rotation
 
 Array = NDArray[Any]
+
+CDR_PREFIX = 4  # bytes before the fields; the second says the byte order
 
 
 @cache
@@ -36,6 +39,14 @@ def serialise(made: Any) -> bytes:
     """The CDR bytes of a message of a standard type; of a ROS 1 message after it was brought up to date."""
     modern = modernise(made)
     return bytes(standard_types().serialize_cdr(modern, modern.__msgtype__))
+
+
+def header_stamp_ns(cdr: bytes) -> int:
+    """The stamp of a message that begins with a header, from its CDR bytes: nothing else is decoded."""
+    if len(cdr) < CDR_PREFIX + 8:
+        raise ValueError(f"expected the CDR bytes of a message with a header, got {len(cdr)} bytes")
+    seconds, nanoseconds = struct.unpack_from("<iI" if cdr[1] & 1 else ">iI", cdr, CDR_PREFIX)
+    return int(seconds) * 10**9 + int(nanoseconds)
 
 
 def modernise(old: Any) -> Any:

@@ -46,6 +46,19 @@ def test_poses_pass_through_their_bytes() -> None:
     assert np.allclose(moved.T_odom_body, T) and moved.child_frame_id == "camera"
 
 
+@pytest.mark.parametrize("stamp_ns", [0, 5, 12_000_000_003, 1_700_000_000_999_999_999])
+def test_the_stamp_is_read_from_the_bytes_alone(stamp_ns: int) -> None:
+    info = messages.camera_info(CAMERA, stamp_ns, "a camera")
+    assert messages.header_stamp_ns(messages.serialise(info)) == stamp_ns
+    big = messages.standard_types().serialize_cdr(info, info.__msgtype__, little_endian=False)
+    assert messages.header_stamp_ns(bytes(big)) == stamp_ns
+
+
+def test_bytes_without_room_for_a_stamp_are_refused() -> None:
+    with pytest.raises(ValueError, match="got 7 bytes"):
+        messages.header_stamp_ns(bytes(7))
+
+
 def test_a_type_that_ros_2_does_not_ship_is_refused() -> None:
     with pytest.raises(ValueError, match="my_msgs/msg/Odd: expected a type that ROS 2 ships"):
         messages.serialise(SimpleNamespace(__msgtype__="my_msgs/msg/Odd"))

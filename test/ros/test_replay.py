@@ -15,6 +15,7 @@ from nav_msgs.msg import Odometry
 from recording.folders import tum_folder
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Image
+from std_srvs.srv import Trigger
 
 from objreg_ros.bridge import from_msg, qos
 
@@ -36,8 +37,8 @@ def objreg(graph: Graph, *words: str, seconds: float = 600) -> str:
 
 
 def start(graph: Graph, model: Path, *detector: str) -> None:
-    graph.start("detector", "detector", f"-p model:={model}", *detector)
-    graph.start("segmenter", "segmenter")
+    graph.start("detector", "detector", f"-p model:={model}", "-p reliable:=true", *detector)
+    graph.start("segmenter", "segmenter", "-p reliable:=true")
     graph.start("registrar", "registrar")
 
 
@@ -88,12 +89,21 @@ def test_a_lossless_replay_without_nodes_says_so(fresh: Graph, tmp_path: Path) -
     assert done.returncode == 1 and "expected the nodes to publish `finished`, got none" in done.stderr
 
 
+def end_keyframe(graph: Graph) -> None:
+    """Let the registrar search for the keyframe in hand, as an offline run does at its end."""
+    client = graph.node.create_client(Trigger, "registrar/save")
+    graph.wait_for(client.service_is_ready, what="the registrar's service")
+    answer = client.call_async(Trigger.Request())
+    graph.wait_for(answer.done, START_S, "the registrar to save")
+
+
 @pytest.mark.slow
 def test_a_recording_gives_the_same_constraints_live_and_offline(fresh: Graph, shared: Path, tmp_path: Path) -> None:
     kitchen, model = shared / "data/redkitchen_a", shared / "models/ssd_mobilenet_v1_coco_int8.onnx"
     fresh.hear(Odometry, "constraints", qos.latched(1000))
     start(fresh, model, "-p threshold:=0.4")
     objreg(fresh, "replay", str(kitchen), "--lossless", "--end", "4", "--wait", str(START_S))
+    end_keyframe(fresh)
     words = ("offline", str(kitchen), "--model", str(model), "--set", "detector.threshold=0.4", "--max-frames", "60")
     objreg(fresh, *words, "--json", str(tmp_path / "out.json"))
     offline = json.loads((tmp_path / "out.json").read_text())["constraints"]
