@@ -21,6 +21,11 @@ from objreg_ros.bridge.receipts import DEPTH, IMAGE, ORDER, Receipts
 
 QUEUE = 20  # messages of a topic that wait in DDS for a slow reader
 ASK_AGAIN_S = 2.0  # how often a play that waits looks whether the nodes are still there
+START_S = 300.0  # how long the start of a node may take
+INPUTS = {  # what a node hears of the nodes before it
+    "segmenter": ("detections_table", "labels"),
+    "registrar": ("objects", "view", "view/camera_info", "gravity", "labels"),
+}
 SETTLE_S = 3.0  # for the nodes to find us and each other, after we have found some of them
 # One image and one depth are on their way at a time, so that none is overtaken. Where the graph stays silent, it may
 # wait for what comes next (slow odometry, say): a second goes after 1 s of silence, a third after 10 s.
@@ -71,19 +76,36 @@ class Player(Node):
         return [p.topic_name for p in wanted if p.get_subscription_count() == 0]
 
     def listen_to_receipts(self, seconds: float) -> Receipts:
-        """Wait for the nodes that receipt frames; ValueError if there are none within ``seconds``."""
+        """Wait for the nodes that receipt frames; ValueError if there are none within ``seconds``.
+
+        A node that is there is waited for until it listens to its inputs: its first start compiles for a while.
+        """
         self.create_subscription(Header, "finished", self._hear, qos.room(depth=1000))
-        deadline = time.monotonic() + seconds
-        while not set(ORDER) <= self._receipting() and time.monotonic() < deadline:
-            self._executor.spin_once(timeout_sec=0.05)
+        self._spin_until(lambda: set(ORDER) <= self._receipting(), seconds)
         nodes = self._receipting() & set(ORDER)
         if not nodes:
             raise ValueError("lossless: expected the nodes to publish `finished`, got none; are they running here?")
+        if not self._spin_until(lambda: not self._deaf(nodes), START_S):
+            raise ValueError(f"lossless: expected nodes that listen, got none on {', '.join(self._deaf(nodes))}")
+        self._wait_until(time.monotonic() + SETTLE_S)
         self._receipts = Receipts(nodes)
         return self._receipts
 
+    def _spin_until(self, true: Callable[[], bool], seconds: float) -> bool:
+        deadline = time.monotonic() + seconds
+        while not true() and time.monotonic() < deadline:
+            self._executor.spin_once(timeout_sec=0.05)
+        return true()
+
     def _receipting(self) -> set[str]:
         return {info.node_name for info in self.get_publishers_info_by_topic(self.resolve_topic_name("finished"))}
+
+    def _deaf(self, nodes: Iterable[str]) -> list[str]:
+        """What the nodes should listen to and do not yet."""
+        return [topic for node in nodes for topic in INPUTS.get(node, ()) if node not in self._listeners(topic)]
+
+    def _listeners(self, topic: str) -> set[str]:
+        return {info.node_name for info in self.get_subscriptions_info_by_topic(self.resolve_topic_name(topic))}
 
     def _hear(self, receipt: Header) -> None:
         self._heard = time.monotonic()

@@ -54,7 +54,7 @@ def test_a_lossless_replay_brings_every_frame_through_every_node(
 ) -> None:
     start(fresh, tiny_model)
     folder = tum_folder(tmp_path / "tum", frames=12)
-    output = objreg(fresh, "replay", str(folder), "--lossless", "--wait", str(START_S))
+    output = objreg(fresh, "replay", str(folder), "--lossless", "--wait", str(START_S), "--patience", "60")
     assert "12 image" in output
     for room in ROOMS:
         assert f"{room}: 12 published\n" in output
@@ -67,7 +67,7 @@ def test_depth_with_stamps_of_its_own_goes_through_but_for_the_last(
 ) -> None:
     start(fresh, tiny_model)
     folder = tum_folder(tmp_path / "tum", frames=6, lag=0.004)
-    output = objreg(fresh, "replay", str(folder), "--lossless", "--wait", str(START_S))
+    output = objreg(fresh, "replay", str(folder), "--lossless", "--wait", str(START_S), "--patience", "60")
     assert "registrar: 5 published\n" in output  # the last depth is newer than any image, so another may come
     assert "1 frames without a receipt, the first of 504000000 ns" in output
 
