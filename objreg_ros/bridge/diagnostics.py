@@ -15,6 +15,7 @@ DROPPED = "dropped: "
 LOST = "lost in transport: "
 LATENCY = "latency "
 REJECTED = "rejected: "
+CONNECTED = "connected: "
 
 
 def diagnostic(
@@ -68,6 +69,11 @@ def balance_of(status: DiagnosticStatus) -> Balance:
             for stage in stages
         },
     )
+
+
+def connected_of(status: DiagnosticStatus) -> dict[str, int]:
+    """Full topic name → the publishers that a node is connected to, as its status tells."""
+    return _counts_of({pair.key: pair.value for pair in status.values}, CONNECTED)
 
 
 def _counts_of(values: Mapping[str, str], prefix: str) -> dict[str, int]:

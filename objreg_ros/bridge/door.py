@@ -11,6 +11,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
@@ -19,7 +20,7 @@ from rclpy.task import Future
 from std_msgs.msg import Header
 
 from objreg_ros.bridge import qos, to_msg
-from objreg_ros.bridge.diagnostics import diagnostic
+from objreg_ros.bridge.diagnostics import CONNECTED, diagnostic
 from objreg_ros.bridge.ledger import Ledger
 from objreg_ros.bridge.log import ThrottledLog
 from objreg_ros.bridge.missed import Missed
@@ -50,6 +51,7 @@ class Door(Node):
         self.settings = Parameters(self, *kinds, DoorParams)
         self.settings.changed = self.adopt
         self.ledger = Ledger()
+        self.connected: dict[str, int] = {}  # full topic name → publishers that DDS has connected us to
         self.failure: Future = Future()
         self.throttled = ThrottledLog(self.get_logger().warning)
         self.watch = Watch(self.count_publishers, self.settings.of(DoorParams).silence)
@@ -89,7 +91,12 @@ class Door(Node):
             self.watch.hear(watched)
             heard(message)
 
-        return self.create_subscription(kind, topic, hear, profile)  # type: ignore[arg-type]  # takes both forms
+        full = self.resolve_topic_name(topic)
+        events = SubscriptionEventCallbacks(matched=partial(self._note_match, full))
+        return self.create_subscription(kind, topic, hear, profile, event_callbacks=events)  # type: ignore[arg-type]
+
+    def _note_match(self, topic: str, event: Any) -> None:
+        self.connected[topic] = event.current_count
 
     def _note_loss(self, topic: str, count: int) -> None:
         if count and self.count_publishers(self.resolve_topic_name(topic)) == 1:  # several count each for itself
@@ -180,7 +187,9 @@ class Door(Node):
         rate = (balance.received - before) / (now - then)
         stamp = self.get_clock().now().to_msg()
         name = self.get_fully_qualified_name()
-        self._diagnostics.publish(diagnostic(name, stamp, balance, rate, silent, self.extra_diagnostics()))
+        connected = {f"{CONNECTED}{topic}": count for topic, count in sorted(self.connected.items())}
+        extra = {**connected, **self.extra_diagnostics()}
+        self._diagnostics.publish(diagnostic(name, stamp, balance, rate, silent, extra))
 
     def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> SetParametersResult:
         """As rclpy, but refused in the words of `Params`, and with 1 good for 1.0."""

@@ -20,7 +20,7 @@ from rclpy.node import Node
 from std_msgs.msg import Header
 
 from objreg_ros.bridge import from_msg, profile, qos
-from objreg_ros.bridge.diagnostics import balance_of
+from objreg_ros.bridge.diagnostics import balance_of, connected_of
 from objreg_ros.bridge.ledger import Balance
 
 START_S = 600.0  # a first start compiles kernels, on a machine that may be busy
@@ -44,6 +44,7 @@ class Graph:
         self.publishers: dict[str, Any] = {}
         self.heard: defaultdict[str, list[Any]] = defaultdict(list)
         self.books: dict[str, Balance] = {}
+        self.connected: dict[str, dict[str, int]] = {}
         self.node.create_subscription(DiagnosticArray, "/diagnostics", self._take_books, qos.room())
 
     # Processes
@@ -107,9 +108,9 @@ class Graph:
         if topic not in self.publishers:
             reliable = qos.latched() if topic.endswith("labels") else qos.room()
             self.publishers[topic] = self.node.create_publisher(type(message), topic, reliable)
-            publisher = self.publishers[topic]
-            enough = lambda: publisher.get_subscription_count() >= listeners  # noqa: E731
-            self.wait_for(enough, START_S, f"{listeners} listeners on {topic}")
+            full = self.publishers[topic].topic_name
+            there = lambda: sum(known.get(full, 0) for known in self.connected.values()) >= listeners  # noqa: E731
+            self.wait_for(there, START_S, f"{listeners} nodes that are connected to {topic}")
         self.publishers[topic].publish(message)
 
     def answer(self, node: str, stamp_ns: int, topic: str = "finished") -> str:
@@ -137,7 +138,8 @@ class Graph:
 
     def _take_books(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            self.books[status.name.removesuffix(": frames")] = balance_of(status)
+            name = status.name.removesuffix(": frames")
+            self.books[name], self.connected[name] = balance_of(status), connected_of(status)
 
     def _logs(self) -> str:
         return "\n".join(f"--- {name}\n{self.log(name)}" for name in self.processes)

@@ -44,6 +44,15 @@ def running(graph: Graph, tiny_model: Path) -> Graph:
     return graph
 
 
+def connected(graph: Graph) -> bool:
+    """Whether the rooms are connected to each other."""
+    inner = {
+        "/segmenter": ("/detections_table", "/labels"),
+        "/registrar": ("/labels", *(f"/{topic}" for topic in WIRE)),
+    }
+    return all(graph.connected.get(node, {}).get(topic) for node, topics in inner.items() for topic in topics)
+
+
 def feed(graph: Graph, moment: Moment) -> None:
     for topic, message in moment.messages.items():
         graph.publish(topic, message, listeners=2 if topic == "image" else 1)
@@ -60,6 +69,7 @@ def call(graph: Graph, kind: type, name: str, **values: object) -> tuple[bool, s
 def test_every_frame_passes_three_nodes_and_every_node_balances_its_books(
     running: Graph, moments: list[Moment]
 ) -> None:
+    running.wait_for(lambda: connected(running), START_S, "the rooms to find each other")
     for moment in moments:
         feed(running, moment)
         assert [running.answer(room, moment.stamp_ns) for room in ROOMS] == ["published"] * 3, running.log("/registrar")
