@@ -60,6 +60,7 @@ setup(
             "detector = objreg_ros.detector.node:main",
             "segmenter = objreg_ros.segmenter.node:main",
             "registrar = objreg_ros.registrar.node:main",
+            "mapper = objreg_ros.mapper.node:main",
         ],
     },
     zip_safe=True,
