@@ -158,3 +158,28 @@ def _at_jump(depth, v, u, jump):  # type: ignore[no-untyped-def]
         or (u >= 2 and not abs(depth[v, u - 2] - z) < jump)
         or (u + 2 < w and not abs(depth[v, u + 2] - z) < jump)
     )
+
+
+def cell_points(surface: Surface, cells: Array, rgb: Array | None) -> tuple[Array, Array, Array | None]:
+    """Points and normals (N, 3) float32 and colours (N, 3) uint8 or None of ``cells (h, w) bool`` of a whole frame."""
+    n = int(np.count_nonzero(cells))
+    xyz, normals = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
+    _gather_cells(surface.depth, surface.normals, surface.x, surface.y, cells, xyz, normals)
+    if rgb is None:
+        return xyz, normals, None
+    colours = np.empty((n, 3), np.uint8)
+    _pick(rgb[:: surface.step, :: surface.step], 0, 0, cells, colours)
+    return xyz, normals, colours
+
+
+@numba.njit(cache=True)
+def _gather_cells(depth, cell_normals, x, y, cells, xyz, normals):  # type: ignore[no-untyped-def]
+    n = 0
+    for i in range(depth.shape[0]):
+        for j in range(depth.shape[1]):
+            if cells[i, j]:
+                z = depth[i, j]
+                xyz[n, 0], xyz[n, 1], xyz[n, 2] = x[j] * z, y[i] * z, z
+                for k in range(3):
+                    normals[n, k] = cell_normals[k, i, j]
+                n += 1

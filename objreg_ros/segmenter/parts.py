@@ -68,14 +68,8 @@ def measure(
     ``rgb (H, W, 3) uint8`` is the whole picture, or None.
     """
     left, top, right, bottom = window
-    inside = np.bincount(labels[top:bottom, left:right].ravel(), minlength=count + 1)
-    inside[0] = 0
-    order = np.argsort(-inside, kind="stable")[:limit]
-    order = order[inside[order] > 0]
-    number = np.zeros(count + 1, np.int32)
-    number[order] = np.arange(1, len(order) + 1)
-    renamed = number[labels]
-    k = len(order) + 1
+    renamed = np.empty_like(labels)
+    k = 1 + _rank(labels, count, np.array(window), limit, renamed)
     counts, extent = np.zeros((k, 4)), np.zeros((k, 4), np.int64)
     touching, front, gap = np.zeros((k, k), np.int64), np.zeros((k, k), np.int64), np.full((k, k), np.inf, np.float32)
     bounds = np.array(jump, np.float32)
@@ -97,6 +91,27 @@ def measure(
         front=front[1:],
         hidden=front[:, 1:].sum(axis=0),
     )
+
+
+@numba.njit(cache=True)
+def _rank(labels, count, window, limit, renamed):  # type: ignore[no-untyped-def]
+    """Fill ``renamed`` with labels in the order of their cells in the window, 0 without any; how many there are."""
+    left, top, right, bottom = window
+    inside = np.zeros(count + 1, np.int64)
+    for i in range(top, bottom):
+        for j in range(left, right):
+            inside[labels[i, j]] += 1
+    inside[0] = 0
+    number = np.zeros(count + 1, np.int32)
+    kept = 0
+    for k in np.argsort(-inside, kind="mergesort")[:limit]:
+        if inside[k] > 0:
+            kept += 1
+            number[k] = kept
+    for i in range(labels.shape[0]):
+        for j in range(labels.shape[1]):
+            renamed[i, j] = number[labels[i, j]]
+    return kept
 
 
 def _colours(labels: Array, rgb: Array, surface: Surface, count: int) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 from objreg_ros.data import Array, DepthImage, Detections, Frame, Intrinsics, ObjectCloud, PointFlag
 from objreg_ros.segmenter import boxes, paper
 from objreg_ros.segmenter.boxes import Box
-from objreg_ros.segmenter.extract import Pixels
+from objreg_ros.segmenter.extract import Pixels, cell_points
 from objreg_ros.segmenter.gravity import CAMERA_UP, estimate_up, known_normals
 from objreg_ros.segmenter.isolate import isolate
 from objreg_ros.segmenter.params import SegmenterParams
@@ -106,23 +106,21 @@ def _object(label: str, score: float, instance: int, pixels: Pixels, flags: Poin
 
 def _support_cloud(ground: Ground, taken: Array, depth: DepthImage) -> ObjectCloud | None:
     """The coarse cells of the support surfaces that are of no object, one point each; None where there are none."""
-    surface = ground.coarse
-    cells = np.zeros(surface.depth.shape, np.bool_)
+    cells = np.zeros(ground.coarse.depth.shape, np.bool_)
     for support in ground.supports:
         cells |= support.parts > 0
     cells &= ~taken[::COARSE, ::COARSE]
-    rows, cols = np.nonzero(cells)
-    if len(rows) == 0:
+    xyz, normals, rgb = cell_points(ground.coarse, cells, depth.rgb)
+    if len(xyz) == 0:
         return None
-    z = surface.depth[rows, cols]
     area = sum(support.area for support in ground.supports)
     return ObjectCloud(
         label="support",
         score=1.0,
         instance=0,
-        xyz=np.stack([surface.x[cols] * z, surface.y[rows] * z, z], axis=-1),
-        normals=np.ascontiguousarray(surface.normals[:, rows, cols].T),
-        rgb=None if depth.rgb is None else depth.rgb[rows * surface.step, cols * surface.step],
-        flags=np.zeros(len(rows), np.uint16),
-        density=len(rows) / max(area, 1e-9),
+        xyz=xyz,
+        normals=normals,
+        rgb=rgb,
+        flags=np.zeros(len(xyz), np.uint16),
+        density=len(xyz) / max(area, 1e-9),
     )

@@ -36,11 +36,19 @@ def select(parts: Parts, window: Window) -> list[int]:
     fits = np.array([_fit(extent, window) for extent in parts.extent])
     score = np.sqrt(parts.weight) * parts.pure**2 * (0.1 + fits) ** 2 * (0.2 + parts.figure)
     chosen = [int(score.argmax())]
+    if _is_alone(parts, chosen[0]):
+        return [chosen[0] + 1]
     while True:
         best = _best_addition(parts, chosen, window)
         if best is None:
             return [k + 1 for k in chosen + _enclosed(parts, chosen, window)]
         chosen.append(best)
+
+
+def _is_alone(parts: Parts, seed: int) -> bool:
+    """Whether no other part could be added: nothing next to it lies in the box."""
+    near = parts.gap[seed] < GAP_ALIKE * parts.size[seed]  # parts that touch have a gap too, of one cell
+    return not bool((near & (parts.pure >= MIN_PURE)).any())
 
 
 def _touching(parts: Parts, chosen: list[int]) -> Array:
