@@ -27,16 +27,16 @@ LEAST_SIDE_PX = 6.0
 INTERPOLATIONS = (cv2.INTER_LINEAR, cv2.INTER_AREA, cv2.INTER_CUBIC, cv2.INTER_NEAREST)
 
 
-MOSAIC_SHARE, MOSAIC_GRIDS, MOSAIC_ZOOM = 0.65, (2, 3, 3, 4), (0.55, 2.5)
-"""So many pictures are grids of pieces with an object each: many times as much to learn from for the same time."""
+MOSAIC_GRIDS, MOSAIC_ZOOM = (2, 3, 3, 4), (0.55, 2.5)
+"""A grid of pieces with an object each is many times as much to learn from in the same time."""
 
 LABEL_WEIGHTS = np.array([1.0, 1.0, 1.6, 0.6, 0.8, 1.2, 1.6, 1.4, 1.0])
 """How often the pieces show each label, in the order of the labels; small and thin things are harder to learn."""
 
 
-def augment(pick: Callable[[], Sample], rng: Rng) -> Sample:
-    """A random picture of the network's size made of one or four samples that ``pick`` gives."""
-    sample = mosaic(pick, rng) if rng.random() < MOSAIC_SHARE else single(pick(), rng)
+def augment(pick: Callable[[], Sample], rng: Rng, mosaic_share: float = 0.5) -> Sample:
+    """A random picture of the network's size: a share of mosaics, the others of one sample that ``pick`` gives."""
+    sample = mosaic(pick, rng) if rng.random() < mosaic_share else single(pick(), rng)
     rgb = sample.rgb
     if rng.random() < 0.5:
         rgb = change_light(rgb, rng)

@@ -30,8 +30,9 @@ def example(sample: Sample, matcher: Matcher) -> Example:
 class Stream(IterableDataset[Example]):
     """Augmented examples in random order without end; new shards join as they appear."""
 
-    def __init__(self, folder: Path, seed: int, look_again_every: int = 2000) -> None:
-        self.folder, self.seed, self.look_again_every = folder, seed, look_again_every
+    def __init__(self, folder: Path, seed: int, mosaic_share: float, look_again_every: int = 2000) -> None:
+        self.folder, self.seed, self.mosaic_share = folder, seed, mosaic_share
+        self.look_again_every = look_again_every
 
     def __iter__(self) -> Iterator[Example]:
         worker = get_worker_info()
@@ -48,7 +49,7 @@ class Stream(IterableDataset[Example]):
                 raise ValueError(f"{self.folder}: expected shards (*.npz), got none; run training.render first")
             places = [(shard, index) for shard in shards.values() for index in range(len(shard))]
             for _ in range(self.look_again_every):
-                yield example(augment(lambda: _pick(places, rng), rng), matcher)  # noqa: B023
+                yield example(augment(lambda: _pick(places, rng), rng, self.mosaic_share), matcher)  # noqa: B023
 
 
 def _pick(places: list[tuple[Shard, int]], rng: np.random.Generator) -> Sample:

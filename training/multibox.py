@@ -12,7 +12,6 @@ from torch.nn import functional
 MATCH_IOU, IGNORE_IOU = 0.4, 0.3
 """A prior that overlaps an object by the first is positive; between the two it is neither positive nor negative."""
 
-NEGATIVES_PER_POSITIVE = 3
 LEAST_NEGATIVES = 20
 """An image without objects still teaches by its hardest negatives."""
 
@@ -73,15 +72,17 @@ class Matcher:
         return target, offsets
 
 
-def multibox_loss(loc: Tensor, logits: Tensor, target: Tensor, offsets: Tensor) -> tuple[Tensor, Tensor]:
-    """The location and the confidence loss of a batch, each per positive prior, with hard negative mining."""
+def multibox_loss(
+    loc: Tensor, logits: Tensor, target: Tensor, offsets: Tensor, negatives: int = 3
+) -> tuple[Tensor, Tensor]:
+    """The location and the confidence loss of a batch, each per positive prior, with so many hard negatives to one."""
     positive = target > 0
     count = positive.sum().clamp(min=1)
     location = functional.smooth_l1_loss(loc[positive], offsets[positive], reduction="sum", beta=0.5) / count
     entropy = functional.cross_entropy(logits.flatten(0, 1), target.clamp(min=0).flatten(), reduction="none")
     entropy = entropy.view_as(target)
     hardness = torch.where(target == 0, entropy.detach(), torch.full_like(entropy, -1.0))
-    wanted = (positive.sum(dim=1, keepdim=True) * NEGATIVES_PER_POSITIVE).clamp(min=LEAST_NEGATIVES)
+    wanted = (positive.sum(dim=1, keepdim=True) * negatives).clamp(min=LEAST_NEGATIVES)
     hardest = hardness.topk(int(wanted.max().clamp(max=target.shape[1])), dim=1).indices
     within = torch.arange(hardest.shape[1], device=hardest.device) < wanted
     chosen = positive | (torch.zeros_like(positive).scatter(1, hardest, within) & (target == 0))

@@ -53,7 +53,7 @@ class Training:
         """Leave the first layers as they are: a fifth of the time for what changes least late in a training."""
         self.network.stages[0][0].requires_grad_(False).eval()
 
-    def advance(self, batch: Example, steps: int) -> tuple[float, float]:
+    def advance(self, batch: Example, steps: int, negatives: int = 3) -> tuple[float, float]:
         """One step on one batch; the location and the confidence loss."""
         picture, target, offsets = (part.to(self.device, non_blocking=True) for part in batch)
         for group in self.optimiser.param_groups:
@@ -61,7 +61,7 @@ class Training:
         x = picture.to(memory_format=torch.channels_last, dtype=torch.float32)
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.half):
             loc, logits = self.network((x - 127.5) / 127.5)
-        location, confidence = multibox_loss(loc.float(), logits.float(), target, offsets)
+        location, confidence = multibox_loss(loc.float(), logits.float(), target, offsets, negatives)
         self.optimiser.zero_grad(set_to_none=True)
         (location + confidence).backward()
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), GRADIENT_LIMIT)
@@ -124,12 +124,12 @@ def _state(network: MobileNetSsd) -> Iterator[Tensor]:
 
 def run(training: Training, arguments: argparse.Namespace) -> None:
     """Train until the last step, with a checkpoint, an ONNX file and a validation every now and then."""
-    stream = Stream(arguments.data, seed=arguments.seed + training.step)
+    stream = Stream(arguments.data, arguments.seed + training.step, arguments.mosaic)
     batches = iter(DataLoader(stream, batch_size=arguments.batch, num_workers=arguments.workers, prefetch_factor=4))
     recent: list[tuple[float, float]] = []
     begin = time.monotonic()
     while training.step < arguments.steps:
-        recent.append(training.advance(next(batches), arguments.steps))
+        recent.append(training.advance(next(batches), arguments.steps, arguments.negatives))
         training.seconds, begin = training.seconds + time.monotonic() - begin, time.monotonic()
         if training.step % 100 == 0:
             location, confidence = (sum(part) / len(recent) for part in zip(*recent, strict=True))
@@ -165,6 +165,8 @@ def parse(words: list[str]) -> argparse.Namespace:
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--check-every", type=int, default=1000)
+    parser.add_argument("--mosaic", type=float, default=0.65, help="share of mosaics; few at the end of a training")
+    parser.add_argument("--negatives", type=int, default=3, help="hard negatives to one positive; more at the end")
     parser.add_argument("--bf16", action="store_true", help="compute in bfloat16 where the processor is faster so")
     parser.add_argument("--freeze-stem", action="store_true", help="leave the first layers as they are")
     parser.add_argument("--seed", type=int, default=0)
