@@ -275,6 +275,7 @@ def show(cell: dict[str, Any]) -> str:
         none = m["error_m"] is None
         words += f"  {name}: " + ("none" if none else f"{m['error_m']:.4f} m {m['rotation_deg']:5.1f}° "
                                   f"{m['translation_cm']:5.1f} cm {100 * m['success']:3.0f} %")  # fmt: skip
+        words += f", accepted {100 * m['accepted']:.0f} %" if "accepted" in m else ""
     return words
 
 
