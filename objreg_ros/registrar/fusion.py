@@ -18,6 +18,7 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.tracking import view_normals
 
 CUT = np.uint16(PointFlag.CUT_BY_IMAGE | PointFlag.CUT_BY_BOX)
+SPARE = 3  # points of each sighting for each one that is kept of the object
 CENTRE_SPREAD = 0.05  # m: how far the middle of one small object wanders between neighbouring frames
 
 
@@ -58,7 +59,7 @@ def fuse_objects(
     for frame, T in zip(frames, T_reference_frame, strict=True):
         free = list(tracks)
         for item in frame.objects:
-            sighting = _moved(item, T)
+            sighting = _moved(item, T, most=SPARE * params.object_points)
             track = _nearest(sighting, free, groups)
             if track is None:
                 tracks.append(_Track([sighting]))
@@ -72,17 +73,18 @@ def fuse_context(
     frames: Sequence[Frame], T_reference_frame: Sequence[Array], objects: Sequence[KeyObject], params: RegistrarParams
 ) -> Context:
     """What the views saw within the context's radius of any object, thinned to voxels, with the mean normals."""
-    xyz, normals = [], []
-    for frame, T in zip(frames, T_reference_frame, strict=True):
-        surface = view_normals(frame.view.xyz)
-        known = surface.any(axis=-1) & (frame.view.xyz[..., 2] < params.context_range)
-        xyz.append(transform(T, frame.view.xyz[known]))
-        normals.append(rotate(T, surface[known]))
-    points, directions = np.concatenate(xyz), np.concatenate(normals)
-    near = _near(points, [item.centroid for item in objects], params.context_radius)
-    return Context(
-        **dict(zip(("xyz", "normals"), thin(points[near], directions[near], params.context_voxel), strict=True))
-    )
+    seen = [_surface(frame, T, params.context_range) for frame, T in zip(frames, T_reference_frame, strict=True)]
+    points, normals = (np.concatenate(part) for part in zip(*seen, strict=True))
+    xyz, directions = thin(points, normals, params.context_voxel)
+    near = _near(xyz, [item.centroid for item in objects], params.context_radius)
+    return Context(xyz=xyz[near], normals=directions[near])
+
+
+def _surface(frame: Frame, T_reference_frame: Array, reach: float) -> tuple[Array, Array]:
+    """Points and normals of a view, every second one each way: four frames make up for it."""
+    xyz, normals = frame.view.xyz[::2, ::2], view_normals(frame.view.xyz)[::2, ::2]
+    known = (normals[..., 2] != 0) & (xyz[..., 2] < reach)
+    return transform(T_reference_frame, xyz[known]), rotate(T_reference_frame, normals[known])
 
 
 def thin(xyz: Array, normals: Array, voxel: float) -> tuple[Array, Array]:
@@ -152,15 +154,17 @@ def _box(item: ObjectCloud) -> tuple[Array, float]:
     return (low + high) / 2.0, float(np.linalg.norm(high - low))
 
 
-def _moved(item: ObjectCloud, T: Array) -> ObjectCloud:
+def _moved(item: ObjectCloud, T: Array, most: int) -> ObjectCloud:
+    """The cloud in another frame; of more than ``most`` points every so many."""
+    every = slice(None, None, 1 + (len(item) - 1) // most)
     return ObjectCloud(
         label=item.label,
         score=item.score,
         instance=item.instance,
-        xyz=transform(T, item.xyz),
-        normals=rotate(T, item.normals),
-        rgb=item.rgb,
-        flags=item.flags,
+        xyz=transform(T, item.xyz[every]),
+        normals=rotate(T, item.normals[every]),
+        rgb=None if item.rgb is None else item.rgb[every],
+        flags=item.flags[every],
         density=item.density,
     )
 

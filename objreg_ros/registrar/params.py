@@ -33,7 +33,7 @@ class RegistrarParams(Params):
     keyframe_min_objects: int = param(1, "least number of objects of a keyframe", ge=1)
     keyframe_frames: int = param(4, "most frames that are fused into one keyframe", ge=1, le=30)
     object_voxel: float = param(0.004, "edge of a voxel when sightings of an object are fused", "m", ge=0.001, le=0.05)
-    object_points: int = param(4000, "most points of an object that are kept", ge=100)
+    object_points: int = param(2000, "most points of an object that are kept", ge=100)
     context_radius: float = param(1.0, "how far around an object the context reaches", "m", ge=0.1)
     context_voxel: float = param(0.03, "edge of a voxel of the context", "m", ge=0.005, le=0.2)
     context_range: float = param(4.0, "context farther from the camera is left out", "m", ge=0.5)
@@ -52,7 +52,8 @@ class RegistrarParams(Params):
     prior_translation: float = param(0.20, "odometry less certain than this proposes no pose", "m", ge=0.0)
     prior_rotation: float = param(6.0, "odometry less certain than this proposes no pose", "deg", ge=0.0)
     thin_seconds: float = param(1.0, "closures whose both ends are nearer than this are one closure", "s", ge=0.0)
-    candidates: int = param(6, "stored keyframes that are tried for each new one, best first", ge=1, le=100)
+    closures: int = param(2, "accepted closures of one keyframe that end its search", ge=1)
+    candidates: int = param(4, "stored keyframes that are tried for each new one, best first", ge=1, le=100)
 
     # How a pose is found and looked at.
     feature_voxel: float = param(0.07, "distance of the points that carry a local feature", "m", ge=0.01, le=0.2)
@@ -96,13 +97,13 @@ class RegistrarParams(Params):
     min_objects: int = param(2, "explained objects that make up for chains that do not agree", ge=1)
     max_gravity_error: float = param(5.0, "largest angle between the gravities", "deg", ge=0.0, le=180.0)
     max_translation: float = param(5.0, "largest distance between the two cameras", "m", ge=0.0)
-    max_slack_sigma: float = param(0.10, "largest standard deviation along any translation", "m", ge=0.0)
+    max_slack_sigma: float = param(0.08, "largest standard deviation along any translation", "m", ge=0.0)
     odometry_sigmas: float = param(4.0, "largest distance from odometry in its standard deviations", ge=0.0)
 
     # How wrong an accepted pose may be; config/covariance.yaml says how these were calibrated.
-    covariance_scale: float = param(4.0, "factor of the covariance of a registration", ge=0.0)
-    covariance_floor_translation: float = param(0.02, "least standard deviation of each axis", "m", ge=1e-4)
-    covariance_floor_rotation: float = param(0.6, "least standard deviation of each axis", "deg", ge=1e-3)
+    covariance_scale: float = param(90.0, "factor of the covariance of a registration", ge=0.0)
+    covariance_floor_translation: float = param(0.002, "least standard deviation of each axis", "m", ge=1e-4)
+    covariance_floor_rotation: float = param(0.05, "least standard deviation of each axis", "deg", ge=1e-3)
     slack_translation: float = param(0.5, "standard deviation along a free direction of translation", "m", ge=0.0)
     slack_rotation: float = param(60.0, "standard deviation about a free axis", "deg", ge=0.0)
 

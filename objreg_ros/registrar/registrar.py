@@ -138,7 +138,7 @@ class Registrar:
         for place in places:
             if self._thinning.redundant(place.stamp_ns, keyframe.stamp_ns):
                 refuse(place.stamp_ns, (Reason.REDUNDANT, "a closure of the same two moments was accepted"))
-            elif tries == 0:
+            elif tries == 0 or len(accepted) == self.params.closures:
                 break
             else:
                 tries -= 1

@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -42,3 +45,10 @@ def test_a_slide_shows_in_the_worst_translation() -> None:
     slide = np.array([[0.6, 0.8, 0, 0, 0, 0]])
     C = covariance_of(candidate(information=1e9 * np.eye(6), slack=slide).alignment, PARAMS)
     assert worst_translation(C) == pytest.approx(0.5, rel=0.01)
+
+
+def test_the_file_that_tells_of_the_calibration_holds_the_values_of_the_code(repository: Path) -> None:
+    text = (repository / "config" / "covariance.yaml").read_text(encoding="utf-8")
+    values = dict(re.findall(r"^    (\w+): ([\d.]+)$", text, re.MULTILINE))
+    assert len(values) == 5
+    assert {name: getattr(RegistrarParams(), name) for name in values} == {k: float(v) for k, v in values.items()}
