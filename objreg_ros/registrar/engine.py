@@ -104,13 +104,19 @@ def gravity_error_deg(source: Prepared, target: Prepared, T_target_source: Array
 
 def merged(candidates: list[Candidate], middle: Array, params: RegistrarParams) -> list[Candidate]:
     """Distinct candidates, best first; each knows which other chains came to its pose."""
-    ranked = sorted(candidates, key=lambda candidate: -candidate.verification.score)
+    ranked = sorted(candidates, key=lambda candidate: -worth(candidate, params))
     kept: list[Candidate] = []
     for candidate in ranked:
         if not any(same_pose(candidate, other, middle, params) for other in kept):
             chains = {other.chain for other in ranked if same_pose(candidate, other, middle, params)}
             kept.append(replace(candidate, agreeing_chains=tuple(sorted(chains))))
     return kept
+
+
+def worth(candidate: Candidate, params: RegistrarParams) -> float:
+    """What candidates are ranked by: the views' verdict, and the objects' where rooms repeat themselves."""
+    objects = min(2, len(candidate.explained)) - min(2, len(candidate.moved))
+    return candidate.verification.score + params.object_bonus * objects
 
 
 def same_pose(a: Candidate, b: Candidate, middle: Array, params: RegistrarParams) -> bool:

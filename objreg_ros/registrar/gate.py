@@ -23,11 +23,18 @@ Refusal = tuple[Reason, str]
 
 
 def judge(candidates: Sequence[Candidate], params: RegistrarParams, prior: Prior | None = None) -> Candidate | Refusal:
-    """The first candidate that nothing speaks against, or the refusal of the best one."""
+    """The first candidate that nothing speaks against, or the refusal of the best one.
+
+    A candidate that the views like clearly less than the best never stands in for it: when the truth is refused, for
+    instance because it could slide, the next best is an alias.
+    """
     if not candidates:
         return Reason.NO_HYPOTHESIS, "no chain proposed a pose"
     refusals = []
+    best = candidates[0].verification.score
     for candidate in candidates:
+        if candidate.verification.score < best - params.rival_margin:
+            break
         refusal = refuse(candidate, params, prior)
         if refusal is None:
             return candidate
@@ -95,9 +102,9 @@ def _score(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
 
 def _agreement(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
-    """Independent chains, or several objects, must say the same."""
+    """Several objects, or one and two independent chains: without an object rooms that repeat themselves look alike."""
     chains, explained = len(candidate.agreeing_chains), len(candidate.explained)
-    if chains >= params.min_chains or explained >= params.min_objects:
+    if explained >= params.min_objects or (explained >= 1 and chains >= params.min_chains):
         return None
     reason = Reason.CHAINS_DISAGREE if explained else Reason.FEW_OBJECTS
     return reason, f"{chains} chains < {params.min_chains} and {explained} objects < {params.min_objects}"

@@ -81,6 +81,7 @@ class RegistrarParams(Params):
     detail_sigma: float = param(3.0, "blur that the high pass of grey takes away", "px", ge=0.5)
     agreement_rotation: float = param(5.0, "chains agree within this rotation", "deg", ge=0.0)
     agreement_translation: float = param(0.15, "chains agree within this distance", "m", ge=0.0)
+    object_bonus: float = param(0.25, "what an explained object adds to V when candidates are ranked", ge=0.0)
     explained_distance: float = param(0.12, "an object is explained when the middles are this close", "m", ge=0.0)
 
     # The founding method.
@@ -91,9 +92,10 @@ class RegistrarParams(Params):
     # What decides a closure. Below score_alone a closure needs agreement of chains or objects.
     min_tested: int = param(600, "least number of pixels that both views must see", ge=1)
     min_inliers: float = param(0.45, "least share of tested pixels whose depth agrees", ge=0.0, le=1.0)
-    max_violations: float = param(0.10, "largest share of tested pixels in seen free space", ge=0.0, le=1.0)
-    min_texture: float = param(0.10, "least correlation of the high-passed grey, where there is grey", ge=-1.0, le=1.0)
-    min_score: float = param(0.15, "least verification score V", ge=-3.0, le=2.0)
+    max_violations: float = param(0.07, "largest share of tested pixels in seen free space", ge=0.0, le=1.0)
+    min_texture: float = param(0.20, "least correlation of the high-passed grey, where there is grey", ge=-1.0, le=1.0)
+    min_score: float = param(0.10, "least verification score V", ge=-3.0, le=2.0)
+    rival_margin: float = param(0.1, "a candidate this much below the best in V is not considered", ge=0.0)
     min_chains: int = param(2, "chains that must agree when fewer objects than min_objects are explained", ge=1)
     min_objects: int = param(2, "explained objects that make up for chains that do not agree", ge=1)
     max_gravity_error: float = param(5.0, "largest angle between the gravities", "deg", ge=0.0, le=180.0)

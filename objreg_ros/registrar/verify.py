@@ -83,4 +83,4 @@ def score(worse: tuple[float, float], texture: float | None, share: float) -> fl
     """
     inliers, violations = worse
     grey = NO_TEXTURE if texture is None else texture
-    return float(grey + inliers - 3.0 * violations + 0.3 * np.log10(max(share, 1e-3)) - NEUTRAL)
+    return float(grey + inliers - 3.0 * violations + 0.5 * np.log10(max(share, 1e-3)) - NEUTRAL)

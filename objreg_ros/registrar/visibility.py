@@ -18,6 +18,8 @@ from objreg_ros.data import Array, Intrinsics, View
 # What `count` counts, in the order of its result.
 SEEN, INLIERS, VIOLATIONS, OCCLUDED, SHADED, SUM_A, SUM_B, SUM_AA, SUM_BB, SUM_AB = range(10)
 
+EDGE = 0.06  # of the depth: a larger range around a pixel is a depth jump
+SHADELESS = 1e6  # the shade of a point at a depth jump: not to be compared
 NEAREST = 0.3  # m; nearer depth is noise on every structured-light camera
 
 
@@ -26,7 +28,7 @@ class Sight:
     """A view made ready. ``near``, ``far (h, w) float32`` m, 0 where nothing was measured; ``detail (h, w) float32``.
 
     ``points (P, 3) float32`` m and ``shades (P,) float32`` are its measured pixels in a fixed shuffled order, so that
-    the first n of them are a fair sample.
+    the first n of them are a fair sample; a pixel at a depth jump has the shade SHADELESS.
     """
 
     near: Array
@@ -49,13 +51,14 @@ def prepare_sight(view: View, sight_range: float, detail_sigma: float, seed: int
     depth = np.where((depth > NEAREST) & (depth < sight_range), depth, 0.0).astype(np.float32)
     near, far = depth_bounds(depth)
     detail = high_pass(view.grey, detail_sigma) if view.grey is not None else np.zeros_like(depth)
+    shades = np.where(far - near > EDGE * np.maximum(far, 1.0), np.float32(SHADELESS), detail)
     chosen = np.random.default_rng(seed).permutation(np.flatnonzero(depth > 0))
     return Sight(
         near=near,
         far=far,
         detail=detail,
         points=np.ascontiguousarray(view.xyz.reshape(-1, 3)[chosen]),
-        shades=np.ascontiguousarray(detail.ravel()[chosen]),
+        shades=np.ascontiguousarray(shades.ravel()[chosen]),
         textured=view.grey is not None,
         intrinsics=view.intrinsics,
     )
@@ -110,12 +113,14 @@ def count(points, shades, T, near, far, detail, camera, tolerance, growth):  # t
             continue
         out[SEEN] += 1.0
         out[INLIERS] += 1.0
+        own = shades[i]
+        if own >= SHADELESS or high - low > 2.0 * slop:  # silhouettes look alike everywhere
+            continue
         left, top = int(u), int(v)
         a, b = u - left, v - top
         shade = (1.0 - b) * ((1.0 - a) * detail[top, left] + a * detail[top, left + 1]) + b * (
             (1.0 - a) * detail[top + 1, left] + a * detail[top + 1, left + 1]
         )
-        own = shades[i]
         out[SHADED] += 1.0
         out[SUM_A] += own
         out[SUM_B] += shade

@@ -86,3 +86,8 @@ def test_the_refusal_is_that_of_the_best_candidate() -> None:
 def test_no_candidate_at_all_is_no_hypothesis() -> None:
     verdict = judge((), PARAMS)
     assert isinstance(verdict, tuple) and verdict[0] is Reason.NO_HYPOTHESIS
+
+
+def test_an_alias_does_not_stand_in_for_a_refused_best_candidate() -> None:
+    alias = candidate(score=0.5)
+    assert judge((candidate(violations=0.4, score=0.9), alias), PARAMS) is not alias
