@@ -146,7 +146,7 @@ CHECKS: tuple[Check, ...] = (
     _free_space,
     _texture,
     _score,
-    _agreement,
     _stationary,
+    _agreement,
     _held,
 )
