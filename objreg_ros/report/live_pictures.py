@@ -13,6 +13,7 @@ from objreg_ros.data import Array, Detections, Intrinsics, LoopClosure, ObjectCl
 from objreg_ros.truth import FALSE, Truth, within
 
 GOLDEN_ANGLE = 137.508  # degrees of hue between one object and the next: neighbours never look alike
+FONT, FONT_SIZE = cv2.FONT_HERSHEY_SIMPLEX, 0.42
 RIGHT, WRONG, WAY = "#1a8a3c", "#d03b3b", "#8b8a83"
 
 
@@ -48,9 +49,10 @@ def _draw_points(picture: Array, xyz: Array, camera: Intrinsics, colour: tuple[i
 def _draw_box(picture: Array, xyxy: Array, name: str) -> None:
     x_min, y_min, x_max, y_max = (round(float(value)) for value in xyxy)
     cv2.rectangle(picture, (x_min, y_min), (x_max, y_max), (255, 255, 255), 1, cv2.LINE_AA)
-    for ink, width in (((0, 0, 0), 3), ((255, 255, 255), 1)):
-        place = (x_min + 3, max(y_min, 0) + 13)
-        cv2.putText(picture, name, place, cv2.FONT_HERSHEY_SIMPLEX, 0.42, ink, width, cv2.LINE_AA)
+    (width, height), base = cv2.getTextSize(name, FONT, FONT_SIZE, 1)
+    left, bottom = x_min + 1, max(y_min, 0) + height + base + 2
+    cv2.rectangle(picture, (left, bottom - height - base - 1), (left + width + 3, bottom), (0, 0, 0), cv2.FILLED)
+    cv2.putText(picture, name, (left + 2, bottom - base), FONT, FONT_SIZE, (255, 255, 255), 1, cv2.LINE_AA)
 
 
 def draw_way(file: Path, truth: Truth, closures: Sequence[LoopClosure]) -> None:
