@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Train the detector from random weights on shards of simulated pictures; start it again and it goes on.
 
-python -m training.train --data DATA --validation VALIDATION --out OUT --steps 9000
+python -m training.train --data DATA --validation VALIDATION --out OUT --steps 7000
 """
 
 from __future__ import annotations
@@ -128,7 +128,8 @@ def run(training: Training, arguments: argparse.Namespace) -> None:
     batches = iter(DataLoader(stream, batch_size=arguments.batch, num_workers=arguments.workers, prefetch_factor=4))
     recent: list[tuple[float, float]] = []
     begin = time.monotonic()
-    while training.step < arguments.steps:
+    last = min(arguments.steps, arguments.until or arguments.steps)
+    while training.step < last:
         recent.append(training.advance(next(batches), arguments.steps, arguments.negatives))
         training.seconds, begin = training.seconds + time.monotonic() - begin, time.monotonic()
         if training.step % 100 == 0:
@@ -136,7 +137,7 @@ def run(training: Training, arguments: argparse.Namespace) -> None:
             recent.clear()
             print(f"step {training.step} of {arguments.steps}, {training.seconds / 60:.1f} min: "
                   f"location {location:.3f}, confidence {confidence:.3f}", flush=True)  # fmt: skip
-        if training.step % arguments.check_every == 0 or training.step == arguments.steps:
+        if training.step % arguments.check_every == 0 or training.step == last:
             check(training, arguments)
 
 
@@ -156,7 +157,8 @@ def parse(words: list[str]) -> argparse.Namespace:
     parser.add_argument("--validation", type=Path, help="folder of shards of other seeds")
     parser.add_argument("--out", type=Path, required=True, help="folder for checkpoint.pt and model.onnx")
     parser.add_argument("--backbone", type=Path, help="weights from training.pretrain to begin with")
-    parser.add_argument("--steps", type=int, default=9000)
+    parser.add_argument("--steps", type=int, default=7000, help="length of the schedule")
+    parser.add_argument("--until", type=int, help="stop at this step, before the schedule ends")
     parser.add_argument("--batch", type=int, default=16)
     parser.add_argument("--rate", type=float, default=1.5e-3)
     parser.add_argument(
