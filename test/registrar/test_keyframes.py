@@ -65,3 +65,13 @@ def test_odometry_that_appears_begins_its_own_session() -> None:
     stretches = _run(Keyframer(PARAMS), [frame(0.0, CUP), frame(0.1, CUP, moved(7.0)), frame(0.2, CUP, moved(7.5))])
     assert [s.session for s in stretches] == [0, 1, 1]
     assert np.allclose(stretches[-1].T_session_first, moved(7.5))
+
+
+def test_a_gap_in_the_odometry_is_bridged_by_the_views() -> None:
+    poses = [moved(5.0 + 0.03 * i) for i in range(6)]
+    frames = [
+        frame(0.1 * i, CUP, None if i in (2, 4) else poses[i], scene_view(moved(0.03 * i))) for i in range(len(poses))
+    ]
+    stretches = _run(Keyframer(PARAMS), frames)
+    assert {s.session for s in stretches} == {0} and all(s.by_odometry for s in stretches)
+    assert np.allclose(stretches[-1].T_session_first, moved(5.12), atol=0.005)
