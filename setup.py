@@ -44,7 +44,7 @@ setup(
         "open3d>=0.18",
         "opencv-python-headless>=4.6",
         "pyyaml>=6",
-        "rosbags>=0.10",
+        "rosbags>=0.11",
         "scipy>=1.11",
         "small_gicp>=1.0",
         "tqdm>=4.64",

@@ -15,8 +15,8 @@ import click
 
 from objreg_ros.bridge import from_msg
 from objreg_ros.cli import live_table, options
-from objreg_ros.cli.choice import Choice, as_rosbag2, best_at_hand
 from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
+from objreg_ros.cli.played import as_rosbag2, simulated_room
 from objreg_ros.data import ColourImage
 from objreg_ros.offline import constraint
 from objreg_ros.recording import Recording, open_recording
@@ -54,7 +54,7 @@ class Asked:
 @click.option("--lossless", is_flag=True, help="Wait for every frame instead of keeping the pace.")
 @click.option("--out", type=click.Path(file_okay=False, path_type=Path), default=Path("out/demo"), show_default=True)
 def command(**asked: Any) -> None:
-    """Play RECORDING (or the best one at hand) through three live nodes and show what came out.
+    """Play RECORDING (or a simulated room) through three live nodes and show what came out.
 
     Ends with the books of every node, latencies, constraints and their true error, and with pictures in the folder of
     --out. A recording that is no rosbag2 is written as one first.
@@ -65,13 +65,12 @@ def command(**asked: Any) -> None:
 
 def run(asked: Asked) -> None:
     """The whole demo; ValueError or OSError if it cannot be, or if the books do not balance."""
-    choice = best_at_hand(asked.out) if asked.recording is None else Choice(asked.recording)
-    bag = as_rosbag2(choice.recording, asked.out, asked.seconds)
+    bag = as_rosbag2(asked.recording or simulated_room(asked.out), asked.out, asked.seconds)
     with open_recording(bag) as source:
         inputs = choose_inputs(source.topics, parse_remaps(asked.remaps))
         if not inputs.complete:
             raise ValueError(f"{bag}: expected {inputs.missing}, got {', '.join(source.topics)}; see --remap")
-        live = run_live(bag, setup_of(choice, asked), asked.out / "logs", _say)
+        live = run_live(bag, setup_of(asked), asked.out / "logs", _say)
         truth = Truth.of(source, inputs.ground_truth)
         _write(asked.out / "demo.json", bag, live, truth)
         _draw(asked.out, live, truth, source, inputs)
@@ -86,12 +85,11 @@ def _say(text: str) -> None:
     click.echo(text, err=True)
 
 
-def setup_of(choice: Choice, asked: Asked) -> Setup:
+def setup_of(asked: Asked) -> Setup:
     """The arguments of the nodes and of the player."""
     everywhere = [] if asked.params_file is None else ["--params-file", str(asked.params_file)]
     everywhere += ["-p", "reliable:=true"] if asked.lossless else []
     node_args = {room: list(everywhere) for room in ROOMS}
-    node_args["detector"] += choice.detector_args
     named = {"model": asked.model, "labels": asked.labels}
     changes = [*(f"detector.{name}={value}" for name, value in named.items() if value), *asked.changes]
     for change in changes:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from objreg_ros.cli.choice import Choice, as_rosbag2
 from objreg_ros.cli.demo import Asked, setup_of
+from objreg_ros.cli.played import as_rosbag2
 from objreg_ros.recording import open_recording
 
 ASKED = Asked(
@@ -17,27 +17,27 @@ ASKED = Asked(
 
 
 def test_without_options_the_nodes_run_with_their_own_defaults_at_the_recordings_pace() -> None:
-    setup = setup_of(Choice(Path("rec")), ASKED)
+    setup = setup_of(ASKED)
     assert all(not arguments for arguments in setup.node_args.values()) and setup.replay_args == ["--rate", "1.0"]
 
 
 def test_options_reach_the_node_that_they_are_for() -> None:
     asked = replace(ASKED, model="my.onnx", changes=("registrar.seed=4",), params_file=Path("p.yaml"))
-    args = setup_of(Choice(Path("rec"), ("-p", "threshold:=0.4")), asked).node_args
-    assert args["detector"] == ["--params-file", "p.yaml", "-p", "threshold:=0.4", "-p", "model:=my.onnx"]
+    args = setup_of(asked).node_args
+    assert args["detector"] == ["--params-file", "p.yaml", "-p", "model:=my.onnx"]
     assert args["registrar"] == ["--params-file", "p.yaml", "-p", "seed:=4"]
     assert args["segmenter"] == ["--params-file", "p.yaml"]
 
 
 def test_lossless_asks_every_node_for_reliable_delivery_and_keeps_no_pace() -> None:
-    setup = setup_of(Choice(Path("rec")), replace(ASKED, lossless=True, seconds=2.0, remaps=("image:=/a",)))
+    setup = setup_of(replace(ASKED, lossless=True, seconds=2.0, remaps=("image:=/a",)))
     assert all("reliable:=true" in arguments for arguments in setup.node_args.values())
     assert setup.replay_args == ["--lossless", "--end", "2.0", "--remap", "image:=/a"]
 
 
 def test_a_change_of_no_node_is_refused() -> None:
     with pytest.raises(ValueError, match=r"expected NODE\.NAME=VALUE"):
-        setup_of(Choice(Path("rec")), replace(ASKED, changes=("seed=4",)))
+        setup_of(replace(ASKED, changes=("seed=4",)))
 
 
 def test_a_folder_of_pictures_becomes_a_rosbag2_once(shared: Path, tmp_path: Path) -> None:

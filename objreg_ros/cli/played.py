@@ -1,45 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which recording a demo plays, as a rosbag2, and with which detector."""
+"""Which recording a demo plays, as a rosbag2."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import click
 from tqdm import tqdm
 
-from objreg_ros import share
 from objreg_ros.recording import open_recording, write_rosbag2
 
-KITCHEN, COCO = "data/redkitchen_a", "models/ssd_mobilenet_v1_coco_int8.onnx"
-COCO_ARGS = ("-p", "threshold:=0.4")  # the scores of the quantised model are low
 SCENARIO, SEED, FRAMES, RATE_HZ = "loop", 1, 600, 30.0
 
 
-@dataclass(frozen=True, slots=True)
-class Choice:
-    """What is played, and the ROS arguments of its detector."""
-
-    recording: Path
-    detector_args: Sequence[str] = ()
-
-
-def best_at_hand(out: Path) -> Choice:
-    """Real frames if they lie beside the checkout (or in OBJREG_SHARED), else a simulated room, made once."""
-    folder = Path(os.environ.get("OBJREG_SHARED", next(share.folders()).parent / "shared"))
-    kitchen, model = folder / KITCHEN, folder / COCO
-    if kitchen.is_dir() and model.is_file():
-        return Choice(kitchen, ("-p", f"model:={model}", *COCO_ARGS))
-    return Choice(_simulated(out / f"simulated_{SCENARIO}_{SEED}"))
-
-
-def _simulated(bag: Path) -> Path:
+def simulated_room(out: Path) -> Path:
+    """A simulated room to leave and come back to, with exact truth; made once."""
     from objreg_ros.cli.simulate import camera_of, sensors_of
     from objreg_ros.simulation.write import simulate
 
+    bag = out / f"simulated_{SCENARIO}_{SEED}"
     if not bag.exists():
         unfinished = _unfinished(bag)
         with tqdm(total=FRAMES, unit="frame", desc="simulating a room", disable=None) as bar:
