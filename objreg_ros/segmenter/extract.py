@@ -41,17 +41,21 @@ def extract(image: DepthImage, box: Box, surface: Surface, chosen: Array, jump: 
     x0, y0, x1, y1 = box
     camera = image.intrinsics
     mask = np.zeros((y1 - y0, x1 - x0), np.bool_)
+    kept = np.zeros_like(mask)
     a, b = np.float32(jump[0]), np.float32(jump[1])
-    grid = (surface.left, surface.top, surface.step)
-    count = _mark(image.depth, x0, y0, surface.depth, grid, chosen, a, b, mask)
+    h, w = surface.depth.shape
+    rows = np.minimum((np.arange(y0, y1) - surface.top) // surface.step, h - 1)
+    cols = np.minimum((np.arange(x0, x1) - surface.left) // surface.step, w - 1)
+    depth = image.depth[y0:y1, x0:x1]
+    count = _mark(depth, surface.depth, rows, cols, chosen, a, b, mask)
     xyz, normals = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
     edge, bounds = np.empty(count, np.uint16), np.empty(4, np.int64)
     x, y = _slopes(x0, x1, camera.cx, camera.fx), _slopes(y0, y1, camera.cy, camera.fy)
-    kept = np.zeros_like(mask)
-    n, area = _gather(image.depth, x0, y0, mask, kept, surface.normals, grid, x, y, a, b, xyz, normals, edge, bounds)
+    edges = _jumps(image.depth, x0, y0, a, b, mask)
+    n, area = _gather(depth, mask, kept, edges, surface.normals, rows, cols, x, y, xyz, normals, edge, bounds)
     rgb = None if image.rgb is None else _colours(image.rgb, x0, y0, kept, n)
     area /= camera.fx * camera.fy
-    around = (int(bounds[0]), int(bounds[1]), int(bounds[2]), int(bounds[3]))
+    around = (x0 + int(bounds[0]), y0 + int(bounds[1]), x0 + int(bounds[2]), y0 + int(bounds[3]))
     return Pixels(xyz[:n], normals[:n], rgb, edge[:n], area, around)
 
 
@@ -77,18 +81,16 @@ def _pick(rgb, x0, y0, mask, out):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, fastmath=EXACT)
-def _mark(depth, x0, y0, cells, grid, chosen, a, b, mask):  # type: ignore[no-untyped-def]
+def _mark(depth, cells, rows, cols, chosen, a, b, mask):  # type: ignore[no-untyped-def]
     """Mark the pixels that belong to chosen cells: by their own cell, or by the nearest in depth around it."""
-    left, top, step = grid
-    h, w = cells.shape
     count = 0
     for v in range(mask.shape[0]):
-        i = min((v + y0 - top) // step, h - 1)
+        i = rows[v]
         for u in range(mask.shape[1]):
-            z = depth[v + y0, u + x0]
+            z = depth[v, u]
             if not (z > 0):
                 continue
-            j = min((u + x0 - left) // step, w - 1)
+            j = cols[u]
             jump = a + b * z * z
             if cells[i, j] > 0 and abs(cells[i, j] - z) < jump:
                 mask[v, u] = chosen[i, j]
@@ -112,28 +114,27 @@ def _nearest(cells, chosen, i, j, z, limit):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, fastmath=EXACT)
-def _gather(depth, x0, y0, mask, kept, cell_normals, grid, x, y, a, b, xyz, normals, edge, bounds):  # type: ignore[no-untyped-def]
+def _gather(depth, mask, kept, edges, cell_normals, rows, cols, x, y, xyz, normals, edge, bounds):  # type: ignore[no-untyped-def]
     """Fill the outputs from the marked pixels but for outliers, and ``kept``; their number and area times fx fy."""
     h, w = mask.shape
-    left, top, step = grid
     area, n = 0.0, 0
-    bounds[0], bounds[1], bounds[2], bounds[3] = x0 + w, y0 + h, x0, y0
+    bounds[0], bounds[1], bounds[2], bounds[3] = w, h, 0, 0
     for v in range(h):
-        i = min((v + y0 - top) // step, cell_normals.shape[1] - 1)
+        i = rows[v]
         for u in range(w):
             if not mask[v, u] or _neighbours(mask, v, u) < MIN_NEIGHBOURS:
                 continue
             kept[v, u] = True
-            z = depth[v + y0, u + x0]
-            j = min((u + x0 - left) // step, cell_normals.shape[2] - 1)
+            z = depth[v, u]
+            j = cols[u]
             n_x, n_y, n_z = cell_normals[0, i, j], cell_normals[1, i, j], cell_normals[2, i, j]
             xyz[n, 0], xyz[n, 1], xyz[n, 2] = x[u] * z, y[v] * z, z
             normals[n, 0], normals[n, 1], normals[n, 2] = n_x, n_y, n_z
-            edge[n] = EDGE if _at_jump(depth, v + y0, u + x0, 2 * (a + b * z * z)) else 0
+            edge[n] = EDGE if edges[v, u] else 0
             cosine = abs(x[u] * n_x + y[v] * n_y + n_z)
             area += z * z / (max(cosine, MIN_COSINE) if cosine > 0 else UNKNOWN_COSINE)
-            bounds[0], bounds[1] = min(bounds[0], u + x0), min(bounds[1], v + y0)
-            bounds[2], bounds[3] = max(bounds[2], u + x0 + 1), v + y0 + 1
+            bounds[0], bounds[1] = min(bounds[0], u), min(bounds[1], v)
+            bounds[2], bounds[3] = max(bounds[2], u + 1), v + 1
             n += 1
     return n, area
 
@@ -147,17 +148,20 @@ def _neighbours(mask, v, u):  # type: ignore[no-untyped-def]
     return count
 
 
-@numba.njit(cache=True, fastmath=EXACT, inline="always")
-def _at_jump(depth, v, u, jump):  # type: ignore[no-untyped-def]
-    """Whether a pixel two rows or columns away has no depth or lies across a depth jump."""
-    z = depth[v, u]
+@numba.njit(cache=True, fastmath=EXACT)
+def _jumps(depth, x0, y0, a, b, mask):  # type: ignore[no-untyped-def]
+    """(h, w) bool like ``mask``: whether two rows or columns away there is no depth, or it lies across a depth jump."""
+    edges = np.zeros(mask.shape, np.bool_)
     h, w = depth.shape
-    return (
-        (v >= 2 and not abs(depth[v - 2, u] - z) < jump)
-        or (v + 2 < h and not abs(depth[v + 2, u] - z) < jump)
-        or (u >= 2 and not abs(depth[v, u - 2] - z) < jump)
-        or (u + 2 < w and not abs(depth[v, u + 2] - z) < jump)
-    )
+    for v in range(mask.shape[0]):
+        up, down = depth[max(v + y0 - 2, 0)], depth[min(v + y0 + 2, h - 1)]
+        row = depth[v + y0]
+        for u in range(mask.shape[1]):
+            k = u + x0
+            z = row[k]
+            across = max(abs(row[max(k - 2, 0)] - z), abs(row[min(k + 2, w - 1)] - z))
+            edges[v, u] = not max(across, max(abs(up[k] - z), abs(down[k] - z))) < 2 * (a + b * z * z)
+    return edges
 
 
 def cell_points(surface: Surface, cells: Array, rgb: Array | None) -> tuple[Array, Array, Array | None]:

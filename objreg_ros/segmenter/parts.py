@@ -12,6 +12,7 @@ from objreg_ros.data import Array
 from objreg_ros.segmenter.surface import EXACT, Surface, Window
 
 ACROSS = 3  # cells over which two parts are neighbours
+ALIKE = 0.12  # how far apart the shares of red, green and blue of one colour are
 RIM = 0.7  # how much less a cell at the rim of the box counts than one in its middle
 
 
@@ -21,10 +22,12 @@ class Parts:
 
     Of each part: ``total`` and ``inside (K,)`` its cells and those in the box, ``weight (K,)`` those in the box where
     the middle counts more than the rim, ``extent (K, 4)`` left, top, right, bottom in cells, half open, ``size (K,)``
-    the length in metres of the box's longer side at the part's depth, ``colour (K, 3)`` the mean, or None. Of each
-    pair: ``touching (K, K)`` the cells in which they are neighbours without a depth jump, ``gap (K, K)`` m the least
-    distance over a border, ``front (K, 1 + K)`` the cells in which the first hides the second, whose column 0 is
-    everything that is no part; ``hidden (K,)`` the cells in which a part is hidden by anything.
+    the length in metres of the box's longer side at the part's depth, ``pure (K,)`` which share of it lies in the box,
+    ``figure (K,)`` which share of its depth jumps is its own silhouette, 1 where it has none.
+
+    Of each pair: ``alike (K, K)`` whether they have one colour in whatever light, False without colour, ``touching
+    (K, K)`` the cells in which they are neighbours without a depth jump, ``gap (K, K)`` m the least distance over a
+    border, ``front (K, 1 + K)`` the cells in which the first hides the second; column 0 is what is no part.
     """
 
     labels: Array
@@ -33,25 +36,15 @@ class Parts:
     weight: Array
     extent: Array
     size: Array
-    colour: Array | None
+    pure: Array
+    figure: Array
+    alike: Array
     touching: Array
     gap: Array
     front: Array
-    hidden: Array
 
     def __len__(self) -> int:
         return len(self.total)
-
-    @property
-    def pure(self) -> Array:
-        """(K,) which share of each part lies in the box."""
-        return self.inside / self.total
-
-    @property
-    def figure(self) -> Array:
-        """(K,) which share of each part's depth jumps is its own silhouette; 1 where it has none."""
-        front = self.front.sum(axis=1)
-        return (front + 1) / (front + self.hidden + 1)
 
 
 def measure(
@@ -78,6 +71,7 @@ def measure(
     total = counts[1:, 0]
     cell = float(surface.x[1] - surface.x[0]) if len(surface.x) > 1 else 0.0
     size = max(right - left, bottom - top) * cell * counts[1:, 3] / total
+    shown = front[1:].sum(axis=1)
     return Parts(
         labels=renamed,
         total=total,
@@ -85,11 +79,12 @@ def measure(
         weight=counts[1:, 2],
         extent=extent[1:],
         size=size,
-        colour=None if rgb is None else _colours(renamed, rgb, surface, k)[1:],
+        pure=counts[1:, 1] / total,
+        figure=(shown + 1) / (shown + front[:, 1:].sum(axis=0) + 1),
+        alike=np.zeros((k - 1, k - 1), np.bool_) if rgb is None else _alike(renamed, rgb, surface, k),
         touching=touching[1:, 1:],
         gap=np.sqrt(gap[1:, 1:]),
         front=front[1:],
-        hidden=front[:, 1:].sum(axis=0),
     )
 
 
@@ -114,11 +109,13 @@ def _rank(labels, count, window, limit, renamed):  # type: ignore[no-untyped-def
     return kept
 
 
-def _colours(labels: Array, rgb: Array, surface: Surface, count: int) -> Array:
-    """(count, 3) the mean colour of each label."""
+def _alike(labels: Array, rgb: Array, surface: Surface, count: int) -> Array:
+    """(K, K) bool: whether the shares of red, green and blue of two parts are about the same; ``count`` is K + 1."""
     sums = np.zeros((count, 4))
     _sum_colours(labels, rgb, surface.left, surface.top, surface.step, sums)
-    return sums[:, :3] / np.maximum(sums[:, 3:], 1)
+    colour = sums[1:, :3] + 8 * sums[1:, 3:]  # what is nearly black has no colour
+    share = colour / colour.sum(axis=1, keepdims=True)
+    return np.asarray(np.abs(share[:, None] - share[None]).sum(axis=-1) < ALIKE)
 
 
 @numba.njit(cache=True)
@@ -166,19 +163,28 @@ def _compare(labels, depth, x, y, bounds, touching, front, gap):  # type: ignore
                 continue
             k = labels[i, j]
             jump = bounds[0] + bounds[1] * s * s
-            for n in range(2 * ACROSS):
-                p, q = (i + n // 2 + 1, j) if n % 2 == 0 else (i, j + n // 2 + 1)
-                if p >= h or q >= w or depth[p, q] <= 0 or labels[p, q] == k:
-                    continue
-                o, t = labels[p, q], depth[p, q]
-                if k > 0 and o > 0:
-                    square = (x[q] * t - x[j] * s) ** 2 + (y[p] * t - y[i] * s) ** 2 + (t - s) ** 2
-                    gap[k, o] = min(gap[k, o], square)
-                    gap[o, k] = gap[k, o]
-                if n < 2 and abs(t - s) < jump:
-                    touching[k, o] += 1
-                    touching[o, k] += 1
-                elif n < 4 and t - s >= jump:
-                    front[k, o] += 1
-                elif n < 4 and s - t >= jump:
-                    front[o, k] += 1
+            for d in range(1, ACROSS + 1):
+                if i + d < h and labels[i + d, j] != k:
+                    _pair(labels, depth, x, y, i, j, i + d, j, d, jump, touching, front, gap)
+                if j + d < w and labels[i, j + d] != k:
+                    _pair(labels, depth, x, y, i, j, i, j + d, d, jump, touching, front, gap)
+
+
+@numba.njit(cache=True, fastmath=EXACT)
+def _pair(labels, depth, x, y, i, j, p, q, d, jump, touching, front, gap):  # type: ignore[no-untyped-def]
+    """Count one pair of cells of two parts, ``d`` cells from each other."""
+    k, o = labels[i, j], labels[p, q]
+    s, t = depth[i, j], depth[p, q]
+    if t <= 0:
+        return
+    if k > 0 and o > 0:
+        square = (x[q] * t - x[j] * s) ** 2 + (y[p] * t - y[i] * s) ** 2 + (t - s) ** 2
+        gap[k, o] = min(gap[k, o], square)
+        gap[o, k] = gap[k, o]
+    if d == 1 and abs(t - s) < jump:
+        touching[k, o] += 1
+        touching[o, k] += 1
+    elif d <= 2 and t - s >= jump:
+        front[k, o] += 1
+    elif d <= 2 and s - t >= jump:
+        front[o, k] += 1

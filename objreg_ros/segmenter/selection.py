@@ -22,7 +22,6 @@ SMALL_GAIN = 0.005  # what a part must add that is wholly there and touches
 MIN_TOUCH = 3  # cells that two parts of one object touch in
 GAP = 0.08  # of the box's size: how far apart two parts of one object are where they are neighbours
 GAP_ALIKE = 0.25  # the same, for parts of one colour
-ALIKE = 0.12  # in colour: how far apart the shares of red, green and blue are
 
 
 def select(parts: Parts, window: Window) -> list[int]:
@@ -59,27 +58,19 @@ def _touching(parts: Parts, chosen: list[int]) -> Array:
 def _close(parts: Parts, chosen: list[int]) -> Array:
     """(K,) bool: the parts that a depth jump keeps from ``chosen``, but no more than within one object."""
     gap, size = parts.gap[chosen], parts.size[chosen[0]]
-    return ((gap < GAP * size) | ((gap < GAP_ALIKE * size) & _alike(parts, chosen))).any(axis=0)
-
-
-def _alike(parts: Parts, chosen: list[int]) -> Array:
-    """(chosen, K) bool: whether two parts have one colour, in whatever light; False without colour."""
-    if parts.colour is None:
-        return np.zeros((len(chosen), len(parts)), bool)
-    share = (parts.colour + 8) / (parts.colour + 8).sum(axis=1, keepdims=True)
-    return np.abs(share[chosen][:, None] - share[None]).sum(axis=-1) < ALIKE
+    return ((gap < GAP * size) | ((gap < GAP_ALIKE * size) & parts.alike[chosen])).any(axis=0)
 
 
 def _lies_on(parts: Parts, chosen: list[int]) -> Array:
     """(K,) bool: the parts that hide more of ``chosen`` than it hides of them, and have another colour."""
     hides = parts.front[:, np.array(chosen) + 1].sum(axis=1)
-    return (hides > parts.front[chosen, 1:].sum(axis=0)) & ~_alike(parts, chosen).any(axis=0)
+    return (hides > parts.front[chosen, 1:].sum(axis=0)) & ~parts.alike[chosen].any(axis=0)
 
 
 def _best_addition(parts: Parts, chosen: list[int], window: Window) -> int | None:
     """The part that adds most to the fit of ``chosen``; None if none adds enough."""
     touching = _touching(parts, chosen)
-    no_background = (parts.figure >= MIN_FIGURE) | _alike(parts, chosen).any(axis=0)
+    no_background = (parts.figure >= MIN_FIGURE) | parts.alike[chosen].any(axis=0)
     near = touching | (_close(parts, chosen) & no_background)
     near[chosen] = False
     ease = touching & (parts.pure >= WHOLE) & ~_lies_on(parts, chosen)
