@@ -92,13 +92,17 @@ class Stage:
         distance = float(rng.uniform(1.2, 1.45) if model.on_floor else rng.uniform(0.7, 1.0))
         return cls(scene.with_objects(number([(model, T)])), model, T, float(rng.uniform(0, 360)), distance)
 
-    def camera(self, angles: Angles) -> Array:
-        """``T_world_camera`` after the camera went around by X, up by Y and rolled by Z."""
+    def camera(self, angles: Angles, rng: np.random.Generator) -> Array:
+        """``T_world_camera`` after the camera went around by X, up by Y and rolled by Z.
+
+        No hand keeps the distance or the aim: both differ a little from view to view.
+        """
         azimuth, elevation = np.radians(self.start_deg + angles[0]), np.radians(35.0 + angles[1])
         away = np.array([np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
         centre = transform(self.T_world_object, self.model.mesh.bounds.mean(axis=0).astype(float))
+        distance, aim = self.distance * rng.uniform(0.9, 1.1), centre + rng.normal(0.0, 0.03, 3)
         roll = pose(rotation_from_vector(np.array([0.0, 0.0, np.radians(angles[2])])), np.zeros(3))
-        return looking(centre + self.distance * away, centre, UP) @ roll
+        return looking(centre + distance * away, aim, UP) @ roll
 
     def error(self, T_first_second: Array, T_world_first: Array, T_world_second: Array) -> tuple[float, float]:
         """(degrees, centimetres) of the object's pose in the first camera when it is carried over from the second."""
@@ -179,8 +183,9 @@ class Bench:
 
     def _pair(self, label: str, angles: Angles, seed: int) -> dict[str, Any]:
         stage = self._stages[label, seed]
-        cameras = stage.camera((0.0, 0.0, 0.0)), stage.camera(angles)
-        noise = [int(np.random.default_rng([seed, int(angles[0]) + 360, k]).integers(2**31)) for k in (0, 1)]
+        rng = np.random.default_rng([seed, int(angles[0]) + 360])
+        cameras = stage.camera((0.0, 0.0, 0.0), rng), stage.camera(angles, rng)
+        noise = rng.integers(2**31, size=2).tolist()
         paper, whole = (
             [shoot(stage, T, s, preset) for T, s in zip(cameras, noise, strict=True)] for preset in ("paper", "default")
         )
