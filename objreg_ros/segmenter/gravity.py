@@ -33,7 +33,7 @@ def estimate_up(normals: Array, prior: Array, cone_deg: float) -> tuple[Array | 
         return None, 0.0
     candidates = level[np.linspace(0, len(level) - 1, CANDIDATES).astype(int)]
     count = np.empty(len(candidates), np.int64)
-    _count_near(candidates, level, CLUSTER, count)
+    _count_near(candidates, np.ascontiguousarray(level.T), CLUSTER, count)
     weight = count * np.clip(candidates @ prior.astype(level.dtype), 0, 1) ** 4
     best = int(weight.argmax())
     up = _refine(level, candidates[best])
@@ -71,10 +71,10 @@ def _gather_known(normals, stride, known):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=True)
 def _count_near(candidates, normals, cosine, count):  # type: ignore[no-untyped-def]
-    """How many ``normals (N, 3)`` lie within the cone of each candidate (K, 3)."""
+    """How many ``normals (3, N)`` lie within the cone of each candidate (K, 3)."""
     for k in range(len(candidates)):
         x, y, z = candidates[k]
         total = 0
-        for n in range(len(normals)):
-            total += 1 if x * normals[n, 0] + y * normals[n, 1] + z * normals[n, 2] > cosine else 0
+        for n in range(normals.shape[1]):
+            total += 1 if x * normals[0, n] + y * normals[1, n] + z * normals[2, n] > cosine else 0
         count[k] = total

@@ -42,7 +42,10 @@ def _back_project(depth, x, y, z_min, z_max, xyz):  # type: ignore[no-untyped-de
 
 def _grey(rgb: Array, step: int, height: int, width: int) -> Array:
     grey = np.empty((height, width), np.uint8)
-    _mean(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY), step, grey)
+    full = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
+    if full.shape == (step * height, step * width):
+        return np.asarray(cv2.resize(full, (width, height), interpolation=cv2.INTER_AREA))
+    _mean(full, step, grey)
     return grey
 
 
