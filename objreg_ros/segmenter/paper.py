@@ -62,5 +62,7 @@ def _no_outlier(xyz: Array) -> Array:
     from scipy.spatial import cKDTree  # needed by this preset alone
 
     k = min(NEIGHBOURS + 1, len(xyz))
+    if k < 2:
+        return np.ones(len(xyz), bool)
     distance = cKDTree(xyz).query(xyz, k)[0][:, 1:].mean(axis=1)
     return distance <= distance.mean() + DEVIATIONS * distance.std()
