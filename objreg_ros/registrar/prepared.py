@@ -43,13 +43,14 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
     """Everything about one keyframe that does not depend on its partner."""
     fine = thin(*seen(keyframe, params), params.surface_voxel)
     coarse = thin(*fine, params.feature_voxel)
+    things = thin(*of_objects(keyframe), params.thing_voxel)
     groups = LabelGroups(params.label_groups)
     return Prepared(
         keyframe=keyframe,
         sight=prepare_sight(keyframe.view, params.context_range, params.detail_sigma, params.seed),
-        surface=prepare_surface(*fine, params.grid_cell, params.grid_reach),
+        surface=prepare_surface(*joined(fine, things), params.grid_cell, params.grid_reach),
         features=describe(*coarse, params.feature_radius),
-        **_shuffled(*coarse, params.seed),
+        **_shuffled(*joined(coarse, sampled(things, params.thing_points, params.seed)), params.seed),
         up=None if keyframe.gravity is None else -np.asarray(keyframe.gravity, float),
         groups=tuple(groups.of(label) for label in keyframe.labels),
         centroids=np.array([item.centroid for item in keyframe.objects]).reshape(-1, 3),
@@ -66,6 +67,27 @@ def seen(keyframe: Keyframe, params: RegistrarParams) -> tuple[Array, Array]:
     known = normals.any(axis=-1) & (view[..., 2] < params.context_range)
     context = keyframe.context
     return np.concatenate([view[known], context.xyz]), np.concatenate([normals[known], context.normals])
+
+
+def of_objects(keyframe: Keyframe) -> tuple[Array, Array]:
+    """Points (N, 3) and normals (N, 3) of all objects: finer than the view, so that what is small counts too."""
+    clouds = [item.cloud for item in keyframe.objects]
+    nothing = np.zeros((0, 3), np.float32)
+    return (
+        np.concatenate([nothing, *(cloud.xyz for cloud in clouds)]),
+        np.concatenate([nothing, *(cloud.normals for cloud in clouds)]),
+    )
+
+
+def joined(*parts: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Oriented points of several parts as one."""
+    return np.concatenate([xyz for xyz, _ in parts]), np.concatenate([normals for _, normals in parts])
+
+
+def sampled(part: tuple[Array, Array], most: int, seed: int) -> tuple[Array, Array]:
+    """At most so many of the oriented points, drawn evenly."""
+    chosen = np.random.default_rng(seed).permutation(len(part[0]))[:most]
+    return part[0][chosen], part[1][chosen]
 
 
 def _shuffled(xyz: Array, normals: Array, seed: int) -> dict[str, Array]:

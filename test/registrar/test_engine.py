@@ -84,3 +84,10 @@ def test_an_empty_keyframe_proposes_nothing(engine: Engine) -> None:
     dark = View(xyz=np.full_like(full.view.xyz, np.nan), grey=None, intrinsics=full.view.intrinsics)
     empty = replace(full, objects=(), context=Context(xyz=nothing, normals=nothing), view=dark)
     assert engine.propose(full, empty) == () == engine.propose(empty, full)
+
+
+def test_what_is_small_counts_too(engine: Engine) -> None:
+    prepared = engine._pantry.get(keyframe(seen_from(0.0), seed=1))
+    cup = next(item.cloud.xyz for item in prepared.keyframe.objects if item.label == "cup")
+    near = np.linalg.norm(prepared.xyz[:, None] - cup[None, ::4], axis=-1).min(axis=1) < 0.02
+    assert near.sum() >= 5
