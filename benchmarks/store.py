@@ -48,10 +48,11 @@ LIGHT = 30  # of an object where as many as 10^5 would fill the disk
 def make_keyframe(number: int, draw: np.random.Generator, points: int = POINTS) -> Keyframe:
     """A keyframe of made-up objects, a context of four times their points and a noisy view."""
     objects = tuple(_make_object(i + 1, draw, points) for i in range(PER_KEYFRAME))
-    noise = draw.normal(size=(120, 160)) if points == POINTS else np.zeros((120, 160))
+    camera = CAMERA if points == POINTS else CAMERA.scaled(10)
+    noise = draw.normal(size=(camera.height, camera.width))
     depth = (2.0 + 0.01 * noise).astype(np.float32)
-    v, u = np.mgrid[0:120, 0:160].astype(np.float32)
-    xyz = np.stack([(u - CAMERA.cx) / CAMERA.fx * depth, (v - CAMERA.cy) / CAMERA.fy * depth, depth], axis=-1)
+    v, u = np.mgrid[0 : camera.height, 0 : camera.width].astype(np.float32)
+    xyz = np.stack([(u - camera.cx) / camera.fx * depth, (v - camera.cy) / camera.fy * depth, depth], axis=-1)
     context = draw.normal(size=(4 * points, 3)).astype(np.float32)
     return Keyframe(
         keyframe_id=number,
@@ -60,7 +61,7 @@ def make_keyframe(number: int, draw: np.random.Generator, points: int = POINTS) 
         frame_id="camera",
         objects=objects,
         context=Context(xyz=context, normals=context / np.linalg.norm(context, axis=1, keepdims=True)),
-        view=View(xyz=xyz, grey=np.asarray(128 + 20 * noise, np.uint8), intrinsics=CAMERA),
+        view=View(xyz=xyz, grey=np.asarray(128 + 20 * noise, np.uint8), intrinsics=camera),
         gravity=np.array([0.0, 1.0, 0.0]),
         gravity_confidence=1.0,
         T_odom_camera=np.eye(4),
@@ -149,8 +150,8 @@ def _fill(path: Path, objects: int, draw: np.random.Generator) -> None:
         names = [row[1] for row in connection.execute("PRAGMA table_info(keyframe)")]
         changed = {"id": "id + :shift", "stamp_ns": "stamp_ns + :shift * 1000000000"}
         copies = ", ".join(changed.get(name, name) for name in names)
-        with connection as transaction:
-            for shift in range(made, keyframes, made):
+        for shift in range(made, keyframes, made):
+            with connection as transaction:
                 transaction.execute(
                     f"INSERT INTO keyframe SELECT {copies} FROM keyframe WHERE id <= {made}", {"shift": shift}
                 )
