@@ -21,6 +21,7 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.sighting import Sighting
 
 LIKENESS = 0.5  # distance of descriptors at which a vote falls to 0.6
+WORTH_A_VOTE = 8.0  # half the squared distance behind the likest beyond which a vote would be nothing
 SHORTLIST = 64  # votes that one object may give
 SPARE = 4  # keyframes that a query names for each one that is tried
 
@@ -112,8 +113,9 @@ class Index:
         n = block.size
         likeness = block.descriptor[:n] @ row.descriptor - block.half_norm[:n]
         likeness[~self._allowed(block, row)] = -np.inf
-        best = np.argpartition(-likeness, SHORTLIST)[:SHORTLIST] if n > SHORTLIST else np.arange(n)
-        best = best[np.isfinite(likeness[best])]
+        best = np.flatnonzero(likeness > max(likeness.max() - WORTH_A_VOTE, -1e30))
+        if len(best) > SHORTLIST:
+            best = best[np.argpartition(-likeness[best], SHORTLIST)[:SHORTLIST]]
         best = best[np.lexsort((block.keyframe_id[best], -likeness[best]))]
         squared = np.maximum(float(row.descriptor @ row.descriptor) - 2.0 * likeness[best].astype(float), 0.0)
         vote = np.exp(-0.5 * squared / LIKENESS**2) * np.log(2.0 + len(self) / n)
@@ -126,7 +128,8 @@ class Index:
         n, params = block.size, self._params
         apart = np.abs(block.stamp_ns[:n] - row.stamp_ns) >= round(1e9 * params.min_gap)
         reach = params.odometry_radius + params.odometry_drift * np.abs(row.travelled - block.travelled[:n])
-        gone = np.square(block.position[:n] - row.position.astype(np.float32)).sum(axis=1) > np.square(reach)
+        offset = block.position[:n] - row.position.astype(np.float32)
+        gone = np.einsum("ij,ij->i", offset, offset) > np.square(reach)
         return np.asarray(apart & ~(gone & (block.session[:n] == row.session)))
 
     def _spread(self, places: list[Place]) -> list[Place]:
