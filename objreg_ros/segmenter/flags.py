@@ -75,14 +75,14 @@ def _sum_moments(depth, x, y, chosen, moments):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=EXACT)
 def _count_on_plane(depth, x, y, chosen, box, normal, offset, counts):  # type: ignore[no-untyped-def]
-    """Fill ``counts``: of the chosen cells and of those outside the box, how many there are and lie on the plane."""
+    """Fill ``counts``: of the chosen cells in the box and of all outside it, how many there are and lie on the plane."""
     for i in range(0, depth.shape[0], STRIDE):
         for j in range(0, depth.shape[1], STRIDE):
             z = depth[i, j]
             outside = i < box[1] or i >= box[3] or j < box[0] or j >= box[2]
             if z <= 0 or not (outside or chosen[i, j]):
                 continue
-            k = 0 if chosen[i, j] else 1
+            k = 1 if outside else 0
             off = abs(z * (normal[0] * x[j] + normal[1] * y[i] + normal[2]) - offset)
             counts[k, 0] += 1
             counts[k, 1] += off < 2 * (FLOOR + GROWTH * z * z)

@@ -50,7 +50,9 @@ class Scene:
         """The depth image with Gaussian noise of ``noise`` · z² metres; unseen pixels are 0."""
         depth = np.where(np.isfinite(self.depth), self.depth, 0.0)
         depth = depth + np.random.default_rng(seed).normal(0, 1, depth.shape) * noise * depth**2
-        rgb = np.random.default_rng(seed).integers(0, 255, (*depth.shape, 3)).astype(np.uint8)
+        palette = np.array([(40, 40, 40), (150, 140, 120), (200, 40, 40), (40, 80, 200), (60, 190, 60)])
+        speckle = np.random.default_rng(seed).integers(0, 30, (*depth.shape, 3))
+        rgb = (palette[np.minimum(self.owner, 4)] + speckle).astype(np.uint8)
         return DepthImage(depth=depth.astype(np.float32), rgb=rgb, intrinsics=self.camera, stamp_ns=7, frame_id="eye")
 
     def box_of(self, *owners: int, pad: float = 0.08) -> tuple[float, float, float, float]:

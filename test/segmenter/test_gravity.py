@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Up from normals."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from objreg_ros.segmenter.gravity import CAMERA_UP, estimate_up, known_normals
+
+
+def around(direction: np.ndarray, count: int, spread: float = 0.03) -> np.ndarray:
+    n = direction / np.linalg.norm(direction) + np.random.default_rng(0).normal(0, spread, (count, 3))
+    return (n / np.linalg.norm(n, axis=1, keepdims=True)).astype(np.float32)
+
+
+def test_the_floor_wins_over_a_larger_wall() -> None:
+    floor, wall = np.array([0.0, -0.9, -0.43]), np.array([0.1, 0.0, -1.0])
+    up, confidence = estimate_up(np.vstack([around(floor, 600), around(wall, 2500)]), CAMERA_UP, 65.0)
+    assert up is not None
+    assert up @ floor / np.linalg.norm(floor) > np.cos(np.radians(0.5))
+    assert confidence > 0.9
+
+
+def test_walls_alone_tell_nothing() -> None:
+    assert estimate_up(around(np.array([0.2, 0.05, -1.0]), 2000), CAMERA_UP, 65.0) == (None, 0.0)
+
+
+def test_two_candidates_alike_give_little_confidence() -> None:
+    tilted = [np.array([0.0, -0.8, s]) for s in (0.6, -0.6)]
+    _, confidence = estimate_up(np.vstack([around(t, 800) for t in tilted]), CAMERA_UP, 65.0)
+    assert confidence < 0.3
+
+
+def test_unknown_normals_are_left_out() -> None:
+    normals = np.zeros((3, 6, 8), np.float32)
+    normals[2, ::2, 1:] = -1
+    assert known_normals(normals, 1).shape == (21, 3)

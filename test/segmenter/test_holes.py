@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Holes in an object."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from objreg_ros.segmenter.holes import fill_holes
+
+JUMP = (0.012, 0.008)
+
+
+def ring() -> np.ndarray:
+    chosen = np.zeros((12, 12), bool)
+    chosen[2:10, 2:10] = True
+    chosen[5:7, 5:7] = False
+    return chosen
+
+
+def test_a_hole_that_goes_on_smoothly_is_filled() -> None:
+    chosen = ring()
+    fill_holes(chosen, np.ones((12, 12), np.float32), JUMP)
+    assert chosen[2:10, 2:10].all()
+    assert chosen.sum() == 64
+
+
+def test_what_is_seen_through_a_hole_stays_outside() -> None:
+    chosen, depth = ring(), np.ones((12, 12), np.float32)
+    depth[5:7, 5:7] = 1.5
+    fill_holes(chosen, depth, JUMP)
+    assert not chosen[5:7, 5:7].any()

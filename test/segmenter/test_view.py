@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The reduced view."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from objreg_ros.data import DepthImage, Intrinsics
+from objreg_ros.segmenter.view import reduced_view
+
+
+def image(height: int, width: int) -> DepthImage:
+    camera = Intrinsics(fx=100.0, fy=100.0, cx=width / 2, cy=height / 2, width=width, height=height)
+    depth = np.arange(height * width, dtype=np.float32).reshape(height, width) / (height * width) + 1
+    rgb = np.full((height, width, 3), 90, np.uint8)
+    return DepthImage(depth=depth, rgb=rgb, intrinsics=camera, stamp_ns=0)
+
+
+def test_points_are_those_of_every_fourth_pixel() -> None:
+    full = image(48, 64)
+    view = reduced_view(full, 4, 0.2, 4.0)
+    np.testing.assert_array_equal(view.xyz[..., 2], full.depth[2::4, 2::4])
+    x, _, z = view.xyz[3, 5]
+    assert abs(x / z * 100 + 32 - 22) < 1e-4
+
+
+def test_grey_is_grey_and_odd_sizes_fit() -> None:
+    for height, width in ((48, 64), (50, 67), (3, 3), (1, 1)):
+        view = reduced_view(image(height, width), 4, 0.2, 4.0)
+        assert view.grey is not None
+        assert view.grey.shape == view.xyz.shape[:2]
+        assert (view.grey == 90).all()
+
+
+def test_depth_out_of_range_is_nan() -> None:
+    assert np.isnan(reduced_view(image(48, 64), 4, 0.2, 0.9).xyz).all()
