@@ -45,10 +45,9 @@ class PaperEngine:
     def propose(
         self, source: Keyframe, target: Keyframe, T_target_source_prior: Array | None = None
     ) -> tuple[Candidate, ...]:
-        """Poses of ``source`` in ``target``, the best verified first; the prior is where ICP starts, rest without."""
-        start = np.eye(4) if T_target_source_prior is None else T_target_source_prior
+        """Poses of ``source`` in ``target``, the best verified first. ICP starts from rest: the prior is not looked at."""
         alignments = [
-            register(a.cloud.xyz, b.cloud.xyz, start, self._params)
+            register(a.cloud.xyz, b.cloud.xyz, np.eye(4), self._params)
             for a in source.objects
             for b in target.objects
             if a.label == b.label
