@@ -79,7 +79,7 @@ def four(seed: int) -> Stage:
     """A table with four different objects; its middle is the object of the stage."""
     rng = np.random.default_rng([seed, 4])
     labels = rng.permutation(FOUR)[:4]
-    table, room = furniture.table(rng, (1.3, 0.9)), furniture.room(rng, (2.8, 2.8))
+    table, room = furniture.table(rng, (1.3, 0.9)), furniture.room(rng, (3.2, 2.5))
     height = table.boards[0][2]
     corners = np.array([(-0.3, -0.2), (0.3, -0.2), (-0.3, 0.2), (0.3, 0.2)]) + rng.uniform(-0.05, 0.05, (4, 2))
     models = [make_object(str(label), int(rng.integers(2**31))) for label in labels]
@@ -92,14 +92,13 @@ def four(seed: int) -> Stage:
     return Stage(scene, models[0], pose(np.eye(3), np.array([0.0, 0.0, height])), float(rng.uniform(0, 360)), 1.15)
 
 
-def around(stage: Stage, angle: float, middle: bool) -> Array:
-    """``T_world_camera`` after going around by ``angle`` degrees, looking at the object or at the table's middle."""
-    if not middle:
-        return stage.camera((angle, 0.0, 0.0))
+def around(stage: Stage, angle: float, rng: np.random.Generator) -> Array:
+    """``T_world_camera`` after going around a table by ``angle`` degrees; distance and aim differ a little."""
     azimuth, elevation = np.radians(stage.start_deg + angle), np.radians(38.0)
     away = np.array([np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
     centre = stage.T_world_object[:3, 3]
-    return looking(centre + stage.distance * away, centre, UP)
+    aim = centre + rng.normal(0.0, 0.03, 3)
+    return looking(centre + stage.distance * rng.uniform(0.9, 1.1) * away, aim, UP)
 
 
 class Bench:
@@ -109,6 +108,7 @@ class Bench:
         self.params = RegistrarParams()
         self.engine = Engine(self.params)
         self.stress, self.seed = CONDITIONS[condition], seed
+        self._looks = 0
         self.rows: list[dict[str, Any]] = []
         self.joint: list[dict[str, Any]] = []
         self.negatives: list[bool] = []
@@ -116,9 +116,9 @@ class Bench:
     def single(self, label: str, number: int, angles: Sequence[float], peers: dict[str, Any]) -> Shot:
         """One object from all angles against the first; returns the first look."""
         stage = Stage.of(label, 1000 * self.seed + number)
-        first = look(stage, stage.camera((0.0, 0.0, 0.0)), self._noise(), self.stress, self.params)
+        first = look(stage, stage.camera((0.0, 0.0, 0.0), self._hand()), self._noise(), self.stress, self.params)
         for angle in angles:
-            second = look(stage, stage.camera((angle, 0.0, 0.0)), self._noise(), self.stress, self.params)
+            second = look(stage, stage.camera((angle, 0.0, 0.0), self._hand()), self._noise(), self.stress, self.params)
             row = self.registered(first, second)
             T = row.pop("T")
             error = (180.0, 1e3) if T is None else stage.error(T, first.T_world_camera, second.T_world_camera)
@@ -131,9 +131,9 @@ class Bench:
     def together(self, number: int, angles: Sequence[float]) -> None:
         """Four objects from all angles against the first look."""
         stage = four(1000 * self.seed + number)
-        first = look(stage, around(stage, 0.0, True), self._noise(), self.stress, self.params)
+        first = look(stage, around(stage, 0.0, self._hand()), self._noise(), self.stress, self.params)
         for angle in angles:
-            second = look(stage, around(stage, angle, True), self._noise(), self.stress, self.params)
+            second = look(stage, around(stage, angle, self._hand()), self._noise(), self.stress, self.params)
             row = self.registered(first, second)
             T, truth = row.pop("T"), inverse(first.T_world_camera) @ second.T_world_camera
             middle = transform(inverse(second.T_world_camera), stage.T_world_object[:3, 3])
@@ -197,9 +197,13 @@ class Bench:
             },
         }
 
+    def _hand(self) -> np.random.Generator:
+        """The hand that holds the camera: another one for every look."""
+        self._looks += 1
+        return np.random.default_rng([self.seed, self._looks])
+
     def _noise(self) -> int:
-        self.seed_count = getattr(self, "seed_count", 0) + 1
-        return int(np.random.default_rng([self.seed, self.seed_count]).integers(2**31))
+        return int(self._hand().integers(2**31))
 
 
 def yaw_unknown(shot: Shot, params: RegistrarParams) -> bool:
