@@ -77,6 +77,7 @@ class RegistrarParams(Params):
     min_points: int = param(60, "fewer paired points hold no pose", ge=6)
     surface_noise: float = param(0.005, "least noise that a surface is believed to have", "m", ge=1e-4)
     slack_share: float = param(0.01, "a direction that less of the surface resists is free to slide", ge=0.0, le=0.3)
+    holding_texture: float = param(0.5, "grey that correlates so well holds what shape lets slide", ge=0.0, le=1.0)
     symmetry_share: float = param(0.07, "an object whose surface resists a turn less has no yaw", ge=0.0, le=1.0)
     depth_tolerance: float = param(0.02, "depths this close agree, at the camera", "m", ge=0.001)
     depth_tolerance_growth: float = param(0.006, "growth of that tolerance with the square of depth", "1/m", ge=0.0)
