@@ -45,7 +45,7 @@ class PaperEngine:
     def propose(
         self, source: Keyframe, target: Keyframe, T_target_source_prior: Array | None = None
     ) -> tuple[Candidate, ...]:
-        """Poses of ``source`` in ``target``, the best verified first. ICP starts from rest: the prior is not looked at."""
+        """Poses of ``source`` in ``target``, the best verified first. ICP starts from rest, never from a prior."""
         alignments = [
             register(a.cloud.xyz, b.cloud.xyz, np.eye(4), self._params)
             for a in source.objects
