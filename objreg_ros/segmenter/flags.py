@@ -75,7 +75,7 @@ def _sum_moments(depth, x, y, chosen, moments):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, fastmath=EXACT)
 def _count_on_plane(depth, x, y, chosen, box, normal, offset, counts):  # type: ignore[no-untyped-def]
-    """Fill ``counts``: of the chosen cells in the box and of all outside it, how many there are and lie on the plane."""
+    """Fill ``counts``: of the chosen cells in the box and of all outside it, how many there are and are flat."""
     for i in range(0, depth.shape[0], STRIDE):
         for j in range(0, depth.shape[1], STRIDE):
             z = depth[i, j]
