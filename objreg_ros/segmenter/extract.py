@@ -40,8 +40,8 @@ def extract(image: DepthImage, box: Box, surface: Surface, chosen: Array, jump: 
     """The pixels of ``box`` whose surface is a ``chosen (h, w) bool`` cell of ``surface``."""
     x0, y0, x1, y1 = box
     camera = image.intrinsics
-    mask = np.zeros((y1 - y0, x1 - x0), np.bool_)
-    kept = np.zeros_like(mask)
+    mask = np.zeros((y1 - y0 + 2, x1 - x0 + 2), np.uint8)  # with a rim, so that every pixel has eight neighbours
+    kept = np.zeros((y1 - y0, x1 - x0), np.bool_)
     a, b = np.float32(jump[0]), np.float32(jump[1])
     h, w = surface.depth.shape
     rows = np.minimum((np.arange(y0, y1) - surface.top) // surface.step, h - 1)
@@ -51,7 +51,7 @@ def extract(image: DepthImage, box: Box, surface: Surface, chosen: Array, jump: 
     xyz, normals = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
     edge, bounds = np.empty(count, np.uint16), np.empty(4, np.int64)
     x, y = _slopes(x0, x1, camera.cx, camera.fx), _slopes(y0, y1, camera.cy, camera.fy)
-    edges = _jumps(image.depth, x0, y0, a, b, mask)
+    edges = _jumps(image.depth, x0, y0, a, b, kept)
     n, area = _gather(depth, mask, kept, edges, surface.normals, rows, cols, x, y, xyz, normals, edge, bounds)
     rgb = None if image.rgb is None else _colours(image.rgb, x0, y0, kept, n)
     area /= camera.fx * camera.fy
@@ -84,19 +84,20 @@ def _pick(rgb, x0, y0, mask, out):  # type: ignore[no-untyped-def]
 def _mark(depth, cells, rows, cols, chosen, a, b, mask):  # type: ignore[no-untyped-def]
     """Mark the pixels that belong to chosen cells: by their own cell, or by the nearest in depth around it."""
     count = 0
-    for v in range(mask.shape[0]):
+    for v in range(depth.shape[0]):
         i = rows[v]
-        for u in range(mask.shape[1]):
+        for u in range(depth.shape[1]):
             z = depth[v, u]
             if not (z > 0):
                 continue
             j = cols[u]
             jump = a + b * z * z
             if cells[i, j] > 0 and abs(cells[i, j] - z) < jump:
-                mask[v, u] = chosen[i, j]
+                belongs = chosen[i, j]
             else:
-                mask[v, u] = _nearest(cells, chosen, i, j, z, jump)
-            count += mask[v, u]
+                belongs = _nearest(cells, chosen, i, j, z, jump)
+            mask[v + 1, u + 1] = belongs
+            count += belongs
     return count
 
 
@@ -116,13 +117,13 @@ def _nearest(cells, chosen, i, j, z, limit):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True, fastmath=EXACT)
 def _gather(depth, mask, kept, edges, cell_normals, rows, cols, x, y, xyz, normals, edge, bounds):  # type: ignore[no-untyped-def]
     """Fill the outputs from the marked pixels but for outliers, and ``kept``; their number and area times fx fy."""
-    h, w = mask.shape
+    h, w = kept.shape
     area, n = 0.0, 0
     bounds[0], bounds[1], bounds[2], bounds[3] = w, h, 0, 0
     for v in range(h):
         i = rows[v]
         for u in range(w):
-            if not mask[v, u] or _neighbours(mask, v, u) < MIN_NEIGHBOURS:
+            if mask[v + 1, u + 1] == 0 or _neighbours(mask, v, u) < MIN_NEIGHBOURS:
                 continue
             kept[v, u] = True
             z = depth[v, u]
@@ -141,11 +142,10 @@ def _gather(depth, mask, kept, edges, cell_normals, rows, cols, x, y, xyz, norma
 
 @numba.njit(cache=True, inline="always")
 def _neighbours(mask, v, u):  # type: ignore[no-untyped-def]
-    count = -1
-    for p in range(max(0, v - 1), min(mask.shape[0], v + 2)):
-        for q in range(max(0, u - 1), min(mask.shape[1], u + 2)):
-            count += mask[p, q]
-    return count
+    """How many of the eight neighbours of pixel (v, u) are marked; ``mask`` has a rim of one."""
+    above, here, below = mask[v], mask[v + 1], mask[v + 2]
+    beside = here[u] + here[u + 2]
+    return above[u] + above[u + 1] + above[u + 2] + beside + below[u] + below[u + 1] + below[u + 2]
 
 
 @numba.njit(cache=True, fastmath=EXACT)
