@@ -3,26 +3,31 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Mapping, Sequence
+from itertools import chain, count
 from typing import Any
 
 from objreg_ros.bridge.door import Door
 from objreg_ros.bridge.sync import Stream, Synchroniser
 from objreg_ros.params import Params
 
-EARLY = 100  # messages that are kept until it is known how they are matched
+EARLY = 30  # messages of a stream that are kept until it is known how they are matched
+
+Early = tuple[int, str, int, Any]  # order of arrival, stream, stamp, payload
 
 
 class MatchingDoor(Door):
     """Hands a `Match` to the worker for every message of the first stream that found its partners.
 
-    That first stream is what the books count. `begin` says how streams are matched; what was fed before then waits.
+    That first stream is what the books count. `begin` says how streams are matched; the newest that each stream was
+    fed before then waits.
     """
 
     def __init__(self, name: str, *kinds: type[Params]) -> None:
         super().__init__(name, *kinds)
-        self._early: deque[tuple[str, int, Any]] = deque(maxlen=EARLY)
+        self._early: defaultdict[str, deque[Early]] = defaultdict(lambda: deque(maxlen=EARLY))
+        self._order = count()
         self._sync: Synchroniser | None = None
         self._reference = ""
 
@@ -30,8 +35,9 @@ class MatchingDoor(Door):
         """Start matching; what was fed to streams that are not among these is forgotten."""
         self._reference = streams[0].name
         self._sync = Synchroniser(streams, self._unmatched)
-        while self._early:
-            self.feed(*self._early.popleft())
+        for _, *item in sorted(chain(*self._early.values()), key=lambda early: early[0]):
+            self.feed(*item)
+        self._early.clear()
 
     @property
     def begun(self) -> bool:
@@ -41,7 +47,7 @@ class MatchingDoor(Door):
     def feed(self, name: str, stamp_ns: int, payload: Any) -> None:
         """One message of a stream."""
         if self._sync is None:
-            self._early.append((name, stamp_ns, payload))
+            self._early[name].append((next(self._order), name, stamp_ns, payload))
         elif name in self._sync.queues:
             if name == self._reference:
                 self.accept(stamp_ns)

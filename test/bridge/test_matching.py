@@ -68,6 +68,16 @@ def test_what_comes_before_it_is_known_how_to_match_is_not_lost(door: Pairs) -> 
     assert door.taken == [("a5", "b5")]
 
 
+def test_what_came_once_is_not_pushed_out_by_a_busy_stream_before_matching_begins(door: Pairs) -> None:
+    door.feed("names", 0, "cup")
+    for stamp_ns in range(1000):
+        door.feed("b", stamp_ns, f"b{stamp_ns}")
+    door.begin([Stream("a"), Stream("b"), Stream("names", Need.LATCHED)])
+    door.feed("a", 999, "a999")
+    door.wait()
+    assert door.taken == [("a999", "b999")]
+
+
 def test_a_frame_whose_partner_never_came_is_dropped_as_unmatched(door: Pairs) -> None:
     door.begin([Stream("a"), Stream("b")])
     door.feed("a", 5, "a5")
