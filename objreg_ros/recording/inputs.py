@@ -131,13 +131,16 @@ def choose_inputs(topics: Mapping[str, Topic], remaps: Mapping[str, str] | None 
 
     A depth image with its camera_info goes before points: it is the same measurement in a thirteenth of the bytes.
     Points go before a depth image whose name does not say that it is registered to colour. ValueError for a remap
-    that names no input or no topic of the recording.
+    that names no input, no topic of the recording, a topic of another type or a topic that another remap names.
     """
     asked = {_input_name(name): topic for name, topic in (remaps or {}).items()}
     _require_known(asked, topics)
-    found = {name: asked[name] if name in asked else _best(rule, topics.values()) for name, rule in RULES.items()}
+    _require_types(asked, topics)
+    _require_different(asked)
+    free = [topic for topic in topics.values() if topic.name not in asked.values()]
+    found = {name: asked[name] if name in asked else _best(rule, free) for name, rule in RULES.items()}
     if "depth" not in asked and NATIVE in (found["image"] or ""):
-        found["depth"] = _best(RULES["depth_native"], topics.values())
+        found["depth"] = _best(RULES["depth_native"], free)
     found["camera_info"] = asked.get("camera_info", _camera_info_of((found["depth"], found["image"]), topics))
     if _depth_wins(found, asked):
         found["points"] = None
@@ -179,6 +182,20 @@ def _require_known(asked: Mapping[str, str], topics: Mapping[str, Topic]) -> Non
     unknown = sorted(topic for topic in asked.values() if topic and topic not in topics)
     if unknown:
         raise ValueError(f"remap: expected a topic of the recording ({', '.join(topics)}), got {', '.join(unknown)}")
+
+
+def _require_types(asked: Mapping[str, str], topics: Mapping[str, Topic]) -> None:
+    for name, topic in asked.items():
+        types = (CAMERA_INFO,) if name == "camera_info" else RULES[name].types
+        if topic and topics[topic].msgtype not in types:
+            raise ValueError(f"expected {name} of type {' or '.join(types)}, got {topic} ({topics[topic].msgtype})")
+
+
+def _require_different(asked: Mapping[str, str]) -> None:
+    first: dict[str, str] = {}
+    for name, topic in asked.items():
+        if topic and first.setdefault(topic, name) != name:
+            raise ValueError(f"remap: expected a topic of its own for {name}, got {topic} of {first[topic]} again")
 
 
 def _best(rule: Rule, topics: Iterable[Topic]) -> str | None:

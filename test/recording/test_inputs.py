@@ -116,3 +116,27 @@ def test_a_remap_of_another_form_is_refused(text: str) -> None:
 def test_a_remap_to_nowhere_is_refused() -> None:
     with pytest.raises(ValueError, match=r"expected a topic of the recording \(/image\), got /nowhere"):
         choose_inputs(topics("/image"), {"image": "/nowhere"})
+
+
+@pytest.mark.parametrize(
+    ("name", "topic", "expected"),
+    [
+        ("odom", "/image", r"odom of type nav_msgs/msg/Odometry, got /image \(sensor_msgs/msg/Image\)"),
+        ("camera_info", "/odom", r"camera_info of type sensor_msgs/msg/CameraInfo, got /odom \(nav_msgs"),
+        ("image", "/points", r"image of type sensor_msgs/msg/Image or sensor_msgs/msg/CompressedImage, got /points"),
+        ("points", "/image", r"points of type sensor_msgs/msg/PointCloud2, got /image"),
+    ],
+)
+def test_a_remap_to_a_topic_of_another_type_is_refused(name: str, topic: str, expected: str) -> None:
+    with pytest.raises(ValueError, match=f"^expected {expected}"):
+        choose_inputs(topics("/image /points:points /odom:odom /camera_info:info"), {name: topic})
+
+
+def test_a_topic_for_two_inputs_is_refused() -> None:
+    with pytest.raises(ValueError, match="expected a topic of its own for depth, got /image of image again"):
+        choose_inputs(topics("/image /depth/image"), {"image": "/image", "depth": "/image"})
+
+
+def test_a_topic_that_a_remap_names_is_not_chosen_for_another_input() -> None:
+    inputs = choose_inputs(topics("/image /vicon/camera:odom"), {"odom": "/vicon/camera"})
+    assert (inputs.odom, inputs.ground_truth) == ("/vicon/camera", None)
