@@ -268,9 +268,14 @@ class Line:
         for match in matches:
             if self.full:
                 return
-            frame = with_odometry(match["frame"], match["odom"], self._timing.T_base_camera)
+            labels = self._labels.pop(match.stamp_ns, ())
+            frame = self._kept(
+                "frame", partial(with_odometry, match["frame"], match["odom"], self._timing.T_base_camera)
+            )
+            if frame is None:
+                continue
             self.run.frames += 1
-            self.run.glimpses.append(glimpse(frame, self._labels.pop(frame.stamp_ns, ())))
+            self.run.glimpses.append(glimpse(frame, labels))
             with self._timed("register"):
                 outcome = self._rooms.registrar.process(frame)
             self._note(outcome)
@@ -321,7 +326,7 @@ def run_offline(
 
 
 def with_odometry(frame: Frame, odom: Any, T_base_camera: Array | None) -> Frame:
-    """The frame with the pose that an odometry message (or None) gives its camera."""
+    """The frame with the pose that an odometry message (or None) gives its camera; ValueError if it gives none."""
     if odom is None:
         return frame
     T_odom_body = from_msg.odometry(odom).T_odom_body

@@ -90,6 +90,24 @@ def test_broken_messages_are_counted_and_the_run_goes_on() -> None:
     assert "got 'bayer'" in run.complaints["malformed_image"]
 
 
+def lost() -> Iterator[Record]:
+    """The second odometry message has a quaternion of zeros, as drivers send that have lost track."""
+    for record in records(4):
+        message = record.message
+        if (record.topic, record.stamp_ns) == ("/odom", 1100 * MS):
+            message.pose.pose.orientation.w = 0.0
+        yield Record.of(record.topic, message, record.stamp_ns)
+
+
+def test_a_frame_whose_odometry_is_no_pose_is_dropped_and_the_run_goes_on() -> None:
+    rooms, chain = simple_rooms()
+    run = run_offline(lost(), rooms, INPUTS)
+    assert [frame.stamp_ns // MS for frame in chain.frames] == [1000, 1200, 1300]
+    assert (run.frames, run.dropped) == (3, {"malformed_frame": 1})
+    assert [row["labels"] for row in run.glimpses] == [["cup"]] * 3
+    assert "quaternion of non-zero length" in run.complaints["malformed_frame"]
+
+
 def test_a_bug_in_a_room_is_not_taken_for_a_broken_message() -> None:
     rooms, chain = simple_rooms()
 
