@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -54,15 +55,25 @@ def command(
     Deterministic, and as fast as the CPU goes. Prints what came out and, where the recording has ground truth, the
     true error of every constraint.
     """
+    if json_file is not None:
+        _require_writable(json_file)
     settings = read_settings(params_file, [*changes, *_model_changes(model, labels)])
     with open_recording(recording) as source:
         inputs = _inputs(source, remaps, odometry)
         truth = Truth.of(source, inputs.ground_truth)
         run = _run(source, inputs, settings, max_frames, odometry)
     summary = run.summary(truth)
+    _say(run, summary)
     if json_file is not None:
         json_file.write_text(json.dumps({"recording": str(recording), "odometry": inputs.odom, **summary}, indent=1))
-    _say(run, summary)
+
+
+def _require_writable(file: Path) -> None:
+    """OSError before the run rather than after it, where its outcome could not be kept."""
+    if not file.parent.is_dir():
+        raise OSError(f"--json: expected {file.parent} to be a folder, and it is not; create it or choose another")
+    if not os.access(file if file.exists() else file.parent, os.W_OK):
+        raise OSError(f"--json: expected to be allowed to write {file}, and am not; choose another place")
 
 
 def _model_changes(model: str | None, labels: str | None) -> list[str]:
