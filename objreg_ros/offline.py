@@ -110,6 +110,7 @@ class Timing:
     slop_ns: int = 20_000_000
     odom_slop_ns: int = 20_000_000
     T_base_camera: Array | None = None
+    colour: bool = True  # whether a depth image takes its colour from `image`
 
 
 @dataclass
@@ -199,8 +200,8 @@ class Line:
         streams = [Stream("depth"), Stream("detections", slop_ns=self._timing.slop_ns)]
         if self._from_points:
             return streams
-        colour = Stream("image", Need.OPTIONAL, self._timing.slop_ns)
-        return [*streams, Stream("camera_info", Need.LATCHED), colour]
+        colour = [Stream("image", Need.OPTIONAL, self._timing.slop_ns)] if self._timing.colour else []
+        return [*streams, Stream("camera_info", Need.LATCHED), *colour]
 
     @property
     def full(self) -> bool:
@@ -260,7 +261,7 @@ class Line:
 
     def _depth(self, match: Match) -> DepthImage:
         if not self._from_points:
-            return from_msg.depth_image(match["depth"], match["camera_info"], match["image"])
+            return from_msg.depth_image(match["depth"], match["camera_info"], match.payloads.get("image"))
         camera = None if self._camera_info is None else from_msg.intrinsics(self._camera_info)
         return self._rooms.organise(from_msg.point_cloud(match["depth"]), camera)
 

@@ -34,6 +34,13 @@ def test_colour_reaches_the_segmenter_registered_to_depth() -> None:
     assert [round(float(frame.objects[0].xyz[0, 2]), 3) for frame in chain.frames] == [1.0, 1.001, 1.002]
 
 
+def test_colour_can_be_left_out() -> None:
+    rooms, chain = simple_rooms()
+    run = run_offline(records(3), rooms, INPUTS, Timing(colour=False))
+    assert run.frames == run.detections == 3
+    assert [frame.objects[0].rgb for frame in chain.frames] == [None] * 3
+
+
 def test_without_odometry_frames_go_through_without_it() -> None:
     rooms, chain = simple_rooms()
     run = run_offline(records(3), rooms, Inputs(image="/image", depth="/depth/image", camera_info="/camera_info"))

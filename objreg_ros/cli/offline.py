@@ -59,7 +59,7 @@ def command(
         _require_writable(json_file)
     settings = read_settings(params_file, [*changes, *_model_changes(model, labels)])
     with open_recording(recording) as source:
-        inputs = _inputs(source, remaps, odometry)
+        inputs = _inputs(source, remaps, odometry, settings.of("segmenter", SegmenterNodeParams).source)
         truth = Truth.of(source, inputs.ground_truth)
         run = _run(source, inputs, settings, max_frames, odometry)
     summary = run.summary(truth)
@@ -81,19 +81,30 @@ def _model_changes(model: str | None, labels: str | None) -> list[str]:
     return [f"{name}={value}" for name, value in named.items() if value]
 
 
-def _inputs(source: Recording, remaps: tuple[str, ...], odometry: str | None) -> Inputs:
-    asked = parse_remaps(remaps)
+def _inputs(source: Recording, remaps: tuple[str, ...], odometry: str | None, depth_source: str) -> Inputs:
+    asked = _only(depth_source, parse_remaps(remaps))
     if odometry is not None:
         asked["odom"] = "" if odometry == "none" or odometry.startswith(DRIFT) else odometry
     inputs = choose_inputs(source.topics, asked)
     if not inputs.complete:
         there = ", ".join(f"{topic.name} ({topic.msgtype})" for topic in source.topics.values()) or "no topics"
-        raise ValueError(f"{source.path}: expected {inputs.missing}, got {there}; choose with --remap input:=/topic")
+        wanted = inputs.missing + ("" if depth_source == "auto" else f" for segmenter.source={depth_source}")
+        raise ValueError(f"{source.path}: expected {wanted}, got {there}; choose with --remap input:=/topic")
     if (odometry or "").startswith(DRIFT):
         if inputs.ground_truth is None:
             raise ValueError(f"{source.path}: --odometry {odometry} needs a ground truth, and there is none")
         return Inputs(**{**inputs.chosen(), "odom": ODOM})
     return inputs
+
+
+def _only(depth_source: str, asked: dict[str, str]) -> dict[str, str]:
+    """What is asked for, and of the two kinds of depth only the segmenter's ``source``; ValueError for the other."""
+    other = {"points": "depth", "depth": "points"}.get(depth_source)
+    if other is None:
+        return asked
+    if asked.get(other):
+        raise ValueError(f"--remap: expected no {other} with segmenter.source={depth_source}, got {asked[other]}")
+    return {**asked, other: ""}
 
 
 def _run(source: Recording, inputs: Inputs, settings: Settings, max_frames: int | None, odometry: str | None) -> Run:
@@ -114,7 +125,8 @@ def _run(source: Recording, inputs: Inputs, settings: Settings, max_frames: int 
 
 def _timing(settings: Settings) -> Timing:
     segmenter, registrar = settings.of("segmenter", SegmenterNodeParams), settings.of("registrar", RegistrarNodeParams)
-    return Timing(round(segmenter.slop * 1e9), round(registrar.odom_slop * 1e9), registrar.mounting)
+    slop_ns, odom_slop_ns = round(segmenter.slop * 1e9), round(registrar.odom_slop * 1e9)
+    return Timing(slop_ns, odom_slop_ns, registrar.mounting, segmenter.colour)
 
 
 def _records(source: Recording, inputs: Inputs, odometry: str | None) -> Iterator[Record]:

@@ -10,6 +10,7 @@ from detector.tiny_model import save_constant_model, tf_outputs
 from recording.folders import tum_folder
 
 from objreg_ros.cli.offline import command
+from objreg_ros.offline import Run
 
 KEYS = {"frames", "detections", "objects", "constraints", "rejected", "stage_ms", "truth"}
 
@@ -85,3 +86,26 @@ def test_a_model_that_is_not_there_is_refused(tmp_path: Path) -> None:
 def test_a_parameter_reaches_its_room(model: Path, tmp_path: Path) -> None:
     output = offline(tum_folder(tmp_path, frames=2), "--model", model, "--set", "detector.threshold=0.95")
     assert "2 frames, 0 detections, 0 objects" in output
+
+
+def test_the_segmenters_source_chooses_the_depth(model: Path, tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path, frames=2)
+    assert "2 frames" in offline(folder, "--model", model, "--set", "segmenter.source=depth")
+    with pytest.raises(ValueError, match=r"expected points or a depth image for segmenter\.source=points, got "):
+        offline(folder, "--model", model, "--set", "segmenter.source=points")
+
+
+def test_a_remap_against_the_segmenters_source_is_refused(model: Path, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"expected no depth with segmenter\.source=points, got /depth/image"):
+        words = ("--set", "segmenter.source=points", "--remap", "depth:=/depth/image")
+        offline(tum_folder(tmp_path), "--model", model, *words)
+
+
+@pytest.mark.parametrize("colour", [True, False])
+def test_the_segmenters_colour_reaches_the_run(
+    colour: bool, model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list = []
+    monkeypatch.setattr("objreg_ros.cli.offline.run_offline", lambda *words: seen.append(words[3]) or Run())
+    offline(tum_folder(tmp_path), "--model", model, "--set", f"segmenter.colour={str(colour).lower()}")
+    assert seen[0].colour is colour
