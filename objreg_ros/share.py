@@ -21,6 +21,7 @@ def folders() -> Iterator[Path]:
             yield Path(prefix) / "share" / NAME
     if len(package.parents) > 3:  # <prefix>/lib/python3.x/site-packages/objreg_ros
         yield package.parents[3] / "share" / NAME
+    yield package.parent / "share" / NAME  # pip install --target
     yield Path(sys.prefix) / "share" / NAME
 
 

@@ -36,6 +36,11 @@ def test_files_beside_a_pip_installation_are_found(elsewhere: Path) -> None:
     assert share.find("config/a.xml") == expected
 
 
+def test_files_beside_an_installation_into_a_target_folder_are_found(elsewhere: Path) -> None:
+    expected = put(elsewhere / "prefix" / "lib" / "python3.x" / "site-packages", "config/a.xml")
+    assert share.find("config/a.xml") == expected
+
+
 def test_a_colcon_workspace_is_found_by_its_prefix(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     expected = put(elsewhere / "workspace", "config/a.xml")
     put(elsewhere / "prefix", "config/a.xml")
