@@ -96,6 +96,7 @@ class RegistrarParams(Params):
     min_tested: int = param(600, "least number of pixels that both views must see", ge=1)
     min_inliers: float = param(0.45, "least share of tested pixels whose depth agrees", ge=0.0, le=1.0)
     max_violations: float = param(0.07, "largest share of tested pixels in seen free space", ge=0.0, le=1.0)
+    max_violations_alone: float = param(0.035, "the same where a single object is explained", ge=0.0, le=1.0)
     min_texture: float = param(0.25, "least correlation of the high-passed grey, where there is grey", ge=-1.0, le=1.0)
     min_score: float = param(0.10, "least verification score V", ge=-3.0, le=2.0)
     rival_margin: float = param(0.1, "a candidate this much below the best in V is not considered", ge=0.0)

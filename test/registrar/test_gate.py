@@ -54,6 +54,12 @@ def test_one_object_closes_a_loop_when_independent_chains_agree() -> None:
     assert refuse(candidate(explained=(CUP,)), PARAMS) is None
 
 
+def test_a_lone_object_must_respect_free_space_more_than_several() -> None:
+    refusal = refuse(candidate(explained=(CUP,), violations=0.05), PARAMS)
+    assert refusal is not None and refusal[0] is Reason.FREE_SPACE
+    assert refuse(candidate(explained=(CUP, ObjectPair(1, 1, "book")), violations=0.05), PARAMS) is None
+
+
 def test_two_objects_make_up_for_a_chain_that_is_alone() -> None:
     assert refuse(candidate(agreeing_chains=("features",)), PARAMS) is None
 
