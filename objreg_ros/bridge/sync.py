@@ -105,6 +105,8 @@ class Queue:
 
     def drop_after(self, stamp_ns: int) -> None:
         """Take out what lies in the future of a time that was jumped back to."""
+        if not self.items or self.items[-1].stamp_ns <= stamp_ns:
+            return
         held, self.items = self.items, deque(item for item in self.items if item.stamp_ns <= stamp_ns)
         for item in held:
             if item.stamp_ns > stamp_ns:
@@ -144,6 +146,7 @@ class Synchroniser:
         if queue.last_ns is not None and stamp_ns < queue.last_ns:
             self.time_jumps += 1
             self._forget_after(stamp_ns)
+        queue.drop_after(stamp_ns)  # another stream's jump may have left what lies in the future of this one's
         queue.last_ns = stamp_ns
         queue.items.append(Item(stamp_ns, payload))
         return [*self._matches(), *self._make_room(queue)]

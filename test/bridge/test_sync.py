@@ -112,6 +112,14 @@ def test_a_jump_back_drops_what_waits_in_the_future() -> None:
     assert pairs(sync.add("depth", 10, "d"), "image") == [("new",)] and accounts_hold(sync)
 
 
+def test_a_stream_that_follows_anothers_jump_back_loses_nothing_in_silence() -> None:
+    sync = Synchroniser((Stream("image"), Stream("depth"), Stream("odom", Need.OPTIONAL)))
+    for name, stamp in (("depth", 1), ("odom", 2), ("odom", 1), ("image", 0)):
+        assert sync.add(name, stamp, stamp) == []
+    assert pairs(sync.add("depth", 0, "d0"), "depth") == [("d0",)]
+    assert sync.queues["depth"].dropped == {"time_jump": 1} and accounts_hold(sync)
+
+
 def test_one_frame_played_again_and_again_matches_each_time() -> None:
     sync = Synchroniser(EXACT)
     assert sum(len(sync.add(name, 7, 7)) for _ in range(4) for name in ("image", "depth")) == 4
