@@ -28,13 +28,11 @@ class Segmenter:
 
     def warm(self) -> None:
         """Compile or load every kernel, so that the first frame is as fast as the others."""
-        depth = np.full((48, 64), 1.0, np.float32)
-        depth[10:30, 20:40] = 0.8
-        camera = Intrinsics(fx=50.0, fy=50.0, cx=32.0, cy=24.0, width=64, height=48)
-        image = DepthImage(depth=depth, rgb=np.zeros((48, 64, 3), np.uint8), intrinsics=camera, stamp_ns=0)
-        box = np.array([[16, 6, 44, 34]], np.float32)
-        one = np.ones(1, np.float32)
-        self.segment(Detections(xyxy=box, score=one, label=("",), image_hw=(48, 64), stamp_ns=0), image)
+        camera = Intrinsics(fx=262.0, fy=262.0, cx=160.0, cy=120.0, width=320, height=240)
+        image = DepthImage(depth=_table(camera), rgb=np.zeros((240, 320, 3), np.uint8), intrinsics=camera, stamp_ns=0)
+        boxes = np.array([[110, 70, 210, 170], [0, 0, 320, 240]], np.float32)
+        scores = np.ones(2, np.float32)
+        self.segment(Detections(xyxy=boxes, score=scores, label=("", ""), image_hw=(240, 320), stamp_ns=0), image)
 
     def segment(self, detections: Detections, depth: DepthImage, gravity: Array | None = None) -> Frame:
         """The objects of one moment, in the order of their boxes; stamp and frame_id are those of ``depth``.
@@ -80,6 +78,14 @@ class Segmenter:
         up, confidence = _up(coarse, gravity, params.up_tilt)
         supports = [] if up is None else find_supports(coarse, depth.intrinsics, up, params.support_area, jump)
         return Ground(up, confidence, supports, surface, coarse)
+
+
+def _table(camera: Intrinsics) -> Array:
+    """Depth of a level surface with a block on it, seen from a metre above at half a right angle."""
+    y = (np.arange(camera.height, dtype=np.float32)[:, None] - camera.cy) / camera.fy
+    depth = np.repeat(np.sqrt(2.0) / (1.0 + np.maximum(y, -0.6)), camera.width, axis=1).astype(np.float32)
+    depth[80:160, 120:200] *= 0.8
+    return depth
 
 
 def _up(surface: Surface, gravity: Array | None, tilt_deg: float) -> tuple[Array | None, float]:
