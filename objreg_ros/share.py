@@ -42,7 +42,9 @@ def user_models() -> Path:
 
 def model(name: str) -> Path:
     """A model by its path, or by its file name in the user's data folder or in models/; else FileNotFoundError."""
-    for path in (Path(name).expanduser(), user_models() / name):
-        if path.is_file():
-            return path
-    return find(f"models/{name}")
+    path = Path(name).expanduser()
+    if path.is_file():
+        return path
+    if path.name != name:
+        raise FileNotFoundError(f"{name}: expected a model file there, got none; `objreg fetch-model` gets one")
+    return user_models() / name if (user_models() / name).is_file() else find(f"models/{name}")

@@ -62,3 +62,9 @@ def test_a_model_is_a_path_or_a_name_in_the_users_folder_or_ours(
     users = put(elsewhere, "models/a.onnx")
     assert share.model("a.onnx") == users
     assert share.model(str(ours)) == ours
+
+
+def test_a_model_that_is_named_with_its_folder_is_looked_for_there_only(elsewhere: Path) -> None:
+    put(elsewhere / "prefix", "models/a.onnx")
+    with pytest.raises(FileNotFoundError, match=r"^elsewhere/a\.onnx: expected a model file there, got none"):
+        share.model("elsewhere/a.onnx")

@@ -18,8 +18,11 @@ class Need(Enum):
     """What a match does without an item of a stream."""
 
     REQUIRED = "required"  # there is no match; an item serves one match
-    OPTIONAL = "optional"  # it goes without; waited for once the stream has spoken; an item may serve many matches
+    OPTIONAL = "optional"  # it goes without; waited for while the stream speaks; an item may serve many matches
     LATCHED = "latched"  # the last value serves whatever its stamp; there is no match before the first
+
+
+SILENCE_NS = 1_000_000_000  # an optional stream that is so far behind has stopped: nothing waits for it
 
 
 class Drop(Enum):
@@ -182,9 +185,15 @@ class Synchroniser:
             if queue.stream.need is Need.LATCHED:
                 if queue.latched is None:
                     return False
-            elif not queue.settled(item.stamp_ns):
+            elif not queue.settled(item.stamp_ns) and not self._silent(queue):
                 return False
         return True
+
+    def _silent(self, queue: Queue) -> bool:
+        """Whether an optional stream has stopped, by the time of the reference."""
+        now_ns, last_ns = self._reference.last_ns, queue.last_ns
+        stopped = now_ns is not None and last_ns is not None and now_ns - last_ns > SILENCE_NS
+        return stopped and queue.stream.need is Need.OPTIONAL
 
     def _resolve(self, item: Item, why: Drop = Drop.UNMATCHED) -> list[Match]:
         """Take the first reference item out: a match, or a drop."""

@@ -65,11 +65,10 @@ def command(**asked: Any) -> None:
 
 def run(asked: Asked) -> None:
     """The whole demo; ValueError or OSError if it cannot be, or if the books do not balance."""
-    bag = as_rosbag2(asked.recording or simulated_room(asked.out), asked.out, asked.seconds)
+    recording = asked.recording or simulated_room(asked.out)
+    inputs = _inputs(recording, asked.remaps)
+    bag = as_rosbag2(recording, asked.out, asked.seconds)
     with open_recording(bag) as source:
-        inputs = choose_inputs(source.topics, parse_remaps(asked.remaps))
-        if not inputs.complete:
-            raise ValueError(f"{bag}: expected {inputs.missing}, got {', '.join(source.topics)}; see --remap")
         live = run_live(bag, setup_of(asked), asked.out / "logs", _say)
         truth = Truth.of(source, inputs.ground_truth)
         _write(asked.out / "demo.json", bag, live, truth)
@@ -79,6 +78,14 @@ def run(asked: Asked) -> None:
     _say(f"wrote {asked.out / 'report.html'}")
     click.echo("\n".join(live_table.lines(live, sent, _errors(live, truth))))
     live_table.require_balance(live, sent)
+
+
+def _inputs(recording: Path, remaps: tuple[str, ...]) -> Inputs:
+    with open_recording(recording) as source:
+        inputs = choose_inputs(source.topics, parse_remaps(remaps))
+        if inputs.complete:
+            return inputs
+        raise ValueError(f"{recording}: expected {inputs.missing}, got {', '.join(source.topics)}; see --remap")
 
 
 def _say(text: str) -> None:

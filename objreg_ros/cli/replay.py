@@ -65,6 +65,7 @@ def command(
         if not names:
             raise ValueError(f"{recording}: expected topics that the graph can use, got {', '.join(source.topics)}")
         selection = Selection(names, start, end)
+        selection.require_some(source)
         click.echo(profile.apply(), err=True)
         rclpy.init(args=list(ros_args))
         player = Player({out: source.topics[topic].msgtype for topic, out in names.items()}, clock)

@@ -32,6 +32,14 @@ class Selection:
         end_ns = None if self.end is None else recording.start_ns + round(self.end * 1e9)
         return recording.records(set(self.names), start_ns, end_ns)
 
+    def require_some(self, recording: Recording) -> None:
+        """ValueError where the times leave nothing of the recording."""
+        if self.start >= recording.seconds or (self.end is not None and self.end <= self.start):
+            end = "the end" if self.end is None else f"{self.end:g} s"
+            raise ValueError(
+                f"expected a part of the {recording.seconds:.1f} s of the recording, got {self.start:g} s to {end}"
+            )
+
     def count(self, recording: Recording) -> int:
         """About how many records these are: exact for the whole recording, else by share of time."""
         whole = sum(recording.topics[topic].count for topic in self.names)

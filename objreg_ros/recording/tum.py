@@ -115,10 +115,10 @@ def _pairs(folder: Path) -> list[tuple[int, str, int, str]]:
     else:
         pairs = _associate(_pictures(folder, "rgb"), _pictures(folder, "depth"))
     missing = next((name for _, c, _, d in pairs for name in (c, d) if not (folder / name).exists()), None)
-    if missing or not pairs:
-        raise FileNotFoundError(
-            f"{folder}: expected pairs of colour and depth pictures, got {missing or 'none'} missing"
-        )
+    if missing:
+        raise FileNotFoundError(f"{folder}: expected the picture {missing} that its list names, got no such file")
+    if not pairs:
+        raise FileNotFoundError(f"{folder}: expected colour and depth pictures within 20 ms of each other, got none")
     return pairs
 
 

@@ -20,12 +20,13 @@ def write_rosbag2(path: Path | str, records: Iterable[Record], storage: str = "m
     """Write records in order to a new folder; their number comes back.
 
     ValueError for a storage that there is not or a type that ROS 2 does not ship, FileExistsError for a folder that is
-    already there.
+    already there, OSError for one that cannot be made.
     """
     if storage not in STORAGES:
         raise ValueError(f"storage: expected one of {', '.join(STORAGES)}, got {storage!r}")
     if Path(path).exists():
         raise FileExistsError(f"{path}: expected a new folder, got one that exists; choose another name or remove it")
+    _make_parents(Path(path))
     count = 0
     with Writer(Path(path), version=METADATA_VERSION, storage_plugin=STORAGES[storage]) as writer:
         connections: dict[tuple[str, str], Any] = {}
@@ -36,6 +37,13 @@ def write_rosbag2(path: Path | str, records: Iterable[Record], storage: str = "m
             writer.write(connections[key], record.stamp_ns, record.cdr)
             count += 1
     return count
+
+
+def _make_parents(path: Path) -> None:
+    try:
+        path.absolute().parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OSError(f"{path}: expected a place that can be written to, got: {error.strerror}") from error
 
 
 def _connect(writer: Writer, record: Record) -> Any:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from objreg_ros.bridge.sync import Match, Need, Stream, Synchroniser
+from objreg_ros.bridge.sync import SILENCE_NS, Match, Need, Stream, Synchroniser
 
 EXACT = (Stream("image"), Stream("depth"))
 
@@ -85,6 +85,15 @@ def test_an_optional_stream_that_died_is_given_up_when_the_queue_is_full() -> No
     sync.add("odom", 0, "o")
     found = [match for t in (100, 200, 300, 400) for match in sync.add("image", t, t)]
     assert pairs(found, "image", "odom") == [(100, None), (200, None)] and accounts_hold(sync)
+
+
+def test_an_optional_stream_that_has_been_silent_for_long_is_not_waited_for() -> None:
+    sync = Synchroniser((Stream("image"), Stream("odom", Need.OPTIONAL, slop_ns=10)))
+    sync.add("odom", 5, "o")
+    assert sync.add("image", 6 + SILENCE_NS // 2, "a") == []
+    late_ns = 6 + SILENCE_NS
+    assert pairs(sync.add("image", late_ns, "b"), "image", "odom") == [("a", None), ("b", None)]
+    assert pairs(sync.add("image", late_ns + 1, "c"), "image", "odom") == [("c", None)]
 
 
 def test_a_full_queue_drops_its_oldest_with_a_reason() -> None:

@@ -5,8 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from recording.folders import tum_folder
 
-from objreg_ros.cli.demo import Asked, setup_of
+from objreg_ros.cli.demo import Asked, run, setup_of
 from objreg_ros.cli.played import as_rosbag2
 from objreg_ros.recording import open_recording
 
@@ -49,3 +50,11 @@ def test_a_folder_of_pictures_becomes_a_rosbag2_once(shared: Path, tmp_path: Pat
     assert as_rosbag2(kitchen, tmp_path, seconds=0.3) == bag
     assert (bag / "metadata.yaml").stat().st_mtime_ns == written
     assert as_rosbag2(bag, tmp_path, seconds=None) == bag
+
+
+def test_a_recording_that_the_graph_cannot_use_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    recording = tum_folder(tmp_path / "tum")
+    out = tmp_path / "out"
+    with pytest.raises(ValueError, match="expected a colour image, got /"):
+        run(replace(ASKED, recording=recording, remaps=("image:=",), out=out))
+    assert not out.exists()

@@ -48,6 +48,16 @@ def test_a_selection_is_a_part_in_time_of_some_topics(recording: Recording) -> N
     assert Selection({"/image": "image"}, start=99).count(recording) == 0
 
 
+@pytest.mark.parametrize(("start", "end"), [(99.0, None), (0.5, 0.2), (0.5, 0.5)])
+def test_times_that_leave_nothing_are_refused(recording: Recording, start: float, end: float | None) -> None:
+    with pytest.raises(ValueError, match=r"expected a part of the 1\.0 s of the recording, got"):
+        Selection({"/image": "image"}, start, end).require_some(recording)
+
+
+def test_a_part_of_the_recording_is_not_refused(recording: Recording) -> None:
+    Selection({"/image": "image"}, 0.2, 99.0).require_some(recording)
+
+
 def test_reading_ahead_changes_nothing() -> None:
     assert list(read_ahead(range(1000), ahead=3)) == list(range(1000))
 

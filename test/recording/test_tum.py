@@ -32,7 +32,7 @@ def test_records_come_in_order_of_time(tmp_path: Path) -> None:
 
 
 def test_pictures_farther_apart_than_the_association_are_no_pair(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError, match="expected pairs of colour and depth"):
+    with pytest.raises(FileNotFoundError, match="expected colour and depth pictures within 20 ms"):
         open_recording(tum_folder(tmp_path, lists=True, lag=0.03))
 
 
@@ -62,7 +62,7 @@ def test_a_folder_without_truth_has_no_truth(tmp_path: Path) -> None:
 
 def test_a_missing_picture_is_named(tmp_path: Path) -> None:
     (tum_folder(tmp_path) / "depth/0.100000.png").unlink()
-    with pytest.raises(FileNotFoundError, match=r"depth/0\.100000\.png missing"):
+    with pytest.raises(FileNotFoundError, match=r"expected the picture depth/0\.100000\.png"):
         open_recording(tmp_path)
 
 
