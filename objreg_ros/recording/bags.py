@@ -96,7 +96,7 @@ def _broken_means_value_error(path: Path) -> Iterator[None]:
     try:
         yield
     except BROKEN as error:
-        said = str(error).rstrip(".") or type(error).__name__
+        said = " ".join(str(error).split()).rstrip(".") or type(error).__name__
         suffix = path.suffix if path.is_file() else next((f.suffix for f in path.iterdir() if f.suffix in REPAIR), "")
         repair = REPAIR.get(suffix, "record it again or check the copy")
         raise ValueError(f"{path}: expected a whole bag, got: {said}; truncated or corrupt? {repair}") from error
