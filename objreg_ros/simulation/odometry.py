@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Odometry that drifts as visual odometry does.
+"""Odometry that drifts as real odometry does: by what is wrong with it for the whole run, and a little at random.
 
-Between two frames the true motion is known. Odometry gets it with
+After one metre the relative pose error is about ``distance_drift`` in position and ``turn_drift`` in heading:
 
-* a scale error, drawn once, of standard deviation ``distance_drift`` / sqrt(2),
-* a position error that walks: after one metre its standard deviation along each axis is ``distance_drift`` / sqrt(2),
-* a heading error whose rate per metre is half constant and half white: after d metres its standard deviation is
-  ``turn_drift`` * sqrt((d^2 + d) / 2), which is ``turn_drift`` after the first metre,
-* a tilt error that wanders about zero with the standard deviation ``tilt_error``, because gravity is observed.
+* the heading turns steadily with the way, as with unequal wheels (Borenstein and Feng, "Measurement and Correction of
+  Systematic Odometry Errors in Mobile Robots", 1996), and wanders; the wandering is a tenth of the variance,
+* every motion is wrong by a constant share of its length, as much along it (scale) as across it (mounting), and the
+  position wanders; the wandering is half of the variance,
+* a tilt error wanders about zero with the standard deviation ``tilt_error``, because gravity is observed.
+
+What is constant has a sign at random and a size within a quarter of the stated one, so that every run drifts about as
+much. What wanders grows with the root of the way; what is constant grows with the way.
 
 The odometry frame has z up and begins under the first camera, its x axis where that camera looks.
 """
@@ -20,8 +23,16 @@ from objreg_ros.data import Array
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
 from objreg_ros.simulation.params import OdometryParams
 
+Random = np.random.Generator
+
 TILT_MEMORY_M = 1.0
 """The tilt error is forgotten over about this distance."""
+STEADY_HEADING = 0.9
+"""Share of the variance of the heading's error after one metre that is constant."""
+STEADY_POSITION = 0.5
+"""The same of the position's."""
+VARIETY = 0.25
+"""How far the size of a constant error is from the stated one, at most."""
 
 
 def drifted(T_world_camera: Array, params: OdometryParams, seed: int) -> tuple[Array, Array]:
@@ -33,20 +44,14 @@ def drifted(T_world_camera: Array, params: OdometryParams, seed: int) -> tuple[A
     start = odometry_origin(T_world_camera[0])
     moved = np.diff(T_world_camera[:, :3, 3], axis=0) @ start[:3, :3]  # in the frame of odometry
     length = np.linalg.norm(moved, axis=1)
-    root = np.sqrt(length)
-    share = params.distance_drift / np.sqrt(2)
-    turn = np.radians(params.turn_drift) / np.sqrt(2)
-    scale = 1.0 + share * rng.standard_normal()
-    heading = np.cumsum(turn * (rng.standard_normal() * length + root * rng.standard_normal(len(length))))
-    heading = np.concatenate([[0.0], heading])
+    heading = _heading(length, np.radians(params.turn_drift), rng)
+    believed = _believed(moved, length, params.distance_drift, rng)
     tilt = _wandering(length, np.radians(params.tilt_error), rng)
-    walk = share * root[:, None] * rng.standard_normal((len(length), 3))
     out, at = [], inverse(start)[:3, :3] @ (T_world_camera[0, :3, 3] - start[:3, 3])
     for k, T in enumerate(T_world_camera):
-        turned = rotation_from_vector(np.array([0.0, 0.0, heading[k]])) @ rotation_from_vector(tilt[k])
         if k > 0:
-            at = at + rotation_from_vector(np.array([0.0, 0.0, heading[k - 1]])) @ (scale * moved[k - 1]) + walk[k - 1]
-        out.append(pose(turned @ start[:3, :3].T @ T[:3, :3], at))
+            at = at + _turn(heading[k - 1]) @ believed[k - 1]
+        out.append(pose(_turn(heading[k]) @ rotation_from_vector(tilt[k]) @ start[:3, :3].T @ T[:3, :3], at))
     return np.stack(out), _covariances(np.concatenate([[0.0], np.cumsum(length)]), params)
 
 
@@ -59,7 +64,32 @@ def odometry_origin(T_world_camera: Array) -> Array:
     return pose(np.stack([x, np.cross(z, x), z], axis=1), T_world_camera[:3, 3] * [1.0, 1.0, 0.0])
 
 
-def _wandering(length: Array, deviation: float, rng: np.random.Generator) -> Array:
+def _turn(heading: float) -> Array:
+    return rotation_from_vector(np.array([0.0, 0.0, heading]))
+
+
+def _about(size: float, rng: Random) -> float:
+    """A constant error of about this size."""
+    return size * float(rng.choice([-1.0, 1.0])) * float(rng.uniform(1.0 - VARIETY, 1.0 + VARIETY))
+
+
+def _heading(length: Array, drift: float, rng: Random) -> Array:
+    """(N,) radians of heading error, from zero; ``drift`` after one metre."""
+    steady = _about(drift * np.sqrt(STEADY_HEADING), rng)
+    walk = drift * np.sqrt(1.0 - STEADY_HEADING) * np.sqrt(length) * rng.standard_normal(len(length))
+    return np.concatenate([[0.0], np.cumsum(steady * length + walk)])
+
+
+def _believed(moved: Array, length: Array, drift: float, rng: Random) -> Array:
+    """(N - 1, 3) what is believed of the true motions; ``drift`` is the error after one metre, as a share of it."""
+    steady = drift * np.sqrt(STEADY_POSITION / 2)
+    along, across = _about(steady, rng), _about(steady, rng)
+    wrong = np.array([[1.0 + along, -across, 0.0], [across, 1.0 + along, 0.0], [0.0, 0.0, 1.0 + along]])
+    each_axis = drift * np.sqrt((1.0 - STEADY_POSITION) / 3)
+    return np.asarray(moved @ wrong.T + each_axis * np.sqrt(length)[:, None] * rng.standard_normal((len(length), 3)))
+
+
+def _wandering(length: Array, deviation: float, rng: Random) -> Array:
     """(N, 3) rotation vectors, horizontal, from zero: an Ornstein-Uhlenbeck process over distance."""
     out = np.zeros((len(length) + 1, 3))
     for k, step in enumerate(length):
@@ -71,9 +101,14 @@ def _wandering(length: Array, deviation: float, rng: np.random.Generator) -> Arr
 def _covariances(distance: Array, params: OdometryParams) -> Array:
     """Diagonal (N, 6, 6) covariances after so many metres, never below (1 mm)^2 and (0.05 deg)^2."""
     d = distance[:, None]
-    heading = np.radians(params.turn_drift) * np.sqrt((d**2 + d) / 2)
-    position = params.distance_drift * np.sqrt((d**2 + d) / 2) + 0.5 * heading * d
+    heading = np.radians(params.turn_drift) * _growth(d, STEADY_HEADING)
+    position = params.distance_drift * _growth(d, STEADY_POSITION) + 0.5 * heading * d
     tilt = np.full_like(d, np.radians(params.tilt_error))
     sigma = np.concatenate([position, position, position, tilt, tilt, heading], axis=1)
     floor = np.array([1e-3] * 3 + [np.radians(0.05)] * 3)
     return np.maximum(sigma, floor)[:, :, None] ** 2 * np.eye(6)
+
+
+def _growth(distance: Array, steady: float) -> Array:
+    """The standard deviation after a distance in m, 1 after the first, where ``steady`` of the variance is constant."""
+    return np.asarray(np.sqrt(steady * distance**2 + (1.0 - steady) * distance))

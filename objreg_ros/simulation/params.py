@@ -58,8 +58,8 @@ class StressParams(Params):
 class OdometryParams(Params):
     """How odometry drifts; the model stands in `objreg_ros.simulation.odometry`."""
 
-    distance_drift: float = param(0.02, "drift of position, share of the distance moved", ge=0.0, le=1.0)
-    turn_drift: float = param(1.0, "drift of heading per metre moved", "deg/m", ge=0.0, le=90.0)
+    distance_drift: float = param(0.02, "error of position after one metre, share of it", ge=0.0, le=1.0)
+    turn_drift: float = param(1.0, "error of heading after one metre", "deg/m", ge=0.0, le=90.0)
     tilt_error: float = param(
         0.3, "error of roll and pitch; it does not grow, gravity is observed", "deg", ge=0.0, le=45.0
     )

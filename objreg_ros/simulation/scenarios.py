@@ -4,17 +4,18 @@
 | scenario | what happens |
 | --- | --- |
 | `orbit` | once around a table and a little further |
-| `loop` | a table, then another place out of sight of it, then the table again from a little aside |
-| `opposite` | the same, but the table is seen again from its other side |
-| `look-alikes` | two tables alike with things of the same classes on them: first one, then the other, then the first |
-| `moved` | like `loop`, but the things on the table were rearranged while nobody looked |
+| `loop` | three rounds past a table and another, out of sight of it, each time from a little aside |
+| `opposite` | two rounds, and on the second both tables are seen from their other side |
+| `look-alikes` | like `loop`, but the two tables are alike and things of the same classes lie on them |
+| `moved` | like `loop`, but the things on the first table are rearranged while the second is looked at |
+
+A round leads along one long wall to the second table and along the other one back.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -34,8 +35,11 @@ ROOM_HALF = (4.4, 3.2)
 TABLE_CLASSES = ("cereal_box", "soda_can", "bowl", "book", "cap", "flashlight", "keyboard", "monitor")
 HALF_WIDTH_OF_TABLES = 0.8
 OCCLUDERS = ("mug", "bottle", "carton", "vase", "tin", "plant", "ball")
-Plot = tuple[tuple[Scene, ...], list[Waypoint], float]
-"""The scenes, the camera's way, and the share of the way after which the second scene takes over."""
+DETOUR_M = 1.4
+"""How far from the straight line a round leads."""
+NEAR_M = 0.3
+Plot = tuple[tuple[Scene, ...], list[Waypoint], Waypoint | None]
+"""The scenes, the camera's way, and the waypoint at which the second scene takes over."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,20 +184,22 @@ class _Look:
         return around(centre, self.radius, self.height, self.start, self.stop)
 
 
-def _there_and_back(setting: _Setting, first: _Look, away: _Look, again: _Look) -> list[Waypoint]:
-    a, b = setting.centre(0), setting.centre(1)
-    visits = [first.waypoints(a), away.waypoints(b), again.waypoints(a)]
-    ways = [_between(before[-1], after[0]) for before, after in pairwise(visits)]
-    return [*visits[0], *ways[0], *visits[1], *ways[1], *visits[2]]
+def _rounds(setting: _Setting, looks: list[_Look]) -> list[Waypoint]:
+    """The way past the two tables in turn, seen as the looks say."""
+    visits = [look.waypoints(setting.centre(k % 2)) for k, look in enumerate(looks)]
+    way = visits[0]
+    for k, visit in enumerate(visits[1:]):
+        way = [*way, *_between(way[-1], visit[0], DETOUR_M * (-1) ** k), *visit]
+    return way
 
 
-def _between(before: Waypoint, after: Waypoint) -> list[Waypoint]:
-    """On the way from one place to another the camera is held level and pans along the walls."""
+def _between(before: Waypoint, after: Waypoint, detour: float) -> list[Waypoint]:
+    """From one place to another, ``detour`` to the side; the camera is held level and pans along the walls."""
     out = []
     start, stop = before.target - before.eye, after.target - after.eye
     turned = np.unwrap([np.arctan2(start[1], start[0]), np.arctan2(stop[1], stop[0])])
-    for f in (0.3, 0.7):
-        eye = (1 - f) * before.eye + f * after.eye
+    for f in (0.2, 0.4, 0.6, 0.8):
+        eye = (1 - f) * before.eye + f * after.eye + np.array([0.0, detour * np.sin(np.pi * f), 0.0])
         azimuth = (1 - f) * turned[0] + f * turned[1]
         out.append(Waypoint(eye, eye + np.array([np.cos(azimuth), np.sin(azimuth), -0.2])))
     return out
@@ -205,14 +211,21 @@ def _facing(setting: _Setting, k: int) -> float:
     return float(np.degrees(np.arctan2(towards[1], towards[0])))
 
 
-def _visits(rng: Random, setting: _Setting, aside: float) -> list[Waypoint]:
-    """A look at the first table, one at the second, and one at the first again, ``aside`` degrees further around."""
+def _looks(rng: Random, setting: _Setting, asides: list[float]) -> list[_Look]:
+    """A look at each table, and for every one of ``asides`` another at each, so many degrees further around."""
     sign = float(rng.choice([-1, 1]))
-    front = _facing(setting, 0)
-    first = _Look.at_random(rng, front - sign * 70, sign * 40)
-    away = _Look.at_random(rng, _facing(setting, 1) + sign * 30, -sign * 40)
-    again = _Look.at_random(rng, front - sign * 50 + sign * aside, -sign * 25)
-    return _there_and_back(setting, first, away, again)
+    front, back = _facing(setting, 0), _facing(setting, 1)
+    looks = [_Look.at_random(rng, front - sign * 70, sign * 40), _Look.at_random(rng, back + sign * 30, -sign * 40)]
+    for aside in asides:
+        looks.append(_Look.at_random(rng, front - sign * 50 + sign * aside, -sign * 25))
+        looks.append(_Look.at_random(rng, back + sign * 10 + sign * aside, sign * 25))
+    return looks
+
+
+def _a_little_aside(rng: Random, setting: _Setting) -> list[_Look]:
+    """Three rounds: the second and the third see both tables from a little to the left and to the right."""
+    side = float(rng.choice([-1, 1]))
+    return _looks(rng, setting, [side * float(rng.uniform(15, 35)), -side * float(rng.uniform(15, 35))])
 
 
 def _orbit(rng: Random, occluders: int) -> Plot:
@@ -220,31 +233,34 @@ def _orbit(rng: Random, occluders: int) -> Plot:
     start = float(rng.uniform(0, 360))
     look = _Look.at_random(rng, start, float(rng.choice([-1, 1])) * 385)
     way = around(setting.centre(0), look.radius, look.height, look.start, look.stop, count=40)
-    return (setting.scene_with(setting.on_table),), way, 1.0
+    return (setting.scene_with(setting.on_table),), way, None
 
 
 def _loop(rng: Random, occluders: int) -> Plot:
     setting = _setting(rng, occluders)
-    return (setting.scene_with(setting.on_table),), _visits(rng, setting, float(rng.uniform(15, 35))), 1.0
+    return (setting.scene_with(setting.on_table),), _rounds(setting, _a_little_aside(rng, setting)), None
 
 
 def _opposite(rng: Random, occluders: int) -> Plot:
     setting = _setting(rng, occluders)
-    return (setting.scene_with(setting.on_table),), _visits(rng, setting, float(rng.uniform(150, 180))), 1.0
+    looks = _looks(rng, setting, [float(rng.uniform(150, 180))])
+    return (setting.scene_with(setting.on_table),), _rounds(setting, looks), None
 
 
 def _alike(rng: Random, occluders: int) -> Plot:
     setting = _setting(rng, occluders, alike=True)
-    return (setting.scene_with(setting.on_table),), _visits(rng, setting, float(rng.uniform(15, 35))), 1.0
+    return (setting.scene_with(setting.on_table),), _rounds(setting, _a_little_aside(rng, setting)), None
 
 
 def _moved(rng: Random, occluders: int) -> Plot:
     setting = _setting(rng, occluders)
-    way = _visits(rng, setting, float(rng.uniform(15, 35)))
+    looks = _a_little_aside(rng, setting)
     piece, T = setting.tables[0]
     again = _table_with(rng, piece, T, [model for model, _ in setting.on_table[0]], 0)
     before = setting.scene_with(setting.on_table)
-    return (before, _same_numbers(before, setting.scene_with((again, *setting.on_table[1:])))), way, 0.5
+    after = _same_numbers(before, setting.scene_with((again, *setting.on_table[1:])))
+    at_the_second = looks[1].waypoints(setting.centre(1))
+    return (before, after), _rounds(setting, looks), at_the_second[len(at_the_second) // 2]
 
 
 def _same_numbers(before: Scene, after: Scene) -> Scene:
@@ -275,5 +291,12 @@ def make_story(
     rng = np.random.default_rng([seed, 31, list(SCENARIOS).index(scenario)])
     scenes, waypoints, change = SCENARIOS[scenario](rng, occluders)
     poses, rate = carried(waypoints, frames, rate, rng, hand or Hand())
-    scene_of = (np.arange(frames) >= change * frames).astype(int) if len(scenes) > 1 else np.zeros(frames, int)
+    scene_of = np.zeros(frames, int)
+    if change is not None:
+        scene_of[_first_passing(poses, change) :] = 1
     return Story(scenes, scene_of, poses, rate)
+
+
+def _first_passing(poses: Array, waypoint: Waypoint) -> int:
+    """The first frame whose camera is near a waypoint of its way."""
+    return int(np.argmax(np.linalg.norm(poses[:, :3, 3] - waypoint.eye, axis=1) < NEAR_M))

@@ -44,16 +44,27 @@ def test_a_story_moves_at_the_speed_of_a_hand(scenario: str) -> None:
 @pytest.mark.parametrize("seed", [0, 1])
 def test_the_first_table_is_left_out_of_sight_and_seen_again(scenario: str, seed: int) -> None:
     story = make_story(scenario, seed, frames=60)
-    first, away, again = (seen_on_the_first_table(story, k) for k in (2, 30, 57))
-    assert len(first & again) >= 3
-    assert not away
+    counts = [len(seen_on_the_first_table(story, 0) & seen_on_the_first_table(story, k)) for k in range(0, 60, 2)]
+    away = counts.index(0)
+    assert counts[0] >= 3 and max(counts[away:]) >= 3
 
 
-def test_opposite_returns_from_the_other_side_and_loop_from_nearby() -> None:
-    for scenario, low, high in (("opposite", 120.0, 180.0), ("loop", 0.0, 70.0)):
-        T = make_story(scenario, 0, frames=60).T_world_camera
-        turned = np.degrees(rotation_angle(T[2, :3, :3].T @ T[57, :3, :3]))
-        assert low < turned < high
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_opposite_returns_from_the_other_side_only_and_loop_from_nearby(seed: int) -> None:
+    for scenario, low, high in (("opposite", 110.0, 180.0), ("loop", 0.0, 50.0)):
+        story = make_story(scenario, seed, frames=120)
+        assert low < nearest_return_deg(story) < high
+
+
+def nearest_return_deg(story: Story) -> float:
+    """How much else, in degrees, the first table is looked at when it is in the middle of the picture again."""
+    T = story.T_world_camera
+    to_table = story.scenes[0].places[0].centre - T[:, :3, 3]
+    distance = np.linalg.norm(to_table, axis=1)
+    looks = np.flatnonzero((np.einsum("ij,ij->i", T[:, :3, 2], to_table) > 0.95 * distance) & (distance < 1.6))
+    first_left = int(np.flatnonzero(np.diff(looks) > 5)[0])
+    visit, later = looks[: first_left + 1], looks[first_left + 1 :]
+    return min(float(np.degrees(rotation_angle(T[a, :3, :3].T @ T[b, :3, :3]))) for a in visit for b in later)
 
 
 def test_look_alikes_have_the_same_classes_on_both_tables_in_different_places() -> None:
