@@ -6,228 +6,117 @@ For every recording and method: constraints, true ones (within 5 degrees and 10 
 drifting odometry before and after the same pose graph took the method's constraints. The oracle's constraints are
 perfect and there is one for every revisit: its trajectory error is what no closing of loops can take away.
 
+    python benchmarks/closure.py --quick
+    python benchmarks/closure.py --simulate loop:0,1,2,3,4 --simulate moved:0,1,2,3,4 --json OUT --figure closure.png
     python benchmarks/closure.py ../shared/data/redkitchen_a --model ../shared/models/ssd_mobilenet_v1_coco_int8.onnx
-    python benchmarks/closure.py --simulate loop:0,1,2,3,4 --simulate moved:0,1,2,3,4 --json closure.json
+
+Simulated recordings and the figures of every method are kept in a folder, so that another run goes on where one ended;
+``--again objreg`` measures a method anew.
 """
 
 from __future__ import annotations
 
 import json
-import tempfile
-import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+import os
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
-from peers import Peer, peers
+import closers
+from closure_table import draw, grouped, table, table_of_totals, totals
+from peers import peers
 from sources import Source, read_source
 
-from objreg_ros.data import Array, Frame, LoopClosure, Odometry, Reason
-from objreg_ros.geometry import inverse, rotation_angle
-from objreg_ros.mapper.pose_graph import PoseGraph
-from objreg_ros.offline import constraint
-from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.registrar import Registrar
-from objreg_ros.report.revisits import Revisit, Seen, recall_by_view_change, revisits
-from objreg_ros.report.trajectory_error import absolute_trajectory_error
 from objreg_ros.simulation.write import simulate
-from objreg_ros.truth import FALSE, LOOSE, Truth, within
 
-GAP_NS = 2_000_000_000  # what is nearer in time is no loop
-TOLERANCE_NS = 1_000_000_000  # a keyframe spans up to a second
-KEYFRAME_MOTION = (0.15, 8.0)  # m, degrees: as often as the registrar by default
-AHEAD = np.array([0.0, 0.0, 1.2, 1.0])  # what a camera looks at, about
-PEER_COVARIANCE = np.diag([0.05**2] * 3 + [np.radians(2.0) ** 2] * 3)
-ORACLE_COVARIANCE = np.diag([0.005**2] * 3 + [np.radians(0.2) ** 2] * 3)
-UNTRIED = (Reason.NO_CANDIDATE, Reason.REDUNDANT, Reason.OVER_BUDGET)
+OURS, ORACLE = "objreg", "oracle"
+QUICK = {"scenarios": ("loop:0",), "frames": 300, "names": "orb_pnp", "candidates": 1}
 
 
-@dataclass
-class Result:
-    """What one method made of one recording."""
+@dataclass(frozen=True)
+class Asked:
+    """What is compared, and how."""
 
-    closures: list[LoopClosure]
-    pairs: int
-    seconds: float
-    prepare_seconds: float = 0.0
+    model: str
+    names: tuple[str, ...]
+    candidates: int
+    seed: int
 
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """The names of all methods."""
+        return (OURS, *self.names, ORACLE)
 
-def ours(source: Source, seed: int) -> Result:
-    """The registrar, frame by frame."""
-    registrar = Registrar(RegistrarParams(seed=seed))
-    closures: list[LoopClosure] = []
-    tried, start = 0, time.perf_counter()
-    for frame in source.frames:
-        outcome = registrar.process(frame)
-        closures += outcome.closures
-        tried += len(outcome.closures) + sum(r.reason not in UNTRIED for r in outcome.rejected)
-    outcome = registrar.finish()
-    closures += outcome.closures
-    tried += len(outcome.closures) + sum(r.reason not in UNTRIED for r in outcome.rejected)
-    seconds = time.perf_counter() - start
-    registrar.close()
-    return Result(closures, tried, seconds)
+    def tag(self) -> str:
+        """What the figures depend on, as a part of a file's name."""
+        return f"{Path(self.model).stem or 'default'}_{self.candidates}_{self.seed}"
 
 
-def oracle(source: Source, found: Sequence[Revisit]) -> Result:
-    """A perfect constraint for every revisit: what is left of the trajectory's error then, no method can take away."""
-    answers = [
-        (revisit.from_ns, revisit.to_ns, source.truth.between(revisit.from_ns, revisit.to_ns)) for revisit in found
-    ]
-    return Result([_closure(a, b, T, ORACLE_COVARIANCE) for a, b, T in answers if T is not None], len(answers), 0.0)
+class Kept:
+    """The figures of one recording in a file, written after every method."""
+
+    def __init__(self, file: Path, again: Sequence[str]) -> None:
+        self._file = file
+        self.row: dict[str, Any] = json.loads(file.read_text()) if file.exists() else {"methods": {}}
+        for name in again:
+            self.row["methods"].pop(name, None)
+
+    def missing(self, names: Sequence[str]) -> list[str]:
+        """The methods of which there is nothing yet."""
+        return [name for name in names if name not in self.row["methods"]]
+
+    def write(self) -> None:
+        """Write the file in one go."""
+        self._file.parent.mkdir(parents=True, exist_ok=True)
+        unfinished = self._file.with_suffix(".part")
+        unfinished.write_text(json.dumps(self.row))
+        os.replace(unfinished, self._file)
 
 
-def theirs(peer: Peer, source: Source, keyframes: Sequence[Frame], pairs: Sequence[tuple[int, int]]) -> Result:
-    """A peer on pairs of keyframes (earlier, later)."""
-    result = Result([], len(pairs), 0.0)
-    used = sorted({k for pair in pairs for k in pair})
-    prepared = {}
-    for k in used:
-        shot = source.shot(keyframes[k])
-        start = time.perf_counter()
-        prepared[k] = peer.prepare(shot)
-        result.prepare_seconds += time.perf_counter() - start
-    for a, b in pairs:
-        start = time.perf_counter()
-        answer = peer.register(prepared[a], prepared[b])
-        result.seconds += time.perf_counter() - start
-        if answer is not None and answer.accepted:
-            moments = keyframes[a].stamp_ns, keyframes[b].stamp_ns
-            result.closures.append(_closure(*moments, answer.T_from_to, PEER_COVARIANCE))
-    return result
+def compare(path: Path, asked: Asked, kept: Kept) -> dict[str, Any]:
+    """Every method on one recording; those that were measured before come from ``kept``."""
+    missing = kept.missing(asked.methods)
+    if missing:
+        click.echo(f"{path.name}: detecting and segmenting", err=True)
+        with read_source(path, asked.model, asked.seed) as source:
+            _measure(source, asked, missing, kept)
+    methods = {name: kept.row["methods"][name] for name in asked.methods}
+    return {**kept.row, "methods": methods}
 
 
-def _closure(from_ns: int, to_ns: int, T_from_to: Array, covariance: Array) -> LoopClosure:
-    return LoopClosure(from_ns=from_ns, to_ns=to_ns, T_from_to=T_from_to, covariance=covariance, labels=())
+def _measure(source: Source, asked: Asked, names: Sequence[str], kept: Kept) -> None:
+    keyframes = closers.keyframes_of(source.frames)
+    found = closers.loops_of(keyframes, source.truth)
+    pairs = closers.candidate_pairs(keyframes, asked.candidates)
+    work = {OURS: partial(closers.ours, source, asked.seed), ORACLE: partial(closers.oracle, source, found)}
+    work |= {peer.name: partial(closers.theirs, peer, source, keyframes, pairs) for peer in peers(asked.names)}
+    kept.row |= {"frames": len(source.frames), "keyframes": len(keyframes), "revisits": len(found)}
+    kept.row["path_m"] = round(source.truth.length, 2)
+    for name in names:
+        click.echo(f"  {name}", err=True)
+        kept.row["methods"][name] = closers.judged(work[name](), source, found)
+        kept.write()
 
 
-def keyframes_of(frames: Sequence[Frame]) -> list[Frame]:
-    """Frames that are apart by `KEYFRAME_MOTION` in odometry."""
-    kept: list[Frame] = []
-    for frame in frames:
-        if frame.T_odom_camera is None:
-            continue
-        if kept and kept[-1].T_odom_camera is not None:
-            motion = inverse(kept[-1].T_odom_camera) @ frame.T_odom_camera
-            near = np.linalg.norm(motion[:3, 3]) < KEYFRAME_MOTION[0]
-            if near and np.degrees(rotation_angle(motion[:3, :3])) < KEYFRAME_MOTION[1]:
-                continue
-        kept.append(frame)
-    return kept
+def simulated(folder: Path, scenario: str, seed: int, frames: int) -> Path:
+    """The recording of a scenario, made if it is not there yet."""
+    path = folder / f"{scenario}_{seed}_{frames}" / f"{scenario}_{seed}"
+    if not path.exists():
+        click.echo(f"{path.name}: simulating {frames} frames", err=True)
+        unfinished = path.with_name("part")
+        _remove(unfinished)
+        simulate(unfinished, scenario, seed, frames, jpeg=True, threads=len(os.sched_getaffinity(0)))
+        os.replace(unfinished, path)
+    return path
 
 
-def candidate_pairs(keyframes: Sequence[Frame], most: int) -> list[tuple[int, int]]:
-    """For every keyframe the earlier ones that by odometry look at the nearest place, as every SLAM proposes them."""
-    looked_at = [T @ AHEAD for T in (keyframe.T_odom_camera for keyframe in keyframes) if T is not None]
-    pairs = []
-    for b, later in enumerate(keyframes):
-        earlier = [a for a in range(b) if later.stamp_ns - keyframes[a].stamp_ns >= GAP_NS]
-        earlier.sort(key=lambda a: float(np.linalg.norm(looked_at[a] - looked_at[b])))
-        pairs += [(a, b) for a in earlier[:most]]
-    return pairs
+def _remove(folder: Path) -> None:
+    import shutil
 
-
-def judged(result: Result, source: Source, found: Sequence[Revisit]) -> dict[str, Any]:
-    """A method's result against the truth."""
-    truth = source.truth
-    errors = [error for closure in result.closures if (error := truth.error(closure)) is not None]
-    recall = recall_by_view_change(found, result.closures, truth, TOLERANCE_NS)
-    before, after, pruned = trajectory_errors(source.frames, result.closures, truth)
-    return {
-        "constraints": len(result.closures),
-        "true": sum(within(error, LOOSE) for error in errors),
-        "false": sum(not within(error, FALSE) for error in errors),
-        "recall": {name: {"closed": closed, "of": of} for name, (closed, of) in recall.items()},
-        "pairs": result.pairs,
-        "ms_per_pair": round(1e3 * result.seconds / max(result.pairs, 1), 2),
-        "prepare_seconds": round(result.prepare_seconds, 2),
-        "ate_cm": {"before": round(100 * before, 2), "after": round(100 * after, 2)},
-        "ate_reduced": round(1 - after / before, 3) if before else 0.0,
-        "pruned": pruned,
-        "rotation_deg": _median([error[0] for error in errors]),
-        "translation_cm": _median([error[1] for error in errors]),
-        "closures": [constraint(closure) for closure in result.closures],
-    }
-
-
-def _median(values: Sequence[float]) -> float | None:
-    return round(float(np.median(values)), 3) if values else None
-
-
-def trajectory_errors(
-    frames: Sequence[Frame], closures: Sequence[LoopClosure], truth: Truth
-) -> tuple[float, float, int]:
-    """The trajectory error in m by odometry and in the map, and how many closures the map pruned."""
-    graph = PoseGraph()
-    for frame in frames:
-        if frame.T_odom_camera is not None:
-            graph.add_odometry(Odometry(T_odom_body=frame.T_odom_camera, stamp_ns=frame.stamp_ns))
-    for closure in closures:
-        graph.add_closure(closure)
-    pruned = len(graph.optimise().pruned)
-    known = [(stamp, T, true) for stamp, T in graph.odometry if (true := truth.at(stamp)) is not None]
-    true = [row[2] for row in known]
-    before = absolute_trajectory_error([row[1] for row in known], true)
-    after = absolute_trajectory_error(graph.corrected(row[0] for row in known), true)
-    return before, after, pruned
-
-
-def compare(source: Source, wanted: Sequence[Peer], candidates: int, seed: int) -> dict[str, Any]:
-    """Every method on one recording."""
-    keyframes = keyframes_of(source.frames)
-    seen = [Seen(f.stamp_ns, f.view, T) for f in keyframes if (T := source.truth.at(f.stamp_ns)) is not None]
-    found = revisits(seen, GAP_NS)
-    pairs = candidate_pairs(keyframes, candidates)
-    click.echo(f"{len(source.frames)} frames, {len(keyframes)} keyframes, {len(pairs)} pairs for each peer", err=True)
-    methods = {"objreg": judged(ours(source, seed), source, found)}
-    for peer in wanted:
-        click.echo(f"  {peer.name}", err=True)
-        methods[peer.name] = judged(theirs(peer, source, keyframes, pairs), source, found)
-    methods["oracle"] = judged(oracle(source, found), source, found)
-    return {"frames": len(source.frames), "keyframes": len(keyframes), "revisits": len(found), "methods": methods}
-
-
-def totals(recordings: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Over all recordings: counts are added, the trajectory error's reduction is the worst and the median."""
-    out: dict[str, dict[str, Any]] = {}
-    for name in dict.fromkeys(m for row in recordings.values() for m in row["methods"]):
-        rows = [row["methods"][name] for row in recordings.values()]
-        pairs = sum(row["pairs"] for row in rows)
-        bins = rows[0]["recall"]
-        out[name] = {
-            **{key: sum(row[key] for row in rows) for key in ("constraints", "true", "false", "pruned")},
-            "recall": {b: {k: sum(row["recall"][b][k] for row in rows) for k in ("closed", "of")} for b in bins},
-            "ms_per_pair": round(sum(row["ms_per_pair"] * row["pairs"] for row in rows) / max(pairs, 1), 2),
-            "ate_reduced_worst": min(row["ate_reduced"] for row in rows),
-            "ate_reduced_median": round(float(np.median([row["ate_reduced"] for row in rows])), 3),
-        }
-    return out
-
-
-def table(name: str, row: dict[str, Any]) -> str:
-    """The methods of one recording as text."""
-    head = f"{name}: {row['frames']} frames, {row['keyframes']} keyframes, {row['revisits']} revisits"
-    lines = [head, f"  {'method':10} {'constr.':>7} {'true':>5} {'false':>5} {'recall':>7} {'ms/pair':>8}  ATE cm"]
-    for method, m in row["methods"].items():
-        every = m["recall"]["all"]
-        lines.append(
-            f"  {method:10} {m['constraints']:7} {m['true']:5} {m['false']:5} {every['closed']:3}/{every['of']:<3} "
-            f"{m['ms_per_pair']:8.1f}  {m['ate_cm']['before']:.1f} → {m['ate_cm']['after']:.1f}"
-        )
-    return "\n".join(lines)
-
-
-@contextmanager
-def simulated(story: str, seed: int, frames: int) -> Iterator[Path]:
-    """A recording of a scenario, gone afterwards."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, f"{story}_{seed}")
-        simulate(path, story, seed, frames, jpeg=True)
-        yield path
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def stories(texts: Sequence[str]) -> list[tuple[str, int]]:
@@ -244,37 +133,38 @@ def stories(texts: Sequence[str]) -> list[tuple[str, int]]:
 @click.option("--simulate", "scenarios", multiple=True, metavar="SCENARIO:SEED,SEED…", help="Make and use a recording.")
 @click.option("--frames", default=600, show_default=True, help="Frames of a simulated recording.")
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
+@click.option("--figure", type=click.Path(dir_okay=False, path_type=Path), help="Draw them here (svg, png).")
 @click.option("--model", default="", help="ONNX model; `truth` takes the true boxes of a simulated recording.")
 @click.option("--peers", "names", default="orb_pnp,fpfh_icp,paper", show_default=True, help="Methods to compare with.")
-@click.option("--candidates", default=3, show_default=True, help="Pairs that a peer may try for each keyframe.")
+@click.option("--candidates", default=1, show_default=True, help="Pairs that a peer may try for each keyframe.")
 @click.option("--seed", default=1, show_default=True, help="Of the synthetic drift and of the registrar.")
-def main(
-    recordings: tuple[Path, ...],
-    scenarios: tuple[str, ...],
-    frames: int,
-    json_file: Path | None,
-    model: str,
-    names: str,
-    candidates: int,
-    seed: int,
-) -> None:
+@click.option(
+    "--keep", type=click.Path(file_okay=False, path_type=Path), default=Path("out/closure"), show_default=True
+)
+@click.option("--again", multiple=True, metavar="METHOD", help="Measure this method anew.")
+@click.option("--quick", is_flag=True, help="One short loop beside one peer.")
+def main(recordings: tuple[Path, ...], keep: Path, again: tuple[str, ...], quick: bool, **options: Any) -> None:
     """Compare loop closure on RECORDINGS that have ground truth."""
-    wanted = peers(tuple(name for name in names.split(",") if name))
+    options |= QUICK if quick else {}
+    asked = Asked(
+        options["model"], tuple(n for n in options["names"].split(",") if n), options["candidates"], options["seed"]
+    )
+    paths = [partial(Path, path) for path in recordings]
+    paths += [partial(simulated, keep, *story, options["frames"]) for story in stories(options["scenarios"])]
     rows: dict[str, dict[str, Any]] = {}
-
-    def take(path: Path) -> None:
-        click.echo(f"{path.name}: detecting and segmenting", err=True)
-        with read_source(path, model, seed) as source:
-            rows[path.name] = compare(source, wanted, candidates, seed)
+    for make in paths:
+        path = make()
+        kept = Kept(keep / "figures" / f"{path.name}_{options['frames']}_{asked.tag()}.json", again)
+        rows[path.name] = compare(path, asked, kept)
         click.echo(table(path.name, rows[path.name]))
-        if json_file is not None:
-            json_file.write_text(json.dumps({"recordings": rows, "total": totals(rows)}, indent=1))
-
-    for path in recordings:
-        take(path)
-    for name, number in stories(scenarios):
-        with simulated(name, number, frames) as path:
-            take(path)
+    by_group = {group: totals(list(members.values())) for group, members in grouped(rows).items()}
+    for group, methods in by_group.items():
+        click.echo(table_of_totals(group, methods))
+    if options["json_file"] is not None:
+        result = {"recordings": rows, "by_scenario": by_group, "total": totals(list(rows.values()))}
+        options["json_file"].write_text(json.dumps(result, indent=1))
+    if options["figure"] is not None:
+        draw(rows, options["figure"])
 
 
 if __name__ == "__main__":
