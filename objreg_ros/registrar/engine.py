@@ -83,15 +83,12 @@ class Engine:
         params, source, target = self._params, pair.source, pair.target
         alignment = refine(source, target, seed.T_target_source, params)
         T = alignment.T_target_source
-        verification = verify(source.sight, target.sight, T, params)
-        if verification.texture is not None and verification.texture >= params.holding_texture:
-            alignment = replace(alignment, slack=np.zeros((0, 6)))  # what shape lets slide, the grey holds
         explained, moved = explain(source, target, T, params)
         return Candidate(
             alignment=alignment,
             chain=seed.chain,
             agreeing_chains=(seed.chain,),
-            verification=verification,
+            verification=verify(source.sight, target.sight, T, params),
             explained=explained,
             moved=moved,
             gravity_error_deg=gravity_error_deg(source, target, T),

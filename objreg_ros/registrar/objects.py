@@ -18,11 +18,12 @@ Pairs = tuple[ObjectPair, ...]
 def explain(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> tuple[Pairs, Pairs]:
     """(explained, moved): one-to-one pairs of confusable labels, nearest first.
 
-    Explained are those whose middles lie within ``explained_distance``; moved are those left over of which each, where
-    it stood, is now free space in the other view.
+    Explained are those whose middles lie within ``explained_distance``, large ones a share of their extent farther;
+    moved are those left over of which each, where it stood, is now free space in the other view.
     """
     distances = gaps(source, target, T_target_source)
-    explained = _assign(source, distances, params.explained_distance)
+    spread = params.explained_share * np.minimum(source.extents[:, None], target.extents[None])
+    explained = _assign(source, distances - spread, params.explained_distance)
     left = distances.copy()
     left[[pair.source for pair in explained], :] = np.inf
     left[:, [pair.target for pair in explained]] = np.inf

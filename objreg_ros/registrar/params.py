@@ -75,6 +75,9 @@ class RegistrarParams(Params):
     reaches: tuple[float, ...] = param((0.2, 0.1, 0.06), "distance of a pair at first, in the basin, at the end", "m")
     iterations: int = param(15, "most iterations of one round of refinement", ge=1)
     min_points: int = param(60, "fewer paired points hold no pose", ge=6)
+    grey_points: int = param(2500, "points a side whose grey ends a refinement", ge=100)
+    grey_sigma: float = param(0.7, "difference of the high-passed grey that counts little, in its deviations", ge=0.01)
+    shape_sigma: float = param(0.02, "distance from a surface that weighs as much", "m", ge=0.001)
     surface_noise: float = param(0.005, "least noise that a surface is believed to have", "m", ge=1e-4)
     slack_share: float = param(0.01, "a direction that less of the surface resists is free to slide", ge=0.0, le=0.3)
     holding_texture: float = param(0.5, "grey that correlates so well holds what shape lets slide", ge=0.0, le=1.0)
@@ -85,7 +88,10 @@ class RegistrarParams(Params):
     agreement_rotation: float = param(5.0, "chains agree within this rotation", "deg", ge=0.0)
     agreement_translation: float = param(0.15, "chains agree within this distance", "m", ge=0.0)
     object_bonus: float = param(0.25, "what an explained object adds to V when candidates are ranked", ge=0.0)
-    explained_distance: float = param(0.12, "an object is explained when the middles are this close", "m", ge=0.0)
+    explained_distance: float = param(0.10, "an object is explained when the middles are this close", "m", ge=0.0)
+    explained_share: float = param(
+        0.1, "and so much of its extent farther, since a large thing is never seen whole", ge=0.0
+    )
 
     # The founding method.
     paper_distance: float = param(0.10, "pairs of points farther apart are rejected", "m", ge=0.001)

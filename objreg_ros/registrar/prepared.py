@@ -24,7 +24,7 @@ class Prepared:
     """All that was seen, thinned: ``surface`` to be aligned to, ``xyz`` and ``normals (M, 3)`` to align with.
 
     ``up (3,)`` is against gravity, or None; ``groups`` the confusable group of each object, ``centroids (K, 3)`` their
-    middles; ``middle (3,)`` that of everything: where poses are compared.
+    middles and ``extents (K,)`` m; ``middle (3,)`` that of everything: where poses are compared.
     """
 
     keyframe: Keyframe
@@ -36,6 +36,7 @@ class Prepared:
     up: Array | None
     groups: tuple[str, ...]
     centroids: Array
+    extents: Array
     middle: Array
 
 
@@ -54,6 +55,7 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
         up=None if keyframe.gravity is None else -np.asarray(keyframe.gravity, float),
         groups=tuple(groups.of(label) for label in keyframe.labels),
         centroids=np.array([item.centroid for item in keyframe.objects]).reshape(-1, 3),
+        extents=np.array([item.extent for item in keyframe.objects]),
         middle=np.asarray(coarse[0].mean(axis=0) if len(coarse[0]) else np.zeros(3), float),
     )
 

@@ -7,20 +7,23 @@ import numpy as np
 
 from objreg_ros.data import Alignment, Array
 from objreg_ros.geometry import skew, transform
+from objreg_ros.registrar.direct import finish
 from objreg_ros.registrar.icp import Fit, align, fit
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
+from objreg_ros.registrar.verify import verify
 
 
 def refine(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> Alignment:
     """Refine a pose that is in its basin; ``converged`` is False where next to nothing holds it.
 
-    The information counts only what lies on different patches of surface as independent, because the noise of
-    neighbouring points is not.
+    Grey has its say at the end, and keeps it where the views like the pose no less. The information counts only what
+    lies on different patches of surface as independent, because the noise of neighbouring points is not.
     """
     _, reach, last = params.reaches
     points = (source.xyz, source.normals, target.surface)
     T = align(*points, T_target_source[None], reach, last, params.iterations)[0][0]
+    T, grey = _finished(source, target, T, params)
     found = fit(*points, T, last)
     return Alignment(
         T_target_source=T,
@@ -30,8 +33,23 @@ def refine(source: Prepared, target: Prepared, T_target_source: Array, params: R
         rmse=found.rmse,
         iterations=params.iterations,
         converged=found.inliers >= params.min_points,
-        slack=slack(found, T, transform(T, source.middle), params.slack_share),
+        slack=slack(found._replace(H=found.H + grey), T, transform(T, source.middle), params.slack_share),
     )
+
+
+def _finished(source: Prepared, target: Prepared, T: Array, params: RegistrarParams) -> tuple[Array, Array]:
+    """The pose after grey had its say, and what grey adds to its information: nothing where it does not correlate.
+
+    The pose as it was, where the views like it better.
+    """
+    nothing = np.zeros((6, 6))
+    if not (source.sight.textured and target.sight.textured):
+        return T, nothing
+    finished, grey = finish(source, target, T, params)
+    before, after = (verify(source.sight, target.sight, pose, params, params.grey_points) for pose in (T, finished))
+    if after.score < before.score:
+        return T, nothing
+    return finished, grey if (after.texture or 0.0) >= params.holding_texture else nothing
 
 
 def about_camera(H: Array, T_target_source: Array) -> Array:

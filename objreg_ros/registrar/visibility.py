@@ -8,6 +8,7 @@ depth are a few pixels apart on real cameras, and edges are ragged), the high-pa
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numba
@@ -20,24 +21,43 @@ SEEN, INLIERS, VIOLATIONS, OCCLUDED, SHADED, SUM_A, SUM_B, SUM_AA, SUM_BB, SUM_A
 
 EDGE = 0.06  # of the depth: a larger range around a pixel is a depth jump
 SHADELESS = 1e6  # the shade of a point at a depth jump: not to be compared
+FINEST = 0.5  # px: a blur that takes pixel noise away
+BLURS = (2.5, 1.0)  # of the bands, the coarse one first
+LEAST_CONTRAST = 2.0  # grey levels; less is noise, not texture
 NEAREST = 0.3  # m; nearer depth is noise on every structured-light camera
+
+
+class Band(NamedTuple):
+    """Grey without its slow part: ``detail (h, w) float32`` of the image and ``shades (P,) float32`` of its points."""
+
+    detail: Array
+    shades: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Sight:
-    """A view made ready. ``near``, ``far (h, w) float32`` m, 0 where nothing was measured; ``detail (h, w) float32``.
+    """A view made ready. ``near``, ``far (h, w) float32`` m, 0 where nothing was measured; ``bands``, coarse first.
 
-    ``points (P, 3) float32`` m and ``shades (P,) float32`` are its measured pixels in a fixed shuffled order, so that
-    the first n of them are a fair sample; a pixel at a depth jump has the shade SHADELESS.
+    ``points (P, 3) float32`` m are its measured pixels in a fixed shuffled order, so that the first n of them are a
+    fair sample; a pixel at a depth jump has the shade SHADELESS.
     """
 
     near: Array
     far: Array
-    detail: Array
     points: Array
-    shades: Array
+    bands: tuple[Band, ...]
     textured: bool
     intrinsics: Intrinsics
+
+    @property
+    def detail(self) -> Array:
+        """The finest band of the image."""
+        return self.bands[-1].detail
+
+    @property
+    def shades(self) -> Array:
+        """The finest band of the points."""
+        return self.bands[-1].shades
 
     @property
     def camera(self) -> tuple[float, float, float, float]:
@@ -50,15 +70,13 @@ def prepare_sight(view: View, sight_range: float, detail_sigma: float, seed: int
     depth = np.nan_to_num(view.xyz[..., 2], nan=0.0)
     depth = np.where((depth > NEAREST) & (depth < sight_range), depth, 0.0).astype(np.float32)
     near, far = depth_bounds(depth)
-    detail = high_pass(view.grey, detail_sigma) if view.grey is not None else np.zeros_like(depth)
-    shades = np.where(far - near > EDGE * np.maximum(far, 1.0), np.float32(SHADELESS), detail)
+    jump = far - near > EDGE * np.maximum(far, 1.0)
     chosen = np.random.default_rng(seed).permutation(np.flatnonzero(depth > 0))
     return Sight(
         near=near,
         far=far,
-        detail=detail,
         points=np.ascontiguousarray(view.xyz.reshape(-1, 3)[chosen]),
-        shades=np.ascontiguousarray(shades.ravel()[chosen]),
+        bands=tuple(_band(view.grey, blur * FINEST, blur * detail_sigma, jump, chosen) for blur in BLURS),
         textured=view.grey is not None,
         intrinsics=view.intrinsics,
     )
@@ -71,10 +89,17 @@ def depth_bounds(depth: Array) -> tuple[Array, Array]:
     return np.where(near < 1e3, near, 0.0).astype(np.float32), cv2.dilate(depth, window)
 
 
-def high_pass(grey: Array, sigma: float) -> Array:
-    """Grey without its slow part, so that lighting and exposure drop out."""
-    image = cv2.GaussianBlur(grey.astype(np.float32), (0, 0), 0.5)
-    return np.asarray(image - cv2.GaussianBlur(image, (0, 0), sigma), np.float32)
+def _band(grey: Array | None, fine: float, slow: float, jump: Array, chosen: Array) -> Band:
+    detail = np.zeros(jump.shape, np.float32) if grey is None else band_pass(grey, fine, slow)
+    shades = np.where(jump, np.float32(SHADELESS), detail)
+    return Band(detail, np.ascontiguousarray(shades.ravel()[chosen]))
+
+
+def band_pass(grey: Array, fine: float, slow: float) -> Array:
+    """Grey between two blurs in pixels, in its standard deviations: lighting, exposure and contrast drop out."""
+    image = cv2.GaussianBlur(grey.astype(np.float32), (0, 0), fine)
+    detail = image - cv2.GaussianBlur(image, (0, 0), slow)
+    return np.asarray(detail / max(LEAST_CONTRAST, float(detail.std())), np.float32)
 
 
 @numba.njit(cache=True, fastmath=True, nogil=True)

@@ -45,7 +45,7 @@ def test_a_furnished_room_leaves_no_slack(pair) -> None:
 
 def test_a_bare_wall_slides_both_ways_and_turns() -> None:
     T = seen_from(0.0, height=0.75)
-    wall = prepare(keyframe(T, WALL, noise=0.0003), PARAMS)
+    wall = prepare(keyframe(T, WALL, noise=0.0003, grey=False), PARAMS)
     found = refine(wall, wall, np.eye(4), PARAMS)
     assert found.slack.shape == (3, 6)
     assert np.allclose(np.linalg.norm(found.slack, axis=1), 1.0)
@@ -53,6 +53,21 @@ def test_a_bare_wall_slides_both_ways_and_turns() -> None:
     along, across = T[:3, :3].T @ np.array([0.0, 1.0, 0.0]), T[:3, :3].T @ np.array([1.0, 0.0, 0.0])
     assert np.linalg.norm(span.T @ np.r_[along, 0.0, 0.0, 0.0]) > 0.95
     assert np.linalg.norm(span.T @ np.r_[across, 0.0, 0.0, 0.0]) < 0.3
+
+
+def test_the_pattern_of_a_bare_wall_holds_what_its_shape_lets_slide() -> None:
+    T = seen_from(0.0, height=0.75)
+    wall = prepare(keyframe(T, WALL, noise=0.0003), PARAMS)
+    shifted = prepare(keyframe(T @ pose(np.eye(3), np.array([0.04, 0.0, 0.0])), WALL, noise=0.0003, seed=1), PARAMS)
+    found = refine(shifted, wall, np.eye(4), PARAMS)
+    assert len(found.slack) == 0
+    assert pose_error(found.T_target_source, pose(np.eye(3), np.array([0.04, 0.0, 0.0])))[1] < 1.0
+
+
+def test_a_pattern_that_does_not_correlate_holds_nothing() -> None:
+    here, there = pose(np.eye(3), np.zeros(3)), pose(np.eye(3), np.array([0.5, 0.3, 0.0]))
+    views = (keyframe(seen_from(0.0, height=0.75) @ T, WALL, noise=0.0003) for T in (here, there))
+    assert len(refine(*(prepare(view, PARAMS) for view in views), np.eye(4), PARAMS).slack) == 3
 
 
 def test_a_start_far_away_does_not_converge(pair) -> None:
