@@ -15,6 +15,8 @@ from objreg_ros.segmenter.surface import EXACT, MIN_COSINE, Surface
 EDGE = int(PointFlag.EDGE)
 UNKNOWN_COSINE = np.float32(0.7)  # of a surface whose normal is not known
 MIN_NEIGHBOURS = 3  # of 8; a pixel with fewer in its object is an outlier
+NO_COLOUR = np.zeros((0, 0, 3), np.uint8)
+NO_COLOUR.flags.writeable = False  # as the arrays of a DepthImage, so that one kernel serves both
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,72 +38,107 @@ class Pixels:
         return len(self.xyz)
 
 
+def colours(image: DepthImage) -> Array:
+    """The colours (H, W, 3) uint8 of an image; of height 0 where it has none."""
+    return NO_COLOUR if image.rgb is None else image.rgb
+
+
 def extract(image: DepthImage, box: Box, surface: Surface, chosen: Array, jump: tuple[float, float]) -> Pixels:
     """The pixels of ``box`` whose surface is a ``chosen (h, w) bool`` cell of ``surface``."""
-    x0, y0, x1, y1 = box
     camera = image.intrinsics
+    grid = (surface.depth, surface.normals, chosen, (surface.left, surface.top, surface.step))
+    pinhole = (float(camera.fx), float(camera.fy), float(camera.cx), float(camera.cy))
+    bounds = np.float32(jump[0]), np.float32(jump[1])
+    xyz, normals, rgb, edge, area, around = _extract(image.depth, colours(image), box, grid, pinhole, bounds)
+    return Pixels(xyz, normals, rgb if image.rgb is not None else None, edge, area / (camera.fx * camera.fy), around)
+
+
+@numba.njit(cache=True, nogil=True, fastmath=EXACT, error_model="numpy")
+def _extract(depth, rgb, box, grid, pinhole, jump):  # type: ignore[no-untyped-def]
+    """The fields of `Pixels`, the area times fx fy; row by row, and in each row run by run of pixels that are kept."""
+    x0, y0, x1, y1 = box
+    fx, fy, cx, cy = pinhole
+    rows, cols = _cells_of_pixels(box, grid)
     mask = np.zeros((y1 - y0 + 2, x1 - x0 + 2), np.uint8)  # with a rim, so that every pixel has eight neighbours
-    kept = np.zeros((y1 - y0, x1 - x0), np.bool_)
-    a, b = np.float32(jump[0]), np.float32(jump[1])
-    h, w = surface.depth.shape
-    rows = np.minimum((np.arange(y0, y1) - surface.top) // surface.step, h - 1)
-    cols = np.minimum((np.arange(x0, x1) - surface.left) // surface.step, w - 1)
-    depth = image.depth[y0:y1, x0:x1]
-    count = _mark(depth, surface.depth, rows, cols, chosen, a, b, mask)
+    count = _mark(depth, box, grid, rows, cols, jump, mask)
     xyz, normals = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
-    edge, bounds = np.empty(count, np.uint16), np.empty(4, np.int64)
-    x, y = _slopes(x0, x1, camera.cx, camera.fx), _slopes(y0, y1, camera.cy, camera.fy)
-    edges = _jumps(image.depth, x0, y0, a, b, kept)
-    n, area = _gather(depth, mask, kept, edges, surface.normals, rows, cols, x, y, xyz, normals, edge, bounds)
-    rgb = None if image.rgb is None else _colours(image.rgb, x0, y0, kept, n)
-    area /= camera.fx * camera.fy
-    around = (x0 + int(bounds[0]), y0 + int(bounds[1]), x0 + int(bounds[2]), y0 + int(bounds[3]))
-    return Pixels(xyz[:n], normals[:n], rgb, edge[:n], area, around)
+    colour, edge = np.empty((count if len(rgb) > 0 else 0, 3), np.uint8), np.empty(count, np.uint16)
+    kept, flags = np.empty(x1 - x0, np.uint8), np.empty(x1 - x0, np.uint16)
+    x = ((np.arange(x0, x1) - cx) / fx).astype(np.float32)
+    n, area, around = 0, 0.0, (x1, y1, x0, y0)
+    for v in range(y0, y1):
+        left, right = _keep(mask[v - y0], mask[v - y0 + 1], mask[v - y0 + 2], kept)
+        if left == right:
+            continue
+        around = (min(around[0], x0 + left), min(around[1], v), max(around[2], x0 + right), v + 1)
+        _flag_jumps(depth, v, x0 + left, x0 + right, jump, flags[left:])
+        y = np.float32((v - cy) / fy)
+        while left < right:
+            last = left
+            while last < right and kept[last]:
+                last += 1
+            end = n + last - left
+            z = depth[v, x0 + left : x0 + last]
+            area += _fill(x[left:last], y, z, grid[1][:, rows[v - y0]], cols[left:last], xyz[n:end], normals[n:end])
+            edge[n:end] = flags[left:last]
+            if len(rgb) > 0:
+                colour[n:end] = rgb[v, x0 + left : x0 + last]
+            n, left = end, last
+            while left < right and not kept[left]:
+                left += 1
+    return xyz[:n], normals[:n], colour[:n], edge[:n], area, around
 
 
-def _slopes(first: int, last: int, centre: float, focal: float) -> Array:
-    return ((np.arange(first, last) - centre) / focal).astype(np.float32)
+@numba.njit(cache=True, nogil=True)
+def _cells_of_pixels(box, grid):  # type: ignore[no-untyped-def]
+    """The row of cells of each row of pixels in the box, and the same of columns."""
+    left, top, step = grid[3]
+    h, w = grid[0].shape
+    rows = np.minimum((np.arange(box[1], box[3]) - top) // step, h - 1)
+    return rows, np.minimum((np.arange(box[0], box[2]) - left) // step, w - 1)
 
 
-def _colours(rgb: Array, x0: int, y0: int, mask: Array, count: int) -> Array:
-    out = np.empty((count, 3), np.uint8)
-    _pick(rgb, x0, y0, mask, out)
-    return out
-
-
-@numba.njit(cache=True)
-def _pick(rgb, x0, y0, mask, out):  # type: ignore[no-untyped-def]
-    n = 0
-    for v in range(mask.shape[0]):
-        for u in range(mask.shape[1]):
-            if mask[v, u]:
-                for k in range(3):
-                    out[n, k] = rgb[v + y0, u + x0, k]
-                n += 1
-
-
-@numba.njit(cache=True, fastmath=EXACT)
-def _mark(depth, cells, rows, cols, chosen, a, b, mask):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, nogil=True, fastmath=EXACT)
+def _mark(depth, box, grid, rows, cols, jump, mask):  # type: ignore[no-untyped-def]
     """Mark the pixels that belong to chosen cells: by their own cell, or by the nearest in depth around it."""
+    cells, _, chosen, _ = grid
+    x0, y0, x1, y1 = box
+    near = _spread(chosen)
     count = 0
-    for v in range(depth.shape[0]):
-        i = rows[v]
-        for u in range(depth.shape[1]):
+    for v in range(y0, y1):
+        i = rows[v - y0]
+        for u in range(x0, x1):
+            j = cols[u - x0]
             z = depth[v, u]
-            if not (z > 0):
+            if not near[i, j] or not (z > 0):
                 continue
-            j = cols[u]
-            jump = a + b * z * z
-            if cells[i, j] > 0 and abs(cells[i, j] - z) < jump:
+            limit = jump[0] + jump[1] * z * z
+            if cells[i, j] > 0 and abs(cells[i, j] - z) < limit:
                 belongs = chosen[i, j]
             else:
-                belongs = _nearest(cells, chosen, i, j, z, jump)
-            mask[v + 1, u + 1] = belongs
+                belongs = _nearest(cells, chosen, i, j, z, limit)
+            mask[v - y0 + 1, u - x0 + 1] = belongs
             count += belongs
     return count
 
 
-@numba.njit(cache=True, fastmath=EXACT)
+@numba.njit(cache=True, nogil=True)
+def _spread(chosen):  # type: ignore[no-untyped-def]
+    """(h, w) bool: the cells that are chosen or have a chosen one beside them, across corners too."""
+    h, w = chosen.shape
+    spread = np.empty((h, w), np.bool_)
+    column = np.zeros(w + 2, np.bool_)
+    for i in range(h):
+        above, here, below = chosen[max(i - 1, 0)], chosen[i], chosen[min(i + 1, h - 1)]
+        middle, right, out = column[1:], column[2:], spread[i]
+        for j in range(w):
+            middle[j] = above[j] | here[j] | below[j]
+        for j in range(w):
+            out[j] = column[j] | middle[j] | right[j]
+    return spread
+
+
+@numba.njit(cache=True, nogil=True, fastmath=EXACT)
 def _nearest(cells, chosen, i, j, z, limit):  # type: ignore[no-untyped-def]
     """Whether the cell nearest in depth to z around (i, j) is chosen; False for none within ``limit``."""
     found = False
@@ -114,76 +151,82 @@ def _nearest(cells, chosen, i, j, z, limit):  # type: ignore[no-untyped-def]
     return found
 
 
-@numba.njit(cache=True, fastmath=EXACT)
-def _gather(depth, mask, kept, edges, cell_normals, rows, cols, x, y, xyz, normals, edge, bounds):  # type: ignore[no-untyped-def]
-    """Fill the outputs from the marked pixels but for outliers, and ``kept``; their number and area times fx fy."""
-    h, w = kept.shape
-    area, n = 0.0, 0
-    bounds[0], bounds[1], bounds[2], bounds[3] = w, h, 0, 0
-    for v in range(h):
-        i = rows[v]
-        for u in range(w):
-            if mask[v + 1, u + 1] == 0 or _neighbours(mask, v, u) < MIN_NEIGHBOURS:
-                continue
-            kept[v, u] = True
-            z = depth[v, u]
-            j = cols[u]
-            n_x, n_y, n_z = cell_normals[0, i, j], cell_normals[1, i, j], cell_normals[2, i, j]
-            xyz[n, 0], xyz[n, 1], xyz[n, 2] = x[u] * z, y[v] * z, z
-            normals[n, 0], normals[n, 1], normals[n, 2] = n_x, n_y, n_z
-            edge[n] = EDGE if edges[v, u] else 0
-            cosine = abs(x[u] * n_x + y[v] * n_y + n_z)
-            area += z * z / (max(cosine, MIN_COSINE) if cosine > 0 else UNKNOWN_COSINE)
-            bounds[0], bounds[1] = min(bounds[0], u), min(bounds[1], v)
-            bounds[2], bounds[3] = max(bounds[2], u + 1), v + 1
-            n += 1
-    return n, area
+@numba.njit(cache=True, nogil=True)
+def _keep(above, here, below, kept):  # type: ignore[no-untyped-def]
+    """Fill ``kept (w,)``: the marked pixels of a row but for outliers; the first of them and the one after the last.
+
+    The rows of the mask have a rim of one."""
+    above_right, here_right, below_right = above[2:], here[2:], below[2:]
+    above_middle, middle, below_middle = above[1:], here[1:], below[1:]
+    for u in range(len(kept)):
+        beside = here[u] + here_right[u] + above_middle[u] + below_middle[u]
+        across = above[u] + above_right[u] + below[u] + below_right[u]
+        kept[u] = middle[u] if beside + across >= MIN_NEIGHBOURS else 0
+    first, end = 0, len(kept)
+    while first < end and not kept[first]:
+        first += 1
+    while end > first and not kept[end - 1]:
+        end -= 1
+    return first, end
 
 
-@numba.njit(cache=True, inline="always")
-def _neighbours(mask, v, u):  # type: ignore[no-untyped-def]
-    """How many of the eight neighbours of pixel (v, u) are marked; ``mask`` has a rim of one."""
-    above, here, below = mask[v], mask[v + 1], mask[v + 2]
-    beside = here[u] + here[u + 2]
-    return above[u] + above[u + 1] + above[u + 2] + beside + below[u] + below[u + 1] + below[u + 2]
-
-
-@numba.njit(cache=True, fastmath=EXACT)
-def _jumps(depth, x0, y0, a, b, mask):  # type: ignore[no-untyped-def]
-    """(h, w) bool like ``mask``: whether two rows or columns away there is no depth, or it lies across a depth jump."""
-    edges = np.zeros(mask.shape, np.bool_)
+@numba.njit(cache=True, nogil=True, fastmath=EXACT)
+def _flag_jumps(depth, v, x0, x1, jump, flags):  # type: ignore[no-untyped-def]
+    """Fill ``flags (x1 - x0,)``: EDGE where two rows or columns away is no depth or a depth beyond a jump, else 0."""
     h, w = depth.shape
-    for v in range(mask.shape[0]):
-        up, down = depth[max(v + y0 - 2, 0)], depth[min(v + y0 + 2, h - 1)]
-        row = depth[v + y0]
-        for u in range(mask.shape[1]):
-            k = u + x0
-            z = row[k]
-            across = max(abs(row[max(k - 2, 0)] - z), abs(row[min(k + 2, w - 1)] - z))
-            edges[v, u] = not max(across, max(abs(up[k] - z), abs(down[k] - z))) < 2 * (a + b * z * z)
-    return edges
+    n = x1 - x0
+    up, here, down = depth[max(v - 2, 0)][x0:], depth[v][x0:], depth[min(v + 2, h - 1)][x0:]
+    wide = np.empty(n + 4, np.float32)  # the row with two more pixels at each side, the image's last ones repeated
+    for k in range(2):
+        wide[k] = depth[v, max(x0 + k - 2, 0)]
+        wide[n + 2 + k] = depth[v, min(x1 + k, w - 1)]
+    wide[2 : n + 2] = here[:n]
+    right = wide[4:]
+    for u in range(n):
+        z = here[u]
+        across = max(max(abs(wide[u] - z), abs(right[u] - z)), max(abs(up[u] - z), abs(down[u] - z)))
+        flags[u] = EDGE if not across < np.float32(2) * (jump[0] + jump[1] * z * z) else 0
 
 
-def cell_points(surface: Surface, cells: Array, rgb: Array | None) -> tuple[Array, Array, Array | None]:
-    """Points and normals (N, 3) float32 and colours (N, 3) uint8 or None of ``cells (h, w) bool`` of a whole frame."""
-    n = int(np.count_nonzero(cells))
-    xyz, normals = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
-    _gather_cells(surface.depth, surface.normals, surface.x, surface.y, cells, xyz, normals)
-    if rgb is None:
-        return xyz, normals, None
-    colours = np.empty((n, 3), np.uint8)
-    _pick(rgb[:: surface.step, :: surface.step], 0, 0, cells, colours)
-    return xyz, normals, colours
+@numba.njit(cache=True, nogil=True, fastmath=EXACT, error_model="numpy")
+def _fill(x, y, z, cell_normals, cols, xyz, normals):  # type: ignore[no-untyped-def]
+    """Fill the points and normals of pixels of a row that lie side by side; their area times fx fy."""
+    n_x, n_y, n_z = cell_normals[0], cell_normals[1], cell_normals[2]
+    area = np.float32(0)
+    for k in range(len(z)):
+        j = cols[k]
+        a, b, c = n_x[j], n_y[j], n_z[j]
+        xyz[k, 0], xyz[k, 1], xyz[k, 2] = x[k] * z[k], y * z[k], z[k]
+        normals[k, 0], normals[k, 1], normals[k, 2] = a, b, c
+        cosine = abs(x[k] * a + y * b + c)
+        area += z[k] * z[k] / (max(cosine, MIN_COSINE) if cosine > 0 else UNKNOWN_COSINE)
+    return area
 
 
-@numba.njit(cache=True)
-def _gather_cells(depth, cell_normals, x, y, cells, xyz, normals):  # type: ignore[no-untyped-def]
+def cell_points(surface: Surface, cells: Array, rgb: Array) -> tuple[Array, Array, Array]:
+    """Points and normals (N, 3) float32 and colours (N, 3) uint8 of ``cells (h, w) bool`` of a whole frame.
+
+    ``rgb (H, W, 3) uint8`` is the whole picture; without colour its height is 0 and so is N of the colours.
+    """
+    return tuple(_gather_cells(surface.depth, surface.normals, surface.x, surface.y, surface.step, rgb, cells))
+
+
+@numba.njit(cache=True, nogil=True)
+def _gather_cells(depth, cell_normals, x, y, step, rgb, cells):  # type: ignore[no-untyped-def]
+    count = np.count_nonzero(cells)
+    xyz, normals = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
+    colour = np.empty((count if len(rgb) > 0 else 0, 3), np.uint8)
     n = 0
     for i in range(depth.shape[0]):
         for j in range(depth.shape[1]):
-            if cells[i, j]:
-                z = depth[i, j]
-                xyz[n, 0], xyz[n, 1], xyz[n, 2] = x[j] * z, y[i] * z, z
+            if not cells[i, j]:
+                continue
+            z = depth[i, j]
+            xyz[n, 0], xyz[n, 1], xyz[n, 2] = x[j] * z, y[i] * z, z
+            for k in range(3):
+                normals[n, k] = cell_normals[k, i, j]
+            if len(rgb) > 0:
                 for k in range(3):
-                    normals[n, k] = cell_normals[k, i, j]
-                n += 1
+                    colour[n, k] = rgb[i * step, j * step, k]
+            n += 1
+    return xyz, normals, colour

@@ -22,12 +22,12 @@ STRIDE = 2
 def whole_flags(image: DepthImage, pixels: Pixels, around: Surface, chosen: Array, box: Window) -> PointFlag:
     """The flags of an object of ``pixels``, that is ``chosen (h, w) bool`` of ``around``; ``box`` in cells of that."""
     flags = PointFlag(0)
-    inside = int(np.count_nonzero(chosen[box[1] : box[3], box[0] : box[2]]))
-    if inside < (1 - LEAK) * int(np.count_nonzero(chosen)):
+    cut, wall_like = _inspect(around.depth, around.x, around.y, chosen, box)
+    if cut:
         flags |= PointFlag.CUT_BY_BOX
     if len(pixels) > 0 and _touches_border(pixels, *image.depth.shape):
         flags |= PointFlag.CUT_BY_IMAGE
-    if inside > MIN_CELLS and _wall_like(around, chosen, box):
+    if wall_like:
         flags |= PointFlag.WALL_LIKE
     return flags
 
@@ -38,51 +38,57 @@ def _touches_border(pixels: Pixels, height: int, width: int) -> bool:
     return x0 < du or y0 < dv or x1 > width - du or y1 > height - dv
 
 
-def _wall_like(around: Surface, chosen: Array, box: Window) -> bool:
-    """Whether the chosen cells are flat and their plane goes on around the box."""
-    grid = (around.depth, around.x, around.y)
-    moments = np.zeros(10)
-    _sum_moments(*grid, chosen, moments)
-    centre = moments[1:4] / moments[0]
-    xx, xy, xz, yy, yz, zz = moments[4:]
-    M = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) / moments[0] - np.outer(centre, centre)
-    normal = np.linalg.eigh(M)[1][:, 0]
-    counts = np.zeros((2, 2))
-    _count_on_plane(*grid, chosen, np.array(box), normal.astype(np.float32), np.float32(normal @ centre), counts)
-    (own, own_flat), (ring, ring_flat) = counts
-    return bool(own_flat > FLAT * own and ring > MIN_CELLS / STRIDE**2 and ring_flat > WALL_AROUND * ring)
+@numba.njit(cache=True, nogil=True)
+def _inspect(depth, x, y, chosen, box):  # type: ignore[no-untyped-def]
+    """Whether the box cuts the chosen cells; whether they are flat and their plane goes on around the box."""
+    everywhere, inside = 0, 0
+    for i in range(chosen.shape[0]):
+        for j in range(chosen.shape[1]):
+            everywhere += chosen[i, j]
+    for i in range(box[1], box[3]):
+        for j in range(box[0], box[2]):
+            inside += chosen[i, j]
+    cut = inside < (1 - LEAK) * everywhere
+    if inside <= MIN_CELLS:
+        return cut, False
+    normal, offset = _fit_plane(depth, x, y, chosen)
+    own, own_flat, ring, ring_flat = _count_on_plane(depth, x, y, chosen, box, normal, offset)
+    flat = own_flat > FLAT * own
+    return cut, flat and ring > MIN_CELLS / STRIDE**2 and ring_flat > WALL_AROUND * ring
 
 
-@numba.njit(cache=True, fastmath=EXACT)
-def _sum_moments(depth, x, y, chosen, moments):  # type: ignore[no-untyped-def]
-    """Fill ``moments`` with the number, the sum of p and the sum of p pᵀ of every other chosen cell."""
+@numba.njit(cache=True, nogil=True)
+def _fit_plane(depth, x, y, chosen):  # type: ignore[no-untyped-def]
+    """The normal (3,) float32 and the offset of the plane through the chosen cells: least squares."""
+    M, centre, count = np.zeros((3, 3)), np.zeros(3), 0
     for i in range(0, depth.shape[0], STRIDE):
         for j in range(0, depth.shape[1], STRIDE):
             if chosen[i, j]:
                 z = np.float64(depth[i, j])
                 p, q = x[j] * z, y[i] * z
-                moments[0] += 1
-                moments[1] += p
-                moments[2] += q
-                moments[3] += z
-                moments[4] += p * p
-                moments[5] += p * q
-                moments[6] += p * z
-                moments[7] += q * q
-                moments[8] += q * z
-                moments[9] += z * z
+                count += 1
+                centre[0], centre[1], centre[2] = centre[0] + p, centre[1] + q, centre[2] + z
+                M[0, 0], M[0, 1], M[0, 2] = M[0, 0] + p * p, M[0, 1] + p * q, M[0, 2] + p * z
+                M[1, 1], M[1, 2], M[2, 2] = M[1, 1] + q * q, M[1, 2] + q * z, M[2, 2] + z * z
+    centre /= count
+    M[1, 0], M[2, 0], M[2, 1] = M[0, 1], M[0, 2], M[1, 2]
+    normal = np.linalg.eigh(M / count - np.outer(centre, centre))[1][:, 0].copy()
+    return normal.astype(np.float32), np.float32(normal @ centre)
 
 
-@numba.njit(cache=True, fastmath=EXACT)
-def _count_on_plane(depth, x, y, chosen, box, normal, offset, counts):  # type: ignore[no-untyped-def]
-    """Fill ``counts``: of the chosen cells in the box and of all outside it, how many there are and are flat."""
+@numba.njit(cache=True, nogil=True, fastmath=EXACT)
+def _count_on_plane(depth, x, y, chosen, box, normal, offset):  # type: ignore[no-untyped-def]
+    """How many of the chosen cells in the box there are and are flat, and the same of all cells outside it."""
+    own, own_flat, ring, ring_flat = 0, 0, 0, 0
     for i in range(0, depth.shape[0], STRIDE):
         for j in range(0, depth.shape[1], STRIDE):
             z = depth[i, j]
-            outside = i < box[1] or i >= box[3] or j < box[0] or j >= box[2]
-            if z <= 0 or not (outside or chosen[i, j]):
-                continue
-            k = 1 if outside else 0
             off = abs(z * (normal[0] * x[j] + normal[1] * y[i] + normal[2]) - offset)
-            counts[k, 0] += 1
-            counts[k, 1] += off < 2 * (FLOOR + GROWTH * z * z)
+            flat = off < 2 * (FLOOR + GROWTH * z * z)
+            if i < box[1] or i >= box[3] or j < box[0] or j >= box[2]:
+                ring += z > 0
+                ring_flat += (z > 0) & flat
+            elif chosen[i, j]:
+                own += 1
+                own_flat += flat
+    return own, own_flat, ring, ring_flat

@@ -16,6 +16,7 @@ CAMERA_UP = np.array([0.0, -1.0, 0.0])  # of an upright camera in its optical fr
 CANDIDATES = 64
 CLUSTER = np.float32(np.cos(np.radians(8.0)))
 RIVAL = np.float32(np.cos(np.radians(16.0)))
+CONES = tuple(np.cos(np.radians((10.0, 8.0, 6.0, 6.0))).tolist())  # in which the middle of a cluster is sought
 ENOUGH = 0.10  # share of the normals that makes a cluster fully believed
 MIN_NORMALS = 20
 
@@ -27,27 +28,62 @@ def estimate_up(normals: Array, prior: Array, cone_deg: float) -> tuple[Array | 
     weighed by the fourth power of the cosine to the prior. The confidence is what the cluster's weight leads the best
     other cluster by, less where only a small part of the frame is level.
     """
-    cosine = normals @ prior.astype(normals.dtype)
-    level = normals[cosine > np.cos(np.radians(cone_deg))]
-    if len(level) < MIN_NORMALS:
-        return None, 0.0
-    candidates = level[np.linspace(0, len(level) - 1, CANDIDATES).astype(int)]
-    count = np.empty(len(candidates), np.int64)
-    _count_near(candidates, np.ascontiguousarray(level.T), CLUSTER, count)
-    weight = count * np.clip(candidates @ prior.astype(level.dtype), 0, 1) ** 4
-    best = int(weight.argmax())
-    up = _refine(level, candidates[best])
-    rivals = weight[candidates @ up.astype(level.dtype) < RIVAL]
-    lead = 1.0 - float(rivals.max(initial=0.0) / weight[best])
-    return up, lead * min(1.0, float(count[best]) / (ENOUGH * len(normals)))
+    limit = np.float32(np.cos(np.radians(cone_deg)))
+    up, confidence = _estimate(normals, prior.astype(np.float32), limit)
+    return (up, confidence) if confidence > 0 else (None, 0.0)
 
 
-def _refine(normals: Array, up: Array) -> Array:
+@numba.njit(cache=True, nogil=True)
+def _estimate(normals, prior, limit):  # type: ignore[no-untyped-def]
+    """Up (3,) float64 and its confidence, 0 where there is none."""
+    level = np.empty((3, len(normals)), np.float32)
+    n = 0
+    for normal in normals:
+        if normal[0] * prior[0] + normal[1] * prior[1] + normal[2] * prior[2] > limit:
+            level[0, n], level[1, n], level[2, n] = normal[0], normal[1], normal[2]
+            n += 1
+    if n < MIN_NORMALS:
+        return np.zeros(3), 0.0
+    level = level[:, :n]
+    candidates = np.linspace(0, n - 1, CANDIDATES).astype(np.int64)
+    count, weight = np.empty(CANDIDATES), np.empty(CANDIDATES)
+    for k in range(CANDIDATES):
+        x, y, z = level[0, candidates[k]], level[1, candidates[k]], level[2, candidates[k]]
+        count[k] = _count_near(level, x, y, z)
+        weight[k] = count[k] * max(x * prior[0] + y * prior[1] + z * prior[2], 0) ** 4
+    best = np.argmax(weight)
+    up = _refine(level, level[:, candidates[best]].astype(np.float64))
+    rival = 0.0
+    for k in range(CANDIDATES):
+        x, y, z = level[0, candidates[k]], level[1, candidates[k]], level[2, candidates[k]]
+        if x * up[0] + y * up[1] + z * up[2] < RIVAL:
+            rival = max(rival, weight[k])
+    return up, (1.0 - rival / weight[best]) * min(1.0, count[best] / (ENOUGH * len(normals)))
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _count_near(level, x, y, z):  # type: ignore[no-untyped-def]
+    """How many normals ``level (3, N)`` lie within the cone of a cluster around one."""
+    total = 0
+    n_x, n_y, n_z = level[0], level[1], level[2]
+    for n in range(len(n_x)):
+        total += 1 if x * n_x[n] + y * n_y[n] + z * n_z[n] > CLUSTER else 0
+    return total
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _refine(level, up):  # type: ignore[no-untyped-def]
     """The mean of the normals around ``up``, in shrinking cones."""
-    for cone_deg in (10.0, 8.0, 6.0, 6.0):
-        mean = normals[normals @ up > np.cos(np.radians(cone_deg))].mean(axis=0)
-        up = mean / np.linalg.norm(mean)
-    return up.astype(np.float64) / np.linalg.norm(up.astype(np.float64))
+    n_x, n_y, n_z = level[0], level[1], level[2]
+    for cosine in CONES:
+        x, y, z = 0.0, 0.0, 0.0
+        for n in range(len(n_x)):
+            near = n_x[n] * up[0] + n_y[n] * up[1] + n_z[n] * up[2] > cosine
+            x += n_x[n] if near else 0.0
+            y += n_y[n] if near else 0.0
+            z += n_z[n] if near else 0.0
+        up = np.array([x, y, z]) / np.sqrt(x * x + y * y + z * z)
+    return up
 
 
 def known_normals(normals: Array, stride: int) -> Array:
@@ -57,7 +93,7 @@ def known_normals(normals: Array, stride: int) -> Array:
     return known[: _gather_known(normals, stride, known)]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _gather_known(normals, stride, known):  # type: ignore[no-untyped-def]
     n = 0
     for i in range(0, normals.shape[1], stride):
@@ -67,14 +103,3 @@ def _gather_known(normals, stride, known):  # type: ignore[no-untyped-def]
                     known[n, k] = normals[k, i, j]
                 n += 1
     return n
-
-
-@numba.njit(cache=True, fastmath=True)
-def _count_near(candidates, normals, cosine, count):  # type: ignore[no-untyped-def]
-    """How many ``normals (3, N)`` lie within the cone of each candidate (K, 3)."""
-    for k in range(len(candidates)):
-        x, y, z = candidates[k]
-        total = 0
-        for n in range(normals.shape[1]):
-            total += 1 if x * normals[0, n] + y * normals[1, n] + z * normals[2, n] > cosine else 0
-        count[k] = total

@@ -3,17 +3,15 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from objreg_ros.data import Array, DepthImage, PointFlag
 from objreg_ros.segmenter.boxes import Box
-from objreg_ros.segmenter.components import connect, grow
-from objreg_ros.segmenter.extract import Pixels, extract
+from objreg_ros.segmenter.components import split
+from objreg_ros.segmenter.extract import Pixels, colours, extract
 from objreg_ros.segmenter.flags import whole_flags
 from objreg_ros.segmenter.holes import fill_holes
 from objreg_ros.segmenter.level import support_cells
 from objreg_ros.segmenter.params import SegmenterParams
-from objreg_ros.segmenter.parts import Parts, measure
+from objreg_ros.segmenter.parts import measure
 from objreg_ros.segmenter.seams import find_seams
 from objreg_ros.segmenter.selection import select
 from objreg_ros.segmenter.support import Ground
@@ -21,7 +19,7 @@ from objreg_ros.segmenter.surface import Surface, Window
 
 MIN_PART = 10  # cells; what is smaller joins a neighbour
 GROWTH = 12  # rounds that parts grow over seams
-MAX_CELLS = 30000  # around a box; larger ones are looked at on the coarse grid
+MAX_CELLS = 23000  # around a box; larger ones are looked at on the coarse grid
 MAX_PARTS = 32
 
 
@@ -40,13 +38,9 @@ def isolate(
     around = grid.crop(crop)
     level, supported = support_cells(around, window, ground, params.height)
     here = (window[0] - crop[0], window[1] - crop[1], window[2] - crop[0], window[3] - crop[1])
-    keep = (around.depth > 0) & ~level
-    labels, count = connect(around.depth, keep & ~find_seams(around, params.crease, jump), jump)
-    labels[np.bincount(labels.ravel(), minlength=count + 1)[labels] < MIN_PART] = 0
-    grow(labels, around.depth, keep, jump, GROWTH)
-    parts = measure(labels, count, here, around, image.rgb, jump, MAX_PARTS)
-    selected = select(parts, here)
-    chosen = _chosen(parts, selected)
+    labels, count = split(around.depth, level, find_seams(around, params.crease, jump), jump, MIN_PART, GROWTH)
+    parts = measure(labels, count, here, around, colours(image), jump, MAX_PARTS)
+    chosen = select(parts, here)
     fill_holes(chosen, around.depth, jump)
     pixels = extract(image, box, around, chosen, jump)
     flags = PointFlag(0) if supported else PointFlag.UNSUPPORTED
@@ -61,13 +55,6 @@ def _grid(box: Box, ground: Ground, margin: float) -> Surface:
     """The grid of the frame on which a box has no more than MAX_CELLS with its margin, or the coarsest one."""
     pixels = (box[2] - box[0]) * (box[3] - box[1]) * (1 + 2 * margin) ** 2
     return ground.surface if pixels <= MAX_CELLS * ground.surface.step**2 else ground.coarse
-
-
-def _chosen(parts: Parts, selected: list[int]) -> Array:
-    """(h, w) bool: the cells of the parts with these numbers."""
-    table = np.zeros(len(parts) + 1, np.bool_)
-    table[selected] = True
-    return table[parts.labels]
 
 
 def _cells(box: Box, surface: Surface) -> Window:

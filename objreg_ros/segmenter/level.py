@@ -6,18 +6,17 @@ A depth camera bends planes by some millimetres over the frame, so only a local 
 
 from __future__ import annotations
 
-import cv2
 import numba
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.segmenter.support import FLOOR, GROWTH, Ground, Plane, Support, fit_level
+from objreg_ros.segmenter.support import FLOOR, GROWTH, Ground, Plane, fit_level
 from objreg_ros.segmenter.surface import EXACT, Surface, Window
 
 OWN_TOP = 0.65  # a level part with more of it in a box is a top of the object there, not what it stands on
 LOWEST = 0.1  # with less than this share of the box's cells below it a level part is no top
 MIN_NEAR = 12  # coarse cells of a part around a box that say something
-REACH = np.ones((7, 7), np.uint8)  # coarse cells that a support surface is thought to go on
+REACH = 3  # coarse cells that a support surface is thought to go on
 SPREADS = 3.0  # standard deviations of the surface's noise
 MAX_SPREAD = 0.5  # tolerances; what is rougher is no plane
 
@@ -28,12 +27,14 @@ def support_cells(around: Surface, window: Window, ground: Ground, base: float) 
     ``window`` is the box in cells of the whole frame, ``around`` a crop of it; ``base`` metres are added to the noise.
     """
     level = np.zeros(around.depth.shape, np.bool_)
+    here = np.empty(around.depth.shape, np.bool_)
     found = False
     if ground.up is None:
         return level, found
+    grid = (around.depth, around.x, around.y, (around.left, around.top, around.step))
     for support in ground.supports:
-        here = _beneath(support, window, around, ground.coarse)
-        if here is None:
+        normal, offset = _equation(support.plane)
+        if not _find_beneath(support.parts, support.total, normal, offset, window, grid, ground.coarse.step, here):
             continue
         plane = fit_level(around, here, ground.up, support.plane, stride=2, lowest=True)
         if plane is None or plane.spread > MAX_SPREAD:
@@ -48,67 +49,91 @@ def _equation(plane: Plane) -> tuple[Array, np.float32]:
     return plane.normal.astype(np.float32), np.float32(plane.offset)
 
 
-def _beneath(support: Support, window: Window, around: Surface, coarse: Surface) -> Array | None:
-    """(h, w) bool of ``around``: where ``support`` may be what the things in ``window`` stand on; None for nowhere.
+@numba.njit(cache=True, nogil=True)
+def _find_beneath(parts, total, normal, offset, window, grid, coarse_step, here):  # type: ignore[no-untyped-def]
+    """Fill ``here``: where a support may be what the things in ``window`` stand on; whether it is anywhere.
 
     A part that lies mostly in the window is a top of the object itself, unless more of its plane is seen around it, or
     nothing is seen below it.
     """
-    stride = coarse.step // around.step  # 1 or more
-    left, top = around.left // coarse.step, around.top // coarse.step
-    h, w = around.depth.shape
-    right, bottom = left + -(-(w + stride) // stride), top + -(-(h + stride) // stride)
-    parts = np.ascontiguousarray(support.parts[top:bottom, left:right])
-    near = np.bincount(parts.ravel(), minlength=len(support.total))
-    near[0] = 0
+    depth, _, _, (first_u, first_v, step) = grid
+    h, w = depth.shape
+    left, top = first_u // coarse_step, first_v // coarse_step
+    stride = coarse_step // step  # 1 or more
+    crop = (left, top, left + -(-(w + stride) // stride), top + -(-(h + stride) // stride))
+    near = _count(parts, crop, 1, len(total))
     if near.sum() < MIN_NEAR:
-        return None
-    inside = tuple(-(-edge // stride) for edge in window)
-    within = np.bincount(support.parts[inside[1] : inside[3], inside[0] : inside[2]].ravel(), minlength=len(near))
-    own = within > OWN_TOP * support.total
+        return False
+    within = _count(parts, window, stride, len(total))
+    own = within > OWN_TOP * total
     own[0] = False
-    lone = near[~own].sum() <= near[own].sum()
-    if lone and own.any() and _share_below(support.plane, around, window) > LOWEST:
-        kept = ~own
-    else:
-        kept = np.ones(len(near), bool)
-    kept &= near >= MIN_NEAR
-    kept[0] = False
+    around_it, on_it = near[~own].sum(), near[own].sum()
+    if on_it > 0 and around_it <= on_it and _share_below(normal, offset, window, grid) > LOWEST:
+        near[own] = 0
+    kept = near >= MIN_NEAR
     if not kept.any():
-        return None
-    mask = cv2.dilate(kept[parts].view(np.uint8), REACH)
-    here = np.zeros(around.depth.shape, np.bool_)
-    rows = np.minimum((around.top + np.arange(h) * around.step) // coarse.step - top, mask.shape[0] - 1)
-    cols = np.minimum((around.left + np.arange(w) * around.step) // coarse.step - left, mask.shape[1] - 1)
-    _spread(mask, rows, cols, around.depth, here)
-    return here
+        return False
+    _spread(parts, kept, crop, coarse_step, grid, here)
+    return True
 
 
-@numba.njit(cache=True)
-def _spread(mask, rows, cols, depth, here):  # type: ignore[no-untyped-def]
-    for i in range(here.shape[0]):
-        for j in range(here.shape[1]):
-            here[i, j] = mask[rows[i], cols[j]] > 0 and depth[i, j] > 0
+@numba.njit(cache=True, nogil=True)
+def _count(parts, window, stride, count):  # type: ignore[no-untyped-def]
+    """(count,) how many cells each part has in a window of cells ``stride`` times as fine; none for 0."""
+    near = np.zeros(count, np.int64)
+    for i in range(-(-window[1] // stride), min(-(-window[3] // stride), parts.shape[0])):
+        for j in range(-(-window[0] // stride), min(-(-window[2] // stride), parts.shape[1])):
+            near[parts[i, j]] += 1
+    near[0] = 0
+    return near
 
 
-def _share_below(plane: Plane, around: Surface, window: Window) -> float:
-    """Which share of the cells in ``window`` lies well below ``plane``."""
-    left, top = around.left // around.step, around.top // around.step
-    rows, cols = slice(window[1] - top, window[3] - top), slice(window[0] - left, window[2] - left)
-    depth = around.depth[rows, cols]
-    ray = plane.normal.astype(np.float32)
-    height = depth * (ray[0] * around.x[None, cols] + ray[1] * around.y[rows, None] + ray[2]) + np.float32(plane.offset)
-    known = depth > 0
-    below = known & (height < -(np.float32(FLOOR) + np.float32(GROWTH) * depth**2))
-    return int(np.count_nonzero(below)) / max(1, int(np.count_nonzero(known)))
+@numba.njit(cache=True, nogil=True)
+def _spread(parts, kept, crop, coarse_step, grid, here):  # type: ignore[no-untyped-def]
+    """Fill ``here``: the cells with depth no farther than REACH coarse cells from a kept part, along both axes."""
+    depth, _, _, (first_u, first_v, step) = grid
+    left, top, right, bottom = crop[0], crop[1], min(crop[2], parts.shape[1]), min(crop[3], parts.shape[0])
+    mask = np.zeros((bottom - top, right - left), np.bool_)
+    for i in range(top, bottom):
+        free_from = 0  # the first column that is not marked by what was met before
+        for j in range(left, right):
+            if kept[parts[i, j]]:
+                for k in range(max(free_from, j - left - REACH), min(right - left, j - left + REACH + 1)):
+                    mask[i - top, k] = True
+                free_from = j - left + REACH + 1
+    tall = mask.copy()
+    for d in range(1, REACH + 1):
+        tall[d:] |= mask[:-d]
+        tall[:-d] |= mask[d:]
+    cols = np.minimum((first_u + step * np.arange(depth.shape[1])) // coarse_step - left, right - left - 1)
+    for i in range(depth.shape[0]):
+        marks = tall[min((first_v + i * step) // coarse_step - top, bottom - top - 1)]
+        row, out = depth[i], here[i]
+        for j in range(len(row)):
+            out[j] = marks[cols[j]] & (row[j] > 0)
 
 
-@numba.njit(cache=True, fastmath=EXACT)
+@numba.njit(cache=True, nogil=True)
+def _share_below(normal, offset, window, grid):  # type: ignore[no-untyped-def]
+    """Which share of the cells in ``window`` lies well below a plane."""
+    depth, x, y, (first_u, first_v, step) = grid
+    left, top = first_u // step, first_v // step
+    known, below = 0, 0
+    for i in range(window[1] - top, window[3] - top):
+        for j in range(window[0] - left, window[2] - left):
+            z = depth[i, j]
+            if z > 0:
+                known += 1
+                below += z * (normal[0] * x[j] + normal[1] * y[i] + normal[2]) + offset < -(FLOOR + GROWTH * z * z)
+    return below / max(1, known)
+
+
+@numba.njit(cache=True, nogil=True, fastmath=EXACT)
 def _mark(depth, x, y, here, n, offset, base, limit, level):  # type: ignore[no-untyped-def]
     """Mark the cells within base + limit · tolerance of the plane."""
     for i in range(depth.shape[0]):
-        for j in range(depth.shape[1]):
-            z = depth[i, j]
+        row, possible, out = depth[i], here[i], level[i]
+        for j in range(len(row)):
+            z = row[j]
             height = z * (n[0] * x[j] + n[1] * y[i] + n[2]) + offset
-            if here[i, j] and abs(height) < base + limit * (np.float32(FLOOR) + np.float32(GROWTH) * z * z):
-                level[i, j] = True
+            out[j] |= possible[j] & (abs(height) < base + limit * (FLOOR + GROWTH * z * z))

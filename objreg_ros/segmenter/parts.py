@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -13,11 +13,11 @@ from objreg_ros.segmenter.surface import EXACT, Surface, Window
 
 ACROSS = 3  # cells over which two parts are neighbours
 ALIKE = 0.12  # how far apart the shares of red, green and blue of one colour are
+DARK = 8.0  # grey values that are added to each colour: what is nearly black has none
 RIM = 0.7  # how much less a cell at the rim of the box counts than one in its middle
 
 
-@dataclass(frozen=True, slots=True)
-class Parts:
+class Parts(NamedTuple):
     """K connected parts of a surface, the largest in the box first, numbered from 1 in ``labels (h, w) int32``.
 
     Of each part: ``total`` and ``inside (K,)`` its cells and those in the box, ``weight (K,)`` those in the box where
@@ -43,54 +43,52 @@ class Parts:
     gap: Array
     front: Array
 
-    def __len__(self) -> int:
-        return len(self.total)
-
 
 def measure(
-    labels: Array,
-    count: int,
-    window: Window,
-    surface: Surface,
-    rgb: Array | None,
-    jump: tuple[float, float],
-    limit: int,
+    labels: Array, count: int, window: Window, surface: Surface, rgb: Array, jump: tuple[float, float], limit: int
 ) -> Parts:
     """The ``limit`` largest parts of ``labels (h, w) int32``, 0 … ``count``, by their cells in ``window``.
 
-    ``rgb (H, W, 3) uint8`` is the whole picture, or None.
+    ``rgb (H, W, 3) uint8`` is the whole picture, of height 0 without colour.
     """
+    pixels = (surface.left, surface.top, surface.step)
+    bounds = (np.float32(jump[0]), np.float32(jump[1]))
+    measured = _measure(labels, count, window, surface.depth, surface.x, surface.y, pixels, rgb, bounds, limit)
+    return Parts(*measured)
+
+
+@numba.njit(cache=True, nogil=True, fastmath=EXACT)
+def _measure(labels, count, window, depth, x, y, pixels, rgb, bounds, limit):  # type: ignore[no-untyped-def]
     left, top, right, bottom = window
+    number, kept = _rank(labels, count, window, limit)
+    k = kept + 1
     renamed = np.empty_like(labels)
-    k = 1 + _rank(labels, count, np.array(window), limit, renamed)
-    counts, extent = np.zeros((k, 4)), np.zeros((k, 4), np.int64)
+    sums, extent = np.zeros((k, 8)), np.zeros((k, 4), np.int64)
+    _sum_up(labels, number, window, depth, pixels, rgb, renamed, sums, extent)
     touching, front, gap = np.zeros((k, k), np.int64), np.zeros((k, k), np.int64), np.full((k, k), np.inf, np.float32)
-    bounds = np.array(jump, np.float32)
-    _count(renamed, np.array(window), surface.depth, counts, extent)
-    _compare(renamed, surface.depth, surface.x, surface.y, bounds, touching, front, gap)
-    total = counts[1:, 0]
-    cell = float(surface.x[1] - surface.x[0]) if len(surface.x) > 1 else 0.0
-    size = max(right - left, bottom - top) * cell * counts[1:, 3] / total
+    _compare(renamed, depth, x, y, bounds, touching, front, gap)
+    total = sums[1:, 0].copy()
+    cell = x[1] - x[0] if len(x) > 1 else np.float32(0)
     shown = front[1:].sum(axis=1)
-    return Parts(
-        labels=renamed,
-        total=total,
-        inside=counts[1:, 1],
-        weight=counts[1:, 2],
-        extent=extent[1:],
-        size=size,
-        pure=counts[1:, 1] / total,
-        figure=(shown + 1) / (shown + front[:, 1:].sum(axis=0) + 1),
-        alike=np.zeros((k - 1, k - 1), np.bool_) if rgb is None else _alike(renamed, rgb, surface, k),
-        touching=touching[1:, 1:],
-        gap=np.sqrt(gap[1:, 1:]),
-        front=front[1:],
+    return (
+        renamed,
+        total,
+        sums[1:, 1].copy(),
+        sums[1:, 2].copy(),
+        extent[1:],
+        max(right - left, bottom - top) * cell * sums[1:, 3] / total,
+        sums[1:, 1] / total,
+        (shown + 1) / (shown + front[:, 1:].sum(axis=0) + 1),
+        _alike(sums[1:, 4:7], total, len(rgb) > 0),
+        touching[1:, 1:].copy(),
+        np.sqrt(gap[1:, 1:]),
+        front[1:],
     )
 
 
-@numba.njit(cache=True)
-def _rank(labels, count, window, limit, renamed):  # type: ignore[no-untyped-def]
-    """Fill ``renamed`` with labels in the order of their cells in the window, 0 without any; how many there are."""
+@numba.njit(cache=True, nogil=True)
+def _rank(labels, count, window, limit):  # type: ignore[no-untyped-def]
+    """(count + 1,) the place of each label in the order of their cells in the window, 0 without any; the last place."""
     left, top, right, bottom = window
     inside = np.zeros(count + 1, np.int64)
     for i in range(top, bottom):
@@ -103,66 +101,88 @@ def _rank(labels, count, window, limit, renamed):  # type: ignore[no-untyped-def
         if inside[k] > 0:
             kept += 1
             number[k] = kept
-    for i in range(labels.shape[0]):
-        for j in range(labels.shape[1]):
-            renamed[i, j] = number[labels[i, j]]
-    return kept
+    return number, kept
 
 
-def _alike(labels: Array, rgb: Array, surface: Surface, count: int) -> Array:
-    """(K, K) bool: whether the shares of red, green and blue of two parts are about the same; ``count`` is K + 1."""
-    sums = np.zeros((count, 4))
-    _sum_colours(labels, rgb, surface.left, surface.top, surface.step, sums)
-    colour = sums[1:, :3] + 8 * sums[1:, 3:]  # what is nearly black has no colour
-    share = colour / colour.sum(axis=1, keepdims=True)
-    return np.asarray(np.abs(share[:, None] - share[None]).sum(axis=-1) < ALIKE)
-
-
-@numba.njit(cache=True)
-def _sum_colours(labels, rgb, left, top, step, sums):  # type: ignore[no-untyped-def]
-    for i in range(labels.shape[0]):
-        for j in range(labels.shape[1]):
-            k = labels[i, j]
-            if k > 0:
-                v, u = top + i * step, left + j * step
-                for c in range(3):
-                    sums[k, c] += rgb[v, u, c]
-                sums[k, 3] += 1
-
-
-@numba.njit(cache=True, fastmath=EXACT)
-def _count(labels, window, depth, counts, extent):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, nogil=True, fastmath=EXACT)
+def _sum_up(labels, number, window, depth, pixels, rgb, renamed, sums, extent):  # type: ignore[no-untyped-def]
+    """Fill ``renamed`` and of each part its ``extent`` and the sums of its cells: all, those in the window, weighed by
+    their place there, depth, red, green and blue; run by run, a run being the cells of one part in a row."""
     h, w = labels.shape
-    left, top, right, bottom = window
+    first_u, first_v, step = pixels
     for i in range(h):
-        off_v = abs(2 * i + 1 - top - bottom) / (bottom - top)
-        for j in range(w):
-            k = labels[i, j]
+        row, out = labels[i], renamed[i]
+        last = 0
+        while last < w:
+            first, label = last, row[last]
+            while last < w and row[last] == label:
+                last += 1
+            k = number[label]
+            out[first:last] = k
             if k == 0:
                 continue
-            if counts[k, 0] == 0:
-                extent[k, 0], extent[k, 1], extent[k, 2] = j, i, j + 1
-            counts[k, 0] += 1
-            counts[k, 3] += depth[i, j]
-            extent[k, 0], extent[k, 2] = min(extent[k, 0], j), max(extent[k, 2], j + 1)
+            if sums[k, 0] == 0:
+                extent[k, 0], extent[k, 1], extent[k, 2] = first, i, last
+            extent[k, 0], extent[k, 2] = min(extent[k, 0], first), max(extent[k, 2], last)
             extent[k, 3] = i + 1
-            if i >= top and i < bottom and j >= left and j < right:
-                off_u = abs(2 * j + 1 - left - right) / (right - left)
-                counts[k, 1] += 1
-                counts[k, 2] += 1 - RIM * max(off_u, off_v)
+            sums[k, 0] += last - first
+            sums[k, 3] += depth[i, first:last].sum()
+            _weigh(i, first, last, window, sums[k])
+            if len(rgb) > 0:
+                _add_colours(rgb[first_v + i * step], first_u, step, first, last, sums[k])
 
 
-@numba.njit(cache=True, fastmath=EXACT)
+@numba.njit(cache=True, nogil=True)
+def _weigh(i, first, last, window, sums):  # type: ignore[no-untyped-def]
+    """Add the cells first … last of row i that lie in the window to ``sums``."""
+    left, top, right, bottom = window
+    if not top <= i < bottom:
+        return
+    first, last = max(first, left), min(last, right)
+    off_v = abs(2 * i + 1 - top - bottom) / (bottom - top)
+    weight = 0.0
+    for j in range(first, last):
+        weight += 1 - RIM * max(abs(2 * j + 1 - left - right) / (right - left), off_v)
+    sums[1] += max(0, last - first)
+    sums[2] += weight
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_colours(row, first_u, step, first, last, sums):  # type: ignore[no-untyped-def]
+    red, green, blue = 0, 0, 0
+    for j in range(first, last):
+        pixel = row[first_u + j * step]
+        red, green, blue = red + pixel[0], green + pixel[1], blue + pixel[2]
+    sums[4], sums[5], sums[6] = sums[4] + red, sums[5] + green, sums[6] + blue
+
+
+@numba.njit(cache=True, nogil=True)
+def _alike(colours, total, coloured):  # type: ignore[no-untyped-def]
+    """(K, K) bool: whether the shares of red, green and blue of two parts are about the same."""
+    count = len(total)
+    share = np.empty((count, 3))
+    alike = np.zeros((count, count), np.bool_)
+    for k in range(count):
+        share[k] = colours[k] + DARK * total[k]
+        share[k] /= share[k].sum()
+    for k in range(count):
+        for o in range(count):
+            off = abs(share[k, 0] - share[o, 0]) + abs(share[k, 1] - share[o, 1]) + abs(share[k, 2] - share[o, 2])
+            alike[k, o] = coloured and off < ALIKE
+    return alike
+
+
+@numba.njit(cache=True, nogil=True, fastmath=EXACT)
 def _compare(labels, depth, x, y, bounds, touching, front, gap):  # type: ignore[no-untyped-def]
     """Fill the tables of pairs from the cells next to each other; ``gap`` gets squares of metres."""
     h, w = labels.shape
+    changes = _find_changes(labels)
     for i in range(h):
         for j in range(w):
-            s = depth[i, j]
-            if s <= 0:
+            if not changes[i, j] or depth[i, j] <= 0:
                 continue
             k = labels[i, j]
-            jump = bounds[0] + bounds[1] * s * s
+            jump = bounds[0] + bounds[1] * depth[i, j] * depth[i, j]
             for d in range(1, ACROSS + 1):
                 if i + d < h and labels[i + d, j] != k:
                     _pair(labels, depth, x, y, i, j, i + d, j, d, jump, touching, front, gap)
@@ -170,7 +190,28 @@ def _compare(labels, depth, x, y, bounds, touching, front, gap):  # type: ignore
                     _pair(labels, depth, x, y, i, j, i, j + d, d, jump, touching, front, gap)
 
 
-@numba.njit(cache=True, fastmath=EXACT)
+@numba.njit(cache=True, nogil=True)
+def _find_changes(labels):  # type: ignore[no-untyped-def]
+    """(h, w) bool: whether a cell has another label within ACROSS cells to the right or below."""
+    h, w = labels.shape
+    changes = np.zeros((h, w), np.bool_)
+    below, right = np.zeros((h, w), np.bool_), np.zeros(w + ACROSS, np.bool_)
+    for i in range(h):
+        row, next_row, out = labels[i], labels[min(i + 1, h - 1)], below[i]
+        for j in range(w):
+            out[j] = row[j] != next_row[j]
+    for i in range(h):
+        row, beside, out = labels[i], labels[i][1:], changes[i]
+        for j in range(w - 1):
+            right[j] = row[j] != beside[j]
+        for d in range(ACROSS):
+            across, down = right[d:], below[min(i + d, h - 1)]
+            for j in range(w):
+                out[j] |= across[j] | down[j]
+    return changes
+
+
+@numba.njit(cache=True, nogil=True, fastmath=EXACT, inline="always")
 def _pair(labels, depth, x, y, i, j, p, q, d, jump, touching, front, gap):  # type: ignore[no-untyped-def]
     """Count one pair of cells of two parts, ``d`` cells from each other."""
     k, o = labels[i, j], labels[p, q]

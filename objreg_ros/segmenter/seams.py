@@ -33,43 +33,49 @@ def find_seams(surface: Surface, angle_deg: float, jump: tuple[float, float]) ->
     return seams
 
 
-@numba.njit(cache=True, fastmath=EXACT, inline="always")
-def _valley(dx, dy, dz, n, m, s, z, t, bend, jump):  # type: ignore[no-untyped-def]
-    """1 where the surface from depth s over z to t, with normals n and m at its ends, is a valley, else 0."""
-    zero, one = np.float32(0), np.float32(1)
-    dot = dx * (m[0] - n[0]) + dy * (m[1] - n[1]) + dz * (m[2] - n[2])
-    one_surface = max(abs(s - z), abs(t - z)) < jump
-    known = n[2] * m[2] != zero
-    deep = -dot * abs(dot) > bend * (dx * dx + dy * dy + dz * dz)
-    return (one if one_surface else zero) * (one if known else zero) * (one if deep else zero)
+@numba.njit(cache=True, nogil=True, fastmath=EXACT, inline="always")
+def _valley(p, q, z, n, m, bend, jump):  # type: ignore[no-untyped-def]
+    """Whether the surface from point p over depth z to point q, with normals n and m there, is a valley."""
+    d_x, d_y, d_z = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+    dot = d_x * (m[0] - n[0]) + d_y * (m[1] - n[1]) + d_z * (m[2] - n[2])
+    one_surface = max(abs(p[2] - z), abs(q[2] - z)) < jump
+    known = n[2] * m[2] != np.float32(0)
+    return one_surface & known & (-dot * abs(dot) > bend * (d_x * d_x + d_y * d_y + d_z * d_z))
 
 
-@numba.njit(cache=True, fastmath=EXACT, inline="always")
+@numba.njit(cache=True, nogil=True, fastmath=EXACT, inline="always")
 def _bump(before, z, after, limit):  # type: ignore[no-untyped-def]
-    zero, one = np.float32(0), np.float32(1)
-    bent = abs(before + after - z - z) > limit
-    return (one if before * after > zero else zero) * (one if bent else zero)
+    return (abs(before + after - z - z) > limit) & (before * after > np.float32(0))
 
 
-@numba.njit(cache=True, fastmath=EXACT, error_model="numpy")
+@numba.njit(cache=True, nogil=True, fastmath=EXACT, error_model="numpy")
 def _find(depth, normals, x, y, bend, a, b, seams):  # type: ignore[no-untyped-def]
+    """Fill ``seams`` row by row: rows shifted against each other, so that the CPU's vectors see plain indices."""
     h, w = depth.shape
-    two = np.float32(2)
-    n_x, n_y, n_z = normals[0], normals[1], normals[2]
+    n = w - 2 * REACH
+    zero, one, two, step = np.float32(0), np.float32(1), np.float32(2), np.float32(STEP)
+    x_left, x_here, x_right = x[:n], x[REACH : n + REACH], x[2 * REACH :]
     for i in range(REACH, h - REACH):
-        up, down = i - REACH, i + REACH
-        for j in range(REACH, w - REACH):
-            z = depth[i, j]
+        y_up, y_here, y_down = y[i - REACH], y[i], y[i + REACH]
+        row = depth[i]
+        here, far_left, far_right = row[REACH : n + REACH], row[:n], row[2 * REACH :]
+        left, right = row[REACH - 1 : n + REACH - 1], row[REACH + 1 : n + REACH + 1]
+        up, down = depth[i - 1][REACH : n + REACH], depth[i + 1][REACH : n + REACH]
+        far_up, far_down = depth[i - REACH][REACH : n + REACH], depth[i + REACH][REACH : n + REACH]
+        l_x, l_y, l_z = normals[0, i][:n], normals[1, i][:n], normals[2, i][:n]
+        r_x, r_y, r_z = normals[0, i][2 * REACH :], normals[1, i][2 * REACH :], normals[2, i][2 * REACH :]
+        u_x, u_y, u_z = normals[0, i - REACH][REACH:], normals[1, i - REACH][REACH:], normals[2, i - REACH][REACH:]
+        d_x, d_y, d_z = normals[0, i + REACH][REACH:], normals[1, i + REACH][REACH:], normals[2, i + REACH][REACH:]
+        out = seams[i][REACH : n + REACH]
+        for j in range(n):
+            z = here[j]
             jump = a + b * z * z
-            left, right = j - REACH, j + REACH
-            sharp = bend * max(z * z, np.float32(1))
-            s, t = depth[i, left], depth[i, right]
-            n, m = (n_x[i, left], n_y[i, left], n_z[i, left]), (n_x[i, right], n_y[i, right], n_z[i, right])
-            seam = _valley(x[right] * t - x[left] * s, y[i] * (t - s), t - s, n, m, s, z, t, sharp, two * jump)
-            s, t = depth[up, j], depth[down, j]
-            n, m = (n_x[up, j], n_y[up, j], n_z[up, j]), (n_x[down, j], n_y[down, j], n_z[down, j])
-            seam += _valley(x[j] * (t - s), y[down] * t - y[up] * s, t - s, n, m, s, z, t, sharp, two * jump)
-            limit = np.float32(STEP) * jump
-            seam += _bump(depth[i, j - 1], z, depth[i, j + 1], limit)
-            seam += _bump(depth[i - 1, j], z, depth[i + 1, j], limit)
-            seams[i, j] = (z > np.float32(0)) & (seam > np.float32(0))
+            sharp = bend * max(z * z, one)
+            s, t = far_left[j], far_right[j]
+            p, q = (x_left[j] * s, y_here * s, s), (x_right[j] * t, y_here * t, t)
+            seam = _valley(p, q, z, (l_x[j], l_y[j], l_z[j]), (r_x[j], r_y[j], r_z[j]), sharp, two * jump)
+            s, t = far_up[j], far_down[j]
+            p, q = (x_here[j] * s, y_up * s, s), (x_here[j] * t, y_down * t, t)
+            seam |= _valley(p, q, z, (u_x[j], u_y[j], u_z[j]), (d_x[j], d_y[j], d_z[j]), sharp, two * jump)
+            seam |= _bump(left[j], z, right[j], step * jump) | _bump(up[j], z, down[j], step * jump)
+            out[j] = seam & (z > zero)

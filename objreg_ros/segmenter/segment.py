@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from objreg_ros.data import Array, DepthImage, Detections, Frame, Intrinsics, ObjectCloud, PointFlag
 from objreg_ros.segmenter import boxes, paper
 from objreg_ros.segmenter.boxes import Box
-from objreg_ros.segmenter.extract import Pixels, cell_points
+from objreg_ros.segmenter.extract import Pixels, cell_points, colours
 from objreg_ros.segmenter.gravity import CAMERA_UP, estimate_up, known_normals
 from objreg_ros.segmenter.isolate import isolate
 from objreg_ros.segmenter.params import SegmenterParams
@@ -17,6 +19,8 @@ from objreg_ros.segmenter.surface import Surface, cell_size, reduce
 from objreg_ros.segmenter.view import reduced_view
 
 COARSE = 2  # every so many cells tell gravity and the support surfaces
+WARM_SIZES = ((640, 480), (320, 240))  # two and one pixel a cell: each has a kernel of its own
+LARGEST_BLOCK = 24 << 20  # bytes
 NORMALS = 3  # every so many of these tell gravity
 
 
@@ -27,12 +31,23 @@ class Segmenter:
         self.params = params or SegmenterParams()
 
     def warm(self) -> None:
-        """Compile or load every kernel, so that the first frame is as fast as the others."""
-        camera = Intrinsics(fx=262.0, fy=262.0, cx=160.0, cy=120.0, width=320, height=240)
-        image = DepthImage(depth=_table(camera), rgb=np.zeros((240, 320, 3), np.uint8), intrinsics=camera, stamp_ns=0)
-        boxes = np.array([[110, 70, 210, 170], [0, 0, 320, 240]], np.float32)
-        scores = np.ones(2, np.float32)
-        self.segment(Detections(xyxy=boxes, score=scores, label=("", ""), image_hw=(240, 320), stamp_ns=0), image)
+        """Compile or load every kernel and claim memory, so that the first frame is as fast as the others."""
+        _keep_memory()
+        for width, height in WARM_SIZES:
+            camera = Intrinsics(
+                fx=float(width), fy=float(width), cx=width / 2, cy=height / 2, width=width, height=height
+            )
+            colour = np.zeros((height, width, 3), np.uint8)
+            image = DepthImage(depth=_block_on_table(camera), rgb=colour, intrinsics=camera, stamp_ns=0)
+            block = np.array([[0.3, 0.25, 0.7, 0.75]], np.float32) * (width, height, width, height)
+            asked = Detections(
+                xyxy=block.astype(np.float32),
+                score=np.ones(1, np.float32),
+                label=("",),
+                image_hw=(height, width),
+                stamp_ns=0,
+            )
+            self.segment(asked, image)
 
     def segment(self, detections: Detections, depth: DepthImage, gravity: Array | None = None) -> Frame:
         """The objects of one moment, in the order of their boxes; stamp and frame_id are those of ``depth``.
@@ -43,6 +58,7 @@ class Segmenter:
         of `min_points` gives none; instances count the objects from 1. ``T_odom_camera`` is None.
         """
         params = self.params
+        depth = _plain(depth)
         ground = self._ground(depth, gravity)
         taken = np.zeros(ground.surface.depth.shape, np.bool_)
         objects: list[ObjectCloud] = []
@@ -80,11 +96,30 @@ class Segmenter:
         return Ground(up, confidence, supports, surface, coarse)
 
 
-def _table(camera: Intrinsics) -> Array:
-    """Depth of a level surface with a block on it, seen from a metre above at half a right angle."""
+def _plain(image: DepthImage) -> DepthImage:
+    """``image`` with arrays in the one memory layout that the kernels are compiled for."""
+    depth = np.require(image.depth, requirements=("C", "A"))
+    rgb = None if image.rgb is None else np.require(image.rgb, requirements=("C", "A"))
+    return image if depth is image.depth and rgb is image.rgb else replace(image, depth=depth, rgb=rgb)
+
+
+def _keep_memory() -> None:
+    """Let the allocator keep what a frame frees for the next one.
+
+    Page faults on memory given back between frames take milliseconds of each. The GNU C library raises the size of
+    what it gives back at once to that of the largest block it has seen freed, and trims its heap at twice that
+    (mallopt(3), M_MMAP_THRESHOLD); the block is never touched, so it costs nothing. Elsewhere this does nothing.
+    """
+    np.empty(LARGEST_BLOCK, np.uint8)
+
+
+def _block_on_table(camera: Intrinsics) -> Array:
+    """Depth of a level surface seen from a metre above at half a right angle, with a block on it that has a pit."""
     y = (np.arange(camera.height, dtype=np.float32)[:, None] - camera.cy) / camera.fy
     depth = np.repeat(np.sqrt(2.0) / (1.0 + np.maximum(y, -0.6)), camera.width, axis=1).astype(np.float32)
-    depth[80:160, 120:200] *= 0.8
+    h, w = camera.height // 8, camera.width // 8
+    depth[3 * h : 5 * h, 3 * w : 5 * w] *= 0.8
+    depth[4 * h : 4 * h + h // 4, 4 * w : 4 * w + w // 4] *= 1.1
     return depth
 
 
@@ -112,11 +147,13 @@ def _object(label: str, score: float, instance: int, pixels: Pixels, flags: Poin
 
 def _support_cloud(ground: Ground, taken: Array, depth: DepthImage) -> ObjectCloud | None:
     """The coarse cells of the support surfaces that are of no object, one point each; None where there are none."""
-    cells = np.zeros(ground.coarse.depth.shape, np.bool_)
-    for support in ground.supports:
+    if not ground.supports:
+        return None
+    cells = ground.supports[0].parts > 0
+    for support in ground.supports[1:]:
         cells |= support.parts > 0
     cells &= ~taken[::COARSE, ::COARSE]
-    xyz, normals, rgb = cell_points(ground.coarse, cells, depth.rgb)
+    xyz, normals, rgb = cell_points(ground.coarse, cells, colours(depth))
     if len(xyz) == 0:
         return None
     area = sum(support.area for support in ground.supports)
@@ -126,7 +163,7 @@ def _support_cloud(ground: Ground, taken: Array, depth: DepthImage) -> ObjectClo
         instance=0,
         xyz=xyz,
         normals=normals,
-        rgb=rgb,
+        rgb=None if depth.rgb is None else rgb,
         flags=np.zeros(len(xyz), np.uint16),
         density=len(xyz) / max(area, 1e-9),
     )

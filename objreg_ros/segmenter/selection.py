@@ -7,6 +7,7 @@ something else, and the right parts together fill it from edge to edge. What is 
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 
 from objreg_ros.data import Array
@@ -24,82 +25,159 @@ GAP = 0.08  # of the box's size: how far apart two parts of one object are where
 GAP_ALIKE = 0.25  # the same, for parts of one colour
 
 
-def select(parts: Parts, window: Window) -> list[int]:
-    """The numbers (from 1) of the parts of the object in ``window``; empty if no part is there.
+def select(parts: Parts, window: Window) -> Array:
+    """(h, w) bool: the cells of the parts that are the object in ``window``; none if no part is there.
 
     The seed fits the box best; parts next to what is selected are added while the fit gets better, and in the end
     those that lie within it and not on it, as the inside of a bowl does.
     """
-    if len(parts) == 0:
-        return []
-    fits = np.array([_fit(extent, window) for extent in parts.extent])
-    score = np.sqrt(parts.weight) * parts.pure**2 * (0.1 + fits) ** 2 * (0.2 + parts.figure)
-    chosen = [int(score.argmax())]
-    if _is_alone(parts, chosen[0]):
-        return [chosen[0] + 1]
-    while True:
-        best = _best_addition(parts, chosen, window)
-        if best is None:
-            return [k + 1 for k in chosen + _enclosed(parts, chosen, window)]
-        chosen.append(best)
+    return np.asarray(_select(parts, window))
 
 
-def _is_alone(parts: Parts, seed: int) -> bool:
-    """Whether no other part could be added: nothing next to it lies in the box."""
-    near = parts.gap[seed] < GAP_ALIKE * parts.size[seed]  # parts that touch have a gap too, of one cell
-    return not bool((near & (parts.pure >= MIN_PURE)).any())
+@numba.njit(cache=True, nogil=True)
+def _select(parts, window):  # type: ignore[no-untyped-def]
+    table = _choose(parts, window)
+    h, w = parts.labels.shape
+    cells = np.empty((h, w), np.bool_)
+    for i in range(h):
+        for j in range(w):
+            cells[i, j] = table[parts.labels[i, j]]
+    return cells
 
 
-def _touching(parts: Parts, chosen: list[int]) -> Array:
-    """(K,) bool: the parts that touch ``chosen``."""
-    return parts.touching[chosen].sum(axis=0) >= MIN_TOUCH
+@numba.njit(cache=True, nogil=True)
+def _choose(parts, window):  # type: ignore[no-untyped-def]
+    """(1 + K,) bool: which parts, by their numbers, are the object."""
+    count = len(parts.total)
+    table = np.zeros(count + 1, np.bool_)
+    if count == 0:
+        return table
+    chosen = table[1:]
+    seed = _seed(parts, window)
+    chosen[seed] = True
+    if _is_alone(parts, seed):
+        return table
+    best = _best_addition(parts, chosen, seed, window)
+    while best >= 0:
+        chosen[best] = True
+        best = _best_addition(parts, chosen, seed, window)
+    _add_enclosed(parts, chosen, seed, window)
+    return table
 
 
-def _close(parts: Parts, chosen: list[int]) -> Array:
-    """(K,) bool: the parts that a depth jump keeps from ``chosen``, but no more than within one object."""
-    gap, size = parts.gap[chosen], parts.size[chosen[0]]
-    return ((gap < GAP * size) | ((gap < GAP_ALIKE * size) & parts.alike[chosen])).any(axis=0)
-
-
-def _lies_on(parts: Parts, chosen: list[int]) -> Array:
-    """(K,) bool: the parts that hide more of ``chosen`` than it hides of them, and have another colour."""
-    hides = parts.front[:, np.array(chosen) + 1].sum(axis=1)
-    return (hides > parts.front[chosen, 1:].sum(axis=0)) & ~parts.alike[chosen].any(axis=0)
-
-
-def _best_addition(parts: Parts, chosen: list[int], window: Window) -> int | None:
-    """The part that adds most to the fit of ``chosen``; None if none adds enough."""
-    touching = _touching(parts, chosen)
-    no_background = (parts.figure >= MIN_FIGURE) | parts.alike[chosen].any(axis=0)
-    near = touching | (_close(parts, chosen) & no_background)
-    near[chosen] = False
-    ease = touching & (parts.pure >= WHOLE) & ~_lies_on(parts, chosen)
-    extent = _union(parts.extent[chosen])
-    fit = _fit(extent, window)
-    best, most = None, 0.0
-    for k in np.flatnonzero(near & (parts.pure >= MIN_PURE)):
-        gain = _fit(_union(np.array([extent, parts.extent[k]])), window) - fit
-        if gain > most and gain > (SMALL_GAIN if ease[k] else MIN_GAIN):
-            best, most = int(k), gain
+@numba.njit(cache=True, nogil=True)
+def _seed(parts, window):  # type: ignore[no-untyped-def]
+    """The part that alone fits the box best."""
+    best, most = 0, -1.0
+    for k in range(len(parts.total)):
+        fit = _fit(_extent(parts, k), window)
+        score = np.sqrt(parts.weight[k]) * parts.pure[k] ** 2 * (0.1 + fit) ** 2 * (0.2 + parts.figure[k])
+        if score > most:
+            best, most = k, score
     return best
 
 
-def _enclosed(parts: Parts, chosen: list[int], window: Window) -> list[int]:
-    """The parts within the extent of ``chosen`` that lie next to it and do not hide it."""
-    extent = _union(parts.extent[chosen])
-    slack = SLACK * np.array([window[2] - window[0], window[3] - window[1]])
-    within = (parts.extent[:, :2] >= extent[:2] - slack).all(axis=1)
-    within &= (parts.extent[:, 2:] <= extent[2:] + slack).all(axis=1)
-    near = _touching(parts, chosen) | _close(parts, chosen)
-    near[chosen] = False
-    return [int(k) for k in np.flatnonzero(near & within & ~_lies_on(parts, chosen) & (parts.pure >= WHOLE))]
+@numba.njit(cache=True, nogil=True)
+def _is_alone(parts, seed):  # type: ignore[no-untyped-def]
+    """Whether no other part could be added: nothing next to it lies in the box."""
+    for k in range(len(parts.total)):
+        near = parts.gap[seed, k] < GAP_ALIKE * parts.size[seed]  # parts that touch have a gap too, of one cell
+        if near and parts.pure[k] >= MIN_PURE:
+            return False
+    return True
 
 
-def _union(extents: Array) -> Array:
-    return np.concatenate([extents[:, :2].min(axis=0), extents[:, 2:].max(axis=0)])
+@numba.njit(cache=True, nogil=True)
+def _touches(parts, chosen, k):  # type: ignore[no-untyped-def]
+    """Whether part k touches what is chosen."""
+    cells = 0
+    for c in range(len(chosen)):
+        if chosen[c]:
+            cells += parts.touching[c, k]
+    return cells >= MIN_TOUCH
 
 
-def _fit(extent: Array, window: Window) -> float:
+@numba.njit(cache=True, nogil=True)
+def _is_close(parts, chosen, seed, k):  # type: ignore[no-untyped-def]
+    """Whether a depth jump keeps part k from what is chosen, but no more than within one object."""
+    for c in range(len(chosen)):
+        limit = GAP_ALIKE if parts.alike[c, k] else GAP
+        if chosen[c] and parts.gap[c, k] < limit * parts.size[seed]:
+            return True
+    return False
+
+
+@numba.njit(cache=True, nogil=True)
+def _has_its_colour(parts, chosen, k):  # type: ignore[no-untyped-def]
+    return (chosen & parts.alike[:, k]).any()
+
+
+@numba.njit(cache=True, nogil=True)
+def _lies_on(parts, chosen, k):  # type: ignore[no-untyped-def]
+    """Whether part k hides more of what is chosen than that hides of it, and has another colour."""
+    lead = 0
+    for c in range(len(chosen)):
+        if chosen[c]:
+            lead += parts.front[k, c + 1] - parts.front[c, k + 1]
+    return lead > 0 and not _has_its_colour(parts, chosen, k)
+
+
+@numba.njit(cache=True, nogil=True)
+def _best_addition(parts, chosen, seed, window):  # type: ignore[no-untyped-def]
+    """The part that adds most to the fit of what is chosen; -1 if none adds enough."""
+    extent = _chosen_extent(parts, chosen)
+    fit = _fit(extent, window)
+    best, most = -1, 0.0
+    for k in range(len(chosen)):
+        if chosen[k] or parts.pure[k] < MIN_PURE:
+            continue
+        gain = _fit(_union(extent, _extent(parts, k)), window) - fit
+        if gain <= most or gain <= SMALL_GAIN:
+            continue
+        touching = _touches(parts, chosen, k)
+        no_background = parts.figure[k] >= MIN_FIGURE or _has_its_colour(parts, chosen, k)
+        if not (touching or (no_background and _is_close(parts, chosen, seed, k))):
+            continue
+        if gain > MIN_GAIN or (touching and parts.pure[k] >= WHOLE and not _lies_on(parts, chosen, k)):
+            best, most = k, gain
+    return best
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_enclosed(parts, chosen, seed, window):  # type: ignore[no-untyped-def]
+    """Add to ``chosen`` the parts within its extent that lie next to it and do not hide it."""
+    left, top, right, bottom = _chosen_extent(parts, chosen)
+    slack_u, slack_v = SLACK * (window[2] - window[0]), SLACK * (window[3] - window[1])
+    before = chosen.copy()
+    for k in range(len(chosen)):
+        a, b, c, d = _extent(parts, k)
+        within = a >= left - slack_u and b >= top - slack_v and c <= right + slack_u and d <= bottom + slack_v
+        if before[k] or not within or parts.pure[k] < WHOLE or _lies_on(parts, before, k):
+            continue
+        chosen[k] = _touches(parts, before, k) or _is_close(parts, before, seed, k)
+
+
+@numba.njit(cache=True, nogil=True)
+def _extent(parts, k):  # type: ignore[no-untyped-def]
+    return parts.extent[k, 0], parts.extent[k, 1], parts.extent[k, 2], parts.extent[k, 3]
+
+
+@numba.njit(cache=True, nogil=True)
+def _chosen_extent(parts, chosen):  # type: ignore[no-untyped-def]
+    extent = _extent(parts, np.argmax(chosen))
+    for k in range(len(chosen)):
+        if chosen[k]:
+            extent = _union(extent, _extent(parts, k))
+    return extent
+
+
+@numba.njit(cache=True, nogil=True)
+def _union(a, b):  # type: ignore[no-untyped-def]
+    return min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3])
+
+
+@numba.njit(cache=True, nogil=True)
+def _fit(extent, window):  # type: ignore[no-untyped-def]
     """Intersection over union of two boxes, the first one's edges moved by up to SLACK towards the second one's."""
     left, right = _snap(extent[0], extent[2], window[0], window[2])
     top, bottom = _snap(extent[1], extent[3], window[1], window[3])
@@ -110,7 +188,8 @@ def _fit(extent: Array, window: Window) -> float:
     return inner / ((right - left) * (bottom - top) + (window[2] - window[0]) * (window[3] - window[1]) - inner)
 
 
-def _snap(low: float, high: float, target_low: float, target_high: float) -> tuple[float, float]:
+@numba.njit(cache=True, nogil=True)
+def _snap(low, high, target_low, target_high):  # type: ignore[no-untyped-def]
     slack = SLACK * (target_high - target_low)
     return (
         low + min(max(target_low - low, -slack), slack),

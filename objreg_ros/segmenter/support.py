@@ -20,7 +20,7 @@ MIN_CELLS = 30
 MANY = 6000  # level cells of which every fourth is enough
 NEAR = np.float32(2.5)  # tolerances around a plane within which its cells are sought
 LAYER, LAYERS = 0.3, 5  # thickness in tolerances, and number to each side, of the layers sought around a plane
-CLIPS = np.array([1.0, 1.5, 1.5, 2.5, 3.0, 3.0], np.float32)  # the first of the tolerance, the others of the spread
+CLIPS = (1.0, 1.5, 1.5, 2.5, 3.0, 3.0)  # the first of the tolerance, the others of the spread
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,16 +85,14 @@ def find_supports(
     low, high = _survey(*grid, up.astype(np.float32), pixel, height, area)
     supports: list[Support] = []
     for _ in range(2 * MAX_SUPPORTS):
-        free = area > 0
-        peak = _commonest(height, area, low, high)
-        if peak is None or len(supports) == MAX_SUPPORTS:
+        peak, count = _commonest(height, area, low, high)
+        if count == 0 or len(supports) == MAX_SUPPORTS:
             break
-        stride = 2 if np.count_nonzero(free) > MANY else 1
-        plane = fit_level(surface, free, up, Plane(up, -peak, 1.0), stride)
-        cells = np.zeros(free.shape, np.bool_)
+        plane = fit_level(surface, area > 0, up, Plane(up, -peak, 1.0), 2 if count > MANY else 1)
         if plane is None:
             area[np.abs(height - np.float32(peak)) < 2 * BIN] = 0
             continue
+        cells = np.zeros(area.shape, np.bool_)
         size = _claim(surface.depth, surface.x, surface.y, plane.normal.astype(np.float32), plane.offset, area, cells)
         if size < min_area:
             break
@@ -103,7 +101,7 @@ def find_supports(
     return supports
 
 
-@numba.njit(cache=True, fastmath=EXACT, error_model="numpy")
+@numba.njit(cache=True, nogil=True, fastmath=EXACT, error_model="numpy")
 def _survey(depth, normals, x, y, up, pixel, height, area):  # type: ignore[no-untyped-def]
     """Fill the height along up and the m² of each level cell, 0 for the others; the lowest and the highest one."""
     low, high = np.float32(np.inf), np.float32(-np.inf)
@@ -121,26 +119,27 @@ def _survey(depth, normals, x, y, up, pixel, height, area):  # type: ignore[no-u
     return low, high
 
 
-def _commonest(height: Array, area: Array, low: float, high: float) -> float | None:
-    """The height in ``low`` … ``high`` that most ``area`` has; None for none."""
+@numba.njit(cache=True, nogil=True)
+def _commonest(height, area, low, high):  # type: ignore[no-untyped-def]
+    """The height in ``low`` … ``high`` that most ``area`` has, and how many cells have any."""
     if not low <= high:
-        return None
+        return 0.0, 0
     votes = np.zeros(int((high - low) / BIN) + 3)
-    _vote(height, area, np.float32(low), np.float32(BIN), votes)
-    votes[1:-1] += 0.5 * (votes[2:] + votes[:-2])
-    best = int(votes.argmax())
-    return low + (best - 0.5) * BIN if votes[best] > 0 else None
-
-
-@numba.njit(cache=True)
-def _vote(height, area, low, width, votes):  # type: ignore[no-untyped-def]
+    count = 0
     for i in range(height.shape[0]):
         for j in range(height.shape[1]):
             if area[i, j] > 0:
-                votes[int((height[i, j] - low) / width) + 1] += area[i, j]
+                votes[int((height[i, j] - low) / BIN) + 1] += area[i, j]
+                count += 1
+    best, most = 1, 0.0
+    for k in range(1, len(votes) - 1):
+        smooth = votes[k] + 0.5 * (votes[k - 1] + votes[k + 1])
+        if smooth > most:
+            best, most = k, smooth
+    return low + (best - 0.5) * BIN, count
 
 
-@numba.njit(cache=True, fastmath=EXACT)
+@numba.njit(cache=True, nogil=True, fastmath=EXACT)
 def _claim(depth, x, y, n, offset, area, cells):  # type: ignore[no-untyped-def]
     """Mark the cells of a plane and take them, and those just off it, out of ``area``; the m² of the plane."""
     total = 0.0
@@ -165,38 +164,58 @@ def fit_level(
     Weighted least squares of the height along ``up`` over the plane, with shrinking, then growing, limits: so the
     larger of two surfaces with a small step between them wins, or the ``lowest`` of similar ones.
     """
-    side = np.array([up[1], -up[0], 0.0]) if abs(up[2]) < 0.9 else np.array([0.0, up[2], -up[1]])
-    side /= np.sqrt(side @ side)
-    frame = np.stack([side, _cross(up, side), up])
-    n_side, n_other, n_up = frame @ plane.normal
-    start = np.array([-plane.offset / n_up, -n_side / n_up, -n_other / n_up], np.float32)
-    samples = np.empty((4, -(-cells.shape[0] // stride) * -(-cells.shape[1] // stride)), np.float32)
     grid = (surface.depth, surface.normals, surface.x, surface.y)
-    count = _sample(*grid, cells, frame.astype(np.float32), start, stride, samples)
-    levels = np.empty(4)
-    if count < MIN_CELLS or not _fit(samples[:, :count], lowest, CLIPS, levels):
-        return None
+    found, normal, offset, spread = _fit_level(grid, cells, up, plane.normal, plane.offset, stride, lowest)
+    return Plane(normal, offset, spread) if found else None
+
+
+@numba.njit(cache=True, nogil=True)
+def _fit_level(grid, cells, up, normal, offset, stride, lowest):  # type: ignore[no-untyped-def]
+    """Whether there is a plane; its normal, offset and spread."""
+    frame = _level_frame(up)
+    n_side, n_other, n_up = frame @ normal
+    start = np.array([-offset / n_up, -n_side / n_up, -n_other / n_up], np.float32)
+    samples = np.empty((4, -(-cells.shape[0] // stride) * -(-cells.shape[1] // stride)), np.float32)
+    count = _sample(grid, cells, frame.astype(np.float32), start, stride, samples)
+    levels = np.zeros(4)
+    if count < MIN_CELLS or not _fit(samples[:, :count], lowest, levels):
+        return False, normal, offset, 0.0
     if np.hypot(levels[1], levels[2]) > SLOPE:
-        return None
+        return False, normal, offset, 0.0
     levels[:3] += start
-    normal = up - levels[1] * frame[0] - levels[2] * frame[1]
-    length = float(np.sqrt(normal @ normal))
-    return Plane(normal / length, float(-levels[0] / length), float(levels[3]))
+    tilted = up - levels[1] * frame[0] - levels[2] * frame[1]
+    length = np.sqrt(tilted @ tilted)
+    return True, tilted / length, -levels[0] / length, levels[3]
 
 
-def _cross(a: Array, b: Array) -> Array:
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+@numba.njit(cache=True, nogil=True)
+def _level_frame(up):  # type: ignore[no-untyped-def]
+    """(3, 3): two level axes and ``up``, as rows."""
+    frame = np.zeros((3, 3))
+    if abs(up[2]) < 0.9:
+        frame[0, 0], frame[0, 1] = up[1], -up[0]
+    else:
+        frame[0, 1], frame[0, 2] = up[2], -up[1]
+    frame[0] /= np.sqrt(frame[0] @ frame[0])
+    for k in range(3):
+        p, q = (k + 1) % 3, (k + 2) % 3
+        frame[1, k] = up[p] * frame[0, q] - up[q] * frame[0, p]
+    frame[2] = up
+    return frame
 
 
-@numba.njit(cache=True, fastmath=EXACT)
-def _sample(depth, normals, x, y, cells, frame, start, stride, samples):  # type: ignore[no-untyped-def]
-    """Fill ``samples`` with s, t in the plane, height over ``start`` and tolerance, of the level cells near it."""
+@numba.njit(cache=True, nogil=True, fastmath=EXACT)
+def _sample(grid, cells, frame, start, stride, samples):  # type: ignore[no-untyped-def]
+    """Fill ``samples`` with s, t in the plane, height over ``start`` and 1 / tolerance, of the level cells near it."""
+    depth, normals, x, y = grid
     n = 0
     up = frame[2]
     for i in range(0, depth.shape[0], stride):
         for j in range(0, depth.shape[1], stride):
+            if not cells[i, j]:
+                continue
             cosine = normals[0, i, j] * up[0] + normals[1, i, j] * up[1] + normals[2, i, j] * up[2]
-            if not cells[i, j] or cosine < TILT:
+            if cosine < TILT:
                 continue
             z = depth[i, j]
             p_x, p_y = x[j] * z, y[i] * z
@@ -205,66 +224,64 @@ def _sample(depth, normals, x, y, cells, frame, start, stride, samples):  # type
             r = up[0] * p_x + up[1] * p_y + up[2] * z - (start[0] + start[1] * s + start[2] * t)
             unit = FLOOR + GROWTH * z * z
             if abs(r) < NEAR * unit:
-                samples[0, n], samples[1, n], samples[2, n], samples[3, n] = s, t, r, unit
+                samples[0, n], samples[1, n], samples[2, n], samples[3, n] = s, t, r, np.float32(1) / unit
                 n += 1
     return n
 
 
-@numba.njit(cache=True, fastmath=EXACT)
+@numba.njit(cache=True, nogil=True, fastmath=EXACT)
 def _lowest_layer(samples):  # type: ignore[no-untyped-def]
     """The height of the lowest layer of many samples, in units of the tolerance."""
     votes = np.zeros(2 * LAYERS + 3)
-    for n in range(samples.shape[1]):
-        k = int(np.floor(samples[2, n] / samples[3, n] / LAYER + LAYERS + 1.5))
-        if k >= 0 and k < len(votes):
+    heights, sharpness = samples[2], samples[3]
+    for n in range(len(heights)):
+        k = int(heights[n] * sharpness[n] * np.float32(1 / LAYER) + np.float32(LAYERS + 1.5))  # above 0: near a plane
+        if 0 <= k < len(votes):
             votes[k] += 1
+    most = votes.max()
     for k in range(1, len(votes) - 1):
-        if votes[k] >= votes.max() / 2 and votes[k] >= votes[k + 1]:
+        if votes[k] >= most / 2 and votes[k] >= votes[k + 1]:
             return (k - LAYERS - 1) * LAYER
     return 0.0
 
 
-@numba.njit(cache=True, fastmath=EXACT)
-def _fit(samples, lowest, clips, levels):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, nogil=True, fastmath=EXACT)
+def _fit(samples, lowest, levels):  # type: ignore[no-untyped-def]
     """Fill ``levels`` with c, a, b of height = c + a s + b t and the spread; whether enough samples agree."""
-    zero = np.float32(0)
-    c, a, b = zero, zero, zero
+    zero, one = np.float32(0), np.float32(1)
     shift = np.float32(_lowest_layer(samples)) if lowest else zero
-    limit = np.float32(LAYER) if lowest else clips[0]
-    for k in range(len(clips)):
-        m, m_s, m_t, m_ss, m_st, m_tt, v, v_s, v_t, square, count = (
-            zero,
-            zero,
-            zero,
-            zero,
-            zero,
-            zero,
-            zero,
-            zero,
-            zero,
-            zero,
-            zero,
-        )
-        for n in range(samples.shape[1]):
-            s, t, unit = samples[0, n], samples[1, n], samples[3, n]
-            r = samples[2, n] - c - a * s - b * t
-            inside = abs(r - shift * unit) < limit * unit
-            g = np.float32(1) / (unit * unit) if inside else zero
-            count += np.float32(1) if inside else zero
+    limit = np.float32(LAYER) if lowest else np.float32(CLIPS[0])
+    sides, others, heights, sharpness = samples[0], samples[1], samples[2], samples[3]
+    for k in range(len(CLIPS)):
+        c, a, b = np.float32(levels[0]), np.float32(levels[1]), np.float32(levels[2])
+        m, m_s, m_t, m_ss, m_st, m_tt = zero, zero, zero, zero, zero, zero
+        v, v_s, v_t, square, count = zero, zero, zero, zero, zero
+        for n in range(len(sides)):
+            s, t, sharp = sides[n], others[n], sharpness[n]
+            r = heights[n] - c - a * s - b * t
+            inside = abs(r * sharp - shift) < limit
+            g = sharp * sharp if inside else zero
+            count += one if inside else zero
             square += g * r * r
             m, m_s, m_t = m + g, m_s + g * s, m_t + g * t
             m_ss, m_st, m_tt = m_ss + g * s * s, m_st + g * s * t, m_tt + g * t * t
             v, v_s, v_t = v + g * r, v_s + g * s * r, v_t + g * t * r
         if count < MIN_CELLS:
             return False
-        M = np.array([[m, m_s, m_t], [m_s, m_ss, m_st], [m_t, m_st, m_tt]], np.float64)
-        for d in range(3):
-            M[d, d] += 1e-6 * m
-        step = np.linalg.solve(M, np.array([v, v_s, v_t], np.float64))
-        c, a, b = c + np.float32(step[0]), a + np.float32(step[1]), b + np.float32(step[2])
-        spread = max(np.sqrt(square / count), np.float32(0.02))
+        ridge = 1e-6 * m
+        _step((m + ridge, m_s, m_t, m_ss + ridge, m_st, m_tt + ridge), (v, v_s, v_t), levels)
+        levels[3] = max(np.sqrt(square / count), np.float32(0.02))
         shift = zero
-        if k + 1 < len(clips):
-            limit = clips[k + 1] * spread
-    levels[0], levels[1], levels[2], levels[3] = c, a, b, spread
+        limit = np.float32(CLIPS[min(k + 1, len(CLIPS) - 1)] * levels[3])
     return True
+
+
+@numba.njit(cache=True, nogil=True)
+def _step(M, v, levels):  # type: ignore[no-untyped-def]
+    """Add to ``levels`` the solution of M x = v, with M symmetric, by Cramer's rule."""
+    a, b, c, d, e, f = (np.float64(M[0]), np.float64(M[1]), np.float64(M[2]), np.float64(M[3]), M[4] * 1.0, M[5] * 1.0)
+    p, q, r = d * f - e * e, c * e - b * f, b * e - c * d
+    determinant = a * p + b * q + c * r
+    levels[0] += (p * v[0] + q * v[1] + r * v[2]) / determinant
+    levels[1] += (q * v[0] + (a * f - c * c) * v[1] + (b * c - a * e) * v[2]) / determinant
+    levels[2] += (r * v[0] + (b * c - a * e) * v[1] + (a * d - b * b) * v[2]) / determinant

@@ -28,7 +28,7 @@ def reduced_view(image: DepthImage, step: int, z_min: float, z_max: float) -> Vi
     return View(xyz=xyz, grey=grey, intrinsics=camera)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _back_project(depth, x, y, z_min, z_max, xyz):  # type: ignore[no-untyped-def]
     for i in range(depth.shape[0]):
         for j in range(depth.shape[1]):
@@ -42,23 +42,23 @@ def _back_project(depth, x, y, z_min, z_max, xyz):  # type: ignore[no-untyped-de
 
 def _grey(rgb: Array, step: int, height: int, width: int) -> Array:
     grey = np.empty((height, width), np.uint8)
-    full = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
-    if full.shape == (step * height, step * width):
-        return np.asarray(cv2.resize(full, (width, height), interpolation=cv2.INTER_AREA))
-    _mean(full, step, grey)
+    _mean(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY), step, grey)
     return grey
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _mean(full, step, grey):  # type: ignore[no-untyped-def]
-    total, count = np.empty(grey.shape[1], np.int32), np.empty(grey.shape[1], np.int32)
+    """Each pixel: the mean of a block; the blocks at the right and lower border may be smaller."""
+    height, width = full.shape
+    column = np.empty(width, np.int32)
     for i in range(grey.shape[0]):
-        total[:], count[:] = 0, 0
-        for v in range(i * step, min((i + 1) * step, full.shape[0])):
-            for u in range(step):
-                row = full[v, u:]
-                for j in range(min(len(total), (len(row) + step - 1) // step)):
-                    total[j] += row[j * step]
-                    count[j] += 1
+        last = min((i + 1) * step, height)
+        column[:] = 0
+        for v in range(i * step, last):
+            row = full[v]
+            for u in range(width):
+                column[u] += row[u]
         for j in range(grey.shape[1]):
-            grey[i, j] = total[j] // count[j]
+            block = column[j * step : (j + 1) * step]
+            count = len(block) * (last - i * step)
+            grey[i, j] = (block.sum() + count // 2) // count
