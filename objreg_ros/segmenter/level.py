@@ -17,7 +17,7 @@ OWN_TOP = 0.65  # a level part with more of it in a box is a top of the object t
 LOWEST = 0.1  # with less than this share of the box's cells below it a level part is no top
 MIN_NEAR = 12  # coarse cells of a part around a box that say something
 REACH = 3  # coarse cells that a support surface is thought to go on
-SPREADS = 3.0  # standard deviations of the surface's noise
+SPREADS = 2.0  # standard deviations of the surface's noise
 MAX_SPREAD = 0.5  # tolerances; what is rougher is no plane
 
 
