@@ -17,6 +17,9 @@ from objreg_ros.simulation.surfaces import LEVELS, Surfaces
 
 LIGHT_SCALE = 16383.0
 
+ONE = np.uintp(1)
+"""Unsigned indices spare numba the question whether they count from the end."""
+
 FAST = {"contract", "arcp", "nsz", "reassoc"}
 
 
@@ -33,35 +36,37 @@ def _lit(moments, rotation, position, pinhole, reference, k, px, py, pz, floor):
     size = moments.shape[1]
     if not (u >= 0 and v >= 0 and u < size - 1 and v < size - 1):
         return np.float32(1.0)
-    i, j = int(v), int(u)
+    i, j = np.uintp(v), np.uintp(u)
+    below, right = i + ONE, j + ONE
     a, b = v - np.float32(i), u - np.float32(j)
     w00, w01 = (np.float32(1) - a) * (np.float32(1) - b), (np.float32(1) - a) * b
     w10, w11 = a * (np.float32(1) - b), a * b
-    mean = w00 * moments[k, i, j, 0] + w01 * moments[k, i, j + 1, 0]
-    mean += w10 * moments[k, i + 1, j, 0] + w11 * moments[k, i + 1, j + 1, 0]
+    mean = w00 * moments[k, i, j, 0] + w01 * moments[k, i, right, 0]
+    mean += w10 * moments[k, below, j, 0] + w11 * moments[k, below, right, 0]
     excess = z - reference[k] - mean - np.float32(0.006)
     if excess <= 0:
         return np.float32(1.0)
-    square = w00 * moments[k, i, j, 1] + w01 * moments[k, i, j + 1, 1]
-    square += w10 * moments[k, i + 1, j, 1] + w11 * moments[k, i + 1, j + 1, 1]
+    square = w00 * moments[k, i, j, 1] + w01 * moments[k, i, right, 1]
+    square += w10 * moments[k, below, j, 1] + w11 * moments[k, below, right, 1]
     variance = max(square - mean * mean, floor)
     share = variance / (variance + excess * excess)
     return max(np.float32(0.0), (share - np.float32(0.15)) * np.float32(1.0 / 0.85))  # less light bleeding
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
-def _weights(edges, bounds, f, x, y, z):  # type: ignore[no-untyped-def]
-    """The barycentric coordinates of a pixel of face f at depth z."""
-    ox, oy = np.float32(x - bounds[f, 0]), np.float32(y - bounds[f, 1])
-    b0 = (edges[f, 0, 0] + edges[f, 0, 1] * ox + edges[f, 0, 2] * oy) * z
-    b1 = (edges[f, 1, 0] + edges[f, 1, 1] * ox + edges[f, 1, 2] * oy) * z
-    return b0, b1, np.float32(1.0) - b0 - b1
+def _load(values, faces, edges, f, c, plane):  # type: ignore[no-untyped-def]
+    """Column c of the corners' values of face f as `_value` takes it: value of corner 2, then the slopes beyond it."""
+    last = values[faces[f, 2], c]
+    first, second = values[faces[f, 0], c] - last, values[faces[f, 1], c] - last
+    plane[0] = last
+    for k in range(3):
+        plane[1 + k] = first * edges[f, 0, k] + second * edges[f, 1, k]
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
-def _blend(values, faces, f, b, c):  # type: ignore[no-untyped-def]
-    """Column c of the corners' values of face f at barycentric coordinates b."""
-    return b[0] * values[faces[f, 0], c] + b[1] * values[faces[f, 1], c] + b[2] * values[faces[f, 2], c]
+def _value(plane, ox, oy, z):  # type: ignore[no-untyped-def]
+    """A value at depth z, (ox, oy) pixels from the first of the face's bounds: barycentric blending in one product."""
+    return plane[0] + (plane[1] + plane[2] * ox + plane[3] * oy) * z
 
 
 @nb.njit(cache=True, nogil=True, inline="always")
@@ -85,9 +90,10 @@ def _texel(texels, start, size, u, v, out):  # type: ignore[no-untyped-def]
     fx, fy = np.floor(x), np.floor(y)
     a, b = x - fx, y - fy
     i, j = int(fy), int(fx)
-    i0, i1, j0, j1 = i & mask, (i + 1) & mask, j & mask, (j + 1) & mask
-    p00, p01 = start + i0 * size + j0, start + i0 * size + j1
-    p10, p11 = start + i1 * size + j0, start + i1 * size + j1
+    above, below = start + (i & mask) * size, start + ((i + 1) & mask) * size
+    left, right = j & mask, (j + 1) & mask
+    p00, p01 = np.uintp(above + left), np.uintp(above + right)
+    p10, p11 = np.uintp(below + left), np.uintp(below + right)
     one = np.float32(1.0)
     w00, w01, w10, w11 = (one - a) * (one - b), a * (one - b), (one - a) * b, a * b
     for c in range(3):
@@ -140,54 +146,58 @@ def _shade(  # type: ignore[no-untyped-def]
     """Colour the rows y_first..y_last; see `shade`.
 
     Light changes slowly over a face: it is found for every second pixel of every second row, and for the others only
-    where they see another face than that one. ``y_first`` is even.
+    where they see another face than that one, and so is the mip level. ``y_first`` is even.
     """
     fx, fy, cx, cy = camera
     width = triangle.shape[1]
     albedo = np.empty(3, np.float32)
     own = (width + 1) // 2  # the last row of ``lights`` is for a pixel that keeps its light to itself
     lights = np.empty((own + 1, 6), np.float32)
+    levels = np.empty((own + 1, 2), np.int32)
     lit_face = np.full(own, -1, np.int32)
-    one = np.float32(1.0)
+    normal, picture = np.empty((3, 4), np.float32), np.empty((2, 4), np.float32)
+    one, loaded, m = np.float32(1.0), -1, 0
     for y in range(y_first, y_last):
         dy = (np.float32(y) - cy) / fy
         for x in range(width):
-            f = triangle[y, x]
+            f, j = triangle[y, x], x >> 1
             keeps = ((x | y) & 1) == 0
+            shared = not keeps and lit_face[j] == f
+            if keeps:
+                lit_face[j] = f
             if f < 0:
-                if keeps:
-                    lit_face[x >> 1] = -1
                 out[y, x, 0], out[y, x, 1], out[y, x, 2] = 0, 0, 0
                 continue
             z = one / nearness[y, x]
-            dx = (np.float32(x) - cx) / fx
-            rx = R[0, 0] * dx + R[0, 1] * dy + R[0, 2]
-            ry = R[1, 0] * dx + R[1, 1] * dy + R[1, 2]
-            rz = R[2, 0] * dx + R[2, 1] * dy + R[2, 2]
-            b = _weights(edges, bounds, f, x, y, z)
-            nx, ny = _blend(normals, faces, f, b, 0), _blend(normals, faces, f, b, 1)
-            nz = _blend(normals, faces, f, b, 2)
-            ray = one / np.sqrt(rx * rx + ry * ry + rz * rz)
-            norm = one / np.sqrt(nx * nx + ny * ny + nz * nz + np.float32(1e-12))
-            facing = (nx * rx + ny * ry + nz * rz) * norm
-            if open_surface[f] and facing > 0:
-                norm = -norm
-            m = material[f]
-            level, size = _mip_level(texture_size[m], detail[f] * z / fx, abs(facing) * ray)
-            tu, tv = _blend(uv, faces, f, b, 0), _blend(uv, faces, f, b, 1)
-            _texel(texels, level_start[m, level], size, tu, tv, albedo)
-            j = x >> 1
-            shared = not keeps and lit_face[j] == f
+            if f != loaded:
+                loaded, m = f, material[f]
+                for c in range(2):
+                    _load(uv, faces, edges, f, c, picture[c])
+            ox, oy = np.float32(x - bounds[f, 0]), np.float32(y - bounds[f, 1])
             at = j if keeps or shared else own
             if not shared:
+                dx = (np.float32(x) - cx) / fx
+                rx = R[0, 0] * dx + R[0, 1] * dy + R[0, 2]
+                ry = R[1, 0] * dx + R[1, 1] * dy + R[1, 2]
+                rz = R[2, 0] * dx + R[2, 1] * dy + R[2, 2]
+                for c in range(3):
+                    _load(normals, faces, edges, f, c, normal[c])
+                nx, ny, nz = _value(normal[0], ox, oy, z), _value(normal[1], ox, oy, z), _value(normal[2], ox, oy, z)
+                ray = one / np.sqrt(rx * rx + ry * ry + rz * rz)
+                norm = one / np.sqrt(nx * nx + ny * ny + nz * nz + np.float32(1e-12))
+                facing = (nx * rx + ny * ry + nz * rz) * norm
+                if open_surface[f] and facing > 0:
+                    norm = -norm
+                levels[at, 0], levels[at, 1] = _mip_level(texture_size[m], detail[f] * z / fx, abs(facing) * ray)
                 _illuminate(
                     eye[0] + z * rx, eye[1] + z * ry, eye[2] + z * rz, nx * norm, ny * norm, nz * norm,
                     rx * ray, ry * ray, rz * ray, response[m, 0], int(response[m, 1]),
                     lamp_position, lamp_colour, ambient,
                     moments, rotation, position, pinhole, reference, lights, at,
                 )  # fmt: skip
-            if keeps:
-                lit_face[j] = f
+            start = level_start[m, levels[at, 0]]
+            tu, tv = _value(picture[0], ox, oy, z), _value(picture[1], ox, oy, z)
+            _texel(texels, start, levels[at, 1], tu, tv, albedo)
             for c in range(3):
                 value = albedo[c] * (lights[at, c] + response[m, 2]) + lights[at, 3 + c]
                 out[y, x, c] = np.uint16(min(np.float32(65535.0), np.sqrt(value) * np.float32(LIGHT_SCALE)))
