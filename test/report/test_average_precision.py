@@ -72,3 +72,9 @@ def test_another_label_on_the_right_place_is_wrong() -> None:
 def test_scores_are_ranked_over_all_images_together() -> None:
     images = [seen((FAR, 0.9)), seen((A, 0.8))]
     assert average_precision(images, [known(), known(A)], "cap") == pytest.approx(0.5)
+
+
+def test_a_false_alarm_smaller_than_what_is_asked_for_is_no_error() -> None:
+    one = [seen(((50, 50, 54, 54), 0.95), (A, 0.9))]
+    assert average_precision(one, [known(A)], "cap") == pytest.approx(0.5)
+    assert average_precision(one, [known(A)], "cap", least_area=20.0) == 1.0
