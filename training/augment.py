@@ -27,7 +27,7 @@ LEAST_SIDE_PX = 6.0
 INTERPOLATIONS = (cv2.INTER_LINEAR, cv2.INTER_AREA, cv2.INTER_CUBIC, cv2.INTER_NEAREST)
 
 
-MOSAIC_GRIDS, MOSAIC_ZOOM = (2, 3, 3, 4), (0.55, 2.5)
+MOSAIC_GRIDS, MOSAIC_ZOOM = (2, 3, 4, 4, 5), (0.55, 2.5)
 """A grid of pieces with an object each is many times as much to learn from in the same time."""
 
 LABEL_WEIGHTS = np.array([1.0, 1.0, 1.6, 0.6, 0.8, 1.2, 1.6, 1.4, 1.0])
@@ -100,7 +100,7 @@ def random_window(shape: tuple[int, int], rng: Rng) -> Array:
     kind = rng.random()
     if kind < 0.45:
         return np.array([0, 0, width, height], float)
-    share = rng.uniform(0.4, 1.0) if kind < 0.85 else rng.uniform(1.0, 1.7)
+    share = rng.uniform(0.6, 1.0) if kind < 0.7 else rng.uniform(1.0, 1.8)
     aspect = np.exp(rng.uniform(-0.25, 0.25))
     size = np.array([width * share * aspect**0.5, height * share / aspect**0.5])
     low = rng.uniform(0, 1, 2) * (np.array([width, height]) - size)

@@ -12,19 +12,23 @@ import torch
 from torch.utils.data import IterableDataset, get_worker_info
 
 from training.augment import augment
-from training.multibox import Matcher
-from training.priors import INPUT_HW, VARIANCES, make_priors
+from training.multibox import DIFFICULT, WANTED
 from training.samples import Sample, Shard
 
-Example = tuple[torch.Tensor, torch.Tensor, torch.Tensor]
+Example = tuple[torch.Tensor, torch.Tensor]
+
+MOST_OBJECTS = 64
+"""So many rows of truth has every example, that they may be stacked."""
 
 
-def example(sample: Sample, matcher: Matcher) -> Example:
-    """A sample of the network's size as picture (3, H, W) uint8, target and offsets of the priors."""
-    size = torch.tensor([INPUT_HW[1], INPUT_HW[0]] * 2, dtype=torch.float32)
-    boxes = torch.from_numpy(sample.boxes) / size
-    target, offsets = matcher(boxes, torch.from_numpy(sample.classes), torch.from_numpy(sample.difficult))
-    return torch.from_numpy(np.ascontiguousarray(sample.rgb.transpose(2, 0, 1))), target, offsets
+def example(sample: Sample) -> Example:
+    """A sample of the network's size as picture ``(3, H, W) uint8`` and truth ``(MOST_OBJECTS, 6)``."""
+    truth = np.zeros((MOST_OBJECTS, 6), np.float32)
+    rows = truth[: len(sample.boxes)]
+    rows[:, :4] = sample.boxes[:MOST_OBJECTS]
+    rows[:, 4] = sample.classes[:MOST_OBJECTS]
+    rows[:, 5] = np.where(sample.difficult[:MOST_OBJECTS], DIFFICULT, WANTED)
+    return torch.from_numpy(np.ascontiguousarray(sample.rgb.transpose(2, 0, 1))), torch.from_numpy(truth)
 
 
 class Stream(IterableDataset[Example]):
@@ -39,7 +43,6 @@ class Stream(IterableDataset[Example]):
         rng = np.random.default_rng([self.seed, worker.id if worker else 0])
         torch.set_num_threads(1)
         cv2.setNumThreads(0)
-        matcher = Matcher(torch.from_numpy(make_priors()), torch.tensor(VARIANCES))
         shards: dict[Path, Shard] = {}
         while True:
             for path in sorted(self.folder.glob("*.npz")):
@@ -49,7 +52,7 @@ class Stream(IterableDataset[Example]):
                 raise ValueError(f"{self.folder}: expected shards (*.npz), got none; run training.render first")
             places = [(shard, index) for shard in shards.values() for index in range(len(shard))]
             for _ in range(self.look_again_every):
-                yield example(augment(lambda: _pick(places, rng), rng, self.mosaic_share), matcher)  # noqa: B023
+                yield example(augment(lambda: _pick(places, rng), rng, self.mosaic_share))  # noqa: B023
 
 
 def _pick(places: list[tuple[Shard, int]], rng: np.random.Generator) -> Sample:

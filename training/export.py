@@ -17,6 +17,7 @@ from pathlib import Path
 import onnx
 import torch
 from torch import Tensor, nn
+from torch.nn import functional
 
 from training.labels import LABELS
 from training.network import MobileNetSsd
@@ -27,7 +28,10 @@ OPSET = 13
 
 
 class Embedded(nn.Module):
-    """The network behind its normalisation: ``(1, H, W, 3)`` uint8 RGB in, ``loc`` and ``logits`` out."""
+    """The network behind its normalisation: ``(1, H, W, 3)`` uint8 RGB in, ``loc`` and ``logits`` out.
+
+    Log odds of the classes beside a background of 0 are logits for a softmax: for one likely class it is the sigmoid.
+    """
 
     def __init__(self, network: MobileNetSsd) -> None:
         super().__init__()
@@ -35,8 +39,8 @@ class Embedded(nn.Module):
 
     def forward(self, rgb: Tensor) -> tuple[Tensor, Tensor]:
         x = rgb.permute(0, 3, 1, 2).to(torch.float32)
-        loc, logits = self.network((x - 127.5) / 127.5)
-        return loc, logits
+        loc, odds = self.network((x - 127.5) / 127.5)
+        return loc, functional.pad(odds, (1, 0))
 
 
 def metadata(provenance: Mapping[str, str]) -> dict[str, str]:

@@ -1,5 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which prior answers for which object, and the loss of SSD (Liu et al., 2016, section 2.2)."""
+"""Which prior answers for which object, and what its answer costs.
+
+The assignment is the task-aligned one of Feng et al., "TOOD" (2021, section 3.2): a prior whose centre lies in an
+object answers for it when the network already scores and places that object well there. The class costs binary cross
+entropy against that alignment, the box 1 - GIoU (Rezatofighi et al., "Generalized Intersection over Union", 2019).
+All boxes are x_min y_min x_max y_max in pixels of the network's input.
+"""
 
 from __future__ import annotations
 
@@ -9,81 +15,110 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-MATCH_IOU, IGNORE_IOU = 0.4, 0.3
-"""A prior that overlaps an object by the first is positive; between the two it is neither positive nor negative."""
+SCORE_POWER, IOU_POWER = 0.5, 4.0
+"""How much score and overlap count in the alignment."""
 
-LEAST_NEGATIVES = 20
-"""An image without objects still teaches by its hardest negatives."""
+ANSWERS = 9
+"""At most so many priors answer for one object."""
 
-NEITHER = -1
+LEAST_REACH_PX = 6.0
+"""Objects thinner than twice this draw from priors this far from their middle; else many would have none."""
+
+BOX_WEIGHT = 2.0
+
+NOTHING, WANTED, DIFFICULT = 0.0, 1.0, 2.0
+"""The last number of a row of truth: padding, an object to find, an object neither to find nor to rule out."""
 
 
-def corners(boxes: Tensor) -> Tensor:
-    """cx cy w h to x_min y_min x_max y_max."""
-    half = boxes[..., 2:] / 2
-    return torch.cat([boxes[..., :2] - half, boxes[..., :2] + half], dim=-1)
+def area(boxes: Tensor) -> Tensor:
+    """The areas of boxes."""
+    return (boxes[..., 2:] - boxes[..., :2]).clamp(min=0).prod(dim=-1)
 
 
-def pairwise_iou(a: Tensor, b: Tensor) -> Tensor:
-    """Intersection over union ``(N, M)`` of corner boxes."""
-    low = torch.maximum(a[:, None, :2], b[None, :, :2])
-    high = torch.minimum(a[:, None, 2:], b[None, :, 2:])
+def overlap(a: Tensor, b: Tensor) -> tuple[Tensor, Tensor]:
+    """Intersection over union, and the union, of boxes of broadcastable shapes ``(..., 4)``."""
+    low, high = torch.maximum(a[..., :2], b[..., :2]), torch.minimum(a[..., 2:], b[..., 2:])
     shared = (high - low).clamp(min=0).prod(dim=-1)
-    areas = [(boxes[:, 2:] - boxes[:, :2]).clamp(min=0).prod(dim=-1) for boxes in (a, b)]
-    return shared / (areas[0][:, None] + areas[1][None] - shared).clamp(min=1e-9)
+    union = (area(a) + area(b) - shared).clamp(min=1e-6)
+    return shared / union, union
 
 
-def encode(boxes: Tensor, priors: Tensor, variances: Tensor) -> Tensor:
-    """Corner boxes ``(A, 4)`` as offsets from priors; the inverse of `objreg_ros.detector.boxes.decode`."""
-    centre, size = (boxes[:, :2] + boxes[:, 2:]) / 2, (boxes[:, 2:] - boxes[:, :2]).clamp(min=1e-4)
-    offset = (centre - priors[:, :2]) / priors[:, 2:]
-    return torch.cat([offset / variances[:2], torch.log(size / priors[:, 2:]) / variances[2:]], dim=1)
+def generalised_iou(a: Tensor, b: Tensor) -> Tensor:
+    """GIoU of boxes ``(..., 4)``, pairwise: -1 far apart, 1 the same."""
+    iou, union = overlap(a, b)
+    hull = torch.cat([torch.minimum(a[..., :2], b[..., :2]), torch.maximum(a[..., 2:], b[..., 2:])], dim=-1)
+    whole = area(hull).clamp(min=1e-6)
+    return iou - (whole - union) / whole
+
+
+def decode(loc: Tensor, priors: Tensor, variances: Tensor) -> Tensor:
+    """Boxes of offsets ``(B, A, 4)`` from priors ``(A, 4)`` cx cy w h; as `objreg_ros.detector.boxes.decode`."""
+    centre = priors[:, :2] + loc[..., :2] * variances[:2] * priors[:, 2:]
+    half = priors[:, 2:] * torch.exp((loc[..., 2:] * variances[2:]).clamp(max=4.0)) / 2
+    return torch.cat([centre - half, centre + half], dim=-1)
 
 
 @dataclass
-class Matcher:
-    """Matches the objects of one image to the priors ``(A, 4)`` (cx cy w h in 0..1)."""
+class Assignment:
+    """What the priors of a batch should have said."""
+
+    alignment: Tensor
+    """``(B, A)``: the score that is wanted, 0 for background."""
+    classes: Tensor
+    """``(B, A) int64``: of which class, where that is not 0."""
+    boxes: Tensor
+    """``(B, A, 4)``: and which box."""
+    counted: Tensor
+    """``(B, A) bool``: whether what it says of classes counts; False at difficult objects."""
+
+
+@torch.no_grad()
+def assign(scores: Tensor, boxes: Tensor, centres: Tensor, truth: Tensor) -> Assignment:
+    """The assignment for class scores ``(B, A, C)`` in 0..1, boxes ``(B, A, 4)`` and prior centres ``(A, 2)``.
+
+    ``truth (B, N, 6)``: box, class, and `NOTHING`, `WANTED` or `DIFFICULT`.
+    """
+    known, classes, kind = truth[..., :4], truth[..., 4].long(), truth[..., 5]
+    inside = _inside(centres, known)
+    iou = overlap(known[:, :, None], boxes[:, None])[0]
+    score = scores.gather(2, classes[:, None].expand(-1, scores.shape[1], -1)).transpose(1, 2)
+    aligned = score**SCORE_POWER * iou**IOU_POWER * (inside & (kind == WANTED)[..., None])
+    least = aligned.topk(ANSWERS, dim=2).values[..., -1:]
+    aligned = torch.where(aligned >= least, aligned, 0.0)
+    best = aligned.amax(dim=2, keepdim=True).clamp(min=1e-9)
+    wanted = aligned / best * iou.masked_fill(aligned == 0, 0.0).amax(dim=2, keepdim=True)
+    owner = torch.where(aligned > 0, iou, -1.0).argmax(dim=1)
+    alignment = wanted.gather(1, owner[:, None])[:, 0]
+    hidden = ((inside | (iou > 0.5)) & (kind == DIFFICULT)[..., None]).any(dim=1)
+    return Assignment(
+        alignment,
+        classes.gather(1, owner),
+        known.gather(1, owner[..., None].expand(-1, -1, 4)),
+        (alignment > 0) | ~hidden,
+    )
+
+
+def _inside(centres: Tensor, boxes: Tensor) -> Tensor:
+    """Whether prior centres ``(A, 2)`` lie in boxes ``(B, N, 4)``, or near the middle of thin ones: ``(B, N, A)``."""
+    middle = (boxes[..., :2] + boxes[..., 2:]) / 2
+    reach = ((boxes[..., 2:] - boxes[..., :2]) / 2).clamp(min=LEAST_REACH_PX)
+    return ((centres - middle[:, :, None]).abs() < reach[:, :, None]).all(dim=-1)
+
+
+@dataclass
+class MultiboxLoss:
+    """The loss of a batch for priors ``(A, 4)`` cx cy w h in pixels."""
 
     priors: Tensor
     variances: Tensor
 
-    def __post_init__(self) -> None:
-        self.prior_corners = corners(self.priors)
-
-    def __call__(self, boxes: Tensor, classes: Tensor, difficult: Tensor) -> tuple[Tensor, Tensor]:
-        """``target (A,) int64`` (0 background, 1 + class, `NEITHER`) and ``offsets (A, 4)``.
-
-        ``boxes (N, 4)`` corners in 0..1; objects that are ``difficult (N,) bool`` make their priors `NEITHER`.
-        """
-        target = torch.zeros(len(self.priors), dtype=torch.int64)
-        offsets = torch.zeros(len(self.priors), 4)
-        if len(boxes) == 0:
-            return target, offsets
-        overlap = pairwise_iou(self.prior_corners, boxes)
-        best, which = overlap.max(dim=1)
-        own = overlap.argmax(dim=0)
-        for index in torch.nonzero(overlap.amax(dim=0) > 0.1).flatten():  # each object keeps its best prior
-            best[own[index]], which[own[index]] = 1.0, index
-        matched = best >= MATCH_IOU
-        target[matched] = classes[which[matched]] + 1
-        target[(best >= IGNORE_IOU) & ~matched] = NEITHER
-        target[(best >= IGNORE_IOU) & difficult[which]] = NEITHER
-        offsets[matched] = encode(boxes[which[matched]], self.priors[matched], self.variances)
-        return target, offsets
-
-
-def multibox_loss(
-    loc: Tensor, logits: Tensor, target: Tensor, offsets: Tensor, negatives: int = 3
-) -> tuple[Tensor, Tensor]:
-    """The location and the confidence loss of a batch, each per positive prior, with so many hard negatives to one."""
-    positive = target > 0
-    count = positive.sum().clamp(min=1)
-    location = functional.smooth_l1_loss(loc[positive], offsets[positive], reduction="sum", beta=0.5) / count
-    entropy = functional.cross_entropy(logits.flatten(0, 1), target.clamp(min=0).flatten(), reduction="none")
-    entropy = entropy.view_as(target)
-    hardness = torch.where(target == 0, entropy.detach(), torch.full_like(entropy, -1.0))
-    wanted = (positive.sum(dim=1, keepdim=True) * negatives).clamp(min=LEAST_NEGATIVES)
-    hardest = hardness.topk(int(wanted.max().clamp(max=target.shape[1])), dim=1).indices
-    within = torch.arange(hardest.shape[1], device=hardest.device) < wanted
-    chosen = positive | (torch.zeros_like(positive).scatter(1, hardest, within) & (target == 0))
-    return location, entropy[chosen].sum() / count
+    def __call__(self, loc: Tensor, logits: Tensor, truth: Tensor) -> tuple[Tensor, Tensor]:
+        """What the boxes cost and what the classes cost, each per answer wanted; ``logits (B, A, C)``."""
+        boxes = decode(loc, self.priors, self.variances)
+        wanted = assign(logits.sigmoid(), boxes, self.priors[:, :2], truth)
+        count = wanted.alignment.sum().clamp(min=1.0)
+        target = functional.one_hot(wanted.classes, logits.shape[2]) * wanted.alignment[..., None]
+        entropy = functional.binary_cross_entropy_with_logits(logits, target, reduction="none").sum(dim=2)
+        chosen = wanted.alignment > 0
+        apart = (1 - generalised_iou(boxes[chosen], wanted.boxes[chosen])) * wanted.alignment[chosen]
+        return BOX_WEIGHT * apart.sum() / count, (entropy * wanted.counted).sum() / count

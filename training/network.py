@@ -10,8 +10,6 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from training.priors import PRIORS_PER_CELL
-
 STEM = ((16, 2), (32, 2), (32, 1))
 TO_STRIDE_8 = ((96, 2), (128, 1), (128, 1))
 TO_STRIDE_16 = ((256, 2), (256, 1), (256, 1), (256, 1), (256, 1))
@@ -19,6 +17,9 @@ TO_STRIDE_32 = ((384, 2), (384, 1))
 TO_STRIDE_64 = ((256, 2),)
 TO_STRIDE_128 = ((128, 2),)
 HEAD_WIDTH = 96
+
+RARE = -4.0
+"""The log odds of an object at a prior, to begin with."""
 
 
 def convolution(inputs: int, outputs: int, kernel: int, stride: int = 1, groups: int = 1) -> nn.Sequential:
@@ -42,7 +43,7 @@ def stage(inputs: int, blocks: tuple[tuple[int, int], ...]) -> nn.Sequential:
 
 
 class MobileNetSsd(nn.Module):
-    """``(B, 3, H, W)`` in about -1..1 to ``loc (B, A, 4)`` and ``logits (B, A, 1 + C)``, background first."""
+    """``(B, 3, H, W)`` in about -1..1 to ``loc (B, A, 4)`` and the log odds of the classes ``(B, A, C)``."""
 
     def __init__(self, classes: int) -> None:
         super().__init__()
@@ -54,11 +55,13 @@ class MobileNetSsd(nn.Module):
         self.stages[0] = nn.Sequential(stem, self.stages[0])
         self.laterals = nn.ModuleList([nn.Conv2d(width, HEAD_WIDTH, 1) for width in widths[1:4]])
         towers = [HEAD_WIDTH] * 3 + widths[4:]
-        self.towers = nn.ModuleList([separable(width, HEAD_WIDTH) for width in towers])
-        self.heads = nn.ModuleList([nn.Conv2d(HEAD_WIDTH, PRIORS_PER_CELL * (5 + classes), 1) for _ in towers])
+        self.towers = nn.ModuleList(
+            [nn.Sequential(separable(width, HEAD_WIDTH), separable(HEAD_WIDTH, HEAD_WIDTH)) for width in towers]
+        )
+        self.heads = nn.ModuleList([nn.Conv2d(HEAD_WIDTH, 4 + classes, 1) for _ in towers])
         self.apply(_initialise)
         for head in self.heads:
-            _expect_background(head, classes)
+            _expect_background(head)
 
     def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
         levels = []
@@ -83,8 +86,8 @@ class MobileNetSsd(nn.Module):
         return merged + levels[3:]
 
     def _rows(self, head: Tensor) -> Tensor:
-        """``(B, P (5 + C), h, w)`` to one row a prior, in the order of `training.priors.make_priors`."""
-        return head.permute(0, 2, 3, 1).reshape(head.shape[0], -1, 5 + self.classes)
+        """``(B, 4 + C, h, w)`` to one row a prior, in the order of `training.priors.make_priors`."""
+        return head.permute(0, 2, 3, 1).reshape(head.shape[0], -1, 4 + self.classes)
 
 
 def _initialise(module: nn.Module) -> None:
@@ -94,9 +97,8 @@ def _initialise(module: nn.Module) -> None:
             nn.init.zeros_(module.bias)
 
 
-def _expect_background(head: nn.Module, classes: int) -> None:
-    """Start with small outputs and the background likely, as almost all priors are."""
+def _expect_background(head: nn.Module) -> None:
+    """Start with small outputs and objects unlikely, as they are at almost all priors."""
     assert isinstance(head, nn.Conv2d) and head.bias is not None
     nn.init.normal_(head.weight, std=0.01)
-    bias = head.bias.data.view(PRIORS_PER_CELL, 5 + classes)
-    bias[:, 4] = 4.0
+    head.bias.data[4:] = RARE

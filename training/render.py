@@ -8,22 +8,27 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from objreg_ros.data import Array, Intrinsics
 from objreg_ros.simulation.params import ColourParams
 from objreg_ros.simulation.render import Rendering, render
-from objreg_ros.simulation.scene import Scene
+from objreg_ros.simulation.scene import Scene, random_view
 from training.augment import background
 from training.labels import LABELS
 from training.priors import INPUT_HW
 from training.samples import Sample, write_shard
-from training.scenes import training_scene, training_view
+from training.scenes import plain_scene, training_scene, training_view
 
 VIEWS_PER_SCENE = 10
 SHARD = 200
+PLAIN_SHARE = 0.6
+"""Of the scenes, so many are the simulator's own, seen by its own camera; the others are made to differ."""
+
 EMPTY_SHARE = 0.15
 """Of the pictures without an object to be found, so many are kept."""
 
@@ -39,19 +44,33 @@ def sample_of(rendering: Rendering) -> Sample:
     assert rendering.rgb is not None
     seen = rendering.objects
     boxes = np.array([one.xyxy for one in seen], np.float32).reshape(-1, 4)
-    sides = boxes[:, 2:] - boxes[:, :2]
-    difficult = np.array([one.visibility < LEAST_VISIBILITY for one in seen], bool)
-    difficult |= (sides.min(axis=1, initial=1e9) < LEAST_SIDE_PX) | (sides.prod(axis=1) < LEAST_AREA_PX)
+    difficult = np.array([one.visibility < LEAST_VISIBILITY for one in seen], bool) | is_small(boxes)
     return Sample(rendering.rgb, boxes, np.array([LABELS.index(one.label) for one in seen], np.int64), difficult)
+
+
+def is_small(boxes: Array) -> Array:
+    """Which of the boxes ``(N, 4)`` are too small to teach anything: ``(N,) bool``."""
+    sides = boxes[:, 2:] - boxes[:, :2]
+    return (sides.min(axis=1, initial=1e9) < LEAST_SIDE_PX) | (sides.prod(axis=1) < LEAST_AREA_PX)
 
 
 def samples(rng: np.random.Generator) -> Iterator[Sample]:
     """Pictures of one scene; few of them without an object."""
-    scene, poses = training_scene(rng)
+    plain = rng.random() < PLAIN_SHARE
+    scene, poses = plain_scene(rng) if plain else training_scene(rng)
     for _ in range(VIEWS_PER_SCENE):
-        sample = sample_of(_picture(scene, poses, rng))
+        sample = _plain_sample(scene, poses, rng) if plain else sample_of(_picture(scene, poses, rng))
         if not sample.difficult.all() or rng.random() < EMPTY_SHARE:
             yield sample
+
+
+def _plain_sample(scene: Scene, poses: Array, rng: np.random.Generator) -> Sample:
+    """What the detector gets of the simulator's own Kinect: the whole picture, halved."""
+    T = poses[int(rng.integers(len(poses)))] if len(poses) else random_view(scene, int(rng.integers(2**31)))
+    whole = sample_of(render(scene, T, seed=int(rng.integers(2**31))))
+    rgb = cv2.resize(whole.rgb, INPUT_HW[::-1], interpolation=cv2.INTER_LINEAR)
+    boxes = whole.boxes * np.float32(INPUT_HW[0] / whole.rgb.shape[0])
+    return replace(whole, rgb=rgb, boxes=boxes, difficult=whole.difficult | is_small(boxes))
 
 
 def _picture(scene: Scene, poses: Array, rng: np.random.Generator) -> Rendering:

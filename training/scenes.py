@@ -55,6 +55,15 @@ def training_scene(rng: Rng) -> tuple[Scene, Array]:
     return (relit(scene, rng) if rng.random() < 0.5 else scene), poses
 
 
+def plain_scene(rng: Rng) -> tuple[Scene, Array]:
+    """A room or a scenario just as the simulator makes it, and the camera poses of the scenario ``(N, 4, 4)``."""
+    if rng.random() < 0.5:
+        return random_scene(_seed(rng)), np.zeros((0, 4, 4))
+    story = make_story(str(rng.choice(list(SCENARIOS))), _seed(rng), STORY_FRAMES)
+    chosen = int(rng.integers(len(story.scenes)))
+    return story.scenes[chosen], story.T_world_camera[story.scene_of == chosen]
+
+
 def desk(rng: Rng) -> Scene:
     """A table against a wall with a monitor, a keyboard before it, a mouse, books, a chair, and more."""
     room = furniture.room(rng, (rng.uniform(1.3, 2.5), rng.uniform(1.3, 2.5)))

@@ -23,8 +23,9 @@ from torch.utils.data import DataLoader
 from training.dataset import Example, Stream
 from training.export import export, provenance_of
 from training.labels import LABELS
-from training.multibox import multibox_loss
+from training.multibox import NOTHING, MultiboxLoss
 from training.network import MobileNetSsd
+from training.priors import INPUT_HW, VARIANCES, make_priors
 from training.validation import describe, validate_model
 
 WARM_UP_STEPS = 200
@@ -40,28 +41,35 @@ class Training:
         self.device = torch.device(device)
         self.network = MobileNetSsd(len(LABELS)).to(self.device, memory_format=torch.channels_last)
         self.average = copy.deepcopy(self.network).eval()
+        priors = torch.from_numpy(make_priors()) * torch.tensor([INPUT_HW[1], INPUT_HW[0]] * 2)
+        self.loss = MultiboxLoss(priors.to(self.device), torch.tensor(VARIANCES, device=self.device))
         self.optimiser = torch.optim.AdamW(_groups(self.network), lr=rate)
         self.rate, self.command, self.half = rate, command, half
         self.step, self.seconds = 0, 0.0
 
     def start_from(self, weights: Path) -> None:
-        """Begin with the weights of `training.pretrain`."""
+        """Begin with the weights of `training.pretrain`, or with those of another checkpoint that fit."""
+        content = torch.load(weights, map_location=self.device, weights_only=True)
+        content = content.get("average", content)
         for network in (self.network, self.average):
-            network.load_state_dict(torch.load(weights, map_location=self.device, weights_only=True))
+            own = network.state_dict()
+            fitting = {key: value for key, value in content.items() if key in own and own[key].shape == value.shape}
+            network.load_state_dict(own | fitting)
 
     def freeze_stem(self) -> None:
         """Leave the first layers as they are: a fifth of the time for what changes least late in a training."""
         self.network.stages[0][0].requires_grad_(False).eval()
 
-    def advance(self, batch: Example, steps: int, negatives: int = 3) -> tuple[float, float]:
-        """One step on one batch; the location and the confidence loss."""
-        picture, target, offsets = (part.to(self.device, non_blocking=True) for part in batch)
+    def advance(self, batch: Example, steps: int) -> tuple[float, float]:
+        """One step on one batch; what the boxes and what the classes cost."""
+        picture, truth = (part.to(self.device, non_blocking=True) for part in batch)
         for group in self.optimiser.param_groups:
             group["lr"] = learning_rate(self.step, steps, self.rate)
+        truth = truth[:, : int((truth[..., 5] != NOTHING).sum(dim=1).max())]
         x = picture.to(memory_format=torch.channels_last, dtype=torch.float32)
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.half):
             loc, logits = self.network((x - 127.5) / 127.5)
-        location, confidence = multibox_loss(loc.float(), logits.float(), target, offsets, negatives)
+        location, confidence = self.loss(loc.float(), logits.float(), truth)
         self.optimiser.zero_grad(set_to_none=True)
         (location + confidence).backward()
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), GRADIENT_LIMIT)
@@ -130,7 +138,7 @@ def run(training: Training, arguments: argparse.Namespace) -> None:
     begin = time.monotonic()
     last = min(arguments.steps, arguments.until or arguments.steps)
     while training.step < last:
-        recent.append(training.advance(next(batches), arguments.steps, arguments.negatives))
+        recent.append(training.advance(next(batches), arguments.steps))
         training.seconds, begin = training.seconds + time.monotonic() - begin, time.monotonic()
         if training.step % 100 == 0:
             location, confidence = (sum(part) / len(recent) for part in zip(*recent, strict=True))
@@ -168,7 +176,6 @@ def parse(words: list[str]) -> argparse.Namespace:
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--check-every", type=int, default=1000)
     parser.add_argument("--mosaic", type=float, default=0.65, help="share of mosaics; few at the end of a training")
-    parser.add_argument("--negatives", type=int, default=3, help="hard negatives to one positive; more at the end")
     parser.add_argument("--bf16", action="store_true", help="compute in bfloat16 where the processor is faster so")
     parser.add_argument("--freeze-stem", action="store_true", help="leave the first layers as they are")
     parser.add_argument("--seed", type=int, default=0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Matching, encoding and the loss."""
+"""Assignment, decoding and the loss."""
 
 from __future__ import annotations
 
@@ -8,42 +8,83 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
-from objreg_ros.detector.boxes import decode  # noqa: E402
-from training.multibox import NEITHER, Matcher, encode, multibox_loss  # noqa: E402
-from training.priors import VARIANCES, make_priors  # noqa: E402
+from objreg_ros.detector import boxes as detector_boxes  # noqa: E402
+from training.multibox import (  # noqa: E402
+    ANSWERS,
+    DIFFICULT,
+    WANTED,
+    Assignment,
+    MultiboxLoss,
+    assign,
+    decode,
+    generalised_iou,
+)
+from training.priors import INPUT_HW, VARIANCES, make_priors  # noqa: E402
 
-MATCHER = Matcher(torch.from_numpy(make_priors()), torch.tensor(VARIANCES))
-
-
-def test_what_is_encoded_for_training_is_decoded_by_the_detector() -> None:
-    priors = make_priors()[:50]
-    boxes = np.tile(np.array([[0.1, 0.2, 0.4, 0.5]], np.float32), (50, 1))
-    offsets = encode(torch.from_numpy(boxes), torch.from_numpy(priors), torch.tensor(VARIANCES)).numpy()
-    near = np.abs(offsets[:, 2:]).max(axis=1) < 4 / 0.2
-    assert decode(offsets, priors, np.array(VARIANCES, np.float32))[near] == pytest.approx(boxes[near], abs=1e-5)
-
-
-def test_every_object_has_a_prior_even_where_none_fits() -> None:
-    thin = torch.tensor([[0.30, 0.50, 0.70, 0.52]])
-    target, _ = MATCHER(thin, torch.tensor([7]), torch.tensor([False]))
-    assert (target == 8).sum() >= 1
-
-
-def test_priors_of_difficult_objects_are_neither_positive_nor_negative() -> None:
-    box = torch.tensor([[0.3, 0.3, 0.6, 0.6]])
-    target, _ = MATCHER(box, torch.tensor([2]), torch.tensor([True]))
-    assert (target == NEITHER).sum() > 0 and (target > 0).sum() == 0
+CLASSES = 9
+PRIORS = torch.from_numpy(make_priors()) * torch.tensor([INPUT_HW[1], INPUT_HW[0]] * 2)
+LOSS = MultiboxLoss(PRIORS, torch.tensor(VARIANCES))
+START = decode(torch.zeros(1, len(PRIORS), 4), PRIORS, torch.tensor(VARIANCES))
+SCORES = torch.full((1, len(PRIORS), CLASSES), 0.02)
 
 
-def test_a_picture_without_objects_is_all_background() -> None:
-    target, _ = MATCHER(torch.zeros(0, 4), torch.zeros(0, dtype=torch.int64), torch.zeros(0, dtype=torch.bool))
-    assert (target == 0).all()
+def truth(*rows: tuple[float, ...]) -> torch.Tensor:
+    """One picture's truth with a row of padding."""
+    return torch.tensor([[*rows, (0.0,) * 6]])
+
+
+def assigned(*rows: tuple[float, ...]) -> Assignment:
+    return assign(SCORES, START, PRIORS[:, :2], truth(*rows))
+
+
+def offsets(box: tuple[float, ...]) -> torch.Tensor:
+    """The output with which every prior says ``box``."""
+    low, high = torch.tensor(box[:2]), torch.tensor(box[2:])
+    centre = ((low + high) / 2 - PRIORS[:, :2]) / PRIORS[:, 2:] / 0.1
+    return torch.cat([centre, torch.log((high - low) / PRIORS[:, 2:]) / 0.2], dim=1)[None]
+
+
+def test_training_and_detector_decode_alike() -> None:
+    loc = np.random.default_rng(0).normal(size=(len(PRIORS), 4)).astype(np.float32)
+    ours = decode(torch.from_numpy(loc)[None], PRIORS, torch.tensor(VARIANCES))[0].numpy()
+    theirs = detector_boxes.decode(loc, PRIORS.numpy(), np.array(VARIANCES, np.float32))
+    assert ours == pytest.approx(theirs, abs=1e-2)
+
+
+def test_generalised_iou_is_one_for_the_same_box_and_negative_for_boxes_apart() -> None:
+    a, b = torch.tensor([0.0, 0.0, 10.0, 10.0]), torch.tensor([90.0, 0.0, 100.0, 10.0])
+    assert float(generalised_iou(a, a)) == pytest.approx(1.0)
+    assert float(generalised_iou(a, b)) == pytest.approx(-0.8)
+
+
+def test_an_object_is_answered_for_by_a_few_priors_inside_of_it() -> None:
+    found = assigned((100, 100, 160, 160, 3, WANTED))
+    rows = torch.nonzero(found.alignment[0]).flatten()
+    assert 1 <= len(rows) <= ANSWERS and (found.classes[0, rows] == 3).all()
+    assert ((PRIORS[rows, :2] > 100) & (PRIORS[rows, :2] < 160)).all()
+
+
+def test_even_a_thin_object_has_a_prior() -> None:
+    assert (assigned((100, 201, 160, 204, 6, WANTED)).alignment > 0).any()
+
+
+def test_a_difficult_object_is_neither_positive_nor_negative() -> None:
+    found = assigned((100, 100, 200, 200, 2, DIFFICULT))
+    assert not found.alignment.any()
+    assert not found.counted.all() and found.counted.float().mean() > 0.9
+
+
+def test_padding_is_all_background() -> None:
+    found = assigned()
+    assert not found.alignment.any() and found.counted.all()
 
 
 def test_the_right_answer_costs_less_than_the_wrong_one() -> None:
-    target, offsets = MATCHER(torch.tensor([[0.3, 0.3, 0.6, 0.6]]), torch.tensor([2]), torch.tensor([False]))
-    right = torch.nn.functional.one_hot(target.clamp(min=0), 10).float()[None] * 10
-    wrong = torch.nn.functional.one_hot((target.clamp(min=0) + 1) % 10, 10).float()[None] * 10
-    location, confidence = multibox_loss(offsets[None], right, target[None], offsets[None])
-    assert float(location) == 0 and float(confidence) < 0.01
-    assert float(multibox_loss(offsets[None] + 1, wrong, target[None], offsets[None])[1]) > 5
+    box = (100.0, 100.0, 160.0, 160.0)
+    known = truth((*box, 3, WANTED))
+    chosen = assign(SCORES, decode(offsets(box), PRIORS, torch.tensor(VARIANCES)), PRIORS[:, :2], known).alignment > 0
+    right, wrong = (torch.full((1, len(PRIORS), CLASSES), -10.0) for _ in range(2))
+    right[0, chosen[0], 3], wrong[0, chosen[0], 4] = 10.0, 10.0
+    assert float(LOSS(offsets(box), right, known)[0]) == pytest.approx(0.0, abs=1e-3)
+    assert float(LOSS(offsets(box), right, known)[1]) < 0.1
+    assert float(LOSS(offsets(box), wrong, known)[1]) > 5

@@ -4,23 +4,24 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from training.priors import INPUT_HW, PRIORS_PER_CELL, STRIDES, grid_hw, make_priors
+from training.priors import INPUT_HW, SIDES_PX, STRIDES, grid_hw, make_priors
 
 
-def test_there_is_one_set_of_priors_for_every_cell_of_every_level() -> None:
-    cells = sum(int(np.prod(grid_hw(stride))) for stride in STRIDES)
-    assert make_priors().shape == (cells * PRIORS_PER_CELL, 4)
+def test_there_is_one_prior_for_every_cell_of_every_level() -> None:
+    assert make_priors().shape == (sum(int(np.prod(grid_hw(stride))) for stride in STRIDES), 4)
 
 
 def test_the_first_prior_is_the_small_square_in_the_first_cell() -> None:
     height, width = INPUT_HW
-    assert np.allclose(make_priors()[0] * [width, height, width, height], [4, 4, 12, 12], atol=1e-4)
+    first = make_priors()[0] * [width, height, width, height]
+    assert first == pytest.approx([4, 4, SIDES_PX[0], SIDES_PX[0]], abs=1e-3)
 
 
 def test_rows_of_a_level_run_along_the_image_first() -> None:
     priors = make_priors()
     _, columns = grid_hw(STRIDES[0])
-    along, down = priors[PRIORS_PER_CELL], priors[PRIORS_PER_CELL * columns]
+    along, down = priors[1], priors[columns]
     assert along[0] > priors[0, 0] and along[1] == priors[0, 1]
     assert down[1] > priors[0, 1] and down[0] == priors[0, 0]

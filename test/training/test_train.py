@@ -9,15 +9,15 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
-from training.priors import INPUT_HW, make_priors  # noqa: E402
+from training.multibox import WANTED  # noqa: E402
+from training.priors import INPUT_HW  # noqa: E402
 from training.train import Training, learning_rate, parse, recipe  # noqa: E402
 
 
-def batch() -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    count = len(make_priors())
-    target = torch.zeros(2, count, dtype=torch.int64)
-    target[:, ::50] = 3
-    return torch.zeros(2, 3, *INPUT_HW, dtype=torch.uint8), target, torch.zeros(2, count, 4)
+def batch() -> tuple[torch.Tensor, torch.Tensor]:
+    truth = torch.zeros(2, 4, 6)
+    truth[:, 0] = torch.tensor([40.0, 60.0, 120.0, 160.0, 3.0, WANTED])
+    return torch.zeros(2, 3, *INPUT_HW, dtype=torch.uint8), truth
 
 
 def test_a_checkpoint_brings_back_weights_average_optimiser_and_step(tmp_path: Path) -> None:
@@ -31,6 +31,19 @@ def test_a_checkpoint_brings_back_weights_average_optimiser_and_step(tmp_path: P
     assert first.advance(batch(), steps=10) == pytest.approx(second.advance(batch(), steps=10))
     for a, b in zip(first.average.state_dict().values(), second.average.state_dict().values(), strict=True):
         assert torch.allclose(a.float(), b.float())
+
+
+def test_a_training_starts_from_whatever_weights_fit(tmp_path: Path) -> None:
+    donor = Training(1e-3, "command")
+    weights = donor.network.state_dict()
+    weights["heads.0.weight"] = torch.zeros(70, 96, 1, 1)
+    torch.save(weights, tmp_path / "weights.pt")
+    torch.manual_seed(5)
+    other = Training(1e-3, "command")
+    other.start_from(tmp_path / "weights.pt")
+    ours = other.network.state_dict()
+    assert torch.equal(ours["laterals.0.weight"], weights["laterals.0.weight"])
+    assert ours["heads.0.weight"].shape == (13, 96, 1, 1)
 
 
 def test_the_learning_rate_rises_then_falls_to_a_hundredth() -> None:
