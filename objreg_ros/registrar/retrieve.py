@@ -33,6 +33,7 @@ class Place(NamedTuple):
     stamp_ns: int
     travelled: float
     turned: float
+    session: int
     votes: float
 
 
@@ -99,11 +100,13 @@ class Index:
         found: dict[int, Place] = {}
         for sighting in sightings:
             for place in self._votes(sighting):
-                before = found.get(place.keyframe_id)
-                found[place.keyframe_id] = place._replace(votes=place.votes + (before.votes if before else 0.0))
-        places = list(found.values())
-        places.sort(key=lambda place: (-place.votes, place.keyframe_id))
-        return self._spread(places[: SPARE * self._params.candidates])
+                known = found.get(place.keyframe_id)
+                found[place.keyframe_id] = place._replace(votes=place.votes + (known.votes if known else 0.0))
+        places = sorted(found.values(), key=lambda place: (-place.votes, place.keyframe_id))
+        here = [place for place in places if self._same_pass(place, sightings[0])]
+        before = [place for place in places if not self._same_pass(place, sightings[0])]
+        most = SPARE * self._params.candidates
+        return self._spread(before[:most], here[:most])
 
     def _votes(self, row: Sighting) -> list[Place]:
         """At most one vote a keyframe: its likest object's."""
@@ -121,8 +124,9 @@ class Index:
         vote = np.exp(-0.5 * squared / LIKENESS**2) * np.log(2.0 + len(self) / n)
         ids, first = np.unique(block.keyframe_id[best], return_index=True)
         rows = best[first]
-        columns = (ids, block.stamp_ns[rows], block.travelled[rows], block.turned[rows], vote[first])
-        return [Place(*values) for values in zip(*(column.tolist() for column in columns), strict=True)]
+        where = (column[rows] for column in (block.stamp_ns, block.travelled, block.turned, block.session))
+        columns = [column.tolist() for column in (ids, *where, vote[first])]
+        return [Place(*values) for values in zip(*columns, strict=True)]
 
     def _allowed(self, block: _Block, row: Sighting) -> Array:
         n, params = block.size, self._params
@@ -132,12 +136,23 @@ class Index:
         gone = np.einsum("ij,ij->i", offset, offset) > np.square(reach)
         return np.asarray(apart & ~(gone & (block.session[:n] == row.session)))
 
-    def _spread(self, places: list[Place]) -> list[Place]:
-        """The best of each moment first: neighbours of a chosen keyframe come after every other place."""
-        chosen: list[Place] = []
-        later: list[Place] = []
+    def _spread(self, before: list[Place], here: list[Place]) -> list[Place]:
+        """The best of each pass by here, then the next best of each, ``here``, this very pass, last among equals.
+
+        Neighbours of a chosen keyframe come after every other place.
+        """
         spacing = round(1e9 * self._params.thin_seconds)
-        for place in places:
+        chosen: list[Place] = []
+        rank: dict[int, tuple[bool, int]] = {}
+        for place in before + here:
             near = any(abs(place.stamp_ns - other.stamp_ns) < spacing for other in chosen)
-            (later if near else chosen).append(place)
-        return chosen + later
+            rank[place.keyframe_id] = near, 0 if near else sum(self._same_pass(place, other) for other in chosen)
+            if not near:
+                chosen.append(place)
+        return sorted(before + here, key=lambda place: rank[place.keyframe_id])
+
+    def _same_pass(self, place: Place, other: Place | Sighting) -> bool:
+        """Whether odometry is certain of the motion between the two."""
+        params, way = self._params, abs(place.travelled - other.travelled)
+        sigma = params.odometry_translation_noise + params.odometry_drift * way
+        return place.session == other.session and sigma <= params.prior_translation

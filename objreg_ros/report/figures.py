@@ -152,8 +152,8 @@ def closure_words(story: Story, closure: LoopClosure) -> str:
     """A closure in one line."""
     times = f"{story.seconds(closure.from_ns):.1f} s ↔ {story.seconds(closure.to_ns):.1f} s"
     error = story.error(closure)
-    truth = "" if error is None else f", off by {error[0]:.1f}° and {error[1]:.1f} cm"
-    return f"{times}, {', '.join(closure.labels) or 'no labels'}{truth}"
+    truth = [] if error is None else [f"off by {error[0]:.1f}° and {error[1]:.1f} cm"]
+    return ", ".join([times, *closure.labels, *truth])
 
 
 def _index(tracks: Tracks, stamp_ns: int) -> int:

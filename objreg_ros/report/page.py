@@ -152,13 +152,17 @@ def _reasons(story: Story) -> str:
         (name.replace("_", " "), f"{count}", MEANINGS.get(name, ""), examples.get(name, ""))
         for name, count in sorted(counts.items(), key=lambda item: -item[1])
     ]
-    body = "".join(
+    body = "".join(_reason_row(*row) for row in rows)
+    example = "for example" if examples else ""  # the live graph tells counts only
+    head = f"<tr><th>refused because</th><th class=number>times</th><th>meaning</th><th>{example}</th></tr>"
+    return f"<div class=card><table>{head}{body}</table></div>"
+
+
+def _reason_row(name: str, count: str, meaning: str, example: str) -> str:
+    return (
         f"<tr><td>{escape(name)}</td><td class=number>{count}</td><td>{escape(meaning)}</td>"
         f"<td class=detail>{escape(example)}</td></tr>"
-        for name, count, meaning, example in rows
     )
-    head = "<tr><th>refused because</th><th class=number>times</th><th>meaning</th><th>for example</th></tr>"
-    return f"<div class=card><table>{head}{body}</table></div>"
 
 
 def _accepted(story: Story, album: Album | None) -> str:
