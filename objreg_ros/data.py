@@ -288,7 +288,8 @@ class Alignment:
 
     ``information (6, 6) float64`` of the error ``[tx ty tz rx ry rz]`` in the target frame; ``inliers`` how many source
     points found a partner; ``overlap`` their share 0..1; ``rmse`` m of the inliers; ``slack (K, 6) float64`` unit
-    directions of the same tangent space that the data leave open, K may be 0.
+    directions of the same tangent space that the data leave open, K may be 0; ``held (L, 6) float64`` motions of one
+    sigma along directions that only the look of the whole holds.
     """
 
     T_target_source: Array
@@ -299,11 +300,13 @@ class Alignment:
     iterations: int
     converged: bool
     slack: Array = field(default_factory=lambda: np.zeros((0, 6)))
+    held: Array = field(default_factory=lambda: np.zeros((0, 6)))
 
     def __post_init__(self) -> None:
         _hold_pose(self, "T_target_source")
         _hold(self, "information", np.float64, (6, 6), {})
         _hold(self, "slack", np.float64, (None, 6), {})
+        _hold(self, "held", np.float64, (None, 6), {})
 
 
 @word

@@ -19,6 +19,7 @@ def covariance_of(alignment: Alignment, params: RegistrarParams) -> Array:
     C = params.covariance_scale * _inverse(alignment.information) + _floor(params)
     for direction in alignment.slack:
         C = C + _opened(direction, params)
+    C = C + alignment.held.T @ alignment.held
     return np.asarray((C + C.T) / 2.0)
 
 

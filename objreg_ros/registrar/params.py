@@ -80,6 +80,9 @@ class RegistrarParams(Params):
     shape_sigma: float = param(0.02, "distance from a surface that weighs as much", "m", ge=0.001)
     surface_noise: float = param(0.005, "least noise that a surface is believed to have", "m", ge=1e-4)
     slack_share: float = param(0.01, "a direction that less of the surface resists is free to slide", ge=0.0, le=0.3)
+    pushes: tuple[float, ...] = param(
+        (0.05, 0.1, 0.15), "a pose pushed so far along such a direction that the views like it less is held there", "m"
+    )
     holding_texture: float = param(0.5, "grey that correlates so well holds what shape lets slide", ge=0.0, le=1.0)
     symmetry_share: float = param(0.07, "an object whose surface resists a turn less has no yaw", ge=0.0, le=1.0)
     depth_tolerance: float = param(0.02, "depths this close agree, at the camera", "m", ge=0.001)

@@ -11,6 +11,7 @@ from objreg_ros.registrar.direct import finish
 from objreg_ros.registrar.icp import Fit, align, fit
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
+from objreg_ros.registrar.sliding import resisted
 from objreg_ros.registrar.verify import verify
 
 
@@ -25,6 +26,8 @@ def refine(source: Prepared, target: Prepared, T_target_source: Array, params: R
     T = align(*points, T_target_source[None], reach, last, params.iterations)[0][0]
     T, grey = _finished(source, target, T, params)
     found = fit(*points, T, last)
+    loose = slack(found._replace(H=found.H + grey), T, transform(T, source.middle), params.slack_share)
+    free, held = resisted(source, target, T, loose, found.extent, params)
     return Alignment(
         T_target_source=T,
         information=about_camera(found.H, T) / max(found.rmse, params.surface_noise) ** 2,
@@ -33,7 +36,8 @@ def refine(source: Prepared, target: Prepared, T_target_source: Array, params: R
         rmse=found.rmse,
         iterations=params.iterations,
         converged=found.inliers >= params.min_points,
-        slack=slack(found._replace(H=found.H + grey), T, transform(T, source.middle), params.slack_share),
+        slack=free,
+        held=held,
     )
 
 

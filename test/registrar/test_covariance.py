@@ -47,6 +47,12 @@ def test_a_slide_shows_in_the_worst_translation() -> None:
     assert worst_translation(C) == pytest.approx(0.5, rel=0.01)
 
 
+def test_what_the_views_alone_hold_is_open_by_as_much_as_they_say() -> None:
+    held = np.array([[0.03, 0.04, 0, 0, 0, 0]])
+    C = covariance_of(candidate(information=1e9 * np.eye(6), held=held).alignment, PARAMS)
+    assert worst_translation(C) == pytest.approx(np.hypot(0.05, 0.01), rel=0.01)
+
+
 def test_the_file_that_tells_of_the_calibration_holds_the_values_of_the_code(repository: Path) -> None:
     text = (repository / "config" / "covariance.yaml").read_text(encoding="utf-8")
     values = dict(re.findall(r"^    (\w+): ([\d.]+)$", text, re.MULTILINE))

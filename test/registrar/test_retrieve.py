@@ -69,6 +69,12 @@ def test_neighbours_of_a_chosen_keyframe_give_way_to_other_moments() -> None:
     assert [place.keyframe_id for place in index.query(_seen(9, 100, CUP))] == [1, 4, 2, 3]
 
 
+def test_passes_by_here_take_turns_and_this_one_comes_last() -> None:
+    params = PARAMS.replaced(min_gap=0.5, odometry_radius=99.0)
+    index = _index(*(_seen(k, float(k), CUP) for k in (1, 2, 50, 51, 99)), params=params)
+    assert [place.keyframe_id for place in index.query(_seen(100, 100, CUP))] == [1, 50, 99, 2, 51]
+
+
 def test_a_removed_keyframe_is_not_found_again() -> None:
     index = _index(_seen(1, 0, CUP), _seen(2, 10, CUP, BOOK))
     index.remove([2])

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How far a pose may slide where the surfaces let it: as far as the views like it no less.
+
+Two views of a table from opposite sides share little but its top, on which one can be pushed along the other. What
+stands on it resists, with too few points to count as surface; yet a pose that was pushed is seen to be worse. So a pose
+is pushed, and where both ways are clearly worse it is held by the views, to about half the push.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.geometry import pose, rotation_from_vector, transform
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.prepared import Prepared
+from objreg_ros.registrar.verify import verify
+
+
+def resisted(
+    source: Prepared, target: Prepared, T_target_source: Array, slack: Array, extent: float, params: RegistrarParams
+) -> tuple[Array, Array]:
+    """Which of the ``slack`` directions (K, 6) are free, and the motions (L, 6) of one sigma along those that are held.
+
+    Directions and motions [t r] are of the source camera's pose in the target's axes. ``extent`` m is the lever that
+    makes a turn of what was seen comparable to a shift. All are free where the views do not like the pose itself.
+    """
+    score = verify(source.sight, target.sight, T_target_source, params, params.grey_points).score
+    free, held = [], []
+    for direction in slack:
+        unit = direction / _length(
+            direction, transform(T_target_source, source.middle) - T_target_source[:3, 3], extent
+        )
+        reach = _reach(source, target, T_target_source, unit, score, params) if score >= params.min_score else None
+        if reach is None:
+            free.append(direction)
+        else:
+            held.append(0.5 * reach * unit)
+    return np.reshape(free, (-1, 6)), np.reshape(held, (-1, 6))
+
+
+def pushed(T_target_source: Array, motion: Array) -> Array:
+    """The pose (4, 4) after a motion [t r]."""
+    R, t = T_target_source[:3, :3], T_target_source[:3, 3]
+    return pose(rotation_from_vector(motion[3:]) @ R, t + motion[:3])
+
+
+def _length(direction: Array, lever: Array, extent: float) -> float:
+    """How far what was seen moves, m, when its camera goes along a unit direction: its middle, and its rim about it."""
+    shift, turn = direction[:3] + np.cross(direction[3:], lever), direction[3:]
+    return float(np.hypot(np.linalg.norm(shift), np.linalg.norm(turn) * extent))
+
+
+def _reach(
+    source: Prepared, target: Prepared, T: Array, unit: Array, score: float, params: RegistrarParams
+) -> float | None:
+    """The least push in m that the views like clearly less, either way; None where there is none."""
+    for push in params.pushes:
+        scores = [
+            verify(source.sight, target.sight, pushed(T, way * unit), params, params.grey_points).score
+            for way in (-push, push)
+        ]
+        if max(scores) <= score - params.rival_margin:
+            return push
+    return None

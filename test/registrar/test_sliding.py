@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of what holds a pose where the surfaces let it slide."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from objreg_ros.geometry import inverse, pose, pose_error
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.prepared import Prepared, prepare
+from objreg_ros.registrar.sliding import pushed, resisted
+
+from .rooms import ROOM, keyframe, seen_from
+
+PARAMS = RegistrarParams()
+WALL = (("room", (-9.0, -9.0, -9.0), (2.0, 9.0, 9.0)),)
+TABLE = (ROOM[0], *(box for box in ROOM if box[0] not in ("shelf", "cupboard", "stool")))
+TRUTH = inverse(seen_from(20.0)) @ seen_from(0.0)
+SIDEWAYS = np.eye(6)[:1]
+
+
+def views(boxes: tuple, *angles: float) -> list[Prepared]:
+    return [prepare(keyframe(seen_from(a), boxes, grey=False, seed=k), PARAMS) for k, a in enumerate(angles)]
+
+
+def test_what_stands_on_a_table_holds_it() -> None:
+    free, held = resisted(*views(TABLE, 0.0, 20.0), TRUTH, SIDEWAYS, 1.0, PARAMS)
+    assert free.shape == (0, 6) and held.shape == (1, 6)
+    assert min(abs(held[0, 0] - 0.5 * push) for push in PARAMS.pushes) < 1e-9 and not held[0, 1:].any()
+
+
+def test_nothing_holds_a_bare_wall() -> None:
+    wall = prepare(keyframe(seen_from(0.0, height=0.75), WALL, grey=False), PARAMS)
+    along = (inverse(seen_from(0.0, height=0.75))[:3, :3] @ [0.0, 1.0, 0.0]).tolist()
+    slack = np.array([[*along, 0.0, 0.0, 0.0]])
+    free, held = resisted(wall, wall, np.eye(4), slack, 1.0, PARAMS)
+    assert np.array_equal(free, slack) and held.shape == (0, 6)
+
+
+def test_a_pose_that_the_views_do_not_like_is_free_everywhere() -> None:
+    wrong = TRUTH @ pose(np.eye(3), np.array([0.0, 0.0, 0.8]))
+    free, held = resisted(*views(TABLE, 0.0, 20.0), wrong, SIDEWAYS, 1.0, PARAMS)
+    assert len(free) == 1 and len(held) == 0
+
+
+def test_a_push_moves_the_camera_where_it_stands() -> None:
+    moved = pushed(TRUTH, np.array([0.1, 0.0, 0.0, 0.0, 0.0, np.radians(2.0)]))
+    rotation, centimetres = pose_error(moved, TRUTH)
+    assert rotation == pytest.approx(2.0) and centimetres == pytest.approx(10.0)
