@@ -227,9 +227,12 @@ def objects(message: Any, names: Mapping[int, str]) -> tuple[tuple[ObjectCloud, 
     """The objects (instance 1 and up, in order) and the support surface (instance 0) of an ``objects`` cloud."""
     needed = ("x", "y", "z", "normal_x", "normal_y", "normal_z", "score", "density", "class_id", "instance", "flags")
     rows = table(message, *needed).reshape(1, -1)
-    rows = rows[:, np.argsort(rows["instance"][0], kind="stable")]
-    _, starts = np.unique(rows["instance"][0], return_index=True)
-    clouds = [_object(part, names) for part in np.split(rows, starts[1:], axis=1) if part.size]
+    instance = rows["instance"][0].astype(np.int64)
+    if (np.diff(instance) < 0).any():  # ours come in order
+        order = np.argsort(instance, kind="stable")
+        rows, instance = rows[:, order], instance[order]
+    starts = np.flatnonzero(np.diff(instance)) + 1
+    clouds = [_object(part, names) for part in np.split(rows, starts, axis=1) if part.size]
     support = next((cloud for cloud in clouds if cloud.instance == 0), None)
     return tuple(cloud for cloud in clouds if cloud.instance > 0), support
 

@@ -120,4 +120,16 @@ def _field_kind(field: Any, order: str) -> np.dtype[Any]:
 
 def columns(records: Array, *names: str) -> Array:
     """Some columns of a (height, width) table as (height, width, len(names)) float32 in native order, copied."""
+    if _side_by_side(records.dtype, names):
+        first = records[names[0]]
+        shape, strides = (*first.shape, len(names)), (*first.strides, first.itemsize)
+        return np.array(np.lib.stride_tricks.as_strided(first, shape, strides))
     return np.stack([records[name] for name in names], axis=-1, dtype=np.float32, casting="same_kind")
+
+
+def _side_by_side(layout: np.dtype[Any], names: tuple[str, ...]) -> bool:
+    """Whether these fields are native float32 right behind each other: then they are copied in one go."""
+    assert layout.fields is not None
+    placed = [layout.fields[name][:2] for name in names]
+    start = placed[0][1]
+    return all(kind == np.float32 and offset == start + 4 * k for k, (kind, offset) in enumerate(placed))
