@@ -21,7 +21,7 @@ class SegmenterParams(Params):
     min_points: int = param(80, "an object of fewer points is not published", ge=1, live=True)
     margin: float = param(0.2, "how far around a box its surroundings are looked at, of the box's size", ge=0.0, le=1.0)
     jump: float = param(0.012, "depth step that ends an object, at the camera", "m", ge=0.001)
-    jump_z2: float = param(0.008, "how the depth step grows with squared depth", "1/m", ge=0.0)
+    jump_z2: float = param(0.012, "how the depth step grows with squared depth", "1/m", ge=0.0)
     crease: float = param(20.0, "a valley that bends more than this parts two things", "deg", ge=5.0, le=90.0)
     height: float = param(0.0005, "a point this far above the support belongs to it, without noise", "m", ge=0.0)
     up_tilt: float = param(65.0, "most tilt of the camera's y axis from the vertical", "deg", ge=5.0, le=89.0)
