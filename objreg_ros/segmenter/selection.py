@@ -23,6 +23,9 @@ SMALL_GAIN = 0.005  # what a part must add that is wholly there and touches
 MIN_TOUCH = 3  # cells that two parts of one object touch in
 GAP = 0.08  # of the box's size: how far apart two parts of one object are where they are neighbours
 GAP_ALIKE = 0.25  # the same, for parts of one colour
+FELLOW_GAIN = 0.15  # in fit: what a part must add that is only seen apart from the others, as a seat from its back
+FELLOW_FIGURE = 0.5  # such a part with less of its depth jumps its own silhouette is background
+FELLOW_DEPTH = 0.15  # of its depth: how much nearer or farther such a part may be
 
 
 def select(parts: Parts, window: Window) -> Array:
@@ -55,8 +58,6 @@ def _choose(parts, window):  # type: ignore[no-untyped-def]
     chosen = table[1:]
     seed = _seed(parts, window)
     chosen[seed] = True
-    if _is_alone(parts, seed):
-        return table
     best = _best_addition(parts, chosen, seed, window)
     while best >= 0:
         chosen[best] = True
@@ -78,16 +79,6 @@ def _seed(parts, window):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _is_alone(parts, seed):  # type: ignore[no-untyped-def]
-    """Whether no other part could be added: nothing next to it lies in the box."""
-    for k in range(len(parts.total)):
-        near = parts.gap[seed, k] < GAP_ALIKE * parts.size[seed]  # parts that touch have a gap too, of one cell
-        if near and parts.pure[k] >= MIN_PURE:
-            return False
-    return True
-
-
-@numba.njit(cache=True, nogil=True)
 def _touches(parts, chosen, k):  # type: ignore[no-untyped-def]
     """Whether part k touches what is chosen."""
     cells = 0
@@ -105,6 +96,14 @@ def _is_close(parts, chosen, seed, k):  # type: ignore[no-untyped-def]
         if chosen[c] and parts.gap[c, k] < limit * parts.size[seed]:
             return True
     return False
+
+
+@numba.njit(cache=True, nogil=True)
+def _is_fellow(parts, chosen, seed, k):  # type: ignore[no-untyped-def]
+    """Whether part k, wholly in the box, has the colour of what is chosen and is about as far away."""
+    as_far = abs(parts.size[k] / parts.size[seed] - 1) < FELLOW_DEPTH  # sizes are those of the box at a part's depth
+    whole = parts.pure[k] >= WHOLE and parts.figure[k] >= FELLOW_FIGURE
+    return whole and as_far and _has_its_colour(parts, chosen, k)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -136,7 +135,8 @@ def _best_addition(parts, chosen, seed, window):  # type: ignore[no-untyped-def]
             continue
         touching = _touches(parts, chosen, k)
         no_background = parts.figure[k] >= MIN_FIGURE or _has_its_colour(parts, chosen, k)
-        if not (touching or (no_background and _is_close(parts, chosen, seed, k))):
+        near = touching or (no_background and _is_close(parts, chosen, seed, k))
+        if not near and not (gain > FELLOW_GAIN and _is_fellow(parts, chosen, seed, k)):
             continue
         if gain > MIN_GAIN or (touching and parts.pure[k] >= WHOLE and not _lies_on(parts, chosen, k)):
             best, most = k, gain
