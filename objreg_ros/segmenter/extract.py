@@ -14,7 +14,7 @@ from objreg_ros.segmenter.surface import EXACT, MIN_COSINE, Surface
 
 EDGE = int(PointFlag.EDGE)
 UNKNOWN_COSINE = np.float32(0.7)  # of a surface whose normal is not known
-MIN_NEIGHBOURS = 3  # of 8; a pixel with fewer in its object is an outlier
+MIN_NEIGHBOURS = 2  # of 8; a pixel with fewer in its object is an outlier
 NO_COLOUR = np.zeros((0, 0, 3), np.uint8)
 NO_COLOUR.flags.writeable = False  # as the arrays of a DepthImage, so that one kernel serves both
 
