@@ -30,20 +30,24 @@ def word(cls: type[Word]) -> type[Word]:
 def _hold(owner: Any, name: str, dtype: Any, shape: tuple[int | str | None, ...], sizes: dict[str, int]) -> None:
     """Check one array field and make it read-only. A size is a number, a name shared by fields, or None for any."""
     array = getattr(owner, name)
-    expected = f"{type(owner).__name__}.{name}: expected {np.dtype(dtype)} of shape {_shape_text(shape)}"
     if not isinstance(array, np.ndarray):
-        raise ValueError(f"{expected}, got {type(array).__name__}")
-    wrong = array.dtype != np.dtype(dtype) or array.ndim != len(shape)
+        raise ValueError(f"{_expected(owner, name, dtype, shape)}, got {type(array).__name__}")
+    wrong = array.dtype != dtype or array.ndim != len(shape)
     if not wrong:
         for got, size in zip(array.shape, shape, strict=True):
             wanted = sizes.setdefault(size, got) if isinstance(size, str) else size
             wrong = wrong or (wanted is not None and got != wanted)
     if wrong:
         known = {k: v for k, v in sizes.items() if k in shape}
-        raise ValueError(f"{expected}{f' with {known}' if known else ''}, got {array.dtype} of shape {array.shape}")
+        expected = _expected(owner, name, dtype, shape) + (f" with {known}" if known else "")
+        raise ValueError(f"{expected}, got {array.dtype} of shape {array.shape}")
     view = array.view()
     view.flags.writeable = False
     object.__setattr__(owner, name, view)
+
+
+def _expected(owner: Any, name: str, dtype: Any, shape: tuple[int | str | None, ...]) -> str:
+    return f"{type(owner).__name__}.{name}: expected {np.dtype(dtype)} of shape {_shape_text(shape)}"
 
 
 def _shape_text(shape: tuple[int | str | None, ...]) -> str:
