@@ -15,6 +15,7 @@ from objreg_ros.segmenter.surface import EXACT, Surface, Window
 
 OWN_TOP = 0.65  # a level part with more of it in a box is a top of the object there, not what it stands on
 LOWEST = 0.1  # with less than this share of the box's cells below it a level part is no top
+MANY = 9000  # cells of which every third in each row and column is enough for a plane
 MIN_NEAR = 12  # coarse cells of a part around a box that say something
 REACH = 3  # coarse cells that a support surface is thought to go on
 SPREADS = 2.0  # standard deviations of the surface's noise
@@ -36,7 +37,8 @@ def support_cells(around: Surface, window: Window, ground: Ground, base: float) 
         normal, offset = _equation(support.plane)
         if not _find_beneath(support.parts, support.total, normal, offset, window, grid, ground.coarse.step, here):
             continue
-        plane = fit_level(around, here, ground.up, support.plane, stride=2, lowest=True)
+        stride = 2 if here.size <= MANY else 3
+        plane = fit_level(around, here, ground.up, support.plane, stride, lowest=True)
         if plane is None or plane.spread > MAX_SPREAD:
             plane = support.plane
         limit = np.float32(SPREADS * min(plane.spread, MAX_SPREAD))

@@ -53,12 +53,15 @@ def _mean(full, step, grey):  # type: ignore[no-untyped-def]
     column = np.empty(width, np.int32)
     for i in range(grey.shape[0]):
         last = min((i + 1) * step, height)
+        share = np.float32(1) / (last - i * step)
         column[:] = 0
         for v in range(i * step, last):
             row = full[v]
             for u in range(width):
                 column[u] += row[u]
         for j in range(grey.shape[1]):
-            block = column[j * step : (j + 1) * step]
-            count = len(block) * (last - i * step)
-            grey[i, j] = (block.sum() + count // 2) // count
+            end = min((j + 1) * step, width)
+            total = np.int32(0)
+            for u in range(j * step, end):
+                total += column[u]
+            grey[i, j] = int(total * share / (end - j * step) + np.float32(0.5))
