@@ -8,6 +8,8 @@ Camera frames are optical: x right, y down, z forward.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -38,6 +40,18 @@ def pose(R: Array, t: Array) -> Array:
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = R, t
     return T
+
+
+def mounting(numbers: Sequence[float]) -> Array | None:
+    """``T_base_camera`` (4, 4) of ``x y z qx qy qz qw``, None of no numbers: the camera is where the body is.
+
+    ValueError for any other count and for a quaternion of length 0.
+    """
+    if not numbers:
+        return None
+    if len(numbers) != 7:
+        raise ValueError(f"T_base_camera: expected x y z qx qy qz qw or nothing, got {tuple(numbers)}")
+    return pose(rotation_from_quaternion(np.array(numbers[3:])), np.array(numbers[:3], float))
 
 
 def is_rigid(T: Array, tolerance: float = 1e-5) -> bool:

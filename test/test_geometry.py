@@ -142,6 +142,16 @@ def test_what_is_rigid_and_what_is_not() -> None:
         assert not g.is_rigid(wrong)
 
 
+def test_a_mounting_is_seven_numbers_or_none_at_all() -> None:
+    T = g.mounting((0.1, 0.2, 0.3, 0.0, 0.0, 2.0, 0.0))
+    assert T is not None and np.allclose(T[:3], [[-1, 0, 0, 0.1], [0, -1, 0, 0.2], [0, 0, 1, 0.3]])
+    assert g.mounting(()) is None
+    with pytest.raises(ValueError, match="expected x y z qx qy qz qw or nothing, got"):
+        g.mounting((1.0, 2.0))
+    with pytest.raises(ValueError, match="non-zero length"):
+        g.mounting((0.0,) * 7)
+
+
 @given(VECTORS, VECTORS)
 def test_skew_is_the_cross_product(v: np.ndarray, w: np.ndarray) -> None:
     assert np.allclose(g.skew(v) @ w, np.cross(v, w))

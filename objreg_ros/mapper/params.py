@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.geometry import pose, rotation_from_quaternion
+from objreg_ros.geometry import mounting
 from objreg_ros.params import Params, param
 
 
@@ -43,12 +43,10 @@ class MapperNodeParams(Params):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if len(self.T_base_camera) not in (0, 7):
-            raise ValueError(f"T_base_camera: expected x y z qx qy qz qw or nothing, got {self.T_base_camera}")
+        mounting(self.T_base_camera)
 
     @property
     def mounting(self) -> Array:
-        """``T_base_camera`` as a (4, 4) pose; ValueError for a quaternion of length 0."""
-        if not self.T_base_camera:
-            return np.eye(4)
-        return pose(rotation_from_quaternion(np.array(self.T_base_camera[3:])), np.array(self.T_base_camera[:3]))
+        """``T_base_camera`` as a (4, 4) pose."""
+        T = mounting(self.T_base_camera)
+        return np.eye(4) if T is None else T
