@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
@@ -63,3 +64,35 @@ class Worker(Generic[Job]):
                 self._work(job)
         except BaseException as error:
             self._failed(error)
+
+
+class Backlog(Worker[Job]):
+    """Runs ``work`` on the newest job, and before it ``settle`` on each that it overtook, the oldest first."""
+
+    def __init__(
+        self, work: Callable[[Job], None], settle: Callable[[Job], None], failed: Callable[[BaseException], None]
+    ) -> None:
+        self._aside: deque[Job] = deque()
+        self._newest, self._settle = work, settle
+        super().__init__(self._in_order, self._aside.append, failed)
+
+    def put(self, job: Job) -> None:
+        """Hand over a job; never waits."""
+        with self._ready:  # the overtaken one is aside before the new one can be taken
+            if self._next is not None:
+                self._aside.append(self._next)
+            self._next = job
+            self._ready.notify()
+
+    def rest(self) -> list[Job]:
+        """Take back every job that has not begun, the oldest first."""
+        with self._ready:
+            waiting = [*self._aside, *([] if self._next is None else [self._next])]
+            self._aside.clear()
+            self._next = None
+        return waiting
+
+    def _in_order(self, job: Job) -> None:
+        while self._aside:
+            self._settle(self._aside.popleft())
+        self._newest(job)

@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import threading
 
-from objreg_ros.bridge.worker import Worker
+from objreg_ros.bridge.worker import Backlog, Worker
 
 PATIENCE = 10.0  # seconds; a test that gets there has failed
 
@@ -87,3 +87,43 @@ def test_a_job_that_has_not_begun_can_be_taken_back() -> None:
     bench.go.set()
     bench.worker.close()
     assert bench.done == ["first"] and not bench.replaced
+
+
+def test_a_backlog_settles_what_was_overtaken_before_it_works_on_the_newest() -> None:
+    begun, go, over = threading.Event(), threading.Event(), threading.Event()
+    done: list[tuple[str, int]] = []
+
+    def work(job: int) -> None:
+        begun.set()
+        assert go.wait(PATIENCE)
+        done.append(("work", job))
+        if job == 4:
+            over.set()
+
+    backlog: Backlog[int] = Backlog(work, lambda job: done.append(("settle", job)), print)
+    backlog.put(1)
+    assert begun.wait(PATIENCE)
+    for job in (2, 3, 4):
+        backlog.put(job)
+    go.set()
+    assert over.wait(PATIENCE)
+    backlog.close()
+    assert done == [("work", 1), ("settle", 2), ("settle", 3), ("work", 4)] and backlog.rest() == []
+
+
+def test_a_closed_backlog_gives_back_what_it_did_not_begin() -> None:
+    begun, go = threading.Event(), threading.Event()
+
+    def work(_: int) -> None:
+        begun.set()
+        assert go.wait(PATIENCE)
+
+    backlog: Backlog[int] = Backlog(work, lambda _: None, print)
+    backlog.put(1)
+    assert begun.wait(PATIENCE)
+    for job in (2, 3):
+        backlog.put(job)
+    rest = backlog.rest()
+    go.set()
+    backlog.close()
+    assert rest == [2, 3]
