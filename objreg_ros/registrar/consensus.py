@@ -50,7 +50,9 @@ def poses(
     pairs = _consistent_pairs(*arrays, *ups, upright, tolerance, shortest, most_pairs)  # type: ignore[call-arg]
     if len(pairs) == 0:
         return ()
-    T, support = _supported_poses(*arrays, matches.weights, *ups, upright, tolerance, pairs)  # type: ignore[call-arg]
+    T = _poses(*arrays, *ups, upright, pairs)  # type: ignore[call-arg]
+    columns = (np.ascontiguousarray(part.T, np.float32) for part in (matches.source, matches.target, matches.weights))
+    support = _support(*columns, T.astype(np.float32), np.float32(tolerance))  # type: ignore[call-arg]
     middle = matches.source.mean(axis=0)
     chosen = distinct(T, support, middle, limit, angle=np.radians(6.0), distance=1.5 * tolerance)
     return tuple((T[k], float(support[k])) for k in chosen)
@@ -128,40 +130,68 @@ def _consistent_pairs(P, Q, N, M, up_p, up_q, upright, tolerance, shortest, most
     return found[:n]
 
 
-@numba.njit(cache=True, nogil=True)
-def _frame(direction, axis):  # type: ignore[no-untyped-def]
-    """A right-handed frame whose last column is along ``axis``, its first along what of ``direction`` is not."""
-    R = np.empty((3, 3))
-    z = axis / np.sqrt((axis * axis).sum())
-    x = direction - (direction * z).sum() * z
-    x = x / np.sqrt((x * x).sum() + 1e-18)
-    R[:, 0] = x
-    R[0, 1] = z[1] * x[2] - z[2] * x[1]
-    R[1, 1] = z[2] * x[0] - z[0] * x[2]
-    R[2, 1] = z[0] * x[1] - z[1] * x[0]
-    R[:, 2] = z
-    return R
+@numba.njit(cache=True, nogil=True, inline="always")
+def _axes(direction, axis):  # type: ignore[no-untyped-def]
+    """A right-handed frame: its third axis along ``axis``, its first along what of ``direction`` is not."""
+    z = np.sqrt(_dot(axis, axis)) + 1e-18
+    zx, zy, zz = axis[0] / z, axis[1] / z, axis[2] / z
+    along = direction[0] * zx + direction[1] * zy + direction[2] * zz
+    x, y, w = direction[0] - along * zx, direction[1] - along * zy, direction[2] - along * zz
+    n = np.sqrt(x * x + y * y + w * w) + 1e-9
+    x, y, w = x / n, y / n, w / n
+    return (x, y, w), (zy * w - zz * y, zz * x - zx * w, zx * y - zy * x), (zx, zy, zz)
 
 
 @numba.njit(cache=True, nogil=True)
-def _supported_poses(P, Q, N, M, weights, up_p, up_q, upright, tolerance, pairs):  # type: ignore[no-untyped-def]
-    """The pose of each pair (K, 4, 4) and the weight of the matches that it brings together (K,)."""
+def _turn(from_direction, from_axis, to_direction, to_axis, R):  # type: ignore[no-untyped-def]
+    """Fill ``R`` (3, 3) with the rotation that takes an axis and, about it, a direction to others."""
+    a, b = _axes(from_direction, from_axis), _axes(to_direction, to_axis)
+    for r in range(3):
+        for c in range(3):
+            R[r, c] = b[0][r] * a[0][c] + b[1][r] * a[1][c] + b[2][r] * a[2][c]
+
+
+@numba.njit(cache=True, nogil=True)
+def _poses(P, Q, N, M, up_p, up_q, upright, pairs):  # type: ignore[no-untyped-def]
+    """The pose (K, 4, 4) of each pair of matches."""
     T = np.zeros((len(pairs), 4, 4))
-    support = np.zeros(len(pairs))
+    dp, dq, n, m = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for k in range(len(pairs)):
         i, j = pairs[k]
-        dp, dq = P[j] - P[i], Q[j] - Q[i]
+        for a in range(3):
+            dp[a], dq[a] = P[j, a] - P[i, a], Q[j, a] - Q[i, a]
+            n[a], m[a] = N[i, a] + N[j, a] + 1e-9, M[i, a] + M[j, a] + 1e-9
+        R = T[k]
         if upright:
-            R = _frame(dq, up_q) @ _frame(dp, up_p).T
+            _turn(dp, up_p, dq, up_q, R)
         else:  # the baseline is exact, the normals are not: they turn about it
-            R = _frame(M[i] + M[j] + 1e-9, dq) @ _frame(N[i] + N[j] + 1e-9, dp).T
-        t = 0.5 * (Q[i] + Q[j]) - R @ (0.5 * (P[i] + P[j]))
-        T[k, :3, :3], T[k, :3, 3], T[k, 3, 3] = R, t, 1.0
-        for m in range(len(P)):
-            error = 0.0
-            for a in range(3):
-                r = R[a, 0] * P[m, 0] + R[a, 1] * P[m, 1] + R[a, 2] * P[m, 2] + t[a] - Q[m, a]
-                error += r * r
-            if error < tolerance * tolerance:
-                support[k] += weights[m] * (1.0 - error / (tolerance * tolerance))
-    return T, support
+            _turn(n, dp, m, dq, R)
+        for a in range(3):
+            R[a, 3] = 0.5 * (Q[i, a] + Q[j, a])
+            for b in range(3):
+                R[a, 3] -= R[a, b] * 0.5 * (P[i, b] + P[j, b])
+        R[3, 3] = 1.0
+    return T
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _support(P, Q, weights, T, tolerance):  # type: ignore[no-untyped-def]
+    """The weight of the matches, columns (3, M) float32, that each pose (K, 4, 4) float32 brings together.
+
+    Without branches, so that it runs in lanes.
+    """
+    support = np.zeros(len(T))
+    px, py, pz, qx, qy, qz = P[0], P[1], P[2], Q[0], Q[1], Q[2]
+    scale, nothing, one = np.float32(1.0) / (tolerance * tolerance), np.float32(0.0), np.float32(1.0)
+    for k in range(len(T)):
+        r00, r01, r02, tx = T[k, 0, 0], T[k, 0, 1], T[k, 0, 2], T[k, 0, 3]
+        r10, r11, r12, ty = T[k, 1, 0], T[k, 1, 1], T[k, 1, 2], T[k, 1, 3]
+        r20, r21, r22, tz = T[k, 2, 0], T[k, 2, 1], T[k, 2, 2], T[k, 2, 3]
+        total = nothing
+        for m in range(len(weights)):
+            x = r00 * px[m] + r01 * py[m] + r02 * pz[m] + tx - qx[m]
+            y = r10 * px[m] + r11 * py[m] + r12 * pz[m] + ty - qy[m]
+            z = r20 * px[m] + r21 * py[m] + r22 * pz[m] + tz - qz[m]
+            total += weights[m] * max(nothing, one - scale * (x * x + y * y + z * z))
+        support[k] = total
+    return support

@@ -11,16 +11,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.geometry import rotation_angle
 from objreg_ros.registrar.candidate import Candidate
 from objreg_ros.registrar.consensus import distinct
 from objreg_ros.registrar.hypotheses import Hypothesis, from_centroids, from_features, from_objects, from_prior
 from objreg_ros.registrar.icp import align
 from objreg_ros.registrar.keyframe import Keyframe
-from objreg_ros.registrar.objects import explain
+from objreg_ros.registrar.objects import Pairs, explain
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Pantry, Prepared
-from objreg_ros.registrar.refine import refine
+from objreg_ros.registrar.refine import refine, settle
 from objreg_ros.registrar.verify import rank, verify
 
 
@@ -39,6 +38,10 @@ class Engine:
         self._params = params
         self._pantry = Pantry(params)
 
+    def prepare(self, keyframe: Keyframe) -> None:
+        """Make a keyframe ready, before several threads propose poses of it."""
+        self._pantry.get(keyframe)
+
     def propose(
         self, source: Keyframe, target: Keyframe, T_target_source_prior: Array | None = None
     ) -> tuple[Candidate, ...]:
@@ -49,8 +52,13 @@ class Engine:
         pair = Pair(source=self._pantry.get(source), target=self._pantry.get(target))
         if min(len(pair.source.xyz), len(pair.target.xyz)) < self._params.min_points:
             return ()
-        seeds = self._seeds(pair, T_target_source_prior)
-        candidates = [self._judge(pair, seed) for seed in seeds]
+        seeds = self._settled(pair, self._seeds(pair, T_target_source_prior))
+        if not seeds:
+            return ()
+        T, worth = np.array([seed.T_target_source for seed in seeds]), np.array([seed.worth for seed in seeds])
+        apart = np.radians(self._params.agreement_rotation), self._params.agreement_translation
+        best = distinct(T, worth, pair.source.middle, self._params.finished, *apart)
+        candidates = [self._judge(pair, seeds[k], seeds) for k in best]
         return tuple(merged(candidates, pair.source.middle, self._params))
 
     def _seeds(self, pair: Pair, prior: Array | None) -> list[Hypothesis]:
@@ -78,16 +86,31 @@ class Engine:
         chosen = distinct(T, V, source.middle, params.refined_per_chain, np.radians(5.0), 0.10)
         return [replace(chain[k], T_target_source=T[k]) for k in chosen]
 
-    def _judge(self, pair: Pair, seed: Hypothesis) -> Candidate:
-        """Refine a hypothesis and gather the evidence."""
+    def _settled(self, pair: Pair, seeds: list[Hypothesis]) -> list[Hypothesis]:
+        """The hypotheses where the shape alone brings them, each with its worth for the views and the objects."""
+        if not seeds:
+            return []
+        params, source, target = self._params, pair.source, pair.target
+        T = settle(source, target, np.array([seed.T_target_source for seed in seeds]), params)
+        V = rank(source.sight, target.sight, T, params, params.grey_points)
+        objects = [agreement(*explain(source, target, pose, params), params) for pose in T]
+        return [
+            replace(seed, T_target_source=pose, worth=float(v + more))
+            for seed, pose, v, more in zip(seeds, T, V, objects, strict=True)
+        ]
+
+    def _judge(self, pair: Pair, seed: Hypothesis, seeds: list[Hypothesis]) -> Candidate:
+        """Finish a hypothesis and gather the evidence; ``seeds`` are all that may agree with it."""
         params, source, target = self._params, pair.source, pair.target
         alignment = refine(source, target, seed.T_target_source, params)
         T = alignment.T_target_source
         explained, moved = explain(source, target, T, params)
+        poses = np.array([other.T_target_source for other in seeds])
+        same = [same_pose(poses, T_known, source.middle, params) for T_known in (seed.T_target_source, T)]
         return Candidate(
             alignment=alignment,
             chain=seed.chain,
-            agreeing_chains=(seed.chain,),
+            agreeing_chains=tuple(sorted({seeds[k].chain for k in np.flatnonzero(same[0] | same[1])})),
             verification=verify(source.sight, target.sight, T, params),
             explained=explained,
             moved=moved,
@@ -103,25 +126,33 @@ def gravity_error_deg(source: Prepared, target: Prepared, T_target_source: Array
 
 
 def merged(candidates: list[Candidate], middle: Array, params: RegistrarParams) -> list[Candidate]:
-    """Distinct candidates, best first; each knows which other chains came to its pose."""
+    """Distinct candidates, best first; each knows the chains of those that came to its pose."""
     ranked = sorted(candidates, key=lambda candidate: -worth(candidate, params))
+    poses = np.array([candidate.T_target_source for candidate in ranked])
     kept: list[Candidate] = []
-    for candidate in ranked:
-        if not any(same_pose(candidate, other, middle, params) for other in kept):
-            chains = {other.chain for other in ranked if same_pose(candidate, other, middle, params)}
+    known = np.zeros(len(ranked), bool)
+    for k, candidate in enumerate(ranked):
+        if not known[k]:
+            same = same_pose(poses, poses[k], middle, params)
+            chains = {chain for j in np.flatnonzero(same) for chain in ranked[j].agreeing_chains}
             kept.append(replace(candidate, agreeing_chains=tuple(sorted(chains))))
+            known |= same
     return kept
 
 
 def worth(candidate: Candidate, params: RegistrarParams) -> float:
     """What candidates are ranked by: the views' verdict, and the objects' where rooms repeat themselves."""
-    objects = min(2, len(candidate.explained)) - min(2, len(candidate.moved))
-    return candidate.verification.score + params.object_bonus * objects
+    return candidate.verification.score + agreement(candidate.explained, candidate.moved, params)
 
 
-def same_pose(a: Candidate, b: Candidate, middle: Array, params: RegistrarParams) -> bool:
-    """Whether two candidates differ by less than the tolerance of agreement, seen from the middle of the context."""
-    Ta, Tb = a.T_target_source, b.T_target_source
-    turned = np.degrees(rotation_angle(Ta[:3, :3].T @ Tb[:3, :3]))
-    moved = np.linalg.norm(Ta[:3, :3] @ middle + Ta[:3, 3] - Tb[:3, :3] @ middle - Tb[:3, 3])
-    return bool(turned < params.agreement_rotation and moved < params.agreement_translation)
+def agreement(explained: Pairs, moved: Pairs, params: RegistrarParams) -> float:
+    """What the objects add to V."""
+    return params.object_bonus * (min(2, len(explained)) - min(2, len(moved)))
+
+
+def same_pose(T: Array, T_known: Array, middle: Array, params: RegistrarParams) -> Array:
+    """Which poses (K, 4, 4) differ from one by less than the tolerance of agreement, seen from the context's middle."""
+    cosine = 0.5 * (np.einsum("kij,ij->k", T[:, :3, :3], T_known[:3, :3]) - 1.0)
+    moved = np.linalg.norm((T[:, :3, :3] - T_known[:3, :3]) @ middle + T[:, :3, 3] - T_known[:3, 3], axis=-1)
+    close = cosine > np.cos(np.radians(params.agreement_rotation))
+    return np.asarray(close & (moved < params.agreement_translation))

@@ -14,6 +14,7 @@ import numpy as np
 from objreg_ros.data import Array
 
 BINS = 11
+CROWD = 256  # most neighbours of a point
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -70,14 +71,16 @@ def match(source: Features, target: Features, limit: int) -> tuple[Array, Array,
     a, b = pairs[:, 0], pairs[:, 1]
     mutual = (forward[a] == b) & (backward[b] == a)
     salient = np.minimum(source.saliency[a], target.saliency[b])
-    rank = salient * np.where(mutual, 2.0, 1.0) / (20.0 + np.sqrt(squared[a, b]))
+    rank = salient * np.where(mutual, 2.0, 1.0) / (20.0 + np.sqrt(np.maximum(squared[a, b], 0.0)))
     best = np.argsort(-rank, kind="stable")[:limit]
     return a[best], b[best], rank[best] / max(1e-9, float(rank.max()))
 
 
 def _squared_distances(a: Array, b: Array) -> Array:
-    squared = (a * a).sum(axis=1)[:, None] + (b * b).sum(axis=1)[None] - 2.0 * (a @ b.T)
-    return np.asarray(np.maximum(squared, 0.0))
+    squared = (a * np.float32(-2.0)) @ b.T
+    squared += (a * a).sum(axis=1)[:, None]
+    squared += (b * b).sum(axis=1)[None]
+    return np.asarray(squared)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -118,54 +121,74 @@ def _neighbours(xyz, i, order, first, low, shape, radius, found, squared):  # ty
     return n
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
-def _add_pair(p, n, q, m, distance, out):  # type: ignore[no-untyped-def]
-    """Add the Darboux angles of two oriented points to the three histograms in ``out``."""
-    d = (q - p) / distance
-    a1 = n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
-    a2 = m[0] * d[0] + m[1] * d[1] + m[2] * d[2]
-    u, w, phi = n, m, a1
-    if abs(a1) < abs(a2):  # the point whose normal is closer to the line is the source
-        u, w, d, phi = m, n, -d, -a2
-    v = np.array([d[1] * u[2] - d[2] * u[1], d[2] * u[0] - d[0] * u[2], d[0] * u[1] - d[1] * u[0]], np.float32)
-    length = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+@numba.njit(cache=True, nogil=True, fastmath=True, inline="always")
+def _bins(p, n, q, m, distance):  # type: ignore[no-untyped-def]
+    """The bins (of 11 each) of the three Darboux angles of two oriented points, the same from either side.
+
+    The first is -1 where the angles are not defined.
+    """
+    x, y, z = (q[0] - p[0]) / distance, (q[1] - p[1]) / distance, (q[2] - p[2]) / distance
+    a, b = n[0] * x + n[1] * y + n[2] * z, m[0] * x + m[1] * y + m[2] * z
+    u, w, phi = n, m, a
+    if abs(a) < abs(b):  # the point whose normal is closer to the line is the source
+        u, w, x, y, z, phi = m, n, -x, -y, -z, -b
+    vx, vy, vz = y * u[2] - z * u[1], z * u[0] - x * u[2], x * u[1] - y * u[0]
+    length = np.sqrt(vx * vx + vy * vy + vz * vz)
     if length < 1e-6:
-        return
-    v /= length
-    x = np.array([u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]], np.float32)
-    alpha = v[0] * w[0] + v[1] * w[1] + v[2] * w[2]
-    theta = np.arctan2(x[0] * w[0] + x[1] * w[1] + x[2] * w[2], u[0] * w[0] + u[1] * w[1] + u[2] * w[2])
-    out[min(10, int(11.0 * (theta + np.pi) / (2.0 * np.pi)))] += 1.0
-    out[11 + max(0, min(10, int(11.0 * (alpha + 1.0) * 0.5)))] += 1.0
-    out[22 + max(0, min(10, int(11.0 * (phi + 1.0) * 0.5)))] += 1.0
+        return -1, 0, 0
+    alpha = (vx * w[0] + vy * w[1] + vz * w[2]) / length
+    sine = (u[1] * vz - u[2] * vy) * w[0] + (u[2] * vx - u[0] * vz) * w[1] + (u[0] * vy - u[1] * vx) * w[2]
+    theta = np.arctan2(sine / length, u[0] * w[0] + u[1] * w[1] + u[2] * w[2])
+    return (
+        min(10, int(11.0 * (theta + np.pi) / (2.0 * np.pi))),
+        max(0, min(10, int(11.0 * (alpha + 1.0) * 0.5))),
+        max(0, min(10, int(11.0 * (phi + 1.0) * 0.5))),
+    )
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
 def _histograms(xyz, normals, order, first, low, shape, radius):  # type: ignore[no-untyped-def]
     """FPFH (N, 33), each of the three parts summing to 100, and the number of neighbours (N,)."""
     n = len(xyz)
-    found, squared = np.empty(256, np.int64), np.empty(256, np.float32)
-    simple = np.zeros((n, 33), np.float32)
+    found, squared = np.empty((n, CROWD), np.int32), np.empty((n, CROWD), np.float32)
+    simple = np.zeros((n, 3 * BINS), np.float32)
     crowd = np.zeros(n, np.int64)
     for i in range(n):
-        crowd[i] = _neighbours(xyz, i, order, first, low, shape, radius, found, squared)
-        for s in range(crowd[i]):
-            j = found[s]
-            _add_pair(xyz[i], normals[i], xyz[j], normals[j], np.sqrt(squared[s]), simple[i])
-        if crowd[i] > 0:
-            simple[i] *= np.float32(100.0 / crowd[i])
-    fast = np.zeros((n, 33), np.float32)
+        crowd[i] = _neighbours(xyz, i, order, first, low, shape, radius, found[i], squared[i])
     for i in range(n):
-        for s in range(_neighbours(xyz, i, order, first, low, shape, radius, found, squared)):
-            weight = np.float32(1.0) / squared[s]
-            for k in range(33):
-                fast[i, k] += weight * simple[found[s], k]
+        for s in range(crowd[i]):
+            j = found[i, s]
+            mutual = crowd[j] < CROWD and crowd[i] < CROWD  # a full list may lack the other
+            if mutual and j < i:
+                continue  # the other one has added it to both
+            a, b, c = _bins(xyz[i], normals[i], xyz[j], normals[j], np.sqrt(squared[i, s]))
+            if a < 0:
+                continue
+            for k in range(2 if mutual else 1):
+                owner = j if k else i
+                simple[owner, a] += 1.0
+                simple[owner, BINS + b] += 1.0
+                simple[owner, 2 * BINS + c] += 1.0
+    for i in range(n):
+        simple[i] *= np.float32(100.0 / max(1, crowd[i]))
+    return _weighted(simple, found, squared, crowd), crowd
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _weighted(simple, found, squared, crowd):  # type: ignore[no-untyped-def]
+    """Each histogram with those of its neighbours, the near ones most."""
+    fast = np.zeros_like(simple)
+    for i in range(len(simple)):
+        for s in range(crowd[i]):
+            weight, j = np.float32(1.0) / squared[i, s], found[i, s]
+            for k in range(3 * BINS):
+                fast[i, k] += weight * simple[j, k]
         for part in range(3):
             total = np.float32(0.0)
-            for k in range(11):
-                total += fast[i, 11 * part + k]
+            for k in range(BINS):
+                total += fast[i, BINS * part + k]
             scale = np.float32(100.0) / max(total, np.float32(1e-9))
             own = np.float32(1.0) if total > 0 else np.float32(0.0)
-            for k in range(11):
-                fast[i, 11 * part + k] = own * scale * fast[i, 11 * part + k] + simple[i, 11 * part + k]
-    return fast, crowd
+            for k in range(BINS):
+                fast[i, BINS * part + k] = own * scale * fast[i, BINS * part + k] + simple[i, BINS * part + k]
+    return fast

@@ -24,7 +24,7 @@ from objreg_ros.bridge.markers import Scene
 from objreg_ros.bridge.matching import MatchingDoor
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.sync import Match, Need, Stream
-from objreg_ros.bridge.worker import Worker
+from objreg_ros.bridge.worker import Backlog
 from objreg_ros.data import Frame
 from objreg_ros.registrar.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.registrar.registrar import Outcome, Registrar, Stretch
@@ -36,7 +36,8 @@ KEPT_CONSTRAINTS = 1000  # what a mapper that comes late still gets
 class RegistrarNode(MatchingDoor):
     """Follows every frame; searches, in a second worker, for the places that a keyframe shows again.
 
-    A frame that completes a keyframe is in the books until its search is over.
+    A frame that completes a keyframe is in the books until its search is over. A keyframe that a newer one overtakes is
+    stored without a search: nothing that was seen is lost.
     """
 
     def __init__(self) -> None:
@@ -48,9 +49,9 @@ class RegistrarNode(MatchingDoor):
         self._tracking = threading.Lock()
         self._enabled = True
         self._counts = dict(self._registrar.counts())
-        self._accepted, self._refused = 0, Counter[str]()
+        self._accepted, self._unsearched, self._refused = 0, 0, Counter[str]()
         self._scene, self._odom_frame = Scene(), "odom"
-        self.searcher: Worker[tuple[int, Stretch]] = Worker(self._search, self._overtaken, self.fail)
+        self.searcher: Backlog[tuple[int, Stretch]] = Backlog(self._search, self._keep, self.fail)
         self._announce()
         self._serve()
         self._listen(round(inputs.odom_slop * 1e9))
@@ -107,11 +108,16 @@ class RegistrarNode(MatchingDoor):
         return self.read("frame", from_msg.frame, *(match[topic] for topic in topics), self._T_base_camera)
 
     def _search(self, job: tuple[int, Stretch]) -> None:
-        self.conclude(job[0], lambda: self._find(job[1]))
+        self.conclude(job[0], lambda: self._find(job[1], "search", self._seconds))
 
-    def _find(self, stretch: Stretch) -> bool:
-        with self.ledger.timed("search"):
-            outcome = self._registrar.search(stretch, self._seconds)
+    def _keep(self, job: tuple[int, Stretch]) -> None:
+        """Store a keyframe without a search: a newer one waits."""
+        self._unsearched += 1
+        self.conclude(job[0], lambda: self._find(job[1], "keep", 0.0))
+
+    def _find(self, stretch: Stretch, stage: str, seconds: float) -> bool:
+        with self.ledger.timed(stage):
+            outcome = self._registrar.search(stretch, seconds)
         self._publish(outcome)
         return True
 
@@ -135,12 +141,15 @@ class RegistrarNode(MatchingDoor):
         """What is stored, what was accepted, and what was refused by reason."""
         stored = {f"stored {what}": count for what, count in self._counts.items()}
         refused = {f"{REJECTED}{reason}": count for reason, count in sorted(self._refused.items())}
-        return {**super().extra_diagnostics(), **stored, "constraints": self._accepted, **refused}
+        counts = {"constraints": self._accepted, "stored unsearched": self._unsearched}
+        return {**super().extra_diagnostics(), **stored, **counts, **refused}
 
     # Services
 
     def _reset(self, _: Any, response: Any) -> Any:
         with self._tracking:
+            for stamp_ns, _ in self.searcher.rest():
+                self.drop(stamp_ns, "reset")
             self._registrar.reset()
         self._scene.clear()
         self._counts = dict(self._registrar.counts())
@@ -163,9 +172,12 @@ class RegistrarNode(MatchingDoor):
         return response
 
     def close(self) -> None:
-        """End both workers, let go of the store."""
+        """End both workers, store what they had not come to, let go of the store."""
         self.worker.close()
         self.searcher.close()
+        for stretch in (*(job[1] for job in self.searcher.rest()), self._registrar.end()):
+            if stretch is not None:
+                self._registrar.search(stretch, 0.0)
         self._registrar.close()
         super().close()
 

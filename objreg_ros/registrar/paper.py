@@ -42,6 +42,10 @@ class PaperEngine:
         self._params = params
         self._pantry = Pantry(params)
 
+    def prepare(self, keyframe: Keyframe) -> None:
+        """Make a keyframe ready, before several threads propose poses of it."""
+        self._pantry.get(keyframe)
+
     def propose(
         self, source: Keyframe, target: Keyframe, T_target_source_prior: Array | None = None
     ) -> tuple[Candidate, ...]:

@@ -6,9 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
-from objreg_ros.geometry import Array, pose, rotation_from_quaternion
+from objreg_ros.geometry import Array, mounting
 from objreg_ros.params import Params, param
 
 
@@ -53,6 +51,7 @@ class RegistrarParams(Params):
     prior_rotation: float = param(6.0, "odometry less certain than this proposes no pose", "deg", ge=0.0)
     thin_seconds: float = param(1.0, "closures whose both ends are nearer than this are one closure", "s", ge=0.0)
     closures: int = param(2, "accepted closures of one keyframe that end its search", ge=1)
+    threads: int = param(2, "stored keyframes that are tried at once", ge=1, le=16)
     candidates: int = param(4, "stored keyframes that are tried for each new one, best first", ge=1, le=100)
 
     # How a pose is found and looked at.
@@ -70,6 +69,7 @@ class RegistrarParams(Params):
     grid_cell: float = param(0.05, "cell of the grid that knows the closest point", "m", ge=0.01, le=0.2)
     grid_reach: float = param(0.20, "how far from a surface its grid reaches", "m", ge=0.02)
     refined_per_chain: int = param(5, "hypotheses of each chain that are refined to the end", ge=1)
+    finished: int = param(3, "hypotheses of all chains that grey finishes and the gate sees", ge=1)
     quick_sample: int = param(500, "points a side that rank the hypotheses", ge=50)
     quick_points: int = param(500, "points that bring a hypothesis to its basin", ge=50)
     reaches: tuple[float, ...] = param((0.2, 0.1, 0.06), "distance of a pair at first, in the basin, at the end", "m")
@@ -136,15 +136,12 @@ class RegistrarNodeParams(Params):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if len(self.T_base_camera) not in (0, 7):
-            raise ValueError(f"T_base_camera: expected x y z qx qy qz qw or nothing, got {self.T_base_camera}")
+        mounting(self.T_base_camera)
 
     @property
     def mounting(self) -> Array | None:
-        """``T_base_camera`` as a (4, 4) pose, None where none is set; ValueError for a quaternion of length 0."""
-        if not self.T_base_camera:
-            return None
-        return pose(rotation_from_quaternion(np.array(self.T_base_camera[3:])), np.array(self.T_base_camera[:3]))
+        """``T_base_camera`` as a (4, 4) pose, None where none is set."""
+        return mounting(self.T_base_camera)
 
     @property
     def limit(self) -> float:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import OrderedDict
 from dataclasses import dataclass
 
@@ -99,17 +100,23 @@ def _shuffled(xyz: Array, normals: Array, seed: int) -> dict[str, Array]:
 
 
 class Pantry:
-    """The last ``size`` keyframes that were made ready."""
+    """The last ``size`` keyframes that were made ready; for several threads."""
 
     def __init__(self, params: RegistrarParams, size: int = 32) -> None:
         self._params = params
         self._size = size
+        self._lock = threading.Lock()
         self._shelf: OrderedDict[int, Prepared] = OrderedDict()
 
     def get(self, keyframe: Keyframe) -> Prepared:
         """The keyframe made ready, now or before; the entry holds it, so its id stays its own."""
-        prepared = self._shelf.pop(id(keyframe), None) or prepare(keyframe, self._params)
-        self._shelf[id(keyframe)] = prepared
-        while len(self._shelf) > self._size:
-            self._shelf.popitem(last=False)
+        with self._lock:
+            prepared = self._shelf.get(id(keyframe))
+        if prepared is None:
+            prepared = prepare(keyframe, self._params)
+        with self._lock:
+            self._shelf[id(keyframe)] = prepared
+            self._shelf.move_to_end(id(keyframe))
+            while len(self._shelf) > self._size:
+                self._shelf.popitem(last=False)
         return prepared

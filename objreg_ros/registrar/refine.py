@@ -15,17 +15,20 @@ from objreg_ros.registrar.sliding import resisted
 from objreg_ros.registrar.verify import verify
 
 
-def refine(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> Alignment:
-    """Refine a pose that is in its basin; ``converged`` is False where next to nothing holds it.
+def settle(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> Array:
+    """Poses (K, 4, 4) in their basins, brought to where the whole shape holds them."""
+    _, reach, last = params.reaches
+    return align(source.xyz, source.normals, target.surface, T_target_source, reach, last, params.iterations)[0]
 
-    Grey has its say at the end, and keeps it where the views like the pose no less. The information counts only what
+
+def refine(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> Alignment:
+    """Finish a settled pose; ``converged`` is False where next to nothing holds it.
+
+    Grey has its say, and keeps it where the views like the pose no less. The information counts only what
     lies on different patches of surface as independent, because the noise of neighbouring points is not.
     """
-    _, reach, last = params.reaches
-    points = (source.xyz, source.normals, target.surface)
-    T = align(*points, T_target_source[None], reach, last, params.iterations)[0][0]
-    T, grey = _finished(source, target, T, params)
-    found = fit(*points, T, last)
+    T, grey = _finished(source, target, T_target_source, params)
+    found = fit(source.xyz, source.normals, target.surface, T, params.reaches[-1])
     loose = slack(found._replace(H=found.H + grey), T, transform(T, source.middle), params.slack_share)
     free, held = resisted(source, target, T, loose, found.extent, params)
     return Alignment(

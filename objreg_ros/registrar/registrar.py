@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,6 +57,7 @@ class Registrar:
         self._engine = PaperEngine(params) if params.method == "paper" else Engine(params)
         self._store = Store(params.store)
         self._lock = threading.RLock()
+        self._pool = ThreadPoolExecutor(params.threads, "register")
         self._start()
 
     def _start(self) -> None:
@@ -85,8 +88,12 @@ class Registrar:
 
     def finish(self) -> Outcome:
         """Search for the keyframe that was still being collected: the end of a recording."""
-        stretch = self._keyframer.finish()
+        stretch = self.end()
         return Outcome() if stretch is None else self.search(stretch)
+
+    def end(self) -> Stretch | None:
+        """The stretch that was still being collected, None if it shows nothing new."""
+        return self._keyframer.finish()
 
     def track(self, frame: Frame) -> Stretch | None:
         """Follow the camera; returns the stretch of frames that became a keyframe with this one, mostly None."""
@@ -95,8 +102,8 @@ class Registrar:
     def search(self, stretch: Stretch, seconds: float = np.inf) -> Outcome:
         """Make a keyframe of the stretch, look for places that it shows again, and remember it.
 
-        The likeliest places come first; those that are not reached within ``seconds`` are refused as over budget.
-        Without a limit the outcome depends on the frames alone.
+        The likeliest places come first; those that are not reached within ``seconds`` are refused as over budget: with
+        none the keyframe is only stored. Without a limit the outcome depends on the frames alone.
         """
         deadline = time.monotonic() + seconds
         with self._lock:
@@ -122,6 +129,7 @@ class Registrar:
     def close(self) -> None:
         """Let go of the store."""
         with self._lock:
+            self._pool.shutdown()
             self._store.close()
 
     def _try_places(
@@ -131,35 +139,60 @@ class Registrar:
         accepted: list[_Accepted] = []
         rejected: list[Rejected] = []
         refuse = _refuser(rejected, keyframe)
-        places = self._index.query(sightings)
+        places = deque(self._index.query(sightings))
         if not places:
             refuse(keyframe.stamp_ns, (Reason.NO_CANDIDATE, "no stored keyframe has such objects"))
         tries = self.params.candidates
-        for place in places:
-            if self._thinning.redundant(place.stamp_ns, keyframe.stamp_ns):
-                refuse(place.stamp_ns, (Reason.REDUNDANT, "a closure of the same two moments was accepted"))
-            elif tries == 0 or len(accepted) == self.params.closures:
-                break
-            else:
+        while places and tries > 0 and len(accepted) < self.params.closures:
+            for place, ask in self._begun(keyframe, places, min(tries, self.params.threads), deadline):
+                if len(accepted) == self.params.closures:
+                    break
+                if ask is None or self._thinning.redundant(place.stamp_ns, keyframe.stamp_ns):
+                    refuse(place.stamp_ns, (Reason.REDUNDANT, "a closure of the same two moments was accepted"))
+                    continue
                 tries -= 1
-                verdict = self._try_place(keyframe, place, deadline)
+                verdict = ask()
                 if isinstance(verdict, _Accepted):
+                    self._thinning.accept(place.stamp_ns, keyframe.stamp_ns)
                     accepted.append(verdict)
                 else:
                     refuse(place.stamp_ns, verdict)
         return accepted, tuple(rejected)
 
-    def _try_place(self, keyframe: Keyframe, place: Place, deadline: float) -> _Accepted | Refusal:
-        if time.monotonic() > deadline:
-            return Reason.OVER_BUDGET, "not reached in time"
+    def _begun(
+        self, keyframe: Keyframe, places: deque[Place], count: int, deadline: float
+    ) -> list[tuple[Place, Callable[[], _Accepted | Refusal] | None]]:
+        """Take places off until ``count`` are being tried, all at once; with each what waits for its verdict.
+
+        None for one that would say what is said already. Verdicts are asked for in the order of the places, so that it
+        does not matter which is done first.
+        """
+        begun: list[tuple[Place, Callable[[], _Accepted | Refusal] | None]] = []
+        while places and count > 0:
+            place = places.popleft()
+            if self._thinning.redundant(place.stamp_ns, keyframe.stamp_ns):
+                begun.append((place, None))
+                continue
+            begun.append((place, self._try_place(keyframe, place, deadline)))
+            count -= 1
+        return begun
+
+    def _try_place(self, keyframe: Keyframe, place: Place, deadline: float) -> Callable[[], _Accepted | Refusal]:
+        """Begin to register a place in a thread of its own; what comes back waits for the verdict."""
+        late = time.monotonic() - deadline
+        if late > 0:
+            return lambda: (Reason.OVER_BUDGET, f"{1e3 * late:.0f} ms after the end of the search")
+        self._engine.prepare(keyframe)
         target = self._store.keyframe(place.keyframe_id)
         prior = self._path.prior(keyframe, target, place.travelled, place.turned, self.params)
         start = prior.T_target_source if prior is not None and prior.tight(self.params) else None
-        verdict = judge(self._engine.propose(keyframe, target, start), self.params, prior)
-        if not isinstance(verdict, Candidate):
-            return verdict
-        self._thinning.accept(target.stamp_ns, keyframe.stamp_ns)
-        return _Accepted(target=target, candidate=verdict)
+        proposed = self._pool.submit(self._engine.propose, keyframe, target, start)
+
+        def verdict() -> _Accepted | Refusal:
+            answer = judge(proposed.result(), self.params, prior)
+            return _Accepted(target=target, candidate=answer) if isinstance(answer, Candidate) else answer
+
+        return verdict
 
     def _remember(
         self, keyframe: Keyframe, sightings: Sequence[Sighting], accepted: Sequence[_Accepted]

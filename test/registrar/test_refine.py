@@ -9,7 +9,7 @@ import pytest
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import prepare
-from objreg_ros.registrar.refine import about_camera, refine
+from objreg_ros.registrar.refine import about_camera, refine, settle
 
 from .rooms import keyframe, seen_from
 
@@ -25,13 +25,14 @@ def pair():
 
 
 def test_a_shifted_start_comes_back_to_the_truth(pair) -> None:
-    found = refine(*pair, OFF @ TRUTH, PARAMS)
+    found = refine(*pair, settle(*pair, (OFF @ TRUTH)[None], PARAMS)[0], PARAMS)
     rotation, distance = pose_error(found.T_target_source, TRUTH)
     assert rotation < 0.5 and distance < 1.5 and found.converged
 
 
 def test_the_inverted_problem_has_the_inverted_answer(pair) -> None:
-    found = refine(pair[1], pair[0], inverse(OFF @ TRUTH), PARAMS)
+    settled = settle(pair[1], pair[0], inverse(OFF @ TRUTH)[None], PARAMS)
+    found = refine(pair[1], pair[0], settled[0], PARAMS)
     rotation, distance = pose_error(found.T_target_source, inverse(TRUTH))
     assert rotation < 0.5 and distance < 1.5
 
@@ -66,8 +67,8 @@ def test_the_pattern_of_a_bare_wall_holds_what_its_shape_lets_slide() -> None:
 
 def test_a_pattern_that_does_not_correlate_holds_nothing() -> None:
     here, there = pose(np.eye(3), np.zeros(3)), pose(np.eye(3), np.array([0.5, 0.3, 0.0]))
-    views = (keyframe(seen_from(0.0, height=0.75) @ T, WALL, noise=0.0003) for T in (here, there))
-    assert len(refine(*(prepare(view, PARAMS) for view in views), np.eye(4), PARAMS).slack) == 3
+    views = [prepare(keyframe(seen_from(0.0, height=0.75) @ T, WALL, noise=0.0003), PARAMS) for T in (here, there)]
+    assert len(refine(*views, settle(*views, np.eye(4)[None], PARAMS)[0], PARAMS).slack) == 3
 
 
 def test_a_start_far_away_does_not_converge(pair) -> None:
