@@ -89,11 +89,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("checkpoint", type=Path)
     parser.add_argument("model", type=Path)
+    parser.add_argument("--history", help="how it came about, where the last command does not tell it all")
     arguments = parser.parse_args()
     checkpoint = torch.load(arguments.checkpoint, map_location="cpu", weights_only=True)
     network = MobileNetSsd(len(LABELS))
     network.load_state_dict(checkpoint["average"])
-    export(network, arguments.model, provenance_of(checkpoint))
+    history = {"history": arguments.history} if arguments.history else {}
+    export(network, arguments.model, provenance_of(checkpoint) | history)
     print(f"{arguments.model}: {arguments.model.stat().st_size / 1e6:.2f} MB, step {checkpoint['step']}")
 
 
