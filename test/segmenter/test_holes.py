@@ -24,6 +24,14 @@ def test_a_hole_that_goes_on_smoothly_is_filled() -> None:
     assert chosen.sum() == 64
 
 
+def test_a_hole_is_closed_where_depth_is_missing_in_the_rim() -> None:
+    chosen, depth = ring(), np.ones((12, 12), np.float32)
+    chosen[2:5, 5], depth[2:5, 5], depth[1, 5] = False, 0, 0
+    fill_holes(chosen, depth, JUMP)
+    assert chosen[5:7, 5:7].all()
+    assert not chosen[2:5, 5].any()
+
+
 def test_what_is_seen_through_a_hole_stays_outside() -> None:
     chosen, depth = ring(), np.ones((12, 12), np.float32)
     depth[5:7, 5:7] = 1.5

@@ -29,6 +29,13 @@ def test_a_box_that_holds_two_gives_one_of_them() -> None:
     assert min(found[2], found[3]) < 0.05
 
 
+def test_two_parts_of_one_colour_and_distance_that_fill_a_box_are_one_thing() -> None:
+    scene = Scene().plane().box((-0.6, 0, 0), (-0.55, 0.05, 0.05)).box((0.55, 0, 0), (0.6, 0.05, 0.05))
+    scene = scene.box((-0.2, 0, 0.2), (-0.05, 0.05, 0.35)).box((0.1, 0, 0), (0.25, 0.05, 0.15))  # both of one colour
+    found, _ = shares(scene, scene.box_of(4, 5))
+    assert min(found[4], found[5]) > 0.9
+
+
 def test_stacked_boxes_are_told_apart() -> None:
     scene = Scene(tilt_deg=45).plane().box((-0.15, -0.1, 0), (0.15, 0.15, 0.08))
     scene = scene.box((-0.08, -0.02, 0.08), (0.08, 0.12, 0.16))
