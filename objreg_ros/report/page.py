@@ -35,6 +35,8 @@ MEANINGS = {
     "over_budget": "time ran out before this place was tried",
 }
 
+UNTRIED = ("no_candidate", "redundant", "over_budget")
+
 
 def page(chapters: Sequence[tuple[Story, Album | None]]) -> str:
     """The HTML of a report, a chapter for each run; one without an album has no pictures."""
@@ -93,7 +95,9 @@ def _tile(value: str, name: str, note: str, tone: str = "") -> str:
 
 
 def _refused_count(story: Story) -> int:
-    return sum(story.summary.get("rejected", {}).values()) or len(story.refusals)
+    """How many candidates were tried in vain."""
+    counts = story.summary.get("rejected", {})
+    return sum(count for reason, count in counts.items() if reason not in UNTRIED)
 
 
 def _count_note(story: Story) -> str:
