@@ -183,7 +183,8 @@ def _compare(labels, depth, x, y, bounds, touching, front, gap):  # type: ignore
                 continue
             k = labels[i, j]
             jump = bounds[0] + bounds[1] * depth[i, j] * depth[i, j]
-            for d in range(1, ACROSS + 1):
+            far = ACROSS if k > 0 else 2  # beyond two cells only the gap between two parts counts
+            for d in range(1, far + 1):
                 if i + d < h and labels[i + d, j] != k:
                     _pair(labels, depth, x, y, i, j, i + d, j, d, jump, touching, front, gap)
                 if j + d < w and labels[i, j + d] != k:
