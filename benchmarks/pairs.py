@@ -276,7 +276,11 @@ def summed(pairs: Sequence[Pair], rows: Sequence[Row]) -> dict[str, Any]:
 
 
 def figures(pairs: Sequence[Pair], rows: Sequence[Row], middle: int) -> dict[str, Any]:
-    """A method's figures: over all, by view change, and by half of the recording (both frames in it)."""
+    """A method's figures: over all, by view change, and by half of the recording.
+
+    Our thresholds are fixed on the first half: ``fitted`` are the pairs within it, ``held_out`` those within the
+    second, ``across`` those of one frame of each.
+    """
     out = summed(pairs, rows)
     out["by_view_change"] = {}
     for low, high in BINS:
@@ -286,11 +290,13 @@ def figures(pairs: Sequence[Pair], rows: Sequence[Row], middle: int) -> dict[str
             out["by_view_change"][f"{low}-{high}"] = {
                 key: part[key] for key in ("could_close", "loose", "accepted_recall", "wrong")
             }
-    for name, inside in (("first_half", lambda k: k < middle), ("second_half", lambda k: k >= middle)):
-        chosen = [k for k, p in enumerate(pairs) if inside(p.source) and inside(p.target)]
-        if chosen:
-            part = summed([pairs[k] for k in chosen], [rows[k] for k in chosen])
-            out[name] = {key: part[key] for key in ("tried", "could_close", "accepted_recall", "wrong")}
+    sides: dict[str, list[int]] = {"fitted": [], "held_out": [], "across": []}
+    for k, pair in enumerate(pairs):
+        late = (pair.source >= middle) + (pair.target >= middle)
+        sides[("fitted", "across", "held_out")[late]].append(k)
+    parts = {name: summed([pairs[k] for k in side], [rows[k] for k in side]) for name, side in sides.items() if side}
+    shown = ("tried", "could_close", "loose", "accepted_recall", "wrong")
+    out["half"] = {name: {key: part[key] for key in shown} for name, part in parts.items()}
     return out
 
 
