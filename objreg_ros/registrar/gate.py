@@ -54,7 +54,7 @@ def refuse(candidate: Candidate, params: RegistrarParams, prior: Prior | None = 
 def _converged(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
     if candidate.alignment.converged:
         return None
-    return Reason.NOT_CONVERGED, f"{candidate.alignment.iterations} iterations"
+    return Reason.NOT_CONVERGED, f"{candidate.alignment.inliers} points find a partner"
 
 
 def _plausible(candidate: Candidate, params: RegistrarParams) -> Refusal | None:

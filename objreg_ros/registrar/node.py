@@ -50,6 +50,7 @@ class RegistrarNode(MatchingDoor):
         self._enabled = True
         self._counts = dict(self._registrar.counts())
         self._accepted, self._unsearched, self._refused = 0, 0, Counter[str]()
+        self._last_refusal = ""
         self._scene, self._odom_frame = Scene(), "odom"
         self.searcher: Backlog[tuple[int, Stretch]] = Backlog(self._search, self._keep, self.fail)
         self._announce()
@@ -128,21 +129,23 @@ class RegistrarNode(MatchingDoor):
                 self._transforms.publish(transform)
         self._accepted += len(outcome.closures)
         self._refused.update(refusal.reason.value for refusal in outcome.rejected)
+        self._last_refusal = next((f"{r.reason.value}: {r.detail}" for r in outcome.rejected[-1:]), self._last_refusal)
         self._counts = dict(self._registrar.counts())
         if outcome.keyframe_ns is not None:
             self._scene.settle(outcome.keyframe_ns, outcome.closures, outcome.rejected)
             self._show(outcome.keyframe_ns)
 
     def _show(self, stamp_ns: int) -> None:
-        objects = [(known.landmark, known.label, known.position) for known in self._registrar.landmarks]
+        objects = [(known.landmark, known.label, known.position) for known in self._registrar.landmarks_here]
         self._markers.publish(self._scene.markers(objects, stamp_ns, self._odom_frame))
 
     def extra_diagnostics(self) -> Mapping[str, object]:
-        """What is stored, what was accepted, and what was refused by reason."""
+        """What is stored, what was accepted, what was refused by reason, and the last refusal with its numbers."""
         stored = {f"stored {what}": count for what, count in self._counts.items()}
         refused = {f"{REJECTED}{reason}": count for reason, count in sorted(self._refused.items())}
         counts = {"constraints": self._accepted, "stored unsearched": self._unsearched}
-        return {**super().extra_diagnostics(), **stored, **counts, **refused}
+        last = {"last rejected": self._last_refusal} if self._last_refusal else {}
+        return {**super().extra_diagnostics(), **stored, **counts, **refused, **last}
 
     # Services
 

@@ -40,6 +40,11 @@ class Path:
         self.travelled = 0.0
         self.turned = 0.0
 
+    @property
+    def session(self) -> int | None:
+        """The session that goes on, None before the first keyframe."""
+        return self._session
+
     def follow(self, keyframe: Keyframe) -> None:
         """Go on to a keyframe; another session starts at 0."""
         T_session_camera = np.eye(4) if keyframe.T_odom_camera is None else keyframe.T_odom_camera

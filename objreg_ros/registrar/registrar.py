@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from objreg_ros.data import Array, Frame, LoopClosure, ObjectMatch, Reason, Rejected
+from objreg_ros.geometry import transform
 from objreg_ros.registrar.candidate import Candidate
 from objreg_ros.registrar.covariance import covariance_of
 from objreg_ros.registrar.engine import Engine
@@ -75,6 +76,11 @@ class Registrar:
     def landmarks(self) -> tuple[Landmark, ...]:
         """Every known object with its id, label and position in the frame of its session, the oldest first."""
         return self._known
+
+    @property
+    def landmarks_here(self) -> tuple[Landmark, ...]:
+        """The landmarks whose position is in the frame of the session that goes on now."""
+        return tuple(landmark for landmark in self._known if landmark.session == self._path.session)
 
     def counts(self) -> dict[str, int]:
         """How many keyframes, objects, landmarks, sessions and closures the store holds."""
@@ -141,14 +147,20 @@ class Registrar:
         refuse = _refuser(rejected, keyframe)
         places = deque(self._index.query(sightings))
         if not places:
-            refuse(keyframe.stamp_ns, (Reason.NO_CANDIDATE, "no stored keyframe has such objects"))
+            refuse(
+                keyframe.stamp_ns,
+                (Reason.NO_CANDIDATE, f"none of {len(self._index)} stored objects is alike and may be here"),
+            )
         tries = self.params.candidates
         while places and tries > 0 and len(accepted) < self.params.closures:
             for place, ask in self._begun(keyframe, places, min(tries, self.params.threads), deadline):
                 if len(accepted) == self.params.closures:
                     break
                 if ask is None or self._thinning.redundant(place.stamp_ns, keyframe.stamp_ns):
-                    refuse(place.stamp_ns, (Reason.REDUNDANT, "a closure of the same two moments was accepted"))
+                    refuse(
+                        place.stamp_ns,
+                        (Reason.REDUNDANT, f"an accepted closure is nearer than {self.params.thin_seconds} s"),
+                    )
                     continue
                 tries -= 1
                 verdict = ask()
@@ -245,7 +257,7 @@ def closure_of(
         covariance=covariance_of(candidate.alignment, params),
         labels=tuple(dict.fromkeys(match.label for match in matches)) or tuple(dict.fromkeys(keyframe.labels)),
         matches=matches,
-        evidence=_evidence(candidate),
+        evidence=_evidence(candidate) | _moved(keyframe, item),
         frame_id=keyframe.frame_id,
     )
 
@@ -276,6 +288,17 @@ def _evidence(candidate: Candidate) -> dict[str, float]:
         "gravity_error_deg": candidate.gravity_error_deg,
     }
     return {name: float(number) for name, number in numbers.items() if number is not None}
+
+
+def _moved(keyframe: Keyframe, item: _Accepted) -> dict[str, float]:
+    """How far the objects went that stand elsewhere now, by label; the farthest of several of one."""
+    found: dict[str, float] = {}
+    for pair in item.candidate.moved:
+        here = transform(item.candidate.T_target_source, keyframe.objects[pair.source].centroid)
+        metres = float(np.linalg.norm(here - item.target.objects[pair.target].centroid))
+        name = f"moved {pair.label} [m]"
+        found[name] = max(metres, found.get(name, 0.0))
+    return found
 
 
 def _rotation(keyframe: Keyframe) -> Array:

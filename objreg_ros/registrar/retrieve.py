@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+import numba
 import numpy as np
 
 from objreg_ros.data import Array
@@ -114,8 +115,7 @@ class Index:
         if block is None or block.size == 0:
             return []
         n = block.size
-        likeness = block.descriptor[:n] @ row.descriptor - block.half_norm[:n]
-        likeness[~self._allowed(block, row)] = -np.inf
+        likeness = self._likeness(block, row)
         best = np.flatnonzero(likeness > max(likeness.max() - WORTH_A_VOTE, -1e30))
         if len(best) > SHORTLIST:
             best = best[np.argpartition(-likeness[best], SHORTLIST)[:SHORTLIST]]
@@ -128,13 +128,17 @@ class Index:
         columns = [column.tolist() for column in (ids, *where, vote[first])]
         return [Place(*values) for values in zip(*columns, strict=True)]
 
-    def _allowed(self, block: _Block, row: Sighting) -> Array:
+    def _likeness(self, block: _Block, row: Sighting) -> Array:
+        """How alike each object of the block is, up to a constant; -inf if it is too near in time or too far away."""
         n, params = block.size, self._params
-        apart = np.abs(block.stamp_ns[:n] - row.stamp_ns) >= round(1e9 * params.min_gap)
-        reach = params.odometry_radius + params.odometry_drift * np.abs(row.travelled - block.travelled[:n])
-        offset = block.position[:n] - row.position.astype(np.float32)
-        gone = np.einsum("ij,ij->i", offset, offset) > np.square(reach)
-        return np.asarray(apart & ~(gone & (block.session[:n] == row.session)))
+        columns = (getattr(block, name)[:n] for name in ("position", "travelled", "stamp_ns", "session"))
+        return np.asarray(
+            _likeness(  # type: ignore[call-arg]
+                block.descriptor[:n], block.half_norm[:n], *columns,
+                row.descriptor, row.position.astype(np.float32), row.travelled, row.stamp_ns, row.session,
+                round(1e9 * params.min_gap), params.odometry_radius, params.odometry_drift,
+            )
+        )  # fmt: skip
 
     def _spread(self, before: list[Place], here: list[Place]) -> list[Place]:
         """The best of each pass by here, then the next best of each, ``here``, this very pass, last among equals.
@@ -156,3 +160,30 @@ class Index:
         params, way = self._params, abs(place.travelled - other.travelled)
         sigma = params.odometry_translation_noise + params.odometry_drift * way
         return place.session == other.session and sigma <= params.prior_translation
+
+
+@numba.njit(cache=True, nogil=True)
+def _likeness(  # type: ignore[no-untyped-def]
+    descriptors, half_norms, positions, travelled, stamps_ns, sessions,
+    descriptor, position, way, stamp_ns, session, gap_ns, radius, drift,
+):  # fmt: skip
+    """In one pass over the rows, because at 1e5 objects the memory is what costs: (n,) float32."""
+    out = np.full(len(descriptors), -np.inf, np.float32)
+    for i in range(len(descriptors)):
+        if abs(stamps_ns[i] - stamp_ns) < gap_ns:
+            continue
+        if sessions[i] == session:
+            reach = radius + drift * abs(way - travelled[i])
+            x, y, z = positions[i, 0] - position[0], positions[i, 1] - position[1], positions[i, 2] - position[2]
+            if x * x + y * y + z * z > reach * reach:
+                continue
+        out[i] = _dot(descriptors[i], descriptor) - half_norms[i]
+    return out
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _dot(a, b):  # type: ignore[no-untyped-def]
+    total = np.float32(0.0)
+    for k in range(len(a)):
+        total += a[k] * b[k]
+    return total

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -122,3 +123,31 @@ def test_save_writes_a_copy_that_another_registrar_opens(tmp_path: Path) -> None
     _run(registrar, _frame(0, HERE))
     path = registrar.save(str(tmp_path / "copy.db"))
     assert Registrar(PARAMS.replaced(store=path)).counts()["keyframes"] == 1
+
+
+def test_the_number_of_threads_changes_no_closure() -> None:
+    frames = [_frame(3.0 * k, T, True) for k, T in enumerate((HERE, AWAY, BESIDE, HERE, BESIDE, AWAY))]
+    alone, together = (_run(Registrar(RegistrarParams(threads=n)), *frames) for n in (1, 3))
+    assert [(r.reason, r.from_ns, r.to_ns) for r in alone[1]] == [(r.reason, r.from_ns, r.to_ns) for r in together[1]]
+    assert len(alone[0]) == len(together[0]) > 0
+    for a, b in zip(alone[0], together[0], strict=True):
+        assert (a.from_ns, a.to_ns) == (b.from_ns, b.to_ns) and np.array_equal(a.T_from_to, b.T_from_to)
+
+
+def test_a_closure_says_how_far_an_object_has_moved() -> None:
+    changed = tuple(
+        ("bottle", (1.5, 0.6, 0.72), (1.58, 0.68, 1.0)) if box[0] == "bottle" else box for box in rooms.ROOM
+    )
+    later = rooms.keyframe(BESIDE, changed)
+    moved = replace(_frame(30, BESIDE), view=later.view, objects=tuple(item.cloud for item in later.objects))
+    closures, _ = _run(Registrar(PARAMS), _frame(0, HERE), moved)
+    assert closures and closures[0].evidence["moved bottle [m]"] == pytest.approx(0.41, abs=0.05)
+
+
+def test_landmarks_of_another_session_are_known_but_not_here(tmp_path: Path) -> None:
+    for expected in (False, True):
+        registrar = Registrar(RegistrarParams(store=str(tmp_path / "place.db")))
+        assert bool(registrar.landmarks) is expected and registrar.landmarks_here == ()
+        _run(registrar, _frame(0, HERE, True))
+        assert registrar.landmarks_here
+        registrar.close()
