@@ -81,13 +81,19 @@ class Stage:
     distance: float
 
     @classmethod
-    def of(cls, label: str, seed: int) -> Stage:
-        """A stage by label and seed."""
+    def of(cls, label: str, seed: int, aside: float = 0.0) -> Stage:
+        """A stage by label and seed; the object stands ``aside`` m from the middle of the table, twice that in a room.
+
+        In the very middle of a table, half a turn about the object is half a turn of the table: both look the same.
+        """
         rng = np.random.default_rng([seed, list(TABLE_1).index(label)])
         model = make_object(label, int(rng.integers(2**31)))
         table, room = furniture.table(rng, (1.3, 0.8)), furniture.room(rng, (2.6, 2.6))
         scene = furnished(rng, [] if model.on_floor else [(table, np.eye(4))], room)
         x, y, height = (0.0, 0.0, 0.0) if model.on_floor else table.boards[0][:3]
+        if aside > 0.0:
+            way, far = rng.uniform(0.0, 2.0 * np.pi), aside * (2.0 if model.on_floor else 1.0)
+            x, y = x + far * np.cos(way), y + far * np.sin(way)
         T = place_on(model, pose(np.eye(3), np.array([0.0, 0.0, height])), x, y, float(rng.uniform(0, 2 * np.pi)))
         distance = float(rng.uniform(1.2, 1.45) if model.on_floor else rng.uniform(0.7, 1.0))
         return cls(scene.with_objects(number([(model, T)])), model, T, float(rng.uniform(0, 360)), distance)

@@ -4,17 +4,24 @@
 One object stands on a table in a room (a chair on the floor), and the camera goes around it by 0 to 180 degrees: right
 is at most 5 degrees and 2 cm in the pose of the object, up to its symmetry. Four objects: right is the same of the
 camera's motion at their middle, without that excuse. What must be refused is another instance of the same kind, or
-another object, each in a room of its own. Beside ours, in the same run: the usual ways to register two object clouds.
+another object, each in a room of its own; an accepted pose of the camera beyond 8 degrees or 15 cm is false too.
+`success`, `joint_success` and `ms` are of the objects' shapes and the views, prepared before; `engine_*`, what is
+accepted and the covariance are of the whole engine and its gate. With `stored` the object is known from four sides.
+Beside ours, in the same run: the usual ways to register two object clouds.
 
-    python benchmarks/registration.py --seed 7 --json registration.json
+    python benchmarks/registration.py --seed 7 --cache /tmp/shots --json registration.json
+
+`--cache` keeps every finished piece, so that a run that was stopped goes on where it was.
 """
 
 from __future__ import annotations
 
 import json
 import time
+import zlib
+from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -28,8 +35,11 @@ from objreg_ros.registrar.candidate import Candidate
 from objreg_ros.registrar.covariance import covariance_of
 from objreg_ros.registrar.engine import Engine
 from objreg_ros.registrar.gate import judge
+from objreg_ros.registrar.hypotheses import Hypothesis
 from objreg_ros.registrar.keyframe import Keyframe
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.prepared import Prepared, prepare
+from objreg_ros.registrar.scene_search import from_shapes
 from objreg_ros.registrar.symmetry import yaw_share
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
@@ -45,6 +55,9 @@ CONDITIONS = {
     "stress": StressParams(depth_bias=0.003, warp=0.003, ragged=1.0, motion_blur=2.0),
 }
 FALSE = (8.0, 15.0)  # degrees and centimetres beyond which an accepted pose is a lie
+NOTHING = (180.0, 1e3)  # the error where there is no pose
+ASIDE = 0.18  # m from the middle of the table
+STORED = (0.0, 60.0, 120.0, 180.0)  # sides that an object is known from
 FOUR = ("cereal_box", "book", "keyboard", "bowl", "cap", "flashlight", "soda_can")
 SYMMETRIC = ("soda_can", "bowl")
 TELLING = ("cereal_box", "chair", "monitor", "flashlight", "book", "keyboard")  # a cap tells next to nothing
@@ -57,6 +70,15 @@ class Shot:
     T_world_camera: Array
     frame: Frame
     key: Keyframe
+    _made: list[Prepared] = field(default_factory=list)
+
+    def prepared(self, params: RegistrarParams) -> Prepared:
+        """The keyframe made ready, with the grids that others are laid upon."""
+        if not self._made:
+            self._made.append(prepare(self.key, params))
+            for shape in (*self._made[0].shapes, self._made[0].scene):
+                assert shape is None or len(shape.surface) >= 0
+        return self._made[0]
 
 
 def look(stage: Stage, T_world_camera: Array, seed: int, stress: StressParams, params: RegistrarParams) -> Shot:
@@ -102,108 +124,210 @@ def around(stage: Stage, angle: float, rng: np.random.Generator) -> Array:
 
 
 class Bench:
-    """One condition: pairs that must be registered, pairs that must be refused."""
+    """One condition: pairs that must be registered, pairs that must be refused, piece by piece."""
 
-    def __init__(self, condition: str, seed: int) -> None:
+    def __init__(self, condition: str, seed: int, cache: Path | None = None) -> None:
         self.params = RegistrarParams()
         self.engine = Engine(self.params)
         self.stress, self.seed = CONDITIONS[condition], seed
-        self._looks = 0
+        self._cache = None if cache is None else cache / f"{condition}_{seed}"
         self.rows: list[dict[str, Any]] = []
         self.joint: list[dict[str, Any]] = []
-        self.negatives: list[bool] = []
+        self.negatives: list[dict[str, Any]] = []
 
-    def single(self, label: str, number: int, angles: Sequence[float], peers: dict[str, Any]) -> Shot:
-        """One object from all angles against the first; returns the first look."""
-        stage = Stage.of(label, 1000 * self.seed + number)
-        first = look(stage, stage.camera((0.0, 0.0, 0.0), self._hand()), self._noise(), self.stress, self.params)
+    def single(self, label: str, number: int, angles: Sequence[float], peers: dict[str, Any]) -> None:
+        """One object from all angles against the first look, and against four stored ones."""
+        name = f"single_{label}_{number}_{len(angles)}_{len(peers)}"
+        self.rows += self._piece(name, lambda: self._single(label, number, angles, peers))
+
+    def _single(self, label: str, number: int, angles: Sequence[float], peers: dict[str, Any]) -> list[dict[str, Any]]:
+        stage = Stage.of(label, 1000 * self.seed + number, ASIDE)
+        shots = Shots(self, stage, lambda angle, hand: stage.camera((angle, 0.0, 0.0), hand), [label, number])
+        first = shots.first(0.0)
+        stored = [shots.first(angle) for angle in STORED]
+        rows = []
         for angle in angles:
-            second = look(stage, stage.camera((angle, 0.0, 0.0), self._hand()), self._noise(), self.stress, self.params)
+            second = shots.next(angle)
             row = self.registered(first, second)
-            T = row.pop("T")
-            error = (180.0, 1e3) if T is None else stage.error(T, first.T_world_camera, second.T_world_camera)
+            T = row.pop("T_engine")
+            row["engine_error"] = NOTHING if T is None else stage.error(T, first.T_world_camera, second.T_world_camera)
+            row["error"] = object_error(stage, first, second, row.pop("found"))
+            best = max(stored, key=lambda one: worth_of(laid(second, one, self.params)[0]))
+            row["stored_error"] = object_error(stage, best, second, laid(second, best, self.params)[0])
             row["yaw_unknown"] = yaw_unknown(second, self.params)
-            row |= {"label": label, "angle": angle, "error": error, "success": within(error, SUCCESS)}
             row["peers"] = {name: peer_row(peer, stage, first, second) for name, peer in peers.items()}
-            self.rows.append(row)
-        return first
+            rows.append(row | {"label": label, "angle": angle})
+        return [judged(row) for row in rows]
 
     def together(self, number: int, angles: Sequence[float]) -> None:
         """Four objects from all angles against the first look."""
-        stage = four(1000 * self.seed + number)
-        first = look(stage, around(stage, 0.0, self._hand()), self._noise(), self.stress, self.params)
-        for angle in angles:
-            second = look(stage, around(stage, angle, self._hand()), self._noise(), self.stress, self.params)
-            row = self.registered(first, second)
-            T, truth = row.pop("T"), inverse(first.T_world_camera) @ second.T_world_camera
-            middle = transform(inverse(second.T_world_camera), stage.T_world_object[:3, 3])
-            error = (180.0, 1e3) if T is None else error_at(T, truth, middle)
-            self.joint.append(row | {"angle": angle, "error": error, "success": within(error, SUCCESS)})
+        self.joint += self._piece(f"four_{number}_{len(angles)}", lambda: self._together(number, angles))
 
-    def refuse(self, shots: Sequence[Shot], count: int) -> None:
-        """Pairs of looks at different rooms: whatever is accepted is a lie."""
+    def _together(self, number: int, angles: Sequence[float]) -> list[dict[str, Any]]:
+        stage = four(1000 * self.seed + number)
+        shots = Shots(self, stage, lambda angle, hand: around(stage, angle, hand), ["four", number])
+        first, rows = shots.first(0.0), []
+        for angle in angles:
+            second = shots.next(angle)
+            row = self.registered(first, second)
+            truth = inverse(first.T_world_camera) @ second.T_world_camera
+            middle = transform(inverse(second.T_world_camera), stage.T_world_object[:3, 3])
+            T, found = row.pop("T_engine"), row.pop("found")
+            row["engine_error"] = NOTHING if T is None else error_at(T, truth, middle)
+            row["error"] = NOTHING if found is None else error_at(found.T_target_source, truth, middle)
+            rows.append(row | {"angle": angle})
+        return [judged(row) for row in rows]
+
+    def refuse(self, labels: Sequence[str], rooms: int, count: int) -> None:
+        """Pairs of looks at different rooms, half of them at the same kind of object: whatever is accepted is a lie."""
+        self.negatives += self._piece(f"refuse_{rooms}_{count}", lambda: self._refuse(labels, rooms, count))
+
+    def _refuse(self, labels: Sequence[str], rooms: int, count: int) -> list[dict[str, Any]]:
         rng = np.random.default_rng([self.seed, 9])
-        for _ in range(count):
-            i, j = rng.choice(len(shots), 2, replace=False)
-            verdict = judge(self.engine.propose(shots[i].key, shots[j].key), self.params)
-            self.negatives.append(isinstance(verdict, Candidate))
+        shots = {(label, n): self._stranger(label, n) for label in labels for n in range(rooms)}
+        rows = []
+        for k in range(count):
+            first = labels[rng.integers(len(labels))]
+            second = first if k % 2 == 0 else labels[rng.integers(len(labels))]
+            i, j = rng.choice(rooms, 2, replace=False)
+            verdict = judge(self.engine.propose(shots[first, i].key, shots[second, j].key), self.params)
+            rows.append({"labels": [first, second], "accepted": isinstance(verdict, Candidate)})
+        return rows
+
+    def _stranger(self, label: str, number: int) -> Shot:
+        stage = Stage.of(label, 1000 * self.seed + 500 + number, ASIDE)
+        shots = Shots(self, stage, lambda angle, hand: stage.camera((angle, 0.0, 0.0), hand), [label, 500 + number])
+        return shots.next(0.0)
 
     def registered(self, first: Shot, second: Shot) -> dict[str, Any]:
-        """The best pose ``T_first_second``, whether it is accepted, whether that is a lie, and how long it took."""
+        """What the shapes find, and the engine's best pose ``T_first_second``: if it is accepted, if that is a lie."""
+        found, ms = laid(second, first, self.params)
         start = time.perf_counter()
         candidates = self.engine.propose(second.key, first.key)
         verdict = judge(candidates, self.params)
-        ms = 1e3 * (time.perf_counter() - start)
-        accepted = isinstance(verdict, Candidate)
+        engine_ms = 1e3 * (time.perf_counter() - start)
         best = verdict if isinstance(verdict, Candidate) else (candidates[0] if candidates else None)
-        row: dict[str, Any] = {"T": None, "accepted": accepted, "false": False, "ms": ms, "nees": None}
+        row: dict[str, Any] = {"found": found, "ms": ms, "engine_ms": engine_ms, "T_engine": None, "nees": None}
+        row |= {"accepted": isinstance(verdict, Candidate), "false": False, "right": False}
+        row["why"] = "" if isinstance(verdict, Candidate) else verdict[0].value
         if best is not None:
             truth = inverse(first.T_world_camera) @ second.T_world_camera
-            row["T"] = best.T_target_source
+            row["T_engine"] = best.T_target_source
             row["pose_error"] = pose_error(best.T_target_source, truth)
-            row["false"] = accepted and not within(row["pose_error"], FALSE)
-            if accepted:
+            row["right"] = within(row["pose_error"], FALSE)
+            row["false"] = row["accepted"] and not row["right"]
+            if row["accepted"]:
                 row["nees"] = nees(best.T_target_source, truth, covariance_of(best.alignment, self.params))
         return row
 
     def figures(self) -> dict[str, Any]:
         """The figures of this condition."""
-        rows, joint = self.rows, self.joint
+        rows, joint, both = self.rows, self.joint, self.rows + self.joint
         right = [row for row in rows if row["success"]]
-        both = rows + joint
         spread = [row["nees"] for row in both if row["nees"] is not None and not row["false"]]
+        closable = [row for row in both if row["engine_success"] and row["right"]]
         return {
             "success": mean(rows, "success"),
             "success_90": mean([row for row in rows if row["angle"] <= 90], "success"),
             "by_object": grouped(rows, "label"),
             "by_angle": grouped(rows, "angle"),
+            "stored_success": mean(rows, "stored_success"),
+            "engine_success": mean(rows, "engine_success"),
             "joint_success": mean(joint, "success"),
+            "joint_engine_success": mean(joint, "engine_success"),
             "rotation_deg": median([row["error"][0] for row in right]),
             "translation_cm": median([row["error"][1] for row in right]),
+            "pairs": len(rows),
+            "joint_pairs": len(joint),
+            "negatives": len(self.negatives),
             "tried": len(both) + len(self.negatives),
-            "false_accepted": sum(row["false"] for row in both) + sum(self.negatives),
-            "recall_accepted": mean([row for row in both if row["success"]], "accepted"),
+            "false_accepted": sum(row["false"] for row in both) + sum(row["accepted"] for row in self.negatives),
+            "recall_accepted": mean(closable, "accepted"),
+            "recall_accepted_single": mean([row for row in closable if "label" in row], "accepted"),
+            "recall_accepted_joint": mean([row for row in closable if "label" not in row], "accepted"),
+            "refused_though_right": dict(Counter(row["why"] for row in closable if not row["accepted"])),
             "symmetry_recall": mean([row for row in rows if row["label"] in SYMMETRIC], "yaw_unknown"),
             "symmetry_false_alarm": mean([row for row in rows if row["label"] in TELLING], "yaw_unknown"),
             "false": [
                 {key: row.get(key, "four") for key in ("label", "angle", "pose_error")} for row in both if row["false"]
-            ],
+            ]
+            + [row["labels"] for row in self.negatives if row["accepted"]],
             "nees_mean": float(np.mean(spread)) if spread else None,
-            "ms_p50": float(np.percentile([row["ms"] for row in both], 50)),
-            "ms_p95": float(np.percentile([row["ms"] for row in both], 95)),
+            **percentiles("ms", [row["ms"] for row in rows]),
+            **percentiles("joint_ms", [row["ms"] for row in joint]),
+            **percentiles("engine_ms", [row["engine_ms"] for row in both]),
             "peers": {
                 name: mean([row["peers"][name] for row in rows], "success")
                 for name in (rows[0]["peers"] if rows else ())
             },
         }
 
-    def _hand(self) -> np.random.Generator:
-        """The hand that holds the camera: another one for every look."""
-        self._looks += 1
-        return np.random.default_rng([self.seed, self._looks])
+    def _piece(self, name: str, make: Callable[[], list[dict[str, Any]]]) -> list[dict[str, Any]]:
+        """The rows of a piece, made now or in a run before."""
+        if self._cache is None:
+            return make()
+        file = self._cache / f"{name}.json"
+        if not file.exists():
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(json.dumps(make(), default=float))
+        rows: list[dict[str, Any]] = json.loads(file.read_text())
+        return rows
 
-    def _noise(self) -> int:
-        return int(self._hand().integers(2**31))
+
+class Shots:
+    """The looks at one stage: another hand holds the camera for each of them."""
+
+    def __init__(
+        self, bench: Bench, stage: Stage, camera: Callable[[float, np.random.Generator], Array], name: list[Any]
+    ) -> None:
+        self._bench, self._stage, self._camera = bench, stage, camera
+        self._name = zlib.crc32(repr(name).encode())
+        self._looks = 0
+        self._kept: dict[float, Shot] = {}
+
+    def next(self, angle: float) -> Shot:
+        """A new look from an angle."""
+        self._looks += 1
+        hand = np.random.default_rng([self._bench.seed, self._name, self._looks])
+        T = self._camera(angle, hand)
+        return look(self._stage, T, int(hand.integers(2**31)), self._bench.stress, self._bench.params)
+
+    def first(self, angle: float) -> Shot:
+        """The first look from an angle, the same whenever it is asked for."""
+        if angle not in self._kept:
+            self._kept[angle] = self.next(angle)
+        return self._kept[angle]
+
+
+def laid(source: Shot, target: Shot, params: RegistrarParams) -> tuple[Hypothesis | None, float]:
+    """The best pose of the objects by their shapes and the views, None without one; and its milliseconds."""
+    a, b = source.prepared(params), target.prepared(params)
+    start = time.perf_counter()
+    found = from_shapes(a, b, params)
+    return (found[0] if found else None), 1e3 * (time.perf_counter() - start)
+
+
+def worth_of(found: Hypothesis | None) -> float:
+    """What a pose is worth; less than any for none."""
+    return -np.inf if found is None else found.worth
+
+
+def object_error(stage: Stage, first: Shot, second: Shot, found: Hypothesis | None) -> tuple[float, float]:
+    """The error of the object's pose that was found."""
+    if found is None:
+        return NOTHING
+    return stage.error(found.T_target_source, first.T_world_camera, second.T_world_camera)
+
+
+def judged(row: dict[str, Any]) -> dict[str, Any]:
+    """The row with what of it is a success."""
+    errors = {"success": "error", "engine_success": "engine_error", "stored_success": "stored_error"}
+    return row | {name: within(row[error], SUCCESS) for name, error in errors.items() if error in row}
+
+
+def percentiles(name: str, values: Sequence[float]) -> dict[str, float | None]:
+    """The median and the 95th percentile; None without values."""
+    return {f"{name}_p{q}": float(np.percentile(values, q)) if values else None for q in (50, 95)}
 
 
 def yaw_unknown(shot: Shot, params: RegistrarParams) -> bool:
@@ -313,19 +437,24 @@ def cloud_peers() -> dict[str, Peer]:
 @click.option("--seed", default=1, show_default=True)
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
 @click.option("--quick", is_flag=True, help="Few objects and angles; ends within 50 s.")
+@click.option("--cache", type=click.Path(file_okay=False, path_type=Path), help="Keep finished pieces here.")
 @click.option("--reps", default=2, show_default=True, help="Instances of each object.")
-def main(seed: int, json_file: Path | None, quick: bool, reps: int) -> None:
+def main(seed: int, json_file: Path | None, quick: bool, reps: int, cache: Path | None) -> None:
     """Register simulated objects and scenes, and refuse what is not the same."""
     start = time.perf_counter()
     angles = [0.0, 40.0, 90.0] if quick else [float(a) for a in range(0, 181, 10)]
     labels = ["cereal_box", "soda_can"] if quick else list(TABLE_1)
+    reps, rooms, negatives = (1, 2, 4) if quick else (reps, 4, 500)
     out: dict[str, Any] = {"seed": seed}
     for condition in CONDITIONS:
-        bench, peers = Bench(condition, seed), {} if quick else cloud_peers()
-        shots = [bench.single(label, n, angles, peers) for label in labels for n in range(1 if quick else reps)]
+        bench, peers = Bench(condition, seed, cache), {} if quick else cloud_peers()
+        for n in range(reps):
+            for label in labels:
+                bench.single(label, n, angles, peers)
+                click.echo(f"{condition} {label} {n}: {time.perf_counter() - start:.0f} s")
         for n in range(1 if quick else 2 * reps):
             bench.together(n, angles[1:])
-        bench.refuse(shots, 4 if quick else 500)
+        bench.refuse(labels, rooms, negatives)
         out[condition] = bench.figures()
         click.echo(f"{condition}: {json.dumps({k: v for k, v in out[condition].items() if not isinstance(v, dict)})}")
     click.echo(f"{time.perf_counter() - start:.0f} s")

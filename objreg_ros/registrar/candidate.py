@@ -42,7 +42,9 @@ class Candidate:
     ``chain`` proposed it, ``agreeing_chains`` (``chain`` among them) came to the same pose independently;
     ``explained`` are the object pairs that lie upon each other under it, ``moved`` those of the same kind that should
     and do not although both views look there; ``gravity_error_deg`` is the angle between the two gravities under it,
-    None where one is unknown.
+    None where one is unknown; ``likeness`` is how alike the explained objects look, -1..1, None where that is unknown;
+    ``yaw_known`` says that the shape of one of them tells its yaw; ``margin`` is how much more the candidate is worth
+    than any other.
     """
 
     alignment: Alignment
@@ -52,6 +54,9 @@ class Candidate:
     explained: tuple[ObjectPair, ...] = ()
     moved: tuple[ObjectPair, ...] = ()
     gravity_error_deg: float | None = None
+    likeness: float | None = None
+    yaw_known: bool = False
+    margin: float = 0.0
 
     @property
     def T_target_source(self) -> Array:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data import Alignment, Array
 from objreg_ros.registrar.candidate import Candidate
 from objreg_ros.registrar.consensus import distinct
 from objreg_ros.registrar.hypotheses import Hypothesis, from_centroids, from_features, from_objects, from_prior
@@ -20,7 +20,12 @@ from objreg_ros.registrar.objects import Pairs, explain
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Pantry, Prepared
 from objreg_ros.registrar.refine import refine, settle
-from objreg_ros.registrar.verify import rank, verify
+from objreg_ros.registrar.scene_search import from_shapes
+from objreg_ros.registrar.shape import upright_motion
+from objreg_ros.registrar.shape_score import alike
+from objreg_ros.registrar.verify import WORST, rank, verify
+
+APART = (np.radians(4.0), 0.04)  # rad and m: what the shapes found is distinct beyond
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -52,7 +57,8 @@ class Engine:
         pair = Pair(source=self._pantry.get(source), target=self._pantry.get(target))
         if min(len(pair.source.xyz), len(pair.target.xyz)) < self._params.min_points:
             return ()
-        seeds = self._settled(pair, self._seeds(pair, T_target_source_prior))
+        upright = self._upright(pair)
+        seeds = self._settled(pair, self._seeds(pair, T_target_source_prior) + upright) + self._rated(pair, upright)
         if not seeds:
             return ()
         T, worth = np.array([seed.T_target_source for seed in seeds]), np.array([seed.worth for seed in seeds])
@@ -92,12 +98,26 @@ class Engine:
             return []
         params, source, target = self._params, pair.source, pair.target
         T = settle(source, target, np.array([seed.T_target_source for seed in seeds]), params)
+        return self._rated(pair, [replace(seed, T_target_source=pose) for seed, pose in zip(seeds, T, strict=True)])
+
+    def _rated(self, pair: Pair, seeds: list[Hypothesis]) -> list[Hypothesis]:
+        """The hypotheses with their worth for the views and the objects."""
+        params, source, target = self._params, pair.source, pair.target
+        T = np.array([seed.T_target_source for seed in seeds]).reshape(-1, 4, 4)
         V = rank(source.sight, target.sight, T, params, params.grey_points)
-        objects = [agreement(*explain(source, target, pose, params), params) for pose in T]
-        return [
-            replace(seed, T_target_source=pose, worth=float(v + more))
-            for seed, pose, v, more in zip(seeds, T, V, objects, strict=True)
-        ]
+        rated = []
+        for seed, v in zip(seeds, V, strict=True):
+            explained, moved = explain(source, target, seed.T_target_source, params)
+            same = likeness(source, target, explained, seed.T_target_source, params)
+            rated.append(replace(seed, worth=float(v) + agreement(explained, moved, same, params)))
+        return rated
+
+    def _upright(self, pair: Pair) -> list[Hypothesis]:
+        """The distinct hypotheses of the objects' shapes: they are in their basins already."""
+        found = from_shapes(pair.source, pair.target, self._params)
+        T, worth = np.array([seed.T_target_source for seed in found]), np.array([seed.worth for seed in found])
+        chosen = distinct(T.reshape(-1, 4, 4), worth, pair.source.middle, self._params.refined_per_chain, *APART)
+        return [found[k] for k in chosen]
 
     def _judge(self, pair: Pair, seed: Hypothesis, seeds: list[Hypothesis]) -> Candidate:
         """Finish a hypothesis and gather the evidence; ``seeds`` are all that may agree with it."""
@@ -107,15 +127,36 @@ class Engine:
         explained, moved = explain(source, target, T, params)
         poses = np.array([other.T_target_source for other in seeds])
         same = [same_pose(poses, T_known, source.middle, params) for T_known in (seed.T_target_source, T)]
-        return Candidate(
+        candidate = Candidate(
             alignment=alignment,
             chain=seed.chain,
             agreeing_chains=tuple(sorted({seeds[k].chain for k in np.flatnonzero(same[0] | same[1])})),
             verification=verify(source.sight, target.sight, T, params),
             explained=explained,
             moved=moved,
+            likeness=likeness(source, target, explained, T, params),
+            yaw_known=any(source.yaw_known[pair.source] and target.yaw_known[pair.target] for pair in explained),
             gravity_error_deg=gravity_error_deg(source, target, T),
         )
+        return replace(candidate, alignment=held(alignment)) if is_held(candidate, params) else candidate
+
+
+def is_held(candidate: Candidate, params: RegistrarParams) -> bool:
+    """Whether what the surfaces let slide is held by the outline and the print of an object."""
+    alike = candidate.likeness
+    return candidate.yaw_known and alike is not None and alike >= params.holding_likeness
+
+
+def held(alignment: Alignment) -> Alignment:
+    """The alignment without its slack."""
+    return replace(alignment, slack=np.zeros((0, 6)))
+
+
+def likeness(source: Prepared, target: Prepared, explained: Pairs, T: Array, params: RegistrarParams) -> float | None:
+    """How alike the explained objects look under a pose, their mean from -1 to 1; None where none has a shape."""
+    shapes = [(source.shapes[pair.source], target.shapes[pair.target]) for pair in explained]
+    scores = [alike(a, b, upright_motion(a, b, T), params) for a, b in shapes if a is not None and b is not None]
+    return float(np.clip(scores, -1.0, 1.0).mean()) if scores else None
 
 
 def gravity_error_deg(source: Prepared, target: Prepared, T_target_source: Array) -> float | None:
@@ -137,17 +178,24 @@ def merged(candidates: list[Candidate], middle: Array, params: RegistrarParams) 
             chains = {chain for j in np.flatnonzero(same) for chain in ranked[j].agreeing_chains}
             kept.append(replace(candidate, agreeing_chains=tuple(sorted(chains))))
             known |= same
-    return kept
+    return [replace(candidate, margin=_margin(candidate, kept, params)) for candidate in kept]
+
+
+def _margin(candidate: Candidate, others: list[Candidate], params: RegistrarParams) -> float:
+    rivals = [worth(other, params) for other in others if other is not candidate]
+    return worth(candidate, params) - max(rivals, default=WORST)
 
 
 def worth(candidate: Candidate, params: RegistrarParams) -> float:
     """What candidates are ranked by: the views' verdict, and the objects' where rooms repeat themselves."""
-    return candidate.verification.score + agreement(candidate.explained, candidate.moved, params)
+    more = agreement(candidate.explained, candidate.moved, candidate.likeness, params)
+    return candidate.verification.score + more
 
 
-def agreement(explained: Pairs, moved: Pairs, params: RegistrarParams) -> float:
+def agreement(explained: Pairs, moved: Pairs, likeness: float | None, params: RegistrarParams) -> float:
     """What the objects add to V."""
-    return params.object_bonus * (min(2, len(explained)) - min(2, len(moved)))
+    stand = params.object_bonus * (min(2, len(explained)) - min(2, len(moved)))
+    return stand + params.likeness_weight * (likeness or 0.0)
 
 
 def same_pose(T: Array, T_known: Array, middle: Array, params: RegistrarParams) -> Array:

@@ -104,12 +104,23 @@ def _score(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
 
 def _agreement(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
-    """Several objects, or one and two independent chains: without an object rooms that repeat themselves look alike."""
+    """Several objects, or one and two independent chains, or one that is unmistakable.
+
+    Without an object rooms that repeat themselves look alike.
+    """
     chains, explained = len(candidate.agreeing_chains), len(candidate.explained)
     if explained >= params.min_objects or (explained >= 1 and chains >= params.min_chains):
         return None
+    if explained >= 1 and _unmistakable(candidate, params):
+        return None
     reason = Reason.CHAINS_DISAGREE if explained else Reason.FEW_OBJECTS
     return reason, f"{chains} chains < {params.min_chains} and {explained} objects < {params.min_objects}"
+
+
+def _unmistakable(candidate: Candidate, params: RegistrarParams) -> bool:
+    """Whether an object's own shape and print hold the pose, and no other pose comes near it."""
+    alike = candidate.likeness is not None and candidate.likeness >= params.min_likeness_alone
+    return candidate.yaw_known and alike and candidate.margin >= params.min_margin_alone
 
 
 def _stationary(candidate: Candidate, params: RegistrarParams) -> Refusal | None:

@@ -13,9 +13,11 @@ from objreg_ros.data import Array
 from objreg_ros.registrar.features import Features, describe
 from objreg_ros.registrar.fusion import thin
 from objreg_ros.registrar.icp import Surface, prepare_surface
-from objreg_ros.registrar.keyframe import Keyframe
+from objreg_ros.registrar.keyframe import Keyframe, KeyObject
 from objreg_ros.registrar.labels import LabelGroups
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.shape import Shape, prepare_shape
+from objreg_ros.registrar.symmetry import yaw_share
 from objreg_ros.registrar.tracking import view_normals
 from objreg_ros.registrar.visibility import Sight, prepare_sight
 
@@ -25,7 +27,8 @@ class Prepared:
     """All that was seen, thinned: ``surface`` to be aligned to, ``xyz`` and ``normals (M, 3)`` to align with.
 
     ``up (3,)`` is against gravity, or None; ``groups`` the confusable group of each object, ``centroids (K, 3)`` their
-    middles and ``extents (K,)`` m; ``middle (3,)`` that of everything: where poses are compared.
+    middles and ``extents (K,)`` m, ``shapes`` what is laid upon others and ``yaw_known`` whether that tells a turn;
+    ``scene`` is all of them as one shape; ``middle (3,)`` that of everything: where poses are compared.
     """
 
     keyframe: Keyframe
@@ -36,6 +39,9 @@ class Prepared:
     normals: Array
     up: Array | None
     groups: tuple[str, ...]
+    yaw_known: tuple[bool, ...]
+    shapes: tuple[Shape | None, ...]
+    scene: Shape | None
     centroids: Array
     extents: Array
     middle: Array
@@ -47,18 +53,27 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
     coarse = thin(*fine, params.feature_voxel)
     things = thin(*of_objects(keyframe), params.thing_voxel)
     groups = LabelGroups(params.label_groups)
+    up = None if keyframe.gravity is None else -np.asarray(keyframe.gravity, float)
     return Prepared(
         keyframe=keyframe,
         sight=prepare_sight(keyframe.view, params.context_range, params.detail_sigma, params.seed),
         surface=prepare_surface(*joined(fine, things), params.grid_cell, params.grid_reach),
         features=describe(*coarse, params.feature_radius),
         **_shuffled(*joined(coarse, sampled(things, params.thing_points, params.seed)), params.seed),
-        up=None if keyframe.gravity is None else -np.asarray(keyframe.gravity, float),
+        up=up,
         groups=tuple(groups.of(label) for label in keyframe.labels),
+        yaw_known=tuple(tells_yaw(item, up, params) for item in keyframe.objects),
+        shapes=tuple(prepare_shape(keyframe, [i], params.shape_points) for i in range(len(keyframe.objects))),
+        scene=prepare_shape(keyframe, range(len(keyframe.objects)), params.scene_points),
         centroids=np.array([item.centroid for item in keyframe.objects]).reshape(-1, 3),
         extents=np.array([item.extent for item in keyframe.objects]),
         middle=np.asarray(coarse[0].mean(axis=0) if len(coarse[0]) else np.zeros(3), float),
     )
+
+
+def tells_yaw(item: KeyObject, up: Array | None, params: RegistrarParams) -> bool:
+    """Whether an object's own shape tells how it is turned; False where up is unknown."""
+    return up is not None and yaw_share(item.cloud, up) >= params.symmetry_share
 
 
 def seen(keyframe: Keyframe, params: RegistrarParams) -> tuple[Array, Array]:

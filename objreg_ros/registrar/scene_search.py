@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The registration of objects upon objects of their kind: one alone by its shape, several together as one shape.
+
+What each pair of look-alikes and the middles of all propose is judged by all objects as one, so that a can, whose own
+shape tells no yaw, gets it from where the others stand.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.geometry import transform
+from objreg_ros.registrar.hypotheses import Hypothesis, from_centroids, look_alikes
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.prepared import Prepared
+from objreg_ros.registrar.shape import Shape
+from objreg_ros.registrar.shape_search import Fitting, glance, improve, register_shapes
+from objreg_ros.registrar.verify import rank
+
+EACH = 2  # poses that each pair of objects proposes
+
+
+def from_shapes(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Hypothesis]:
+    """Upright poses that lay objects upon those of their kind, those that objects and views like best first."""
+    pairs = shape_pairs(source, target)
+    found = register_shapes(*pairs[0], params) if len(pairs) == 1 else register_scenes(source, target, params)
+    if not found:
+        return []
+    T = np.array([fit.T_target_source for fit in found])
+    V = rank(source.sight, target.sight, T, params, params.quick_sample)
+    worth = V + params.likeness_weight * np.clip([fit.score for fit in found], -1.0, 1.0)
+    order = np.argsort(-worth, kind="stable")
+    return [Hypothesis(T_target_source=T[k], chain="objects", worth=float(worth[k])) for k in order]
+
+
+def register_scenes(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Fitting]:
+    """The best distinct poses of all objects of ``source`` upon those of ``target``, best first; empty without any."""
+    if source.scene is None or target.scene is None:
+        return []
+    seeds = [hypothesis.T_target_source for hypothesis in from_centroids(source, target, params)[: params.scene_seeds]]
+    pairs = shape_pairs(source, target)
+    for a, b in pairs:
+        seeds += glance(a, b, EACH, params)
+    levelled = [_levelled(pairs, T, params.centroid_tolerance) for T in seeds]
+    return improve(source.scene, target.scene, levelled, params) if levelled else []
+
+
+def shape_pairs(source: Prepared, target: Prepared) -> list[tuple[Shape, Shape]]:
+    """The shapes of all objects that a detector may call by one name."""
+    pairs = ((source.shapes[i], target.shapes[j]) for i, j in look_alikes(source, target))
+    return [(a, b) for a, b in pairs if a is not None and b is not None]
+
+
+def _levelled(pairs: list[tuple[Shape, Shape]], T_target_source: Array, tolerance: float) -> Array:
+    """The pose raised or lowered so that the objects that it brings together stand at the same height.
+
+    What an object stands on is known to a millimetre, its middle to centimetres.
+    """
+    gaps = np.array([b.foot - transform(T_target_source, a.foot) for a, b in pairs])
+    near = np.linalg.norm(gaps, axis=1) < 2.0 * tolerance
+    T = T_target_source.copy()
+    if near.any():
+        up = pairs[0][1].R_upright_camera[2]
+        T[:3, 3] += np.median(gaps[near] @ up) * up
+    return T

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One object, or several together, made ready to be registered upright: points about a footing, and a silhouette."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import cv2
+import numpy as np
+
+from objreg_ros.data import Array, PointFlag
+from objreg_ros.geometry import pose
+from objreg_ros.registrar.icp import Surface, prepare_surface
+from objreg_ros.registrar.keyframe import Keyframe
+from objreg_ros.registrar.silhouette import Silhouette, draw
+
+EDGE = np.uint16(PointFlag.EDGE)
+LEAST = 30  # points of a shape
+LEVEL = 0.9  # cosine of a surface that things stand on with up
+CLEAR = 0.003  # m between the lowest points of an object and what it stands on
+STEP = 0.02  # m: a level surface lies within as much of height
+SEEN = 5  # points of the context that make one
+AROUND = 0.25  # m beyond the object
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Shape:
+    """Points and normals (N, 3) float32 in upright axes (z against gravity) about ``origin``, in a shuffled order.
+
+    ``shades (N,) float32`` is their grey; the first ``most`` of them are laid upon other shapes. ``R_upright_camera
+    (3, 3)`` and the ``origin (3,)`` in upright axes: the middle of the object in its plane, and the height of what it
+    stands on; ``extent`` m is its width.
+    """
+
+    xyz: Array
+    normals: Array
+    shades: Array
+    most: int
+    silhouette: Silhouette
+    R_upright_camera: Array
+    origin: Array
+    extent: float
+
+    @property
+    def foot(self) -> Array:
+        """The origin (3,) in the camera frame."""
+        return self.R_upright_camera.T @ self.origin
+
+    @cached_property
+    def surface(self) -> Surface:
+        """What other shapes are laid upon: twice as many points, and the grid that knows the closest."""
+        dense = slice(2 * self.most)
+        return prepare_surface(self.xyz[dense], self.normals[dense], *_cells(self.xyz))
+
+    @property
+    def sight(self) -> tuple[Any, ...]:
+        """The points and what the camera saw, for the kernels."""
+        s, few = self.silhouette, slice(self.most)
+        points = self.xyz[few], self.normals[few], self.shades[few]
+        return (*points, self.R_upright_camera, self.origin, s.depth, s.mask, s.grey, s.camera)
+
+
+def prepare_shape(keyframe: Keyframe, indices: Sequence[int], most: int, seed: int = 0) -> Shape | None:
+    """The objects ``indices`` of a keyframe as one shape of at most ``most`` points.
+
+    None without gravity or with too few points.
+    """
+    clouds = [keyframe.objects[i].cloud for i in indices]
+    if keyframe.gravity is None or sum(len(cloud) for cloud in clouds) < LEAST:
+        return None
+    xyz = np.concatenate([cloud.xyz for cloud in clouds])
+    grey = np.concatenate([_grey(cloud.rgb, len(cloud)) for cloud in clouds])
+    firm = np.concatenate([(cloud.normals != 0).any(axis=1) & ((cloud.flags & EDGE) == 0) for cloud in clouds])
+    normals = np.concatenate([cloud.normals for cloud in clouds])
+    if firm.sum() < LEAST:
+        firm = (normals != 0).any(axis=1)
+    if firm.sum() < LEAST:
+        return None
+    R = upright_axes(-np.asarray(keyframe.gravity, float))
+    feet = [footing(keyframe, i, R) for i in indices]
+    upright = xyz @ R.T.astype(np.float32)
+    low, high = np.percentile(upright[:, :2], (2, 98), axis=0)
+    origin = np.array([*(low + high) / 2.0, np.median(feet)])
+    order = np.random.default_rng(seed).permutation(np.flatnonzero(firm))
+    points = np.ascontiguousarray(upright[order] - origin.astype(np.float32))
+    facing = np.ascontiguousarray(normals[order] @ R.T.astype(np.float32))
+    extent = float(np.linalg.norm(high - low))
+    return Shape(
+        xyz=points,
+        normals=facing,
+        shades=grey[order],
+        most=most,
+        silhouette=draw(xyz, grey, keyframe.view),
+        R_upright_camera=R,
+        origin=origin,
+        extent=extent,
+    )
+
+
+def _cells(points: Array) -> tuple[float, float]:
+    """(cell, reach) m of the grid of a shape."""
+    cell = max(float(np.ptp(points, axis=0).max()) / 40.0, 0.005)
+    return cell, min(0.07, 10.0 * cell)
+
+
+def _grey(rgb: Array | None, count: int) -> Array:
+    if rgb is None or count == 0:
+        return np.zeros(count, np.float32)
+    return np.asarray(cv2.cvtColor(np.ascontiguousarray(rgb[None]), cv2.COLOR_RGB2GRAY)[0], np.float32)
+
+
+def upright_axes(up: Array) -> Array:
+    """``R_upright_camera (3, 3)``: z along ``up``, x along what of the optical axis is level."""
+    ahead = np.array([0.0, 0.0, 1.0]) if abs(up[2]) < 0.99 else np.array([0.0, -1.0, 0.0])
+    x = ahead - up * (ahead @ up)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(up, x), up])
+
+
+def footing(keyframe: Keyframe, index: int, R_upright_camera: Array) -> float:
+    """The height along up of what an object stands on: of the level surface around it, else of its lowest points."""
+    points = keyframe.objects[index].cloud.xyz @ R_upright_camera.T.astype(np.float32)
+    lowest = float(np.percentile(points[:, 2], 2))
+    around = keyframe.context.xyz @ R_upright_camera.T.astype(np.float32)
+    level = keyframe.context.normals @ R_upright_camera[2].astype(np.float32) > LEVEL
+    low, high = points[:, :2].min(axis=0) - AROUND, points[:, :2].max(axis=0) + AROUND
+    near = ((around[:, :2] > low) & (around[:, :2] < high)).all(axis=1)
+    heights = np.sort(around[level & near & (around[:, 2] < lowest - CLEAR), 2])[::-1]
+    for first in range(len(heights) - SEEN + 1):  # from the top: the first height where a surface is
+        within = heights[first:][heights[first:] > heights[first] - STEP]
+        if len(within) >= SEEN:
+            return float(np.median(within))
+    return lowest
+
+
+def upright_pose(source: Shape, target: Shape, motion: Array) -> Array:
+    """``T_target_source (4, 4)`` of a motion (yaw, x, y, rise) between the upright axes about the two origins."""
+    c, s = np.cos(motion[0]), np.sin(motion[0])
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    shift = motion[1:] + target.origin - turn @ source.origin
+    back = target.R_upright_camera.T
+    return pose(back @ turn @ source.R_upright_camera, back @ shift)
+
+
+def upright_motion(source: Shape, target: Shape, T_target_source: Array) -> Array:
+    """(yaw, x, y, rise) of the upright motion nearest to a pose."""
+    turn = target.R_upright_camera @ T_target_source[:3, :3] @ source.R_upright_camera.T
+    yaw = np.arctan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1])
+    at = source.R_upright_camera.T @ source.origin
+    moved = target.R_upright_camera @ (T_target_source[:3, :3] @ at + T_target_source[:3, 3]) - target.origin
+    return np.array([yaw, *moved])

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The registration of one shape upon another: every yaw, to its basin, scored by both silhouettes, the best climbed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.shape import Shape, upright_motion, upright_pose
+from objreg_ros.registrar.shape_icp import settle
+from objreg_ros.registrar.shape_score import climb, two_way, weights_of
+
+SAME_TURN = 0.12  # rad within which two motions are one
+SAME_SHIFT = 0.015  # m
+CLIMB = (0.05, 0.012)  # rad and m: the first steps of a climb
+WIDEST_REACH = 0.07  # m within which a point finds a partner at first
+
+
+class Fitting(NamedTuple):
+    """A pose of one shape upon another and what both silhouettes say of it; a higher score is better."""
+
+    T_target_source: Array
+    score: float
+
+
+def register_shapes(source: Shape, target: Shape, params: RegistrarParams) -> list[Fitting]:
+    """The best distinct poses of ``source`` upon ``target``, both upright on what they stand on, best first."""
+    motions, scores = _begun(source, target, params.shape_yaws, params.shape_offsets, params.shape_glance, params)
+    return _finished(source, target, motions, scores, 0.5 * _reach(source, target), params)
+
+
+def glance(source: Shape, target: Shape, most: int, params: RegistrarParams) -> list[Array]:
+    """The poses of ``source`` upon ``target`` that look best at first, at most so many: a tenth of a registration."""
+    motions, scores = _begun(source, target, params.glance_yaws, params.shape_offsets[:1], params.glance, params)
+    return [upright_pose(source, target, motions[k]) for k in np.argsort(-scores, kind="stable")[:most]]
+
+
+def _begun(
+    source: Shape, target: Shape, yaws: int, offsets: tuple[float, ...], sample: int, params: RegistrarParams
+) -> tuple[Array, Array]:
+    extent = 0.5 * (source.extent + target.extent)
+    starts = _starts(yaws, np.array(offsets) * extent)
+    reach = _reach(source, target)
+    return _started(source.sight, target.sight, _grid(target), starts, extent, weights_of(params), sample, reach)
+
+
+def _reach(source: Shape, target: Shape) -> float:
+    return min(WIDEST_REACH, 0.25 * (source.extent + target.extent))
+
+
+def improve(source: Shape, target: Shape, poses: Sequence[Array], params: RegistrarParams) -> list[Fitting]:
+    """Poses (4, 4) of ``source`` near ``target``, made upright and brought to where both silhouettes like them best.
+
+    The best distinct ones come back, best first.
+    """
+    motions = np.array([upright_motion(source, target, T) for T in poses]).reshape(-1, 4)
+    extent = 0.5 * (source.extent + target.extent)
+    weights, sample = weights_of(params), params.shape_glance
+    moved, scores = _started(source.sight, target.sight, _grid(target), motions, extent, weights, sample, WIDEST_REACH)
+    return _finished(source, target, moved, scores, 0.5 * WIDEST_REACH, params)
+
+
+def _starts(yaws: int, offsets: Array) -> Array:
+    """Motions (K, 4) of every yaw; both cameras look along x, and the unseen middle lies deeper by an offset."""
+    yaw, deeper = (a.ravel() for a in np.meshgrid(2.0 * np.pi * np.arange(yaws) / yaws, offsets, indexing="ij"))
+    return np.stack([yaw, deeper - np.cos(yaw) * deeper, -np.sin(yaw) * deeper, np.zeros_like(yaw)], axis=1)
+
+
+def _finished(
+    source: Shape, target: Shape, motions: Array, scores: Array, reach: float, params: RegistrarParams
+) -> list[Fitting]:
+    extent = 0.5 * (source.extent + target.extent)
+    numbers = params.shape_kept, params.shape_climbed, params.shape_rounds
+    found, worth = _finish(
+        source.sight, target.sight, _grid(target), motions, scores, extent, weights_of(params), numbers, reach
+    )
+    order = np.argsort(-worth, kind="stable")
+    return [Fitting(upright_pose(source, target, found[k]), float(worth[k])) for k in order]
+
+
+def _grid(shape: Shape) -> tuple[Array, Array, Array, Array, float]:
+    surface = shape.surface
+    return surface.xyz, surface.normals, surface.closest, surface.low, surface.cell
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _started(source, target, grid, starts, extent, weights, glance, reach):  # type: ignore[no-untyped-def]
+    """Each start in its basin, unless the silhouettes like it better where it is: (motions (K, 4), scores (K,)).
+
+    Opposite sides of an object have next to no surface in common, and would be drawn together.
+    """
+    motions, scores = starts.copy(), np.empty(len(starts))
+    for k in range(len(starts)):
+        settle(source[0], source[1], glance, grid, motions[k], reach, 0.4 * reach, 8)
+        scores[k] = two_way(source, target, motions[k], extent, weights, glance)
+        before = two_way(source, target, starts[k], extent, weights, glance)
+        if before > scores[k]:
+            scores[k] = before
+            motions[k] = starts[k]
+    return motions, scores
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _finish(source, target, grid, motions, scores, extent, weights, numbers, reach):  # type: ignore[no-untyped-def]
+    """The best distinct motions, refined with every point, the first of them climbed: (motions, scores)."""
+    kept, climbed, rounds = numbers
+    P, N = source[0], source[1]
+    every, cell = len(P), grid[4]
+    best, n = np.empty((kept, 4)), 0
+    for k in np.argsort(-scores):
+        if n < kept and not _known(motions[k], best, n):
+            best[n] = motions[k]
+            n += 1
+    best, worth = best[:n], np.empty(n)
+    for k in range(n):
+        settle(P, N, every, grid, best[k], reach, max(1.5 * cell, 0.008), 12)
+        worth[k] = two_way(source, target, best[k], extent, weights, every)
+    for k in np.argsort(-worth)[:climbed]:
+        worth[k] = climb(source, target, best[k], extent, weights, every, CLIMB[0], CLIMB[1], rounds)
+        polished = best[k].copy()
+        settle(P, N, every, grid, polished, max(1.5 * cell, 0.010), max(1.2 * cell, 0.006), 8)
+        after = two_way(source, target, polished, extent, weights, every)
+        if after >= worth[k]:
+            best[k], worth[k] = polished, after
+    return best, worth
+
+
+@numba.njit(cache=True, nogil=True)
+def _known(motion, others, n):  # type: ignore[no-untyped-def]
+    for k in range(n):
+        turn = (motion[0] - others[k, 0] + np.pi) % (2.0 * np.pi) - np.pi
+        shift = abs(motion[1] - others[k, 1]) + abs(motion[2] - others[k, 2])
+        if abs(turn) < SAME_TURN and shift < SAME_SHIFT:
+            return True
+    return False

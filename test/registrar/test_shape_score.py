@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of the two-way visibility score."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from objreg_ros.geometry import inverse
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.shape import upright_motion
+from objreg_ros.registrar.shape_score import alike, climb, weights_of
+
+from .shapes import BOX, ELL, from_side
+from .test_shape_search import shape_of
+
+PARAMS = RegistrarParams()
+
+
+def truth(angle: float) -> np.ndarray:
+    return inverse(from_side(0.0)) @ from_side(angle)
+
+
+def test_the_truth_looks_alike_and_a_wrong_turn_does_not() -> None:
+    source, target = shape_of(ELL, 30.0, 1), shape_of(ELL, 0.0, 2)
+    motion = upright_motion(source, target, truth(30.0))
+    assert alike(source, target, motion, PARAMS) > 0.5
+    assert alike(source, target, np.add(motion, (np.pi / 2, 0, 0, 0)), PARAMS) < 0.0
+
+
+def test_a_shift_into_free_space_costs_more_than_it_can_gain() -> None:
+    source, target = shape_of(BOX, 0.0, 1), shape_of(BOX, 0.0, 2)
+    motion = upright_motion(source, target, truth(0.0))
+    scores = [alike(source, target, np.add(motion, (0, 0, shift, 0)), PARAMS) for shift in (0.0, 0.02, 0.05)]
+    assert scores[0] > 0.7 and scores[0] > scores[1] > scores[2] and scores[2] < 0.0
+
+
+def test_both_ways_say_the_same() -> None:
+    source, target = shape_of(ELL, 40.0, 1), shape_of(ELL, 0.0, 2)
+    forward = alike(source, target, upright_motion(source, target, truth(40.0)), PARAMS)
+    backward = alike(target, source, upright_motion(target, source, inverse(truth(40.0))), PARAMS)
+    assert abs(forward - backward) < 1e-6
+
+
+def test_a_climb_never_ends_lower() -> None:
+    source, target = shape_of(ELL, 30.0, 1), shape_of(ELL, 0.0, 2)
+    start = np.add(upright_motion(source, target, truth(30.0)), (0.06, 0.01, -0.01, 0.0))
+    motion = start.copy()
+    extent = 0.5 * (source.extent + target.extent)
+    reached = climb(source.sight, target.sight, motion, extent, weights_of(PARAMS), 400, 0.05, 0.012, 8)
+    assert reached > alike(source, target, start, PARAMS) + 0.1
+    assert abs(reached - alike(source, target, motion, PARAMS)) < 1e-9
