@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import Reason
-from objreg_ros.registrar.candidate import ObjectPair
+from objreg_ros.registrar.candidate import Candidate, ObjectPair
 from objreg_ros.registrar.gate import judge, refuse
 from objreg_ros.registrar.odometry import Prior
 from objreg_ros.registrar.params import RegistrarParams
@@ -97,3 +97,22 @@ def test_no_candidate_at_all_is_no_hypothesis() -> None:
 def test_an_alias_does_not_stand_in_for_a_refused_best_candidate() -> None:
     alias = candidate(score=0.5)
     assert judge((candidate(violations=0.4, score=0.9), alias), PARAMS) is not alias
+
+
+def lone(**evidence: object) -> Candidate:
+    """A candidate of one object that no second chain confirms."""
+    alone = {"explained": (ObjectPair(0, 0, "cup"),), "agreeing_chains": ("objects",)}
+    return candidate(**{**alone, "likeness": 0.6, "yaw_known": True, "margin": 0.5, **evidence})
+
+
+def test_a_lone_object_that_is_unmistakable_needs_no_second_chain() -> None:
+    assert refuse(lone(), PARAMS) is None
+
+
+@pytest.mark.parametrize(
+    "doubt", [{"yaw_known": False}, {"likeness": -0.1}, {"likeness": None}, {"margin": 0.05}], ids=str
+)
+def test_a_lone_object_that_could_be_turned_or_stands_elsewhere_needs_a_second_chain(doubt: dict) -> None:
+    refusal = refuse(lone(**doubt), PARAMS)
+    assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
+    assert refuse(lone(**doubt, agreeing_chains=("features", "objects")), PARAMS) is None
