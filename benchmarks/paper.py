@@ -5,6 +5,9 @@ An object stands on a table (a chair on the floor) in a simulated room; the came
 Y and rolls by Z. The error is the document's: the mean distance in metres between closest points after alignment. It
 says little of the pose, so the true error of the object's pose stands beside it (up to the object's symmetry).
 
+Ours is the registration of the object's shape; its time is that of a pair, and what is made once of every keyframe
+stands beside it, as `prepare_ms`. What the whole engine makes of the pair, and its gate, is `engine`.
+
     python benchmarks/paper.py --json paper.json --figure paper.svg
 """
 
@@ -31,6 +34,8 @@ from objreg_ros.registrar.keyframe import Keyframe
 from objreg_ros.registrar.keyframes import Stretch
 from objreg_ros.registrar.paper import register
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.prepared import Prepared, prepare
+from objreg_ros.registrar.scene_search import from_shapes
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.simulation import furniture
@@ -40,8 +45,10 @@ from objreg_ros.simulation.objects import make_object
 from objreg_ros.simulation.render import Rendering, render
 from objreg_ros.simulation.scene import Scene, furnished, number, place_on
 
+ASIDE = 0.18  # m from the middle of the table, about which half a turn would look the same
 PAPER_SECONDS = (2.0, 4.0)  # what the document says of its time for a pair
 SUCCESS = (5.0, 2.0)  # degrees, centimetres
+METHODS = ("founding", "ours", "engine")
 BINS = ((0, 30), (30, 60), (60, 120), (120, 181))
 UP = np.array([0.0, 0.0, 1.0])
 Angles = tuple[float, float, float]
@@ -152,15 +159,28 @@ def founding(first: Frame, second: Frame, params: RegistrarParams) -> tuple[Arra
     return alignment.T_target_source, closest(source, target, alignment.T_target_source)
 
 
-def ours(first: Frame, second: Frame, engine: Engine, params: RegistrarParams) -> tuple[Array, float, bool] | None:
-    """The engine's best pose, the document's error of it, and whether the gate accepts it; None without a pose."""
-    candidates = engine.propose(keyframe(second, params), keyframe(first, params))
-    if not candidates or not first.objects or not second.objects:
-        return None
+def ours(source: Prepared, target: Prepared, params: RegistrarParams) -> Array | None:
+    """The best pose ``T_target_source`` of the object by its shape; None without one."""
+    found = from_shapes(source, target, params)
+    return found[0].T_target_source if found else None
+
+
+def whole(first: Keyframe, second: Keyframe, engine: Engine, params: RegistrarParams) -> tuple[Array, bool] | None:
+    """The engine's best pose of the pair, and whether the gate accepts it; None without a pose."""
+    candidates = engine.propose(second, first)
     verdict = judge(candidates, params)
-    best = verdict if isinstance(verdict, Candidate) else candidates[0]
-    T = best.T_target_source
-    return T, closest(second.objects[0].xyz, first.objects[0].xyz, T), isinstance(verdict, Candidate)
+    if isinstance(verdict, Candidate):
+        return verdict.T_target_source, True
+    return (candidates[0].T_target_source, False) if candidates else None
+
+
+def ready(key: Keyframe, params: RegistrarParams) -> Prepared:
+    """The keyframe as registrations use it, with what they would make of it at first use."""
+    prepared = prepare(key, params)
+    for shape in (*prepared.shapes, prepared.scene):
+        if shape is not None:
+            shape.surface, shape.sight  # noqa: B018
+    return prepared
 
 
 def timed(work: Callable[[], Any]) -> tuple[Any, dict[str, float]]:
@@ -177,14 +197,14 @@ class Bench:
         self.params = RegistrarParams()
         self.engine = Engine(self.params)
         self._seeds = seeds
-        self._stages = {(label, seed): Stage.of(label, seed) for label in TABLE_1 for seed in seeds}
+        self._stages = {(label, seed): Stage.of(label, seed, ASIDE) for label in TABLE_1 for seed in seeds}
         self.pairs: list[dict[str, Any]] = []
 
     def cell(self, label: str, angles: Angles, document: float | None) -> dict[str, Any]:
-        """One cell: the document's error, and of both methods the error, the true error and how often it was right."""
+        """One cell: the document's error, and of every method the error, the true error and how often it was right."""
         rows = [self._pair(label, angles, seed) for seed in self._seeds]
         self.pairs += rows
-        methods = {name: summed([row[name] for row in rows]) for name in ("founding", "ours")}
+        methods = {name: summed([row[name] for row in rows]) for name in METHODS}
         return {"object": label, "angles_deg": list(angles), "document_m": document, **methods}
 
     def _pair(self, label: str, angles: Angles, seed: int) -> dict[str, Any]:
@@ -192,26 +212,39 @@ class Bench:
         rng = np.random.default_rng([seed, int(angles[0]) + 360])
         cameras = stage.camera((0.0, 0.0, 0.0), rng), stage.camera(angles, rng)
         noise = rng.integers(2**31, size=2).tolist()
-        paper, whole = (
+        paper, full = (
             [shoot(stage, T, s, preset) for T, s in zip(cameras, noise, strict=True)] for preset in ("paper", "default")
         )
-        answers = {
-            "founding": timed(lambda: founding(paper[0], paper[1], self.params)),
-            "ours": timed(lambda: ours(whole[0], whole[1], self.engine, self.params)),
-        }
+        keys = [keyframe(frame, self.params) for frame in full]
+        made, preparing = timed(lambda: [ready(key, self.params) for key in keys])
         row: dict[str, Any] = {"angle": abs(((angles[0] + 180) % 360) - 180)}
-        for name, (answer, spent) in answers.items():
-            row[name] = {**self._judged(stage, answer, cameras), **spent}
+        answer, spent = timed(lambda: founding(paper[0], paper[1], self.params))
+        row["founding"] = {**self._judged(stage, answer, cameras), **spent}
+        T, spent = timed(lambda: ours(made[1], made[0], self.params))
+        found = None if T is None or not all(f.objects for f in full) else (T, self._error(full, T))
+        row["ours"] = {**self._judged(stage, found, cameras), **spent, "prepare_ms": preparing["cpu_ms"] / 2}
+        answer, spent = timed(lambda: whole(keys[0], keys[1], self.engine, self.params))
+        accepted = answer is not None and answer[1]
+        found = None if answer is None else (answer[0], self._error(full, answer[0]))
+        row["engine"] = {**self._judged(stage, found, cameras), **spent, "accepted": accepted}
         return row
 
-    def _judged(self, stage: Stage, answer: Any, cameras: tuple[Array, Array]) -> dict[str, Any]:
+    @staticmethod
+    def _error(frames: Sequence[Frame], T_first_second: Array) -> float | None:
+        """The document's error; None where a view shows no object."""
+        first, second = frames
+        if not first.objects or not second.objects:
+            return None
+        return closest(second.objects[0].xyz, first.objects[0].xyz, T_first_second)
+
+    @staticmethod
+    def _judged(stage: Stage, answer: Any, cameras: tuple[Array, Array]) -> dict[str, Any]:
         if answer is None:
             return {"error_m": None, "rotation_deg": None, "translation_cm": None, "success": False}
-        T, error, *accepted = answer
+        T, error = answer
         degrees, centimetres = stage.error(T, *cameras)
         right = degrees <= SUCCESS[0] and centimetres <= SUCCESS[1]
-        told = {"error_m": error, "rotation_deg": degrees, "translation_cm": centimetres, "success": right}
-        return {**told, "accepted": accepted[0]} if accepted else told
+        return {"error_m": error, "rotation_deg": degrees, "translation_cm": centimetres, "success": right}
 
 
 def summed(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -231,21 +264,22 @@ def by_angle(pairs: Sequence[dict[str, Any]]) -> dict[str, dict[str, float]]:
     for low, high in BINS:
         rows = [row for row in pairs if low <= row["angle"] < high]
         if rows:
-            shares = {name: float(np.mean([row[name]["success"] for row in rows])) for name in ("founding", "ours")}
+            shares = {name: float(np.mean([row[name]["success"] for row in rows])) for name in METHODS}
             out[f"{low}-{min(high, 180)}"] = {"pairs": float(len(rows)), **shares}
     return out
 
 
 def speed(pairs: Sequence[dict[str, Any]]) -> dict[str, float]:
-    """Median milliseconds a pair, segmentation apart, and how many times the document's 2 s is as long.
+    """Median milliseconds a pair, segmentation and preparation apart, and how many times the document's 2 s is as long.
 
     The processor's time is what the pair takes on a machine that does nothing else.
     """
     out = {
         f"{name}_{kind}": float(np.median([row[name][kind] for row in pairs]))
-        for name in ("founding", "ours")
+        for name in METHODS
         for kind in ("ms", "cpu_ms")
     }
+    out["ours_prepare_ms"] = float(np.median([row["ours"]["prepare_ms"] for row in pairs]))
     paper_ms = 1e3 * PAPER_SECONDS[0]
     ratios = {"ratio_paper_ms": paper_ms / out["ours_ms"], "ratio_paper_cpu_ms": paper_ms / out["ours_cpu_ms"]}
     return {**out, "paper_ms": paper_ms, **ratios}
@@ -281,7 +315,7 @@ def show(cell: dict[str, Any]) -> str:
     """One cell as a line."""
     words = f"{cell['object']:11} {cell['angles_deg'][0]:5.0f}°"
     words += "        " if cell["document_m"] is None else f"  {cell['document_m']:.5f} m"
-    for name in ("founding", "ours"):
+    for name in METHODS:
         m = cell[name]
         none = m["error_m"] is None
         words += f"  {name}: " + ("none" if none else f"{m['error_m']:.4f} m {m['rotation_deg']:5.1f}° "
