@@ -70,9 +70,9 @@ class RegistrarParams(Params):
     shape_offsets: tuple[float, ...] = param(
         (0.1, 0.25), "how much deeper the middle of an object may lie than what is seen of it, in its widths"
     )
-    shape_glance: int = param(130, "points a side that rank those", ge=20)
+    shape_glance: int = param(100, "points a side that rank those", ge=20)
     shape_kept: int = param(6, "motions that are refined", ge=1)
-    shape_climbed: int = param(4, "motions whose score is climbed", ge=1)
+    shape_climbed: int = param(3, "motions whose score is climbed", ge=1)
     shape_rounds: int = param(8, "most rounds of that climb", ge=0)
     scene_seeds: int = param(8, "poses that the middles of the objects propose for all together", ge=0)
     shape_violations: float = param(12.0, "weight of points in seen free space", ge=0.0)
