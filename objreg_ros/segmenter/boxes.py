@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
-from objreg_ros.data import Array, Detections
+from objreg_ros.data import Detections
 
 Box = tuple[int, int, int, int]  # x0, y0, x1, y1 pixels; x1 and y1 are outside
 
@@ -16,15 +16,19 @@ def pixel_boxes(detections: Detections, height: int, width: int) -> list[Box]:
     Only pixels wholly inside a box belong to it. A box outside the image comes back empty (x1 <= x0 or y1 <= y0).
     """
     image_h, image_w = detections.image_hw
-    scale = np.array([width / image_w, height / image_h] * 2)
-    scaled = detections.xyxy.astype(np.float64) * scale
-    low = np.ceil(np.clip(scaled[:, :2], 0, (width, height)) - 1e-6)
-    high = np.floor(np.clip(scaled[:, 2:], 0, (width, height)) + 1e-6)
-    return [_box(row) for row in np.hstack([low, high]).astype(int)]
+    x, y = width / image_w, height / image_h
+    return [
+        (_first(x0 * x, width), _first(y0 * y, height), _end(x1 * x, width), _end(y1 * y, height))
+        for x0, y0, x1, y1 in detections.xyxy.tolist()
+    ]
 
 
-def _box(row: Array) -> Box:
-    return int(row[0]), int(row[1]), int(row[2]), int(row[3])
+def _first(edge: float, size: int) -> int:
+    return math.ceil(min(max(edge, 0.0), size) - 1e-6)
+
+
+def _end(edge: float, size: int) -> int:
+    return math.floor(min(max(edge, 0.0), size) + 1e-6)
 
 
 def is_empty(box: Box) -> bool:
