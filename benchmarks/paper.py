@@ -292,7 +292,7 @@ def line_graph(sweep: dict[str, list[dict[str, Any]]], file: Path) -> None:
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    figure, axes = pyplot.subplots(2, len(sweep), figsize=(3.4 * len(sweep), 5.6), sharex=True, squeeze=False)
+    figure, axes = pyplot.subplots(2, len(sweep), figsize=(3.4 * len(sweep), 5.6), sharex=True, sharey="row", squeeze=False)
     styles = {"founding": ("#d95926", "founding method here"), "ours": ("#2a78d6", "ours")}
     for column, (label, cells) in enumerate(sweep.items()):
         angles = [cell["angles_deg"][0] for cell in cells]
@@ -304,6 +304,7 @@ def line_graph(sweep: dict[str, list[dict[str, Any]]], file: Path) -> None:
             bottom.plot(angles, [cell[name]["rotation_deg"] for cell in cells], "o-", color=colour, ms=3, label=words)
         top.set_title(label.replace("_", " "))
         bottom.set_xlabel("change of view about X, °")
+        bottom.set_xticks(range(-180, 181, 90))
     axes[0, 0].set_ylabel("closest-point error, m")
     axes[1, 0].set_ylabel("true rotation error, °")
     axes[0, -1].legend(fontsize=8)
