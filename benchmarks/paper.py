@@ -292,7 +292,9 @@ def line_graph(sweep: dict[str, list[dict[str, Any]]], file: Path) -> None:
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    figure, axes = pyplot.subplots(2, len(sweep), figsize=(3.4 * len(sweep), 5.6), sharex=True, sharey="row", squeeze=False)
+    figure, axes = pyplot.subplots(
+        2, len(sweep), figsize=(3.4 * len(sweep), 5.6), sharex=True, sharey="row", squeeze=False
+    )
     styles = {"founding": ("#d95926", "founding method here"), "ours": ("#2a78d6", "ours")}
     for column, (label, cells) in enumerate(sweep.items()):
         angles = [cell["angles_deg"][0] for cell in cells]
