@@ -34,26 +34,26 @@ def verify(
     if min(way[SEEN] for way in ways) < 1:
         return Verification(inliers=0.0, violations=1.0, occluded=0.0, texture=None, tested=0, score=WORST)
     asked = sum(min(len(sight.points), sample or len(sight.points)) for sight in (source, target))
-    texture, worth = _rated(*ways, source.textured and target.textured, asked)
+    textured = source.textured and target.textured
+    texture, worth = rated(ways[0], ways[1], textured, asked)
     return Verification(
         inliers=float(min(way[INLIERS] / way[SEEN] for way in ways)),
         violations=float(max(way[VIOLATIONS] / way[SEEN] for way in ways)),
         occluded=float(max(way[OCCLUDED] / way[SEEN] for way in ways)),
-        texture=texture,
+        texture=float(texture) if textured else None,
         tested=int(ways[0][SEEN] + ways[1][SEEN]),
-        score=worth,
+        score=float(worth),
     )
 
 
 def rank(source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams, sample: int) -> Array:
     """V of many poses (K, 4, 4) at once, from the first ``sample`` points a side; -3 where the views do not meet."""
     slops = params.depth_tolerance, params.depth_tolerance_growth
-    back = np.array([inverse(T) for T in T_target_source]).reshape(-1, 4, 4)
     forward = count_many(source.points[:sample], source.shades[:sample], T_target_source, *_image(target), *slops)
+    back = inverses(T_target_source)
     backward = count_many(target.points[:sample], target.shades[:sample], back, *_image(source), *slops)
     asked = min(sample, len(source.points)) + min(sample, len(target.points))
-    textured = source.textured and target.textured
-    return np.array([_rated(a, b, textured, asked)[1] for a, b in zip(forward, backward, strict=True)])
+    return rated(forward, backward, source.textured and target.textured, asked)[1]
 
 
 def look(source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams, sample: int | None) -> Array:
@@ -66,21 +66,28 @@ def _image(sight: Sight) -> tuple[Array, Array, Array, tuple[float, float, float
     return sight.near, sight.far, sight.detail, sight.camera
 
 
-def _rated(forward: Array, backward: Array, textured: bool, asked: int) -> tuple[float | None, float]:
-    """(texture, V) of the counts of both ways."""
-    if min(forward[SEEN], backward[SEEN]) < 1:
-        return None, WORST
-    texture = correlation(forward + backward) if textured else None
-    inliers = min(forward[INLIERS] / forward[SEEN], backward[INLIERS] / backward[SEEN])
-    violations = max(forward[VIOLATIONS] / forward[SEEN], backward[VIOLATIONS] / backward[SEEN])
-    return texture, score((inliers, violations), texture, (forward[SEEN] + backward[SEEN]) / asked)
+def rated(forward: Array, backward: Array, textured: bool, asked: int) -> tuple[Array, Array]:
+    """(texture, V) of the counts (..., 10) of both ways of which ``asked`` points were asked.
 
-
-def score(worse: tuple[float, float], texture: float | None, share: float) -> float:
-    """V, from the worse way's (inliers, violations), the texture and the share of all points that could be tested.
-
+    V is made of the worse way's inliers and violations, the texture and the share of all points that could be tested.
     Weights rounded from a logistic fit on real frames; a view without grey counts as a weak match.
     """
-    inliers, violations = worse
-    grey = NO_TEXTURE if texture is None else texture
-    return float(grey + inliers - 3.0 * violations + 0.5 * np.log10(max(share, 1e-3)) - NEUTRAL)
+    a, b = np.moveaxis(forward, -1, 0), np.moveaxis(backward, -1, 0)
+    met = np.minimum(a[SEEN], b[SEEN]) >= 1
+    seen_a, seen_b = np.maximum(a[SEEN], 1.0), np.maximum(b[SEEN], 1.0)
+    inliers = np.minimum(a[INLIERS] / seen_a, b[INLIERS] / seen_b)
+    violations = np.maximum(a[VIOLATIONS] / seen_a, b[VIOLATIONS] / seen_b)
+    texture = correlation(forward + backward)
+    grey = texture if textured else NO_TEXTURE
+    share = np.maximum((a[SEEN] + b[SEEN]) / asked, 1e-3)
+    V = grey + inliers - 3.0 * violations + 0.5 * np.log10(share) - NEUTRAL
+    return texture, np.where(met, V, WORST)
+
+
+def inverses(T: Array) -> Array:
+    """The inverse motions of poses (K, 4, 4)."""
+    out = np.zeros_like(T)
+    out[:, :3, :3] = T[:, :3, :3].transpose(0, 2, 1)
+    out[:, :3, 3] = -np.einsum("kij,kj->ki", out[:, :3, :3], T[:, :3, 3])
+    out[:, 3, 3] = 1.0
+    return out
