@@ -46,13 +46,12 @@ setup(
         "pyyaml>=6",
         "rosbags>=0.11",
         "scipy>=1.11",
-        "small_gicp>=1.0",
         "tqdm>=4.64",
     ],
     extras_require={
         # The real ROS 2 Jazzy as wheels, for machines without a ROS installation.
         "ros": ["ros-jazzy-rclpy", "ros-jazzy-common-interfaces", "ros-jazzy-rmw-fastrtps-cpp"],
-        "test": ["hypothesis", "mypy", "onnx", "pytest", "ruff"],
+        "test": ["hypothesis", "mypy", "onnx", "pytest", "ruff", "small_gicp>=1.0"],
     },
     entry_points={
         "console_scripts": [
