@@ -1,2 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Room 3: Frames in, LoopClosures out, and a reason for every closure that was refused."""
+"""Room 3: Frames in, LoopClosures out, and a reason for every closure that was refused.
+
+The way of a frame, file by file:
+
+======================  ==========================================================================================
+the verb                `registrar`: `track` for every frame, `search` for every keyframe, `process` for both
+frames to keyframes     `keyframes` (when one ends), `tracking` (motion without odometry), `fusion`, `odometry`
+what is remembered      `keyframe`, `sighting`, `landmarks`; in `store` through `codec`; seen by `survey`, `export`
+which to try            `retrieve`, by `descriptor` and `labels`
+poses from chains       `engine` asks `hypotheses`, fed by `prepared`: `features` and `consensus` on the context,
+                        `scene_search` (`shape`, `silhouette`, `shape_search`, `shape_icp`, `shape_score`) on objects
+refinement              `icp` brings many to their basin; `refine` ends a few, with `direct` where there is grey
+evidence                `verify` and `visibility` (views), `objects` (explained or moved), `symmetry`, `sliding`
+yes or no               `gate`, on a `candidate` with its evidence; then `covariance` and `thinning`
+======================  ==========================================================================================
+
+`paper` is the founding method; `warm` compiles every kernel before the first frame.
+"""
