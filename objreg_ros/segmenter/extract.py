@@ -58,13 +58,12 @@ def _extract(depth, rgb, box, grid, pinhole, jump):  # type: ignore[no-untyped-d
     """The fields of `Pixels`, the area times fx fy; row by row, and in each row run by run of pixels that are kept."""
     x0, y0, x1, y1 = box
     fx, fy, cx, cy = pinhole
-    rows, cols = _cells_of_pixels(box, grid)
+    cols, x = _columns(x0, x1, grid, fx, cx)
     mask = np.zeros((y1 - y0 + 2, x1 - x0 + 2), np.uint8)  # with a rim, so that every pixel has eight neighbours
-    count = _mark(depth, box, grid, rows, cols, jump, mask)
+    count = _mark(depth, box, grid, cols, jump, mask)
     xyz, normals = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
     colour, edge = np.empty((count if len(rgb) > 0 else 0, 3), np.uint8), np.empty(count, np.uint16)
     kept, flags = np.empty(x1 - x0, np.uint8), np.empty(x1 - x0, np.uint16)
-    x = ((np.arange(x0, x1) - cx) / fx).astype(np.float32)
     n, area, around = 0, 0.0, (x1, y1, x0, y0)
     for v in range(y0, y1):
         left, right = _keep(mask[v - y0], mask[v - y0 + 1], mask[v - y0 + 2], kept)
@@ -73,53 +72,88 @@ def _extract(depth, rgb, box, grid, pinhole, jump):  # type: ignore[no-untyped-d
         around = (min(around[0], x0 + left), min(around[1], v), max(around[2], x0 + right), v + 1)
         _flag_jumps(depth, v, x0 + left, x0 + right, jump, flags[left:])
         y = np.float32((v - cy) / fy)
+        cell_normals = grid[1][:, _row(v, grid)]
         while left < right:
             last = left
             while last < right and kept[last]:
                 last += 1
-            end = n + last - left
             z = depth[v, x0 + left : x0 + last]
-            area += _fill(x[left:last], y, z, grid[1][:, rows[v - y0]], cols[left:last], xyz[n:end], normals[n:end])
-            edge[n:end] = flags[left:last]
+            area += _fill(x[left:], y, z, cell_normals, cols[left:], xyz[n:], normals[n:])
+            for k in range(last - left):
+                edge[n + k] = flags[left + k]
             if len(rgb) > 0:
-                colour[n:end] = rgb[v, x0 + left : x0 + last]
-            n, left = end, last
+                _copy(rgb[v, x0 + left : x0 + last], colour[n:])
+            n, left = n + last - left, last
             while left < right and not kept[left]:
                 left += 1
     return xyz[:n], normals[:n], colour[:n], edge[:n], area, around
 
 
+@numba.njit(cache=True, nogil=True, fastmath=EXACT, error_model="numpy")
+def _columns(x0, x1, grid, fx, cx):  # type: ignore[no-untyped-def]
+    """Of each column of pixels the column of its cells, and the slope of its ray."""
+    left, _, step = grid[3]
+    cols, x = np.empty(x1 - x0, np.int32), np.empty(x1 - x0, np.float32)
+    for u in range(x0, x1):
+        cols[u - x0] = min((u - left) // step, grid[0].shape[1] - 1)
+        x[u - x0] = (u - cx) / fx
+    return cols, x
+
+
 @numba.njit(cache=True, nogil=True)
-def _cells_of_pixels(box, grid):  # type: ignore[no-untyped-def]
-    """The row of cells of each row of pixels in the box, and the same of columns."""
-    left, top, step = grid[3]
-    h, w = grid[0].shape
-    rows = np.minimum((np.arange(box[1], box[3]) - top) // step, h - 1)
-    return rows, np.minimum((np.arange(box[0], box[2]) - left) // step, w - 1)
+def _row(v, grid):  # type: ignore[no-untyped-def]
+    """The row of the cells of a row of pixels."""
+    _, top, step = grid[3]
+    return min((v - top) // step, grid[0].shape[0] - 1)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=EXACT)
-def _mark(depth, box, grid, rows, cols, jump, mask):  # type: ignore[no-untyped-def]
-    """Mark the pixels that belong to chosen cells: by their own cell, or by the nearest in depth around it."""
+@numba.njit(cache=True, nogil=True, fastmath=EXACT, error_model="numpy")
+def _mark(depth, box, grid, cols, jump, mask):  # type: ignore[no-untyped-def]
+    """Mark the pixels that belong to chosen cells, by their own cell or by the nearest in depth around it; count them.
+
+    A row's cells are spread over its pixels first, so that the CPU's vectors decide about all but a few."""
     cells, _, chosen, _ = grid
     x0, y0, x1, y1 = box
+    n, now = x1 - x0, -1
     near = _spread(chosen)
-    count = 0
+    cell, own, possible = np.empty(n, np.float32), np.empty(n, np.uint8), np.empty(n, np.uint8)
+    open_ends = np.empty(n, np.uint8)
+    count, some = 0, False
     for v in range(y0, y1):
-        i = rows[v - y0]
-        for u in range(x0, x1):
-            j = cols[u - x0]
-            z = depth[v, u]
-            if not near[i, j] or not (z > 0):
-                continue
-            limit = jump[0] + jump[1] * z * z
-            if cells[i, j] > 0 and abs(cells[i, j] - z) < limit:
-                belongs = chosen[i, j]
-            else:
-                belongs = _nearest(cells, chosen, i, j, z, limit)
-            mask[v - y0 + 1, u - x0 + 1] = belongs
-            count += belongs
+        i = _row(v, grid)
+        if i != now:
+            some, now = _unfold(cells[i], chosen[i], near[i], cols, cell, own, possible), i
+        if not some:
+            continue
+        row, marks = depth[v, x0:x1], mask[v - y0 + 1, 1:]
+        found, doubtful = 0, 0
+        for u in range(n):
+            z = row[u]
+            known = z > 0
+            agrees = (abs(cell[u] - z) < jump[0] + jump[1] * z * z) & (cell[u] > 0) & known
+            marks[u] = own[u] if agrees else 0
+            found += own[u] if agrees else 0
+            open_ends[u] = 0 if agrees else (possible[u] if known else 0)
+            doubtful += open_ends[u]
+        if doubtful > 0:
+            for u in range(n):
+                if open_ends[u]:
+                    z = row[u]
+                    marks[u] = _nearest(cells, chosen, i, cols[u], z, jump[0] + jump[1] * z * z)
+                    found += marks[u]
+        count += found
     return count
+
+
+@numba.njit(cache=True, nogil=True)
+def _unfold(cells, chosen, near, cols, cell, own, possible):  # type: ignore[no-untyped-def]
+    """Fill what a row of pixels needs of its row of cells; whether any pixel can belong to a chosen one."""
+    some = False
+    for u in range(len(cols)):
+        j = cols[u]
+        cell[u], own[u], possible[u] = cells[j], chosen[j], near[j]
+        some |= near[j]
+    return some
 
 
 @numba.njit(cache=True, nogil=True)
@@ -180,7 +214,8 @@ def _flag_jumps(depth, v, x0, x1, jump, flags):  # type: ignore[no-untyped-def]
     for k in range(2):
         wide[k] = depth[v, max(x0 + k - 2, 0)]
         wide[n + 2 + k] = depth[v, min(x1 + k, w - 1)]
-    wide[2 : n + 2] = here[:n]
+    for u in range(n):
+        wide[u + 2] = here[u]
     right = wide[4:]
     for u in range(n):
         z = here[u]
@@ -203,6 +238,12 @@ def _fill(x, y, z, cell_normals, cols, xyz, normals):  # type: ignore[no-untyped
     return area
 
 
+@numba.njit(cache=True, nogil=True)
+def _copy(pixels, out):  # type: ignore[no-untyped-def]
+    for k in range(len(pixels)):
+        out[k, 0], out[k, 1], out[k, 2] = pixels[k, 0], pixels[k, 1], pixels[k, 2]
+
+
 def cell_points(surface: Surface, cells: Array, rgb: Array) -> tuple[Array, Array, Array]:
     """Points and normals (N, 3) float32 and colours (N, 3) uint8 of ``cells (h, w) bool`` of a whole frame.
 
@@ -213,7 +254,11 @@ def cell_points(surface: Surface, cells: Array, rgb: Array) -> tuple[Array, Arra
 
 @numba.njit(cache=True, nogil=True)
 def _gather_cells(depth, cell_normals, x, y, step, rgb, cells):  # type: ignore[no-untyped-def]
-    count = np.count_nonzero(cells)
+    count = 0
+    for i in range(depth.shape[0]):
+        row = cells[i]
+        for j in range(len(row)):
+            count += row[j]
     xyz, normals = np.empty((count, 3), np.float32), np.empty((count, 3), np.float32)
     colour = np.empty((count if len(rgb) > 0 else 0, 3), np.uint8)
     n = 0

@@ -8,7 +8,7 @@ import numpy as np
 
 from objreg_ros.data import Array, DepthImage, PointFlag
 from objreg_ros.segmenter.extract import Pixels
-from objreg_ros.segmenter.support import FLOOR, GROWTH
+from objreg_ros.segmenter.support import FLOOR, GROWTH, solve_symmetric
 from objreg_ros.segmenter.surface import EXACT, Surface, Window
 
 LEAK = 0.08  # an object with more of it outside its box is cut by the box
@@ -51,40 +51,40 @@ def _inspect(depth, x, y, chosen, box):  # type: ignore[no-untyped-def]
     cut = inside < (1 - LEAK) * everywhere
     if inside <= MIN_CELLS:
         return cut, False
-    normal, offset = _fit_plane(depth, x, y, chosen)
-    own, own_flat, ring, ring_flat = _count_on_plane(depth, x, y, chosen, box, normal, offset)
+    plane = _fit_plane(depth, x, y, chosen)
+    own, own_flat, ring, ring_flat = _count_on_plane(depth, x, y, chosen, box, plane)
     flat = own_flat > FLAT * own
     return cut, flat and ring > MIN_CELLS / STRIDE**2 and ring_flat > WALL_AROUND * ring
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _fit_plane(depth, x, y, chosen):  # type: ignore[no-untyped-def]
-    """The normal (3,) float32 and the offset of the plane through the chosen cells: least squares."""
-    M, centre, count = np.zeros((3, 3)), np.zeros(3), 0
+    """a, b, c of the plane 1/z = a x + b y + c through the chosen cells, and its slope √(a² + b² + c²).
+
+    Least squares of inverse depth, of which the noise of structured light is the same at any distance."""
+    m, m_x, m_y, m_xx, m_xy, m_yy, v, v_x, v_y = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(0, depth.shape[0], STRIDE):
+        q = np.float64(y[i])
         for j in range(0, depth.shape[1], STRIDE):
-            if chosen[i, j]:
-                z = np.float64(depth[i, j])
-                p, q = x[j] * z, y[i] * z
-                count += 1
-                centre[0], centre[1], centre[2] = centre[0] + p, centre[1] + q, centre[2] + z
-                M[0, 0], M[0, 1], M[0, 2] = M[0, 0] + p * p, M[0, 1] + p * q, M[0, 2] + p * z
-                M[1, 1], M[1, 2], M[2, 2] = M[1, 1] + q * q, M[1, 2] + q * z, M[2, 2] + z * z
-    centre /= count
-    M[1, 0], M[2, 0], M[2, 1] = M[0, 1], M[0, 2], M[1, 2]
-    normal = np.linalg.eigh(M / count - np.outer(centre, centre))[1][:, 0].copy()
-    return normal.astype(np.float32), np.float32(normal @ centre)
+            if chosen[i, j] and depth[i, j] > 0:
+                p, near = np.float64(x[j]), 1 / np.float64(depth[i, j])
+                m, m_x, m_y = m + 1, m_x + p, m_y + q
+                m_xx, m_xy, m_yy = m_xx + p * p, m_xy + p * q, m_yy + q * q
+                v, v_x, v_y = v + near, v_x + near * p, v_y + near * q
+    ridge = 1e-12 * m
+    c, a, b = solve_symmetric((m, m_x, m_y, m_xx + ridge, m_xy, m_yy + ridge), (v, v_x, v_y))
+    return np.float32(a), np.float32(b), np.float32(c), np.float32(np.sqrt(a * a + b * b + c * c))
 
 
 @numba.njit(cache=True, nogil=True, fastmath=EXACT)
-def _count_on_plane(depth, x, y, chosen, box, normal, offset):  # type: ignore[no-untyped-def]
+def _count_on_plane(depth, x, y, chosen, box, plane):  # type: ignore[no-untyped-def]
     """How many of the chosen cells in the box there are and are flat, and the same of all cells outside it."""
     own, own_flat, ring, ring_flat = 0, 0, 0, 0
     for i in range(0, depth.shape[0], STRIDE):
         for j in range(0, depth.shape[1], STRIDE):
             z = depth[i, j]
-            off = abs(z * (normal[0] * x[j] + normal[1] * y[i] + normal[2]) - offset)
-            flat = off < 2 * (FLOOR + GROWTH * z * z)
+            off = abs(z * (plane[0] * x[j] + plane[1] * y[i] + plane[2]) - np.float32(1))
+            flat = off < plane[3] * 2 * (FLOOR + GROWTH * z * z)
             if i < box[1] or i >= box[3] or j < box[0] or j >= box[2]:
                 ring += z > 0
                 ring_flat += (z > 0) & flat

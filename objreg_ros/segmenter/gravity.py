@@ -36,29 +36,37 @@ def estimate_up(normals: Array, prior: Array, cone_deg: float) -> tuple[Array | 
 @numba.njit(cache=True, nogil=True)
 def _estimate(normals, prior, limit):  # type: ignore[no-untyped-def]
     """Up (3,) float64 and its confidence, 0 where there is none."""
-    level = np.empty((3, len(normals)), np.float32)
+    level, up = np.empty((3, len(normals)), np.float32), np.zeros(3)
     n = 0
-    for normal in normals:
-        if normal[0] * prior[0] + normal[1] * prior[1] + normal[2] * prior[2] > limit:
-            level[0, n], level[1, n], level[2, n] = normal[0], normal[1], normal[2]
+    for k in range(len(normals)):
+        if normals[k, 0] * prior[0] + normals[k, 1] * prior[1] + normals[k, 2] * prior[2] > limit:
+            level[0, n], level[1, n], level[2, n] = normals[k, 0], normals[k, 1], normals[k, 2]
             n += 1
     if n < MIN_NORMALS:
-        return np.zeros(3), 0.0
+        return up, 0.0
     level = level[:, :n]
-    candidates = np.linspace(0, n - 1, CANDIDATES).astype(np.int64)
-    count, weight = np.empty(CANDIDATES), np.empty(CANDIDATES)
+    count, weight, best = np.empty(CANDIDATES), np.empty(CANDIDATES), 0
     for k in range(CANDIDATES):
-        x, y, z = level[0, candidates[k]], level[1, candidates[k]], level[2, candidates[k]]
+        x, y, z = _candidate(level, k)
         count[k] = _count_near(level, x, y, z)
-        weight[k] = count[k] * max(x * prior[0] + y * prior[1] + z * prior[2], 0) ** 4
-    best = np.argmax(weight)
-    up = _refine(level, level[:, candidates[best]].astype(np.float64))
+        cosine = max(x * prior[0] + y * prior[1] + z * prior[2], 0)
+        weight[k] = count[k] * cosine * cosine * cosine * cosine
+        best = k if weight[k] > weight[best] else best
+    up[0], up[1], up[2] = _candidate(level, best)
+    _refine(level, up)
     rival = 0.0
     for k in range(CANDIDATES):
-        x, y, z = level[0, candidates[k]], level[1, candidates[k]], level[2, candidates[k]]
+        x, y, z = _candidate(level, k)
         if x * up[0] + y * up[1] + z * up[2] < RIVAL:
             rival = max(rival, weight[k])
     return up, (1.0 - rival / weight[best]) * min(1.0, count[best] / (ENOUGH * len(normals)))
+
+
+@numba.njit(cache=True, nogil=True)
+def _candidate(level, k):  # type: ignore[no-untyped-def]
+    """The k-th of CANDIDATES normals, spread evenly over ``level (3, N)``."""
+    n = k * (level.shape[1] - 1) // (CANDIDATES - 1)
+    return level[0, n], level[1, n], level[2, n]
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
@@ -73,7 +81,7 @@ def _count_near(level, x, y, z):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
 def _refine(level, up):  # type: ignore[no-untyped-def]
-    """The mean of the normals around ``up``, in shrinking cones."""
+    """Turn ``up (3,)`` to the mean of the normals around it, in shrinking cones."""
     n_x, n_y, n_z = level[0], level[1], level[2]
     for cosine in CONES:
         x, y, z = 0.0, 0.0, 0.0
@@ -82,8 +90,8 @@ def _refine(level, up):  # type: ignore[no-untyped-def]
             x += n_x[n] if near else 0.0
             y += n_y[n] if near else 0.0
             z += n_z[n] if near else 0.0
-        up = np.array([x, y, z]) / np.sqrt(x * x + y * y + z * z)
-    return up
+        length = np.sqrt(x * x + y * y + z * z)
+        up[0], up[1], up[2] = x / length, y / length, z / length
 
 
 def known_normals(normals: Array, stride: int) -> Array:

@@ -34,14 +34,14 @@ def _bounds(chosen):  # type: ignore[no-untyped-def]
     left, top, right, bottom = chosen.shape[1], 0, 0, 0
     for i in range(chosen.shape[0]):
         row = chosen[i]
-        if not row.any():
-            continue
-        top, bottom = i if bottom == 0 else top, i + 1
         first, last = 0, len(row)
-        while not row[first]:
+        while first < last and not row[first]:
             first += 1
+        if first == last:
+            continue
         while not row[last - 1]:
             last -= 1
+        top, bottom = i if bottom == 0 else top, i + 1
         left, right = min(left, first), max(right, last)
     return (left, top, right, bottom) if bottom > 0 else (0, 0, 0, 0)
 

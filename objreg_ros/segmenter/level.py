@@ -64,19 +64,23 @@ def _find_beneath(parts, total, normal, offset, window, grid, coarse_step, here)
     stride = coarse_step // step  # 1 or more
     crop = (left, top, left + -(-(w + stride) // stride), top + -(-(h + stride) // stride))
     near = _count(parts, crop, 1, len(total))
-    if near.sum() < MIN_NEAR:
-        return False
     within = _count(parts, window, stride, len(total))
-    own = within > OWN_TOP * total
-    own[0] = False
-    around_it, on_it = near[~own].sum(), near[own].sum()
-    if on_it > 0 and around_it <= on_it and _share_below(normal, offset, window, grid) > LOWEST:
-        near[own] = 0
-    kept = near >= MIN_NEAR
-    if not kept.any():
+    around_it, on_it = 0, 0
+    for k in range(1, len(total)):
+        if within[k] > OWN_TOP * total[k]:
+            on_it += near[k]
+        else:
+            around_it += near[k]
+    if around_it + on_it < MIN_NEAR:
         return False
-    _spread(parts, kept, crop, coarse_step, grid, here)
-    return True
+    is_top = on_it > 0 and around_it <= on_it and _share_below(normal, offset, window, grid) > LOWEST
+    kept, some = np.zeros(len(total), np.bool_), False
+    for k in range(1, len(total)):
+        kept[k] = near[k] >= MIN_NEAR and not (is_top and within[k] > OWN_TOP * total[k])
+        some |= kept[k]
+    if some:
+        _spread(parts, kept, crop, coarse_step, grid, here)
+    return some
 
 
 @numba.njit(cache=True, nogil=True)
@@ -103,16 +107,30 @@ def _spread(parts, kept, crop, coarse_step, grid, here):  # type: ignore[no-unty
                 for k in range(max(free_from, j - left - REACH), min(right - left, j - left + REACH + 1)):
                     mask[i - top, k] = True
                 free_from = j - left + REACH + 1
-    tall = mask.copy()
-    for d in range(1, REACH + 1):
-        tall[d:] |= mask[:-d]
-        tall[:-d] |= mask[d:]
-    cols = np.minimum((first_u + step * np.arange(depth.shape[1])) // coarse_step - left, right - left - 1)
+    h, w = mask.shape
+    cols = np.empty(depth.shape[1], np.int32)
+    for j in range(len(cols)):
+        cols[j] = min((first_u + step * j) // coarse_step - left, w - 1)
+    marks, now = np.empty(w, np.bool_), -1
     for i in range(depth.shape[0]):
-        marks = tall[min((first_v + i * step) // coarse_step - top, bottom - top - 1)]
+        middle = min((first_v + i * step) // coarse_step - top, h - 1)
+        if middle != now:
+            _any_row(mask, max(0, middle - REACH), min(h, middle + REACH + 1), marks)
+            now = middle
         row, out = depth[i], here[i]
         for j in range(len(row)):
             out[j] = marks[cols[j]] & (row[j] > 0)
+
+
+@numba.njit(cache=True, nogil=True)
+def _any_row(mask, first, end, marks):  # type: ignore[no-untyped-def]
+    """Fill ``marks (w,)``: the columns that are marked in any of the rows first … end."""
+    for j in range(len(marks)):
+        marks[j] = False
+    for i in range(first, end):
+        row = mask[i]
+        for j in range(len(row)):
+            marks[j] |= row[j]
 
 
 @numba.njit(cache=True, nogil=True)

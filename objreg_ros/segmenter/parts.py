@@ -26,8 +26,9 @@ class Parts(NamedTuple):
     ``figure (K,)`` which share of its depth jumps is its own silhouette, 1 where it has none.
 
     Of each pair: ``alike (K, K)`` whether they have one colour in whatever light, False without colour, ``touching
-    (K, K)`` the cells in which they are neighbours without a depth jump, ``gap (K, K)`` m the least distance over a
-    border, ``front (K, 1 + K)`` the cells in which the first hides the second; column 0 is what is no part.
+    (K, 1 + K)`` the cells in which they are neighbours without a depth jump, ``gap (K, 1 + K)`` m² the square of the
+    least distance over a border, ``front (K, 1 + K)`` the cells in which the first hides the second; column 0 is what
+    is no part.
     """
 
     labels: Array
@@ -57,51 +58,62 @@ def measure(
     return Parts(*measured)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=EXACT)
+@numba.njit(cache=True, nogil=True, fastmath=EXACT, error_model="numpy")
 def _measure(labels, count, window, depth, x, y, pixels, rgb, bounds, limit):  # type: ignore[no-untyped-def]
-    left, top, right, bottom = window
+    """The fields of `Parts`. Plain loops: whole-array expressions would take ten times as long to compile."""
     number, kept = _rank(labels, count, window, limit)
     k = kept + 1
     renamed = np.empty_like(labels)
-    sums, extent = np.zeros((k, 8)), np.zeros((k, 4), np.int64)
+    sums, extent = np.zeros((k, 7)), np.zeros((k, 4), np.int64)
     _sum_up(labels, number, window, depth, pixels, rgb, renamed, sums, extent)
-    touching, front, gap = np.zeros((k, k), np.int64), np.zeros((k, k), np.int64), np.full((k, k), np.inf, np.float32)
+    touching, front, gap = np.zeros((k, k), np.int64), np.zeros((k, k), np.int64), np.empty((k, k), np.float32)
+    for p in range(k):
+        for q in range(k):
+            gap[p, q] = np.inf
     _compare(renamed, depth, x, y, bounds, touching, front, gap)
-    total = sums[1:, 0].copy()
     cell = x[1] - x[0] if len(x) > 1 else np.float32(0)
-    shown = front[1:].sum(axis=1)
-    return (
-        renamed,
-        total,
-        sums[1:, 1].copy(),
-        sums[1:, 2].copy(),
-        extent[1:],
-        max(right - left, bottom - top) * cell * sums[1:, 3] / total,
-        sums[1:, 1] / total,
-        (shown + 1) / (shown + front[:, 1:].sum(axis=0) + 1),
-        _alike(sums[1:, 4:7], total, len(rgb) > 0),
-        touching[1:, 1:].copy(),
-        np.sqrt(gap[1:, 1:]),
-        front[1:],
-    )
+    longer = max(window[2] - window[0], window[3] - window[1]) * cell
+    total, inside, weight, size, pure, figure = _describe(sums, front, longer)
+    alike = _alike(sums, len(rgb) > 0)
+    return renamed, total, inside, weight, extent[1:], size, pure, figure, alike, touching[1:], gap[1:], front[1:]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _describe(sums, front, longer):  # type: ignore[no-untyped-def]
+    """Of each part, from 1 on: total, inside, weight, size, pure and figure, each (K,)."""
+    count = len(sums) - 1
+    total, inside, weight = np.empty(count), np.empty(count), np.empty(count)
+    size, pure, figure = np.empty(count), np.empty(count), np.empty(count)
+    for p in range(count):
+        k = p + 1
+        total[p], inside[p], weight[p] = sums[k, 0], sums[k, 1], sums[k, 2]
+        size[p], pure[p] = longer * sums[k, 3] / sums[k, 0], sums[k, 1] / sums[k, 0]
+        shown, hidden = 0, 0
+        for o in range(count + 1):
+            shown += front[k, o]
+            hidden += front[o, k] if o > 0 else 0
+        figure[p] = (shown + 1) / (shown + hidden + 1)
+    return total, inside, weight, size, pure, figure
 
 
 @numba.njit(cache=True, nogil=True)
 def _rank(labels, count, window, limit):  # type: ignore[no-untyped-def]
     """(count + 1,) the place of each label in the order of their cells in the window, 0 without any; the last place."""
     left, top, right, bottom = window
-    inside = np.zeros(count + 1, np.int64)
+    inside, number = np.zeros(count + 1, np.int64), np.zeros(count + 1, np.int32)
     for i in range(top, bottom):
         for j in range(left, right):
             inside[labels[i, j]] += 1
     inside[0] = 0
-    number = np.zeros(count + 1, np.int32)
-    kept = 0
-    for k in np.argsort(-inside, kind="mergesort")[:limit]:
-        if inside[k] > 0:
-            kept += 1
-            number[k] = kept
-    return number, kept
+    for place in range(1, limit + 1):
+        most = 0
+        for k in range(1, count + 1):
+            if number[k] == 0 and inside[k] > inside[most]:
+                most = k
+        if most == 0:
+            return number, place - 1
+        number[most] = place
+    return number, limit
 
 
 @numba.njit(cache=True, nogil=True, fastmath=EXACT)
@@ -118,7 +130,10 @@ def _sum_up(labels, number, window, depth, pixels, rgb, renamed, sums, extent): 
             while last < w and row[last] == label:
                 last += 1
             k = number[label]
-            out[first:last] = k
+            total = np.float32(0)
+            for j in range(first, last):
+                out[j] = k
+                total += depth[i, j]
             if k == 0:
                 continue
             if sums[k, 0] == 0:
@@ -126,7 +141,7 @@ def _sum_up(labels, number, window, depth, pixels, rgb, renamed, sums, extent): 
             extent[k, 0], extent[k, 2] = min(extent[k, 0], first), max(extent[k, 2], last)
             extent[k, 3] = i + 1
             sums[k, 0] += last - first
-            sums[k, 3] += depth[i, first:last].sum()
+            sums[k, 3] += total
             _weigh(i, first, last, window, sums[k])
             if len(rgb) > 0:
                 _add_colours(rgb[first_v + i * step], first_u, step, first, last, sums[k])
@@ -156,15 +171,17 @@ def _add_colours(row, first_u, step, first, last, sums):  # type: ignore[no-unty
     sums[4], sums[5], sums[6] = sums[4] + red, sums[5] + green, sums[6] + blue
 
 
-@numba.njit(cache=True, nogil=True)
-def _alike(colours, total, coloured):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _alike(sums, coloured):  # type: ignore[no-untyped-def]
     """(K, K) bool: whether the shares of red, green and blue of two parts are about the same."""
-    count = len(total)
+    count = len(sums) - 1
     share = np.empty((count, 3))
     alike = np.zeros((count, count), np.bool_)
     for k in range(count):
-        share[k] = colours[k] + DARK * total[k]
-        share[k] /= share[k].sum()
+        dark = DARK * sums[k + 1, 0]
+        whole = sums[k + 1, 4] + sums[k + 1, 5] + sums[k + 1, 6] + 3 * dark
+        for c in range(3):
+            share[k, c] = (sums[k + 1, 4 + c] + dark) / whole
     for k in range(count):
         for o in range(count):
             off = abs(share[k, 0] - share[o, 0]) + abs(share[k, 1] - share[o, 1]) + abs(share[k, 2] - share[o, 2])
@@ -174,7 +191,7 @@ def _alike(colours, total, coloured):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, fastmath=EXACT)
 def _compare(labels, depth, x, y, bounds, touching, front, gap):  # type: ignore[no-untyped-def]
-    """Fill the tables of pairs from the cells next to each other; ``gap`` gets squares of metres."""
+    """Fill the tables of pairs from the cells next to each other."""
     h, w = labels.shape
     changes = _find_changes(labels)
     for i in range(h):
@@ -220,7 +237,8 @@ def _pair(labels, depth, x, y, i, j, p, q, d, jump, touching, front, gap):  # ty
     if t <= 0:
         return
     if k > 0 and o > 0:
-        square = (x[q] * t - x[j] * s) ** 2 + (y[p] * t - y[i] * s) ** 2 + (t - s) ** 2
+        d_x, d_y, d_z = x[q] * t - x[j] * s, y[p] * t - y[i] * s, t - s
+        square = d_x * d_x + d_y * d_y + d_z * d_z
         gap[k, o] = min(gap[k, o], square)
         gap[o, k] = gap[k, o]
     if d == 1 and abs(t - s) < jump:

@@ -84,7 +84,7 @@ def _touches(parts, chosen, k):  # type: ignore[no-untyped-def]
     cells = 0
     for c in range(len(chosen)):
         if chosen[c]:
-            cells += parts.touching[c, k]
+            cells += parts.touching[c, k + 1]
     return cells >= MIN_TOUCH
 
 
@@ -92,8 +92,8 @@ def _touches(parts, chosen, k):  # type: ignore[no-untyped-def]
 def _is_close(parts, chosen, seed, k):  # type: ignore[no-untyped-def]
     """Whether a depth jump keeps part k from what is chosen, but no more than within one object."""
     for c in range(len(chosen)):
-        limit = GAP_ALIKE if parts.alike[c, k] else GAP
-        if chosen[c] and parts.gap[c, k] < limit * parts.size[seed]:
+        limit = (GAP_ALIKE if parts.alike[c, k] else GAP) * parts.size[seed]
+        if chosen[c] and parts.gap[c, k + 1] < limit * limit:
             return True
     return False
 
@@ -108,7 +108,10 @@ def _is_fellow(parts, chosen, seed, k):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _has_its_colour(parts, chosen, k):  # type: ignore[no-untyped-def]
-    return (chosen & parts.alike[:, k]).any()
+    has = False
+    for c in range(len(chosen)):
+        has |= chosen[c] & parts.alike[c, k]
+    return has
 
 
 @numba.njit(cache=True, nogil=True)
@@ -164,7 +167,7 @@ def _extent(parts, k):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _chosen_extent(parts, chosen):  # type: ignore[no-untyped-def]
-    extent = _extent(parts, np.argmax(chosen))
+    extent = (1 << 30, 1 << 30, -1, -1)
     for k in range(len(chosen)):
         if chosen[k]:
             extent = _union(extent, _extent(parts, k))

@@ -169,59 +169,70 @@ def fit_level(
     return Plane(normal, offset, spread) if found else None
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _fit_level(grid, cells, up, normal, offset, stride, lowest):  # type: ignore[no-untyped-def]
     """Whether there is a plane; its normal, offset and spread."""
-    frame = _level_frame(up)
-    n_side, n_other, n_up = frame @ normal
-    start = np.array([-offset / n_up, -n_side / n_up, -n_other / n_up], np.float32)
+    frame, start, levels = np.zeros((3, 3)), np.empty(3, np.float32), np.zeros(4)
+    _fill_level_frame(up, frame)
+    n_side, n_other, n_up = _dot(frame[0], normal), _dot(frame[1], normal), _dot(frame[2], normal)
+    start[0], start[1], start[2] = -offset / n_up, -n_side / n_up, -n_other / n_up
     samples = np.empty((4, -(-cells.shape[0] // stride) * -(-cells.shape[1] // stride)), np.float32)
-    count = _sample(grid, cells, frame.astype(np.float32), start, stride, samples)
-    levels = np.zeros(4)
+    count = _sample(grid, cells, frame, start, stride, samples)
     if count < MIN_CELLS or not _fit(samples[:, :count], lowest, levels):
         return False, normal, offset, 0.0
     if np.hypot(levels[1], levels[2]) > SLOPE:
         return False, normal, offset, 0.0
-    levels[:3] += start
-    tilted = up - levels[1] * frame[0] - levels[2] * frame[1]
-    length = np.sqrt(tilted @ tilted)
-    return True, tilted / length, -levels[0] / length, levels[3]
+    side, other = levels[1] + start[1], levels[2] + start[2]
+    tilted = np.empty(3)
+    for k in range(3):
+        tilted[k] = up[k] - side * frame[0, k] - other * frame[1, k]
+    length = np.sqrt(_dot(tilted, tilted))
+    for k in range(3):
+        tilted[k] /= length
+    return True, tilted, -(levels[0] + start[0]) / length, levels[3]
 
 
 @numba.njit(cache=True, nogil=True)
-def _level_frame(up):  # type: ignore[no-untyped-def]
-    """(3, 3): two level axes and ``up``, as rows."""
-    frame = np.zeros((3, 3))
+def _dot(a, b):  # type: ignore[no-untyped-def]
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _fill_level_frame(up, frame):  # type: ignore[no-untyped-def]
+    """Fill ``frame (3, 3)`` with two level axes and ``up``, as rows."""
     if abs(up[2]) < 0.9:
         frame[0, 0], frame[0, 1] = up[1], -up[0]
     else:
         frame[0, 1], frame[0, 2] = up[2], -up[1]
-    frame[0] /= np.sqrt(frame[0] @ frame[0])
+    length = np.sqrt(_dot(frame[0], frame[0]))
+    for k in range(3):
+        frame[0, k] /= length
+        frame[2, k] = up[k]
     for k in range(3):
         p, q = (k + 1) % 3, (k + 2) % 3
         frame[1, k] = up[p] * frame[0, q] - up[q] * frame[0, p]
-    frame[2] = up
-    return frame
 
 
 @numba.njit(cache=True, nogil=True, fastmath=EXACT)
 def _sample(grid, cells, frame, start, stride, samples):  # type: ignore[no-untyped-def]
     """Fill ``samples`` with s, t in the plane, height over ``start`` and 1 / tolerance, of the level cells near it."""
     depth, normals, x, y = grid
+    a_x, a_y, a_z = np.float32(frame[0, 0]), np.float32(frame[0, 1]), np.float32(frame[0, 2])
+    b_x, b_y, b_z = np.float32(frame[1, 0]), np.float32(frame[1, 1]), np.float32(frame[1, 2])
+    u_x, u_y, u_z = np.float32(frame[2, 0]), np.float32(frame[2, 1]), np.float32(frame[2, 2])
     n = 0
-    up = frame[2]
     for i in range(0, depth.shape[0], stride):
         for j in range(0, depth.shape[1], stride):
             if not cells[i, j]:
                 continue
-            cosine = normals[0, i, j] * up[0] + normals[1, i, j] * up[1] + normals[2, i, j] * up[2]
+            cosine = normals[0, i, j] * u_x + normals[1, i, j] * u_y + normals[2, i, j] * u_z
             if cosine < TILT:
                 continue
             z = depth[i, j]
             p_x, p_y = x[j] * z, y[i] * z
-            s = frame[0, 0] * p_x + frame[0, 1] * p_y + frame[0, 2] * z
-            t = frame[1, 0] * p_x + frame[1, 1] * p_y + frame[1, 2] * z
-            r = up[0] * p_x + up[1] * p_y + up[2] * z - (start[0] + start[1] * s + start[2] * t)
+            s = a_x * p_x + a_y * p_y + a_z * z
+            t = b_x * p_x + b_y * p_y + b_z * z
+            r = u_x * p_x + u_y * p_y + u_z * z - (start[0] + start[1] * s + start[2] * t)
             unit = FLOOR + GROWTH * z * z
             if abs(r) < NEAR * unit:
                 samples[0, n], samples[1, n], samples[2, n], samples[3, n] = s, t, r, np.float32(1) / unit
@@ -238,7 +249,9 @@ def _lowest_layer(samples):  # type: ignore[no-untyped-def]
         k = int(heights[n] * sharpness[n] * np.float32(1 / LAYER) + np.float32(LAYERS + 1.5))  # above 0: near a plane
         if 0 <= k < len(votes):
             votes[k] += 1
-    most = votes.max()
+    most = 0.0
+    for k in range(len(votes)):
+        most = max(most, votes[k])
     for k in range(1, len(votes) - 1):
         if votes[k] >= most / 2 and votes[k] >= votes[k + 1]:
             return (k - LAYERS - 1) * LAYER
@@ -269,19 +282,22 @@ def _fit(samples, lowest, levels):  # type: ignore[no-untyped-def]
         if count < MIN_CELLS:
             return False
         ridge = 1e-6 * m
-        _step((m + ridge, m_s, m_t, m_ss + ridge, m_st, m_tt + ridge), (v, v_s, v_t), levels)
+        step = solve_symmetric((m + ridge, m_s, m_t, m_ss + ridge, m_st, m_tt + ridge), (v, v_s, v_t))
+        levels[0], levels[1], levels[2] = levels[0] + step[0], levels[1] + step[1], levels[2] + step[2]
         levels[3] = max(np.sqrt(square / count), np.float32(0.02))
         shift = zero
         limit = np.float32(CLIPS[min(k + 1, len(CLIPS) - 1)] * levels[3])
     return True
 
 
-@numba.njit(cache=True, nogil=True)
-def _step(M, v, levels):  # type: ignore[no-untyped-def]
-    """Add to ``levels`` the solution of M x = v, with M symmetric, by Cramer's rule."""
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def solve_symmetric(M, v):  # type: ignore[no-untyped-def]
+    """The solution of M x = v, with M symmetric, given as its upper triangle row by row: Cramer's rule."""
     a, b, c, d, e, f = (np.float64(M[0]), np.float64(M[1]), np.float64(M[2]), np.float64(M[3]), M[4] * 1.0, M[5] * 1.0)
     p, q, r = d * f - e * e, c * e - b * f, b * e - c * d
     determinant = a * p + b * q + c * r
-    levels[0] += (p * v[0] + q * v[1] + r * v[2]) / determinant
-    levels[1] += (q * v[0] + (a * f - c * c) * v[1] + (b * c - a * e) * v[2]) / determinant
-    levels[2] += (r * v[0] + (b * c - a * e) * v[1] + (a * d - b * b) * v[2]) / determinant
+    return (
+        (p * v[0] + q * v[1] + r * v[2]) / determinant,
+        (q * v[0] + (a * f - c * c) * v[1] + (b * c - a * e) * v[2]) / determinant,
+        (r * v[0] + (b * c - a * e) * v[1] + (a * d - b * b) * v[2]) / determinant,
+    )
