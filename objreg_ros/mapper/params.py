@@ -9,6 +9,7 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import mounting
+from objreg_ros.mapper.steady import Steady
 from objreg_ros.params import Params, param
 
 
@@ -26,9 +27,22 @@ class MapperParams(Params):
     odometry_rotation_error: float = param(
         1.0, "error of rotation after one metre or one radian, one sigma", "deg", ge=1e-3
     )
+    # And its steady error, which the closures tell; 0 is never any.
+    steady_heading: float = param(1.0, "error of heading that every metre adds alike, one sigma", "deg/m", ge=0.0)
+    steady_distance: float = param(0.02, "error of position that every metre adds alike, one sigma", "m/m", ge=0.0)
     max_residual: float = param(
         5.0, "a constraint farther than this from all the others is pruned", "standard deviations", ge=1.0
     )
+
+    @property
+    def odometry_sigmas(self) -> tuple[float, float]:
+        """How odometry wanders in m and rad, after one metre or one radian."""
+        return self.odometry_translation_error, float(np.radians(self.odometry_rotation_error))
+
+    @property
+    def steady(self) -> Steady:
+        """The standard deviations of what is steadily wrong with odometry."""
+        return Steady(float(np.radians(self.steady_heading)), self.steady_distance, self.steady_distance)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -14,7 +14,11 @@ from objreg_ros.geometry import inverse, rotation_angle
 from objreg_ros.mapper.constraint import Constraint, between_keyframes, open3d_information
 from objreg_ros.mapper.optimisation import Edge, Solution, optimise
 from objreg_ros.mapper.params import MapperParams
+from objreg_ros.mapper.steady import Steady, estimate, step
 from objreg_ros.mapper.trajectory import Trajectory
+
+ROUNDS = 6  # most times that odometry is corrected
+SETTLED = 5e-4  # rad/m and m/m: a change of its steady error that matters no more
 
 
 class Tie(NamedTuple):
@@ -31,13 +35,34 @@ class Problem(NamedTuple):
 
     poses: tuple[Array, ...]
     ties: tuple[Tie, ...]
-    max_residual: float
+    params: MapperParams
 
     def solve(self) -> Solution:
-        """The poses that agree best with odometry and with the closures that can be believed."""
+        """The poses that agree best with odometry and with the closures that can be believed.
+
+        In turn the poses, and what they say is steadily wrong with odometry, until that changes little.
+        """
         if all(tie.closure is None for tie in self.ties):
             return Solution(self.poses, (True,) * len(self.ties))
-        return optimise(self.poses, [_edge(tie) for tie in self.ties], self.max_residual)
+        known, solution = Steady(), self._solved(self.poses, Steady())
+        for _ in range(ROUNDS if any(self.params.steady) else 0):
+            found = estimate(self.poses, solution.poses, self.params.odometry_sigmas, self.params.steady)
+            solution = self._solved(solution.poses, found)
+            if np.allclose(found, known, atol=SETTLED):
+                break
+            known = found
+        return solution
+
+    def _solved(self, start: Sequence[Array], steady: Steady) -> Solution:
+        """The solution from where it starts, with odometry corrected."""
+        edges = [_edge(self._corrected(tie, steady)) for tie in self.ties]
+        return optimise(start, edges, self.params.max_residual)
+
+    def _corrected(self, tie: Tie, steady: Steady) -> Tie:
+        if tie.closure is not None:
+            return tie
+        T_k1_k2 = step(self.poses[tie.k1], self.poses[tie.k2], steady)
+        return tie._replace(constraint=tie.constraint._replace(T_from_to=T_k1_k2))
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +116,7 @@ class PoseGraph:
 
     def problem(self) -> Problem:
         """What there is to solve now."""
-        return Problem(tuple(self.keyframes.poses), tuple(self.ties), self.params.max_residual)
+        return Problem(tuple(self.keyframes.poses), tuple(self.ties), self.params)
 
     def adopt(self, problem: Problem, solution: Solution) -> Summary:
         """Take over the solution of a problem of this graph; keyframes that came since then follow its last one."""
@@ -140,8 +165,8 @@ class PoseGraph:
         """What odometry says between the two newest keyframes."""
         k1, k2 = len(self.keyframes) - 2, len(self.keyframes) - 1
         T_k1_k2 = inverse(self.keyframes.poses[k1]) @ self.keyframes.poses[k2]
-        sigmas = (self.params.odometry_translation_error, np.radians(self.params.odometry_rotation_error))
-        variance = sum(_motion(T_k1_k2)) * np.repeat(np.square(sigmas) / 3, 3)  # a third on each axis
+        each_axis = np.square(self.params.odometry_sigmas) / 3
+        variance = sum(_motion(T_k1_k2)) * np.repeat(each_axis, 3)
         return Tie(k1, k2, Constraint(T_k1_k2, np.diag(variance)))
 
 

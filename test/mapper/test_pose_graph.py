@@ -119,3 +119,12 @@ def test_time_that_runs_back_is_refused() -> None:
     graph = mapped(RIGHT)
     with pytest.raises(ValueError, match="expected a stamp after"):
         graph.add_odometry(odometry(BENT)[0])
+
+
+def test_what_closures_tell_of_odometry_holds_where_nothing_closes() -> None:
+    early = [closure(TRUE, k, k + 30) for k in range(0, 40, 8)]
+    plain = mapped(early, MapperParams(steady_heading=0.0, steady_distance=0.0))
+    knowing = mapped(early, MapperParams(steady_heading=2.0))
+    plain.optimise()
+    knowing.optimise()
+    assert distances(corrected(knowing), TRUE)[-1] < 0.5 * distances(corrected(plain), TRUE)[-1]

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is steadily wrong with odometry is found in the map, and nothing is where nothing is expected."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from objreg_ros.data import Array
+from objreg_ros.geometry import inverse, pose_error
+from objreg_ros.mapper.steady import Steady, estimate, step
+
+from .bent import square
+
+TRUE = square(laps=2)
+WRONG = Steady(heading=0.02, along=-0.015, across=0.01)
+SIGMAS = (0.02, np.radians(1.0))
+
+
+def chained(steps: list[Array]) -> list[Array]:
+    poses = [TRUE[0]]
+    for T_1_2 in steps:
+        poses.append(poses[-1] @ T_1_2)
+    return poses
+
+
+MAPPED = chained([step(a, b, WRONG) for a, b in pairwise(TRUE)])
+
+
+@pytest.mark.parametrize("k", [0, 7, 40])
+def test_a_step_without_anything_steady_is_that_of_odometry(k: int) -> None:
+    assert pose_error(step(TRUE[k], TRUE[k + 1], Steady()), inverse(TRUE[k]) @ TRUE[k + 1]) == pytest.approx(
+        (0.0, 0.0), abs=1e-6
+    )
+
+
+def test_heading_turns_about_up_with_the_way() -> None:
+    T = step(TRUE[0], TRUE[1], Steady(heading=0.1))
+    length = np.linalg.norm(TRUE[1][:3, 3] - TRUE[0][:3, 3])
+    angle, _ = pose_error(T, inverse(TRUE[0]) @ TRUE[1])
+    assert angle == pytest.approx(np.degrees(0.1 * length), rel=1e-4)
+
+
+def test_a_steady_error_is_found() -> None:
+    found = estimate(TRUE, MAPPED, SIGMAS, Steady(0.1, 0.1, 0.1))
+    np.testing.assert_allclose(found, WRONG, atol=1e-3)
+
+
+def test_what_is_not_expected_is_not_found() -> None:
+    found = estimate(TRUE, MAPPED, SIGMAS, Steady(0.1, 0.0, 0.0))
+    assert found.along == 0.0 and found.across == 0.0
+    assert found.heading == pytest.approx(WRONG.heading, abs=3e-3)
+
+
+def test_a_map_that_is_odometry_tells_nothing() -> None:
+    np.testing.assert_allclose(estimate(TRUE, TRUE, SIGMAS, Steady(0.1, 0.1, 0.1)), 0.0, atol=1e-9)
