@@ -19,7 +19,7 @@ from objreg_ros.segmenter.surface import Surface, Window
 
 MIN_PART = 10  # cells; what is smaller joins a neighbour
 GROWTH = 12  # rounds that parts grow over seams
-MAX_CELLS = 16000  # around a box; larger ones are looked at on the coarse grid
+MAX_CELLS = 9000  # around a box; larger ones are looked at on the coarse grid
 MAX_PARTS = 32
 
 

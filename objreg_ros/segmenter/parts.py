@@ -147,17 +147,18 @@ def _sum_up(labels, number, window, depth, pixels, rgb, renamed, sums, extent): 
                 _add_colours(rgb[first_v + i * step], first_u, step, first, last, sums[k])
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, fastmath=EXACT, error_model="numpy")
 def _weigh(i, first, last, window, sums):  # type: ignore[no-untyped-def]
     """Add the cells first … last of row i that lie in the window to ``sums``."""
     left, top, right, bottom = window
     if not top <= i < bottom:
         return
     first, last = max(first, left), min(last, right)
-    off_v = abs(2 * i + 1 - top - bottom) / (bottom - top)
-    weight = 0.0
+    off_v = np.float32(abs(2 * i + 1 - top - bottom)) / np.float32(bottom - top)
+    middle, scale = left + right - 1, np.float32(1) / np.float32(right - left)
+    weight = np.float32(0)
     for j in range(first, last):
-        weight += 1 - RIM * max(abs(2 * j + 1 - left - right) / (right - left), off_v)
+        weight += np.float32(1) - np.float32(RIM) * max(np.float32(abs(2 * j - middle)) * scale, off_v)
     sums[1] += max(0, last - first)
     sums[2] += weight
 
@@ -193,40 +194,44 @@ def _alike(sums, coloured):  # type: ignore[no-untyped-def]
 def _compare(labels, depth, x, y, bounds, touching, front, gap):  # type: ignore[no-untyped-def]
     """Fill the tables of pairs from the cells next to each other."""
     h, w = labels.shape
-    changes = _find_changes(labels)
+    pairs = _find_pairs(labels, depth)
     for i in range(h):
+        row = pairs[i]
         for j in range(w):
-            if not changes[i, j] or depth[i, j] <= 0:
+            bits = row[j]
+            if bits == 0:
                 continue
-            k = labels[i, j]
             jump = bounds[0] + bounds[1] * depth[i, j] * depth[i, j]
-            far = ACROSS if k > 0 else 2  # beyond two cells only the gap between two parts counts
-            for d in range(1, far + 1):
-                if i + d < h and labels[i + d, j] != k:
-                    _pair(labels, depth, x, y, i, j, i + d, j, d, jump, touching, front, gap)
-                if j + d < w and labels[i, j + d] != k:
+            for d in range(1, ACROSS + 1):
+                if bits & 1:
                     _pair(labels, depth, x, y, i, j, i, j + d, d, jump, touching, front, gap)
+                if bits & 2:
+                    _pair(labels, depth, x, y, i, j, i + d, j, d, jump, touching, front, gap)
+                bits >>= 2
 
 
 @numba.njit(cache=True, nogil=True)
-def _find_changes(labels):  # type: ignore[no-untyped-def]
-    """(h, w) bool: whether a cell has another label within ACROSS cells to the right or below."""
+def _find_pairs(labels, depth):  # type: ignore[no-untyped-def]
+    """(h, w) uint8: two bits for each distance d, whether a cell d to the right, or below, is of another part.
+
+    Cells without depth are of no pair, nor are those of no part where the other one is farther than two cells."""
     h, w = labels.shape
-    changes = np.zeros((h, w), np.bool_)
-    below, right = np.zeros((h, w), np.bool_), np.zeros(w + ACROSS, np.bool_)
+    pairs = np.zeros((h, w), np.uint8)
     for i in range(h):
-        row, next_row, out = labels[i], labels[min(i + 1, h - 1)], below[i]
-        for j in range(w):
-            out[j] = row[j] != next_row[j]
-    for i in range(h):
-        row, beside, out = labels[i], labels[i][1:], changes[i]
-        for j in range(w - 1):
-            right[j] = row[j] != beside[j]
-        for d in range(ACROSS):
-            across, down = right[d:], below[min(i + d, h - 1)]
-            for j in range(w):
-                out[j] |= across[j] | down[j]
-    return changes
+        here, z, out = labels[i], depth[i], pairs[i]
+        for d in range(1, ACROSS + 1):
+            right, down = np.uint8(1 << (2 * d - 2)), np.uint8(2 << (2 * d - 2))
+            least = 0 if d <= 2 else 1
+            other, far = here[d:], z[d:]
+            for j in range(len(other)):
+                known = (z[j] > 0) & (far[j] > 0) & (here[j] >= least) & (other[j] >= least)
+                out[j] |= right if (here[j] != other[j]) & known else np.uint8(0)
+            if i + d < h:
+                other, far = labels[i + d], depth[i + d]
+                for j in range(w):
+                    known = (z[j] > 0) & (far[j] > 0) & (here[j] >= least) & (other[j] >= least)
+                    out[j] |= down if (here[j] != other[j]) & known else np.uint8(0)
+    return pairs
 
 
 @numba.njit(cache=True, nogil=True, fastmath=EXACT, inline="always")
@@ -234,8 +239,6 @@ def _pair(labels, depth, x, y, i, j, p, q, d, jump, touching, front, gap):  # ty
     """Count one pair of cells of two parts, ``d`` cells from each other."""
     k, o = labels[i, j], labels[p, q]
     s, t = depth[i, j], depth[p, q]
-    if t <= 0:
-        return
     if k > 0 and o > 0:
         d_x, d_y, d_z = x[q] * t - x[j] * s, y[p] * t - y[i] * s, t - s
         square = d_x * d_x + d_y * d_y + d_z * d_z
