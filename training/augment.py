@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -17,6 +17,7 @@ from training.samples import Sample
 
 Array = NDArray[Any]
 Rng = np.random.Generator
+WindowIn = Callable[[Sample, tuple[int, int], Rng], Array]
 
 LEAST_KEPT = 0.4
 """An object that a crop leaves less of becomes difficult."""
@@ -34,9 +35,28 @@ LABEL_WEIGHTS = np.array([1.0, 1.0, 1.6, 0.6, 0.8, 1.2, 1.6, 1.4, 1.0])
 """How often the pieces show each label, in the order of the labels; small and thin things are harder to learn."""
 
 
-def augment(pick: Callable[[], Sample], rng: Rng, mosaic_share: float = 0.5) -> Sample:
-    """A random picture of the network's size: a share of mosaics, the others of one sample that ``pick`` gives."""
-    sample = mosaic(pick, rng) if rng.random() < mosaic_share else single(pick(), rng)
+MISTAKE_GRIDS, MISTAKE_SHARE = (3, 3, 4), (0.6, 1.0)
+"""The same for mosaics of mistakes: each is shown at about its own size, by so much of its crop."""
+
+
+def augment(
+    pick: Callable[[], Sample], rng: Rng, mosaic_share: float = 0.5, pick_mistake: Callable[[], Sample] | None = None
+) -> Sample:
+    """A random picture of the network's size: a share of mosaics, the others of one sample that ``pick`` gives.
+
+    Every other mosaic is one of mistakes, crops in whose middle something is, if there is something to pick from.
+    """
+    if rng.random() >= mosaic_share:
+        sample = single(pick(), rng)
+    elif pick_mistake is not None and rng.random() < 0.5:
+        sample = mosaic(pick_mistake, rng, MISTAKE_GRIDS, window_at_the_middle)
+    else:
+        sample = mosaic(pick, rng)
+    return with_other_light(sample, rng)
+
+
+def with_other_light(sample: Sample, rng: Rng) -> Sample:
+    """The same under another light and by a worse camera, now and then."""
     rgb = sample.rgb
     if rng.random() < 0.5:
         rgb = change_light(rgb, rng)
@@ -52,16 +72,19 @@ def single(sample: Sample, rng: Rng) -> Sample:
     return cut(sample, random_window(sample.rgb.shape[:2], rng), INPUT_HW, rng)
 
 
-def mosaic(pick: Callable[[], Sample], rng: Rng) -> Sample:
+def mosaic(
+    pick: Callable[[], Sample], rng: Rng, grids: Sequence[int] = MOSAIC_GRIDS, window_in: WindowIn | None = None
+) -> Sample:
     """Pieces around objects, side by side in a grid (after Bochkovskiy et al., "YOLOv4", 2020)."""
-    grid = int(rng.choice(MOSAIC_GRIDS))
+    window_in = window_in or window_at_an_object
+    grid = int(rng.choice(grids))
     height, width = INPUT_HW[0] // grid, INPUT_HW[1] // grid
     rgb = np.zeros((*INPUT_HW, 3), np.uint8)
     parts = []
     for x, y in itertools.product(range(0, grid * width, width), range(0, grid * height, height)):
         sample = pick()
         sample = flip(sample) if rng.random() < 0.5 else sample
-        part = cut(sample, window_at_an_object(sample, (height, width), rng), (height, width), rng)
+        part = cut(sample, window_in(sample, (height, width), rng), (height, width), rng)
         rgb[y : y + height, x : x + width] = part.rgb
         parts.append(replace(part, boxes=part.boxes + np.array([x, y, x, y], np.float32)))
     boxes, classes, difficult = (
@@ -86,6 +109,16 @@ def window_at_an_object(sample: Sample, shape: tuple[int, int], rng: Rng) -> Arr
     return np.concatenate([low, low + size])
 
 
+def window_at_the_middle(sample: Sample, shape: tuple[int, int], rng: Rng) -> Array:
+    """A window of the aspect of ``shape`` around the middle of the picture."""
+    whole = np.array(sample.rgb.shape[1::-1], float)
+    size = np.array([shape[1], shape[0]], float)
+    size *= float((whole / size).min()) * rng.uniform(*MISTAKE_SHARE)
+    low = (whole - size) / 2 + rng.uniform(-0.15, 0.15, 2) * size
+    low = np.clip(low, 0, whole - size)
+    return np.concatenate([low, low + size])
+
+
 def flip(sample: Sample) -> Sample:
     """The mirror image."""
     width = sample.rgb.shape[1]
@@ -98,9 +131,9 @@ def random_window(shape: tuple[int, int], rng: Rng) -> Array:
     """A window x_min y_min x_max y_max in pixels: the whole picture, a part of it, or more than it."""
     height, width = shape
     kind = rng.random()
-    if kind < 0.45:
+    if kind < 0.55:
         return np.array([0, 0, width, height], float)
-    share = rng.uniform(0.6, 1.0) if kind < 0.7 else rng.uniform(1.0, 1.8)
+    share = rng.uniform(0.6, 1.0) if kind < 0.85 else rng.uniform(1.0, 1.6)
     aspect = np.exp(rng.uniform(-0.25, 0.25))
     size = np.array([width * share * aspect**0.5, height * share / aspect**0.5])
     low = rng.uniform(0, 1, 2) * (np.array([width, height]) - size)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -34,27 +35,45 @@ def example(sample: Sample) -> Example:
 class Stream(IterableDataset[Example]):
     """Augmented examples in random order without end; new shards join as they appear."""
 
-    def __init__(self, folder: Path, seed: int, mosaic_share: float, look_again_every: int = 2000) -> None:
-        self.folder, self.seed, self.mosaic_share = folder, seed, mosaic_share
-        self.look_again_every = look_again_every
+    def __init__(
+        self, folder: Path, seed: int, mosaic_share: float, mistakes: Path | None = None, look_again_every: int = 2000
+    ) -> None:
+        self.pool, self.mistakes = Pool(folder), Pool(mistakes) if mistakes else None
+        self.seed, self.mosaic_share, self.look_again_every = seed, mosaic_share, look_again_every
 
     def __iter__(self) -> Iterator[Example]:
         worker = get_worker_info()
         rng = np.random.default_rng([self.seed, worker.id if worker else 0])
         torch.set_num_threads(1)
         cv2.setNumThreads(0)
-        shards: dict[Path, Shard] = {}
+        pick = partial(self.pool.pick, rng)
+        pick_mistake = partial(self.mistakes.pick, rng) if self.mistakes else None
         while True:
-            for path in sorted(self.folder.glob("*.npz")):
-                if path not in shards:
-                    shards[path] = Shard(path)
-            if not shards:
-                raise ValueError(f"{self.folder}: expected shards (*.npz), got none; run training.render first")
-            places = [(shard, index) for shard in shards.values() for index in range(len(shard))]
+            for pool in (self.pool, self.mistakes):
+                if pool is not None:
+                    pool.look()
             for _ in range(self.look_again_every):
-                yield example(augment(lambda: _pick(places, rng), rng, self.mosaic_share))  # noqa: B023
+                yield example(augment(pick, rng, self.mosaic_share, pick_mistake))
 
 
-def _pick(places: list[tuple[Shard, int]], rng: np.random.Generator) -> Sample:
-    shard, index = places[int(rng.integers(len(places)))]
-    return shard[index]
+class Pool:
+    """The samples of all shards in a folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._shards: dict[Path, Shard] = {}
+        self._places: list[tuple[Shard, int]] = []
+
+    def look(self) -> None:
+        """Take in what is new in the folder; an error where there is nothing at all."""
+        for path in sorted(self.folder.glob("*.npz")):
+            if path not in self._shards:
+                self._shards[path] = Shard(path)
+                self._places += [(self._shards[path], index) for index in range(len(self._shards[path]))]
+        if not self._places:
+            raise ValueError(f"{self.folder}: expected shards (*.npz), got none; run training.render first")
+
+    def pick(self, rng: np.random.Generator) -> Sample:
+        """Any of the samples."""
+        shard, index = self._places[int(rng.integers(len(self._places)))]
+        return shard[index]

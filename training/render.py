@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from objreg_ros.data import Array, Intrinsics
@@ -26,7 +24,7 @@ from training.scenes import plain_scene, training_scene, training_view
 
 VIEWS_PER_SCENE = 10
 SHARD = 200
-PLAIN_SHARE = 0.6
+PLAIN_SHARE = 0.8
 """Of the scenes, so many are the simulator's own, seen by its own camera; the others are made to differ."""
 
 EMPTY_SHARE = 0.15
@@ -65,12 +63,9 @@ def samples(rng: np.random.Generator) -> Iterator[Sample]:
 
 
 def _plain_sample(scene: Scene, poses: Array, rng: np.random.Generator) -> Sample:
-    """What the detector gets of the simulator's own Kinect: the whole picture, halved."""
+    """What the detector gets of the simulator's own Kinect."""
     T = poses[int(rng.integers(len(poses)))] if len(poses) else random_view(scene, int(rng.integers(2**31)))
-    whole = sample_of(render(scene, T, seed=int(rng.integers(2**31))))
-    rgb = cv2.resize(whole.rgb, INPUT_HW[::-1], interpolation=cv2.INTER_LINEAR)
-    boxes = whole.boxes * np.float32(INPUT_HW[0] / whole.rgb.shape[0])
-    return replace(whole, rgb=rgb, boxes=boxes, difficult=whole.difficult | is_small(boxes))
+    return sample_of(render(scene, T, seed=int(rng.integers(2**31))))
 
 
 def _picture(scene: Scene, poses: Array, rng: np.random.Generator) -> Rendering:

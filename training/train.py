@@ -132,7 +132,7 @@ def _state(network: MobileNetSsd) -> Iterator[Tensor]:
 
 def run(training: Training, arguments: argparse.Namespace) -> None:
     """Train until the last step, with a checkpoint, an ONNX file and a validation every now and then."""
-    stream = Stream(arguments.data, arguments.seed + training.step, arguments.mosaic)
+    stream = Stream(arguments.data, arguments.seed + training.step, arguments.mosaic, arguments.mistakes)
     batches = iter(DataLoader(stream, batch_size=arguments.batch, num_workers=arguments.workers, prefetch_factor=4))
     recent: list[tuple[float, float]] = []
     begin = time.monotonic()
@@ -165,6 +165,7 @@ def parse(words: list[str]) -> argparse.Namespace:
     parser.add_argument("--validation", type=Path, help="folder of shards of other seeds")
     parser.add_argument("--out", type=Path, required=True, help="folder for checkpoint.pt and model.onnx")
     parser.add_argument("--backbone", type=Path, help="weights from training.pretrain to begin with")
+    parser.add_argument("--mistakes", type=Path, help="folder of crops from training.mistakes for half of the mosaics")
     parser.add_argument("--steps", type=int, default=7000, help="length of the schedule")
     parser.add_argument("--until", type=int, help="stop at this step, before the schedule ends")
     parser.add_argument("--batch", type=int, default=16)
