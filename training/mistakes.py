@@ -43,7 +43,7 @@ MOST_A_PICTURE = 8
 def mistakes(sample: Sample, seen: Detections) -> Array:
     """The boxes ``(M, 4)`` of what was missed, and of what was seen and is not there."""
     names = np.array(LABELS)[sample.classes]
-    same = np.asarray(seen.label)[None] == names[:, None]
+    same = np.array(seen.label, dtype=str)[None] == names[:, None]
     overlap = iou(sample.boxes, seen.xyxy)
     found = np.where(same & (overlap >= 0.5), seen.score[None], 0.0).max(axis=1, initial=0.0) >= BELOW
     missed = sample.boxes[~found & ~sample.difficult]

@@ -43,20 +43,6 @@ def overlap(a: Tensor, b: Tensor) -> tuple[Tensor, Tensor]:
     return shared / union, union
 
 
-def pairwise_iou(a: Tensor, b: Tensor) -> Tensor:
-    """Intersection over union of boxes ``(B, N, 4)`` with boxes ``(B, A, 4)``: ``(B, N, A)``.
-
-    Coordinate by coordinate, because a last axis of four makes the same arithmetic many times slower on a processor.
-    """
-    rows, columns = [one[:, :, None] for one in a.unbind(-1)], [one[:, None] for one in b.unbind(-1)]
-    width, height = (
-        (torch.minimum(rows[high], columns[high]) - torch.maximum(rows[low], columns[low])).clamp_(min=0)
-        for low, high in ((0, 2), (1, 3))
-    )
-    shared = width.mul_(height)
-    return shared / (area(a)[:, :, None] + area(b)[:, None] - shared).clamp_(min=1e-6)
-
-
 def generalised_iou(a: Tensor, b: Tensor) -> Tensor:
     """GIoU of boxes ``(..., 4)``, pairwise: -1 far apart, 1 the same."""
     iou, union = overlap(a, b)
@@ -94,22 +80,30 @@ def assign(scores: Tensor, boxes: Tensor, centres: Tensor, truth: Tensor) -> Ass
     """
     known, classes, kind = truth[..., :4], truth[..., 4].long(), truth[..., 5]
     inside = _inside(centres, known)
-    iou = pairwise_iou(known, boxes)
-    score = scores.gather(2, classes[:, None].expand(-1, scores.shape[1], -1)).transpose(1, 2)
-    aligned = score**SCORE_POWER * iou**IOU_POWER * (inside & (kind == WANTED)[..., None])
-    least = aligned.topk(ANSWERS, dim=2).values[..., -1:]
-    aligned = torch.where(aligned >= least, aligned, 0.0)
-    best = aligned.amax(dim=2, keepdim=True).clamp(min=1e-9)
-    wanted = aligned / best * iou.masked_fill(aligned == 0, 0.0).amax(dim=2, keepdim=True)
-    owner = torch.where(aligned > 0, iou, -1.0).argmax(dim=1)
-    alignment = wanted.gather(1, owner[:, None])[:, 0]
-    hidden = ((inside | (iou > 0.5)) & (kind == DIFFICULT)[..., None]).any(dim=1)
+    hidden = (inside & (kind == DIFFICULT)[..., None]).any(dim=1)
+    b, n, a = (inside & (kind == WANTED)[..., None]).nonzero(as_tuple=True)
+    iou = overlap(known[b, n], boxes[b, a])[0]
+    aligned = scores[b, a, classes[b, n]] ** SCORE_POWER * iou**IOU_POWER
+    best = aligned.new_zeros(inside.shape).index_put_((b, n, a), aligned).topk(ANSWERS, dim=2).values
+    chosen = (aligned > 0) & (aligned >= best[b, n, -1])
+    b, n, a, iou, aligned = (part[chosen] for part in (b, n, a, iou, aligned))
+    wanted = aligned / best[b, n, 0] * _most(iou, (b, n), kind.shape)[b, n]
+    owning = iou == _most(iou, (b, a), scores.shape[:2])[b, a]
+    b, n, a, wanted = (part[owning] for part in (b, n, a, wanted))
+    alignment, owner = scores.new_zeros(scores.shape[:2]), classes.new_zeros(scores.shape[:2])
+    alignment[b, a], owner[b, a] = wanted, n
     return Assignment(
         alignment,
         classes.gather(1, owner),
         known.gather(1, owner[..., None].expand(-1, -1, 4)),
         (alignment > 0) | ~hidden,
     )
+
+
+def _most(values: Tensor, at: tuple[Tensor, Tensor], shape: torch.Size) -> Tensor:
+    """The greatest of the values that fall into each cell of a table of this shape, 0 where none does."""
+    cell = at[0] * shape[1] + at[1]
+    return values.new_zeros(shape.numel()).scatter_reduce_(0, cell, values, "amax").reshape(shape)
 
 
 def _inside(centres: Tensor, boxes: Tensor) -> Tensor:
