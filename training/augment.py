@@ -31,7 +31,7 @@ INTERPOLATIONS = (cv2.INTER_LINEAR, cv2.INTER_AREA, cv2.INTER_CUBIC, cv2.INTER_N
 MOSAIC_GRIDS, MOSAIC_ZOOM = (2, 3, 4, 4, 5), (0.55, 2.5)
 """A grid of pieces with an object each is many times as much to learn from in the same time."""
 
-LABEL_WEIGHTS = np.array([1.0, 1.0, 1.6, 0.6, 0.8, 1.2, 1.6, 1.4, 1.0])
+LABEL_WEIGHTS = np.array([0.9, 1.0, 1.0, 0.7, 0.5, 1.1, 2.6, 2.2, 1.1])
 """How often the pieces show each label, in the order of the labels; small and thin things are harder to learn."""
 
 
