@@ -17,6 +17,7 @@ BIN = 0.015  # metres of height
 TILT = np.float32(np.cos(np.radians(20.0)))  # a cell of a level surface is no farther from up than this
 SLOPE = float(np.tan(np.radians(8.0)))  # nor is a level plane steeper
 MIN_CELLS = 30
+LEAST_PEAK = 0.25  # of the least area: a lower peak of the heights has no surface of that area
 MANY = 3000  # level cells of which every fourth is enough
 NEAR = np.float32(2.5)  # tolerances around a plane within which its cells are sought
 LAYER, LAYERS = 0.3, 5  # thickness in tolerances, and number to each side, of the layers sought around a plane
@@ -85,8 +86,8 @@ def find_supports(
     low, high = _survey(*grid, up.astype(np.float32), pixel, height, area)
     supports: list[Support] = []
     for _ in range(2 * MAX_SUPPORTS):
-        peak, count = _commonest(height, area, low, high)
-        if count == 0 or len(supports) == MAX_SUPPORTS:
+        peak, votes, count = _commonest(height, area, low, high)
+        if votes < LEAST_PEAK * min_area or count < MIN_CELLS or len(supports) == MAX_SUPPORTS:
             break
         plane = fit_level(surface, area > 0, up, Plane(up, -peak, 1.0), 2 if count > MANY else 1)
         if plane is None:
@@ -121,9 +122,9 @@ def _survey(depth, normals, x, y, up, pixel, height, area):  # type: ignore[no-u
 
 @numba.njit(cache=True, nogil=True)
 def _commonest(height, area, low, high):  # type: ignore[no-untyped-def]
-    """The height in ``low`` … ``high`` that most ``area`` has, and how many cells have any."""
+    """The height in ``low`` … ``high`` that most ``area`` has, how much it is, and how many cells have any."""
     if not low <= high:
-        return 0.0, 0
+        return 0.0, 0.0, 0
     votes = np.zeros(int((high - low) / BIN) + 3)
     count = 0
     for i in range(height.shape[0]):
@@ -136,7 +137,7 @@ def _commonest(height, area, low, high):  # type: ignore[no-untyped-def]
         smooth = votes[k] + 0.5 * (votes[k - 1] + votes[k + 1])
         if smooth > most:
             best, most = k, smooth
-    return low + (best - 0.5) * BIN, count
+    return low + (best - 0.5) * BIN, most, count
 
 
 @numba.njit(cache=True, nogil=True, fastmath=EXACT)
