@@ -18,7 +18,9 @@ import json
 import os
 import time
 from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -178,13 +180,19 @@ def _round(value: Any) -> float:
     return round(float(value), 4)
 
 
+def _render(seed: int, count: int) -> list[LabelledImage]:
+    return list(simulated_images(seed, count))
+
+
 def measure(seed: int, clouds: Path, quick: bool) -> tuple[dict[str, Any], list[Result]]:
     """All figures, and every result."""
     rng = np.random.default_rng(seed)
     methods = {OURS: Segmenter(), PAPER: Segmenter(SegmenterParams(preset=PAPER))}
-    methods[OURS].warm()
-    rooms = list(simulated_images(seed, 10 if quick else 100))
-    tables = list(labelled_clouds(clouds)) if clouds.is_dir() else []
+    with ProcessPoolExecutor(1, get_context("spawn")) as beside:  # where kernels are not compiled yet, it takes long
+        rendered = beside.submit(_render, seed, 20 if quick else 100)
+        methods[OURS].warm()
+        tables = list(labelled_clouds(clouds)) if clouds.is_dir() else []
+        rooms = rendered.result()
     results: list[Result] = []
     work = [("sim", image, 1) for image in rooms] + [("mosd", image, 2 if quick else 10) for image in tables]
     with click.progressbar(work, label="segmenting") as bar:
