@@ -8,7 +8,7 @@ Intersection over union of the returned points and the object's true points, bot
 simulator, objects of the nine classes that are at least 60 % visible within 1.75 m, boxes up to 10 % too large at each
 edge. ``mosd``: labelled Kinect clouds of cluttered tables, each edge of a box off by up to 10 % of its size, inwards or
 outwards: no method gets what is outside its box (``iou_median_mosd_limit``). Milliseconds are those of a whole frame
-with four boxes, by the clock and (``cpu_``) of the thread. ``ratio_open3d`` is the time that Open3D's removal of the
+with four boxes, by the clock and (``cpu_``) of all threads. ``ratio_open3d`` is the time that Open3D's removal of the
 largest plane of each of the four boxes takes alone, divided by ours, frame by frame.
 """
 
@@ -141,9 +141,9 @@ def timings(images: list[LabelledImage], segmenter: Segmenter, repeats: int, rng
 
 
 def _clock(work: Callable[[], Any]) -> tuple[float, float]:
-    wall, cpu = time.perf_counter(), time.thread_time()
+    wall, cpu = time.perf_counter(), time.process_time()
     work()
-    return 1e3 * (time.perf_counter() - wall), 1e3 * (time.thread_time() - cpu)
+    return 1e3 * (time.perf_counter() - wall), 1e3 * (time.process_time() - cpu)
 
 
 def summary(results: list[Result]) -> dict[str, Any]:

@@ -34,3 +34,16 @@ def _end(edge: float, size: int) -> int:
 def is_empty(box: Box) -> bool:
     """Whether no pixel lies in ``box``."""
     return box[2] <= box[0] or box[3] <= box[1]
+
+
+def halves(boxes: list[Box]) -> tuple[list[int], list[int]]:
+    """The numbers of the boxes that are not empty, in two groups of about as many pixels."""
+    groups: tuple[list[int], list[int]] = ([], [])
+    pixels = [0, 0]
+    areas = [0 if is_empty(box) else (box[2] - box[0]) * (box[3] - box[1]) for box in boxes]
+    for k in sorted(range(len(boxes)), key=lambda k: -areas[k]):
+        if areas[k] > 0:
+            group = int(pixels[1] < pixels[0])
+            groups[group].append(k)
+            pixels[group] += areas[k]
+    return groups

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from objreg_ros.data import Array, DepthImage, PointFlag
 from objreg_ros.segmenter.boxes import Box
 from objreg_ros.segmenter.components import split
@@ -23,14 +25,25 @@ MAX_CELLS = 9000  # around a box; larger ones are looked at on the coarse grid
 MAX_PARTS = 32
 
 
-def isolate(
-    image: DepthImage, box: Box, ground: Ground, taken: Array, params: SegmenterParams
-) -> tuple[Pixels, PointFlag]:
-    """The pixels of the object that ``box`` shows, and the flags that hold for all of them.
+class Isolated(NamedTuple):
+    """What a box shows: ``pixels``, the ``flags`` that hold for all of them, and the ``cells`` of the whole frame that
+    they are in; None where the method knows none."""
 
-    ``box`` must not be empty. No pixel outside the box comes back; no object gives no pixels. The cells of the object
-    are marked in ``taken (h, w) bool`` of the whole frame.
-    """
+    pixels: Pixels
+    flags: PointFlag
+    cells: Cells | None
+
+
+class Cells(NamedTuple):
+    """``chosen (h, w) bool`` of the cells of ``window`` of the grid with ``step`` pixels a cell."""
+
+    chosen: Array
+    window: Window
+    step: int
+
+
+def isolate(image: DepthImage, box: Box, ground: Ground, params: SegmenterParams) -> Isolated:
+    """The object that ``box``, which must not be empty, shows: no pixel outside it, and none for no object."""
     jump = (params.jump, params.jump_z2)
     grid = _grid(box, ground, params.margin)
     window = _cells(box, grid)
@@ -45,10 +58,14 @@ def isolate(
     pixels = extract(image, box, around, chosen, jump)
     flags = PointFlag(0) if supported else PointFlag.UNSUPPORTED
     flags |= whole_flags(image, pixels, around, chosen, here)
-    scale = grid.step // ground.surface.step
-    marks = taken[::scale, ::scale]
-    marks[crop[1] : crop[3], crop[0] : crop[2]] |= chosen
-    return pixels, flags
+    return Isolated(pixels, flags, Cells(chosen, crop, grid.step))
+
+
+def mark(taken: Array, cells: Cells, ground: Ground) -> None:
+    """Mark the cells of an object in ``taken (h, w) bool`` of the whole frame."""
+    scale = cells.step // ground.surface.step
+    left, top, right, bottom = cells.window
+    taken[::scale, ::scale][top:bottom, left:right] |= cells.chosen
 
 
 def _grid(box: Box, ground: Ground, margin: float) -> Surface:
