@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -64,7 +66,8 @@ class Segmenter:
         """
         params = self.params
         depth = _plain(depth)
-        view = self._beside.submit(reduced_view, depth, params.view_step, params.z_min, params.limits[0])
+        seen = (depth, params.view_step, params.z_min, params.limits[0])
+        view = self._beside.submit(reduced_view, *seen)
         ground = self._ground(depth, gravity)
         taken = np.zeros(ground.surface.depth.shape, np.bool_)
         found = self._cut_all(depth, boxes.pixel_boxes(detections, *depth.depth.shape), ground)
@@ -79,7 +82,7 @@ class Segmenter:
         return Frame(
             objects=tuple(objects),
             support=_support_cloud(ground, taken, depth),
-            view=view.result(),
+            view=_result(view, reduced_view, *seen),
             gravity=None if ground.up is None else -ground.up,
             gravity_confidence=ground.confidence,
             T_odom_camera=None,
@@ -90,12 +93,11 @@ class Segmenter:
     def _cut_all(self, depth: DepthImage, asked: list[Box], ground: Ground) -> dict[int, Isolated]:
         """What each box that is not empty shows, by its number; about half of the pixels on a second thread."""
         first, second = boxes.halves(asked)
-        beside = self._beside.submit(self._cut_some, depth, asked, second, ground) if second else None
-        found = self._cut_some(depth, asked, first, ground)
-        return found if beside is None else found | beside.result()
-
-    def _cut_some(self, depth: DepthImage, asked: list[Box], which: list[int], ground: Ground) -> dict[int, Isolated]:
-        return {k: self._cut(depth, asked[k], ground) for k in which}
+        beside = {k: self._beside.submit(self._cut, depth, asked[k], ground) for k in second}
+        found = {k: self._cut(depth, asked[k], ground) for k in first}
+        for k in reversed(second):
+            found[k] = _result(beside[k], self._cut, depth, asked[k], ground)
+        return found
 
     def _cut(self, depth: DepthImage, box: Box, ground: Ground) -> Isolated:
         if self.params.preset == "paper":
@@ -111,6 +113,11 @@ class Segmenter:
         up, confidence = _up(coarse, gravity, params.up_tilt)
         supports = [] if up is None else find_supports(coarse, depth.intrinsics, up, params.support_area, jump)
         return Ground(up, confidence, supports, surface, coarse)
+
+
+def _result(beside: Future[Any], work: Callable[..., Any], *inputs: Any) -> Any:
+    """What the second thread finds by ``work(*inputs)``; done here if it has not begun, as where all cores are busy."""
+    return work(*inputs) if beside.cancel() else beside.result()
 
 
 def _plain(image: DepthImage) -> DepthImage:
