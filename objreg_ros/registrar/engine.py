@@ -25,7 +25,8 @@ from objreg_ros.registrar.shape import upright_motion
 from objreg_ros.registrar.shape_score import alike
 from objreg_ros.registrar.verify import WORST, rank, verify
 
-APART = (np.radians(4.0), 0.04)  # rad and m: what the shapes found is distinct beyond
+APART = (np.radians(4.0), 0.04)  # rad and m: hypotheses are distinct beyond before they are settled
+ALIKE = (np.radians(0.5), 0.01)  # and after
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -64,6 +65,7 @@ class Engine:
         T, worth = np.array([seed.T_target_source for seed in seeds]), np.array([seed.worth for seed in seeds])
         apart = np.radians(self._params.agreement_rotation), self._params.agreement_translation
         best = distinct(T, worth, pair.source.middle, self._params.finished, *apart)
+        best = [k for k in best if worth[k] >= worth.max() - self._params.finished_margin]
         candidates = [self._judge(pair, seeds[k], seeds) for k in best]
         return tuple(merged(candidates, pair.source.middle, self._params))
 
@@ -79,37 +81,55 @@ class Engine:
         return [seed for chain in chains for seed in self._best(pair, chain)]
 
     def _best(self, pair: Pair, chain: list[Hypothesis]) -> list[Hypothesis]:
-        """The hypotheses of one chain, brought to their basins, that look best from both views, distinct."""
+        """The hypotheses of one chain, brought to their basins, that look best from both views, distinct.
+
+        All are brought near by a few points; what looks hopeless or has become another goes no farther.
+        """
         if not chain:
             return []
+        params, middle = self._params, pair.source.middle
+        T, V = self._drawn(pair, np.array([seed.T_target_source for seed in chain]), *params.first_look)
+        near = distinct(T, V, middle, params.near_per_chain, *APART)
+        T, V = self._drawn(pair, T[near], params.quick_points, params.iterations, params.quick_sample)
+        chosen = distinct(T, V, middle, params.refined_per_chain, np.radians(5.0), 0.10)
+        return [replace(chain[near[k]], T_target_source=T[k]) for k in chosen]
+
+    def _drawn(self, pair: Pair, T: Array, points: int, iterations: int, sample: int) -> tuple[Array, Array]:
+        """Poses (K, 4, 4) drawn to the surface by the first so many ``points``, and V of a ``sample`` a side."""
         params, source, target = self._params, pair.source, pair.target
-        few = slice(params.quick_points)
-        T, _, _ = align(
-            source.xyz[few], source.normals[few], target.surface, np.array([seed.T_target_source for seed in chain]),
-            params.reaches[0], params.reaches[1], params.iterations,
-        )  # fmt: skip
-        V = rank(source.sight, target.sight, T, params, params.quick_sample)
-        chosen = distinct(T, V, source.middle, params.refined_per_chain, np.radians(5.0), 0.10)
-        return [replace(chain[k], T_target_source=T[k]) for k in chosen]
+        wide, narrow, _ = params.reaches
+        moved, _, _ = align(source.xyz[:points], source.normals[:points], target.surface, T, wide, narrow, iterations)
+        return moved, rank(source.sight, target.sight, moved, params, sample)
 
     def _settled(self, pair: Pair, seeds: list[Hypothesis]) -> list[Hypothesis]:
         """The hypotheses where the shape alone brings them, each with its worth for the views and the objects."""
         if not seeds:
             return []
-        params, source, target = self._params, pair.source, pair.target
-        T = settle(source, target, np.array([seed.T_target_source for seed in seeds]), params)
-        return self._rated(pair, [replace(seed, T_target_source=pose) for seed, pose in zip(seeds, T, strict=True)])
+        T, held = settle(pair.source, pair.target, np.array([seed.T_target_source for seed in seeds]), self._params)
+        settled = [replace(seed, T_target_source=pose) for seed, pose in zip(seeds, T, strict=True)]
+        return self._rated(pair, self._hopeful(pair, settled, held))
+
+    def _hopeful(self, pair: Pair, seeds: list[Hypothesis], held: Array) -> list[Hypothesis]:
+        """The hypotheses that enough points hold and that keep gravity; all of them where none does.
+
+        Two views of nothing in common may look alike by chance: V sees what little meets, and that is not refused.
+        """
+        errors = [gravity_error_deg(pair.source, pair.target, seed.T_target_source) or 0.0 for seed in seeds]
+        good = held & (np.array(errors) <= self._params.max_gravity_error)
+        return [seed for seed, hopeful in zip(seeds, good, strict=True) if hopeful] or seeds
 
     def _rated(self, pair: Pair, seeds: list[Hypothesis]) -> list[Hypothesis]:
-        """The hypotheses with their worth for the views and the objects."""
+        """The hypotheses with their worth for the views and the objects; of those that are one pose the best has it."""
         params, source, target = self._params, pair.source, pair.target
         T = np.array([seed.T_target_source for seed in seeds]).reshape(-1, 4, 4)
         V = rank(source.sight, target.sight, T, params, params.grey_points)
-        rated = []
-        for seed, v in zip(seeds, V, strict=True):
+        apart = distinct(T, V, source.middle, len(seeds), *ALIKE)
+        rated = [replace(seed, worth=WORST) for seed in seeds]
+        for k in apart:
+            seed, v = seeds[k], V[k]
             explained, moved = explain(source, target, seed.T_target_source, params)
             same = likeness(source, target, explained, seed.T_target_source, params)
-            rated.append(replace(seed, worth=float(v) + agreement(explained, moved, same, params)))
+            rated[k] = replace(seed, worth=float(v) + agreement(explained, moved, same, params))
         return rated
 
     def _upright(self, pair: Pair) -> list[Hypothesis]:

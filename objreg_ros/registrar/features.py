@@ -15,6 +15,7 @@ from objreg_ros.data import Array
 
 BINS = 11
 CROWD = 256  # most neighbours of a point
+FAR = 1e30  # a squared distance beyond all
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -57,8 +58,8 @@ def match(source: Features, target: Features, limit: int) -> tuple[Array, Array,
     if min(len(source), len(target)) < 3:
         nothing = np.zeros(0, np.int64)
         return nothing, nothing, np.zeros(0)
-    squared = _squared_distances(source.histograms, target.histograms)
-    forward, backward = squared.argmin(axis=1), squared.argmin(axis=0)
+    a, b = source.histograms, target.histograms
+    forward, backward, squared = _nearest(a @ b.T, (a * a).sum(axis=1), (b * b).sum(axis=1))
     pairs = np.unique(
         np.concatenate(
             [
@@ -71,16 +72,31 @@ def match(source: Features, target: Features, limit: int) -> tuple[Array, Array,
     a, b = pairs[:, 0], pairs[:, 1]
     mutual = (forward[a] == b) & (backward[b] == a)
     salient = np.minimum(source.saliency[a], target.saliency[b])
-    rank = salient * np.where(mutual, 2.0, 1.0) / (20.0 + np.sqrt(np.maximum(squared[a, b], 0.0)))
+    distance = np.sqrt(np.where(forward[a] == b, squared[0][a], squared[1][b]))
+    rank = salient * np.where(mutual, 2.0, 1.0) / (20.0 + distance)
     best = np.argsort(-rank, kind="stable")[:limit]
     return a[best], b[best], rank[best] / max(1e-9, float(rank.max()))
 
 
-def _squared_distances(a: Array, b: Array) -> Array:
-    squared = (a * np.float32(-2.0)) @ b.T
-    squared += (a * a).sum(axis=1)[:, None]
-    squared += (b * b).sum(axis=1)[None]
-    return np.asarray(squared)
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _nearest(products, a, b):  # type: ignore[no-untyped-def]
+    """The nearest partner of each of N and each of M by their ``products (N, M)`` and squared lengths, in one pass.
+
+    With the squared distances to them: (N,), (M,), ((N,), (M,)).
+    """
+    n, m = products.shape
+    forward, backward = np.zeros(n, np.int64), np.zeros(m, np.int64)
+    ahead, behind = np.full(n, np.float32(FAR)), np.full(m, np.float32(FAR))
+    for i in range(n):
+        best, where = np.float32(FAR), 0
+        for j in range(m):
+            squared = a[i] + b[j] - np.float32(2.0) * products[i, j]
+            if squared < best:
+                best, where = squared, j
+            if squared < behind[j]:
+                behind[j], backward[j] = squared, i
+        ahead[i], forward[i] = best, where
+    return forward, backward, (np.maximum(ahead, np.float32(0.0)), np.maximum(behind, np.float32(0.0)))
 
 
 @numba.njit(cache=True, nogil=True)

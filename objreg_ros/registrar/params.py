@@ -88,6 +88,9 @@ class RegistrarParams(Params):
     grid_reach: float = param(0.20, "how far from a surface its grid reaches", "m", ge=0.02)
     refined_per_chain: int = param(5, "hypotheses of each chain that are refined to the end", ge=1)
     finished: int = param(3, "hypotheses of all chains that grey finishes and the gate sees", ge=1)
+    first_look: tuple[int, ...] = param((150, 5, 150), "points, iterations and views' points a side of a first look")
+    near_per_chain: int = param(24, "hypotheses of each chain that are looked at again", ge=1)
+    finished_margin: float = param(0.5, "worth below the best at which a hypothesis is not finished", ge=0.0)
     quick_sample: int = param(500, "points a side that rank the hypotheses", ge=50)
     quick_points: int = param(500, "points that bring a hypothesis to its basin", ge=50)
     reaches: tuple[float, ...] = param((0.2, 0.1, 0.06), "distance of a pair at first, in the basin, at the end", "m")
@@ -95,7 +98,7 @@ class RegistrarParams(Params):
     min_points: int = param(60, "fewer paired points hold no pose", ge=6)
     grey_points: int = param(2500, "points a side whose grey ends a refinement", ge=100)
     grey_sigma: float = param(0.7, "difference of the high-passed grey that counts little, in its deviations", ge=0.01)
-    shape_sigma: float = param(0.02, "distance from a surface that weighs as much", "m", ge=0.001)
+    shape_sigma: float = param(0.03, "distance from a surface that weighs as much", "m", ge=0.001)
     surface_noise: float = param(0.005, "least noise that a surface is believed to have", "m", ge=1e-4)
     slack_share: float = param(0.01, "a direction that less of the surface resists is free to slide", ge=0.0, le=0.3)
     pushes: tuple[float, ...] = param(
@@ -125,7 +128,9 @@ class RegistrarParams(Params):
     min_tested: int = param(600, "least number of pixels that both views must see", ge=1)
     min_inliers: float = param(0.45, "least share of tested pixels whose depth agrees", ge=0.0, le=1.0)
     max_violations: float = param(0.07, "largest share of tested pixels in seen free space", ge=0.0, le=1.0)
-    max_violations_alone: float = param(0.035, "the same where a single object is explained", ge=0.0, le=1.0)
+    max_violations_alone: float = param(
+        0.035, "the same where a single object is explained and grey holds nothing", ge=0.0, le=1.0
+    )
     min_texture: float = param(0.25, "least correlation of the high-passed grey, where there is grey", ge=-1.0, le=1.0)
     min_score: float = param(0.10, "least verification score V", ge=-3.0, le=2.0)
     rival_margin: float = param(0.1, "a candidate this much below the best in V is not considered", ge=0.0)

@@ -20,10 +20,11 @@ from objreg_ros.registrar.sliding import resisted
 from objreg_ros.registrar.verify import verify
 
 
-def settle(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> Array:
-    """Poses (K, 4, 4) in their basins, brought to where the whole shape holds them."""
+def settle(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> tuple[Array, Array]:
+    """Poses (K, 4, 4) in their basins, brought to where the whole shape holds them, and whether it does (K,)."""
     _, reach, last = params.reaches
-    return align(source.xyz, source.normals, target.surface, T_target_source, reach, last, params.iterations)[0]
+    T, share, _ = align(source.xyz, source.normals, target.surface, T_target_source, reach, last, params.iterations)
+    return T, share * len(source.xyz) >= params.min_points
 
 
 def refine(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> Alignment:

@@ -47,6 +47,13 @@ def test_matches_of_two_views_are_often_true() -> None:
     assert len(i) <= 300 and weights.max() == 1.0
 
 
+def test_the_matches_of_equal_clouds_are_their_equals() -> None:
+    a = features(0.0)
+    i, j, _ = match(a, a, len(a))
+    assert len(i) > 0.95 * len(a)
+    assert (i == j).mean() > 0.95  # the length of a difference is known to the rounding of the lengths
+
+
 def test_the_same_clouds_give_the_same_matches() -> None:
     first, second = (match(features(0.0), features(15.0), 300) for _ in range(2))
     assert all(np.array_equal(x, y) for x, y in zip(first, second, strict=True))

@@ -55,9 +55,15 @@ def test_one_object_closes_a_loop_when_independent_chains_agree() -> None:
 
 
 def test_a_lone_object_must_respect_free_space_more_than_several() -> None:
-    refusal = refuse(candidate(explained=(CUP,), violations=0.05), PARAMS)
+    refusal = refuse(candidate(explained=(CUP,), violations=0.05, texture=0.4), PARAMS)
     assert refusal is not None and refusal[0] is Reason.FREE_SPACE
-    assert refuse(candidate(explained=(CUP, ObjectPair(1, 1, "book")), violations=0.05), PARAMS) is None
+    both = (CUP, ObjectPair(1, 1, "book"))
+    assert refuse(candidate(explained=both, violations=0.05, texture=0.4), PARAMS) is None
+
+
+def test_a_lone_object_may_violate_as_much_as_several_where_grey_holds_the_pose() -> None:
+    assert refuse(candidate(explained=(CUP,), violations=0.05, texture=0.6), PARAMS) is None
+    assert refuse(candidate(explained=(CUP,), violations=0.1, texture=0.6), PARAMS) is not None
 
 
 def test_two_objects_make_up_for_a_chain_that_is_alone() -> None:

@@ -25,13 +25,13 @@ def pair():
 
 
 def test_a_shifted_start_comes_back_to_the_truth(pair) -> None:
-    found = refine(*pair, settle(*pair, (OFF @ TRUTH)[None], PARAMS)[0], PARAMS)
+    found = refine(*pair, settle(*pair, (OFF @ TRUTH)[None], PARAMS)[0][0], PARAMS)
     rotation, distance = pose_error(found.T_target_source, TRUTH)
     assert rotation < 0.5 and distance < 1.5 and found.converged
 
 
 def test_the_inverted_problem_has_the_inverted_answer(pair) -> None:
-    settled = settle(pair[1], pair[0], inverse(OFF @ TRUTH)[None], PARAMS)
+    settled, _ = settle(pair[1], pair[0], inverse(OFF @ TRUTH)[None], PARAMS)
     found = refine(pair[1], pair[0], settled[0], PARAMS)
     rotation, distance = pose_error(found.T_target_source, inverse(TRUTH))
     assert rotation < 0.5 and distance < 1.5
@@ -68,7 +68,13 @@ def test_the_pattern_of_a_bare_wall_holds_what_its_shape_lets_slide() -> None:
 def test_a_pattern_that_does_not_correlate_holds_nothing() -> None:
     here, there = pose(np.eye(3), np.zeros(3)), pose(np.eye(3), np.array([0.5, 0.3, 0.0]))
     views = [prepare(keyframe(seen_from(0.0, height=0.75) @ T, WALL, noise=0.0003), PARAMS) for T in (here, there)]
-    assert len(refine(*views, settle(*views, np.eye(4)[None], PARAMS)[0], PARAMS).slack) == 3
+    assert len(refine(*views, settle(*views, np.eye(4)[None], PARAMS)[0][0], PARAMS).slack) == 3
+
+
+def test_what_settles_on_nothing_is_told_from_what_the_shape_holds(pair) -> None:
+    far = pose(np.eye(3), np.array([50.0, 0.0, 0.0]))
+    _, held = settle(*pair, np.array([OFF @ TRUTH, far]), PARAMS)
+    assert held.tolist() == [True, False]
 
 
 def test_a_start_far_away_does_not_converge(pair) -> None:
