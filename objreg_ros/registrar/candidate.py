@@ -44,7 +44,8 @@ class Candidate:
     and do not although both views look there; ``gravity_error_deg`` is the angle between the two gravities under it,
     None where one is unknown; ``likeness`` is how alike the explained objects look, -1..1, None where that is unknown;
     ``yaw_known`` says that the shape of one of them tells its yaw; ``margin`` is how much more the candidate is worth
-    than any other.
+    than any other. ``resistance`` is how much less the views like the pose pushed to where it would be false,
+    along the direction in which it is known least; None where it is known well enough without.
     """
 
     alignment: Alignment
@@ -57,6 +58,7 @@ class Candidate:
     likeness: float | None = None
     yaw_known: bool = False
     margin: float = 0.0
+    resistance: float | None = None
 
     @property
     def T_target_source(self) -> Array:

@@ -13,6 +13,7 @@ import numpy as np
 from objreg_ros.data import Alignment, Array
 from objreg_ros.registrar.candidate import Candidate
 from objreg_ros.registrar.consensus import distinct
+from objreg_ros.registrar.covariance import covariance_of, worst_translation
 from objreg_ros.registrar.hypotheses import Hypothesis, from_centroids, from_features, from_objects, from_prior
 from objreg_ros.registrar.icp import align
 from objreg_ros.registrar.keyframe import Keyframe
@@ -23,6 +24,7 @@ from objreg_ros.registrar.refine import refine, settle
 from objreg_ros.registrar.scene_search import from_shapes
 from objreg_ros.registrar.shape import upright_motion
 from objreg_ros.registrar.shape_score import alike
+from objreg_ros.registrar.sliding import resistance
 from objreg_ros.registrar.verify import WORST, rank, verify
 
 APART = (np.radians(4.0), 0.04)  # rad and m: hypotheses are distinct beyond before they are settled
@@ -158,7 +160,16 @@ class Engine:
             yaw_known=any(source.yaw_known[pair.source] and target.yaw_known[pair.target] for pair in explained),
             gravity_error_deg=gravity_error_deg(source, target, T),
         )
-        return replace(candidate, alignment=held(alignment)) if is_held(candidate, params) else candidate
+        if is_held(candidate, params):
+            candidate = replace(candidate, alignment=held(alignment))
+        return replace(candidate, resistance=self._resistance(pair, candidate))
+
+    def _resistance(self, pair: Pair, candidate: Candidate) -> float | None:
+        """How the views resist a push to where the pose would be false; None where it is known well."""
+        C = covariance_of(candidate.alignment, self._params)
+        if worst_translation(C) <= self._params.doubtful_sigma:
+            return None
+        return resistance(pair.source, pair.target, candidate.T_target_source, C, self._params)
 
 
 def is_held(candidate: Candidate, params: RegistrarParams) -> bool:

@@ -136,10 +136,17 @@ def _stationary(candidate: Candidate, params: RegistrarParams) -> Refusal | None
 
 
 def _held(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
+    """Whether the pose is known: by its covariance, and where that is large by a push that the views like less.
+
+    A camera that goes sideways and turns to keep looking at one far thing sees next to no difference.
+    """
     sigma = worst_translation(covariance_of(candidate.alignment, params))
-    if sigma <= params.max_slack_sigma:
+    if sigma > params.max_slack_sigma:
+        return Reason.SLACK, f"sigma {sigma:.3f} m > {params.max_slack_sigma:.3f} m"
+    drop = candidate.resistance
+    if drop is None or drop >= params.rival_margin:
         return None
-    return Reason.SLACK, f"sigma {sigma:.3f} m > {params.max_slack_sigma:.3f} m"
+    return Reason.SLACK, f"V falls by {drop:.2f} < {params.rival_margin:.2f} over {params.pushes[-1]:.2f} m"
 
 
 def _odometry(candidate: Candidate, params: RegistrarParams, prior: Prior) -> Refusal | None:

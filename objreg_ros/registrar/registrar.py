@@ -286,6 +286,7 @@ def _evidence(candidate: Candidate) -> dict[str, float]:
         "explained": len(candidate.explained),
         "moved": len(candidate.moved),
         "gravity_error_deg": candidate.gravity_error_deg,
+        "resistance": candidate.resistance,
     }
     return {name: float(number) for name, number in numbers.items() if number is not None}
 

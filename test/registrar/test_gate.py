@@ -38,6 +38,7 @@ def test_a_candidate_that_nothing_speaks_against_is_accepted() -> None:
         ({"explained": (), "moved": (CUP,)}, Reason.MOVED),
         ({"information": np.diag([1.0, 1e5, 1e5, 1e5, 1e5, 1e5])}, Reason.SLACK),
         ({"slack": np.eye(6)[:1]}, Reason.SLACK),
+        ({"resistance": 0.02}, Reason.SLACK),
     ],
 )
 def test_each_kind_of_evidence_alone_can_refuse(evidence: dict[str, object], reason: Reason) -> None:

@@ -9,7 +9,7 @@ import pytest
 from objreg_ros.geometry import inverse, pose, pose_error
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared, prepare
-from objreg_ros.registrar.sliding import pushed, resisted
+from objreg_ros.registrar.sliding import pushed, resistance, resisted
 
 from .rooms import ROOM, keyframe, seen_from
 
@@ -48,3 +48,13 @@ def test_a_push_moves_the_camera_where_it_stands() -> None:
     moved = pushed(TRUTH, np.array([0.1, 0.0, 0.0, 0.0, 0.0, np.radians(2.0)]))
     rotation, centimetres = pose_error(moved, TRUTH)
     assert rotation == pytest.approx(2.0) and centimetres == pytest.approx(10.0)
+
+
+def test_views_resist_a_push_along_a_table_and_not_along_a_bare_wall() -> None:
+    known = np.diag([0.06**2, 1e-6, 1e-6, 1e-8, 1e-8, 1e-8])
+    assert resistance(*views(TABLE, 0.0, 20.0), TRUTH, known, PARAMS) > PARAMS.rival_margin
+    wall = prepare(keyframe(seen_from(0.0, height=0.75), WALL, grey=False), PARAMS)
+    along = inverse(seen_from(0.0, height=0.75))[:3, :3] @ [0.0, 1.0, 0.0]
+    C = 1e-8 * np.eye(6)
+    C[:3, :3] += 0.06**2 * np.outer(along, along)
+    assert resistance(wall, wall, np.eye(4), C, PARAMS) < PARAMS.rival_margin
