@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import threading
 from collections import deque
 from collections.abc import Callable
@@ -14,7 +16,8 @@ Job = TypeVar("Job")
 class Worker(Generic[Job]):
     """Runs ``work`` on the newest job. A job that a newer one overtakes goes to ``replaced`` instead.
 
-    What ``work`` raises ends the worker and goes to ``failed``: a bug is not to be survived in silence.
+    What ``work`` raises ends the worker and goes to ``failed``: a bug is not to be survived in silence. ``nice`` is how
+    far the thread, and all that it starts, gives way to others for the processor (0 to 19; where threads have that).
     """
 
     def __init__(
@@ -22,8 +25,9 @@ class Worker(Generic[Job]):
         work: Callable[[Job], None],
         replaced: Callable[[Job], None],
         failed: Callable[[BaseException], None],
+        nice: int = 0,
     ) -> None:
-        self._work, self._replaced, self._failed = work, replaced, failed
+        self._work, self._replaced, self._failed, self._nice = work, replaced, failed, nice
         self._ready = threading.Condition()
         self._next: Job | None = None
         self._open = True
@@ -58,8 +62,13 @@ class Worker(Generic[Job]):
             job, self._next = self._next, None
             return job if self._open else None
 
+    def _give_way(self) -> None:
+        if self._nice and sys.platform == "linux":  # elsewhere niceness is a process's
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), self._nice)
+
     def _run(self) -> None:
         try:
+            self._give_way()
             while (job := self._take()) is not None:
                 self._work(job)
         except BaseException as error:
@@ -70,11 +79,15 @@ class Backlog(Worker[Job]):
     """Runs ``work`` on the newest job, and before it ``settle`` on each that it overtook, the oldest first."""
 
     def __init__(
-        self, work: Callable[[Job], None], settle: Callable[[Job], None], failed: Callable[[BaseException], None]
+        self,
+        work: Callable[[Job], None],
+        settle: Callable[[Job], None],
+        failed: Callable[[BaseException], None],
+        nice: int = 0,
     ) -> None:
         self._aside: deque[Job] = deque()
         self._newest, self._settle = work, settle
-        super().__init__(self._in_order, self._aside.append, failed)
+        super().__init__(self._in_order, self._aside.append, failed, nice)
 
     def put(self, job: Job) -> None:
         """Hand over a job; never waits."""

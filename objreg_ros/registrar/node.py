@@ -30,6 +30,7 @@ from objreg_ros.registrar.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.registrar.registrar import Outcome, Registrar, Stretch
 from objreg_ros.registrar.warm import warm
 
+GIVING_WAY = 10  # niceness of the search: the next image must not wait for it
 KEPT_CONSTRAINTS = 1000  # what a mapper that comes late still gets
 
 
@@ -52,7 +53,7 @@ class RegistrarNode(MatchingDoor):
         self._accepted, self._unsearched, self._refused = 0, 0, Counter[str]()
         self._last_refusal = ""
         self._scene, self._odom_frame = Scene(), "odom"
-        self.searcher: Backlog[tuple[int, Stretch]] = Backlog(self._search, self._keep, self.fail)
+        self.searcher: Backlog[tuple[int, Stretch]] = Backlog(self._search, self._keep, self.fail, GIVING_WAY)
         self._announce()
         self._serve()
         self._listen(round(inputs.odom_slop * 1e9))

@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import os
+import sys
 import threading
+
+import pytest
 
 from objreg_ros.bridge.worker import Backlog, Worker
 
@@ -127,3 +131,26 @@ def test_a_closed_backlog_gives_back_what_it_did_not_begin() -> None:
     go.set()
     backlog.close()
     assert rest == [2, 3]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="threads have no niceness of their own")
+def test_a_nice_worker_and_the_threads_that_it_starts_give_way() -> None:
+    seen: list[int] = []
+    done = threading.Event()
+
+    def note() -> None:
+        seen.append(os.getpriority(os.PRIO_PROCESS, threading.get_native_id()))
+
+    def work(_: str) -> None:
+        note()
+        helper = threading.Thread(target=note)
+        helper.start()
+        helper.join()
+        done.set()
+
+    worker = Worker(work, lambda _: None, lambda _: None, nice=19)
+    worker.put("job")
+    assert done.wait(PATIENCE)
+    worker.close()
+    assert seen == [19, 19]
+    assert os.getpriority(os.PRIO_PROCESS, threading.get_native_id()) < 19
