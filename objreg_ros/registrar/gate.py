@@ -117,8 +117,11 @@ def _agreement(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
         return None
     if explained >= 1 and _unmistakable(candidate, params):
         return None
-    reason = Reason.CHAINS_DISAGREE if explained else Reason.FEW_OBJECTS
-    return reason, f"{chains} chains < {params.min_chains} and {explained} objects < {params.min_objects}"
+    if explained == 0:
+        return Reason.FEW_OBJECTS, "0 objects < 1"
+    return Reason.CHAINS_DISAGREE, (
+        f"{chains} chains < {params.min_chains} and {explained} objects < {params.min_objects}"
+    )
 
 
 def _unmistakable(candidate: Candidate, params: RegistrarParams) -> bool:
