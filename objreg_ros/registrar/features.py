@@ -50,6 +50,19 @@ def _features(xyz: Array, normals: Array, histograms: Array) -> Features:
     return Features(xyz=xyz, normals=normals, histograms=histograms, saliency=saliency)
 
 
+def salient(features: Features, most: int) -> Features:
+    """The most salient of them, in their order; matching takes the product of both numbers."""
+    if len(features) <= most:
+        return features
+    kept = np.sort(np.argpartition(-features.saliency, most)[:most])
+    return Features(
+        xyz=features.xyz[kept],
+        normals=features.normals[kept],
+        histograms=features.histograms[kept],
+        saliency=features.saliency[kept],
+    )
+
+
 def match(source: Features, target: Features, limit: int) -> tuple[Array, Array, Array]:
     """The best partner of each salient point, asked both ways: indices into source and target, and a weight 0..1 each.
 

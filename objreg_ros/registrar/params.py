@@ -57,6 +57,7 @@ class RegistrarParams(Params):
     # How a pose is found and looked at.
     feature_voxel: float = param(0.07, "distance of the points that carry a local feature", "m", ge=0.01, le=0.2)
     feature_radius: float = param(0.35, "how far a local feature looks", "m", ge=0.03, le=1.0)
+    feature_points: int = param(800, "most points that are matched by their local features", ge=10)
     feature_matches: int = param(900, "most matches of local features that are considered", ge=10)
     centroid_tolerance: float = param(0.12, "how far the middle of one object may differ between views", "m", ge=0.01)
     seeds_per_chain: int = param(120, "hypotheses that each chain proposes", ge=1)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.registrar.features import Features, describe
+from objreg_ros.registrar.features import Features, describe, salient
 from objreg_ros.registrar.fusion import thin
 from objreg_ros.registrar.icp import Surface, prepare_surface
 from objreg_ros.registrar.keyframe import Keyframe, KeyObject
@@ -58,7 +58,7 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
         keyframe=keyframe,
         sight=prepare_sight(keyframe.view, params.context_range, params.detail_sigma, params.seed),
         surface=prepare_surface(*joined(fine, things), params.grid_cell, params.grid_reach),
-        features=describe(*coarse, params.feature_radius),
+        features=salient(describe(*coarse, params.feature_radius), params.feature_points),
         **_shuffled(*joined(coarse, sampled(things, params.thing_points, params.seed)), params.seed),
         up=up,
         groups=tuple(groups.of(label) for label in keyframe.labels),

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from objreg_ros.geometry import inverse, pose, rotate, rotation_from_vector, transform
-from objreg_ros.registrar.features import describe, match
+from objreg_ros.registrar.features import describe, match, salient
 from objreg_ros.registrar.fusion import thin
 
 from .rooms import keyframe, seen_from
@@ -58,6 +58,14 @@ def test_the_matches_of_equal_clouds_are_their_equals() -> None:
 def test_the_same_clouds_give_the_same_matches() -> None:
     first, second = (match(features(0.0), features(15.0), 300) for _ in range(2))
     assert all(np.array_equal(x, y) for x, y in zip(first, second, strict=True))
+
+
+def test_only_the_most_salient_are_kept_where_there_are_many() -> None:
+    every = features(0.0)
+    kept = salient(every, 300)
+    assert len(kept) == 300
+    assert kept.saliency.min() >= np.sort(every.saliency)[-300]
+    assert len(salient(kept, 300)) == 300 == len(salient(kept, 1000))
 
 
 def test_points_without_normals_have_no_features() -> None:
