@@ -20,10 +20,14 @@ from objreg_ros.registrar.silhouette import Silhouette, draw
 EDGE = np.uint16(PointFlag.EDGE)
 LEAST = 30  # points of a shape
 LEVEL = 0.9  # cosine of a surface that things stand on with up
-CLEAR = 0.003  # m between the lowest points of an object and what it stands on
+CLEAR = 0.005  # m: what an object stands on is at most so much higher than the lowest that is seen of it
 STEP = 0.02  # m: a level surface lies within as much of height
 SEEN = 5  # points of the context that make one
-AROUND = 0.25  # m beyond the object
+BESIDE, AROUND = 0.02, 0.25  # m beyond the object: nearer points may be its own
+WIDE = 0.6  # m beyond the object: what lies there in the same plane tells which way is up
+THICK = (0.03, 0.02, 0.015, 0.015)  # m beside a plane, round by round
+PLANE = 60  # points that make one
+MOST_TILT = 4.0  # degrees between gravity and the normal of what things stand on
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,7 +83,7 @@ def prepare_shape(keyframe: Keyframe, indices: Sequence[int], most: int, seed: i
         firm = (normals != 0).any(axis=1)
     if firm.sum() < LEAST:
         return None
-    R = upright_axes(-np.asarray(keyframe.gravity, float))
+    R = upright_axes(standing(keyframe, indices, -np.asarray(keyframe.gravity, float)))
     feet = [footing(keyframe, i, R) for i in indices]
     upright = xyz @ R.T.astype(np.float32)
     low, high = np.percentile(upright[:, :2], (2, 98), axis=0)
@@ -120,15 +124,50 @@ def upright_axes(up: Array) -> Array:
     return np.stack([x, np.cross(up, x), up])
 
 
+def standing(keyframe: Keyframe, indices: Sequence[int], up: Array) -> Array:
+    """Up (3,) as the normal of what the objects stand on: truer than ``up``, which is the guess against gravity.
+
+    The planes under several objects are parallel. ``up`` itself where too little of them is seen, or they tilt.
+    """
+    R = upright_axes(up)
+    around = keyframe.context.xyz @ R.T.astype(np.float32)
+    level = around[keyframe.context.normals @ R[2].astype(np.float32) > LEVEL]
+    layers = [_layer(keyframe, i, R, level) for i in indices]
+    points = np.concatenate([np.zeros((0, 3)), *(layer for layer in layers if len(layer) >= PLANE)])
+    slope = np.zeros(2)
+    for thickness in THICK:
+        kept = np.abs(points[:, 2] - points[:, :2] @ slope) < thickness
+        if kept.sum() < PLANE:
+            return up
+        slope, *_ = np.linalg.lstsq(points[kept, :2], points[kept, 2], rcond=None)
+    if np.hypot(*slope) > np.tan(np.radians(MOST_TILT)):
+        return up
+    normal = R.T @ np.array([-slope[0], -slope[1], 1.0])
+    return np.asarray(normal / np.linalg.norm(normal))
+
+
+def _layer(keyframe: Keyframe, index: int, R_upright_camera: Array, level: Array) -> Array:
+    """Level points (N, 3) around an object at the height that it stands on, about their own middle."""
+    points = keyframe.objects[index].cloud.xyz @ R_upright_camera.T.astype(np.float32)
+    foot = footing(keyframe, index, R_upright_camera)
+    beside = np.abs(level[:, :2] - points[:, :2].mean(axis=0)).max(axis=1) < WIDE
+    layer = level[beside & (np.abs(level[:, 2] - foot) < THICK[0])]
+    return np.asarray(layer - np.median(layer, axis=0) if len(layer) else layer, float)
+
+
 def footing(keyframe: Keyframe, index: int, R_upright_camera: Array) -> float:
-    """The height along up of what an object stands on: of the level surface around it, else of its lowest points."""
+    """The height along up of what an object stands on: of the level surface around it, else of its lowest points.
+
+    Around, not within: a seat is level too.
+    """
     points = keyframe.objects[index].cloud.xyz @ R_upright_camera.T.astype(np.float32)
     lowest = float(np.percentile(points[:, 2], 2))
     around = keyframe.context.xyz @ R_upright_camera.T.astype(np.float32)
     level = keyframe.context.normals @ R_upright_camera[2].astype(np.float32) > LEVEL
-    low, high = points[:, :2].min(axis=0) - AROUND, points[:, :2].max(axis=0) + AROUND
-    near = ((around[:, :2] > low) & (around[:, :2] < high)).all(axis=1)
-    heights = np.sort(around[level & near & (around[:, 2] < lowest - CLEAR), 2])[::-1]
+    low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+    beyond = np.maximum(low - around[:, :2], around[:, :2] - high).max(axis=1)
+    near = (beyond > BESIDE) & (beyond < AROUND)
+    heights = np.sort(around[level & near & (around[:, 2] < lowest + CLEAR), 2])[::-1]
     for first in range(len(heights) - SEEN + 1):  # from the top: the first height where a surface is
         within = heights[first:][heights[first:] > heights[first] - STEP]
         if len(within) >= SEEN:
