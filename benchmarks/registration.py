@@ -7,11 +7,12 @@ camera's motion at their middle, without that excuse. What must be refused is an
 another object, each in a room of its own; an accepted pose of the camera beyond 8 degrees or 15 cm is false too.
 `success`, `joint_success` and `ms` are of the objects' shapes and the views, prepared before; `engine_*`, what is
 accepted and the covariance are of the whole engine and its gate. With `stored` the object is known from four sides.
-Beside ours, in the same run: the usual ways to register two object clouds.
+Beside ours, in the same run: the usual ways to register two object clouds, on the same looks, at some of the angles.
 
     python benchmarks/registration.py --seed 7 --cache /tmp/shots --json registration.json
 
-`--cache` keeps every finished piece, so that a run that was stopped goes on where it was.
+`--cache` keeps every finished piece, so that a run that was stopped goes on where it was. `--quick` is small pieces of
+the same in a fixed order, as many as fit into its time.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +43,7 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared, prepare
 from objreg_ros.registrar.scene_search import from_shapes
 from objreg_ros.registrar.symmetry import yaw_share
+from objreg_ros.registrar.warm import warm
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.simulation import furniture
@@ -59,6 +62,8 @@ NOTHING = (180.0, 1e3)  # the error where there is no pose
 ASIDE = 0.18  # m from the middle of the table
 STORED = (0.0, 60.0, 120.0, 180.0)  # sides that an object is known from
 FOUR = ("cereal_box", "book", "keyboard", "bowl", "cap", "flashlight", "soda_can")
+QUICK_SECONDS, LEAST = 38.0, 4  # after which a quick run begins no piece beyond the least
+ROOMS = 4  # strangers of each kind that are shown to each other
 SYMMETRIC = ("soda_can", "bowl")
 TELLING = ("cereal_box", "chair", "monitor", "flashlight", "book", "keyboard")  # a cap tells next to nothing
 
@@ -134,15 +139,14 @@ class Bench:
         self.rows: list[dict[str, Any]] = []
         self.joint: list[dict[str, Any]] = []
         self.negatives: list[dict[str, Any]] = []
+        self.peers: list[dict[str, Any]] = []
 
-    def single(self, label: str, number: int, angles: Sequence[float], peers: dict[str, Any]) -> None:
+    def single(self, label: str, number: int, angles: Sequence[float]) -> None:
         """One object from all angles against the first look, and against four stored ones."""
-        name = f"single_{label}_{number}_{len(angles)}_{len(peers)}"
-        self.rows += self._piece(name, lambda: self._single(label, number, angles, peers))
+        self.rows += self._piece(named("single", label, number, angles), lambda: self._single(label, number, angles))
 
-    def _single(self, label: str, number: int, angles: Sequence[float], peers: dict[str, Any]) -> list[dict[str, Any]]:
-        stage = Stage.of(label, 1000 * self.seed + number, ASIDE)
-        shots = Shots(self, stage, lambda angle, hand: stage.camera((angle, 0.0, 0.0), hand), [label, number])
+    def _single(self, label: str, number: int, angles: Sequence[float]) -> list[dict[str, Any]]:
+        stage, shots = self._staged(label, number)
         first = shots.first(0.0)
         stored = [shots.first(angle) for angle in STORED]
         rows = []
@@ -155,13 +159,30 @@ class Bench:
             best = max(stored, key=lambda one: worth_of(laid(second, one, self.params)[0]))
             row["stored_error"] = object_error(stage, best, second, laid(second, best, self.params)[0])
             row["yaw_unknown"] = yaw_unknown(second, self.params)
-            row["peers"] = {name: peer_row(peer, stage, first, second) for name, peer in peers.items()}
             rows.append(row | {"label": label, "angle": angle})
         return [judged(row) for row in rows]
 
+    def compare(self, label: str, number: int, angles: Sequence[float], peers: dict[str, Peer]) -> None:
+        """The peers on the same looks at one object."""
+        name = named("peers", label, number, angles)
+        self.peers += self._piece(name, lambda: self._compare(label, number, angles, peers))
+
+    def _compare(
+        self, label: str, number: int, angles: Sequence[float], peers: dict[str, Peer]
+    ) -> list[dict[str, Any]]:
+        stage, shots = self._staged(label, number)
+        return [
+            {name: peer_success(peer, stage, shots.first(0.0), second) for name, peer in peers.items()}
+            for second in map(shots.next, angles)
+        ]
+
+    def _staged(self, label: str, number: int) -> tuple[Stage, Shots]:
+        stage = Stage.of(label, 1000 * self.seed + number, ASIDE)
+        return stage, Shots(self, stage, lambda angle, hand: stage.camera((angle, 0.0, 0.0), hand), [label, number])
+
     def together(self, number: int, angles: Sequence[float]) -> None:
         """Four objects from all angles against the first look."""
-        self.joint += self._piece(f"four_{number}_{len(angles)}", lambda: self._together(number, angles))
+        self.joint += self._piece(named("four", "", number, angles), lambda: self._together(number, angles))
 
     def _together(self, number: int, angles: Sequence[float]) -> list[dict[str, Any]]:
         stage = four(1000 * self.seed + number)
@@ -178,13 +199,15 @@ class Bench:
             rows.append(row | {"angle": angle})
         return [judged(row) for row in rows]
 
-    def refuse(self, labels: Sequence[str], rooms: int, count: int) -> None:
+    def refuse(self, labels: Sequence[str], part: int, count: int) -> None:
         """Pairs of looks at different rooms, half of them at the same kind of object: whatever is accepted is a lie."""
-        self.negatives += self._piece(f"refuse_{rooms}_{count}", lambda: self._refuse(labels, rooms, count))
+        name = f"refuse_{len(labels)}_{part}_{count}"
+        self.negatives += self._piece(name, lambda: self._refuse(labels, part, count))
 
-    def _refuse(self, labels: Sequence[str], rooms: int, count: int) -> list[dict[str, Any]]:
-        rng = np.random.default_rng([self.seed, 9])
-        shots = {(label, n): self._stranger(label, n) for label in labels for n in range(rooms)}
+    def _refuse(self, labels: Sequence[str], part: int, count: int) -> list[dict[str, Any]]:
+        rng = np.random.default_rng([self.seed, 9, part])
+        rooms = range(ROOMS * part, ROOMS * (part + 1))
+        shots = {(label, n): self._stranger(label, n) for label in labels for n in rooms}
         rows = []
         for k in range(count):
             first = labels[rng.integers(len(labels))]
@@ -195,9 +218,7 @@ class Bench:
         return rows
 
     def _stranger(self, label: str, number: int) -> Shot:
-        stage = Stage.of(label, 1000 * self.seed + 500 + number, ASIDE)
-        shots = Shots(self, stage, lambda angle, hand: stage.camera((angle, 0.0, 0.0), hand), [label, 500 + number])
-        return shots.next(0.0)
+        return self._staged(label, 500 + number)[1].next(0.0)
 
     def registered(self, first: Shot, second: Shot) -> dict[str, Any]:
         """What the shapes find, and the engine's best pose ``T_first_second``: if it is accepted, if that is a lie."""
@@ -256,10 +277,8 @@ class Bench:
             **percentiles("ms", [row["ms"] for row in rows]),
             **percentiles("joint_ms", [row["ms"] for row in joint]),
             **percentiles("engine_ms", [row["engine_ms"] for row in both]),
-            "peers": {
-                name: mean([row["peers"][name] for row in rows], "success")
-                for name in (rows[0]["peers"] if rows else ())
-            },
+            "peers": {name: mean(self.peers, name) for name in (self.peers[0] if self.peers else ())},
+            "peer_pairs": len(self.peers),
         }
 
     def _piece(self, name: str, make: Callable[[], list[dict[str, Any]]]) -> list[dict[str, Any]]:
@@ -275,28 +294,34 @@ class Bench:
 
 
 class Shots:
-    """The looks at one stage: another hand holds the camera for each of them."""
+    """The looks at one stage: another hand holds the camera for each of them, the same whenever it is asked for."""
 
     def __init__(
         self, bench: Bench, stage: Stage, camera: Callable[[float, np.random.Generator], Array], name: list[Any]
     ) -> None:
         self._bench, self._stage, self._camera = bench, stage, camera
         self._name = zlib.crc32(repr(name).encode())
-        self._looks = 0
         self._kept: dict[float, Shot] = {}
 
     def next(self, angle: float) -> Shot:
-        """A new look from an angle."""
-        self._looks += 1
-        hand = np.random.default_rng([self._bench.seed, self._name, self._looks])
+        """A second look from an angle."""
+        return self._look(angle, 2)
+
+    def first(self, angle: float) -> Shot:
+        """The first look from an angle; it is kept."""
+        if angle not in self._kept:
+            self._kept[angle] = self._look(angle, 1)
+        return self._kept[angle]
+
+    def _look(self, angle: float, time: int) -> Shot:
+        hand = np.random.default_rng([self._bench.seed, self._name, round(angle), time])
         T = self._camera(angle, hand)
         return look(self._stage, T, int(hand.integers(2**31)), self._bench.stress, self._bench.params)
 
-    def first(self, angle: float) -> Shot:
-        """The first look from an angle, the same whenever it is asked for."""
-        if angle not in self._kept:
-            self._kept[angle] = self.next(angle)
-        return self._kept[angle]
+
+def named(kind: str, label: str, number: int, angles: Sequence[float]) -> str:
+    """The name of a piece: another for other angles."""
+    return f"{kind}_{label}_{number}_" + "_".join(f"{angle:.0f}" for angle in angles)
 
 
 def laid(source: Shot, target: Shot, params: RegistrarParams) -> tuple[Hypothesis | None, float]:
@@ -375,12 +400,12 @@ def grouped(rows: Sequence[dict[str, Any]], key: str) -> dict[str, float | None]
 Peer = Callable[[Array, Array], Array]
 
 
-def peer_row(peer: Peer, stage: Stage, first: Shot, second: Shot) -> dict[str, Any]:
-    """What a peer makes of the two clouds of the object."""
+def peer_success(peer: Peer, stage: Stage, first: Shot, second: Shot) -> bool:
+    """Whether a peer registers the two clouds of the object."""
     if not first.frame.objects or not second.frame.objects:
-        return {"success": False}
+        return False
     T = peer(second.frame.objects[0].xyz.astype(float), first.frame.objects[0].xyz.astype(float))
-    return {"success": within(stage.error(T, first.T_world_camera, second.T_world_camera), SUCCESS)}
+    return within(stage.error(T, first.T_world_camera, second.T_world_camera), SUCCESS)
 
 
 def cloud_peers() -> dict[str, Peer]:
@@ -455,30 +480,60 @@ def kiss(voxel: float) -> dict[str, Peer]:
     return {"kiss_matcher_gicp": register}
 
 
+Piece = tuple[str, Callable[[Bench], None]]
+
+
+def whole(reps: int, negatives: int, every: int) -> list[Piece]:
+    """The whole benchmark, piece by piece: every object and angle, the peers at every so many of them."""
+    angles = [float(a) for a in range(0, 181, 10)]
+    labels, peers = list(TABLE_1), cloud_peers()
+    plan: list[Piece] = []
+    for n in range(reps):
+        plan += [(label, partial(Bench.single, label=label, number=n, angles=angles)) for label in labels]
+        plan += [("four", partial(Bench.together, number=k, angles=angles[1:])) for k in (2 * n, 2 * n + 1)]
+    shares = np.diff(np.linspace(0, negatives, 5).astype(int))
+    plan += [("strangers", partial(Bench.refuse, labels=labels, part=k, count=int(n))) for k, n in enumerate(shares)]
+    compared = [partial(Bench.compare, label=label, number=0, angles=angles[::every], peers=peers) for label in labels]
+    return plan + [("peers", piece) for piece in compared]
+
+
+def glimpses() -> list[Piece]:
+    """Small pieces, each another place: the first four touch every figure."""
+    plan: list[Piece] = []
+    for n, angles in enumerate(([0.0, 40.0, 90.0], [20.0, 60.0, 140.0], [80.0, 110.0, 170.0])):
+        plan += [("four", partial(Bench.together, number=n, angles=angles[1:]))]
+        plan += [("cereal_box", partial(Bench.single, label="cereal_box", number=n, angles=angles))]
+        plan += [("soda_can", partial(Bench.single, label="soda_can", number=n, angles=angles))]
+        plan += [("strangers", partial(Bench.refuse, labels=("cereal_box", "soda_can"), part=n, count=12))]
+        others = [label for label in TABLE_1 if label not in ("cereal_box", "soda_can")]
+        plan += [(label, partial(Bench.single, label=label, number=n, angles=angles)) for label in others]
+    return plan
+
+
 @click.command()
 @click.option("--seed", default=1, show_default=True)
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
-@click.option("--quick", is_flag=True, help="Few objects and angles; ends within 50 s.")
+@click.option("--quick", is_flag=True, help="As many small pieces as fit; ends within 50 s.")
 @click.option("--cache", type=click.Path(file_okay=False, path_type=Path), help="Keep finished pieces here.")
 @click.option("--negatives", default=500, show_default=True, help="Pairs of different rooms, for each condition.")
 @click.option("--reps", default=2, show_default=True, help="Instances of each object.")
-def main(seed: int, json_file: Path | None, quick: bool, reps: int, negatives: int, cache: Path | None) -> None:
+@click.option("--every", default=2, show_default=True, help="The peers see every so many angles of one instance.")
+def main(
+    seed: int, json_file: Path | None, quick: bool, reps: int, negatives: int, cache: Path | None, every: int
+) -> None:
     """Register simulated objects and scenes, and refuse what is not the same."""
     start = time.perf_counter()
-    angles = [0.0, 40.0, 90.0] if quick else [float(a) for a in range(0, 181, 10)]
-    labels = ["cereal_box", "soda_can"] if quick else list(TABLE_1)
-    reps, rooms, negatives = (1, 2, 4) if quick else (reps, 4, negatives)
+    benches = {condition: Bench(condition, seed, cache) for condition in CONDITIONS}
+    warm(RegistrarParams())
+    for k, (name, piece) in enumerate(glimpses() if quick else whole(reps, negatives, every)):
+        if quick and k >= LEAST and time.perf_counter() - start > QUICK_SECONDS:
+            break
+        for condition, bench in benches.items():
+            piece(bench)
+            click.echo(f"{condition} {name}: {time.perf_counter() - start:.0f} s")
     out: dict[str, Any] = {"seed": seed}
+    out |= {condition: bench.figures() for condition, bench in benches.items()}
     for condition in CONDITIONS:
-        bench, peers = Bench(condition, seed, cache), {} if quick else cloud_peers()
-        for n in range(reps):
-            for label in labels:
-                bench.single(label, n, angles, peers)
-                click.echo(f"{condition} {label} {n}: {time.perf_counter() - start:.0f} s")
-        for n in range(1 if quick else 2 * reps):
-            bench.together(n, angles[1:])
-        bench.refuse(labels, rooms, negatives)
-        out[condition] = bench.figures()
         click.echo(f"{condition}: {json.dumps({k: v for k, v in out[condition].items() if not isinstance(v, dict)})}")
     click.echo(f"{time.perf_counter() - start:.0f} s")
     if json_file is not None:
