@@ -293,7 +293,8 @@ class Alignment:
     ``information (6, 6) float64`` of the error ``[tx ty tz rx ry rz]`` in the target frame; ``inliers`` how many source
     points found a partner; ``overlap`` their share 0..1; ``rmse`` m of the inliers; ``slack (K, 6) float64`` unit
     directions of the same tangent space that the data leave open, K may be 0; ``held (L, 6) float64`` motions of one
-    sigma along directions that only the look of the whole holds.
+    sigma along directions that only the look of the whole holds; ``middle (3,) float64`` m is that of what was aligned,
+    in the target frame.
     """
 
     T_target_source: Array
@@ -305,9 +306,11 @@ class Alignment:
     converged: bool
     slack: Array = field(default_factory=lambda: np.zeros((0, 6)))
     held: Array = field(default_factory=lambda: np.zeros((0, 6)))
+    middle: Array = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
         _hold_pose(self, "T_target_source")
+        _hold(self, "middle", np.float64, (3,), {})
         _hold(self, "information", np.float64, (6, 6), {})
         _hold(self, "slack", np.float64, (None, 6), {})
         _hold(self, "held", np.float64, (None, 6), {})

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """How wrong an accepted pose may be.
 
-The inverse information of a registration is over-confident: its points are not independent and its correspondences are
-not certain. So it is scaled, floored, and opened along directions that the data leave free, each by a parameter;
-config/covariance.yaml says how they were calibrated.
+The inverse information of a registration is scaled, floored, and opened along directions that the data leave free, each
+by a parameter. What no residual shows comes on top: a camera whose lens or depth is not quite as its calibration says
+measures every motion wrong by a share of it. config/covariance.yaml says how the parameters were calibrated.
 """
 
 from __future__ import annotations
@@ -11,11 +11,19 @@ from __future__ import annotations
 import numpy as np
 
 from objreg_ros.data import Alignment, Array
+from objreg_ros.geometry import rotation_angle, skew
 from objreg_ros.registrar.params import RegistrarParams
+
+NEAREST = 0.3  # m: nothing is seen nearer
 
 
 def covariance_of(alignment: Alignment, params: RegistrarParams) -> Array:
     """(6, 6) float64 [tx ty tz rx ry rz] of ``T_target_source`` in the target frame, positive definite."""
+    return spread_of(alignment, params) + _miscalibrated(alignment, params.covariance_calibration)
+
+
+def spread_of(alignment: Alignment, params: RegistrarParams) -> Array:
+    """The same of a camera that is as its calibration says: how far the pose may lie from the best one."""
     C = params.covariance_scale * _inverse(alignment.information) + _floor(params)
     for direction in alignment.slack:
         C = C + _opened(direction, params)
@@ -26,6 +34,20 @@ def covariance_of(alignment: Alignment, params: RegistrarParams) -> Array:
 def worst_translation(C: Array) -> float:
     """The standard deviation in m along the direction in which the position is known least."""
     return float(np.sqrt(np.linalg.eigvalsh(C[:3, :3])[-1]))
+
+
+def _miscalibrated(alignment: Alignment, share: float) -> Array:
+    """What a wrong calibration adds: what was seen is shifted and turned about its middle by a share of the motion.
+
+    To a camera a shift looks like a turn, by as much as it is near to what it sees.
+    """
+    R, t, middle = alignment.T_target_source[:3, :3], alignment.T_target_source[:3, 3], alignment.middle
+    shift, range_m = float(np.linalg.norm(t)), max(float(np.linalg.norm(middle)), NEAREST)
+    turn = float(np.hypot(rotation_angle(R), shift / range_m))
+    camera_from_middle = np.eye(6)
+    camera_from_middle[:3, 3:] = skew(middle - t)
+    motion = share * np.array([shift] * 3 + [turn] * 3)
+    return np.asarray(camera_from_middle @ np.diag(motion**2) @ camera_from_middle.T)
 
 
 def _floor(params: RegistrarParams) -> Array:

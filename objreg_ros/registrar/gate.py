@@ -15,7 +15,7 @@ import numpy as np
 from objreg_ros.data import Reason
 from objreg_ros.geometry import pose_error
 from objreg_ros.registrar.candidate import Candidate
-from objreg_ros.registrar.covariance import covariance_of, worst_translation
+from objreg_ros.registrar.covariance import spread_of, worst_translation
 from objreg_ros.registrar.odometry import Prior
 from objreg_ros.registrar.params import RegistrarParams
 
@@ -143,7 +143,7 @@ def _held(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
     A camera that goes sideways and turns to keep looking at one far thing sees next to no difference.
     """
-    sigma = worst_translation(covariance_of(candidate.alignment, params))
+    sigma = worst_translation(spread_of(candidate.alignment, params))
     if sigma > params.max_slack_sigma:
         return Reason.SLACK, f"sigma {sigma:.3f} m > {params.max_slack_sigma:.3f} m"
     drop = candidate.resistance

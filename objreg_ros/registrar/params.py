@@ -100,7 +100,8 @@ class RegistrarParams(Params):
     grey_points: int = param(2500, "points a side whose grey ends a refinement", ge=100)
     grey_sigma: float = param(0.7, "difference of the high-passed grey that counts little, in its deviations", ge=0.01)
     shape_sigma: float = param(0.03, "distance from a surface that weighs as much", "m", ge=0.001)
-    surface_noise: float = param(0.005, "least noise that a surface is believed to have", "m", ge=1e-4)
+    depth_noise: float = param(0.0012, "standard deviation of depth at 0.4 m", "m", ge=1e-5)
+    depth_noise_growth: float = param(0.0019, "its growth with the square of the depth beyond", "1/m", ge=0.0)
     slack_share: float = param(0.01, "a direction that less of the surface resists is free to slide", ge=0.0, le=0.3)
     pushes: tuple[float, ...] = param(
         (0.05, 0.1, 0.15), "a pose pushed so far along such a direction that the views like it less is held there", "m"
@@ -148,9 +149,13 @@ class RegistrarParams(Params):
     odometry_sigmas: float = param(4.0, "largest distance from odometry in its standard deviations", ge=0.0)
 
     # How wrong an accepted pose may be; config/covariance.yaml says how these were calibrated.
-    covariance_scale: float = param(90.0, "factor of the covariance of a registration", ge=0.0)
-    covariance_floor_translation: float = param(0.002, "least standard deviation of each axis", "m", ge=1e-4)
-    covariance_floor_rotation: float = param(0.05, "least standard deviation of each axis", "deg", ge=1e-3)
+    covariance_scale: float = param(1.15, "factor of the covariance of a registration", ge=0.0)
+    covariance_patch: float = param(0.8, "edge of a patch of surface whose points err together", "m", ge=0.01)
+    covariance_calibration: float = param(
+        0.035, "error of a motion, as a share of it, by a camera that is not quite as its calibration says", ge=0.0
+    )
+    covariance_floor_translation: float = param(0.001, "least standard deviation of each axis", "m", ge=1e-4)
+    covariance_floor_rotation: float = param(0.025, "least standard deviation of each axis", "deg", ge=1e-3)
     slack_translation: float = param(0.5, "standard deviation along a free direction of translation", "m", ge=0.0)
     slack_rotation: float = param(60.0, "standard deviation about a free axis", "deg", ge=0.0)
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from objreg_ros.data import Alignment, Array
 from objreg_ros.geometry import skew, transform
+from objreg_ros.registrar.contradiction import information
 from objreg_ros.registrar.direct import finish
 from objreg_ros.registrar.icp import Fit, align, fit
 from objreg_ros.registrar.params import RegistrarParams
@@ -30,8 +31,8 @@ def settle(source: Prepared, target: Prepared, T_target_source: Array, params: R
 def refine(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> Alignment:
     """Finish a settled pose; ``converged`` is False where next to nothing holds it.
 
-    Grey has its say, and keeps it where the views like the pose no less. The information counts only what
-    lies on different patches of surface as independent, because the noise of neighbouring points is not.
+    Grey has its say, and keeps it where the views like the pose no less. The information is that of patches of surface,
+    because neighbouring points err together.
     """
     T, grey = _finished(source, target, T_target_source, params)
     found = fit(source.xyz, source.normals, target.surface, T, params.reaches[-1])
@@ -39,7 +40,7 @@ def refine(source: Prepared, target: Prepared, T_target_source: Array, params: R
     free, held = resisted(source, target, T, loose, found.extent, params)
     return Alignment(
         T_target_source=T,
-        information=about_camera(found.H, T) / max(found.rmse, params.surface_noise) ** 2,
+        information=about_camera(information(source.xyz, source.normals, target.surface, T, params), T),
         inliers=found.inliers,
         overlap=found.inliers / max(1, len(source.xyz)),
         rmse=found.rmse,
@@ -47,6 +48,7 @@ def refine(source: Prepared, target: Prepared, T_target_source: Array, params: R
         converged=found.inliers >= params.min_points,
         slack=free,
         held=held,
+        middle=transform(T, source.middle),
     )
 
 

@@ -4,18 +4,24 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from objreg_ros.registrar.covariance import covariance_of, worst_translation
+from objreg_ros.geometry import pose, skew
+from objreg_ros.registrar.covariance import covariance_of, spread_of, worst_translation
 from objreg_ros.registrar.params import RegistrarParams
 
 from .samples import candidate
 
 PARAMS = RegistrarParams(
-    covariance_scale=4.0, covariance_floor_translation=0.01, covariance_floor_rotation=0.5, slack_translation=0.5
+    covariance_scale=4.0,
+    covariance_calibration=0.0,
+    covariance_floor_translation=0.01,
+    covariance_floor_rotation=0.5,
+    slack_translation=0.5,
 )
 
 
@@ -53,8 +59,23 @@ def test_what_the_views_alone_hold_is_open_by_as_much_as_they_say() -> None:
     assert worst_translation(C) == pytest.approx(np.hypot(0.05, 0.01), rel=0.01)
 
 
+def test_a_wrong_calibration_is_a_share_of_the_motion_about_what_was_seen() -> None:
+    params = PARAMS.replaced(covariance_calibration=0.05)
+    T = pose(np.eye(3), np.array([0.4, 0.0, 0.0]))
+    alignment = replace(
+        candidate(information=1e12 * np.eye(6)).alignment, T_target_source=T, middle=np.array([0, 0, 2.0])
+    )
+    C = covariance_of(alignment, params) - spread_of(alignment, params)
+    about_middle = np.eye(6)
+    about_middle[:3, 3:] = -skew(alignment.middle - T[:3, 3])
+    sigma = np.sqrt(np.diag(about_middle @ C @ about_middle.T))
+    assert sigma == pytest.approx([0.05 * 0.4] * 3 + [0.05 * 0.4 / 2.0] * 3, rel=1e-6)
+    still = replace(alignment, T_target_source=np.eye(4))
+    assert np.allclose(covariance_of(still, params), spread_of(still, params))
+
+
 def test_the_file_that_tells_of_the_calibration_holds_the_values_of_the_code(repository: Path) -> None:
     text = (repository / "config" / "covariance.yaml").read_text(encoding="utf-8")
     values = dict(re.findall(r"^    (\w+): ([\d.]+)$", text, re.MULTILINE))
-    assert len(values) == 5
+    assert len(values) == 7
     assert {name: getattr(RegistrarParams(), name) for name in values} == {k: float(v) for k, v in values.items()}

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of how well surfaces hold a pose: the information is that of patches that err together."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.registrar.contradiction import information
+from objreg_ros.registrar.icp import Surface, prepare_surface
+from objreg_ros.registrar.params import RegistrarParams
+
+PARAMS = RegistrarParams(depth_noise=0.002, depth_noise_growth=0.0, covariance_patch=0.25)
+
+
+def corner(step: float) -> tuple[Array, Array]:
+    """Three walls of a metre that meet at (0, 0, 2), as points and normals."""
+    a, b = (grid.ravel() for grid in np.meshgrid(np.arange(0.05, 1.0, step), np.arange(0.05, 1.0, step)))
+    nothing = np.zeros_like(a)
+    walls = [(nothing, a, -b), (a, nothing, -b), (a, b, nothing)]
+    normals = np.repeat([(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)], len(a), axis=0)
+    points = np.concatenate([np.stack(wall, axis=1) for wall in walls])
+    return points + np.array([0.0, 0.0, 2.0]), normals
+
+
+def grid_of(xyz: Array, normals: Array) -> Surface:
+    return prepare_surface(xyz.astype(np.float32), normals.astype(np.float32), 0.05, 0.2)
+
+
+def shifted(errors: Array) -> Array:
+    """The information of a corner whose points lie so far off their walls."""
+    xyz, normals = corner(0.05)
+    moved = (xyz + errors[:, None] * normals).astype(np.float32)
+    return information(moved, normals.astype(np.float32), grid_of(xyz, normals), np.eye(4), PARAMS)
+
+
+def sigma(found: Array) -> Array:
+    return np.sqrt(np.diag(np.linalg.inv(found)))
+
+
+def test_patches_that_err_together_hold_a_pose_less_than_as_much_noise_of_points() -> None:
+    xyz, normals = corner(0.05)
+    rng = np.random.default_rng(0)
+    noise = rng.normal(0.0, 0.008, len(xyz))
+    _, patch = np.unique(np.c_[np.floor(xyz / 0.25), normals], axis=0, return_inverse=True)
+    warped = rng.normal(0.0, 0.008, patch.max() + 1)[patch.ravel()]
+    ratio = sigma(shifted(warped)) / sigma(shifted(noise))
+    assert (ratio > 1.2).all() and ratio.mean() > 1.5
+
+
+def test_a_perfect_fit_is_as_good_as_the_noise_of_the_camera() -> None:
+    xyz, normals = corner(0.05)
+    found = shifted(np.zeros(len(xyz)))
+    resisting = (normals[:, 0] ** 2).sum() / (2 * 0.002**2)
+    assert 0.4 * resisting < found[0, 0] < resisting  # the closest of a cell is not every point's closest
+
+
+def test_what_no_point_resists_is_next_to_unknown() -> None:
+    xyz, normals = corner(0.05)
+    wall = normals[:, 2] != 0
+    found = information(
+        xyz[wall].astype(np.float32),
+        normals[wall].astype(np.float32),
+        grid_of(xyz[wall], normals[wall]),
+        np.eye(4),
+        PARAMS,
+    )
+    assert found[0, 0] < 2.0 and found[1, 1] < 2.0 and found[2, 2] > 1e6
+
+
+def test_without_partners_nothing_is_known() -> None:
+    xyz, normals = (part.astype(np.float32) for part in corner(0.1))
+    assert np.array_equal(information(xyz + 5.0, normals, grid_of(xyz, normals), np.eye(4), PARAMS), np.eye(6))
