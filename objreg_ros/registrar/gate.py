@@ -108,26 +108,40 @@ def _score(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
 
 def _agreement(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
-    """Several objects, or one and two independent chains, or one that is unmistakable.
+    """Several objects, or one that speaks for the pose itself, or one and the grey of the views.
 
-    Without an object rooms that repeat themselves look alike.
+    Without an object rooms that repeat themselves look alike. So do plain rooms with one object of a kind in them:
+    chains agree on it, and an object that tells no yaw, or is seen to look otherwise, does not confirm them.
     """
     chains, explained = len(candidate.agreeing_chains), len(candidate.explained)
-    if explained >= params.min_objects or (explained >= 1 and chains >= params.min_chains):
+    if explained >= params.min_objects:
         return None
-    if explained >= 1 and _unmistakable(candidate, params):
+    if explained and _speaking(candidate, params) and (chains >= params.min_chains or _unrivalled(candidate, params)):
+        return None
+    if explained and _painted(candidate, params):
         return None
     if explained == 0:
         return Reason.FEW_OBJECTS, "0 objects < 1"
     return Reason.CHAINS_DISAGREE, (
-        f"{chains} chains < {params.min_chains} and {explained} objects < {params.min_objects}"
+        f"{explained} objects < {params.min_objects}, {chains} chains, "
+        f"likeness {candidate.likeness or 0.0:.2f}, margin {candidate.margin:.2f}"
     )
 
 
-def _unmistakable(candidate: Candidate, params: RegistrarParams) -> bool:
-    """Whether an object's own shape and print hold the pose, and no other pose comes near it."""
-    alike = candidate.likeness is not None and candidate.likeness >= params.min_likeness_alone
-    return candidate.yaw_known and alike and candidate.margin >= params.min_margin_alone
+def _speaking(candidate: Candidate, params: RegistrarParams) -> bool:
+    """Whether an object's own shape and print hold the pose."""
+    return candidate.yaw_known and candidate.likeness is not None and candidate.likeness >= params.min_likeness_alone
+
+
+def _unrivalled(candidate: Candidate, params: RegistrarParams) -> bool:
+    """Whether no other pose comes near it."""
+    return candidate.margin >= params.min_margin_alone
+
+
+def _painted(candidate: Candidate, params: RegistrarParams) -> bool:
+    """Whether the grey of the views holds the pose, and no other pose comes anywhere near it."""
+    texture = candidate.verification.texture
+    return texture is not None and texture >= params.holding_texture and candidate.margin >= params.min_margin_painted
 
 
 def _stationary(candidate: Candidate, params: RegistrarParams) -> Refusal | None:

@@ -143,6 +143,9 @@ class RegistrarParams(Params):
     min_objects: int = param(2, "explained objects that make up for chains that do not agree", ge=1)
     min_likeness_alone: float = param(0.1, "a lone object without another chain looks as much alike", ge=-1.0, le=1.0)
     min_margin_alone: float = param(0.2, "and its pose is worth so much more than any other", ge=0.0)
+    min_margin_painted: float = param(
+        0.45, "so much more where grey correlates by holding_texture and the object itself says nothing", ge=0.0
+    )
     max_gravity_error: float = param(5.0, "largest angle between the gravities", "deg", ge=0.0, le=180.0)
     max_translation: float = param(5.0, "largest distance between the two cameras", "m", ge=0.0)
     max_slack_sigma: float = param(0.12, "largest standard deviation along any translation", "m", ge=0.0)

@@ -51,8 +51,11 @@ def test_a_candidate_without_grey_or_gravity_is_judged_by_the_rest() -> None:
     assert refuse(candidate(texture=None, gravity_error_deg=None), PARAMS) is None
 
 
-def test_one_object_closes_a_loop_when_independent_chains_agree() -> None:
-    assert refuse(candidate(explained=(CUP,)), PARAMS) is None
+def test_one_object_closes_a_loop_when_grey_holds_the_pose_and_no_other_comes_near() -> None:
+    assert refuse(candidate(explained=(CUP,), margin=1.0), PARAMS) is None
+    for doubt in ({"margin": 0.3}, {"texture": 0.4}, {"texture": None}):
+        refusal = refuse(candidate(**{"explained": (CUP,), "margin": 1.0, **doubt}), PARAMS)
+        assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
 
 
 def test_a_lone_object_must_respect_free_space_more_than_several() -> None:
@@ -63,8 +66,8 @@ def test_a_lone_object_must_respect_free_space_more_than_several() -> None:
 
 
 def test_a_lone_object_may_violate_as_much_as_several_where_grey_holds_the_pose() -> None:
-    assert refuse(candidate(explained=(CUP,), violations=0.05, texture=0.6), PARAMS) is None
-    assert refuse(candidate(explained=(CUP,), violations=0.1, texture=0.6), PARAMS) is not None
+    assert refuse(candidate(explained=(CUP,), margin=1.0, violations=0.05, texture=0.6), PARAMS) is None
+    assert refuse(candidate(explained=(CUP,), margin=1.0, violations=0.1, texture=0.6), PARAMS) is not None
 
 
 def test_two_objects_make_up_for_a_chain_that_is_alone() -> None:
@@ -107,19 +110,23 @@ def test_an_alias_does_not_stand_in_for_a_refused_best_candidate() -> None:
 
 
 def lone(**evidence: object) -> Candidate:
-    """A candidate of one object that no second chain confirms."""
-    alone = {"explained": (ObjectPair(0, 0, "cup"),), "agreeing_chains": ("objects",)}
-    return candidate(**{**alone, "likeness": 0.6, "yaw_known": True, "margin": 0.5, **evidence})
+    """A candidate of one object that no second chain confirms, in a plain room."""
+    alone = {"explained": (ObjectPair(0, 0, "cup"),), "agreeing_chains": ("objects",), "texture": 0.4}
+    return candidate(**{**alone, "likeness": 0.6, "yaw_known": True, "margin": 0.4, **evidence})
 
 
 def test_a_lone_object_that_is_unmistakable_needs_no_second_chain() -> None:
     assert refuse(lone(), PARAMS) is None
 
 
-@pytest.mark.parametrize(
-    "doubt", [{"yaw_known": False}, {"likeness": -0.1}, {"likeness": None}, {"margin": 0.05}], ids=str
-)
-def test_a_lone_object_that_could_be_turned_or_stands_elsewhere_needs_a_second_chain(doubt: dict) -> None:
-    refusal = refuse(lone(**doubt), PARAMS)
+def test_a_lone_object_that_has_a_rival_needs_a_second_chain() -> None:
+    refusal = refuse(lone(margin=0.05), PARAMS)
     assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
-    assert refuse(lone(**doubt, agreeing_chains=("features", "objects")), PARAMS) is None
+    assert refuse(lone(margin=0.05, agreeing_chains=("features", "objects")), PARAMS) is None
+
+
+@pytest.mark.parametrize("doubt", [{"yaw_known": False}, {"likeness": -0.1}, {"likeness": None}], ids=str)
+def test_chains_that_agree_in_a_plain_room_do_not_speak_for_an_object_that_could_be_another(doubt: dict) -> None:
+    refusal = refuse(lone(**doubt, agreeing_chains=("features", "objects")), PARAMS)
+    assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
+    assert refuse(lone(**doubt, texture=0.6, margin=0.6), PARAMS) is None
