@@ -107,7 +107,7 @@ class RegistrarParams(Params):
         (0.05, 0.1, 0.15), "a pose pushed so far along such a direction that the views like it less is held there", "m"
     )
     doubtful_sigma: float = param(
-        0.05, "a position that is known less well than this is pushed as far as the last of these", "m", ge=0.0
+        0.03, "a position that is known less well than this is pushed as far as the last of these", "m", ge=0.0
     )
     holding_texture: float = param(0.5, "grey that correlates so well holds what shape lets slide", ge=0.0, le=1.0)
     holding_likeness: float = param(0.3, "so does an object that looks so much alike", ge=-1.0, le=1.0)
