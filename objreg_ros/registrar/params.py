@@ -99,6 +99,7 @@ class RegistrarParams(Params):
     min_points: int = param(60, "fewer paired points hold no pose", ge=6)
     grey_points: int = param(2500, "points a side whose grey ends a refinement", ge=100)
     grey_sigma: float = param(0.7, "difference of the high-passed grey that counts little, in its deviations", ge=0.01)
+    grey_rounds: int = param(3, "most times that grey finishes a pose, coarse to fine", ge=1)
     shape_sigma: float = param(0.03, "distance from a surface that weighs as much", "m", ge=0.001)
     depth_noise: float = param(0.0012, "standard deviation of depth at 0.4 m", "m", ge=1e-5)
     depth_noise_growth: float = param(0.0019, "its growth with the square of the depth beyond", "1/m", ge=0.0)
@@ -135,6 +136,9 @@ class RegistrarParams(Params):
     max_violations: float = param(0.07, "largest share of tested pixels in seen free space", ge=0.0, le=1.0)
     max_violations_alone: float = param(
         0.035, "the same where a single object is explained and grey holds nothing", ge=0.0, le=1.0
+    )
+    min_inliers_alone: float = param(
+        0.65, "least share of depths that agree where grey holds the pose of a single object", ge=0.0, le=1.0
     )
     min_texture: float = param(0.25, "least correlation of the high-passed grey, where there is grey", ge=-1.0, le=1.0)
     min_score: float = param(0.10, "least verification score V", ge=-3.0, le=2.0)

@@ -20,6 +20,8 @@ from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.sliding import resisted
 from objreg_ros.registrar.verify import verify
 
+LITTLE = 0.02  # gain of V after which another round is not worth its time
+
 
 def settle(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> tuple[Array, Array]:
     """Poses (K, 4, 4) in their basins, brought to where the whole shape holds them, and whether it does (K,)."""
@@ -55,16 +57,23 @@ def refine(source: Prepared, target: Prepared, T_target_source: Array, params: R
 def _finished(source: Prepared, target: Prepared, T: Array, params: RegistrarParams) -> tuple[Array, Array]:
     """The pose after grey had its say, and what grey adds to its information: nothing where it does not correlate.
 
-    The pose as it was, where the views like it better.
+    Again while the views like it clearly better, since each round sees more of the other view; the pose as it was,
+    where they like it less.
     """
-    nothing = np.zeros((6, 6))
+    held, most = np.zeros((6, 6)), params.grey_points
     if not (source.sight.textured and target.sight.textured):
-        return T, nothing
-    finished, grey = finish(source, target, T, params)
-    before, after = (verify(source.sight, target.sight, pose, params, params.grey_points) for pose in (T, finished))
-    if after.score < before.score:
-        return T, nothing
-    return finished, grey if (after.texture or 0.0) >= params.holding_texture else nothing
+        return T, held
+    best = verify(source.sight, target.sight, T, params, most).score
+    for _ in range(params.grey_rounds):
+        finished, grey = finish(source, target, T, params)
+        seen = verify(source.sight, target.sight, finished, params, most)
+        if seen.score < best:
+            break
+        gain, best, T = seen.score - best, seen.score, finished
+        held = grey if (seen.texture or 0.0) >= params.holding_texture else np.zeros((6, 6))
+        if gain < LITTLE:
+            break
+    return T, held
 
 
 def about_camera(H: Array, T_target_source: Array) -> Array:
