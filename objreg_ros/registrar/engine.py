@@ -13,7 +13,7 @@ import numpy as np
 from objreg_ros.data import Alignment, Array
 from objreg_ros.registrar.candidate import Candidate
 from objreg_ros.registrar.consensus import distinct
-from objreg_ros.registrar.covariance import covariance_of, worst_translation
+from objreg_ros.registrar.covariance import spread_of, worst_translation
 from objreg_ros.registrar.hypotheses import Hypothesis, from_centroids, from_features, from_objects, from_prior
 from objreg_ros.registrar.icp import align
 from objreg_ros.registrar.keyframe import Keyframe
@@ -166,7 +166,7 @@ class Engine:
 
     def _resistance(self, pair: Pair, candidate: Candidate) -> float | None:
         """How the views resist a push to where the pose would be false; None where it is known well."""
-        C = covariance_of(candidate.alignment, self._params)
+        C = spread_of(candidate.alignment, self._params)
         if worst_translation(C) <= self._params.doubtful_sigma:
             return None
         return resistance(pair.source, pair.target, candidate.T_target_source, C, self._params)

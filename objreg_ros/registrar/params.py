@@ -108,7 +108,7 @@ class RegistrarParams(Params):
         (0.05, 0.1, 0.15), "a pose pushed so far along such a direction that the views like it less is held there", "m"
     )
     doubtful_sigma: float = param(
-        0.03, "a position that is known less well than this is pushed as far as the last of these", "m", ge=0.0
+        0.006, "a position that is known less well than this is pushed as far as the last of these", "m", ge=0.0
     )
     holding_texture: float = param(0.5, "grey that correlates so well holds what shape lets slide", ge=0.0, le=1.0)
     holding_likeness: float = param(0.3, "so does an object that looks so much alike", ge=-1.0, le=1.0)
@@ -152,7 +152,7 @@ class RegistrarParams(Params):
     )
     max_gravity_error: float = param(5.0, "largest angle between the gravities", "deg", ge=0.0, le=180.0)
     max_translation: float = param(5.0, "largest distance between the two cameras", "m", ge=0.0)
-    max_slack_sigma: float = param(0.12, "largest standard deviation along any translation", "m", ge=0.0)
+    max_slack_sigma: float = param(0.015, "largest standard deviation along any translation", "m", ge=0.0)
     odometry_sigmas: float = param(4.0, "largest distance from odometry in its standard deviations", ge=0.0)
 
     # How wrong an accepted pose may be; config/covariance.yaml says how these were calibrated.
