@@ -81,15 +81,9 @@ def _overlap(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
 
 def _free_space(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
-    """Stricter for a lone object in a plain room: a half turn about it is seen in free space alone.
-
-    Where grey holds the pose and most depths agree the room is not plain, and edges of depth account for a few
-    violations.
-    """
+    """Stricter for a lone object: a half turn about it is seen in free space alone."""
     seen = candidate.verification
-    textured = (seen.texture or 0.0) >= params.holding_texture and seen.inliers >= params.min_inliers_alone
-    held = len(candidate.explained) > 1 or textured
-    most = params.max_violations if held else params.max_violations_alone
+    most = params.max_violations if len(candidate.explained) > 1 else params.max_violations_alone
     if seen.violations <= most:
         return None
     return Reason.FREE_SPACE, f"violations {seen.violations:.3f} > {most:.3f}"

@@ -130,16 +130,11 @@ class RegistrarParams(Params):
     paper_iterations: int = param(100, "most iterations", ge=1)
     paper_tolerance: float = param(1e-6, "change of the mean distance that ends the iterations", "m", ge=0.0)
 
-    # What decides a closure. Below score_alone a closure needs agreement of chains or objects.
+    # What decides a closure.
     min_tested: int = param(600, "least number of pixels that both views must see", ge=1)
     min_inliers: float = param(0.45, "least share of tested pixels whose depth agrees", ge=0.0, le=1.0)
     max_violations: float = param(0.07, "largest share of tested pixels in seen free space", ge=0.0, le=1.0)
-    max_violations_alone: float = param(
-        0.035, "the same where a single object is explained and grey holds nothing", ge=0.0, le=1.0
-    )
-    min_inliers_alone: float = param(
-        0.65, "least share of depths that agree where grey holds the pose of a single object", ge=0.0, le=1.0
-    )
+    max_violations_alone: float = param(0.035, "the same where a single object is explained", ge=0.0, le=1.0)
     min_texture: float = param(0.25, "least correlation of the high-passed grey, where there is grey", ge=-1.0, le=1.0)
     min_score: float = param(0.10, "least verification score V", ge=-3.0, le=2.0)
     rival_margin: float = param(0.1, "a candidate this much below the best in V is not considered", ge=0.0)
