@@ -5,7 +5,7 @@
     class DetectorParams(Params):
         threshold: float = param(0.5, "least score of a detection", ge=0.0, le=1.0)
 
-From that line come the ROS declaration with description and range, config/objreg.yaml, the README's table, and the same
+From that line come the ROS declaration with description and range, config/objreg.yaml, docs/parameters.md, and the same
 refusal in a node, a test and an offline run. This file knows neither ROS nor any room.
 """
 

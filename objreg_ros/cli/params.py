@@ -15,15 +15,14 @@ from objreg_ros.bridge.params import DoorParams
 from objreg_ros.cli.settings import KEY, NODES
 from objreg_ros.params import Declaration, Params
 
-YAML_FILE, README = "config/objreg.yaml", "README.md"
-BEGIN, END = "<!-- parameters: objreg params --write -->", "<!-- /parameters -->"
+YAML_FILE, TABLE_FILE = "config/objreg.yaml", "docs/parameters.md"
 WIDTH = 120
 
 
 @click.command()
-@click.option("--table", "form", flag_value="table", default="table", help="The table of the README (the default).")
+@click.option("--table", "form", flag_value="table", default="table", help=f"The tables of {TABLE_FILE} (the default).")
 @click.option("--yaml", "form", flag_value="yaml", help="A ROS 2 parameter file with every default.")
-@click.option("--write", is_flag=True, help=f"Write {YAML_FILE} and the table in {README} of this checkout again.")
+@click.option("--write", is_flag=True, help=f"Write {YAML_FILE} and {TABLE_FILE} of this checkout again.")
 def command(form: str, write: bool) -> None:
     """Show every parameter of every node with its default, range and meaning."""
     if write:
@@ -35,22 +34,17 @@ def command(form: str, write: bool) -> None:
 
 def write_files(repository: Path) -> list[Path]:
     """Write the files that are made from the parameters; FileNotFoundError outside of a checkout."""
-    readme = repository / README
-    if not readme.is_file():
-        raise FileNotFoundError(f"{readme}: expected a checkout of the repository; --yaml and --table print instead")
-    files = {repository / YAML_FILE: yaml_text(), readme: readme_text(readme.read_text())}
+    if not (repository / "package.xml").is_file():
+        raise FileNotFoundError(f"{repository}: expected a checkout of the repository; --yaml and --table only print")
+    files = {repository / YAML_FILE: yaml_text(), repository / TABLE_FILE: page_text()}
     for file, text in files.items():
         file.write_text(text)
     return list(files)
 
 
-def readme_text(old: str) -> str:
-    """The README with the table of now between its marks; ValueError if it has none."""
-    before, begin, rest = old.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        raise ValueError(f"{README}: expected the marks {BEGIN} and {END}")
-    return f"{before}{BEGIN}\n{table_text()}{END}{after}"
+def page_text() -> str:
+    """The page of all parameters, in Markdown."""
+    return f"# Parameters\n\nMade by `objreg params --write` from the code, as `{YAML_FILE}` is.\n\n{table_text()}"
 
 
 def yaml_text() -> str:
@@ -95,7 +89,7 @@ def table_text() -> str:
 
 def _section(title: str, kinds: list[type[Params]]) -> Iterator[str]:
     yield from (
-        f"### {title}",
+        f"## {title}",
         "",
         "| parameter | default | unit | range | live | |",
         "| --- | --- | --- | --- | --- | --- |",

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -8,11 +9,10 @@ import yaml
 from click.testing import CliRunner
 
 from objreg_ros.cli.params import (
-    BEGIN,
-    END,
+    TABLE_FILE,
     YAML_FILE,
     command,
-    readme_text,
+    page_text,
     table_text,
     write_files,
     yaml_text,
@@ -27,9 +27,20 @@ def test_the_parameter_file_is_that_of_the_code(repository: Path) -> None:
     assert (repository / YAML_FILE).read_text() == yaml_text(), f"{YAML_FILE} is {STALE}"
 
 
-def test_the_table_of_the_readme_is_that_of_the_code(repository: Path) -> None:
-    text = (repository / "README.md").read_text()
-    assert readme_text(text) == text, f"the table of README.md is {STALE}"
+def test_the_page_of_parameters_is_that_of_the_code(repository: Path) -> None:
+    assert (repository / TABLE_FILE).read_text() == page_text(), f"{TABLE_FILE} is {STALE}"
+
+
+def test_the_readme_speaks_of_parameters_that_exist(repository: Path) -> None:
+    rows = (repository / "README.md").read_text().partition("## Parameters")[2].partition("\n## ")[0]
+    spoken_of = re.findall(r"^\| `(\w+)\.(\w+)` \| `(.+?)` \|", rows, re.MULTILINE)
+    declared = {
+        (node, declaration.name): yaml_value(declaration.default)
+        for node, kinds in NODES.items()
+        for kind in kinds
+        for declaration in kind.declarations()
+    }
+    assert spoken_of and all(declared[node, name] == default for node, name, default in spoken_of)
 
 
 def test_every_node_has_every_parameter_in_the_file_with_its_default() -> None:
@@ -56,21 +67,11 @@ def test_a_value_is_read_back_in_its_type(value: object) -> None:
     assert back == value and type(back) is type(value)
 
 
-def test_a_readme_without_marks_is_refused() -> None:
-    with pytest.raises(ValueError, match="expected the marks"):
-        readme_text("# Title\n")
-
-
-def test_only_what_is_between_the_marks_changes(tmp_path: Path) -> None:
-    (tmp_path / "config").mkdir()
-    (tmp_path / "README.md").write_text(f"before\n{BEGIN}\nOBSOLETE\n{END}\nafter\n")
-    write_files(tmp_path)
-    text = (tmp_path / "README.md").read_text()
-    assert (
-        text.startswith(f"before\n{BEGIN}\n### `detector`")
-        and text.endswith(f"{END}\nafter\n")
-        and "OBSOLETE" not in text
-    )
+def test_writing_makes_both_files_again(tmp_path: Path) -> None:
+    for place in ("config", "docs"):
+        (tmp_path / place).mkdir()
+    (tmp_path / "package.xml").touch()
+    assert [file.read_text() for file in write_files(tmp_path)] == [yaml_text(), page_text()]
 
 
 def test_outside_of_a_checkout_nothing_is_written(tmp_path: Path) -> None:
