@@ -16,7 +16,7 @@ from sources import Source
 from objreg_ros.data import Array, Frame, LoopClosure, Odometry, Reason
 from objreg_ros.geometry import inverse, rotation_angle
 from objreg_ros.mapper.pose_graph import PoseGraph
-from objreg_ros.offline import constraint
+from objreg_ros.registrar.export import constraint
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Outcome, Registrar
 from objreg_ros.report.revisits import Revisit, Seen, recall_by_view_change, revisits

@@ -34,6 +34,7 @@ from objreg_ros.data import (
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.record import Record
+from objreg_ros.registrar.export import constraint
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.truth import Error, Truth, summarise
@@ -146,17 +147,6 @@ class Run:
             "refusals": [refusal(rejected) for rejected in self.refusals],
             "glimpses": self.glimpses,
         }
-
-
-def constraint(closure: LoopClosure) -> dict[str, Any]:
-    """A closure as JSON."""
-    return {
-        "from_ns": closure.from_ns,
-        "to_ns": closure.to_ns,
-        "T_from_to": closure.T_from_to.tolist(),
-        "covariance": closure.covariance.tolist(),
-        "labels": list(closure.labels),
-    }
 
 
 def refusal(rejected: Rejected) -> dict[str, Any]:

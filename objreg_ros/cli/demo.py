@@ -18,9 +18,9 @@ from objreg_ros.cli import live_table, options
 from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
 from objreg_ros.cli.played import as_rosbag2, simulated_room
 from objreg_ros.data import ColourImage
-from objreg_ros.offline import constraint
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
+from objreg_ros.registrar.export import constraint
 from objreg_ros.report.live_pictures import draw_sight, draw_way
 from objreg_ros.report.write import write_report
 from objreg_ros.truth import Truth, summarise

@@ -32,7 +32,7 @@ def export(path: str | Path, folder: str | Path) -> Iterator[Path]:
             keyframe, sightings = store.keyframe(keyframe_id), list(store.sightings(keyframe_id))
             yield from _write_clouds(folder, keyframe, sightings)
             keyframes.append(_keyframe_json(keyframe, sightings))
-        closures = [_closure_json(closure) for closure in store.closures()]
+        closures = [constraint(closure) for closure in store.closures()]
         yield _write_json(folder / "map.json", {"keyframes": keyframes, "closures": closures})
     finally:
         store.close()
@@ -91,7 +91,8 @@ def _keyframe_json(keyframe: Keyframe, sightings: list[Sighting]) -> dict[str, A
     }
 
 
-def _closure_json(closure: LoopClosure) -> dict[str, Any]:
+def constraint(closure: LoopClosure) -> dict[str, Any]:
+    """A closure as JSON."""
     return {
         "from_ns": closure.from_ns,
         "to_ns": closure.to_ns,
