@@ -52,6 +52,7 @@ class Door(Node):
         self.settings.changed = self.adopt
         self.ledger = Ledger()
         self.connected: dict[str, int] = {}  # full topic name → publishers that DDS has connected us to
+        self._opened: dict[str, dict[str, Subscription]] = {}  # input of `listen_to_first` → its open topics
         self.failure: Future = Future()
         self.throttled = ThrottledLog(self.get_logger().warning)
         self.watch = Watch(self.count_publishers, self.settings.of(DoorParams).silence)
@@ -106,7 +107,7 @@ class Door(Node):
         self, name: str, topics: Mapping[str, type], heard: Callable[[str, Any], None], profile: QoSProfile
     ) -> None:
         """Subscribe to topics that carry the same thing. The first that speaks is kept, the others are closed."""
-        opened: dict[str, Subscription] = {}
+        opened = self._opened.setdefault(name, {})
 
         def hear(topic: str, message: Any) -> None:
             if topic not in opened:
@@ -118,6 +119,12 @@ class Door(Node):
         for topic, kind in topics.items():
             opened[topic] = self.listen(kind, topic, partial(hear, topic), profile, watched=name)
         self.expect(name, *topics)
+
+    def hang_up(self, name: str) -> None:
+        """Close every topic of `listen_to_first`; its silence is no longer reported."""
+        for subscription in self._opened.pop(name, {}).values():
+            self.destroy_subscription(subscription)
+        self.watch.forget(name)
 
     def expect(self, name: str, *topics: str) -> None:
         """Warn when none of ``topics`` speaks."""

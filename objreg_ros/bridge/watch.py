@@ -27,6 +27,11 @@ class Watch:
         self._inputs[name] = topics
         self._heard_at[name] = self._clock()
 
+    def forget(self, name: str) -> None:
+        """Watch the input no longer, if it was."""
+        self._inputs.pop(name, None)
+        self._heard_at.pop(name, None)
+
     def hear(self, name: str) -> None:
         """The input has spoken; of an input that is not watched too."""
         if name in self._heard_at:

@@ -84,6 +84,8 @@ class SegmenterNode(MatchingDoor):
             streams.append(Stream("camera_info", Need.LATCHED))
             streams.append(Stream("image", Need.OPTIONAL, slop_ns))
             self.expect("camera_info", "camera_info")
+        else:
+            self.hang_up("image")  # a cloud brings its own colour
         self.get_logger().info(f"depth comes from {self.resolve_topic_name(topic)}")
         self.begin(streams)
 

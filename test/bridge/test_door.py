@@ -61,3 +61,11 @@ def test_of_topics_that_carry_the_same_the_first_that_speaks_is_kept_and_the_oth
     loud.publish(String(data="three"))
     spin_until(door, heard, 2)
     assert heard[1:] == [("loud", "three")]
+
+
+def test_an_input_that_is_hung_up_has_no_subscriptions_and_hears_nothing_more(door: Door) -> None:
+    door.listen_to_first("words", {"quiet": String, "loud": String}, lambda *_: None, qos.room())
+    assert door.count_subscribers("/quiet") == door.count_subscribers("/loud") == 1
+    door.hang_up("words")
+    door.hang_up("never opened")
+    assert door.count_subscribers("/quiet") == door.count_subscribers("/loud") == 0

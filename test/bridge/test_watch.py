@@ -48,3 +48,11 @@ def test_an_input_that_is_not_watched_may_speak() -> None:
     watch.hear("odom")
     clock.now = 7.0
     assert set(watch.silent()) == {"depth"}
+
+
+def test_a_forgotten_input_may_be_silent() -> None:
+    watch, clock = watched({})
+    watch.forget("depth")
+    watch.forget("odom")
+    clock.now = 7.0
+    assert watch.silent() == {}

@@ -122,6 +122,11 @@ def test_the_segmenter_drops_a_bad_cloud_and_goes_on(running: Graph, stamp_ns: i
         assert running.answer("segmenter", stamp, "clouds/finished") == expected, running.log("/clouds/segmenter")
 
 
+def test_a_segmenter_of_clouds_takes_no_pictures(running: Graph) -> None:
+    assert running.node.count_subscribers("/depths/image") == 0  # not asked for colour
+    assert running.node.count_subscribers("/clouds/image") == 0  # the cloud that spoke brings its own
+
+
 def test_the_log_says_what_was_expected_and_what_came(running: Graph) -> None:
     log = running.log("/clouds/segmenter")
     assert "frame dropped, malformed points: " in log and "frame dropped, refused: " in log
