@@ -12,7 +12,7 @@ import numba
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.registrar.icp import _normal_equations, _stepped
+from objreg_ros.registrar.icp import _normal_equations, _solve, _step
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.visibility import SHADELESS
@@ -52,16 +52,26 @@ def _finish(shape, T, reach, own, image, others, other_image, grey_sigma, shape_
         _normal_equations(P, N, Q, M, closest, low, cell, T, reach, H, g)
         K[:], k[:] = 0.0, 0.0
         _add_grey(own, T, other_image, T, False, grey_sigma, slops, K, k)
-        back[:3, :3] = T[:3, :3].T
-        back[:3, 3] = -(np.ascontiguousarray(T[:3, :3].T) @ np.ascontiguousarray(T[:3, 3]))
+        _invert(T, back)
         _add_grey(others, back, image, T, True, grey_sigma, slops, K, k)
-        A = H / shape_sigma**2 + K
         for i in range(6):
-            A[i, i] += 1.0 + 1e-6 * A[i, i]
-        step = -np.linalg.solve(A, g / shape_sigma**2 + k)
-        T[:] = _stepped(T, step)
-        if np.abs(step).max() < SETTLED:
+            for j in range(6):
+                H[i, j] = H[i, j] / shape_sigma**2 + K[i, j]
+            H[i, i] += 1.0 + 1e-6 * H[i, i]
+            k[i] = -(g[i] / shape_sigma**2 + k[i])
+        _solve(H, k)
+        if _step(T, k) < SETTLED:
             break
+
+
+@numba.njit(cache=True, nogil=True)
+def _invert(T, back):  # type: ignore[no-untyped-def]
+    """Fill ``back`` (4, 4) with the inverse of a pose."""
+    for i in range(3):
+        back[i, 3] = 0.0
+        for j in range(3):
+            back[i, j] = T[j, i]
+            back[i, 3] -= T[j, i] * T[j, 3]
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)

@@ -112,22 +112,14 @@ def _nearest(products, a, b):  # type: ignore[no-untyped-def]
     return forward, backward, (np.maximum(ahead, np.float32(0.0)), np.maximum(behind, np.float32(0.0)))
 
 
-@numba.njit(cache=True, nogil=True)
-def _cells(xyz, size):  # type: ignore[no-untyped-def]
+def _cells(xyz: Array, size: float) -> tuple[Array, Array, Array, Array]:
     """A sorted grid of cells with edge ``size``: (order, first point of each cell, low corner, cells per axis)."""
-    low = np.empty(3, np.float32)
-    shape = np.empty(3, np.int64)
-    for k in range(3):
-        low[k] = xyz[:, k].min()
-        shape[k] = int((xyz[:, k].max() - low[k]) / size) + 1
-    key = np.empty(len(xyz), np.int64)
-    for i in range(len(xyz)):
-        key[i] = (int((xyz[i, 0] - low[0]) / size) * shape[1] + int((xyz[i, 1] - low[1]) / size)) * shape[2] + int(
-            (xyz[i, 2] - low[2]) / size
-        )
-    order = np.argsort(key, kind="mergesort")
-    first = np.searchsorted(key[order], np.arange(shape[0] * shape[1] * shape[2] + 1))
-    return order, first, low, shape
+    low = xyz.min(axis=0)
+    cell = ((xyz - low) / np.float32(size)).astype(np.int64)
+    shape = cell.max(axis=0) + 1
+    key = (cell[:, 0] * shape[1] + cell[:, 1]) * shape[2] + cell[:, 2]
+    order = np.argsort(key, kind="stable")
+    return order, np.searchsorted(key[order], np.arange(np.prod(shape) + 1)), low, shape
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
@@ -199,7 +191,9 @@ def _histograms(xyz, normals, order, first, low, shape, radius):  # type: ignore
                 simple[owner, BINS + b] += 1.0
                 simple[owner, 2 * BINS + c] += 1.0
     for i in range(n):
-        simple[i] *= np.float32(100.0 / max(1, crowd[i]))
+        scale = np.float32(100.0 / max(1, crowd[i]))
+        for k in range(3 * BINS):
+            simple[i, k] *= scale
     return _weighted(simple, found, squared, crowd), crowd
 
 

@@ -163,18 +163,48 @@ def _normal_equations(P, N, Q, M, closest, low, cell, T, reach, H, g):  # type: 
 
 
 @numba.njit(cache=True, nogil=True)
-def _stepped(T, step):  # type: ignore[no-untyped-def]
-    """The pose after a left step [t r]."""
-    angle = np.sqrt(step[3] ** 2 + step[4] ** 2 + step[5] ** 2)
-    R = np.eye(3)
-    if angle > 1e-12:
-        x, y, z = step[3] / angle, step[4] / angle, step[5] / angle
-        K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        R = R + np.sin(angle) * K + (1.0 - np.cos(angle)) * (K @ K)
-    out = np.eye(4)
-    out[:3, :3] = R @ np.ascontiguousarray(T[:3, :3])
-    out[:3, 3] = R @ np.ascontiguousarray(T[:3, 3]) + step[:3]
-    return out
+def _solve(A, b):  # type: ignore[no-untyped-def]
+    """Turn ``b`` (n,) into the x of A x = b for a positive definite ``A`` (n, n), by Cholesky; A is spoilt.
+
+    Plain loops: they compile in a tenth of the time of numpy's solver.
+    """
+    n = len(b)
+    for i in range(n):
+        for j in range(i + 1):
+            value = A[i, j]
+            for k in range(j):
+                value -= A[i, k] * A[j, k]
+            A[i, j] = np.sqrt(max(value, 1e-18)) if i == j else value / A[j, j]
+    for i in range(n):
+        for k in range(i):
+            b[i] -= A[i, k] * b[k]
+        b[i] /= A[i, i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            b[i] -= A[k, i] * b[k]
+        b[i] /= A[i, i]
+
+
+@numba.njit(cache=True, nogil=True)
+def _step(T, step):  # type: ignore[no-untyped-def]
+    """Move a pose ``T`` (4, 4) by a left ``step`` (6,) [t r], in place; returns the largest of its parts."""
+    x, y, z = step[3], step[4], step[5]
+    angle = np.sqrt(x * x + y * y + z * z)
+    sine = np.sin(angle) / angle if angle > 1e-12 else 1.0
+    versed = (1.0 - np.cos(angle)) / (angle * angle) if angle > 1e-6 else 0.5
+    for column in range(4):
+        a, b, c = T[0, column], T[1, column], T[2, column]
+        along = x * a + y * b + z * c
+        squared = angle * angle
+        T[0, column] += sine * (y * c - z * b) + versed * (x * along - squared * a)
+        T[1, column] += sine * (z * a - x * c) + versed * (y * along - squared * b)
+        T[2, column] += sine * (x * b - y * a) + versed * (z * along - squared * c)
+    largest = 0.0
+    for k in range(3):
+        T[k, 3] += step[k]
+    for k in range(6):
+        largest = max(largest, abs(step[k]))
+    return largest
 
 
 @numba.njit(cache=True, nogil=True)
@@ -189,9 +219,9 @@ def _align(P, N, Q, M, closest, low, cell, poses, reach, last_reach, iterations)
                 break
             for a in range(6):
                 H[a, a] += 1e-3 + 1e-6 * H[a, a]
-            step = -np.linalg.solve(H, g)
-            poses[k] = _stepped(poses[k], step)
-            if now <= last_reach and np.abs(step).max() < 2e-4:
+                g[a] = -g[a]
+            _solve(H, g)
+            if _step(poses[k], g) < 2e-4 and now <= last_reach:
                 break
         count, weight, squared, _ = _normal_equations(P, N, Q, M, closest, low, cell, poses[k], last_reach, H, g)
         share[k] = count / len(P)

@@ -6,6 +6,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from objreg_ros.registrar.icp import _solve
+
 COMPATIBLE = 0.5  # cosine between the normals of a pair
 LARGEST_TURN = 0.3  # rad in one step
 POINTWISE = 0.005  # weight of point-to-point error beside it: holds what slides along a plane
@@ -65,10 +67,10 @@ def settle(P, N, most, surface, motion, reach, last_reach, iterations):  # type:
         A[0, 0] += 1e-6 + 1e-4 * A[0, 0]
         A[1, 1] += 1e-3
         A[2, 2] += 1e-3
-        step = np.linalg.solve(A, g)
-        motion[0] -= min(LARGEST_TURN, max(-LARGEST_TURN, step[0]))
-        motion[1] -= step[1]
-        motion[2] -= step[2]
-        if iteration > 3 and abs(step[0]) < 1e-4 and abs(step[1]) + abs(step[2]) < 2e-5:
+        _solve(A, g)
+        motion[0] -= min(LARGEST_TURN, max(-LARGEST_TURN, g[0]))
+        motion[1] -= g[1]
+        motion[2] -= g[2]
+        if iteration > 3 and abs(g[0]) < 1e-4 and abs(g[1]) + abs(g[2]) < 2e-5:
             break
     return pairs

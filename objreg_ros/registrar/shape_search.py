@@ -112,7 +112,9 @@ def _finish(source, target, grid, motions, scores, extent, weights, numbers, rea
     P, N = source[0], source[1]
     every, cell = len(P), grid[4]
     best, n = np.empty((kept, 4)), 0
-    for k in np.argsort(-scores):
+    order = np.empty(len(scores), np.int64)
+    _rank(scores, order)
+    for k in order:
         if n < kept and not _known(motions[k], best, n):
             best[n] = motions[k]
             n += 1
@@ -120,7 +122,8 @@ def _finish(source, target, grid, motions, scores, extent, weights, numbers, rea
     for k in range(n):
         settle(P, N, every, grid, best[k], reach, max(1.5 * cell, 0.008), 12)
         worth[k] = two_way(source, target, best[k], extent, weights, every)
-    for k in np.argsort(-worth)[:climbed]:
+    _rank(worth, order)
+    for k in order[: min(n, climbed)]:
         worth[k] = climb(source, target, best[k], extent, weights, every, CLIMB[0], CLIMB[1], rounds)
         polished = best[k].copy()
         settle(P, N, every, grid, polished, max(1.5 * cell, 0.010), max(1.2 * cell, 0.006), 8)
@@ -128,6 +131,17 @@ def _finish(source, target, grid, motions, scores, extent, weights, numbers, rea
         if after >= worth[k]:
             best[k], worth[k] = polished, after
     return best, worth
+
+
+@numba.njit(cache=True, nogil=True)
+def _rank(scores, order):  # type: ignore[no-untyped-def]
+    """Fill ``order`` with the indices of scores, the highest first, by insertion: they are few."""
+    for k in range(len(scores)):
+        at = k
+        while at > 0 and scores[order[at - 1]] < scores[k]:
+            order[at] = order[at - 1]
+            at -= 1
+        order[at] = k
 
 
 @numba.njit(cache=True, nogil=True)

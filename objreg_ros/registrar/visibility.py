@@ -160,7 +160,9 @@ def count_many(points, shades, T, near, far, detail, camera, tolerance, growth):
     """`count` for many poses (K, 4, 4): (K, 10)."""
     out = np.empty((len(T), 10))
     for k in range(len(T)):
-        out[k] = count(points, shades, T[k], near, far, detail, camera, tolerance, growth)
+        counts = count(points, shades, T[k], near, far, detail, camera, tolerance, growth)
+        for what in range(len(counts)):  # an array into a row would compile for a second and a half
+            out[k, what] = counts[what]
     return out
 
 
