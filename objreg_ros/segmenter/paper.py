@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The founding filter, for comparison: each box is cut out, passed through depth and height limits, loses its largest
-plane (RANSAC) and its statistical outliers. The largest plane of a crop is often the object itself.
+"""The founding filter, for comparison: each box is cut out, passed through depth and height limits, and loses its
+largest plane (RANSAC). The largest plane of a crop is often the object itself.
 """
 
 from __future__ import annotations
@@ -14,8 +14,6 @@ from objreg_ros.segmenter.params import SegmenterParams
 
 PLANE_DISTANCE = 0.01  # metres
 DRAWS = 200
-NEIGHBOURS = 20
-DEVIATIONS = 2.0
 
 
 def cut(image: DepthImage, box: Box, params: SegmenterParams) -> Pixels:
@@ -30,10 +28,8 @@ def cut(image: DepthImage, box: Box, params: SegmenterParams) -> Pixels:
         passed = (z > params.z_min) & (z < z_max) & (np.abs(y) < y_max)
     v, u = np.nonzero(passed)
     xyz = np.stack([x[passed], y[passed], z[passed]], axis=-1)
-    for rule in (_off_plane, _no_outlier):
-        kept = rule(xyz) if len(xyz) >= params.min_points else np.zeros(len(xyz), bool)
-        xyz, u, v = xyz[kept], u[kept], v[kept]
-    u, v = u + x0, v + y0
+    kept = _off_plane(xyz) if len(xyz) >= params.min_points else np.zeros(len(xyz), bool)
+    xyz, u, v = xyz[kept], u[kept] + x0, v[kept] + y0
     area = float((xyz[:, 2] ** 2).sum()) / (camera.fx * camera.fy)
     bounds = (int(u.min()), int(v.min()), int(u.max()) + 1, int(v.max()) + 1) if len(u) > 0 else (x0, y0, x0, y0)
     rgb = None if image.rgb is None else image.rgb[v, u]
@@ -54,15 +50,3 @@ def _off_plane(xyz: Array) -> Array:
     counts = (np.abs(sample @ normals.T - offsets) < PLANE_DISTANCE).sum(axis=0)
     best = int(counts.argmax())
     return np.abs(xyz @ normals[best] - offsets[best]) >= PLANE_DISTANCE
-
-
-def _no_outlier(xyz: Array) -> Array:
-    """The points (N,) bool whose mean distance to 20 neighbours is within 2 standard deviations of the cloud's mean
-    (Rusu et al., "Towards 3D point cloud based object maps for household environments", 2008)."""
-    from scipy.spatial import cKDTree  # needed by this preset alone
-
-    k = min(NEIGHBOURS + 1, len(xyz))
-    if k < 2:
-        return np.ones(len(xyz), bool)
-    distance = cKDTree(xyz).query(xyz, k)[0][:, 1:].mean(axis=1)
-    return distance <= distance.mean() + DEVIATIONS * distance.std()
