@@ -12,13 +12,18 @@ import numpy as np
 
 from objreg_ros.data import Array
 
-CAMERA_UP = np.array([0.0, -1.0, 0.0])  # of an upright camera in its optical frame
 CANDIDATES = 64
 CLUSTER = np.float32(np.cos(np.radians(8.0)))
 RIVAL = np.float32(np.cos(np.radians(16.0)))
 CONES = tuple(np.cos(np.radians((10.0, 8.0, 6.0, 6.0))).tolist())  # in which the middle of a cluster is sought
 ENOUGH = 0.10  # share of the normals that makes a cluster fully believed
 MIN_NORMALS = 20
+
+
+def camera_up(roll_deg: float) -> Array:
+    """Up (3,) in the optical frame of a level camera that is mounted this far clockwise from upright."""
+    roll = np.radians(roll_deg)
+    return np.array([-np.sin(roll), -np.cos(roll), 0.0])
 
 
 def estimate_up(normals: Array, prior: Array, cone_deg: float) -> tuple[Array | None, float]:

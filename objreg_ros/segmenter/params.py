@@ -24,7 +24,10 @@ class SegmenterParams(Params):
     jump_z2: float = param(0.012, "how the depth step grows with squared depth", "1/m", ge=0.0)
     crease: float = param(20.0, "a valley that bends more than this parts two things", "deg", ge=5.0, le=90.0)
     height: float = param(0.0005, "a point this far above the support belongs to it, without noise", "m", ge=0.0)
-    up_tilt: float = param(65.0, "most tilt of the camera's y axis from the vertical", "deg", ge=5.0, le=89.0)
+    roll: float = param(
+        0.0, "how far clockwise, as it looks, the camera is mounted; 180: upside down", "deg", ge=-360.0, le=360.0
+    )
+    up_tilt: float = param(65.0, "most tilt of the camera from upright, apart from `roll`", "deg", ge=5.0, le=89.0)
     support_area: float = param(0.02, "least visible area of a support surface", "m²", ge=0.0)
     view_step: int = param(4, "the view keeps one pixel of so many in each row and column", ge=1, le=32)
 

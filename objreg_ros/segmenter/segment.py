@@ -14,7 +14,7 @@ from objreg_ros.data import Array, DepthImage, Detections, Frame, Intrinsics, Ob
 from objreg_ros.segmenter import boxes, paper
 from objreg_ros.segmenter.boxes import Box
 from objreg_ros.segmenter.extract import Pixels, cell_points, colours
-from objreg_ros.segmenter.gravity import CAMERA_UP, estimate_up, known_normals
+from objreg_ros.segmenter.gravity import camera_up, estimate_up, known_normals
 from objreg_ros.segmenter.isolate import Isolated, isolate, mark
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.support import Ground, find_supports
@@ -110,7 +110,7 @@ class Segmenter:
         limits, jump = (params.z_min, z_max, y_max), (params.jump, params.jump_z2)
         surface = reduce(depth.depth, depth.intrinsics, cell_size(*depth.depth.shape), limits, jump)
         coarse = surface.every(COARSE)
-        up, confidence = _up(coarse, gravity, params.up_tilt)
+        up, confidence = _up(coarse, gravity, params)
         supports = [] if up is None else find_supports(coarse, depth.intrinsics, up, params.support_area, jump)
         return Ground(up, confidence, supports, surface, coarse)
 
@@ -147,13 +147,13 @@ def _block_on_table(camera: Intrinsics) -> Array:
     return depth
 
 
-def _up(surface: Surface, gravity: Array | None, tilt_deg: float) -> tuple[Array | None, float]:
+def _up(surface: Surface, gravity: Array | None, params: SegmenterParams) -> tuple[Array | None, float]:
     if gravity is not None:
         length = float(np.linalg.norm(gravity))
         if not np.isfinite(length) or length < 1e-6:
             raise ValueError(f"gravity: expected a direction of non-zero length, got {np.asarray(gravity).tolist()}")
         return -np.asarray(gravity, np.float64) / length, 1.0
-    return estimate_up(known_normals(surface.normals, NORMALS), CAMERA_UP, tilt_deg)
+    return estimate_up(known_normals(surface.normals, NORMALS), camera_up(params.roll), params.up_tilt)
 
 
 def _object(label: str, score: float, instance: int, pixels: Pixels, flags: PointFlag) -> ObjectCloud:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.segmenter.gravity import CAMERA_UP, estimate_up, known_normals
+from objreg_ros.segmenter.gravity import camera_up, estimate_up, known_normals
 
 
 def around(direction: np.ndarray, count: int, spread: float = 0.03) -> np.ndarray:
@@ -15,20 +15,25 @@ def around(direction: np.ndarray, count: int, spread: float = 0.03) -> np.ndarra
 
 def test_the_floor_wins_over_a_larger_wall() -> None:
     floor, wall = np.array([0.0, -0.9, -0.43]), np.array([0.1, 0.0, -1.0])
-    up, confidence = estimate_up(np.vstack([around(floor, 600), around(wall, 2500)]), CAMERA_UP, 65.0)
+    up, confidence = estimate_up(np.vstack([around(floor, 600), around(wall, 2500)]), camera_up(0.0), 65.0)
     assert up is not None
     assert up @ floor / np.linalg.norm(floor) > np.cos(np.radians(0.5))
     assert confidence > 0.9
 
 
 def test_walls_alone_tell_nothing() -> None:
-    assert estimate_up(around(np.array([0.2, 0.05, -1.0]), 2000), CAMERA_UP, 65.0) == (None, 0.0)
+    assert estimate_up(around(np.array([0.2, 0.05, -1.0]), 2000), camera_up(0.0), 65.0) == (None, 0.0)
 
 
 def test_two_candidates_alike_give_little_confidence() -> None:
     tilted = [np.array([0.0, -0.8, s]) for s in (0.6, -0.6)]
-    _, confidence = estimate_up(np.vstack([around(t, 800) for t in tilted]), CAMERA_UP, 65.0)
+    _, confidence = estimate_up(np.vstack([around(t, 800) for t in tilted]), camera_up(0.0), 65.0)
     assert confidence < 0.3
+
+
+def test_a_camera_turned_clockwise_has_up_to_its_left() -> None:
+    np.testing.assert_allclose(camera_up(0.0), (0, -1, 0), atol=1e-12)
+    np.testing.assert_allclose(camera_up(90.0), (-1, 0, 0), atol=1e-12)
 
 
 def test_unknown_normals_are_left_out() -> None:

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from objreg_ros.data import DepthImage, Detections, PointFlag
+from objreg_ros.data import DepthImage, Detections, Intrinsics, PointFlag
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 
@@ -43,6 +45,29 @@ def test_a_given_gravity_is_handed_on_with_full_confidence() -> None:
     np.testing.assert_allclose(frame.gravity, -scene.up)
     assert frame.gravity_confidence == 1.0
     assert scene.iou(frame.objects[0].xyz, 2) > 0.95
+
+
+@pytest.mark.parametrize("turns", [1, 2, 3])
+def test_a_camera_mounted_on_its_side_or_head_finds_the_same_by_its_roll(turns: int) -> None:
+    scene = two_boxes()
+    x0, y0, x1, y1 = scene.box_of(3)
+    upright = scene.image(NOISE)
+    whole = Segmenter().segment(scene.detections((x0, y0, x1, y1)), upright).objects[0]
+    corners = np.array([(x0, y0), (x1, y1)])
+    camera = scene.camera
+    for _ in range(turns):  # of the camera, clockwise: the picture turns the other way
+        corners = np.stack([corners[:, 1], camera.width - corners[:, 0]], axis=1)
+        camera = Intrinsics(
+            fx=camera.fy, fy=camera.fx, cx=camera.cy, cy=camera.width - 1 - camera.cx,
+            width=camera.height, height=camera.width,
+        )  # fmt: skip
+    box = (*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist())
+    image = DepthImage(depth=np.rot90(upright.depth, turns).copy(), rgb=None, intrinsics=camera, stamp_ns=7)
+    asked = replace(scene.detections(box), image_hw=(camera.height, camera.width))
+    frame = Segmenter(SegmenterParams(roll=90.0 * turns)).segment(asked, image)
+    assert frame.gravity_confidence > 0.9
+    assert abs(len(frame.objects[0]) / len(whole) - 1) < 0.03
+    assert not frame.objects[0].has(PointFlag.UNSUPPORTED)
 
 
 def test_a_gravity_without_direction_is_refused() -> None:
