@@ -53,7 +53,7 @@ class Detects(Protocol):
 class Segments(Protocol):
     """What the second room does."""
 
-    def segment(self, detections: Detections, depth: DepthImage) -> Frame: ...
+    def segment(self, detections: Detections, depth: DepthImage, gravity: Array | None = None) -> Frame: ...
 
 
 class Outcome(Protocol):
@@ -106,12 +106,17 @@ def build_rooms(
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """How the inputs are brought together, as the nodes' parameters say; ``T_base_camera`` as the registrar's."""
+    """How the inputs are brought together, as the nodes' parameters say; ``T_base_camera`` as the registrar's.
+
+    With ``level_odom`` the segmenter takes gravity from the odometry, and ``T_level_camera`` is its T_base_camera.
+    """
 
     slop_ns: int = 20_000_000
     odom_slop_ns: int = 20_000_000
     T_base_camera: Array | None = None
     colour: bool = True  # whether a depth image takes its colour from `image`
+    level_odom: bool = False
+    T_level_camera: Array | None = None
 
 
 @dataclass
@@ -188,6 +193,8 @@ class Line:
 
     def _streams(self) -> list[Stream]:
         streams = [Stream("depth"), Stream("detections", slop_ns=self._timing.slop_ns)]
+        if self._timing.level_odom:
+            streams.append(Stream("odom", Need.OPTIONAL, self._timing.slop_ns, ODOM_DEPTH))
         if self._from_points:
             return streams
         colour = [Stream("image", Need.OPTIONAL, self._timing.slop_ns)] if self._timing.colour else []
@@ -209,6 +216,7 @@ class Line:
         elif name in ("depth", "points"):
             self._feed("depth", stamp_ns, message)
         elif name == "odom":
+            self._feed(name, stamp_ns, message)
             self._track(self._frames.add("odom", stamp_ns, message))
 
     def finish(self) -> Run:
@@ -246,8 +254,9 @@ class Line:
     def _frame(self, match: Match) -> Frame:
         with self._timed("decode"):
             depth = self._depth(match)
+            gravity = from_msg.level_gravity(match.payloads.get("odom"), self._timing.T_level_camera)
         with self._timed("segment"):
-            return as_sent(self._rooms.segmenter.segment(match["detections"], depth))
+            return as_sent(self._rooms.segmenter.segment(match["detections"], depth, gravity))
 
     def _depth(self, match: Match) -> DepthImage:
         if not self._from_points:

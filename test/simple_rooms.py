@@ -46,7 +46,7 @@ class OneBox:
 class OneCloud:
     """Cuts one point out of every depth image."""
 
-    def segment(self, detections: Detections, depth: DepthImage) -> Frame:
+    def segment(self, detections: Detections, depth: DepthImage, gravity: np.ndarray | None = None) -> Frame:
         cloud = ObjectCloud(
             label=detections.label[0],
             score=0.1,
@@ -63,7 +63,7 @@ class OneCloud:
             objects=(cloud,),
             support=None,
             view=View(xyz=xyz, grey=None, intrinsics=camera),
-            gravity=np.array([0.0, 1.0, 0.0]),
+            gravity=np.array([0.0, 1.0, 0.0]) if gravity is None else gravity,
             gravity_confidence=0.3,
             T_odom_camera=None,
             stamp_ns=depth.stamp_ns,

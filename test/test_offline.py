@@ -10,6 +10,7 @@ from recording.folders import CAMERA, records
 from simple_rooms import simple_rooms
 
 from objreg_ros.data import DepthImage
+from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.offline import Timing, as_sent, run_offline
 from objreg_ros.recording import Record, messages
 from objreg_ros.recording.inputs import Inputs
@@ -77,6 +78,20 @@ def test_the_mounting_of_the_camera_is_applied() -> None:
     T_base_camera[2, 3] = 0.7
     run_offline(records(2), rooms, INPUTS, Timing(T_base_camera=T_base_camera))
     assert [frame.T_odom_camera[2, 3] for frame in chain.frames] == [0.7, 0.7]
+
+
+def test_gravity_comes_from_a_level_odometry_where_there_is_one() -> None:
+    rooms, chain = simple_rooms()
+    looking_along_x = pose(np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]]), np.zeros(3))
+    timing = Timing(level_odom=True, T_level_camera=looking_along_x @ turned_about_x(np.radians(30.0)))
+    run_offline(without("/odom", 1100 * MS), rooms, INPUTS, timing)
+    tilted = [0, np.cos(np.radians(30)), -np.sin(np.radians(30))]
+    for frame, expected in zip(chain.frames, (tilted, [0, 1, 0], tilted, tilted), strict=True):
+        np.testing.assert_allclose(frame.gravity, expected, atol=1e-6)
+
+
+def turned_about_x(angle: float) -> np.ndarray:
+    return pose(rotation_from_vector(np.array([angle, 0.0, 0.0])), np.zeros(3))
 
 
 def broken() -> Iterator[Record]:

@@ -131,6 +131,18 @@ def odometry(message: Any) -> Odometry:
     )
 
 
+def level_gravity(message: Any, T_body_camera: Array | None = None) -> Array | None:
+    """The way things fall (3,) in the camera frame by an odometry whose frame is level with z up; None without one.
+
+    ``T_body_camera`` is where the camera sits on the body that the odometry speaks of; the same place if None.
+    """
+    if message is None:
+        return None
+    T_level_body = odometry(message).T_odom_body
+    T_level_camera = T_level_body if T_body_camera is None else T_level_body @ T_body_camera
+    return -T_level_camera[2, :3]
+
+
 def _pose(message: Any) -> Array:
     if hasattr(message, "transform"):
         where, turn = message.transform.translation, message.transform.rotation

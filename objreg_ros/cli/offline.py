@@ -126,7 +126,7 @@ def _run(source: Recording, inputs: Inputs, settings: Settings, max_frames: int 
 def _timing(settings: Settings) -> Timing:
     segmenter, registrar = settings.of("segmenter", SegmenterNodeParams), settings.of("registrar", RegistrarNodeParams)
     slop_ns, odom_slop_ns = round(segmenter.slop * 1e9), round(registrar.odom_slop * 1e9)
-    return Timing(slop_ns, odom_slop_ns, registrar.mounting, segmenter.colour)
+    return Timing(slop_ns, odom_slop_ns, registrar.mounting, segmenter.colour, segmenter.level_odom, segmenter.mounting)
 
 
 def _records(source: Recording, inputs: Inputs, odometry: str | None) -> Iterator[Record]:

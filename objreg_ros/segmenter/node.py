@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The door of the segmenter: ``points``, or ``depth/image`` with ``camera_info`` and ``image``, and
-``detections_table`` in; ``objects``, ``view``, ``view/camera_info`` and ``gravity`` out."""
+``detections_table`` in, and ``odom`` where gravity comes from it; ``objects``, ``view``, ``view/camera_info`` and
+``gravity`` out."""
 
 from __future__ import annotations
 
@@ -8,6 +9,7 @@ import sys
 from typing import Any
 
 from geometry_msgs.msg import Vector3Stamped
+from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from std_msgs.msg import String
 
@@ -23,6 +25,7 @@ from objreg_ros.segmenter.segment import Segmenter
 POINTS = {"points": PointCloud2}
 DEPTH = {"depth/image": Image, "depth/image/compressedDepth": CompressedImage}
 SOURCES = {"auto": {**POINTS, **DEPTH}, "points": POINTS, "depth": DEPTH}
+ODOM_DEPTH = 1000  # odometry is small and many times as frequent as frames
 IMAGES = {"image": Image, "image/compressed": CompressedImage}
 
 
@@ -47,6 +50,8 @@ class SegmenterNode(MatchingDoor):
         if self._inputs.colour and self._inputs.source != "points":
             self.listen_to_first("image", IMAGES, self._hear_image, self.sensor())
         self.listen_to_first("depth", SOURCES[self._inputs.source], self._hear_depth, self.sensor())
+        if self._inputs.level_odom:
+            self.listen(Odometry, "odom", self._hear_odom, self.sensor())
         self.listen(PointCloud2, "detections_table", self._hear_detections, qos.room(), watched="detections_table")
         self.expect("detections_table", "detections_table")
 
@@ -68,6 +73,9 @@ class SegmenterNode(MatchingDoor):
     def _hear_image(self, _: str, message: Any) -> None:
         self.feed("image", from_msg.stamp_ns(message), message)
 
+    def _hear_odom(self, message: Any) -> None:
+        self.feed("odom", from_msg.stamp_ns(message), message)
+
     def _hear_depth(self, topic: str, message: Any) -> None:
         if not self.begun:
             self._choose(topic)
@@ -80,6 +88,8 @@ class SegmenterNode(MatchingDoor):
         """Depth has spoken: now it is known what goes with it."""
         slop_ns = round(self._inputs.slop * 1e9)
         streams = [Stream("depth"), Stream("detections", slop_ns=slop_ns), Stream("labels", Need.LATCHED)]
+        if self._inputs.level_odom:
+            streams.append(Stream("odom", Need.OPTIONAL, slop_ns, ODOM_DEPTH))
         if topic in DEPTH:
             streams.append(Stream("camera_info", Need.LATCHED))
             streams.append(Stream("image", Need.OPTIONAL, slop_ns))
@@ -97,8 +107,9 @@ class SegmenterNode(MatchingDoor):
         names = payload["labels"]
         shape = depth.depth.shape
         detections = self.read("detections", from_msg.detections, payload["detections"], names, shape)
+        gravity = self.read("odom", from_msg.level_gravity, payload.payloads.get("odom"), self._inputs.mounting)
         with self.ledger.timed("segment"):
-            frame = self._segmenter.segment(detections, depth)
+            frame = self._segmenter.segment(detections, depth, gravity)
         self._publish(frame, names)
         return True
 

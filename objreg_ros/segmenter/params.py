@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from objreg_ros.data import Array
+from objreg_ros.geometry import mounting
 from objreg_ros.params import Params, param
 
 PAPER_Z_MAX, PAPER_Y_MAX = 1.75, 0.75  # the passthrough limits of the founding method, metres
@@ -44,5 +46,18 @@ class SegmenterNodeParams(Params):
     source: str = param(
         "auto", "where depth comes from; auto takes what speaks first", choices=("auto", "points", "depth")
     )
-    slop: float = param(0.02, "largest distance in time between depth and its detections or colour", "s", ge=0.0)
+    slop: float = param(0.02, "largest distance in time between depth and what goes with it", "s", ge=0.0)
     colour: bool = param(True, "take the colour of the points from `image` when depth comes as an image")
+    level_odom: bool = param(False, "take gravity from `odom`, whose frame an IMU keeps level with z up")
+    T_base_camera: tuple[float, ...] = param(
+        (), "where the camera's optical frame is on the body of the odometry: x y z qx qy qz qw; empty: there"
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        mounting(self.T_base_camera)
+
+    @property
+    def mounting(self) -> Array | None:
+        """``T_base_camera`` as a (4, 4) pose, None where none is set."""
+        return mounting(self.T_base_camera)

@@ -9,7 +9,7 @@ import pytest
 
 from objreg_ros.bridge import from_msg
 from objreg_ros.bridge.layout import DETECTIONS, OBJECTS, SUPPORT_ID, VIEW
-from objreg_ros.geometry import rotation_from_vector
+from objreg_ros.geometry import pose, rotation_from_vector
 
 from . import messages
 
@@ -155,6 +155,16 @@ def test_odometry_is_a_pose() -> None:
     word = from_msg.odometry(messages.odometry((0, 0, half, half), (1, 2, 3)))
     assert np.allclose(word.T_odom_body[:3, :3], rotation_from_vector(np.array([0, 0, np.pi / 2])))
     assert word.T_odom_body[:3, 3].tolist() == [1, 2, 3] and word.child_frame_id == "base_link"
+
+
+def test_gravity_is_down_in_the_frame_of_a_level_odometry() -> None:
+    half = np.sqrt(0.5)
+    on_its_side = messages.odometry((half, 0, 0, half), (1, 2, 3))  # a quarter turn about x: the body's y is up
+    assert from_msg.level_gravity(None) is None
+    assert np.allclose(from_msg.level_gravity(messages.odometry()), (0, 0, -1))
+    assert np.allclose(from_msg.level_gravity(on_its_side), (0, -1, 0))
+    T_body_camera = pose(rotation_from_vector(np.array([0, 0, np.pi / 2])), np.ones(3))  # the body's y is its x
+    assert np.allclose(from_msg.level_gravity(on_its_side, T_body_camera), (-1, 0, 0))
 
 
 def test_a_stamped_pose_and_a_transform_are_odometry_too() -> None:
