@@ -9,6 +9,9 @@ from objreg_ros.data import Array, DepthImage, Intrinsics, PointCloud
 
 FAR = 65.0  # metres; 65535 mm and 65535 m both mean "no depth"
 MIN_FIT = 30  # points that a fit of the intrinsics needs
+STEPS = (1, 2, 3, 4, 6, 8)  # pixels in each row and column that become one for a thinned cloud
+SAMPLE, NEAREST = 20000, 0.3  # points, and which share of them, that tell whether a cloud fills an image
+FILLED = 0.75  # share of these that have a point right of them, and below
 FIT_ERROR_PX = 1.5  # the median distance that a pixel may have from where the fitted camera sees its point
 
 
@@ -17,7 +20,7 @@ def organise(cloud: PointCloud, intrinsics: Intrinsics | None = None) -> DepthIm
 
     An organised cloud (H > 1) gives its z; with no ``intrinsics`` (or intrinsics of another size) the camera is fitted
     to the cloud's own points. An unorganised cloud (H = 1) is projected with ``intrinsics``, the nearest point of a
-    pixel wins. NaN, infinity, 0 and 65535 are "no depth" (0).
+    pixel wins; a thinned one gives the smaller image that its points fill. NaN, infinity, 0 and 65535 are "no depth".
     Raises ValueError when the camera is not known and cannot be fitted, when nothing was measured, and when the points
     do not lie in front of the camera (negative z: the cloud is not in an optical frame).
     """
@@ -36,7 +39,8 @@ def organise(cloud: PointCloud, intrinsics: Intrinsics | None = None) -> DepthIm
                 f"an unorganised cloud of {xyz.shape[1]} points: expected camera_info to project it with, got none; "
                 "publish camera_info beside the cloud, or an organised cloud"
             )
-        depth, rgb = _project(xyz[0][in_front[0]], None if cloud.rgb is None else cloud.rgb[0][in_front[0]], intrinsics)
+        colours = None if cloud.rgb is None else cloud.rgb[0][in_front[0]]
+        depth, rgb, intrinsics = _project(xyz[0][in_front[0]], colours, intrinsics)
     return DepthImage(depth=depth, rgb=rgb, intrinsics=intrinsics, stamp_ns=cloud.stamp_ns, frame_id=cloud.frame_id)
 
 
@@ -93,23 +97,45 @@ def _fit_line(ratio: Array, pixel: Array) -> tuple[float, float, float]:
     return float(slope), float(offset), float(np.median(np.abs(slope * ratio + offset - pixel)))
 
 
-def _project(points: Array, rgb: Array | None, camera: Intrinsics) -> tuple[Array, Array | None]:
-    """The depth (H, W) and colour (H, W, 3) of points (N, 3) in front of the camera; of one pixel the nearest wins."""
+def _project(points: Array, rgb: Array | None, camera: Intrinsics) -> tuple[Array, Array | None, Intrinsics]:
+    """Depth (h, w) and colour (h, w, 3) of points (N, 3) in front of the camera, and the camera that sees them so.
+
+    That is the one with the most pixels of ``camera`` and its reductions that the points fill, ``camera`` if they fill
+    none; of one pixel the nearest point wins.
+    """
+    for grid in (*(camera.scaled(step) for step in STEPS), camera):
+        inside, index = _pixels(points, grid)
+        if len(index) == 0:
+            raise ValueError(
+                f"expected points within the {camera.width}x{camera.height} image, got none of {len(points)} there; "
+                "is the cloud in the optical frame of this camera?"
+            )
+        z = points[inside, 2]
+        if _is_filled(index, z, grid):
+            break
+    far_first = np.argsort(-z, kind="stable")
+    depth = np.zeros(grid.height * grid.width, np.float32)
+    depth[index[far_first]] = z[far_first]
+    if rgb is None:
+        return depth.reshape(grid.height, grid.width), None, grid
+    colour = np.zeros((grid.height * grid.width, 3), np.uint8)
+    colour[index[far_first]] = rgb[inside][far_first]
+    return depth.reshape(grid.height, grid.width), colour.reshape(grid.height, grid.width, 3), grid
+
+
+def _pixels(points: Array, camera: Intrinsics) -> tuple[Array, Array]:
+    """Which points (N,) bool lie in the image, and the pixels (M,) of those, counted row by row."""
     x, y, z = points.T
     u = np.rint(camera.fx * x / z + camera.cx)
     v = np.rint(camera.fy * y / z + camera.cy)
     inside = (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
-    if not inside.any():
-        raise ValueError(
-            f"expected points within the {camera.width}x{camera.height} image, got none of {len(points)} there; "
-            "is the cloud in the optical frame of this camera?"
-        )
-    index = (v[inside] * camera.width + u[inside]).astype(np.int64)
-    far_first = np.argsort(-z[inside], kind="stable")
-    depth = np.zeros(camera.height * camera.width, np.float32)
-    depth[index[far_first]] = z[inside][far_first]
-    if rgb is None:
-        return depth.reshape(camera.height, camera.width), None
-    colour = np.zeros((camera.height * camera.width, 3), np.uint8)
-    colour[index[far_first]] = rgb[inside][far_first]
-    return depth.reshape(camera.height, camera.width), colour.reshape(camera.height, camera.width, 3)
+    return inside, (v[inside] * camera.width + u[inside]).astype(np.int64)
+
+
+def _is_filled(index: Array, z: Array, camera: Intrinsics) -> bool:
+    """Whether enough of the nearest points, where a cloud thinned by volume is thinnest, have points beside them."""
+    seen = np.zeros((camera.height + 1) * camera.width + 1, np.bool_)
+    seen[index] = True
+    some = slice(None, None, max(1, len(index) // SAMPLE))
+    near = index[some][z[some] <= np.quantile(z[some], NEAREST)]
+    return bool(min(seen[near + 1].mean(), seen[near + camera.width].mean()) >= FILLED)

@@ -9,6 +9,10 @@ import pytest
 from objreg_ros.data import Intrinsics, PointCloud
 from objreg_ros.geometry import back_project
 from objreg_ros.segmenter.organise import fit_intrinsics, organise
+from objreg_ros.segmenter.segment import Segmenter
+
+from .scenes import CAMERA as CAMERA_VGA
+from .scenes import Scene
 
 CAMERA = Intrinsics(fx=300.0, fy=310.0, cx=30.2, cy=22.9, width=64, height=48)
 
@@ -65,6 +69,20 @@ def test_the_nearest_of_two_points_in_a_pixel_wins() -> None:
     assert image.depth[23, 30] == 1
     assert image.rgb is not None
     assert image.rgb[23, 30].tolist() == [1, 1, 1]
+
+
+def test_a_thinned_cloud_gives_the_smaller_image_that_its_points_fill() -> None:
+    scene = Scene().plane().box((-0.1, -0.1, 0), (0.1, 0.1, 0.15))
+    image = scene.image(0.001)
+    xyz = back_project(image.depth, CAMERA_VGA.fx, CAMERA_VGA.fy, CAMERA_VGA.cx, CAMERA_VGA.cy)[image.depth > 0]
+    thin = xyz[np.random.default_rng(0).random(len(xyz)) < 0.1]
+    small = organise(PointCloud(xyz=thin[None], rgb=None, stamp_ns=0), CAMERA_VGA)
+    assert small.depth.shape == (small.intrinsics.height, small.intrinsics.width) == (120, 160)
+    thing = Segmenter().segment(scene.detections(scene.box_of(2)), small).objects[0]
+    low, high = (thing.xyz @ scene.R.T + scene.eye)[:, :2].min(axis=0), (thing.xyz @ scene.R.T + scene.eye).max(axis=0)
+    np.testing.assert_allclose((*low, *high), (-0.1, -0.1, 0.1, 0.1, 0.15), atol=0.02)
+    whole = organise(PointCloud(xyz=xyz[None], rgb=None, stamp_ns=0), CAMERA_VGA)
+    assert whole.depth.shape == image.depth.shape
 
 
 @pytest.mark.parametrize(
