@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import Vector3Stamped
+from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import Header
 
@@ -27,10 +29,12 @@ NAMES = {0: "cup"}
 
 @pytest.fixture(scope="module")
 def running(graph: Graph, tiny_model: Path) -> Graph:
-    """A detector, a segmenter of clouds, and one of depth images."""
+    """A detector, a segmenter of clouds, and one of depth images with a level odometry."""
     graph.start("/detector", "detector", f"-p model:={tiny_model}", "-p reliable:=true")
     graph.start("/clouds/segmenter", "segmenter", "-r __ns:=/clouds", "-p reliable:=true")
-    graph.start("/depths/segmenter", "segmenter", "-r __ns:=/depths", "-p reliable:=true", "-p colour:=false")
+    of_depths = ("-r __ns:=/depths", "-p reliable:=true", "-p colour:=false", "-p level_odom:=true")
+    graph.start("/depths/segmenter", "segmenter", *of_depths)
+    graph.hear(Vector3Stamped, "depths/gravity")
     for topic in ("finished", "clouds/finished", "depths/finished"):
         graph.hear(Header, topic)
     return graph
@@ -133,24 +137,35 @@ def test_the_log_says_what_was_expected_and_what_came(running: Graph) -> None:
     assert CLOUDS["a truncated cloud"][2] in log
 
 
-def test_the_segmenter_drops_bad_depth_and_detections_and_goes_on(running: Graph, stamp_ns: int) -> None:
+def test_the_segmenter_drops_bad_depth_detections_and_odometry_and_goes_on(running: Graph, stamp_ns: int) -> None:
     def depth(stamp: int) -> Image:
         return Image(
             header=to_msg.header(stamp, "eye"), height=240, width=320, encoding="32FC1", step=1280,
             data=to_msg._bytes(depths()),
         )  # fmt: skip
 
+    def odometry(stamp: int, w: float) -> Odometry:
+        message = Odometry(header=to_msg.header(stamp, "odom"))
+        message.pose.pose.orientation.w = w
+        return message
+
     running.publish("depths/labels", to_msg.labels(NAMES))
     running.publish("depths/camera_info", to_msg.camera_info(CAMERA, stamp_ns, "eye"))
+    times = [stamp_ns + k * STEP for k in range(4)]
     cases = (
-        (changed(depth(stamp_ns), encoding="bgr8"), table(stamp_ns), "dropped malformed_depth"),
-        (depth(stamp_ns + STEP), changed(table(stamp_ns + STEP), data=b"", width=1), "dropped malformed_detections"),
-        (depth(stamp_ns + 2 * STEP), table(stamp_ns + 2 * STEP), "published"),
+        (changed(depth(times[0]), encoding="bgr8"), table(times[0]), 1.0, "dropped malformed_depth"),
+        (depth(times[1]), changed(table(times[1]), data=b"", width=1), 1.0, "dropped malformed_detections"),
+        (depth(times[2]), table(times[2]), 0.0, "dropped malformed_odom"),
+        (depth(times[3]), table(times[3]), 1.0, "published"),
     )
-    for k, (picture, detections, expected) in enumerate(cases):
+    for stamp, (picture, detections, w, expected) in zip(times, cases, strict=True):
+        running.publish("depths/odom", odometry(stamp, w))
         running.publish("depths/depth/image", picture)
         running.publish("depths/detections_table", detections)
-        assert running.answer("segmenter", stamp_ns + k * STEP, "depths/finished") == expected
+        assert running.answer("segmenter", stamp, "depths/finished") == expected
+    running.wait_for(lambda: bool(running.heard["depths/gravity"]), what="gravity")
+    falls = running.heard["depths/gravity"][-1].vector
+    assert (falls.x, falls.y, falls.z) == (0.0, 0.0, -1.0)
 
 
 def test_depth_without_detections_is_dropped_as_unmatched_once_newer_ones_came(running: Graph, stamp_ns: int) -> None:
