@@ -7,9 +7,10 @@ upon each other. When a closure shows that two landmarks are one, the older id s
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import islice, product
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.sighting import Sighting
 
 MIDDLE_WANDERS = 0.2  # of the extent
+CELL = 0.5  # m, edge of the cells that know which landmarks are there
+
+Cell = tuple[int, str, int, int, int]  # session, label group, and where
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -55,12 +59,17 @@ class _Known:
 
 
 class Landmarks:
-    """All known objects. Deterministic: the same sightings in the same order give the same ids."""
+    """All known objects. Deterministic: the same sightings in the same order give the same ids.
+
+    What a keyframe costs here does not grow with the number of landmarks.
+    """
 
     def __init__(self, params: RegistrarParams, sightings: Iterable[Sighting] = ()) -> None:
         self._params = params
         self._groups = LabelGroups(params.label_groups)
-        self._known: dict[int, _Known] = {}
+        self._known: dict[int, _Known] = {}  # the one seen last comes last
+        self._there: defaultdict[Cell, set[int]] = defaultdict(set)
+        self._shown: defaultdict[int, set[int]] = defaultdict(set)  # the landmarks of each keyframe
         self._next = 1
         self.add(sightings)
 
@@ -70,6 +79,11 @@ class Landmarks:
     def known(self) -> tuple[Landmark, ...]:
         """Every landmark, the oldest first."""
         return tuple(_landmark(number, known) for number, known in sorted(self._known.items()))
+
+    def recent(self, session: int | None, most: int) -> tuple[Landmark, ...]:
+        """Of the ``most`` landmarks that were seen last those of this session, the oldest first."""
+        last = sorted(islice(reversed(self._known), most))
+        return tuple(_landmark(n, self._known[n]) for n in last if self._known[n].last.session == session)
 
     def assign(
         self, sightings: Sequence[Sighting], links: Sequence[Link] = ()
@@ -97,39 +111,49 @@ class Landmarks:
         for old, new in (merged or {}).items():
             self._merge(old, new)
         for sighting in sightings:
-            known = self._known.setdefault(sighting.landmark, _Known(sighting))
+            number = sighting.landmark
+            known = self._known[number] = self._known.pop(number, _Known(sighting))
+            self._there[self._cell(known.last)].discard(number)
+            self._there[self._cell(sighting)].add(number)
             known.last = sighting
             known.votes[sighting.label] += round(1000 * sighting.score)
             known.views[sighting.keyframe_id] = sighting.viewpoint
-            self._next = max(self._next, sighting.landmark + 1)
+            self._shown[sighting.keyframe_id].add(number)
+            self._next = max(self._next, number + 1)
 
     def surplus(self, landmarks: Iterable[int]) -> list[int]:
         """Keyframes of these landmarks that show each of their objects from where better spread keyframes do too."""
         spare = {number: self._spare(self._known[number]) for number in set(landmarks) if number in self._known}
         tired = set().union(*spare.values()) if spare else set()
-        needed = {k for number, known in self._known.items() for k in known.views if k not in spare.get(number, ())}
-        return sorted(tired - needed)
+        return sorted(k for k in tired if all(k in spare.get(number, ()) for number in self._shown[k]))
 
     def forget(self, keyframe_ids: Iterable[int]) -> None:
         """Forget from where these keyframes saw their objects; the landmarks stay known."""
-        gone = set(keyframe_ids)
-        for known in self._known.values():
-            for keyframe_id in gone & known.views.keys():
-                del known.views[keyframe_id]
+        for keyframe_id in keyframe_ids:
+            for number in self._shown.pop(keyframe_id, ()):
+                del self._known[number].views[keyframe_id]
 
     def _same_place(self, sighting: Sighting, taken: set[int]) -> int:
         """The landmark that this session saw last at this place, 0 if there is none."""
         best, best_distance = 0, np.inf
-        for number, known in self._known.items():
-            last = known.last
-            if last.session != sighting.session or number in taken:
-                continue
-            if self._groups.of(last.label) != self._groups.of(sighting.label):
-                continue
+        for number in sorted(self._near(sighting) - taken):
+            last = self._known[number].last
             distance = float(np.linalg.norm(sighting.position - last.position))
             if distance < min(best_distance, self._reach(sighting, last)):
                 best, best_distance = number, distance
         return best
+
+    def _near(self, sighting: Sighting) -> set[int]:
+        """The landmarks of the sighting's session and label group that may be within reach of it."""
+        reach = 2.0 * self._params.landmark_radius + MIDDLE_WANDERS * sighting.extent  # the largest that it can be
+        low, high = (np.floor((sighting.position + side * reach) / CELL).astype(int) for side in (-1, 1))
+        session, group, *_ = self._cell(sighting)
+        cells = product(*(range(a, b + 1) for a, b in zip(low.tolist(), high.tolist(), strict=True)))
+        return set().union(*(self._there.get((session, group, x, y, z), ()) for x, y, z in cells))
+
+    def _cell(self, sighting: Sighting) -> Cell:
+        x, y, z = np.floor(sighting.position / CELL).astype(int).tolist()
+        return sighting.session, self._groups.of(sighting.label), x, y, z
 
     def _reach(self, sighting: Sighting, last: Sighting) -> float:
         """How far apart two sightings of one object may be: the middle of a large one wanders with the side seen."""
@@ -147,11 +171,14 @@ class Landmarks:
         gone = self._known.pop(old, None)
         if gone is None:
             return
+        self._there[self._cell(gone.last)].discard(old)
         known = self._known.setdefault(new, gone)
-        if known is gone:
-            return
-        known.votes.update(gone.votes)
-        known.views.update(gone.views)
+        self._there[self._cell(known.last)].add(new)
+        for keyframe_id in gone.views:
+            self._shown[keyframe_id] = self._shown[keyframe_id] - {old} | {new}
+        if known is not gone:
+            known.votes.update(gone.votes)
+            known.views.update(gone.views)
 
     def _spare(self, known: _Known) -> set[int]:
         """The keyframes that are left when the most diverse viewpoints are taken one after the other."""

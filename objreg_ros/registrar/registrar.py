@@ -34,6 +34,8 @@ from objreg_ros.registrar.sighting import Sighting, sightings_of
 from objreg_ros.registrar.store import Store
 from objreg_ros.registrar.thinning import Thinning
 
+RECENT = 500  # landmarks that are told of after every keyframe
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
@@ -68,19 +70,20 @@ class Registrar:
         self._index = Index(self.params)
         self._index.add(self._store.sightings())
         self._landmarks = Landmarks(self.params, self._store.sightings())
-        self._known = self._landmarks.known()
         self._thinning = Thinning(self.params.thin_seconds, ((c.from_ns, c.to_ns) for c in self._store.closures()))
         self._path = Path()
 
     @property
     def landmarks(self) -> tuple[Landmark, ...]:
         """Every known object with its id, label and position in the frame of its session, the oldest first."""
-        return self._known
+        with self._lock:
+            return self._landmarks.known()
 
     @property
     def landmarks_here(self) -> tuple[Landmark, ...]:
-        """The landmarks whose position is in the frame of the session that goes on now."""
-        return tuple(landmark for landmark in self._known if landmark.session == self._path.session)
+        """The landmarks of late whose position is in the frame of the session that goes on now, at most `RECENT`."""
+        with self._lock:
+            return self._landmarks.recent(self._path.session, RECENT)
 
     def counts(self) -> dict[str, int]:
         """How many keyframes, objects, landmarks, sessions and closures the store holds."""
@@ -215,7 +218,6 @@ class Registrar:
         closures = tuple(closure_of(keyframe, named, item, self.params) for item in accepted)
         self._store.add(keyframe, named, closures, merged)
         self._landmarks.add(named, merged)
-        self._known = self._landmarks.known()
         self._index.add(named)
         spare = self._landmarks.surplus(sighting.landmark for sighting in named)
         spare += [k for k in self._store.beyond(self.params.max_keyframes) if k not in spare]

@@ -14,6 +14,7 @@ import sqlite3
 from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +66,7 @@ class Store:
     def __init__(self, path: str | Path = "", read_only: bool = False) -> None:
         self.path = str(path)
         self._cache: OrderedDict[int, Keyframe] = OrderedDict()
+        self._sessions: dict[int, int] = {}  # of the keyframes, the oldest first: to count them is to read the file
         if not self.path and not read_only:
             self._connection = _connect(":memory:")
             self._connection.executescript(_birth())
@@ -77,6 +79,7 @@ class Store:
         self._connection = _connect(_read_only_uri(Path(self.path)) if read_only else self.path)
         if not read_only:
             self._connection.execute("PRAGMA journal_mode = WAL")
+        self._sessions.update(self._connection.execute("SELECT id, session FROM keyframe ORDER BY id"))
 
     def add(
         self,
@@ -103,6 +106,7 @@ class Store:
             raise StoreError(
                 f"{self.path or 'memory'}: cannot write keyframe {keyframe.keyframe_id}: {error}"
             ) from error
+        self._sessions[keyframe.keyframe_id] = keyframe.session
         self._remember(keyframe)
 
     def keyframe(self, keyframe_id: int) -> Keyframe:
@@ -132,12 +136,11 @@ class Store:
 
     def keyframe_ids(self) -> list[int]:
         """The ids of the stored keyframes, oldest first."""
-        return [row[0] for row in self._connection.execute("SELECT id FROM keyframe ORDER BY id")]
+        return list(self._sessions)
 
     def beyond(self, most: int) -> list[int]:
         """The ids of the oldest keyframes, those that are more than ``most``."""
-        query = "SELECT id FROM keyframe ORDER BY id DESC LIMIT -1 OFFSET ?"
-        return [row[0] for row in self._connection.execute(query, (most,))]
+        return list(islice(self._sessions, max(len(self._sessions) - most, 0)))
 
     def remove(self, keyframe_ids: Sequence[int]) -> None:
         """Forget keyframes and their objects; their closures stay."""
@@ -145,6 +148,7 @@ class Store:
             transaction.executemany("DELETE FROM keyframe WHERE id = ?", [(k,) for k in keyframe_ids])
         for keyframe_id in keyframe_ids:
             self._cache.pop(keyframe_id, None)
+            self._sessions.pop(keyframe_id, None)
 
     def clear(self) -> None:
         """Forget everything."""
@@ -152,6 +156,7 @@ class Store:
             for table in ("closure", "object", "keyframe"):
                 transaction.execute(f"DELETE FROM {table}")
         self._cache.clear()
+        self._sessions.clear()
 
     def next_keyframe(self) -> int:
         """An id that no keyframe ever had here."""
@@ -160,15 +165,15 @@ class Store:
 
     def next_session(self) -> int:
         """The number of a session that nothing is stored of yet."""
-        return int(self._one("SELECT COALESCE(MAX(session), -1) + 1 FROM keyframe"))
+        return max(self._sessions.values(), default=-1) + 1
 
     def counts(self) -> dict[str, int]:
         """How many keyframes, objects, landmarks, sessions and closures there are."""
         return {
-            "keyframes": self._one("SELECT COUNT(*) FROM keyframe"),
+            "keyframes": len(self._sessions),
             "objects": self._one("SELECT COUNT(*) FROM object"),
             "landmarks": self._one("SELECT COUNT(DISTINCT landmark) FROM object"),
-            "sessions": self._one("SELECT COUNT(DISTINCT session) FROM keyframe"),
+            "sessions": len(set(self._sessions.values())),
             "closures": self._one("SELECT COUNT(*) FROM closure"),
         }
 

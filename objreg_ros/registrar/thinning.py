@@ -3,24 +3,25 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import defaultdict
 from collections.abc import Iterable
-
-REMEMBERED = 4096  # closures that a new one is compared with
 
 
 class Thinning:
-    """Knows the accepted closures of late, and says whether a new pair of moments adds to them."""
+    """Knows the accepted closures, and says whether a new pair of moments adds to them."""
 
     def __init__(self, seconds: float, pairs: Iterable[tuple[int, int]] = ()) -> None:
-        self._span_ns = round(1e9 * seconds)
-        self._pairs: deque[tuple[int, int]] = deque(pairs, maxlen=REMEMBERED)
+        self._span_ns = max(round(1e9 * seconds), 1)
+        self._pairs: defaultdict[int, list[tuple[int, int]]] = defaultdict(list)  # by the span that the later one is in
+        for pair in pairs:
+            self.accept(*pair)
 
     def redundant(self, from_ns: int, to_ns: int) -> bool:
         """Whether an accepted closure joins moments that are both nearer than the span to these."""
         span = self._span_ns
-        return any(abs(a - from_ns) < span and abs(b - to_ns) < span for a, b in self._pairs)
+        pairs = (pair for k in (-1, 0, 1) for pair in self._pairs.get(to_ns // span + k, ()))
+        return any(abs(a - from_ns) < span and abs(b - to_ns) < span for a, b in pairs)
 
     def accept(self, from_ns: int, to_ns: int) -> None:
         """Remember an accepted closure."""
-        self._pairs.append((from_ns, to_ns))
+        self._pairs[to_ns // self._span_ns].append((from_ns, to_ns))

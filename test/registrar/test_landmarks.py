@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from objreg_ros.data import ObjectCloud
 from objreg_ros.registrar.landmarks import Landmarks, Link
@@ -80,3 +81,20 @@ def test_landmarks_are_the_same_after_a_restart() -> None:
     named, _ = landmarks.assign(_seen(1, CUP, BOOK))
     again = Landmarks(PARAMS, named)
     assert _take(again, _seen(2, BOOK)) == [2] and _take(again, _seen(3, box("chair", (2, 0, 2)))) == [3]
+
+
+@pytest.mark.parametrize("x", np.arange(-1.0, 1.0, 0.13))
+def test_an_object_keeps_its_id_wherever_the_place_is(x: float) -> None:
+    landmarks = Landmarks(PARAMS)
+    _take(landmarks, _seen(1, box("chair", (x, 0, 2), 1.0)))
+    _take(landmarks, _seen(2, box("chair", (x + 3.0, 0, 2), 1.0)))
+    assert _take(landmarks, _seen(3, box("chair", (x + 0.25, 0.1, 2), 1.0))) == [1]
+
+
+def test_the_landmarks_of_late_are_those_of_the_session_that_were_seen_last() -> None:
+    landmarks = Landmarks(PARAMS)
+    for number in range(1, 6):
+        _take(landmarks, _seen(number, box("cup", (number, 0, 1)), session=number // 5))
+    _take(landmarks, _seen(6, box("cup", (5, 0, 1)), session=1))
+    assert [known.landmark for known in landmarks.recent(0, 3)] == [3, 4]
+    assert [known.landmark for known in landmarks.recent(1, 3)] == [5]
