@@ -23,30 +23,12 @@ from typing import Any
 
 import click
 import numpy as np
+from tables import RATE_HZ, table_story
 
 from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
-from objreg_ros.simulation import furniture
-from objreg_ros.simulation.objects import make_object
-from objreg_ros.simulation.scenarios import TABLE_CLASSES, Story
-from objreg_ros.simulation.scene import furnished, number, spread
-from objreg_ros.simulation.trajectory import Hand, around, carried
 from objreg_ros.simulation.write import write_story
 
-RATE_HZ = 30.0
 TICKS = os.sysconf("SC_CLK_TCK")
-
-
-def table_story(objects: int, frames: int, seed: int) -> Story:
-    """A camera that goes to and fro before a table with so many objects on it."""
-    rng = np.random.default_rng([seed, objects])
-    table, room = furniture.table(rng, (1.6, 0.9)), furniture.room(rng, (3.0, 3.0))
-    models = [make_object(TABLE_CLASSES[k % len(TABLE_CLASSES)], int(rng.integers(2**31))) for k in range(objects)]
-    laid = spread(rng, sorted(models, key=lambda model: -model.radius), table.boards[0], 0.03)
-    scene = furnished(rng, [(table, np.eye(4))], room).with_objects(number(laid))
-    centre = np.array([0.0, 0.0, table.boards[0][2] + 0.05])
-    way = [point for start, stop in ((-40, 40), (40, -40)) for point in around(centre, 1.3, 0.7, start, stop)]
-    poses, rate = carried(way, frames, RATE_HZ, rng, Hand())
-    return Story((scene,), np.zeros(frames, int), poses, rate)
 
 
 class Witness:

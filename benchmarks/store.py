@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the store costs: inserting and querying at 10^2 to 10^5 objects, size on disk, memory; and kill -9.
+"""What the store costs at 10^2 to 10^5 objects: a frame, inserting, querying, size on disk, memory; and kill -9.
 
     python benchmarks/store.py --json OUT [--quick] [--kills N]
 
@@ -7,7 +7,9 @@
 the index), ``keyframe_query_ms`` (all objects of a keyframe), each with p50 and p95, ``open_s``, ``memory_mb``, and
 ``disk_mb`` (none at 10^5, where the stored objects are light to spare the disk). ``kills``: how often a writing process
 was killed at a random moment, what it had acknowledged, what was lost. The content is made up, of the size that a
-Kinect gives; all objects are of one of nine labels.
+Kinect gives; all objects are of one of nine labels, and all in reach by odometry. ``frames``: what a frame costs the
+registrar, everything included, beside so many light objects of other places (`frame_cost`), and ``frame_ratio`` that
+of the most to the fewest.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ import random
 import signal
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +28,7 @@ from typing import Any, TextIO
 
 import click
 import numpy as np
+from frame_cost import frame_costs, table_frames
 from tqdm import tqdm
 
 from objreg_ros.data import Intrinsics, ObjectCloud, View
@@ -43,6 +46,7 @@ SIZES = (100, 1_000, 10_000, 100_000)
 SAMPLES = 60
 POINTS = 1500  # of an object
 LIGHT = 30  # of an object where as many as 10^5 would fill the disk
+VIEWS = 8  # keyframes that a landmark is seen in
 
 
 def make_keyframe(number: int, draw: np.random.Generator, points: int = POINTS) -> Keyframe:
@@ -81,7 +85,7 @@ def write_forever(path: str, seed: int) -> None:
 def measure_size(objects: int, folder: Path) -> dict[str, Any]:
     """The costs at one number of stored objects."""
     path, draw = folder / f"{objects}.db", np.random.default_rng(0)
-    _fill(path, objects, draw)
+    _fill(path, objects, draw, POINTS if objects < SIZES[-1] else LIGHT)
     disk = path.stat().st_size / 1e6 if objects < SIZES[-1] else None
     before, began = _resident_mb(), time.perf_counter()
     with closing(Store(path)) as store:
@@ -93,6 +97,7 @@ def measure_size(objects: int, folder: Path) -> dict[str, Any]:
         whole = [_ms(index.query, rows) for rows in asked]
         keyframes = [make_keyframe(store.next_keyframe() + i, draw) for i in range(SAMPLES // 3)]
         insert = [_ms(store.add, keyframe, sightings_of(keyframe)) for keyframe in keyframes]
+    path.unlink()
     return {
         "insert_ms": _percentiles(insert),
         "query_ms": _percentiles(single),
@@ -139,12 +144,22 @@ def _lost(path: Path, acknowledged: set[int]) -> set[int]:
     return acknowledged - whole
 
 
-def _fill(path: Path, objects: int, draw: np.random.Generator) -> None:
-    """A store of that many objects: 32 real keyframes, then copies of their rows with other descriptors."""
+def measure_frames(sizes: Sequence[int], folder: Path) -> dict[str, Any]:
+    """What a frame costs beside so many stored objects."""
+    frames, stores = table_frames(folder), [folder / f"frames_{objects}.db" for objects in sizes]
+    for store, objects in zip(stores, sizes, strict=True):
+        _fill(store, objects, np.random.default_rng(1), LIGHT)
+    costs = frame_costs(stores, frames)
+    ratio = costs[-1]["frame_ms"] / costs[0]["frame_ms"]
+    return {"frames": dict(zip(map(str, sizes), costs, strict=True)), "frame_ratio": ratio}
+
+
+def _fill(path: Path, objects: int, draw: np.random.Generator, points: int) -> None:
+    """A store of that many objects: up to 32 made keyframes, then copies of their rows with other descriptors."""
     keyframes, made = objects // PER_KEYFRAME, min(32, objects // PER_KEYFRAME)
     with closing(Store(path)) as store:
         for number in range(1, made + 1):
-            keyframe = make_keyframe(number, draw, POINTS if objects < SIZES[-1] else LIGHT)
+            keyframe = make_keyframe(number, draw, points)
             store.add(keyframe, [_landmark(s, i) for i, s in enumerate(sightings_of(keyframe))])
         connection = store._connection
         names = [row[1] for row in connection.execute("PRAGMA table_info(keyframe)")]
@@ -162,13 +177,15 @@ def _copy_objects(transaction: Any, shift: int, made: int, draw: np.random.Gener
     rows = [dict(row) for row in transaction.execute("SELECT * FROM object WHERE keyframe <= ?", (made,))]
     for row in rows:
         descriptor = np.frombuffer(row["descriptor"], np.float32) + draw.normal(0, 0.3, SIZE).astype(np.float32)
-        row.update(id=None, keyframe=row["keyframe"] + shift, descriptor=descriptor.tobytes())
+        landmark = row["landmark"] + shift // VIEWS * PER_KEYFRAME
+        row.update(id=None, keyframe=row["keyframe"] + shift, landmark=landmark, descriptor=descriptor.tobytes())
     marks = ", ".join(f":{name}" for name in rows[0])
     transaction.executemany(f"INSERT INTO object VALUES ({marks})", rows)
 
 
 def _landmark(sighting: Sighting, number: int) -> Sighting:
-    return sighting.of_landmark(number + 1, np.eye(3))
+    """Its landmark: the objects of so many keyframes in a row are the same."""
+    return sighting.of_landmark((sighting.keyframe_id - 1) // VIEWS * PER_KEYFRAME + number + 1, np.eye(3))
 
 
 def _make_object(instance: int, draw: np.random.Generator, points: int) -> KeyObject:
@@ -204,16 +221,19 @@ def _resident_mb() -> float:
 @click.option("--json", "out", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
 @click.option("--quick", is_flag=True, help="Up to 10^4 objects and 10 kills.")
 @click.option("--kills", type=click.IntRange(min=0), default=200, show_default=True)
-def main(out: Path | None, quick: bool, kills: int) -> None:
+@click.option("--parts", default="sizes,frames,kills", show_default=True, help="What is measured.")
+def main(out: Path | None, quick: bool, kills: int, parts: str) -> None:
     """Measure and print."""
-    sizes = SIZES[:3] if quick else SIZES
-    with tempfile.TemporaryDirectory() as folder:
-        figures: dict[str, Any] = {"sizes": {}}
-        for objects in tqdm(sizes, desc="sizes"):
-            figures["sizes"][str(objects)] = measure_size(objects, Path(folder))
-            (Path(folder) / f"{objects}.db").unlink()
-        count = min(kills, 10) if quick else kills
-        figures["kills"] = measure_kills(count, Path(folder)) if count else None
+    sizes, asked = SIZES[:3] if quick else SIZES, parts.split(",")
+    figures: dict[str, Any] = {}
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        if "sizes" in asked:
+            figures["sizes"] = {str(n): measure_size(n, folder) for n in tqdm(sizes, desc="sizes")}
+        if "frames" in asked:
+            figures |= measure_frames(sizes, folder)
+        if "kills" in asked:
+            figures["kills"] = measure_kills(min(kills, 10) if quick else kills, folder)
     print(json.dumps(figures, indent=1))
     if out is not None:
         out.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
