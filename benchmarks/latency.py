@@ -3,7 +3,8 @@
 
 Simulated recordings are played in real time through the three node processes. A frame's end-to-end latency is from the
 arrival of its image to the registrar's receipt for it; that of a frame that completed a keyframe includes the whole
-search for loops. The books say what every node dropped and why: in = out + dropped.
+search for loops. A constraint's latency is from the arrival of the image that it is about: until its keyframe is
+complete (a second at most), searched for and told. The books say what every node dropped and why: in = out + dropped.
 
     python benchmarks/latency.py --json latency.json
 """
@@ -16,7 +17,7 @@ import random
 import tempfile
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,7 @@ class Witness:
 
     def __init__(self) -> None:
         import rclpy
+        from nav_msgs.msg import Odometry
         from rclpy.context import Context
         from rclpy.executors import SingleThreadedExecutor
         from sensor_msgs.msg import CompressedImage
@@ -46,29 +48,45 @@ class Witness:
 
         self.seen: dict[int, float] = {}
         self.done: dict[tuple[str, int], float] = {}
+        self.told: list[tuple[int, float]] = []  # of each constraint the image that it is about, and when
         self._stamp_ns = stamp_ns
         self._context = Context()
         self._context.init()
         self._node = rclpy.create_node("witness", context=self._context)
         self._node.create_subscription(CompressedImage, "image/compressed", self._see, qos.sensor(True))
         self._node.create_subscription(Header, "finished", self._finish, qos.room(depth=1000))
+        self._node.create_subscription(Odometry, "constraints", self._hear, qos.latched(1000))
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._executor.spin, daemon=True)
         self._thread.start()
 
     def _see(self, message: Any) -> None:
-        self.seen[self._stamp_ns(message)] = time.perf_counter()
+        self.seen[self._stamp_ns(message)] = time.monotonic()
 
     def _finish(self, receipt: Any) -> None:
         node, verdict, *_ = receipt.frame_id.split(" ")
         if verdict == "published":
-            self.done[node, self._stamp_ns(receipt)] = time.perf_counter()
+            self.done[node, self._stamp_ns(receipt)] = time.monotonic()
+
+    def _hear(self, constraint: Any) -> None:
+        self.told.append((self._stamp_ns(constraint), time.monotonic()))
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """From the first image to the last receipt, in seconds of the clock that never jumps."""
+        return min(self.seen.values()), max(self.done.values())
 
     def latency_ms(self, node: str) -> dict[str, float]:
         """p50 and p95 from the image to the node's receipt, and of how many frames."""
-        times = [1e3 * (at - self.seen[stamp]) for (name, stamp), at in self.done.items() if name == node
-                 and stamp in self.seen]  # fmt: skip
+        return self._latency_ms([(stamp, at) for (name, stamp), at in self.done.items() if name == node])
+
+    def constraint_ms(self) -> dict[str, float]:
+        """The same to the constraints about an image."""
+        return self._latency_ms(self.told)
+
+    def _latency_ms(self, ends: Sequence[tuple[int, float]]) -> dict[str, float]:
+        times = [1e3 * (at - self.seen[stamp]) for stamp, at in ends if stamp in self.seen]
         if not times:
             return {"frames": 0.0}
         p50, p95 = np.percentile(times, (50, 95))
@@ -100,18 +118,17 @@ class Meter:
                     self.samples[room].append((time.monotonic(), *sample))
             time.sleep(1.0)
 
-    def figures(self, seconds: float) -> dict[str, dict[str, float]]:
-        """Room → share of one core over the last ``seconds`` before the end, and the largest memory in MB."""
+    def figures(self, start: float, stop: float) -> dict[str, dict[str, float]]:
+        """Room → share of one core between the two moments, and the largest memory in MB."""
         self._open = False
         self._thread.join()
         out = {}
         for room, rows in self.samples.items():
             if len(rows) < 2:
                 continue
-            recent = [row for row in rows if row[0] >= rows[-1][0] - seconds]
-            span = max(recent[-1][0] - recent[0][0], 1e-9)
-            cpu = 100 * (recent[-1][1] - recent[0][1]) / span
-            out[room] = {"cpu_percent": round(cpu, 1), "memory_mb": round(max(row[2] for row in rows), 1)}
+            at, seconds, memory = np.array(rows).T
+            cpu = 100 * np.diff(np.interp((start, stop), at, seconds))[0] / (stop - start)
+            out[room] = {"cpu_percent": round(float(cpu), 1), "memory_mb": round(float(memory.max()), 1)}
         return out
 
 
@@ -175,11 +192,12 @@ def measure(objects: int, frames: int, seed: int, node_args: Mapping[str, list[s
         witness, meter = Witness(), Meter()
         try:
             live = run_live(path, Setup(node_args=node_args), Path(logs), lambda words: click.echo(words, err=True))
-            usage = meter.figures(frames / RATE_HZ)
+            usage = meter.figures(*witness.span)
             latency = {node: witness.latency_ms(node) for node in ROOMS}
+            told = witness.constraint_ms()
         finally:
             witness.close()
-        return {"end_to_end_ms": latency, "books": books_of(live), "usage": usage, "constraints": len(live.closures)}
+        return {"end_to_end_ms": latency, "constraint_ms": told, "books": books_of(live), "usage": usage}
 
 
 @click.command()
@@ -196,8 +214,9 @@ def main(objects: str, frames: int, seed: int, model: str, json_file: Path | Non
     rows = {}
     for count in (int(text) for text in objects.split(",")):
         rows[str(count)] = measure(count, frames, seed, node_args)
-        registrar, usage = rows[str(count)]["end_to_end_ms"]["registrar"], rows[str(count)]["usage"]
-        click.echo(f"{count} objects: end to end {registrar}, usage {usage}")
+        row = rows[str(count)]
+        frames, told = row["end_to_end_ms"]["registrar"], row["constraint_ms"]
+        click.echo(f"{count} objects: end to end {frames}, constraints {told}, usage {row['usage']}")
     if json_file is not None:
         json_file.write_text(json.dumps({"rate_hz": RATE_HZ, "objects": rows}, indent=1))
 

@@ -30,6 +30,12 @@ def run(make: Callable[[], Door], args: Sequence[str] | None = None) -> int:
         gc.freeze()  # else Python looks through every object of every library once more before it ends
 
 
+def _settle() -> None:
+    """What was made at the start stays: no collection of garbage has to look through it between two frames."""
+    gc.collect()
+    gc.freeze()
+
+
 def _serve(make: Callable[[], Door], transport: str) -> int:
     try:
         door = make()
@@ -37,6 +43,7 @@ def _serve(make: Callable[[], Door], transport: str) -> int:
         print(" ".join(str(error).split()), file=sys.stderr)
         return 1
     door.get_logger().info(transport)
+    _settle()
     executor = SingleThreadedExecutor()
     executor.add_node(door)
     try:
