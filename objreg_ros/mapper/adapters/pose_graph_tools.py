@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from objreg_ros.data import LoopClosure
-from objreg_ros.geometry import quaternion_from_rotation
+from objreg_ros.mapper.adapters.pose import fill_pose
 from objreg_ros.mapper.constraint import Constraint, inverted
 
 LOOPCLOSE = 1
@@ -21,8 +21,6 @@ def fill_edge(edge: Any, closure: LoopClosure, robot: int = 0) -> Any:
     edge.key_from, edge.key_to = closure.from_ns, closure.to_ns
     edge.robot_from = edge.robot_to = robot
     edge.type = LOOPCLOSE
-    where, turn = edge.pose.position, edge.pose.orientation
-    where.x, where.y, where.z = map(float, constraint.T_from_to[:3, 3])
-    turn.x, turn.y, turn.z, turn.w = map(float, quaternion_from_rotation(constraint.T_from_to[:3, :3]))
+    fill_pose(edge.pose.position, edge.pose.orientation, constraint.T_from_to)
     edge.covariance = constraint.covariance.ravel().tolist()
     return edge
