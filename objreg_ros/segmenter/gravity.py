@@ -15,7 +15,10 @@ from objreg_ros.data import Array
 CANDIDATES = 64
 CLUSTER = np.float32(np.cos(np.radians(8.0)))
 RIVAL = np.float32(np.cos(np.radians(16.0)))
-CONES = tuple(np.cos(np.radians((10.0, 8.0, 6.0, 6.0))).tolist())  # in which the middle of a cluster is sought
+CONES = tuple(
+    np.cos(np.radians((16.0, 12.0, 10.0, 8.0, 6.0, 6.0))).tolist()
+)  # in which the middle of a cluster is sought
+LEAST = 0.1  # confidence; a guess that deserves less is none
 ENOUGH = 0.10  # share of the normals that makes a cluster fully believed
 MIN_NORMALS = 20
 
@@ -31,11 +34,11 @@ def estimate_up(normals: Array, prior: Array, cone_deg: float) -> tuple[Array | 
 
     ``normals (N, 3)`` of length 1, towards the camera. Only clusters within ``cone_deg`` of ``prior`` count; each is
     weighed by the fourth power of the cosine to the prior. The confidence is what the cluster's weight leads the best
-    other cluster by, less where only a small part of the frame is level.
+    other cluster by, less where only a small part of the frame is level; below 0.1 there is no answer.
     """
     limit = np.float32(np.cos(np.radians(cone_deg)))
     up, confidence = _estimate(normals, prior.astype(np.float32), limit)
-    return (up, confidence) if confidence > 0 else (None, 0.0)
+    return (up, confidence) if confidence >= LEAST else (None, 0.0)
 
 
 @numba.njit(cache=True, nogil=True)

@@ -29,7 +29,7 @@ class SegmenterParams(Params):
     roll: float = param(
         0.0, "how far clockwise, as it looks, the camera is mounted; 180: upside down", "deg", ge=-360.0, le=360.0
     )
-    up_tilt: float = param(65.0, "most tilt of the camera from upright, apart from `roll`", "deg", ge=5.0, le=89.0)
+    up_tilt: float = param(75.0, "most tilt of the camera from upright, apart from `roll`", "deg", ge=5.0, le=89.0)
     support_area: float = param(0.02, "least visible area of a support surface", "m²", ge=0.0)
     view_step: int = param(4, "the view keeps one pixel of so many in each row and column", ge=1, le=32)
 

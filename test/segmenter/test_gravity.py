@@ -31,6 +31,20 @@ def test_two_candidates_alike_give_little_confidence() -> None:
     assert confidence < 0.3
 
 
+def test_a_guess_that_deserves_little_confidence_is_none() -> None:
+    rng = np.random.default_rng(0)
+    anywhere = rng.normal(0, 1, (4000, 3))
+    anywhere = (anywhere / np.linalg.norm(anywhere, axis=1, keepdims=True)).astype(np.float32)
+    assert estimate_up(anywhere, camera_up(0.0), 75.0) == (None, 0.0)
+
+
+def test_noise_does_not_pull_up_towards_the_camera_s_own() -> None:
+    floor = np.array([0.0, -np.cos(np.radians(68)), -np.sin(np.radians(68))])
+    up, _ = estimate_up(around(floor, 3000, spread=0.15), camera_up(0.0), 75.0)
+    assert up is not None
+    assert up @ floor > np.cos(np.radians(3.0))
+
+
 def test_a_camera_turned_clockwise_has_up_to_its_left() -> None:
     np.testing.assert_allclose(camera_up(0.0), (0, -1, 0), atol=1e-12)
     np.testing.assert_allclose(camera_up(90.0), (-1, 0, 0), atol=1e-12)

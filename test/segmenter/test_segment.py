@@ -39,6 +39,14 @@ def test_gravity_is_the_way_things_fall() -> None:
     assert frame.gravity_confidence > 0.9
 
 
+@pytest.mark.parametrize("tilt", [5, 40, 72])
+def test_gravity_is_found_however_steeply_the_camera_looks_down(tilt: float) -> None:
+    scene = Scene(tilt_deg=tilt).plane().box((-0.1, 0.0, 0), (0.1, 0.1, 0.1))
+    frame = Segmenter().segment(scene.detections(), scene.image(2 * NOISE))
+    assert frame.gravity is not None
+    assert np.degrees(np.arccos(-frame.gravity @ scene.up)) < 1.0
+
+
 def test_a_given_gravity_is_handed_on_with_full_confidence() -> None:
     scene = two_boxes()
     frame = Segmenter().segment(scene.detections(scene.box_of(2)), scene.image(NOISE), gravity=-2 * scene.up)
