@@ -15,9 +15,7 @@ from objreg_ros.data import Array
 CANDIDATES = 64
 CLUSTER = np.float32(np.cos(np.radians(8.0)))
 RIVAL = np.float32(np.cos(np.radians(16.0)))
-CONES = tuple(
-    np.cos(np.radians((16.0, 12.0, 10.0, 8.0, 6.0, 6.0))).tolist()
-)  # in which the middle of a cluster is sought
+CONES = tuple(np.cos(np.radians((16.0, 12.0, 10.0, 8.0, 6.0, 6.0))).tolist())  # where a cluster's middle is sought
 LEAST = 0.1  # confidence; a guess that deserves less is none
 ENOUGH = 0.10  # share of the normals that makes a cluster fully believed
 MIN_NORMALS = 20

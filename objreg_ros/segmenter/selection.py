@@ -22,8 +22,10 @@ MIN_GAIN = 0.03  # in fit: what another part must add
 SMALL_GAIN = 0.005  # what a part must add that is wholly there and touches
 MIN_TOUCH = 3  # cells that two parts of one object touch in
 GAP = 0.08  # of the box's size: how far apart two parts of one object are where they are neighbours
+GAP_GAIN = 0.25  # what is added to it with the gain in fit
 GAP_ALIKE = 0.25  # the same, for parts of one colour
-FELLOW_GAIN = 0.15  # in fit: what a part must add that is only seen apart from the others, as a seat from its back
+AS_WIDE = 0.7  # of the width of both: what they share of it
+FELLOW_GAIN = 0.08  # in fit: what a part must add that is only seen apart from the others, as a seat from its back
 FELLOW_FIGURE = 0.5  # such a part with less of its depth jumps its own silhouette is background
 FELLOW_DEPTH = 0.15  # of its depth: how much nearer or farther such a part may be
 
@@ -89,10 +91,18 @@ def _touches(parts, chosen, k):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _is_close(parts, chosen, seed, k):  # type: ignore[no-untyped-def]
-    """Whether a depth jump keeps part k from what is chosen, but no more than within one object."""
+def _is_as_wide(a, b):  # type: ignore[no-untyped-def]
+    """Whether two extents lie above each other and are about as wide, as the inside and the outside of a bowl."""
+    return min(a[2], b[2]) - max(a[0], b[0]) >= AS_WIDE * (max(a[2], b[2]) - min(a[0], b[0]))
+
+
+@numba.njit(cache=True, nogil=True)
+def _is_close(parts, chosen, seed, k, gain):  # type: ignore[no-untyped-def]
+    """Whether a depth jump keeps part k from what is chosen, but no more than within one object.
+
+    The jump may be the wider the more the part is needed to fill the box: its ``gain`` in fit."""
     for c in range(len(chosen)):
-        limit = (GAP_ALIKE if parts.alike[c, k] else GAP) * parts.size[seed]
+        limit = (GAP_ALIKE if parts.alike[c, k] else GAP + GAP_GAIN * gain) * parts.size[seed]
         if chosen[c] and parts.gap[c, k + 1] < limit * limit:
             return True
     return False
@@ -115,13 +125,19 @@ def _has_its_colour(parts, chosen, k):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _lies_on(parts, chosen, k):  # type: ignore[no-untyped-def]
-    """Whether part k hides more of what is chosen than that hides of it, and has another colour."""
+def _hides(parts, chosen, k):  # type: ignore[no-untyped-def]
+    """Whether part k hides more of what is chosen than that hides of it."""
     lead = 0
     for c in range(len(chosen)):
         if chosen[c]:
             lead += parts.front[k, c + 1] - parts.front[c, k + 1]
-    return lead > 0 and not _has_its_colour(parts, chosen, k)
+    return lead > 0
+
+
+@numba.njit(cache=True, nogil=True)
+def _lies_on(parts, chosen, k):  # type: ignore[no-untyped-def]
+    """Whether part k hides what is chosen, and has another colour."""
+    return _hides(parts, chosen, k) and not _has_its_colour(parts, chosen, k)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -137,8 +153,9 @@ def _best_addition(parts, chosen, seed, window):  # type: ignore[no-untyped-def]
         if gain <= most or gain <= SMALL_GAIN:
             continue
         touching = _touches(parts, chosen, k)
+        stretch = gain if _is_as_wide(extent, _extent(parts, k)) else 0.0
         no_background = parts.figure[k] >= MIN_FIGURE or _has_its_colour(parts, chosen, k)
-        near = touching or (no_background and _is_close(parts, chosen, seed, k))
+        near = touching or (no_background and _is_close(parts, chosen, seed, k, stretch))
         if not near and not (gain > FELLOW_GAIN and _is_fellow(parts, chosen, seed, k)):
             continue
         if gain > MIN_GAIN or (touching and parts.pure[k] >= WHOLE and not _lies_on(parts, chosen, k)):
@@ -155,9 +172,10 @@ def _add_enclosed(parts, chosen, seed, window):  # type: ignore[no-untyped-def]
     for k in range(len(chosen)):
         a, b, c, d = _extent(parts, k)
         within = a >= left - slack_u and b >= top - slack_v and c <= right + slack_u and d <= bottom + slack_v
-        if before[k] or not within or parts.pure[k] < WHOLE or _lies_on(parts, before, k):
+        own = parts.figure[k] >= MIN_FIGURE and _has_its_colour(parts, before, k) and not _hides(parts, before, k)
+        if before[k] or not (within or own) or parts.pure[k] < WHOLE or _lies_on(parts, before, k):
             continue
-        chosen[k] = _touches(parts, before, k) or _is_close(parts, before, seed, k)
+        chosen[k] = _touches(parts, before, k) or _is_close(parts, before, seed, k, 0.0)
 
 
 @numba.njit(cache=True, nogil=True)

@@ -52,6 +52,19 @@ def test_an_object_behind_another_is_found_by_its_own_box() -> None:
     assert found[3] < 0.1
 
 
+def test_the_inside_of_a_hollow_thing_belongs_to_it_whatever_its_colour() -> None:
+    scene = Scene(tilt_deg=45).plane().box((-0.12, 0.03, 0), (0.12, 0.22, 0.085)).box((-0.12, 0, 0), (0.12, 0.01, 0.11))
+    found, _ = shares(scene, scene.box_of(2, 3))
+    assert min(found[2], found[3]) > 0.9
+
+
+def test_a_narrow_thing_before_a_wide_one_is_not_added_to_it() -> None:
+    scene = Scene().plane().box((-0.1, 0, 0), (0.1, 0.08, 0.2)).box((-0.03, -0.09, 0), (0.03, -0.03, 0.1))
+    found, _ = shares(scene, scene.box_of(2, 3))
+    assert found[2] > 0.85
+    assert found[3] < 0.05
+
+
 def test_a_thing_without_support_is_still_segmented_and_says_so() -> None:
     scene = Scene(tilt_deg=10).box((-0.15, 0.2, -0.1), (0.15, 0.3, 0.1))
     found, flags = shares(scene, scene.box_of(1))
