@@ -12,11 +12,12 @@ import numpy as np
 from objreg_ros.data import Array, LoopClosure, Odometry
 from objreg_ros.geometry import inverse, rotation_angle
 from objreg_ros.mapper.constraint import Constraint, between_keyframes, open3d_information
-from objreg_ros.mapper.optimisation import Edge, Solution, optimise
+from objreg_ros.mapper.optimisation import Edge, Solution, optimise, squared_residual
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.steady import Steady, estimate, step
 from objreg_ros.mapper.trajectory import Trajectory
 
+FREEDOMS = 6  # of a closure
 ROUNDS = 6  # most times that odometry is corrected
 SETTLED = 5e-4  # rad/m and m/m: a change of its steady error that matters no more
 
@@ -40,18 +41,36 @@ class Problem(NamedTuple):
     def solve(self) -> Solution:
         """The poses that agree best with odometry and with the closures that can be believed.
 
-        In turn the poses, and what they say is steadily wrong with odometry, until that changes little.
+        With what is steadily wrong with odometry only where that explains as much more as three more numbers must
+        (Schwarz, "Estimating the dimension of a model", 1978): a few closures that are all a little wrong one way are
+        no evidence of it.
         """
-        if all(tie.closure is None for tie in self.ties):
+        closures = sum(tie.closure is not None for tie in self.ties)
+        if closures == 0:
             return Solution(self.poses, (True,) * len(self.ties))
-        known, solution = Steady(), self._solved(self.poses, Steady())
-        for _ in range(ROUNDS if any(self.params.steady) else 0):
+        plain = self._solved(self.poses, Steady())
+        if not any(self.params.steady):
+            return plain
+        steady, solution = self._calibrated(plain)
+        gain = self._misfit(plain, Steady()) - self._misfit(solution, steady)
+        return solution if gain > len(steady) * np.log(FREEDOMS * closures) else plain
+
+    def _calibrated(self, solution: Solution) -> tuple[Steady, Solution]:
+        """In turn what the poses say is steadily wrong with odometry, and the poses, until the first changes little."""
+        found = Steady()
+        for _ in range(ROUNDS):
+            known = found
             found = estimate(self.poses, solution.poses, self.params.odometry_sigmas, self.params.steady)
             solution = self._solved(solution.poses, found)
             if np.allclose(found, known, atol=SETTLED):
                 break
-            known = found
-        return solution
+        return found, solution
+
+    def _misfit(self, solution: Solution, steady: Steady) -> float:
+        """The squared residuals of odometry and closures in their standard deviations, and those of what is steady."""
+        residuals = [squared_residual(solution.poses, _edge(self._corrected(tie, steady))) for tie in self.ties]
+        unexpected = [part / sigma for part, sigma in zip(steady, self.params.steady, strict=True) if sigma > 0]
+        return float(np.minimum(residuals, self.params.max_residual**2).sum() + np.square(unexpected).sum())
 
     def _solved(self, start: Sequence[Array], steady: Steady) -> Solution:
         """The solution from where it starts, with odometry corrected."""
