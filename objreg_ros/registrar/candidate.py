@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
+
+import numpy as np
 
 from objreg_ros.data import Alignment, Array
 
@@ -45,7 +47,8 @@ class Candidate:
     None where one is unknown; ``likeness`` is how alike the explained objects look, -1..1, None where that is unknown;
     ``yaw_known`` says that the shape of one of them tells its yaw; ``margin`` is how much more the candidate is worth
     than any other. ``resistance`` is how much less the views like the pose pushed to where it would be false,
-    along the direction in which it is known least; None where it is known well enough without.
+    along the directions in which it is known least; None where it is known well enough without. ``warp (6, 6)`` is the
+    covariance [t r] that a warped depth adds to the alignment's.
     """
 
     alignment: Alignment
@@ -59,6 +62,7 @@ class Candidate:
     yaw_known: bool = False
     margin: float = 0.0
     resistance: float | None = None
+    warp: Array = field(default_factory=lambda: np.zeros((6, 6)))
 
     @property
     def T_target_source(self) -> Array:

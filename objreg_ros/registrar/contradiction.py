@@ -6,6 +6,9 @@ what makes the covariance of an ICP over-confident. So each patch speaks once, w
 cluster-robust covariance H^-1 (sum of g g') H^-1 (White, "Maximum likelihood estimation of misspecified models", 1982;
 Liang and Zeger, "Longitudinal data analysis using generalized linear models", 1986), beside the usual H^-1. Points are
 weighed by the noise that a structured-light camera has at their depth.
+
+What two views share may be few patches, far away and on one side: then there is nothing to contradict, and a depth that
+is a little wrong there turns the camera about them and takes it far. `warped` says how far.
 """
 
 from __future__ import annotations
@@ -44,6 +47,23 @@ def information(xyz: Array, normals: Array, surface: Surface, T: Array, params: 
     return np.linalg.inv((C + C.T) / 2.0)
 
 
+def warped(xyz: Array, normals: Array, surface: Surface, T: Array, params: RegistrarParams) -> Array:
+    """The covariance (6, 6) of a left step [t r] of a pose (4, 4) that wrong depths make, on top of `information`.
+
+    The depth of each patch is wrong by a share ``depth_warp`` of the distance, one standard deviation, as it is of a
+    camera whose depths bend with the place in the image.
+    """
+    noise = params.depth_noise, params.depth_noise_growth
+    J, _, weight, at = _pairs(
+        xyz, normals, surface.xyz, surface.normals, surface.closest, surface.low, surface.cell, T,
+        params.reaches[-1], noise,
+    )  # fmt: skip
+    inverse = np.linalg.inv((J.T * weight) @ J + np.eye(FREEDOMS))
+    error = params.depth_warp * np.linalg.norm(at, axis=1)
+    g = _pulls(J, weight * error, _patches(at, J[:, :3], params.covariance_patch))
+    return np.asarray(inverse @ g @ g.T @ inverse)
+
+
 def _patches(at: Array, normals: Array, edge: float) -> Array:
     """The patch (n,) int64 that each point is of: a cube of space, and which way the surface faces."""
     cells = np.concatenate([np.floor(at / edge), np.rint(normals)], axis=1).astype(np.int64) + 512
@@ -52,10 +72,15 @@ def _patches(at: Array, normals: Array, edge: float) -> Array:
 
 def _spread(J: Array, pull: Array, patch: Array) -> Array:
     """The sum (6, 6) of g g' over the patches, for as few patches as there are."""
-    _, index = np.unique(patch, return_inverse=True)
-    g = np.stack([np.bincount(index.ravel(), J[:, k] * pull) for k in range(FREEDOMS)])
+    g = _pulls(J, pull, patch)
     count = g.shape[1]
     return np.asarray(g @ g.T * (count / max(1, count - FREEDOMS)))
+
+
+def _pulls(J: Array, pull: Array, patch: Array) -> Array:
+    """The sum of the pulls of the points of each patch: (6, number of patches)."""
+    _, index = np.unique(patch, return_inverse=True)
+    return np.stack([np.bincount(index.ravel(), J[:, k] * pull) for k in range(FREEDOMS)])
 
 
 @numba.njit(cache=True, nogil=True)

@@ -20,7 +20,7 @@ from objreg_ros.registrar.keyframe import Keyframe
 from objreg_ros.registrar.objects import Pairs, explain
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Pantry, Prepared
-from objreg_ros.registrar.refine import refine, settle
+from objreg_ros.registrar.refine import refine, settle, warp
 from objreg_ros.registrar.scene_search import from_shapes
 from objreg_ros.registrar.shape import upright_motion
 from objreg_ros.registrar.shape_score import alike
@@ -159,6 +159,7 @@ class Engine:
             likeness=likeness(source, target, explained, T, params),
             yaw_known=any(source.yaw_known[pair.source] and target.yaw_known[pair.target] for pair in explained),
             gravity_error_deg=gravity_error_deg(source, target, T),
+            warp=warp(source, target, T, params),
         )
         if is_held(candidate, params):
             candidate = replace(candidate, alignment=held(alignment))
@@ -166,7 +167,7 @@ class Engine:
 
     def _resistance(self, pair: Pair, candidate: Candidate) -> float | None:
         """How the views resist a push to where the pose would be false; None where it is known well."""
-        C = spread_of(candidate.alignment, self._params)
+        C = spread_of(candidate.alignment, self._params) + candidate.warp
         if worst_translation(C) <= self._params.doubtful_sigma:
             return None
         return resistance(pair.source, pair.target, candidate.T_target_source, C, self._params)

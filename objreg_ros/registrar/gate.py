@@ -149,17 +149,21 @@ def _stationary(candidate: Candidate, params: RegistrarParams) -> Refusal | None
 
 
 def _held(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
-    """Whether the pose is known: by its covariance, and where that is large by a push that the views like less.
+    """Whether the pose is known: by its covariance and a push that the views like less, or by the latter alone.
 
-    A camera that goes sideways and turns to keep looking at one far thing sees next to no difference.
+    The covariance is that of the residuals and of a warped depth: two views may share few patches on one side, which
+    agree with many poses. A camera that goes sideways and turns to keep looking at one far thing sees next to no
+    difference. What is free to slide is not known by any push.
     """
-    sigma = worst_translation(spread_of(candidate.alignment, params))
-    if sigma > params.max_slack_sigma:
-        return Reason.SLACK, f"sigma {sigma:.3f} m > {params.max_slack_sigma:.3f} m"
+    sigma = worst_translation(spread_of(candidate.alignment, params) + candidate.warp)
     drop = candidate.resistance
-    if drop is None or drop >= params.rival_margin:
+    known = sigma <= params.max_slack_sigma
+    least = params.rival_margin if known else params.firm_margin
+    if not known and (drop is None or len(candidate.alignment.slack) > 0):
+        return Reason.SLACK, f"sigma {sigma:.3f} m > {params.max_slack_sigma:.3f} m"
+    if drop is None or drop >= least:
         return None
-    return Reason.SLACK, f"V falls by {drop:.2f} < {params.rival_margin:.2f} over {params.pushes[-1]:.2f} m"
+    return Reason.SLACK, f"V falls by {drop:.2f} < {least:.2f} over {params.pushes[-1]:.2f} m, sigma {sigma:.3f} m"
 
 
 def _odometry(candidate: Candidate, params: RegistrarParams, prior: Prior) -> Refusal | None:

@@ -107,6 +107,9 @@ class RegistrarParams(Params):
     pushes: tuple[float, ...] = param(
         (0.05, 0.1, 0.15), "a pose pushed so far along such a direction that the views like it less is held there", "m"
     )
+    depth_warp: float = param(
+        0.005, "error of depth that a patch of surface shares, as a share of its distance", ge=0.0, le=0.1
+    )
     doubtful_sigma: float = param(
         0.006, "a position that is known less well than this is pushed as far as the last of these", "m", ge=0.0
     )
@@ -147,7 +150,8 @@ class RegistrarParams(Params):
     )
     max_gravity_error: float = param(5.0, "largest angle between the gravities", "deg", ge=0.0, le=180.0)
     max_translation: float = param(5.0, "largest distance between the two cameras", "m", ge=0.0)
-    max_slack_sigma: float = param(0.02, "largest standard deviation along any translation", "m", ge=0.0)
+    max_slack_sigma: float = param(0.03, "largest standard deviation along any translation", "m", ge=0.0)
+    firm_margin: float = param(0.4, "unless the views like a push so much less", ge=0.0)
     odometry_sigmas: float = param(4.0, "largest distance from odometry in its standard deviations", ge=0.0)
 
     # How wrong an accepted pose may be; config/covariance.yaml says how these were calibrated.

@@ -12,7 +12,7 @@ import numpy as np
 
 from objreg_ros.data import Alignment, Array
 from objreg_ros.geometry import skew, transform
-from objreg_ros.registrar.contradiction import information
+from objreg_ros.registrar.contradiction import information, warped
 from objreg_ros.registrar.direct import finish
 from objreg_ros.registrar.icp import Fit, align, fit
 from objreg_ros.registrar.params import RegistrarParams
@@ -84,6 +84,14 @@ def about_camera(H: Array, T_target_source: Array) -> Array:
     A = np.eye(6)
     A[:3, 3:] = skew(T_target_source[:3, 3])
     return np.asarray(A.T @ H @ A)
+
+
+def warp(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> Array:
+    """The covariance (6, 6) [t r] of the source camera's pose that a warped depth makes, in the target's axes."""
+    C = warped(source.xyz, source.normals, target.surface, T_target_source, params)
+    A = np.eye(6)
+    A[:3, 3:] = -skew(T_target_source[:3, 3])
+    return np.asarray(A @ C @ A.T)
 
 
 def slack(found: Fit, T_target_source: Array, middle: Array, least_share: float) -> Array:

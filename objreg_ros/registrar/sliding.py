@@ -42,12 +42,13 @@ def resisted(
 def resistance(source: Prepared, target: Prepared, T_target_source: Array, C: Array, params: RegistrarParams) -> float:
     """How much less the views like the pose, at least, when it is pushed either way where it is known least.
 
-    ``C (6, 6)`` [t r] is its covariance in the target's axes. It is pushed as far as the last of ``params.pushes``, the
-    way that its errors go: a camera that looks at one far thing goes sideways and turns to keep looking at it.
+    ``C (6, 6)`` [t r] is its covariance in the target's axes. Along the two directions in which it is largest the pose
+    is pushed as far as the last of ``params.pushes``, the way that its errors go: a camera that looks at one far thing
+    goes sideways and turns to keep looking at it.
     """
     values, vectors = np.linalg.eigh(C[:3, :3])
-    motion = params.pushes[-1] / values[-1] * (C[:, :3] @ vectors[:, -1])
-    poses = (T_target_source, pushed(T_target_source, motion), pushed(T_target_source, -motion))
+    motions = [params.pushes[-1] / values[k] * (C[:, :3] @ vectors[:, k]) for k in (1, 2)]
+    poses = [T_target_source] + [pushed(T_target_source, way * motion) for motion in motions for way in (-1, 1)]
     score, *others = (verify(source.sight, target.sight, T, params, params.grey_points).score for T in poses)
     return score - max(others)
 

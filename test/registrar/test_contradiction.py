@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from objreg_ros.data import Array
-from objreg_ros.registrar.contradiction import information
+from objreg_ros.registrar.contradiction import information, warped
 from objreg_ros.registrar.icp import Surface, prepare_surface
 from objreg_ros.registrar.params import RegistrarParams
 
@@ -71,3 +72,20 @@ def test_what_no_point_resists_is_next_to_unknown() -> None:
 def test_without_partners_nothing_is_known() -> None:
     xyz, normals = (part.astype(np.float32) for part in corner(0.1))
     assert np.array_equal(information(xyz + 5.0, normals, grid_of(xyz, normals), np.eye(4), PARAMS), np.eye(6))
+
+
+def worst_shift(xyz: Array, normals: Array, share: float) -> float:
+    """How far a camera at the origin may be, by a warp of so much, that sees oriented points."""
+    flat = xyz.astype(np.float32), normals.astype(np.float32)
+    C = warped(*flat, grid_of(xyz, normals), np.eye(4), PARAMS.replaced(depth_warp=share))
+    return float(np.sqrt(np.linalg.eigvalsh(C[:3, :3])[-1]))
+
+
+def test_a_warped_depth_makes_a_pose_as_wrong_as_it_is_warped() -> None:
+    assert worst_shift(*corner(0.05), 0.02) == pytest.approx(2.0 * worst_shift(*corner(0.05), 0.01), rel=0.01)
+
+
+def test_a_warped_depth_turns_a_camera_more_about_a_small_thing_than_about_a_large_one() -> None:
+    xyz, normals = corner(0.05)
+    near_the_corner = np.linalg.norm(xyz - np.array([0.0, 0.0, 2.0]), axis=1) < 0.45
+    assert worst_shift(xyz[near_the_corner], normals[near_the_corner], 0.01) > 1.5 * worst_shift(xyz, normals, 0.01)

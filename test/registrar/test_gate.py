@@ -125,3 +125,17 @@ def test_chains_that_agree_in_a_plain_room_do_not_speak_for_an_object_that_could
     refusal = refuse(lone(**doubt, agreeing_chains=("features", "objects")), PARAMS)
     assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
     assert refuse(lone(**doubt, texture=0.6, margin=0.6), PARAMS) is None
+
+
+def test_a_pose_that_a_warped_depth_would_move_far_is_refused_as_sliding() -> None:
+    moved_by = PARAMS.max_slack_sigma * np.array([0.9, 1.1])
+    kept, refused = (refuse(candidate(warp=np.diag([s**2, 0, 0, 0, 0, 0])), PARAMS) for s in moved_by)
+    assert kept is None
+    assert refused is not None and refused[0] is Reason.SLACK
+
+
+def test_a_pose_that_the_surfaces_do_not_hold_may_be_held_by_the_views_alone() -> None:
+    loose = {"warp": np.diag([(2.0 * PARAMS.max_slack_sigma) ** 2, 0, 0, 0, 0, 0])}
+    assert refuse(candidate(**loose, resistance=PARAMS.firm_margin), PARAMS) is None
+    assert refuse(candidate(**loose, resistance=PARAMS.firm_margin - 0.01), PARAMS) is not None
+    assert refuse(candidate(**loose, resistance=PARAMS.firm_margin, slack=np.eye(6)[:1]), PARAMS) is not None
