@@ -22,9 +22,9 @@ def cut(image: DepthImage, box: Box, params: SegmenterParams) -> Pixels:
     camera = image.intrinsics
     z_max, y_max = params.limits
     z = image.depth[y0:y1, x0:x1]
-    x = z * ((np.arange(x0, x1) - camera.cx) / camera.fx).astype(np.float32)[None, :]
-    y = z * ((np.arange(y0, y1) - camera.cy) / camera.fy).astype(np.float32)[:, None]
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore"):  # depth may be infinite
+        x = z * ((np.arange(x0, x1) - camera.cx) / camera.fx).astype(np.float32)[None, :]
+        y = z * ((np.arange(y0, y1) - camera.cy) / camera.fy).astype(np.float32)[:, None]
         passed = (z > params.z_min) & (z < z_max) & (np.abs(y) < y_max)
     v, u = np.nonzero(passed)
     xyz = np.stack([x[passed], y[passed], z[passed]], axis=-1)

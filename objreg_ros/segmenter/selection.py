@@ -58,9 +58,7 @@ def _choose(parts, window):  # type: ignore[no-untyped-def]
     if count == 0:
         return table
     chosen = table[1:]
-    seed = _seed(parts, window)
-    chosen[seed] = True
-    best = _best_addition(parts, chosen, seed, window)
+    best = seed = _seed(parts, window)
     while best >= 0:
         chosen[best] = True
         best = _best_addition(parts, chosen, seed, window)

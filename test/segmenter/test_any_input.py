@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from objreg_ros.data import DepthImage, Detections, Intrinsics, PointCloud
+from objreg_ros.data import DepthImage, Detections, Intrinsics, ObjectCloud, PointCloud
 from objreg_ros.segmenter.organise import organise
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
@@ -44,6 +44,30 @@ def boxes_of(boxes: list[tuple[float, ...]], image_hw: tuple[int, int]) -> Detec
     )
 
 
+def require_inside(thing: ObjectCloud, camera: Intrinsics, box: tuple[float, ...], image_hw: tuple[int, int]) -> None:
+    """Every pixel of the object lies wholly within its box, that is one of a picture of ``image_hw``."""
+    uv = np.rint(thing.xyz[:, :2] / thing.xyz[:, 2:] * (camera.fx, camera.fy) + (camera.cx, camera.cy))
+    low, high = np.array(box).reshape(2, 2) * (camera.width / image_hw[1], camera.height / image_hw[0])
+    assert (uv >= low - 1e-2).all()
+    assert (uv + 1 <= high + 1e-2).all()
+
+
+LARGE = st.sampled_from([(240, 320), (480, 640), (480, 848), (720, 1280), (360, 37)])
+SHARES = st.tuples(*[st.floats(-0.25, 1.25, width=32)] * 4)
+
+
+@settings(max_examples=25, deadline=None)
+@given(size=LARGE, seed=st.integers(0, 10_000), boxes=st.lists(SHARES, max_size=4), image_hw=LARGE)
+def test_cameras_of_every_size_give_points_of_their_boxes_alone(
+    size: tuple[int, int], seed: int, boxes: list[tuple[float, ...]], image_hw: tuple[int, int]
+) -> None:
+    h, w = image_hw
+    pixels = [(a * w, b * h, c * w, d * h) for a, b, c, d in boxes]
+    image = DepthImage(depth=relief(*size, seed, 0.1), rgb=None, intrinsics=camera_of(*size), stamp_ns=0)
+    for thing in METHODS["default"].segment(boxes_of(pixels, image_hw), image).objects:
+        require_inside(thing, image.intrinsics, pixels[int(thing.label)], image_hw)
+
+
 @pytest.mark.parametrize("method", METHODS)
 @settings(max_examples=60, deadline=None)
 @given(
@@ -66,13 +90,8 @@ def test_any_boxes_on_any_depth_give_points_of_their_boxes_alone(
     camera = camera_of(*size)
     rgb = np.full((*size, 3), 7, np.uint8) if coloured else None
     image = DepthImage(depth=relief(*size, seed, holes), rgb=rgb, intrinsics=camera, stamp_ns=0)
-    frame = METHODS[method].segment(boxes_of(boxes, image_hw), image)
-    scale = np.array([size[1] / image_hw[1], size[0] / image_hw[0]])
-    for thing in frame.objects:
-        uv = thing.xyz[:, :2] / thing.xyz[:, 2:] * (camera.fx, camera.fy) + (camera.cx, camera.cy)
-        box = np.array(boxes[int(thing.label)]).reshape(2, 2) * scale
-        assert (np.rint(uv) >= box[0] - 1e-2).all()
-        assert (np.rint(uv) + 1 <= box[1] + 1e-2).all()
+    for thing in METHODS[method].segment(boxes_of(boxes, image_hw), image).objects:
+        require_inside(thing, camera, boxes[int(thing.label)], image_hw)
         assert (thing.xyz[:, 2] > 0).all()
         lengths = np.linalg.norm(thing.normals, axis=1)
         assert (np.isclose(lengths, 1, atol=1e-3) | (lengths == 0)).all()
