@@ -39,11 +39,13 @@ def worst_translation(C: Array) -> float:
 def _miscalibrated(alignment: Alignment, share: float) -> Array:
     """What a wrong calibration adds: what was seen is shifted and turned about its middle by a share of the motion.
 
-    To a camera a shift looks like a turn, by as much as it is near to what it sees.
+    To a camera a shift looks like a turn, by as much as it is near to what it sees. Two views of a scene that is
+    stretched by a share along the optical axis of each differ by a turn of that share times the sine of the angle
+    between them: a quarter turn is the worst, and beyond it nothing is added.
     """
     R, t, middle = alignment.T_target_source[:3, :3], alignment.T_target_source[:3, 3], alignment.middle
     shift, range_m = float(np.linalg.norm(t)), max(float(np.linalg.norm(middle)), NEAREST)
-    turn = float(np.hypot(rotation_angle(R), shift / range_m))
+    turn = float(np.sin(min(np.hypot(rotation_angle(R), shift / range_m), np.pi / 2)))
     camera_from_middle = np.eye(6)
     camera_from_middle[:3, 3:] = skew(middle - t)
     motion = share * np.array([shift] * 3 + [turn] * 3)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from objreg_ros.geometry import pose, skew
+from objreg_ros.geometry import pose, rotation_from_vector, skew
 from objreg_ros.registrar.covariance import covariance_of, spread_of, worst_translation
 from objreg_ros.registrar.params import RegistrarParams
 
@@ -69,9 +69,19 @@ def test_a_wrong_calibration_is_a_share_of_the_motion_about_what_was_seen() -> N
     about_middle = np.eye(6)
     about_middle[:3, 3:] = -skew(alignment.middle - T[:3, 3])
     sigma = np.sqrt(np.diag(about_middle @ C @ about_middle.T))
-    assert sigma == pytest.approx([0.05 * 0.4] * 3 + [0.05 * 0.4 / 2.0] * 3, rel=1e-6)
+    assert sigma == pytest.approx([0.05 * 0.4] * 3 + [0.05 * np.sin(0.4 / 2.0)] * 3, rel=1e-6)
     still = replace(alignment, T_target_source=np.eye(4))
     assert np.allclose(covariance_of(still, params), spread_of(still, params))
+
+
+@pytest.mark.parametrize("angle", [90.0, 135.0, 180.0])
+def test_a_wrong_calibration_turns_by_no_more_than_its_share(angle: float) -> None:
+    params = PARAMS.replaced(covariance_calibration=0.05)
+    R = rotation_from_vector(np.array([0.0, np.radians(angle), 0.0]))
+    middle = np.array([0, 0, 2.0])
+    seen = replace(candidate(information=1e12 * np.eye(6)).alignment, T_target_source=pose(R, middle - R @ middle))
+    C = covariance_of(replace(seen, middle=middle), params)
+    assert np.sqrt(np.diag(C)[3:]) == pytest.approx([0.05] * 3, rel=0.02)
 
 
 def test_the_file_that_tells_of_the_calibration_holds_the_values_of_the_code(repository: Path) -> None:
