@@ -149,8 +149,8 @@ def _glimpse(row: Mapping[str, Any]) -> Glimpse:
     return Glimpse(
         stamp_ns=int(row["stamp_ns"]),
         T_odom_camera=None if pose is None else np.array(pose, float),
-        labels=tuple(row.get("labels", ())),
-        objects=tuple((label, np.array(xyz, float)) for label, xyz in row.get("objects", ())),
+        labels=tuple(map(_spaced, row.get("labels", ()))),
+        objects=tuple((_spaced(label), np.array(xyz, float)) for label, xyz in row.get("objects", ())),
     )
 
 
@@ -160,8 +160,13 @@ def _closure(row: Mapping[str, Any]) -> LoopClosure:
         to_ns=int(row["to_ns"]),
         T_from_to=np.array(row["T_from_to"], float),
         covariance=np.array(row["covariance"], float),
-        labels=tuple(row["labels"]),
+        labels=tuple(map(_spaced, row["labels"])),
     )
+
+
+def _spaced(label: str) -> str:
+    """A label as it reads on a page."""
+    return label.replace("_", " ")
 
 
 def _refusal(row: Mapping[str, Any]) -> Rejected:

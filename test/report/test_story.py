@@ -50,3 +50,12 @@ def test_an_older_json_without_frames_is_told_all_the_same() -> None:
     story = Story.of("walk", told, TRUTH)
     assert len(story.closures) == 4 and story.tracks() is None
     assert story.seconds(story.closures[0].to_ns) == pytest.approx(6.0)
+
+
+def test_labels_read_as_words() -> None:
+    told = summary()
+    told["constraints"][0]["labels"] = ["cereal_box"]
+    told["glimpses"][0] |= {"labels": ["soda_can"], "objects": [["soda_can", [0.0, 0.0, 1.0]]]}
+    story = Story.of("walk", told, TRUTH)
+    assert story.closures[0].labels == ("cereal box",) and story.glimpses[0].labels == ("soda can",)
+    assert story.glimpses[0].objects[0][0] == "soda can"
