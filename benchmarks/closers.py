@@ -45,7 +45,7 @@ class Result:
 
 def ours(source: Source, seed: int) -> Result:
     """The registrar, frame by frame."""
-    registrar = Registrar(RegistrarParams(seed=seed))
+    registrar = Registrar(RegistrarParams(seed=seed).replaced(**source.camera))
     result = Result([], 0, 0.0)
     start = time.process_time()
     for frame in source.frames:

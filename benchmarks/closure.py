@@ -4,7 +4,8 @@
 For every recording and method: constraints, true ones (within 5 degrees and 10 cm), false ones (worse than 8 degrees or
 15 cm), the share of the revisits that were closed by view change, the processor's milliseconds a pair, and the error of
 the trajectory by drifting odometry and after the same pose graph took the method's constraints. The oracle's
-constraints are perfect and there is one for every revisit: what is left then, no closing of loops can take away.
+constraints are perfect and there is one for every revisit: what is left then, no closing of loops can take away. In
+simulation our constraints know that the camera is calibrated well (covariance_calibration); all else is default.
 
     python benchmarks/closure.py --quick
     python benchmarks/closure.py --simulate loop:0,1,2,3,4 --simulate moved:0,1,2,3,4 --json OUT --figure closure.png

@@ -30,6 +30,7 @@ from objreg_ros.simulation.truth import read_truth
 from objreg_ros.truth import Truth
 
 TRUE_BOXES = "truth"  # in a model's stead
+SIMULATED = {"covariance_calibration": 0.01}  # such a camera is as its calibration says: see config/covariance.yaml
 LEAST_VISIBLE = 0.3
 
 
@@ -96,12 +97,13 @@ class TrueBoxes:
 
 @dataclass
 class Source:
-    """A recording with its frames, its truth and its pictures."""
+    """A recording with its frames, its truth, its pictures, and the registrar's parameters that its camera asks for."""
 
     frames: list[Frame]
     truth: Truth
     album: Album
     detections: dict[int, Detections]
+    camera: dict[str, float]
 
     def shot(self, frame: Frame) -> Shot:
         """The whole image of a frame, and its objects by the founding filter."""
@@ -125,7 +127,15 @@ def read_source(path: Path, model: str, seed: int) -> Iterator[Source]:
         frames, seen = _frames(recording, model)
         if inputs.odom is None:
             frames = with_drift(frames, truth, seed)
-        yield Source(frames, truth, Album(recording, inputs), seen)
+        yield Source(frames, truth, Album(recording, inputs), seen, SIMULATED if _is_simulated(path) else {})
+
+
+def _is_simulated(path: Path) -> bool:
+    try:
+        read_truth(path)
+    except FileNotFoundError:
+        return False
+    return True
 
 
 def _frames(recording: Recording, model: str) -> tuple[list[Frame], dict[int, Detections]]:
