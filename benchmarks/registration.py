@@ -47,7 +47,6 @@ from objreg_ros.registrar.keyframe import Keyframe
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared, prepare
 from objreg_ros.registrar.scene_search import from_shapes
-from objreg_ros.registrar.symmetry import yaw_share
 from objreg_ros.registrar.warm import warm
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
@@ -365,7 +364,7 @@ def yaw_unknown(shot: Shot, params: RegistrarParams) -> bool:
     """Whether the object of a look says itself that its yaw is not to be known."""
     if not shot.frame.objects or shot.frame.gravity is None:
         return False
-    return yaw_share(shot.frame.objects[0], -shot.frame.gravity) < params.symmetry_share
+    return not any(shot.prepared(params).yaw_known)
 
 
 def within(error: tuple[float, float], limit: tuple[float, float]) -> bool:

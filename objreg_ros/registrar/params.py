@@ -116,6 +116,9 @@ class RegistrarParams(Params):
     holding_texture: float = param(0.5, "grey that correlates so well holds what shape lets slide", ge=0.0, le=1.0)
     holding_likeness: float = param(0.3, "so does an object that looks so much alike", ge=-1.0, le=1.0)
     symmetry_share: float = param(0.07, "an object whose surface resists a turn less has no yaw", ge=0.0, le=1.0)
+    symmetry_violations: float = param(
+        0.12, "unless, turned about its axis, so much of it is where its camera saw through", ge=0.0, le=1.0
+    )
     depth_tolerance: float = param(0.02, "depths this close agree, at the camera", "m", ge=0.001)
     depth_tolerance_growth: float = param(0.006, "growth of that tolerance with the square of depth", "1/m", ge=0.0)
     detail_sigma: float = param(3.0, "blur that the high pass of grey takes away", "px", ge=0.5)

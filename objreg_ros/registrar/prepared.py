@@ -13,11 +13,11 @@ from objreg_ros.data import Array
 from objreg_ros.registrar.features import Features, describe, salient
 from objreg_ros.registrar.fusion import thin
 from objreg_ros.registrar.icp import Surface, prepare_surface
-from objreg_ros.registrar.keyframe import Keyframe, KeyObject
+from objreg_ros.registrar.keyframe import Keyframe
 from objreg_ros.registrar.labels import LabelGroups
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.shape import Shape, prepare_shape
-from objreg_ros.registrar.symmetry import yaw_share
+from objreg_ros.registrar.symmetry import tells_yaw
 from objreg_ros.registrar.tracking import view_normals
 from objreg_ros.registrar.visibility import Sight, prepare_sight
 
@@ -54,6 +54,7 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
     things = thin(*of_objects(keyframe), params.thing_voxel)
     groups = LabelGroups(params.label_groups)
     up = None if keyframe.gravity is None else -np.asarray(keyframe.gravity, float)
+    shapes = tuple(prepare_shape(keyframe, [i], params.shape_points) for i in range(len(keyframe.objects)))
     return Prepared(
         keyframe=keyframe,
         sight=prepare_sight(keyframe.view, params.context_range, params.detail_sigma, params.seed),
@@ -62,18 +63,15 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
         **_shuffled(*joined(coarse, sampled(things, params.thing_points, params.seed)), params.seed),
         up=up,
         groups=tuple(groups.of(label) for label in keyframe.labels),
-        yaw_known=tuple(tells_yaw(item, up, params) for item in keyframe.objects),
-        shapes=tuple(prepare_shape(keyframe, [i], params.shape_points) for i in range(len(keyframe.objects))),
+        yaw_known=tuple(
+            tells_yaw(item.cloud, up, shape, params) for item, shape in zip(keyframe.objects, shapes, strict=True)
+        ),
+        shapes=shapes,
         scene=prepare_shape(keyframe, range(len(keyframe.objects)), params.scene_points),
         centroids=np.array([item.centroid for item in keyframe.objects]).reshape(-1, 3),
         extents=np.array([item.extent for item in keyframe.objects]),
         middle=np.asarray(coarse[0].mean(axis=0) if len(coarse[0]) else np.zeros(3), float),
     )
-
-
-def tells_yaw(item: KeyObject, up: Array | None, params: RegistrarParams) -> bool:
-    """Whether an object's own shape tells how it is turned; False where up is unknown."""
-    return up is not None and yaw_share(item.cloud, up) >= params.symmetry_share
 
 
 def seen(keyframe: Keyframe, params: RegistrarParams) -> tuple[Array, Array]:

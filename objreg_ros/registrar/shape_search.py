@@ -114,9 +114,9 @@ def _finish(source, target, grid, motions, scores, extent, weights, numbers, rea
     best, n = np.empty((kept, 4)), 0
     order = np.empty(len(scores), np.int64)
     _rank(scores, order)
-    for k in order:
-        if n < kept and not _known(motions[k], best, n):
-            best[n] = motions[k]
+    for start in order:
+        if n < kept and not _known(motions[start], best, n):
+            best[n] = motions[start]
             n += 1
     best, worth = best[:n], np.empty(n)
     for k in range(n):

@@ -6,7 +6,11 @@ from __future__ import annotations
 import numpy as np
 
 from objreg_ros.data import ObjectCloud
-from objreg_ros.registrar.symmetry import yaw_share
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.shape import prepare_shape
+from objreg_ros.registrar.symmetry import tells_yaw, turned_violations, yaw_share
+
+from .shapes import ELL, from_side, keyframe
 
 UP = np.array([0.0, -1.0, 0.0])  # a level camera: y down
 
@@ -48,3 +52,18 @@ def test_two_sides_of_a_box_do() -> None:
 
 def test_a_cloud_without_normals_is_not_called_symmetric() -> None:
     assert yaw_share(cloud(np.zeros((20, 3)), np.zeros((20, 3))), UP) == 1.0
+
+
+def test_what_is_not_round_would_stand_in_seen_free_space_if_it_were_turned() -> None:
+    params = RegistrarParams(symmetry_share=1.0)  # no surface tells a yaw
+    for angle in (0.0, 70.0, 200.0):
+        for thing, told in ((ELL, True), ((0.0, 0.0), False)):
+            seen = keyframe(from_side(angle), {"thing": thing})
+            shape = prepare_shape(seen, [0], params.shape_points)
+            assert shape is not None and (turned_violations(shape) > 0.1) is told
+            assert tells_yaw(seen.objects[0].cloud, -np.asarray(seen.gravity), shape, params) is told
+
+
+def test_where_up_is_unknown_no_yaw_is_told() -> None:
+    assert not tells_yaw(corner_of_a_box(), None, None, RegistrarParams())
+    assert tells_yaw(corner_of_a_box(), UP, None, RegistrarParams())
