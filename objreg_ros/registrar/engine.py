@@ -24,7 +24,7 @@ from objreg_ros.registrar.refine import refine, settle, warp
 from objreg_ros.registrar.scene_search import from_shapes
 from objreg_ros.registrar.shape import upright_motion
 from objreg_ros.registrar.shape_score import alike
-from objreg_ros.registrar.sliding import resistance
+from objreg_ros.registrar.sliding import resistance, steadied
 from objreg_ros.registrar.verify import WORST, rank, verify
 
 APART = (np.radians(4.0), 0.04)  # rad and m: hypotheses are distinct beyond before they are settled
@@ -163,7 +163,7 @@ class Engine:
         )
         if is_held(candidate, params):
             candidate = replace(candidate, alignment=held(alignment))
-        return replace(candidate, resistance=self._resistance(pair, candidate))
+        return self._steadied(pair, replace(candidate, resistance=self._resistance(pair, candidate)))
 
     def _resistance(self, pair: Pair, candidate: Candidate) -> float | None:
         """How the views resist a push to where the pose would be false; None where it is known well."""
@@ -171,6 +171,16 @@ class Engine:
         if worst_translation(C) <= self._params.doubtful_sigma:
             return None
         return resistance(pair.source, pair.target, candidate.T_target_source, C, self._params)
+
+    def _steadied(self, pair: Pair, candidate: Candidate) -> Candidate:
+        """The candidate with what the views tell of a doubtful position that does not slide freely."""
+        alignment, C = candidate.alignment, spread_of(candidate.alignment, self._params)
+        if candidate.resistance is None or len(alignment.slack) > 0:
+            return candidate
+        added = steadied(pair.source, pair.target, alignment.T_target_source, C + candidate.warp, self._params)
+        steady = replace(alignment, information=alignment.information + added)
+        whole = np.linalg.inv(np.linalg.inv(C + candidate.warp) + added)
+        return replace(candidate, alignment=steady, warp=whole - np.linalg.inv(np.linalg.inv(C) + added))
 
 
 def is_held(candidate: Candidate, params: RegistrarParams) -> bool:

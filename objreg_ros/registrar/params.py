@@ -76,6 +76,9 @@ class RegistrarParams(Params):
     shape_climbed: int = param(3, "motions whose score is climbed", ge=1)
     shape_rounds: int = param(8, "most rounds of that climb", ge=0)
     scene_seeds: int = param(8, "poses that the middles of the objects propose for all together", ge=0)
+    drawing_points: int = param(400, "points of all that was seen that draw such a pose to where the room fits", ge=20)
+    drawing_rounds: int = param(12, "iterations of that", ge=0)
+    drawing_reach: float = param(0.06, "a pose that this moves the objects farther stays as it was", "m", ge=0.0)
     shape_violations: float = param(12.0, "weight of points in seen free space", ge=0.0)
     shape_hidden: float = param(0.6, "weight of points behind what was seen", ge=0.0)
     shape_residual: float = param(1.2, "weight of squared distances from what was seen", ge=0.0)
@@ -112,6 +115,9 @@ class RegistrarParams(Params):
     )
     doubtful_sigma: float = param(
         0.006, "a position that is known less well than this is pushed as far as the last of these", "m", ge=0.0
+    )
+    steadying_texture: float = param(
+        0.4, "grey that correlates so well holds a position as far as pushes are resisted", ge=0.0, le=1.0
     )
     holding_texture: float = param(0.5, "grey that correlates so well holds what shape lets slide", ge=0.0, le=1.0)
     holding_likeness: float = param(0.3, "so does an object that looks so much alike", ge=-1.0, le=1.0)

@@ -16,6 +16,9 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.verify import verify
 
+HELD = 0.5  # of a push that is clearly resisted: one sigma of a pose that the views hold
+DIRECTIONS = 4  # in which a pose is pushed to hold it, one after the other
+
 
 def resisted(
     source: Prepared, target: Prepared, T_target_source: Array, slack: Array, extent: float, params: RegistrarParams
@@ -35,7 +38,7 @@ def resisted(
         if reach is None:
             free.append(direction)
         else:
-            held.append(0.5 * reach * unit)
+            held.append(HELD * reach * unit)
     return np.reshape(free, (-1, 6)), np.reshape(held, (-1, 6))
 
 
@@ -51,6 +54,51 @@ def resistance(source: Prepared, target: Prepared, T_target_source: Array, C: Ar
     poses = [T_target_source] + [pushed(T_target_source, way * motion) for motion in motions for way in (-1, 1)]
     score, *others = (verify(source.sight, target.sight, T, params, params.grey_points).score for T in poses)
     return score - max(others)
+
+
+def steadied(source: Prepared, target: Prepared, T_target_source: Array, C: Array, params: RegistrarParams) -> Array:
+    """The information (6, 6) that the views add to a pose of covariance ``C (6, 6)``.
+
+    What two views of a table share may hold next to nothing across it by its shape, and everything by its print. So
+    the position is pushed where it is known least, and where the views clearly resist it is held there; then where it
+    is known least after that. Nothing is added for grey that hardly correlates.
+    """
+    own = verify(source.sight, target.sight, T_target_source, params, params.grey_points)
+    known, added = np.linalg.inv(C), np.zeros((6, 6))
+    if (own.texture or 0.0) < params.steadying_texture:
+        return added
+    for _ in range(DIRECTIONS):
+        spread = np.linalg.inv(known + added)
+        values, vectors = np.linalg.eigh(spread[:3, :3])
+        if values[-1] <= params.doubtful_sigma**2:
+            break
+        across = vectors[:, -1]
+        reach = _clear(source, target, T_target_source, spread[:, :3] @ across / values[-1], own.score, params)
+        if reach is None:
+            break
+        added[:3, :3] += np.outer(across, across) / (HELD * reach) ** 2
+    return added
+
+
+def _clear(
+    source: Prepared, target: Prepared, T: Array, motion: Array, score: float, params: RegistrarParams
+) -> float | None:
+    """The least push in m along a motion that the views like clearly less, either way, between those that are tried.
+
+    None where there is none.
+    """
+    last_push, last_drop = 0.0, 0.0
+    for push in params.pushes:
+        scores = [
+            verify(source.sight, target.sight, pushed(T, way * push * motion), params, params.grey_points).score
+            for way in (-1, 1)
+        ]
+        drop = score - max(scores)
+        if drop >= params.rival_margin:
+            between = (last_push, push) if last_push > 0.0 else (push, push)
+            return float(np.interp(params.rival_margin, (last_drop, drop), between))
+        last_push, last_drop = push, max(0.0, drop)
+    return None
 
 
 def pushed(T_target_source: Array, motion: Array) -> Array:

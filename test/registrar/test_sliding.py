@@ -9,7 +9,7 @@ import pytest
 from objreg_ros.geometry import inverse, pose, pose_error
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared, prepare
-from objreg_ros.registrar.sliding import pushed, resistance, resisted
+from objreg_ros.registrar.sliding import HELD, pushed, resistance, resisted, steadied
 
 from .rooms import ROOM, keyframe, seen_from
 
@@ -27,7 +27,7 @@ def views(boxes: tuple, *angles: float) -> list[Prepared]:
 def test_what_stands_on_a_table_holds_it() -> None:
     free, held = resisted(*views(TABLE, 0.0, 20.0), TRUTH, SIDEWAYS, 1.0, PARAMS)
     assert free.shape == (0, 6) and held.shape == (1, 6)
-    assert min(abs(held[0, 0] - 0.5 * push) for push in PARAMS.pushes) < 1e-9 and not held[0, 1:].any()
+    assert min(abs(held[0, 0] - HELD * push) for push in PARAMS.pushes) < 1e-9 and not held[0, 1:].any()
 
 
 def test_nothing_holds_a_bare_wall() -> None:
@@ -58,3 +58,11 @@ def test_views_resist_a_push_along_a_table_and_not_along_a_bare_wall() -> None:
     C = 1e-8 * np.eye(6)
     C[:3, :3] += 0.06**2 * np.outer(along, along)
     assert resistance(wall, wall, np.eye(4), C, PARAMS) < PARAMS.rival_margin
+
+
+def test_a_position_that_views_with_grey_hold_is_known_better_and_one_without_is_not() -> None:
+    C = np.diag([0.2**2, 1e-6, 1e-6, 1e-8, 1e-8, 1e-8])
+    grey = [prepare(keyframe(seen_from(a), TABLE, seed=k), PARAMS) for k, a in enumerate((0.0, 20.0))]
+    added = steadied(*grey, TRUTH, C, PARAMS)
+    assert np.linalg.inv(np.linalg.inv(C) + added)[0, 0] <= (HELD * PARAMS.pushes[0]) ** 2
+    assert not steadied(*views(TABLE, 0.0, 20.0), TRUTH, C, PARAMS).any()
