@@ -12,9 +12,11 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.geometry import transform
 from objreg_ros.registrar.hypotheses import Hypothesis, from_centroids, look_alikes
+from objreg_ros.registrar.icp import align
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
-from objreg_ros.registrar.shape import Shape
+from objreg_ros.registrar.shape import Shape, upright_motion
+from objreg_ros.registrar.shape_score import alike
 from objreg_ros.registrar.shape_search import Fitting, glance, improve, register_shapes
 from objreg_ros.registrar.verify import rank
 
@@ -22,16 +24,39 @@ EACH = 2  # poses that each pair of objects proposes
 
 
 def from_shapes(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Hypothesis]:
-    """Upright poses that lay objects upon those of their kind, those that objects and views like best first."""
+    """Poses that lay objects upon those of their kind, those that objects and views like best first.
+
+    Upright as the objects stand, or drawn from there to all that was seen where that is liked better: far views of a
+    thin thing share nothing of it, and its room still tells the last centimetres, or which way round it stands.
+    """
     pairs = shape_pairs(source, target)
-    found = register_shapes(*pairs[0], params) if len(pairs) == 1 else register_scenes(source, target, params)
+    alone = len(pairs) == 1
+    found = register_shapes(*pairs[0], params) if alone else register_scenes(source, target, params)
     if not found:
         return []
+    a, b = pairs[0] if alone else (source.scene, target.scene)
+    assert a is not None and b is not None
     T = np.array([fit.T_target_source for fit in found])
+    T = np.concatenate([T, _drawn(source, target, T, a.foot, params)])
     V = rank(source.sight, target.sight, T, params, params.quick_sample)
-    worth = V + params.likeness_weight * np.clip([fit.score for fit in found], -1.0, 1.0)
-    order = np.argsort(-worth, kind="stable")
-    return [Hypothesis(T_target_source=T[k], chain="objects", worth=float(worth[k])) for k in order]
+    drawn = [alike(a, b, upright_motion(a, b, each), params) for each in T[len(found) :]]
+    likeness = np.clip([fit.score for fit in found] + drawn, -1.0, 1.0)
+    worth = (V + params.likeness_weight * likeness).reshape(2, -1)
+    best = worth.argmax(axis=0) * len(found) + np.arange(len(found))
+    order = best[np.argsort(-worth.max(axis=0), kind="stable")]
+    return [Hypothesis(T_target_source=T[k], chain="objects", worth=float(worth.ravel()[k])) for k in order]
+
+
+def _drawn(source: Prepared, target: Prepared, T: Array, foot: Array, params: RegistrarParams) -> Array:
+    """Poses (K, 4, 4) drawn to the whole surface by a few points; as they were where the objects would be left.
+
+    ``foot (3,)`` is where the objects stand, in the source frame.
+    """
+    _, reach, last = params.reaches
+    few, surface = slice(params.drawing_points), target.surface
+    drawn, _, _ = align(source.xyz[few], source.normals[few], surface, T, reach, last, params.drawing_rounds)
+    gone = np.linalg.norm((drawn - T)[:, :3, :3] @ foot + (drawn - T)[:, :3, 3], axis=1) > params.drawing_reach
+    return np.where(gone[:, None, None], T, drawn)
 
 
 def register_scenes(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Fitting]:

@@ -17,6 +17,7 @@ from objreg_ros.registrar.shape_score import climb, two_way, weights_of
 
 SAME_TURN = 0.12  # rad within which two motions are one
 SAME_SHIFT = 0.015  # m
+ALIKE_TURN, CROWD = 0.5, 2  # rad within which motions turn alike, and how many of them are refined
 CLIMB = (0.05, 0.012)  # rad and m: the first steps of a climb
 WIDEST_REACH = 0.07  # m within which a point finds a partner at first
 
@@ -115,7 +116,7 @@ def _finish(source, target, grid, motions, scores, extent, weights, numbers, rea
     order = np.empty(len(scores), np.int64)
     _rank(scores, order)
     for start in order:
-        if n < kept and not _known(motions[start], best, n):
+        if n < kept and not _known(motions[start], best, n) and _crowd(motions[start], best, n) < CROWD:
             best[n] = motions[start]
             n += 1
     best, worth = best[:n], np.empty(n)
@@ -131,6 +132,17 @@ def _finish(source, target, grid, motions, scores, extent, weights, numbers, rea
         if after >= worth[k]:
             best[k], worth[k] = polished, after
     return best, worth
+
+
+@numba.njit(cache=True, nogil=True)
+def _crowd(motion, others, n):  # type: ignore[no-untyped-def]
+    """How many others turn about as far: what looks much the same after half a turn keeps room for both."""
+    count = 0
+    for k in range(n):
+        turn = (motion[0] - others[k, 0] + np.pi) % (2.0 * np.pi) - np.pi
+        if abs(turn) < ALIKE_TURN:
+            count += 1
+    return count
 
 
 @numba.njit(cache=True, nogil=True)

@@ -5,11 +5,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import prepare
-from objreg_ros.registrar.scene_search import from_shapes, register_scenes
+from objreg_ros.registrar.scene_search import _drawn, from_shapes, register_scenes
 
 from .shapes import BOX, ELL, error, from_side, keyframe
 
@@ -41,3 +43,15 @@ def test_without_gravity_nothing_is_proposed() -> None:
     key = replace(keyframe(from_side(0.0), THREE), gravity=None)
     source, target = prepare(key, PARAMS), prepare(keyframe(from_side(40.0), THREE), PARAMS)
     assert from_shapes(source, target, PARAMS) == []
+
+
+def test_what_was_seen_around_objects_draws_their_pose() -> None:
+    source = prepare(keyframe(from_side(30.0), THREE, seed=1), PARAMS)
+    target = prepare(keyframe(from_side(0.0), THREE, seed=2), PARAMS)
+    truth = inverse(from_side(0.0)) @ from_side(30.0)
+    off = truth @ pose(rotation_from_vector(np.radians([1.5, 2.0, 0.0])), np.array([0.0, 0.01, 0.01]))
+    assert source.scene is not None
+    drawn = _drawn(source, target, off[None], source.scene.foot, PARAMS)[0]
+    assert pose_error(drawn, truth)[0] < 0.5 * pose_error(off, truth)[0]
+    kept = _drawn(source, target, off[None], source.scene.foot, PARAMS.replaced(drawing_reach=0.0))[0]
+    assert np.array_equal(kept, off)

@@ -71,3 +71,10 @@ def test_a_glance_proposes_as_many_as_asked() -> None:
     assert len(proposed) == 3
     foot = transform(proposed[0], source.foot)
     assert np.linalg.norm(foot - target.foot) < 0.1
+
+
+def test_both_ways_round_are_kept_of_what_looks_much_the_same_after_half_a_turn() -> None:
+    found = register_shapes(shape_of(BOX, 20.0, 1), shape_of(BOX, 0.0, 2), PARAMS)
+    turns = [error(fit.T_target_source, 20.0, 0.0)[0] for fit in found]
+    assert min(turns) < 5.0 and max(turns) > 175.0
+    assert sum(turn < 20.0 for turn in turns) <= 2
