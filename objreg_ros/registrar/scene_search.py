@@ -7,6 +7,8 @@ shape tells no yaw, gets it from where the others stand.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from objreg_ros.data import Array
@@ -37,14 +39,20 @@ def from_shapes(source: Prepared, target: Prepared, params: RegistrarParams) -> 
     a, b = pairs[0] if alone else (source.scene, target.scene)
     assert a is not None and b is not None
     T = np.array([fit.T_target_source for fit in found])
-    T = np.concatenate([T, _drawn(source, target, T, a.foot, params)])
+    worth = _worth(source, target, T, [fit.score for fit in found], params)
+    best = np.argsort(-worth, kind="stable")[: params.drawn]
+    drawn = _drawn(source, target, T[best], a.foot, params)
+    after = _worth(source, target, drawn, [alike(a, b, upright_motion(a, b, each), params) for each in drawn], params)
+    better = after > worth[best]
+    T[best[better]], worth[best[better]] = drawn[better], after[better]
+    order = np.argsort(-worth, kind="stable")
+    return [Hypothesis(T_target_source=T[k], chain="objects", worth=float(worth[k])) for k in order]
+
+
+def _worth(source: Prepared, target: Prepared, T: Array, likeness: Sequence[float], params: RegistrarParams) -> Array:
+    """What poses (K, 4, 4) are worth for the views and for objects that look so much alike under them: (K,)."""
     V = rank(source.sight, target.sight, T, params, params.quick_sample)
-    drawn = [alike(a, b, upright_motion(a, b, each), params) for each in T[len(found) :]]
-    likeness = np.clip([fit.score for fit in found] + drawn, -1.0, 1.0)
-    worth = (V + params.likeness_weight * likeness).reshape(2, -1)
-    best = worth.argmax(axis=0) * len(found) + np.arange(len(found))
-    order = best[np.argsort(-worth.max(axis=0), kind="stable")]
-    return [Hypothesis(T_target_source=T[k], chain="objects", worth=float(worth.ravel()[k])) for k in order]
+    return V + params.likeness_weight * np.clip(likeness, -1.0, 1.0)
 
 
 def _drawn(source: Prepared, target: Prepared, T: Array, foot: Array, params: RegistrarParams) -> Array:
