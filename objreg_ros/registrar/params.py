@@ -120,6 +120,7 @@ class RegistrarParams(Params):
     steadying_texture: float = param(
         0.4, "grey that correlates so well holds a position as far as pushes are resisted", ge=0.0, le=1.0
     )
+    steadying_push: float = param(0.06, "the longest push that may be needed for that", "m", ge=0.0)
     holding_texture: float = param(0.5, "grey that correlates so well holds what shape lets slide", ge=0.0, le=1.0)
     holding_likeness: float = param(0.3, "so does an object that looks so much alike", ge=-1.0, le=1.0)
     symmetry_share: float = param(0.07, "an object whose surface resists a turn less has no yaw", ge=0.0, le=1.0)

@@ -3,7 +3,7 @@
 
 Two views of a table from opposite sides share little but its top, on which one can be pushed along the other. What
 stands on it resists, with too few points to count as surface; yet a pose that was pushed is seen to be worse. So a pose
-is pushed, and where both ways are clearly worse it is held by the views, to about half the push.
+is pushed, and where both ways are clearly worse it is held by the views, to a third of the push.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.verify import verify
 
-HELD = 0.5  # of a push that is clearly resisted: one sigma of a pose that the views hold
+HELD = 1.0 / 3.0  # of a push that is clearly resisted: one sigma of a pose that the views hold
 DIRECTIONS = 4  # in which a pose is pushed to hold it, one after the other
 
 
@@ -74,7 +74,7 @@ def steadied(source: Prepared, target: Prepared, T_target_source: Array, C: Arra
             break
         across = vectors[:, -1]
         reach = _clear(source, target, T_target_source, spread[:, :3] @ across / values[-1], own.score, params)
-        if reach is None:
+        if reach is None or reach > params.steadying_push:
             break
         added[:3, :3] += np.outer(across, across) / (HELD * reach) ** 2
     return added
