@@ -7,12 +7,10 @@ shape tells no yaw, gets it from where the others stand.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.geometry import transform
+from objreg_ros.geometry import rotation_from_vector, transform
 from objreg_ros.registrar.hypotheses import Hypothesis, from_centroids, look_alikes
 from objreg_ros.registrar.icp import align
 from objreg_ros.registrar.params import RegistrarParams
@@ -23,6 +21,7 @@ from objreg_ros.registrar.shape_search import Fitting, glance, improve, register
 from objreg_ros.registrar.verify import rank
 
 EACH = 2  # poses that each pair of objects proposes
+LESS = 0.1  # likeness that the views' liking makes up for
 
 
 def from_shapes(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Hypothesis]:
@@ -39,17 +38,34 @@ def from_shapes(source: Prepared, target: Prepared, params: RegistrarParams) -> 
     a, b = pairs[0] if alone else (source.scene, target.scene)
     assert a is not None and b is not None
     T = np.array([fit.T_target_source for fit in found])
-    worth = _worth(source, target, T, [fit.score for fit in found], params)
+    likeness = np.array([fit.score for fit in found])
+    worth = _worth(source, target, T, likeness, params)
     best = np.argsort(-worth, kind="stable")[: params.drawn]
-    drawn = _drawn(source, target, T[best], a.foot, params)
-    after = _worth(source, target, drawn, [alike(a, b, upright_motion(a, b, each), params) for each in drawn], params)
-    better = after > worth[best]
-    T[best[better]], worth[best[better]] = drawn[better], after[better]
+    for better in (_drawn(source, target, T[best], a.foot, params), _turned(source, target, T[best], a, b, params)):
+        same = np.array([alike(a, b, upright_motion(a, b, each), params) for each in better])
+        after = _worth(source, target, better, same, params)
+        gain = (after > worth[best]) & (same > likeness[best] - LESS)
+        T[best[gain]], worth[best[gain]], likeness[best[gain]] = better[gain], after[gain], same[gain]
     order = np.argsort(-worth, kind="stable")
     return [Hypothesis(T_target_source=T[k], chain="objects", worth=float(worth[k])) for k in order]
 
 
-def _worth(source: Prepared, target: Prepared, T: Array, likeness: Sequence[float], params: RegistrarParams) -> Array:
+def _turned(source: Prepared, target: Prepared, T: Array, a: Shape, b: Shape, params: RegistrarParams) -> Array:
+    """Of poses (K, 4, 4) turned a little about where the objects stand those that the views like best: (K, 4, 4).
+
+    What is nearly round tells its yaw to some degrees only; the print of what it stands on tells the rest.
+    """
+    turns = np.radians(np.outer((-1.0, 1.0), params.drawing_turns).ravel())
+    R = np.array([rotation_from_vector(turn * b.R_upright_camera[2]) for turn in turns])
+    tried = np.repeat(T[:, None], len(turns), axis=1)
+    at = T[:, :3, :3] @ a.foot + T[:, :3, 3]
+    tried[..., :3, :3] = R @ T[:, None, :3, :3]
+    tried[..., :3, 3] = at[:, None] + (R @ (T[:, None, :3, 3] - at[:, None])[..., None])[..., 0]
+    V = rank(source.sight, target.sight, tried.reshape(-1, 4, 4), params, params.quick_sample).reshape(len(T), -1)
+    return tried[np.arange(len(T)), V.argmax(axis=1)]
+
+
+def _worth(source: Prepared, target: Prepared, T: Array, likeness: Array, params: RegistrarParams) -> Array:
     """What poses (K, 4, 4) are worth for the views and for objects that look so much alike under them: (K,)."""
     V = rank(source.sight, target.sight, T, params, params.quick_sample)
     return V + params.likeness_weight * np.clip(likeness, -1.0, 1.0)
