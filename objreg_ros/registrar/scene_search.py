@@ -27,8 +27,8 @@ LESS = 0.1  # likeness that the views' liking makes up for
 def from_shapes(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Hypothesis]:
     """Poses that lay objects upon those of their kind, those that objects and views like best first.
 
-    Upright as the objects stand, or drawn from there to all that was seen where that is liked better: far views of a
-    thin thing share nothing of it, and its room still tells the last centimetres, or which way round it stands.
+    Upright as the objects stand; the best also drawn to all that was seen, or turned a little, where that is liked
+    better: far views of a thin thing share nothing of it, and its room still tells the last centimetres and degrees.
     """
     pairs = shape_pairs(source, target)
     alone = len(pairs) == 1
