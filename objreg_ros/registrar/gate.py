@@ -81,12 +81,19 @@ def _overlap(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
 
 def _free_space(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
-    """Stricter for a lone object: a half turn about it is seen in free space alone."""
+    """Stricter for a lone object: a half turn about it is seen in free space alone, unless grey and a push say more."""
     seen = candidate.verification
-    most = params.max_violations if len(candidate.explained) > 1 else params.max_violations_alone
+    lone = len(candidate.explained) < 2 and not _seen_firmly(candidate, params)
+    most = params.max_violations_alone if lone else params.max_violations
     if seen.violations <= most:
         return None
     return Reason.FREE_SPACE, f"violations {seen.violations:.3f} > {most:.3f}"
+
+
+def _seen_firmly(candidate: Candidate, params: RegistrarParams) -> bool:
+    """Whether the grey of the views holds the pose, and they like it much less when it is pushed."""
+    texture, drop = candidate.verification.texture, candidate.resistance
+    return texture is not None and texture >= params.holding_texture and (drop or 0.0) >= params.firm_margin
 
 
 def _texture(candidate: Candidate, params: RegistrarParams) -> Refusal | None:

@@ -139,3 +139,11 @@ def test_a_pose_that_the_surfaces_do_not_hold_may_be_held_by_the_views_alone() -
     assert refuse(candidate(**loose, resistance=PARAMS.firm_margin), PARAMS) is None
     assert refuse(candidate(**loose, resistance=PARAMS.firm_margin - 0.01), PARAMS) is not None
     assert refuse(candidate(**loose, resistance=PARAMS.firm_margin, slack=np.eye(6)[:1]), PARAMS) is not None
+
+
+def test_free_space_is_less_of_a_judge_of_a_lone_object_whose_pose_grey_and_a_push_hold() -> None:
+    lone = {"explained": (CUP,), "violations": 0.05, "texture": 0.7, "yaw_known": True, "likeness": 0.5}
+    assert refuse(candidate(**lone, resistance=PARAMS.firm_margin), PARAMS) is None
+    for weak in ({"texture": 0.3}, {"resistance": PARAMS.firm_margin - 0.1}):
+        refusal = refuse(candidate(**{**lone, "resistance": PARAMS.firm_margin, **weak}), PARAMS)
+        assert refusal is not None and refusal[0] is Reason.FREE_SPACE
