@@ -378,12 +378,16 @@ class Reason(Enum):
 
 @word
 class Rejected:
-    """A refused closure: the reason, and the numbers behind it in ``detail``."""
+    """A refused closure: the reason, and the numbers behind it in ``detail``.
+
+    ``T_from_to (4, 4)`` is the pose that was turned down, for a look at it and nothing else; None where none was tried.
+    """
 
     reason: Reason
     from_ns: int
     to_ns: int
     detail: str
+    T_from_to: Array | None = None
 
 
 def as_dict(value: Any) -> dict[str, Any]:

@@ -156,7 +156,8 @@ class Run:
 
 def refusal(rejected: Rejected) -> dict[str, Any]:
     """A refused candidate as JSON."""
-    moments = {"from_ns": rejected.from_ns, "to_ns": rejected.to_ns}
+    pose = None if rejected.T_from_to is None else rejected.T_from_to.round(6).tolist()
+    moments = {"from_ns": rejected.from_ns, "to_ns": rejected.to_ns, "T_from_to": pose}
     return {"reason": rejected.reason.value, **moments, "detail": rejected.detail}
 
 

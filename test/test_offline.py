@@ -202,4 +202,4 @@ def test_the_json_tells_of_every_refusal() -> None:
     rooms, _ = simple_rooms()
     run = run_offline(without("/odom", 1100 * MS), rooms, INPUTS)
     expected = {"reason": "no_candidate", "from_ns": 1100 * MS, "to_ns": 1200 * MS, "detail": "no odometry"}
-    assert run.summary(Truth([]))["refusals"][1] == expected
+    assert run.summary(Truth([]))["refusals"][1] == expected | {"T_from_to": None}

@@ -147,23 +147,18 @@ class Registrar:
         """Try the stored keyframes that may show the same place, the likeliest first."""
         accepted: list[_Accepted] = []
         rejected: list[Rejected] = []
-        refuse = _refuser(rejected, keyframe)
         places = deque(self._index.query(sightings))
         if not places:
-            refuse(
-                keyframe.stamp_ns,
-                (Reason.NO_CANDIDATE, f"none of {len(self._index)} stored objects is alike and may be here"),
-            )
+            refusal = Reason.NO_CANDIDATE, f"none of {len(self._index)} stored objects is alike and may be here"
+            rejected.append(_rejected(keyframe.stamp_ns, keyframe, refusal))
         tries = self.params.candidates
         while places and tries > 0 and len(accepted) < self.params.closures:
             for place, ask in self._begun(keyframe, places, min(tries, self.params.threads), deadline):
                 if len(accepted) == self.params.closures:
                     break
                 if ask is None or self._thinning.redundant(place.stamp_ns, keyframe.stamp_ns):
-                    refuse(
-                        place.stamp_ns,
-                        (Reason.REDUNDANT, f"an accepted closure is nearer than {self.params.thin_seconds} s"),
-                    )
+                    refusal = Reason.REDUNDANT, f"an accepted closure is nearer than {self.params.thin_seconds} s"
+                    rejected.append(_rejected(place.stamp_ns, keyframe, refusal))
                     continue
                 tries -= 1
                 verdict = ask()
@@ -171,18 +166,18 @@ class Registrar:
                     self._thinning.accept(place.stamp_ns, keyframe.stamp_ns)
                     accepted.append(verdict)
                 else:
-                    refuse(place.stamp_ns, verdict)
+                    rejected.append(verdict)
         return accepted, tuple(rejected)
 
     def _begun(
         self, keyframe: Keyframe, places: deque[Place], count: int, deadline: float
-    ) -> list[tuple[Place, Callable[[], _Accepted | Refusal] | None]]:
+    ) -> list[tuple[Place, Callable[[], _Accepted | Rejected] | None]]:
         """Take places off until ``count`` are being tried, all at once; with each what waits for its verdict.
 
         None for one that would say what is said already. Verdicts are asked for in the order of the places, so that it
         does not matter which is done first.
         """
-        begun: list[tuple[Place, Callable[[], _Accepted | Refusal] | None]] = []
+        begun: list[tuple[Place, Callable[[], _Accepted | Rejected] | None]] = []
         while places and count > 0:
             place = places.popleft()
             if self._thinning.redundant(place.stamp_ns, keyframe.stamp_ns):
@@ -192,20 +187,24 @@ class Registrar:
             count -= 1
         return begun
 
-    def _try_place(self, keyframe: Keyframe, place: Place, deadline: float) -> Callable[[], _Accepted | Refusal]:
+    def _try_place(self, keyframe: Keyframe, place: Place, deadline: float) -> Callable[[], _Accepted | Rejected]:
         """Begin to register a place in a thread of its own; what comes back waits for the verdict."""
         late = time.monotonic() - deadline
         if late > 0:
-            return lambda: (Reason.OVER_BUDGET, f"{1e3 * late:.0f} ms after the end of the search")
+            refusal = Reason.OVER_BUDGET, f"{1e3 * late:.0f} ms after the end of the search"
+            return lambda: _rejected(place.stamp_ns, keyframe, refusal)
         self._engine.prepare(keyframe)
         target = self._store.keyframe(place.keyframe_id)
         prior = self._path.prior(keyframe, target, place.travelled, place.turned, self.params)
         start = prior.T_target_source if prior is not None and prior.tight(self.params) else None
         proposed = self._pool.submit(self._engine.propose, keyframe, target, start)
 
-        def verdict() -> _Accepted | Refusal:
+        def verdict() -> _Accepted | Rejected:
             answer = judge(proposed.result(), self.params, prior)
-            return _Accepted(target=target, candidate=answer) if isinstance(answer, Candidate) else answer
+            if isinstance(answer, Candidate):
+                return _Accepted(target=target, candidate=answer)
+            best = next((candidate.T_target_source for candidate in proposed.result()), None)
+            return _rejected(place.stamp_ns, keyframe, answer, best)
 
         return verdict
 
@@ -264,12 +263,9 @@ def closure_of(
     )
 
 
-def _refuser(rejected: list[Rejected], keyframe: Keyframe) -> Callable[[int, Refusal], None]:
-    def refuse(from_ns: int, refusal: Refusal) -> None:
-        reason, detail = refusal
-        rejected.append(Rejected(reason=reason, from_ns=from_ns, to_ns=keyframe.stamp_ns, detail=detail))
-
-    return refuse
+def _rejected(from_ns: int, keyframe: Keyframe, refusal: Refusal, T_from_to: Array | None = None) -> Rejected:
+    reason, detail = refusal
+    return Rejected(reason=reason, from_ns=from_ns, to_ns=keyframe.stamp_ns, detail=detail, T_from_to=T_from_to)
 
 
 def _evidence(candidate: Candidate) -> dict[str, float]:

@@ -9,7 +9,7 @@ from html import escape
 import numpy as np
 
 from objreg_ros.data import Array, LoopClosure, Rejected
-from objreg_ros.geometry import rotation_angle
+from objreg_ros.geometry import pose_error, rotation_angle
 from objreg_ros.report import figures
 from objreg_ros.report.drawing import legend
 from objreg_ros.report.pictures import Album, chosen_closures, chosen_refusals, data_uri, overlay
@@ -182,7 +182,7 @@ def _accepted(story: Story, album: Album | None) -> str:
 def _refused(story: Story, album: Album | None) -> str:
     pairs = [_refusal_pair(story, refusal, album) for refusal in chosen_refusals(story)] if album else []
     words = (
-        "Candidates that were tried and turned down. Where truth is known, right: the two moments as they truly lie."
+        "Candidates that were tried and turned down. Right: the second moment laid over the first by the refused pose."
     )
     return _section("Refused registrations", words, "".join(pairs)) if any(pairs) else ""
 
@@ -196,13 +196,22 @@ def _closure_pair(story: Story, closure: LoopClosure, album: Album) -> str:
 
 def _refusal_pair(story: Story, refusal: Rejected, album: Album) -> str:
     reason = refusal.reason.value.replace("_", " ")
+    detail = f"{refusal.detail}.{_in_truth(story, refusal)}"
+    words = f'<span class="tag refused">{escape(reason)}</span>{escape(detail)}'
+    return _pair(story, refusal, album, words, refusal.T_from_to, "laid over each other")
+
+
+def _in_truth(story: Story, refusal: Rejected) -> str:
+    """How far the two moments are apart, and by how much the refused pose is wrong; empty without truth."""
     truth = story.truth.between(refusal.from_ns, refusal.to_ns)
-    apart = ""
-    if truth is not None:
-        degrees, metres = np.degrees(rotation_angle(truth[:3, :3])), float(np.linalg.norm(truth[:3, 3]))
-        apart = f" In truth {degrees:.0f}° and {metres:.1f} m apart."
-    words = f'<span class="tag refused">{escape(reason)}</span>{escape(refusal.detail + "." + apart)}'
-    return _pair(story, refusal, album, words, truth, "by truth")
+    if truth is None:
+        return ""
+    degrees, metres = np.degrees(rotation_angle(truth[:3, :3])), float(np.linalg.norm(truth[:3, 3]))
+    words = f" In truth {degrees:.0f}° and {metres:.1f} m apart"
+    if refusal.T_from_to is not None:
+        off_degrees, off_cm = pose_error(refusal.T_from_to, truth)
+        words += f"; the pose is off by {off_degrees:.0f}° and {off_cm:.0f} cm"
+    return words + "."
 
 
 def _pair(

@@ -170,6 +170,11 @@ def _spaced(label: str) -> str:
 
 
 def _refusal(row: Mapping[str, Any]) -> Rejected:
+    pose = row.get("T_from_to")
     return Rejected(
-        reason=Reason(row["reason"]), from_ns=int(row["from_ns"]), to_ns=int(row["to_ns"]), detail=row["detail"]
+        reason=Reason(row["reason"]),
+        from_ns=int(row["from_ns"]),
+        to_ns=int(row["to_ns"]),
+        detail=row["detail"],
+        T_from_to=None if pose is None else np.array(pose, float),
     )

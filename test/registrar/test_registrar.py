@@ -71,6 +71,15 @@ def test_the_first_keyframe_has_no_candidate(revisit: tuple[list[LoopClosure], l
     assert revisit[1][0].reason is Reason.NO_CANDIDATE and revisit[1][0].to_ns == 0
 
 
+def test_a_refusal_tells_the_pose_that_was_turned_down() -> None:
+    strict = PARAMS.replaced(max_translation=0.01)
+    _, rejected = _run(Registrar(strict), _frame(0, HERE), _frame(30, BESIDE))
+    (tried,) = [refusal for refusal in rejected if refusal.reason is Reason.IMPLAUSIBLE_MOTION]
+    closures, _ = _run(Registrar(PARAMS), _frame(0, HERE), _frame(30, BESIDE))
+    assert tried.T_from_to is not None and np.allclose(tried.T_from_to, closures[0].T_from_to)
+    assert rejected[0].reason is Reason.NO_CANDIDATE and rejected[0].T_from_to is None
+
+
 def test_the_same_frames_give_the_same_closures() -> None:
     frames = (_frame(0, HERE), _frame(30, BESIDE))
     first, second = (_run(Registrar(PARAMS), *frames)[0] for _ in range(2))

@@ -59,3 +59,11 @@ def test_labels_read_as_words() -> None:
     story = Story.of("walk", told, TRUTH)
     assert story.closures[0].labels == ("cereal box",) and story.glimpses[0].labels == ("soda can",)
     assert story.glimpses[0].objects[0][0] == "soda can"
+
+
+def test_the_pose_that_was_refused_is_told_where_there_was_one() -> None:
+    told = summary()
+    told["refusals"][1]["T_from_to"] = np.eye(4).tolist()
+    refusals = Story.of("walk", told, TRUTH).refusals
+    assert refusals[0].T_from_to is None
+    np.testing.assert_array_equal(refusals[1].T_from_to, np.eye(4))
