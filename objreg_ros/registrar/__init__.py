@@ -7,7 +7,7 @@ The way of a frame, file by file:
 the verb                `registrar`: `track` for every frame, `search` for every keyframe, `process` for both
 frames to keyframes     `keyframes` (when one ends), `tracking` (motion without odometry), `fusion`, `odometry`
 what is remembered      `keyframe`, `sighting`, `landmarks`; in `store` through `codec`; seen by `survey`, `export`
-which to try            `retrieve`, by `descriptor` and `labels`
+which to try            `retrieve`, by `likest` objects: `descriptor` and `labels`
 poses from chains       `engine` asks `hypotheses`, fed by `prepared`: `features` and `consensus` on the context,
                         `scene_search` (`shape`, `silhouette`, `shape_search`, `shape_icp`, `shape_score`) on objects
 refinement              `icp` brings many to their basin; `refine` ends a few, with `direct` where there is grey
