@@ -1,46 +1,37 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write a trained network as the ONNX file that `objreg_ros.detector` runs (ARCHITECTURE.md, section 8).
 
-python -m training.export CHECKPOINT models/objreg_ssd.onnx
+python -m training.export CHECKPOINT models/objreg_ssd.onnx --calibration DATA
 """
 
 from __future__ import annotations
 
 import argparse
 import base64
+import copy
 import json
 import tempfile
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
+import cv2
 import onnx
 import torch
-from torch import Tensor, nn
-from torch.nn import functional
+from torch import nn
 
+from objreg_ros.data import Array
+from training.embedded import Embedded, FromPixels
 from training.labels import LABELS
 from training.network import MobileNetSsd
 from training.priors import INPUT_HW, VARIANCES, make_priors
+from training.quantise import quantise
+from training.samples import Shard
 
 OPSET = 13
 """Old enough for the onnxruntime of every supported system and for OpenCV's dnn."""
 
-
-class Embedded(nn.Module):
-    """The network behind its normalisation: ``(1, H, W, 3)`` uint8 RGB in, ``loc`` and ``logits`` out.
-
-    Log odds of the classes beside a background of 0 are logits for a softmax: for one likely class it is the sigmoid.
-    """
-
-    def __init__(self, network: MobileNetSsd) -> None:
-        super().__init__()
-        self.network = network
-
-    def forward(self, rgb: Tensor) -> tuple[Tensor, Tensor]:
-        x = rgb.permute(0, 3, 1, 2).to(torch.float32)
-        loc, odds = self.network((x - 127.5) / 127.5)
-        return loc, functional.pad(odds, (1, 0))
+CALIBRATION_PICTURES = 60
 
 
 def metadata(provenance: Mapping[str, str]) -> dict[str, str]:
@@ -54,22 +45,35 @@ def metadata(provenance: Mapping[str, str]) -> dict[str, str]:
     }
 
 
-def export(network: MobileNetSsd, path: Path, provenance: Mapping[str, str]) -> None:
-    """Write ``network`` in its evaluation form to ``path``."""
-    model = Embedded(network.eval()).to(memory_format=torch.contiguous_format)
-    picture = torch.zeros(1, *INPUT_HW, 3, dtype=torch.uint8)
-    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), torch.no_grad():
-        warnings.simplefilter("ignore")  # torch would rather have its other exporter, which needs more packages
+def export(
+    network: MobileNetSsd, path: Path, provenance: Mapping[str, str], calibration: Iterable[Array] | None = None
+) -> None:
+    """Write ``network`` in its evaluation form to ``path``; in int8 where there are pictures to calibrate it with.
+
+    ``calibration``: pictures ``(H, W, 3) uint8`` of the network's size.
+    """
+    embedded = Embedded(copy.deepcopy(network)).to(memory_format=torch.contiguous_format).eval()
+    with tempfile.TemporaryDirectory() as folder:
         raw = Path(folder) / "raw.onnx"
-        torch.onnx.export(
-            model, (picture,), str(raw), input_names=["rgb"], output_names=["loc", "logits"],
-            opset_version=OPSET, dynamo=False,
-        )  # fmt: skip
-        graph = onnx.load(str(raw))
+        if calibration is None:
+            graph = _graph_of(FromPixels(embedded), torch.uint8, raw)
+        else:
+            graph = quantise(_graph_of(embedded, torch.float32, raw), calibration)
     onnx.helper.set_model_props(graph, metadata(provenance))
     onnx.checker.check_model(graph)
     path.parent.mkdir(parents=True, exist_ok=True)
     onnx.save(graph, str(path))
+
+
+def _graph_of(module: nn.Module, dtype: torch.dtype, path: Path) -> onnx.ModelProto:
+    """The module as a graph from ``rgb`` to ``loc`` and ``logits``."""
+    with warnings.catch_warnings(), torch.no_grad():
+        warnings.simplefilter("ignore")  # torch would rather have its other exporter, which needs more packages
+        torch.onnx.export(
+            module, (torch.zeros(1, *INPUT_HW, 3, dtype=dtype),), str(path), input_names=["rgb"],
+            output_names=["loc", "logits"], opset_version=OPSET, dynamo=False,
+        )  # fmt: skip
+    return onnx.load(str(path))
 
 
 def provenance_of(checkpoint: Mapping[str, object]) -> dict[str, str]:
@@ -84,18 +88,30 @@ def provenance_of(checkpoint: Mapping[str, object]) -> dict[str, str]:
     }
 
 
+def calibration_pictures(folder: Path) -> Iterator[Array]:
+    """`CALIBRATION_PICTURES` pictures from all over a folder of shards, of the network's size."""
+    shards = [Shard(path) for path in sorted(folder.glob("*.npz"))]
+    if not shards:
+        raise ValueError(f"{folder}: expected shards (*.npz), got none; run training.render first")
+    for number in range(CALIBRATION_PICTURES):
+        shard = shards[number * len(shards) // CALIBRATION_PICTURES]
+        yield cv2.resize(shard[number % len(shard)].rgb, INPUT_HW[::-1])
+
+
 def main() -> None:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("checkpoint", type=Path)
     parser.add_argument("model", type=Path)
+    parser.add_argument("--calibration", type=Path, help="shards from training.render; makes the model int8")
     parser.add_argument("--history", help="how it came about, where the last command does not tell it all")
     arguments = parser.parse_args()
     checkpoint = torch.load(arguments.checkpoint, map_location="cpu", weights_only=True)
     network = MobileNetSsd(len(LABELS))
     network.load_state_dict(checkpoint["average"])
     history = {"history": arguments.history} if arguments.history else {}
-    export(network, arguments.model, provenance_of(checkpoint) | history)
+    pictures = calibration_pictures(arguments.calibration) if arguments.calibration else None
+    export(network, arguments.model, provenance_of(checkpoint) | history, pictures)
     print(f"{arguments.model}: {arguments.model.stat().st_size / 1e6:.2f} MB, step {checkpoint['step']}")
 
 

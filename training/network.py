@@ -16,6 +16,9 @@ TO_STRIDE_16 = ((256, 2), (256, 1), (256, 1), (256, 1), (256, 1))
 TO_STRIDE_32 = ((384, 2), (384, 1))
 TO_STRIDE_64 = ((256, 2),)
 TO_STRIDE_128 = ((128, 2),)
+DEEPER = (0, 3, 2, 0, 0)
+"""So many residual blocks end each of these stages."""
+
 HEAD_WIDTH = 96
 
 RARE = -4.0
@@ -36,10 +39,25 @@ def separable(inputs: int, outputs: int, stride: int = 1) -> nn.Sequential:
     return nn.Sequential(convolution(inputs, inputs, 3, stride, inputs), convolution(inputs, outputs, 1))
 
 
-def stage(inputs: int, blocks: tuple[tuple[int, int], ...]) -> nn.Sequential:
-    """Separable blocks of (width, stride), one after the other."""
+class Residual(nn.Module):
+    """A separable block that is added to its input, and adds nothing to begin with (Goyal et al., "Accurate,
+    Large Minibatch SGD", 2017, section 5.1)."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.depthwise = convolution(width, width, 3, groups=width)
+        self.pointwise = nn.Sequential(nn.Conv2d(width, width, 1, bias=False), nn.BatchNorm2d(width))
+        nn.init.zeros_(self.pointwise[1].weight)
+
+    def forward(self, x: Tensor) -> Tensor:
+        return functional.relu(x + self.pointwise(self.depthwise(x)))
+
+
+def stage(inputs: int, blocks: tuple[tuple[int, int], ...], deeper: int = 0) -> nn.Sequential:
+    """Separable blocks of (width, stride), one after the other, then so many residual ones."""
     widths = [inputs, *(width for width, _ in blocks)]
-    return nn.Sequential(*(separable(widths[i], width, stride) for i, (width, stride) in enumerate(blocks)))
+    plain = [separable(widths[i], width, stride) for i, (width, stride) in enumerate(blocks)]
+    return nn.Sequential(*plain, *(Residual(widths[-1]) for _ in range(deeper)))
 
 
 class MobileNetSsd(nn.Module):
@@ -51,7 +69,7 @@ class MobileNetSsd(nn.Module):
         stem = nn.Sequential(convolution(3, STEM[0][0], 3, STEM[0][1]), stage(STEM[0][0], STEM[1:]))
         plans = (TO_STRIDE_8, TO_STRIDE_16, TO_STRIDE_32, TO_STRIDE_64, TO_STRIDE_128)
         widths = [STEM[-1][0], *(plan[-1][0] for plan in plans)]
-        self.stages = nn.ModuleList([stage(width, plan) for width, plan in zip(widths[:-1], plans, strict=True)])
+        self.stages = nn.ModuleList([stage(*parts) for parts in zip(widths[:-1], plans, DEEPER, strict=True)])
         self.stages[0] = nn.Sequential(stem, self.stages[0])
         self.laterals = nn.ModuleList([nn.Conv2d(width, HEAD_WIDTH, 1) for width in widths[1:4]])
         towers = [HEAD_WIDTH] * 3 + widths[4:]
@@ -68,12 +86,13 @@ class MobileNetSsd(nn.Module):
         for one in self.stages:
             x = one(x)
             levels.append(x)
-        rows = [
-            self._rows(head(tower(level)))
-            for head, tower, level in zip(self.heads, self.towers, self._top_down(levels), strict=True)
-        ]
-        joined = torch.cat(rows, dim=1)
+        maps = self.tower_maps(levels)
+        joined = torch.cat([self._rows(head(x)) for head, x in zip(self.heads, maps, strict=True)], dim=1)
         return joined[..., :4], joined[..., 4:]
+
+    def tower_maps(self, levels: list[Tensor]) -> list[Tensor]:
+        """What the heads see, of the maps of all stages."""
+        return [tower(level) for tower, level in zip(self.towers, self._top_down(levels), strict=True)]
 
     def _top_down(self, levels: list[Tensor]) -> list[Tensor]:
         """The three finest levels with the context from above, the others as they are."""

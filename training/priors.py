@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-INPUT_HW = (384, 512)
+INPUT_HW = (480, 640)
 """Four fifths of a Kinect's 640 x 480, as much as the processor has time for: objects of 32 px keep 26. Both are
 multiples of the coarsest stride, so that every cell lies where its prior is."""
 

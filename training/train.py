@@ -21,6 +21,7 @@ from torch import Tensor
 from torch.utils.data import DataLoader
 
 from training.dataset import Example, Stream
+from training.embedded import centred
 from training.export import export, provenance_of
 from training.labels import LABELS
 from training.multibox import NOTHING, MultiboxLoss
@@ -68,7 +69,7 @@ class Training:
         truth = truth[:, : int((truth[..., 5] != NOTHING).sum(dim=1).max())]
         x = picture.to(memory_format=torch.channels_last, dtype=torch.float32)
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.half):
-            loc, logits = self.network((x - 127.5) / 127.5)
+            loc, logits = self.network(centred(x))
         location, confidence = self.loss(loc.float(), logits.float(), truth)
         self.optimiser.zero_grad(set_to_none=True)
         (location + confidence).backward()
