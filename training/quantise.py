@@ -35,22 +35,32 @@ class Pictures(CalibrationDataReader):  # type: ignore[misc]
         return None if rgb is None else {INPUT: ((rgb[None].astype(np.float32) - CENTRE) * SCALE).astype(np.float32)}
 
 
-def quantise(graph: onnx.ModelProto, pictures: Iterable[Array]) -> onnx.ModelProto:
+def quantise(graph: onnx.ModelProto, pictures: Iterable[Array], floating: str) -> onnx.ModelProto:
     """The int8 form of a graph whose one input `INPUT` is of centred pixels; its input is uint8 pixels.
 
-    The ranges of the activations are the greatest that occur in ``pictures``. Weights have 7 bits: processors without
-    VNNI add two products in 16 bits, where 8 bits may overflow.
+    The range of an activation is the mean of its ranges in ``pictures``: the greatest would coarsen all for the sake of
+    one. Weights have 7 bits: processors without VNNI add two products in 16 bits, where 8 bits may overflow. Nodes with
+    ``floating`` in their name stay in floats.
     """
     with tempfile.TemporaryDirectory() as folder:
-        paths = [Path(folder) / f"{name}.onnx" for name in ("floats", "ready", "int8")]
-        onnx.save(graph, str(paths[0]))
-        quant_pre_process(str(paths[0]), str(paths[1]), skip_symbolic_shape=True)
-        onnx.save(_with_padding_in_convolutions(onnx.load(str(paths[1]))), str(paths[1]))
+        paths = [str(Path(folder) / f"{name}.onnx") for name in ("floats", "ready", "int8")]
+        onnx.save(graph, paths[0])
+        quant_pre_process(paths[0], paths[1], skip_symbolic_shape=True)
+        ready = _with_padding_in_convolutions(onnx.load(paths[1]))
+        onnx.save(ready, paths[1])
+        exact = {"scale": np.array(SCALE, np.float32), "zero_point": np.array(CENTRE, np.uint8)}
         quantize_static(
-            str(paths[1]), str(paths[2]), Pictures(pictures), quant_format=QuantFormat.QDQ, per_channel=True,
-            reduce_range=True, activation_type=QuantType.QUInt8, weight_type=QuantType.QInt8,
+            paths[1], paths[2], Pictures(pictures), quant_format=QuantFormat.QDQ, per_channel=True, reduce_range=True,
+            activation_type=QuantType.QUInt8, weight_type=QuantType.QInt8,
+            nodes_to_exclude=[node.name for node in ready.graph.node if floating in node.name],
+            extra_options={"CalibMovingAverage": True, "TensorQuantOverrides": {_first_operand(ready): [exact]}},
         )  # fmt: skip
-        return _from_pixels(onnx.load(str(paths[2])))
+        return _from_pixels(onnx.load(paths[2]))
+
+
+def _first_operand(model: onnx.ModelProto) -> str:
+    """The pixels in the shape in which the first convolution takes them."""
+    return str(next(node for node in model.graph.node if node.op_type == "Conv").input[0])
 
 
 def _with_padding_in_convolutions(model: onnx.ModelProto) -> onnx.ModelProto:
@@ -70,13 +80,9 @@ def _with_padding_in_convolutions(model: onnx.ModelProto) -> onnx.ModelProto:
 
 
 def _from_pixels(model: onnx.ModelProto) -> onnx.ModelProto:
-    """The graph without the quantisation of its input: pixels are quantised already, with a scale known exactly."""
+    """The graph without the quantisation of its input: pixels are quantised already."""
     graph = model.graph
     first = next(node for node in graph.node if node.op_type == "QuantizeLinear")  # shapes alone change before it
-    for value in graph.initializer:
-        if value.name in first.input:
-            exact = np.float32(SCALE) if value.name == first.input[1] else np.uint8(CENTRE)
-            value.CopyFrom(numpy_helper.from_array(np.asarray(exact), value.name))
     for node in graph.node:
         for place, name in enumerate(node.input):
             if name == first.output[0]:
