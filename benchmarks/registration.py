@@ -47,7 +47,7 @@ from objreg_ros.registrar.keyframe import Keyframe
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared, prepare
 from objreg_ros.registrar.scene_search import from_shapes
-from objreg_ros.registrar.warm import warm
+from objreg_ros.registrar.warm import drawn
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.simulation import furniture
@@ -487,9 +487,7 @@ def kiss(voxel: float) -> dict[str, Peer]:
 
 def compile_kernels() -> None:
     """Whatever the pieces run, once and thrown away, so that no pair is timed with its compilation."""
-    bench = Bench("clean", 0)
-    bench.single("soda_can", 99, [0.0])
-    bench.together(99, [20.0])
+    Bench("clean", 0).together(99, [20.0])
 
 
 def compile_half(half: int) -> None:
@@ -510,7 +508,8 @@ def compile_half(half: int) -> None:
     else:
         stage = Stage.of("soda_can", 99, ASIDE)
         render(stage.scene, stage.camera((0.0, 0.0, 0.0), np.random.default_rng(0)), seed=0)
-        warm(RegistrarParams())
+        params = RegistrarParams()
+        Engine(params).propose(*(keyframe(drawn(stamp), params) for stamp in (0, 1)))
 
 
 Piece = tuple[str, Callable[[Bench], None]]
@@ -584,7 +583,7 @@ def main(
     start = time.time()
     stop = start + QUICK_SECONDS if quick else math.inf
     size = None if quick else (reps, negatives, every)
-    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
+    with ProcessPoolExecutor(processes, multiprocessing.get_context("fork")) as pool:
         list(pool.map(compile_half, range(2)))
         found = pool.map(run, CONDITIONS, *([part] * 2 for part in (seed, cache, size, stop)))
         figures = dict(zip(CONDITIONS, found, strict=True))

@@ -19,13 +19,13 @@ def warm(params: RegistrarParams) -> None:
     gap_ns = round((params.min_gap + GAP_S) * 1e9)
     registrar = Registrar(params.replaced(store=""))
     for start_ns in (0, gap_ns):
-        registrar.process(_frame(start_ns))
-        registrar.process(_frame(start_ns + 1))
+        registrar.process(drawn(start_ns))
+        registrar.process(drawn(start_ns + 1))
         registrar.finish()
     registrar.close()
 
 
-def _frame(stamp_ns: int) -> Frame:
+def drawn(stamp_ns: int) -> Frame:
     """Two boxes on a table, seen from above, all with a pattern."""
     v, u = np.mgrid[: CAMERA.height, : CAMERA.width]
     depth = (1.6 - 0.005 * v).astype(np.float32)
