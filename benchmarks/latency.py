@@ -200,6 +200,12 @@ def measure(objects: int, frames: int, seed: int, node_args: Mapping[str, list[s
         return {"end_to_end_ms": latency, "constraint_ms": told, "books": books_of(live), "usage": usage}
 
 
+def line_of(row: Mapping[str, Any]) -> str:
+    """One run in a line."""
+    end_to_end, told = row["end_to_end_ms"]["registrar"], row["constraint_ms"]
+    return f"end to end {end_to_end}, constraints {told}, usage {row['usage']}"
+
+
 @click.command()
 @click.option("--objects", default="1,4,8", show_default=True, help="Objects in view, one run each.")
 @click.option("--frames", default=300, show_default=True, help="Frames of a run, at 30 a second.")
@@ -214,9 +220,7 @@ def main(objects: str, frames: int, seed: int, model: str, json_file: Path | Non
     rows = {}
     for count in (int(text) for text in objects.split(",")):
         rows[str(count)] = measure(count, frames, seed, node_args)
-        row = rows[str(count)]
-        frames, told = row["end_to_end_ms"]["registrar"], row["constraint_ms"]
-        click.echo(f"{count} objects: end to end {frames}, constraints {told}, usage {row['usage']}")
+        click.echo(f"{count} objects: {line_of(rows[str(count)])}")
     if json_file is not None:
         json_file.write_text(json.dumps({"rate_hz": RATE_HZ, "objects": rows}, indent=1))
 
