@@ -160,14 +160,15 @@ def _held(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
     The covariance is that of the residuals and of a warped depth: two views may share few patches on one side, which
     agree with many poses. A camera that goes sideways and turns to keep looking at one far thing sees next to no
-    difference. What is free to slide is not known by any push.
+    difference. What is free to slide is not known by any push. A lone object has to hold the pose twice as well.
     """
     sigma = worst_translation(spread_of(candidate.alignment, params) + candidate.warp)
     drop = candidate.resistance
-    known = sigma <= params.max_slack_sigma
+    most = params.max_slack_sigma if len(candidate.explained) > 1 else params.max_slack_sigma_alone
+    known = sigma <= most
     least = params.rival_margin if known else params.firm_margin
     if not known and (drop is None or len(candidate.alignment.slack) > 0):
-        return Reason.SLACK, f"sigma {sigma:.3f} m > {params.max_slack_sigma:.3f} m"
+        return Reason.SLACK, f"sigma {sigma:.3f} m > {most:.3f} m"
     if drop is None or drop >= least:
         return None
     return Reason.SLACK, f"V falls by {drop:.2f} < {least:.2f} over {params.pushes[-1]:.2f} m, sigma {sigma:.3f} m"

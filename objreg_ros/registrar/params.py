@@ -163,6 +163,7 @@ class RegistrarParams(Params):
     max_gravity_error: float = param(5.0, "largest angle between the gravities", "deg", ge=0.0, le=180.0)
     max_translation: float = param(5.0, "largest distance between the two cameras", "m", ge=0.0)
     max_slack_sigma: float = param(0.03, "largest standard deviation along any translation", "m", ge=0.0)
+    max_slack_sigma_alone: float = param(0.015, "the same where a single object is explained", "m", ge=0.0)
     firm_margin: float = param(0.4, "unless the views like a push so much less", ge=0.0)
     odometry_sigmas: float = param(4.0, "largest distance from odometry in its standard deviations", ge=0.0)
 

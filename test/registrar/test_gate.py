@@ -141,6 +141,16 @@ def test_a_pose_that_the_surfaces_do_not_hold_may_be_held_by_the_views_alone() -
     assert refuse(candidate(**loose, resistance=PARAMS.firm_margin, slack=np.eye(6)[:1]), PARAMS) is not None
 
 
+def test_a_lone_object_has_to_hold_its_pose_better_than_several() -> None:
+    between = (PARAMS.max_slack_sigma + PARAMS.max_slack_sigma_alone) / 2.0
+    doubtful = {"warp": np.diag([between**2, 0, 0, 0, 0, 0]), "resistance": PARAMS.firm_margin - 0.1}
+    lone = {"explained": (CUP,), "margin": 1.0}
+    assert refuse(candidate(**doubtful), PARAMS) is None
+    refusal = refuse(candidate(**doubtful, **lone), PARAMS)
+    assert refusal is not None and refusal[0] is Reason.SLACK
+    assert refuse(candidate(**{**doubtful, **lone, "resistance": PARAMS.firm_margin}), PARAMS) is None
+
+
 def test_free_space_is_less_of_a_judge_of_a_lone_object_whose_pose_grey_and_a_push_hold() -> None:
     lone = {"explained": (CUP,), "violations": 0.05, "texture": 0.7, "yaw_known": True, "likeness": 0.5}
     assert refuse(candidate(**lone, resistance=PARAMS.firm_margin), PARAMS) is None
