@@ -22,6 +22,7 @@ from typing import Any
 
 import click
 import numpy as np
+from pose_figures import SUCCESS
 from scipy.spatial import cKDTree
 
 from objreg_ros.data import Array, DepthImage, Detections, Frame
@@ -44,10 +45,10 @@ from objreg_ros.simulation.model import ObjectModel
 from objreg_ros.simulation.objects import make_object
 from objreg_ros.simulation.render import Rendering, render
 from objreg_ros.simulation.scene import Scene, furnished, number, place_on
+from objreg_ros.truth import within
 
 ASIDE = 0.18  # m from the middle of the table, about which half a turn would look the same
 PAPER_SECONDS = (2.0, 4.0)  # what the document says of its time for a pair
-SUCCESS = (5.0, 2.0)  # degrees, centimetres
 METHODS = ("founding", "ours", "engine")
 BINS = ((0, 30), (30, 60), (60, 120), (120, 181))
 UP = np.array([0.0, 0.0, 1.0])
@@ -243,7 +244,7 @@ class Bench:
             return {"error_m": None, "rotation_deg": None, "translation_cm": None, "success": False}
         T, error = answer
         degrees, centimetres = stage.error(T, *cameras)
-        right = degrees <= SUCCESS[0] and centimetres <= SUCCESS[1]
+        right = within((degrees, centimetres), SUCCESS)
         return {"error_m": error, "rotation_deg": degrees, "translation_cm": centimetres, "success": right}
 
 

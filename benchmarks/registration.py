@@ -23,11 +23,9 @@ import json
 import math
 import multiprocessing
 import time
-import zlib
 from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -35,103 +33,38 @@ from typing import Any
 import click
 import numpy as np
 from cloud_peers import Peer, cloud_peers
-from paper import SUCCESS, TABLE_1, UP, Stage, keyframe
+from looks import Setting, Shot, Shots, around, four
+from paper import TABLE_1, Stage, keyframe
+from pose_figures import SUCCESS, error_at, grouped, judged, mean, median, nees, percentiles
 
-from objreg_ros.data import Array, DepthImage, Detections, Frame
-from objreg_ros.geometry import inverse, pose, pose_error, transform, vector_from_rotation
+from objreg_ros.data import DepthImage, Detections
+from objreg_ros.geometry import inverse, pose_error, transform
 from objreg_ros.registrar.candidate import Candidate
 from objreg_ros.registrar.covariance import spread_of
 from objreg_ros.registrar.engine import Engine
 from objreg_ros.registrar.gate import judge
 from objreg_ros.registrar.hypotheses import Hypothesis
-from objreg_ros.registrar.keyframe import Keyframe
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.prepared import Prepared, prepare
 from objreg_ros.registrar.scene_search import from_shapes
 from objreg_ros.registrar.warm import drawn
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
-from objreg_ros.simulation import furniture
 from objreg_ros.simulation.camera import KINECT
-from objreg_ros.simulation.light import looking
-from objreg_ros.simulation.objects import make_object
 from objreg_ros.simulation.params import StressParams
 from objreg_ros.simulation.render import render
-from objreg_ros.simulation.scene import furnished, number, place_on
+from objreg_ros.truth import FALSE, within
 
 CONDITIONS = {
     "clean": StressParams(),
     "stress": StressParams(depth_bias=0.003, warp=0.003, ragged=1.0, motion_blur=2.0),
 }
-FALSE = (8.0, 15.0)  # degrees and centimetres beyond which an accepted pose is a lie
 NOTHING = (180.0, 1e3)  # the error where there is no pose
 ASIDE = 0.18  # m from the middle of the table
 STORED = (0.0, 60.0, 120.0, 180.0)  # sides that an object is known from
-FOUR = ("cereal_box", "book", "keyboard", "bowl", "cap", "flashlight", "soda_can")
 QUICK_SECONDS, LEAST = 40.0, 3  # after which a quick run begins no piece beyond the least
 ROOMS = 4  # strangers of each kind that are shown to each other
 SYMMETRIC = ("soda_can", "bowl")
 TELLING = ("cereal_box", "chair", "monitor", "flashlight", "book", "keyboard")  # a cap tells next to nothing
-
-
-@dataclass(frozen=True, eq=False)
-class Shot:
-    """One look: the camera's true pose and what the segmenter made of it."""
-
-    T_world_camera: Array
-    frame: Frame
-    key: Keyframe
-    _made: list[Prepared] = field(default_factory=list)
-
-    def prepared(self, params: RegistrarParams) -> Prepared:
-        """The keyframe made ready, with the grids that others are laid upon."""
-        if not self._made:
-            self._made.append(prepare(self.key, params))
-            for shape in (*self._made[0].shapes, self._made[0].scene):
-                assert shape is None or len(shape.surface) >= 0
-        return self._made[0]
-
-
-def look(stage: Stage, T_world_camera: Array, seed: int, stress: StressParams, params: RegistrarParams) -> Shot:
-    """A picture of a stage with the true boxes of its objects."""
-    image = render(stage.scene, T_world_camera, seed=seed, stress=stress)
-    seen = [item for item in image.objects if item.visibility > 0.3]
-    detections = Detections(
-        xyxy=np.array([item.xyxy for item in seen], np.float32).reshape(-1, 4),
-        score=np.ones(len(seen), np.float32),
-        label=tuple(item.label for item in seen),
-        image_hw=image.depth.shape,
-        stamp_ns=seed,
-    )
-    depth = DepthImage(depth=image.depth, rgb=image.rgb, intrinsics=image.intrinsics, stamp_ns=seed)
-    frame = Segmenter(SegmenterParams()).segment(detections, depth)
-    return Shot(T_world_camera, frame, keyframe(frame, params))
-
-
-def four(seed: int) -> Stage:
-    """A table with four different objects; its middle is the object of the stage."""
-    rng = np.random.default_rng([seed, 4])
-    labels = rng.permutation(FOUR)[:4]
-    table, room = furniture.table(rng, (1.3, 0.9)), furniture.room(rng, (3.2, 2.5))
-    height = table.boards[0][2]
-    corners = np.array([(-0.3, -0.2), (0.3, -0.2), (-0.3, 0.2), (0.3, 0.2)]) + rng.uniform(-0.05, 0.05, (4, 2))
-    models = [make_object(str(label), int(rng.integers(2**31))) for label in labels]
-    T_table = pose(np.eye(3), np.array([0.0, 0.0, height]))
-    placed = [
-        (model, place_on(model, T_table, x, y, float(rng.uniform(0, 2 * np.pi))))
-        for model, (x, y) in zip(models, corners, strict=True)
-    ]
-    scene = furnished(rng, [(table, np.eye(4))], room).with_objects(number(placed))
-    return Stage(scene, models[0], pose(np.eye(3), np.array([0.0, 0.0, height])), float(rng.uniform(0, 360)), 1.15)
-
-
-def around(stage: Stage, angle: float, rng: np.random.Generator) -> Array:
-    """``T_world_camera`` after going around a table by ``angle`` degrees; distance and aim differ a little."""
-    azimuth, elevation = np.radians(stage.start_deg + angle), np.radians(38.0)
-    away = np.array([np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
-    centre = stage.T_world_object[:3, 3]
-    aim = centre + rng.normal(0.0, 0.03, 3)
-    return looking(centre + stage.distance * rng.uniform(0.9, 1.1) * away, aim, UP)
 
 
 class Bench:
@@ -140,7 +73,8 @@ class Bench:
     def __init__(self, condition: str, seed: int, cache: Path | None = None) -> None:
         self.params = RegistrarParams()
         self.engine = Engine(self.params)
-        self.stress, self.seed = CONDITIONS[condition], seed
+        self.seed = seed
+        self.setting = Setting(CONDITIONS[condition], seed, self.params)
         self._cache = None if cache is None else cache / f"{condition}_{seed}"
         self.rows: list[dict[str, Any]] = []
         self.joint: list[dict[str, Any]] = []
@@ -184,7 +118,9 @@ class Bench:
 
     def _staged(self, label: str, number: int) -> tuple[Stage, Shots]:
         stage = Stage.of(label, 1000 * self.seed + number, ASIDE)
-        return stage, Shots(self, stage, lambda angle, hand: stage.camera((angle, 0.0, 0.0), hand), [label, number])
+        return stage, Shots(
+            self.setting, stage, lambda angle, hand: stage.camera((angle, 0.0, 0.0), hand), [label, number]
+        )
 
     def together(self, number: int, angles: Sequence[float]) -> None:
         """Four objects from all angles against the first look."""
@@ -192,7 +128,7 @@ class Bench:
 
     def _together(self, number: int, angles: Sequence[float]) -> list[dict[str, Any]]:
         stage = four(1000 * self.seed + number)
-        shots = Shots(self, stage, lambda angle, hand: around(stage, angle, hand), ["four", number])
+        shots = Shots(self.setting, stage, lambda angle, hand: around(stage, angle, hand), ["four", number])
         first, rows = shots.first(0.0), []
         for angle in angles:
             second = shots.next(angle)
@@ -299,32 +235,6 @@ class Bench:
         return rows
 
 
-class Shots:
-    """The looks at one stage: another hand holds the camera for each of them, the same whenever it is asked for."""
-
-    def __init__(
-        self, bench: Bench, stage: Stage, camera: Callable[[float, np.random.Generator], Array], name: list[Any]
-    ) -> None:
-        self._bench, self._stage, self._camera = bench, stage, camera
-        self._name = zlib.crc32(repr(name).encode())
-        self._kept: dict[float, Shot] = {}
-
-    def next(self, angle: float) -> Shot:
-        """A second look from an angle."""
-        return self._look(angle, 2)
-
-    def first(self, angle: float) -> Shot:
-        """The first look from an angle; it is kept."""
-        if angle not in self._kept:
-            self._kept[angle] = self._look(angle, 1)
-        return self._kept[angle]
-
-    def _look(self, angle: float, time: int) -> Shot:
-        hand = np.random.default_rng([self._bench.seed, self._name, round(angle), time])
-        T = self._camera(angle, hand)
-        return look(self._stage, T, int(hand.integers(2**31)), self._bench.stress, self._bench.params)
-
-
 def named(kind: str, label: str, number: int, angles: Sequence[float]) -> str:
     """The name of a piece: another for other angles."""
     return f"{kind}_{label}_{number}_" + "_".join(f"{angle:.0f}" for angle in angles)
@@ -350,57 +260,11 @@ def object_error(stage: Stage, first: Shot, second: Shot, found: Hypothesis | No
     return stage.error(found.T_target_source, first.T_world_camera, second.T_world_camera)
 
 
-def judged(row: dict[str, Any]) -> dict[str, Any]:
-    """The row with what of it is a success."""
-    errors = {"success": "error", "engine_success": "engine_error", "stored_success": "stored_error"}
-    return row | {name: within(row[error], SUCCESS) for name, error in errors.items() if error in row}
-
-
-def percentiles(name: str, values: Sequence[float]) -> dict[str, float | None]:
-    """The median and the 95th percentile; None without values."""
-    return {f"{name}_p{q}": float(np.percentile(values, q)) if values else None for q in (50, 95)}
-
-
 def yaw_unknown(shot: Shot, params: RegistrarParams) -> bool:
     """Whether the object of a look says itself that its yaw is not to be known."""
     if not shot.frame.objects or shot.frame.gravity is None:
         return False
     return not any(shot.prepared(params).yaw_known)
-
-
-def within(error: tuple[float, float], limit: tuple[float, float]) -> bool:
-    """Whether an error is at most so many degrees and centimetres."""
-    return error[0] <= limit[0] and error[1] <= limit[1]
-
-
-def error_at(T: Array, truth: Array, point: Array) -> tuple[float, float]:
-    """(degrees, centimetres that a point moves too far) of a pose."""
-    degrees, _ = pose_error(T, truth)
-    return degrees, float(100.0 * np.linalg.norm(transform(T, point) - transform(truth, point)))
-
-
-def nees(T: Array, truth: Array, C: Array) -> float:
-    """The error squared in units of its covariance; its mean is 6 for an honest covariance."""
-    e = np.r_[truth[:3, 3] - T[:3, 3], vector_from_rotation(truth[:3, :3] @ T[:3, :3].T)]
-    return float(e @ np.linalg.solve(C, e))
-
-
-def mean(rows: Sequence[dict[str, Any]], key: str) -> float | None:
-    """The share of rows that are so; None without rows."""
-    return float(np.mean([row[key] for row in rows])) if rows else None
-
-
-def median(values: Sequence[float]) -> float | None:
-    """The median; None without values."""
-    return float(np.median(values)) if values else None
-
-
-def grouped(rows: Sequence[dict[str, Any]], key: str) -> dict[str, float | None]:
-    """Success by a key."""
-    return {
-        str(value): mean([r for r in rows if r[key] == value], "success")
-        for value in dict.fromkeys(r[key] for r in rows)
-    }
 
 
 def peer_success(peer: Peer, stage: Stage, first: Shot, second: Shot) -> bool:
