@@ -29,8 +29,9 @@ import click
 import closers
 from closure_table import draw, grouped, table, table_of_totals, totals
 from peers import peers
-from sources import Source, read_source
+from sources import Source, detector_of, read_source
 
+from objreg_ros.detector.params import DetectorParams
 from objreg_ros.simulation.write import simulate
 
 OURS, ORACLE = "objreg", "oracle"
@@ -41,10 +42,11 @@ QUICK = {"scenarios": ("loop:0",), "frames": 300, "names": "orb_pnp", "candidate
 class Asked:
     """What is compared, and how."""
 
-    model: str
+    detector: DetectorParams
     names: tuple[str, ...]
     candidates: int
     seed: int
+    drift: float
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -53,7 +55,12 @@ class Asked:
 
     def tag(self) -> str:
         """What the figures depend on, as a part of a file's name."""
-        return f"{Path(self.model).stem or 'default'}_{self.candidates}_{self.seed}"
+        usual = DetectorParams()
+        model = "default" if self.detector.model == usual.model else Path(self.detector.model).stem
+        parts = [model, f"{self.candidates}", f"{self.seed}"]
+        parts += [f"{self.detector.threshold:g}"] if self.detector.threshold != usual.threshold else []
+        parts += [f"x{self.drift:g}"] if self.drift != 1.0 else []
+        return "_".join(parts)
 
 
 class Kept:
@@ -82,7 +89,7 @@ def compare(path: Path, asked: Asked, kept: Kept) -> dict[str, Any]:
     missing = kept.missing(asked.methods)
     if missing:
         click.echo(f"{path.name}: detecting and segmenting", err=True)
-        with read_source(path, asked.model, asked.seed) as source:
+        with read_source(path, asked.detector, asked.seed, asked.drift) as source:
             _measure(source, asked, missing, kept)
     methods = {name: kept.row["methods"][name] for name in asked.methods}
     return {**kept.row, "methods": methods}
@@ -136,9 +143,11 @@ def stories(texts: Sequence[str]) -> list[tuple[str, int]]:
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
 @click.option("--figure", type=click.Path(dir_okay=False, path_type=Path), help="Draw them here (svg, png).")
 @click.option("--model", default="", help="ONNX model; `truth` takes the true boxes of a simulated recording.")
+@click.option("--threshold", default=0.5, show_default=True, help="Least score of a detection; COCO models want 0.4.")
 @click.option("--peers", "names", default="orb_pnp,fpfh_icp,paper", show_default=True, help="Methods to compare with.")
 @click.option("--candidates", default=1, show_default=True, help="Pairs that a peer may try for each keyframe.")
 @click.option("--seed", default=1, show_default=True, help="Of the synthetic drift and of the registrar.")
+@click.option("--drift", default=1.0, show_default=True, help="Synthetic odometry drifts so many times 2 % and 1°/m.")
 @click.option(
     "--keep", type=click.Path(file_okay=False, path_type=Path), default=Path("out/closure"), show_default=True
 )
@@ -147,9 +156,9 @@ def stories(texts: Sequence[str]) -> list[tuple[str, int]]:
 def main(recordings: tuple[Path, ...], keep: Path, again: tuple[str, ...], quick: bool, **options: Any) -> None:
     """Compare loop closure on RECORDINGS that have ground truth."""
     options |= QUICK if quick else {}
-    asked = Asked(
-        options["model"], tuple(n for n in options["names"].split(",") if n), options["candidates"], options["seed"]
-    )
+    names = tuple(n for n in options["names"].split(",") if n)
+    detector = detector_of(options["model"], options["threshold"])
+    asked = Asked(detector, names, options["candidates"], options["seed"], options["drift"])
     paths = [partial(Path, path) for path in recordings]
     paths += [partial(simulated, keep, *story, options["frames"]) for story in stories(options["scenarios"])]
     rows: dict[str, dict[str, Any]] = {}

@@ -15,7 +15,7 @@ from contextlib import closing
 from pathlib import Path
 
 import numpy as np
-from sources import TRUE_BOXES, read_source
+from sources import TRUE_BOXES, detector_of, read_source
 from tables import table_story
 
 from objreg_ros.data import Frame
@@ -33,7 +33,7 @@ def table_frames(folder: Path) -> list[Frame]:
     """The frames of one pass."""
     path = folder / "table"
     write_story(path, table_story(OBJECTS, FRAMES, 0), "table", 0, jpeg=True, threads=os.cpu_count() or 1)
-    with read_source(path, TRUE_BOXES, 0) as source:
+    with read_source(path, detector_of(TRUE_BOXES), 0) as source:
         return source.frames
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
-from sources import read_source
+from sources import detector_of, read_source
 
 from objreg_ros.data import Array, ObjectCloud, PointFlag
 from objreg_ros.geometry import transform
@@ -25,7 +25,7 @@ def lay(recording: Path, model: str, json_path: Path | None) -> dict[str, Any]:
     The distance is that of a point to the nearest one of another view, where they overlap: within 5 cm. A picture with
     every view in its own colour, from above and from the side, goes beside ``json_path``.
     """
-    with read_source(recording, model, seed=0) as source:
+    with read_source(recording, detector_of(model), seed=0) as source:
         seen = [
             (transform(T, o.xyz), o, frame.stamp_ns)
             for frame in source.frames

@@ -23,7 +23,7 @@ from frame_pairs import Pair, Truths, draw_pairs
 from pair_figures import Row, figures, line
 from pair_pictures import draw_failures
 from peers import Answer, Peer, Shot, peers
-from sources import Source, read_source
+from sources import Source, detector_of, read_source
 
 from objreg_ros.data import Array, Frame, Reason
 from objreg_ros.geometry import back_project, pose_error
@@ -192,6 +192,7 @@ def compare(source: Source, params: RegistrarParams, options: dict[str, Any]) ->
 @click.option("--quick", is_flag=True, help="Few pairs, ours and two peers.")
 @click.option("--wanted", default=200, show_default=True, help="Pairs of each kind.")
 @click.option("--model", default="", help="ONNX model; empty: the default one.")
+@click.option("--threshold", default=0.5, show_default=True, help="Least score of a detection; COCO models want 0.4.")
 @click.option("--peers", "names", default="paper,orb_pnp,sift_pnp,fpfh_icp", show_default=True)
 @click.option("--pictures", type=click.Path(file_okay=False, path_type=Path), help="Draw the worst failures here.")
 @click.option("--seed", default=1, show_default=True)
@@ -202,6 +203,7 @@ def main(
     quick: bool,
     wanted: int,
     model: str,
+    threshold: float,
     names: str,
     pictures: Path | None,
     seed: int,
@@ -215,7 +217,7 @@ def main(
         "pictures": pictures,
         "seed": seed,
     }
-    with read_source(recording, model, seed) as source:
+    with read_source(recording, detector_of(model, threshold), seed) as source:
         result = compare(source, RegistrarParams(), options)
     if json_file is not None:
         json_file.write_text(json.dumps(result, indent=1))

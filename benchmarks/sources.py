@@ -117,16 +117,19 @@ class Source:
 
 
 @contextmanager
-def read_source(path: Path, model: str, seed: int) -> Iterator[Source]:
-    """A recording, open. Without odometry of its own it gets one that drifts from its ground truth, by ``seed``."""
+def read_source(path: Path, detector: DetectorParams, seed: int, drift: float = 1.0) -> Iterator[Source]:
+    """A recording, open. Without odometry of its own it gets one that drifts from its ground truth, by ``seed``.
+
+    It drifts ``drift`` times 2 % and 1 degree a metre.
+    """
     with open_recording(path) as recording:
         inputs = choose_inputs(recording.topics)
         truth = Truth.of(recording, inputs.ground_truth)
         if not truth.stamps_ns:
             raise ValueError(f"{path}: expected a recording with ground truth, got none")
-        frames, seen = _frames(recording, model)
+        frames, seen = _frames(recording, detector)
         if inputs.odom is None:
-            frames = with_drift(frames, truth, seed)
+            frames = with_drift(frames, truth, seed, drift)
         yield Source(frames, truth, Album(recording, inputs), seen, SIMULATED if _is_simulated(path) else {})
 
 
@@ -138,26 +141,31 @@ def _is_simulated(path: Path) -> bool:
     return True
 
 
-def _frames(recording: Recording, model: str) -> tuple[list[Frame], dict[int, Detections]]:
+def _frames(recording: Recording, asked: DetectorParams) -> tuple[list[Frame], dict[int, Detections]]:
     inputs = choose_inputs(recording.topics)
-    detector = Remembered(TrueBoxes(recording.path) if model == TRUE_BOXES else _detector(model))
+    detector = Remembered(
+        TrueBoxes(recording.path) if asked.model == TRUE_BOXES else Detector(asked, share.model(asked.model))
+    )
     collector, segmenter = Collector(), Segmenter(SegmenterParams())
     records = recording.records(set(inputs.chosen().values()))
     run_offline(records, Rooms(detector, segmenter, collector, organise), inputs)
     return collector.frames, detector.seen
 
 
-def _detector(model: str) -> Detector:
-    params = DetectorParams(model=model) if model else DetectorParams()
-    return Detector(params, share.model(params.model))
+def detector_of(model: str = "", threshold: float = 0.5) -> DetectorParams:
+    """A detector of a model, the embedded one by default."""
+    params = DetectorParams(threshold=threshold)
+    return params.replaced(model=model) if model else params
 
 
-def with_drift(frames: list[Frame], truth: Truth, seed: int) -> list[Frame]:
-    """The frames with the simulator's drifting odometry (2 % and 1 degree a metre), made of their true poses."""
+def with_drift(frames: list[Frame], truth: Truth, seed: int, drift: float = 1.0) -> list[Frame]:
+    """The frames with odometry that drifts ``drift`` times as much as the simulator's, made of their true poses."""
     known = [frame for frame in frames if truth.at(frame.stamp_ns) is not None]
     true = np.array([truth.at(frame.stamp_ns) for frame in known])
     level = np.array([_levelling(known, true) @ T for T in true])
-    poses, _ = drifted(level, OdometryParams(), seed)
+    usual = OdometryParams()
+    drifting = usual.replaced(distance_drift=drift * usual.distance_drift, turn_drift=drift * usual.turn_drift)
+    poses, _ = drifted(level, drifting, seed)
     return [replace(frame, T_odom_camera=T) for frame, T in zip(known, poses, strict=True)]
 
 

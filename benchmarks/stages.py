@@ -20,7 +20,7 @@ from typing import Any
 
 import click
 import numpy as np
-from sources import read_source
+from sources import detector_of, read_source
 
 from objreg_ros.data import Array, Frame
 from objreg_ros.registrar.params import RegistrarParams
@@ -97,7 +97,7 @@ def main(recordings: tuple[Path, ...], threads: int, model: str, json_file: Path
     warm(params)
     rows: dict[str, Any] = {}
     for path in recordings:
-        with read_source(path, model, seed) as source:
+        with read_source(path, detector_of(model), seed) as source:
             rows[path.name] = compare(source.frames, params)
         click.echo(table(path.name, rows[path.name]))
     if json_file is not None:
