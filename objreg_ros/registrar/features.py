@@ -71,8 +71,7 @@ def match(source: Features, target: Features, limit: int) -> tuple[Array, Array,
     if min(len(source), len(target)) < 3:
         nothing = np.zeros(0, np.int64)
         return nothing, nothing, np.zeros(0)
-    a, b = source.histograms, target.histograms
-    forward, backward, squared = _nearest(a @ b.T, (a * a).sum(axis=1), (b * b).sum(axis=1))
+    forward, backward, squared = _nearest(source.histograms, np.ascontiguousarray(target.histograms.T))
     pairs = np.unique(
         np.concatenate(
             [
@@ -92,24 +91,30 @@ def match(source: Features, target: Features, limit: int) -> tuple[Array, Array,
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def _nearest(products, a, b):  # type: ignore[no-untyped-def]
-    """The nearest partner of each of N and each of M by their ``products (N, M)`` and squared lengths, in one pass.
+def _nearest(a, b):  # type: ignore[no-untyped-def]
+    """The nearest partner of each of N and each of M histograms, ``a (N, K)`` and ``b (K, M)``, in one pass.
 
-    With the squared distances to them: (N,), (M,), ((N,), (M,)).
+    With the squared distances to them: (N,), (M,), ((N,), (M,)). Not by BLAS, whose own threads wait for each other
+    and spin meanwhile, while two places are tried at once.
     """
-    n, m = products.shape
+    n, m = len(a), b.shape[1]
     forward, backward = np.zeros(n, np.int64), np.zeros(m, np.int64)
     ahead, behind = np.full(n, np.float32(FAR)), np.full(m, np.float32(FAR))
+    squared = np.empty(m, np.float32)
     for i in range(n):
+        squared[:] = np.float32(0.0)
+        for k in range(len(b)):
+            own = a[i, k]
+            for j in range(m):
+                squared[j] += (own - b[k, j]) * (own - b[k, j])
         best, where = np.float32(FAR), 0
         for j in range(m):
-            squared = a[i] + b[j] - np.float32(2.0) * products[i, j]
-            if squared < best:
-                best, where = squared, j
-            if squared < behind[j]:
-                behind[j], backward[j] = squared, i
+            if squared[j] < best:
+                best, where = squared[j], j
+            if squared[j] < behind[j]:
+                behind[j], backward[j] = squared[j], i
         ahead[i], forward[i] = best, where
-    return forward, backward, (np.maximum(ahead, np.float32(0.0)), np.maximum(behind, np.float32(0.0)))
+    return forward, backward, (ahead, behind)
 
 
 def _cells(xyz: Array, size: float) -> tuple[Array, Array, Array, Array]:

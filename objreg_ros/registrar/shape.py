@@ -150,8 +150,9 @@ def _layer(keyframe: Keyframe, index: int, R_upright_camera: Array, level: Array
     """Level points (N, 3) around an object at the height that it stands on, about their own middle."""
     points = keyframe.objects[index].cloud.xyz @ R_upright_camera.T.astype(np.float32)
     foot = footing(keyframe, index, R_upright_camera)
-    beside = np.abs(level[:, :2] - points[:, :2].mean(axis=0)).max(axis=1) < WIDE
-    layer = level[beside & (np.abs(level[:, 2] - foot) < THICK[0])]
+    (x, y, z), middle = level.T, points.mean(axis=0)
+    beside = np.maximum(np.abs(x - middle[0]), np.abs(y - middle[1])) < WIDE
+    layer = level[beside & (np.abs(z - foot) < THICK[0])]
     return np.asarray(layer - np.median(layer, axis=0) if len(layer) else layer, float)
 
 
@@ -164,10 +165,10 @@ def footing(keyframe: Keyframe, index: int, R_upright_camera: Array) -> float:
     lowest = float(np.percentile(points[:, 2], 2))
     around = keyframe.context.xyz @ R_upright_camera.T.astype(np.float32)
     level = keyframe.context.normals @ R_upright_camera[2].astype(np.float32) > LEVEL
-    low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
-    beyond = np.maximum(low - around[:, :2], around[:, :2] - high).max(axis=1)
+    (x, y, z), (a, b, _) = around.T, points.T
+    beyond = np.maximum(np.maximum(a.min() - x, x - a.max()), np.maximum(b.min() - y, y - b.max()))
     near = (beyond > BESIDE) & (beyond < AROUND)
-    heights = np.sort(around[level & near & (around[:, 2] < lowest + CLEAR), 2])[::-1]
+    heights = np.sort(z[level & near & (z < lowest + CLEAR)])[::-1]
     for first in range(len(heights) - SEEN + 1):  # from the top: the first height where a surface is
         within = heights[first:][heights[first:] > heights[first] - STEP]
         if len(within) >= SEEN:
