@@ -48,7 +48,8 @@ class Candidate:
     ``yaw_known`` says that the shape of one of them tells its yaw; ``margin`` is how much more the candidate is worth
     than any other. ``resistance`` is how much less the views like the pose pushed to where it would be false,
     along the directions in which it is known least; None where it is known well enough without. ``warp (6, 6)`` is the
-    covariance [t r] that a warped depth adds to the alignment's.
+    covariance [t r] that a warped depth adds to the alignment's. ``floating`` is the share of the tested pixels that
+    float in seen free space beyond doubt.
     """
 
     alignment: Alignment
@@ -62,6 +63,7 @@ class Candidate:
     yaw_known: bool = False
     margin: float = 0.0
     resistance: float | None = None
+    floating: float = 0.0
     warp: Array = field(default_factory=lambda: np.zeros((6, 6)))
 
     @property

@@ -24,8 +24,8 @@ from objreg_ros.registrar.refine import refine, settle, warp
 from objreg_ros.registrar.scene_search import from_shapes
 from objreg_ros.registrar.shape import upright_motion
 from objreg_ros.registrar.shape_score import alike
-from objreg_ros.registrar.sliding import resistance, steadied
-from objreg_ros.registrar.verify import WORST, rank, verify
+from objreg_ros.registrar.sliding import preferred, resistance, steadied
+from objreg_ros.registrar.verify import WORST, floating, rank, verify
 
 APART = (np.radians(4.0), 0.04)  # rad and m: hypotheses are distinct beyond before they are settled
 ALIKE = (np.radians(0.5), 0.01)  # and after
@@ -144,7 +144,7 @@ class Engine:
     def _judge(self, pair: Pair, seed: Hypothesis, seeds: list[Hypothesis]) -> Candidate:
         """Finish a hypothesis and gather the evidence; ``seeds`` are all that may agree with it."""
         params, source, target = self._params, pair.source, pair.target
-        alignment = refine(source, target, seed.T_target_source, params)
+        alignment = self._refined(pair, seed.T_target_source)
         T = alignment.T_target_source
         explained, moved = explain(source, target, T, params)
         poses = np.array([other.T_target_source for other in seeds])
@@ -159,11 +159,22 @@ class Engine:
             likeness=likeness(source, target, explained, T, params),
             yaw_known=any(source.yaw_known[pair.source] and target.yaw_known[pair.target] for pair in explained),
             gravity_error_deg=gravity_error_deg(source, target, T),
+            floating=floating(source.sight, target.sight, T, params),
             warp=warp(source, target, T, params),
         )
         if is_held(candidate, params):
             candidate = replace(candidate, alignment=held(alignment))
         return self._steadied(pair, replace(candidate, resistance=self._resistance(pair, candidate)))
+
+    def _refined(self, pair: Pair, T_target_source: Array) -> Alignment:
+        """The refined pose; where that is known badly, the one that the views like best of all that it could be."""
+        params, source, target = self._params, pair.source, pair.target
+        alignment = refine(source, target, T_target_source, params)
+        C = spread_of(alignment, params) + warp(source, target, alignment.T_target_source, params)
+        if worst_translation(C) <= params.doubtful_sigma:
+            return alignment
+        better = preferred(source, target, alignment.T_target_source, C, params)
+        return alignment if better is None else refine(source, target, better, params)
 
     def _resistance(self, pair: Pair, candidate: Candidate) -> float | None:
         """How the views resist a push to where the pose would be false; None where it is known well."""

@@ -81,19 +81,13 @@ def _overlap(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
 
 def _free_space(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
-    """Stricter for a lone object: a half turn about it is seen in free space alone, unless grey and a push say more."""
-    seen = candidate.verification
-    lone = len(candidate.explained) < 2 and not _seen_firmly(candidate, params)
-    most = params.max_violations_alone if lone else params.max_violations
-    if seen.violations <= most:
-        return None
-    return Reason.FREE_SPACE, f"violations {seen.violations:.3f} > {most:.3f}"
-
-
-def _seen_firmly(candidate: Candidate, params: RegistrarParams) -> bool:
-    """Whether the grey of the views holds the pose, and they like it much less when it is pushed."""
-    texture, drop = candidate.verification.texture, candidate.resistance
-    return texture is not None and texture >= params.holding_texture and (drop or 0.0) >= params.firm_margin
+    """Stricter for a lone object: a half turn about it is seen in free space alone, by what floats beyond doubt."""
+    violations, floating = candidate.verification.violations, candidate.floating
+    if violations > params.max_violations:
+        return Reason.FREE_SPACE, f"violations {violations:.3f} > {params.max_violations:.3f}"
+    if len(candidate.explained) < 2 and floating > params.max_floating_alone:
+        return Reason.FREE_SPACE, f"{floating:.3f} float > {params.max_floating_alone:.3f}"
+    return None
 
 
 def _texture(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
@@ -119,9 +113,7 @@ def _agreement(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
     chains, explained = len(candidate.agreeing_chains), len(candidate.explained)
     if explained >= params.min_objects:
         return None
-    if explained and _speaking(candidate, params) and (chains >= params.min_chains or _unrivalled(candidate, params)):
-        return None
-    if explained and _painted(candidate, params):
+    if explained and any(says(candidate, params) for says in (_speaking, _unrivalled, _painted)):
         return None
     if explained == 0:
         return Reason.FEW_OBJECTS, "0 objects < 1"
@@ -132,13 +124,18 @@ def _agreement(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
 
 def _speaking(candidate: Candidate, params: RegistrarParams) -> bool:
-    """Whether an object's own shape and print hold the pose."""
-    return candidate.yaw_known and candidate.likeness is not None and candidate.likeness >= params.min_likeness_alone
+    """Whether an object's own shape and print hold the pose that chains agree on."""
+    likeness, chains = candidate.likeness, len(candidate.agreeing_chains)
+    alike = likeness is not None and likeness >= params.min_likeness_alone
+    return alike and candidate.yaw_known and chains >= params.min_chains
 
 
 def _unrivalled(candidate: Candidate, params: RegistrarParams) -> bool:
-    """Whether no other pose comes near it."""
-    return candidate.margin >= params.min_margin_alone
+    """Whether no other pose comes near it, and the object does not look otherwise; it tells the yaw, or grey does."""
+    likeness, plain = candidate.likeness, candidate.verification.texture is None
+    least = params.min_likeness_alone if plain else params.min_likeness_unrivalled
+    alike = likeness is not None and likeness >= least and (candidate.yaw_known or not plain)
+    return alike and candidate.margin >= params.min_margin_alone
 
 
 def _painted(candidate: Candidate, params: RegistrarParams) -> bool:
@@ -156,22 +153,20 @@ def _stationary(candidate: Candidate, params: RegistrarParams) -> Refusal | None
 
 
 def _held(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
-    """Whether the pose is known: by its covariance and a push that the views like less, or by the latter alone.
+    """Whether the pose is known: the worse by its covariance, the more the views must like a push less.
 
     The covariance is that of the residuals and of a warped depth: two views may share few patches on one side, which
     agree with many poses. A camera that goes sideways and turns to keep looking at one far thing sees next to no
-    difference. What is free to slide is not known by any push. A lone object has to hold the pose twice as well.
+    difference. V falls with the square of a push, so what it must fall by grows with the variance; what is free to
+    slide is not known by any push.
     """
-    sigma = worst_translation(spread_of(candidate.alignment, params) + candidate.warp)
-    drop = candidate.resistance
-    most = params.max_slack_sigma if len(candidate.explained) > 1 else params.max_slack_sigma_alone
-    known = sigma <= most
-    least = params.rival_margin if known else params.firm_margin
-    if not known and (drop is None or len(candidate.alignment.slack) > 0):
-        return Reason.SLACK, f"sigma {sigma:.3f} m > {most:.3f} m"
-    if drop is None or drop >= least:
-        return None
-    return Reason.SLACK, f"V falls by {drop:.2f} < {least:.2f} over {params.pushes[-1]:.2f} m, sigma {sigma:.3f} m"
+    sigma, drop = worst_translation(spread_of(candidate.alignment, params) + candidate.warp), candidate.resistance
+    least = params.rival_margin * max(1.0, (sigma / params.max_slack_sigma) ** 2)
+    if drop is None:
+        held, by = sigma <= params.max_slack_sigma, "not tried"
+    else:
+        held, by = drop >= least, f"{drop:.2f} < {least:.2f}"
+    return None if held else (Reason.SLACK, f"sigma {sigma:.3f} m, V falls by {by} over {params.pushes[-1]:.2f} m")
 
 
 def _odometry(candidate: Candidate, params: RegistrarParams, prior: Prior) -> Refusal | None:

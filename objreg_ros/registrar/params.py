@@ -118,6 +118,10 @@ class RegistrarParams(Params):
     doubtful_sigma: float = param(
         0.006, "a position that is known less well than this is pushed as far as the last of these", "m", ge=0.0
     )
+    search_step: float = param(0.05, "and looked for about where it is, in the plane where it may err", "m", ge=0.01)
+    search_steps: int = param(4, "so many steps each way; 0: not at all", ge=0, le=10)
+    search_points: int = param(1000, "points a side that are asked", ge=50)
+    searched: int = param(2, "best places of those that grey finishes", ge=1)
     steadying_texture: float = param(
         0.4, "grey that correlates so well holds a position as far as pushes are resisted", ge=0.0, le=1.0
     )
@@ -135,9 +139,9 @@ class RegistrarParams(Params):
     agreement_translation: float = param(0.15, "chains agree within this distance", "m", ge=0.0)
     object_bonus: float = param(0.25, "what an explained object adds to V when candidates are ranked", ge=0.0)
     likeness_weight: float = param(0.5, "what the likeness of explained objects adds to V", ge=0.0)
-    explained_distance: float = param(0.10, "an object is explained when the middles are this close", "m", ge=0.0)
+    explained_distance: float = param(0.06, "an object is explained when the middles are this close", "m", ge=0.0)
     explained_share: float = param(
-        0.1, "and so much of its extent farther, since a large thing is never seen whole", ge=0.0
+        0.28, "and so much of its extent farther, since a large thing is never seen whole", ge=0.0
     )
 
     # The founding method.
@@ -149,22 +153,25 @@ class RegistrarParams(Params):
     min_tested: int = param(600, "least number of pixels that both views must see", ge=1)
     min_inliers: float = param(0.45, "least share of tested pixels whose depth agrees", ge=0.0, le=1.0)
     max_violations: float = param(0.07, "largest share of tested pixels in seen free space", ge=0.0, le=1.0)
-    max_violations_alone: float = param(0.035, "the same where a single object is explained", ge=0.0, le=1.0)
+    max_floating_alone: float = param(
+        0.008, "largest share of them far in it, where a single object is explained", ge=0.0, le=1.0
+    )
     min_texture: float = param(0.25, "least correlation of the high-passed grey, where there is grey", ge=-1.0, le=1.0)
     min_score: float = param(0.10, "least verification score V", ge=-3.0, le=2.0)
     rival_margin: float = param(0.1, "a candidate this much below the best in V is not considered", ge=0.0)
     min_chains: int = param(2, "chains that must agree when fewer objects than min_objects are explained", ge=1)
     min_objects: int = param(2, "explained objects that make up for chains that do not agree", ge=1)
-    min_likeness_alone: float = param(0.1, "a lone object without another chain looks as much alike", ge=-1.0, le=1.0)
-    min_margin_alone: float = param(0.2, "and its pose is worth so much more than any other", ge=0.0)
+    min_likeness_alone: float = param(0.1, "a lone object that chains agree on looks as much alike", ge=-1.0, le=1.0)
+    min_margin_alone: float = param(0.2, "or its pose is worth so much more than any other", ge=0.0)
+    min_likeness_unrivalled: float = param(-0.25, "and it looks at least as much alike", ge=-1.0, le=1.0)
     min_margin_painted: float = param(
         0.45, "so much more where grey correlates by holding_texture and the object itself says nothing", ge=0.0
     )
     max_gravity_error: float = param(5.0, "largest angle between the gravities", "deg", ge=0.0, le=180.0)
     max_translation: float = param(5.0, "largest distance between the two cameras", "m", ge=0.0)
-    max_slack_sigma: float = param(0.03, "largest standard deviation along any translation", "m", ge=0.0)
-    max_slack_sigma_alone: float = param(0.015, "the same where a single object is explained", "m", ge=0.0)
-    firm_margin: float = param(0.4, "unless the views like a push so much less", ge=0.0)
+    max_slack_sigma: float = param(
+        0.03, "standard deviation of a position beyond which the views must resist a push more", "m", ge=0.001
+    )
     odometry_sigmas: float = param(4.0, "largest distance from odometry in its standard deviations", ge=0.0)
 
     # How wrong an accepted pose may be; config/covariance.yaml says how these were calibrated.

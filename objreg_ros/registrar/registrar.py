@@ -275,6 +275,7 @@ def _evidence(candidate: Candidate) -> dict[str, float]:
         "score": seen.score,
         "inliers": seen.inliers,
         "violations": seen.violations,
+        "floating": candidate.floating,
         "occluded": seen.occluded,
         "texture": seen.texture,
         "tested": seen.tested,

@@ -8,15 +8,20 @@ is pushed, and where both ways are clearly worse it is held by the views, to a t
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import pose, rotation_from_vector, transform
+from objreg_ros.registrar.direct import finish
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
-from objreg_ros.registrar.verify import verify
+from objreg_ros.registrar.verify import rank, verify
 
 HELD = 1.0 / 3.0  # of a push that is clearly resisted: one sigma of a pose that the views hold
+AROUND = 8  # ways in which a pose is pushed to see whether it is resisted
+CLEARLY = 0.02  # gain of V for which a pose is left for another
+HOPE = 0.3  # of V, what grey may add to a pose by finishing it
 DIRECTIONS = 4  # in which a pose is pushed to hold it, one after the other
 
 
@@ -43,17 +48,55 @@ def resisted(
 
 
 def resistance(source: Prepared, target: Prepared, T_target_source: Array, C: Array, params: RegistrarParams) -> float:
-    """How much less the views like the pose, at least, when it is pushed either way where it is known least.
+    """How much less the views like the pose, at least, when it is pushed any way where it is known least.
 
-    ``C (6, 6)`` [t r] is its covariance in the target's axes. Along the two directions in which it is largest the pose
-    is pushed as far as the last of ``params.pushes``, the way that its errors go: a camera that looks at one far thing
+    ``C (6, 6)`` [t r] is its covariance in the target's axes. In the plane in which it is largest the pose is pushed
+    all around as far as the last of ``params.pushes``, the way that its errors go: a camera that looks at one far thing
     goes sideways and turns to keep looking at it.
     """
+    angles = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
+    pushes = params.pushes[-1] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    poses = np.array([T_target_source, *(pushed(T_target_source, motion) for motion in pushes @ weakest(C))])
+    score, *others = rank(source.sight, target.sight, poses, params, params.grey_points)
+    return float(score - max(others))
+
+
+def weakest(C: Array) -> Array:
+    """The motions (2, 6) [t r] of 1 m along the directions in which a position of covariance (6, 6) is known least."""
     values, vectors = np.linalg.eigh(C[:3, :3])
-    motions = [params.pushes[-1] / values[k] * (C[:, :3] @ vectors[:, k]) for k in (1, 2)]
-    poses = [T_target_source] + [pushed(T_target_source, way * motion) for motion in motions for way in (-1, 1)]
-    score, *others = (verify(source.sight, target.sight, T, params, params.grey_points).score for T in poses)
-    return score - max(others)
+    return np.asarray((C[:, :3] @ vectors[:, 1:] / values[1:]).T)
+
+
+def preferred(
+    source: Prepared, target: Prepared, T_target_source: Array, C: Array, params: RegistrarParams
+) -> Array | None:
+    """A pose that the views like better where one of covariance ``C (6, 6)`` could as well be; None if there is none.
+
+    Far away a shift looks like a turn, and what repeats itself looks alike on either side of the truth: a pose may come
+    to rest beside it. So the views are asked all over the plane in which the position is known least, and what they
+    like there, aside from the pose itself, is finished by grey. Nothing is preferred without grey.
+    """
+    if not (source.sight.textured and target.sight.textured):
+        return None
+    steps = params.search_step * np.arange(-params.search_steps, params.search_steps + 1)
+    pushes = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    poses = np.array([pushed(T_target_source, motion) for motion in pushes @ weakest(C)])
+    V = rank(source.sight, target.sight, poses, params, params.search_points).astype(np.float32)
+    best, score = None, verify(source.sight, target.sight, T_target_source, params, params.grey_points).score + CLEARLY
+    for k in _peaks(V, len(steps))[: params.searched]:
+        finished, _ = finish(source, target, poses[k], params)
+        seen = verify(source.sight, target.sight, finished, params, params.grey_points)
+        if seen.score > score:
+            best, score = finished, seen.score
+    return best
+
+
+def _peaks(V: Array, width: int) -> list[int]:
+    """The places in a square of scores, row by row, that no neighbour exceeds, best first; hopeful, not its middle."""
+    square, middle = V.reshape(width, width), width // 2
+    peaks = (square >= cv2.dilate(square, np.ones((3, 3), np.uint8))) & (square >= square[middle, middle] - HOPE)
+    peaks[middle - 1 : middle + 2, middle - 1 : middle + 2] = False
+    return [int(k) for k in np.argsort(-V, kind="stable") if peaks.ravel()[k]]
 
 
 def steadied(source: Prepared, target: Prepared, T_target_source: Array, C: Array, params: RegistrarParams) -> Array:

@@ -17,6 +17,7 @@ from objreg_ros.registrar.visibility import INLIERS, OCCLUDED, SEEN, VIOLATIONS,
 
 NO_TEXTURE = 0.2  # what stands in for the texture of a view without grey: less than a right pose usually has
 WORST = -3.0  # V where there is nothing to look at
+FIRMLY = 2.0  # tolerances that leave no doubt
 NEUTRAL = 0.65  # what a wrong pose at its best reaches
 
 
@@ -60,6 +61,23 @@ def look(source: Sight, target: Sight, T_target_source: Array, params: Registrar
     """What the target view says of the source's points; the counts of `visibility.count`."""
     slops = params.depth_tolerance, params.depth_tolerance_growth
     return np.asarray(count(source.points[:sample], source.shades[:sample], T_target_source, *_image(target), *slops))
+
+
+def floating(source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams) -> float:
+    """The share of tested pixels that float beyond doubt, the worse way's: 1 where the views do not meet.
+
+    In front of everything that the other view saw in a wide window, by more than twice the tolerance: edges are ragged
+    and a right pose is a little off, but a thing that is not there is larger than that.
+    """
+    ways = (source, target, T_target_source), (target, source, inverse(T_target_source))
+    return max(_floating(asked, seen, T, params) for asked, seen, T in ways)
+
+
+def _floating(asked: Sight, seen: Sight, T: Array, params: RegistrarParams) -> float:
+    slops = FIRMLY * params.depth_tolerance, FIRMLY * params.depth_tolerance_growth
+    counts = count(asked.points, asked.shades, T, seen.front, seen.far, seen.detail, seen.camera, *slops)
+    tested = look(asked, seen, T, params, None)[SEEN]
+    return float(counts[VIOLATIONS] / tested) if tested >= 1 else 1.0
 
 
 def _image(sight: Sight) -> tuple[Array, Array, Array, tuple[float, float, float, float]]:

@@ -24,6 +24,7 @@ SHADELESS = 1e6  # the shade of a point at a depth jump: not to be compared
 FINEST = 0.5  # px: a blur that takes pixel noise away
 BLURS = (2.5, 1.0)  # of the bands, the coarse one first
 LEAST_CONTRAST = 2.0  # grey levels; less is noise, not texture
+WINDOW = 9  # px: what is in front of everything so far around is in front, however ragged edges are
 NEAREST = 0.3  # m; nearer depth is noise on every structured-light camera
 
 
@@ -38,12 +39,15 @@ class Band(NamedTuple):
 class Sight:
     """A view made ready. ``near``, ``far (h, w) float32`` m, 0 where nothing was measured; ``bands``, coarse first.
 
+    ``front (h, w) float32`` m is the nearest depth in a wide window around each pixel, 0 where nothing was measured.
+
     ``points (P, 3) float32`` m are its measured pixels in a fixed shuffled order, so that the first n of them are a
     fair sample; a pixel at a depth jump has the shade SHADELESS.
     """
 
     near: Array
     far: Array
+    front: Array
     points: Array
     bands: tuple[Band, ...]
     textured: bool
@@ -75,6 +79,7 @@ def prepare_sight(view: View, sight_range: float, detail_sigma: float, seed: int
     return Sight(
         near=near,
         far=far,
+        front=nearest_depth(depth, WINDOW),
         points=np.ascontiguousarray(view.xyz.reshape(-1, 3)[chosen]),
         bands=tuple(_band(view.grey, blur * FINEST, blur * detail_sigma, jump, chosen) for blur in BLURS),
         textured=view.grey is not None,
@@ -84,9 +89,13 @@ def prepare_sight(view: View, sight_range: float, detail_sigma: float, seed: int
 
 def depth_bounds(depth: Array) -> tuple[Array, Array]:
     """The nearest and the farthest measured depth in the 3 x 3 pixels around each; 0 where none was measured."""
-    window = np.ones((3, 3), np.uint8)
-    near = cv2.erode(np.where(depth > 0, depth, np.float32(1e3)), window)
-    return np.where(near < 1e3, near, 0.0).astype(np.float32), cv2.dilate(depth, window)
+    return nearest_depth(depth, 3), cv2.dilate(depth, np.ones((3, 3), np.uint8))
+
+
+def nearest_depth(depth: Array, window: int) -> Array:
+    """The nearest measured depth in a square of ``window`` pixels around each; 0 where none was measured."""
+    near = cv2.erode(np.where(depth > 0, depth, np.float32(1e3)), np.ones((window, window), np.uint8))
+    return np.where(near < 1e3, near, 0.0).astype(np.float32)
 
 
 def _band(grey: Array | None, fine: float, slow: float, jump: Array, chosen: Array) -> Band:

@@ -59,10 +59,10 @@ def test_one_object_closes_a_loop_when_grey_holds_the_pose_and_no_other_comes_ne
 
 
 def test_a_lone_object_must_respect_free_space_more_than_several() -> None:
-    refusal = refuse(candidate(explained=(CUP,), violations=0.05, texture=0.4), PARAMS)
+    far = {"floating": 2.0 * PARAMS.max_floating_alone}
+    refusal = refuse(candidate(explained=(CUP,), margin=1.0, **far), PARAMS)
     assert refusal is not None and refusal[0] is Reason.FREE_SPACE
-    both = (CUP, ObjectPair(1, 1, "book"))
-    assert refuse(candidate(explained=both, violations=0.05, texture=0.4), PARAMS) is None
+    assert refuse(candidate(**far), PARAMS) is None
 
 
 def test_two_objects_make_up_for_a_chain_that_is_alone() -> None:
@@ -122,38 +122,37 @@ def test_a_lone_object_that_has_a_rival_needs_a_second_chain() -> None:
 
 @pytest.mark.parametrize("doubt", [{"yaw_known": False}, {"likeness": -0.1}, {"likeness": None}], ids=str)
 def test_chains_that_agree_in_a_plain_room_do_not_speak_for_an_object_that_could_be_another(doubt: dict) -> None:
+    doubt = {**doubt, "margin": 0.1}
     refusal = refuse(lone(**doubt, agreeing_chains=("features", "objects")), PARAMS)
     assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
-    assert refuse(lone(**doubt, texture=0.6, margin=0.6), PARAMS) is None
+    assert refuse(lone(**{**doubt, "texture": 0.6, "margin": 0.6}), PARAMS) is None
+
+
+def test_an_object_that_looks_otherwise_is_another_however_good_its_pose() -> None:
+    refusal = refuse(lone(likeness=PARAMS.min_likeness_unrivalled - 0.1, margin=3.0), PARAMS)
+    assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
+
+
+def test_without_grey_a_lone_object_has_to_tell_its_yaw_and_look_alike() -> None:
+    assert refuse(lone(texture=None), PARAMS) is None
+    for doubt in ({"yaw_known": False}, {"likeness": -0.1}):
+        refusal = refuse(lone(texture=None, **doubt), PARAMS)
+        assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
+
+
+def warped(sigma: float) -> dict[str, object]:
+    """The evidence of a position that a warped depth leaves as badly known as that."""
+    return {"warp": np.diag([sigma**2, 0, 0, 0, 0, 0])}
 
 
 def test_a_pose_that_a_warped_depth_would_move_far_is_refused_as_sliding() -> None:
-    moved_by = PARAMS.max_slack_sigma * np.array([0.9, 1.1])
-    kept, refused = (refuse(candidate(warp=np.diag([s**2, 0, 0, 0, 0, 0])), PARAMS) for s in moved_by)
+    kept, refused = (refuse(candidate(**warped(PARAMS.max_slack_sigma * share)), PARAMS) for share in (0.9, 1.1))
     assert kept is None
     assert refused is not None and refused[0] is Reason.SLACK
 
 
-def test_a_pose_that_the_surfaces_do_not_hold_may_be_held_by_the_views_alone() -> None:
-    loose = {"warp": np.diag([(2.0 * PARAMS.max_slack_sigma) ** 2, 0, 0, 0, 0, 0])}
-    assert refuse(candidate(**loose, resistance=PARAMS.firm_margin), PARAMS) is None
-    assert refuse(candidate(**loose, resistance=PARAMS.firm_margin - 0.01), PARAMS) is not None
-    assert refuse(candidate(**loose, resistance=PARAMS.firm_margin, slack=np.eye(6)[:1]), PARAMS) is not None
-
-
-def test_a_lone_object_has_to_hold_its_pose_better_than_several() -> None:
-    between = (PARAMS.max_slack_sigma + PARAMS.max_slack_sigma_alone) / 2.0
-    doubtful = {"warp": np.diag([between**2, 0, 0, 0, 0, 0]), "resistance": PARAMS.firm_margin - 0.1}
-    lone = {"explained": (CUP,), "margin": 1.0}
-    assert refuse(candidate(**doubtful), PARAMS) is None
-    refusal = refuse(candidate(**doubtful, **lone), PARAMS)
-    assert refusal is not None and refusal[0] is Reason.SLACK
-    assert refuse(candidate(**{**doubtful, **lone, "resistance": PARAMS.firm_margin}), PARAMS) is None
-
-
-def test_free_space_is_less_of_a_judge_of_a_lone_object_whose_pose_grey_and_a_push_hold() -> None:
-    lone = {"explained": (CUP,), "violations": 0.05, "texture": 0.7, "yaw_known": True, "likeness": 0.5}
-    assert refuse(candidate(**lone, resistance=PARAMS.firm_margin), PARAMS) is None
-    for weak in ({"texture": 0.3}, {"resistance": PARAMS.firm_margin - 0.1}):
-        refusal = refuse(candidate(**{**lone, "resistance": PARAMS.firm_margin, **weak}), PARAMS)
-        assert refusal is not None and refusal[0] is Reason.FREE_SPACE
+def test_the_worse_the_surfaces_hold_a_pose_the_more_the_views_must() -> None:
+    loose, least = warped(2.0 * PARAMS.max_slack_sigma), 4.0 * PARAMS.rival_margin
+    assert refuse(candidate(**loose, resistance=least + 0.01), PARAMS) is None
+    assert refuse(candidate(**loose, resistance=least - 0.01), PARAMS) is not None
+    assert refuse(candidate(**loose, resistance=least + 0.01, slack=np.eye(6)[:1]), PARAMS) is not None

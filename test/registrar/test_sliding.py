@@ -9,7 +9,7 @@ import pytest
 from objreg_ros.geometry import inverse, pose, pose_error
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared, prepare
-from objreg_ros.registrar.sliding import HELD, pushed, resistance, resisted, steadied
+from objreg_ros.registrar.sliding import HELD, preferred, pushed, resistance, resisted, steadied
 
 from .rooms import ROOM, keyframe, seen_from
 
@@ -66,3 +66,17 @@ def test_a_position_that_views_with_grey_hold_is_known_better_and_one_without_is
     added = steadied(*grey, TRUTH, C, PARAMS)
     assert np.linalg.inv(np.linalg.inv(C) + added)[0, 0] <= (HELD * PARAMS.pushes[0]) ** 2
     assert not steadied(*views(TABLE, 0.0, 20.0), TRUTH, C, PARAMS).any()
+
+
+def test_a_pose_that_came_to_rest_beside_the_truth_is_left_for_it() -> None:
+    pair = [prepare(keyframe(seen_from(a), TABLE, seed=k), PARAMS) for k, a in enumerate((0.0, 20.0))]
+    across = np.array([0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
+    C = np.diag([0.05**2, 0.04**2, 1e-6, 1e-8, 1e-8, 1e-8])
+    found = preferred(*pair, pushed(TRUTH, across), C, PARAMS)
+    assert found is not None and pose_error(found, TRUTH)[1] < 1.0
+    assert preferred(*pair, TRUTH, C, PARAMS) is None
+
+
+def test_nothing_is_preferred_without_grey() -> None:
+    wrong = pushed(TRUTH, np.array([0.1, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    assert preferred(*views(TABLE, 0.0, 20.0), wrong, np.diag([0.05**2] * 3 + [1e-8] * 3), PARAMS) is None

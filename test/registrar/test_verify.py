@@ -8,7 +8,7 @@ import pytest
 
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.verify import verify
+from objreg_ros.registrar.verify import floating, verify
 from objreg_ros.registrar.visibility import prepare_sight
 
 from .rooms import keyframe, seen_from
@@ -46,3 +46,15 @@ def test_views_that_do_not_meet_are_not_tested(sights) -> None:
     away = pose(rotation_from_vector(np.array([0.0, np.pi, 0.0])), np.zeros(3))
     found = verify(*sights, away, PARAMS)
     assert found.tested == 0 and found.score == -3.0 and found.texture is None
+
+
+def test_a_ragged_edge_does_not_float_and_a_thing_that_is_gone_does(sights) -> None:
+    assert floating(*sights, TRUTH, PARAMS) < 0.01
+    a_little_off = pose(np.eye(3), np.array([0.03, 0.0, 0.0])) @ TRUTH
+    assert floating(*sights, a_little_off, PARAMS) < verify(*sights, a_little_off, PARAMS).violations
+    far_off = pose(np.eye(3), np.array([0.0, 0.0, -0.4])) @ TRUTH
+    assert floating(*sights, far_off, PARAMS) > 0.1
+
+
+def test_views_that_do_not_meet_float_altogether(sights) -> None:
+    assert floating(*sights, pose(np.eye(3), np.array([0.0, 0.0, 90.0])), PARAMS) == 1.0
