@@ -120,7 +120,6 @@ class RegistrarParams(Params):
     )
     search_step: float = param(0.05, "and looked for about where it is, in the plane where it may err", "m", ge=0.01)
     search_steps: int = param(4, "so many steps each way; 0: not at all", ge=0, le=10)
-    search_points: int = param(1000, "points a side that are asked", ge=50)
     searched: int = param(2, "best places of those that grey finishes", ge=1)
     steadying_texture: float = param(
         0.4, "grey that correlates so well holds a position as far as pushes are resisted", ge=0.0, le=1.0
@@ -163,7 +162,7 @@ class RegistrarParams(Params):
     min_objects: int = param(2, "explained objects that make up for chains that do not agree", ge=1)
     min_likeness_alone: float = param(0.1, "a lone object that chains agree on looks as much alike", ge=-1.0, le=1.0)
     min_margin_alone: float = param(0.2, "or its pose is worth so much more than any other", ge=0.0)
-    min_likeness_unrivalled: float = param(-0.25, "and it looks at least as much alike", ge=-1.0, le=1.0)
+    min_likeness_unrivalled: float = param(-0.5, "and it looks at least as much alike", ge=-1.0, le=1.0)
     min_margin_painted: float = param(
         0.45, "so much more where grey correlates by holding_texture and the object itself says nothing", ge=0.0
     )

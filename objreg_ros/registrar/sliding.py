@@ -81,7 +81,7 @@ def preferred(
     steps = params.search_step * np.arange(-params.search_steps, params.search_steps + 1)
     pushes = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     poses = np.array([pushed(T_target_source, motion) for motion in pushes @ weakest(C)])
-    V = rank(source.sight, target.sight, poses, params, params.search_points).astype(np.float32)
+    V = rank(source.sight, target.sight, poses, params, params.quick_sample).astype(np.float32)
     best, score = None, verify(source.sight, target.sight, T_target_source, params, params.grey_points).score + CLEARLY
     for k in _peaks(V, len(steps))[: params.searched]:
         finished, _ = finish(source, target, poses[k], params)
