@@ -3,7 +3,8 @@
 
 Two views of a table from opposite sides share little but its top, on which one can be pushed along the other. What
 stands on it resists, with too few points to count as surface; yet a pose that was pushed is seen to be worse. So a pose
-is pushed, and where both ways are clearly worse it is held by the views, to a third of the push.
+is pushed, and where both ways are clearly worse it is held by the views, to a third of the push. Where its position is
+known badly all the same, the views are asked for a better one about it, and then whether they resist it all around.
 """
 
 from __future__ import annotations
