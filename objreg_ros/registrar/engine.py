@@ -17,13 +17,11 @@ from objreg_ros.registrar.covariance import spread_of, worst_translation
 from objreg_ros.registrar.hypotheses import Hypothesis, from_centroids, from_features, from_objects, from_prior
 from objreg_ros.registrar.icp import align
 from objreg_ros.registrar.keyframe import Keyframe
-from objreg_ros.registrar.objects import Pairs, explain
+from objreg_ros.registrar.objects import Pairs, explain, likeness
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Pantry, Prepared
 from objreg_ros.registrar.refine import refine, settle, warp
 from objreg_ros.registrar.scene_search import from_shapes
-from objreg_ros.registrar.shape import upright_motion
-from objreg_ros.registrar.shape_score import alike
 from objreg_ros.registrar.sliding import preferred, resistance, steadied
 from objreg_ros.registrar.verify import WORST, floating, rank, verify
 
@@ -203,13 +201,6 @@ def is_held(candidate: Candidate, params: RegistrarParams) -> bool:
 def held(alignment: Alignment) -> Alignment:
     """The alignment without its slack."""
     return replace(alignment, slack=np.zeros((0, 6)))
-
-
-def likeness(source: Prepared, target: Prepared, explained: Pairs, T: Array, params: RegistrarParams) -> float | None:
-    """How alike the explained objects look under a pose, their mean from -1 to 1; None where none has a shape."""
-    shapes = [(source.shapes[pair.source], target.shapes[pair.target]) for pair in explained]
-    scores = [alike(a, b, upright_motion(a, b, T), params) for a, b in shapes if a is not None and b is not None]
-    return float(np.clip(scores, -1.0, 1.0).mean()) if scores else None
 
 
 def gravity_error_deg(source: Prepared, target: Prepared, T_target_source: Array) -> float | None:

@@ -10,6 +10,8 @@ from objreg_ros.geometry import inverse, transform
 from objreg_ros.registrar.candidate import ObjectPair
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
+from objreg_ros.registrar.shape import upright_motion
+from objreg_ros.registrar.shape_score import alike
 from objreg_ros.registrar.visibility import SEEN, VIOLATIONS, count
 
 Pairs = tuple[ObjectPair, ...]
@@ -29,6 +31,13 @@ def explain(source: Prepared, target: Prepared, T_target_source: Array, params: 
     left[:, [pair.target for pair in explained]] = np.inf
     _keep_gone(left, source, target, T_target_source, params)
     return explained, _assign(source, left, np.inf)
+
+
+def likeness(source: Prepared, target: Prepared, explained: Pairs, T: Array, params: RegistrarParams) -> float | None:
+    """How alike the explained objects look under a pose, their mean from -1 to 1; None where none has a shape."""
+    shapes = [(source.shapes[pair.source], target.shapes[pair.target]) for pair in explained]
+    scores = [alike(a, b, upright_motion(a, b, T), params) for a, b in shapes if a is not None and b is not None]
+    return float(np.clip(scores, -1.0, 1.0).mean()) if scores else None
 
 
 def gaps(source: Prepared, target: Prepared, T_target_source: Array) -> Array:

@@ -79,8 +79,13 @@ class RegistrarParams(Params):
     drawn: int = param(2, "such poses that are drawn to where the room fits", ge=0)
     drawing_points: int = param(300, "points of all that was seen that draw them", ge=20)
     drawing_rounds: int = param(10, "iterations of that", ge=0)
-    drawing_turns: tuple[float, ...] = param((3.0, 6.0), "turns about the objects that are tried then", "deg")
     drawing_reach: float = param(0.06, "a pose that this moves the objects farther stays as it was", "m", ge=0.0)
+    upright_likeness: float = param(1.0, "what likeness adds to V when upright poses of objects are compared", ge=0.0)
+    upright_violations: float = param(5.0, "and weight of seen free space beyond its weight in V", ge=0.0)
+    climb_points: int = param(120, "points a side, of objects and of views, that such a pose is then climbed by", ge=20)
+    climb_turns: tuple[float, ...] = param(
+        (3.0, 6.0, 10.0, 15.0, 20.0, 25.0), "turns about the objects, either way, with which it may begin", "deg"
+    )
     shape_violations: float = param(12.0, "weight of points in seen free space", ge=0.0)
     shape_hidden: float = param(0.6, "weight of points behind what was seen", ge=0.0)
     shape_residual: float = param(1.2, "weight of squared distances from what was seen", ge=0.0)

@@ -12,9 +12,11 @@ import numpy as np
 
 from objreg_ros.data import Alignment, Array
 from objreg_ros.geometry import skew, transform
+from objreg_ros.registrar.candidate import Verification
 from objreg_ros.registrar.contradiction import information, warped
 from objreg_ros.registrar.direct import finish
 from objreg_ros.registrar.icp import Fit, align, fit
+from objreg_ros.registrar.objects import Pairs, explain, likeness
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.sliding import resisted
@@ -57,23 +59,33 @@ def refine(source: Prepared, target: Prepared, T_target_source: Array, params: R
 def _finished(source: Prepared, target: Prepared, T: Array, params: RegistrarParams) -> tuple[Array, Array]:
     """The pose after grey had its say, and what grey adds to its information: nothing where it does not correlate.
 
-    Again while the views like it clearly better, since each round sees more of the other view; the pose as it was,
-    where they like it less.
+    Again while views and objects like it clearly better, since each round sees more of the other view; the pose as it
+    was, where they like it less: views that share little may like a pose a hair better that is centimetres off, and
+    the objects then look less alike.
     """
-    held, most = np.zeros((6, 6)), params.grey_points
+    held = np.zeros((6, 6))
     if not (source.sight.textured and target.sight.textured):
         return T, held
-    best = verify(source.sight, target.sight, T, params, most).score
+    explained, _ = explain(source, target, T, params)
+    best, _ = _liked(source, target, T, explained, params)
     for _ in range(params.grey_rounds):
         finished, grey = finish(source, target, T, params)
-        seen = verify(source.sight, target.sight, finished, params, most)
-        if seen.score < best:
+        worth, seen = _liked(source, target, finished, explained, params)
+        if worth < best:
             break
-        gain, best, T = seen.score - best, seen.score, finished
+        gain, best, T = worth - best, worth, finished
         held = grey if (seen.texture or 0.0) >= params.holding_texture else np.zeros((6, 6))
         if gain < LITTLE:
             break
     return T, held
+
+
+def _liked(
+    source: Prepared, target: Prepared, T: Array, explained: Pairs, params: RegistrarParams
+) -> tuple[float, Verification]:
+    """What a pose is worth to the views and to the ``explained`` objects, and what the views say."""
+    seen = verify(source.sight, target.sight, T, params, params.grey_points)
+    return seen.score + params.likeness_weight * (likeness(source, target, explained, T, params) or 0.0), seen
 
 
 def about_camera(H: Array, T_target_source: Array) -> Array:

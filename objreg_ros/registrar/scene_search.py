@@ -7,28 +7,28 @@ shape tells no yaw, gets it from where the others stand.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.geometry import rotation_from_vector, transform
+from objreg_ros.geometry import transform
 from objreg_ros.registrar.hypotheses import Hypothesis, from_centroids, look_alikes
 from objreg_ros.registrar.icp import align
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
-from objreg_ros.registrar.shape import Shape, upright_motion
-from objreg_ros.registrar.shape_score import alike
+from objreg_ros.registrar.shape import Shape, upright_motion, upright_pose
 from objreg_ros.registrar.shape_search import Fitting, glance, improve, register_shapes
-from objreg_ros.registrar.verify import rank
+from objreg_ros.registrar.worth import Worth
 
 EACH = 2  # poses that each pair of objects proposes
-LESS = 0.1  # likeness that the views' liking makes up for
 
 
 def from_shapes(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Hypothesis]:
     """Poses that lay objects upon those of their kind, those that objects and views like best first.
 
-    Upright as the objects stand; the best also drawn to all that was seen, or turned a little, where that is liked
-    better: far views of a thin thing share nothing of it, and its room still tells the last centimetres and degrees.
+    Upright as the objects stand; the best also drawn to all that was seen, or climbed to what both like best, where
+    that is worth more: far views of a thin thing share nothing of it, and its room still tells where it is.
     """
     pairs = shape_pairs(source, target)
     alone = len(pairs) == 1
@@ -37,50 +37,27 @@ def from_shapes(source: Prepared, target: Prepared, params: RegistrarParams) -> 
         return []
     a, b = pairs[0] if alone else (source.scene, target.scene)
     assert a is not None and b is not None
-    T = np.array([fit.T_target_source for fit in found])
-    likeness = np.array([fit.score for fit in found])
-    worth = _worth(source, target, T, likeness, params)
+    scale = Worth(source, target, a, b, params)
+    motions = np.array([upright_motion(a, b, fit.T_target_source) for fit in found])
+    worth = scale.of(motions)
     best = np.argsort(-worth, kind="stable")[: params.drawn]
-    for better in (_drawn(source, target, T[best], a.foot, params), _turned(source, target, T[best], a, b, params)):
-        same = np.array([alike(a, b, upright_motion(a, b, each), params) for each in better])
-        after = _worth(source, target, better, same, params)
-        gain = (after > worth[best]) & (same > likeness[best] - LESS)
-        T[best[gain]], worth[best[gain]], likeness[best[gain]] = better[gain], after[gain], same[gain]
+    for better in (partial(_drawn, source, target, a, b, params=params), scale.climbed):
+        tried = np.array([better(motion) for motion in motions[best]])
+        after = scale.of(tried)
+        gain = after > worth[best]
+        motions[best[gain]], worth[best[gain]] = tried[gain], after[gain]
     order = np.argsort(-worth, kind="stable")
-    return [Hypothesis(T_target_source=T[k], chain="objects", worth=float(worth[k])) for k in order]
+    poses = [(upright_pose(a, b, motions[k]), float(worth[k])) for k in order]
+    return [Hypothesis(T_target_source=T, chain="objects", worth=value) for T, value in poses]
 
 
-def _turned(source: Prepared, target: Prepared, T: Array, a: Shape, b: Shape, params: RegistrarParams) -> Array:
-    """Of poses (K, 4, 4) turned a little about where the objects stand those that the views like best: (K, 4, 4).
-
-    What is nearly round tells its yaw to some degrees only; the print of what it stands on tells the rest.
-    """
-    turns = np.radians(np.outer((-1.0, 1.0), params.drawing_turns).ravel())
-    R = np.array([rotation_from_vector(turn * b.R_upright_camera[2]) for turn in turns])
-    tried = np.repeat(T[:, None], len(turns), axis=1)
-    at = T[:, :3, :3] @ a.foot + T[:, :3, 3]
-    tried[..., :3, :3] = R @ T[:, None, :3, :3]
-    tried[..., :3, 3] = at[:, None] + (R @ (T[:, None, :3, 3] - at[:, None])[..., None])[..., 0]
-    V = rank(source.sight, target.sight, tried.reshape(-1, 4, 4), params, params.quick_sample).reshape(len(T), -1)
-    return tried[np.arange(len(T)), V.argmax(axis=1)]
-
-
-def _worth(source: Prepared, target: Prepared, T: Array, likeness: Array, params: RegistrarParams) -> Array:
-    """What poses (K, 4, 4) are worth for the views and for objects that look so much alike under them: (K,)."""
-    V = rank(source.sight, target.sight, T, params, params.quick_sample)
-    return V + params.likeness_weight * np.clip(likeness, -1.0, 1.0)
-
-
-def _drawn(source: Prepared, target: Prepared, T: Array, foot: Array, params: RegistrarParams) -> Array:
-    """Poses (K, 4, 4) drawn to the whole surface by a few points; as they were where the objects would be left.
-
-    ``foot (3,)`` is where the objects stand, in the source frame.
-    """
+def _drawn(source: Prepared, target: Prepared, a: Shape, b: Shape, motion: Array, params: RegistrarParams) -> Array:
+    """An upright motion drawn to the whole surface by a few points; as it was where the objects would be left."""
     _, reach, last = params.reaches
-    few, surface = slice(params.drawing_points), target.surface
-    drawn, _, _ = align(source.xyz[few], source.normals[few], surface, T, reach, last, params.drawing_rounds)
-    gone = np.linalg.norm((drawn - T)[:, :3, :3] @ foot + (drawn - T)[:, :3, 3], axis=1) > params.drawing_reach
-    return np.where(gone[:, None, None], T, drawn)
+    few, surface, T = slice(params.drawing_points), target.surface, upright_pose(a, b, motion)
+    (drawn,), _, _ = align(source.xyz[few], source.normals[few], surface, T[None], reach, last, params.drawing_rounds)
+    gone = np.linalg.norm(transform(drawn, a.foot) - transform(T, a.foot)) > params.drawing_reach
+    return motion if gone else upright_motion(a, b, drawn)
 
 
 def register_scenes(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Fitting]:

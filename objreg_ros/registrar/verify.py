@@ -7,6 +7,7 @@ whole view does not: what one camera saw to be empty, the other must not fill.
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 
 from objreg_ros.data import Array
@@ -54,7 +55,7 @@ def rank(source: Sight, target: Sight, T_target_source: Array, params: Registrar
     back = inverses(T_target_source)
     backward = count_many(target.points[:sample], target.shades[:sample], back, *_image(source), *slops)
     asked = min(sample, len(source.points)) + min(sample, len(target.points))
-    return rated(forward, backward, source.textured and target.textured, asked)[1]
+    return np.asarray(_rated_many(forward, backward, source.textured and target.textured, asked))
 
 
 def look(source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams, sample: int | None) -> Array:
@@ -84,22 +85,31 @@ def _image(sight: Sight) -> tuple[Array, Array, Array, tuple[float, float, float
     return sight.near, sight.far, sight.detail, sight.camera
 
 
-def rated(forward: Array, backward: Array, textured: bool, asked: int) -> tuple[Array, Array]:
-    """(texture, V) of the counts (..., 10) of both ways of which ``asked`` points were asked.
+@numba.njit(cache=True, nogil=True)
+def rated(forward, backward, textured, asked):  # type: ignore[no-untyped-def]
+    """(texture, V) of the counts (10,) of both ways of which ``asked`` points were asked.
 
     V is made of the worse way's inliers and violations, the texture and the share of all points that could be tested.
     Weights rounded from a logistic fit on real frames; a view without grey counts as a weak match.
     """
-    a, b = np.moveaxis(forward, -1, 0), np.moveaxis(backward, -1, 0)
-    met = np.minimum(a[SEEN], b[SEEN]) >= 1
-    seen_a, seen_b = np.maximum(a[SEEN], 1.0), np.maximum(b[SEEN], 1.0)
-    inliers = np.minimum(a[INLIERS] / seen_a, b[INLIERS] / seen_b)
-    violations = np.maximum(a[VIOLATIONS] / seen_a, b[VIOLATIONS] / seen_b)
     texture = correlation(forward + backward)
+    seen_a, seen_b = forward[SEEN], backward[SEEN]
+    if min(seen_a, seen_b) < 1.0:
+        return texture, WORST
+    inliers = min(forward[INLIERS] / seen_a, backward[INLIERS] / seen_b)
+    violations = max(forward[VIOLATIONS] / seen_a, backward[VIOLATIONS] / seen_b)
+    share = max((seen_a + seen_b) / asked, 1e-3)
     grey = texture if textured else NO_TEXTURE
-    share = np.maximum((a[SEEN] + b[SEEN]) / asked, 1e-3)
-    V = grey + inliers - 3.0 * violations + 0.5 * np.log10(share) - NEUTRAL
-    return texture, np.where(met, V, WORST)
+    return texture, grey + inliers - 3.0 * violations + 0.5 * np.log10(share) - NEUTRAL
+
+
+@numba.njit(cache=True, nogil=True)
+def _rated_many(forward, backward, textured, asked):  # type: ignore[no-untyped-def]
+    """V (K,) of many counts (K, 10)."""
+    V = np.empty(len(forward))
+    for k in range(len(V)):
+        V[k] = rated(forward[k], backward[k], textured, asked)[1]
+    return V
 
 
 def inverses(T: Array) -> Array:

@@ -175,14 +175,14 @@ def count_many(points, shades, T, near, far, detail, camera, tolerance, growth):
     return out
 
 
-def correlation(counts: Array) -> Array:
-    """The normalised correlation -1..1 of the shades in ``counts (..., 10)``.
+@numba.njit(cache=True, nogil=True)
+def correlation(counts):  # type: ignore[no-untyped-def]
+    """The normalised correlation -1..1 of the shades in ``counts (10,)``.
 
     0 with fewer than 30 of them or none that vary.
     """
-    c = np.moveaxis(counts, -1, 0)
-    n = np.maximum(c[SHADED], 1.0)
-    a, b = c[SUM_AA] - c[SUM_A] ** 2 / n, c[SUM_BB] - c[SUM_B] ** 2 / n
-    known = (c[SHADED] >= 30) & (np.minimum(a, b) > 1e-6 * n)
-    product = np.where(known, a * b, 1.0)
-    return np.where(known, (c[SUM_AB] - c[SUM_A] * c[SUM_B] / n) / np.sqrt(product), 0.0)
+    n = max(counts[SHADED], 1.0)
+    a, b = counts[SUM_AA] - counts[SUM_A] ** 2 / n, counts[SUM_BB] - counts[SUM_B] ** 2 / n
+    if counts[SHADED] < 30 or min(a, b) <= 1e-6 * n:
+        return 0.0
+    return (counts[SUM_AB] - counts[SUM_A] * counts[SUM_B] / n) / np.sqrt(a * b)

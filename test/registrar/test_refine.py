@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
+from objreg_ros.registrar.candidate import Verification
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import prepare
 from objreg_ros.registrar.refine import about_camera, refine, settle
@@ -88,3 +89,18 @@ def test_information_moves_from_the_target_camera_to_the_source_camera() -> None
     C = np.linalg.inv(about_camera(H, T))
     assert C[1, 1] == pytest.approx(1.0 + 4.0 / 100.0)  # a turn of the target camera moves what is 2 m away
     assert C[0, 0] == pytest.approx(1.0)
+
+
+def test_objects_that_look_alike_are_not_taken_apart_by_grey(pair, monkeypatch) -> None:
+    def shifted(source, target, T, params):
+        return pose(np.eye(3), np.array([0.03, 0.0, 0.0])) @ T, np.zeros((6, 6))
+
+    monkeypatch.setattr("objreg_ros.registrar.refine.finish", shifted)
+    def rightwards(source, target, T, params, sample=None):
+        score = 0.5 + T[0, 3] - TRUTH[0, 3]
+        return Verification(inliers=1.0, violations=0.0, occluded=0.0, texture=0.5, tested=1000, score=score)
+
+    monkeypatch.setattr("objreg_ros.registrar.refine.verify", rightwards)
+    assert np.allclose(refine(*pair, TRUTH, PARAMS).T_target_source, TRUTH)
+    careless = PARAMS.replaced(likeness_weight=0.0)
+    assert pose_error(refine(*pair, TRUTH, careless).T_target_source, TRUTH)[1] > 2.0
