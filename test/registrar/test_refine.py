@@ -96,6 +96,7 @@ def test_objects_that_look_alike_are_not_taken_apart_by_grey(pair, monkeypatch) 
         return pose(np.eye(3), np.array([0.03, 0.0, 0.0])) @ T, np.zeros((6, 6))
 
     monkeypatch.setattr("objreg_ros.registrar.refine.finish", shifted)
+
     def rightwards(source, target, T, params, sample=None):
         score = 0.5 + T[0, 3] - TRUTH[0, 3]
         return Verification(inliers=1.0, violations=0.0, occluded=0.0, texture=0.5, tested=1000, score=score)
