@@ -67,7 +67,7 @@ class RegistrarParams(Params):
     seeds_per_object_chain: int = param(60, "hypotheses that the chain of single objects proposes", ge=1)
     shape_points: int = param(400, "most points of an object that are laid upon another", ge=30)
     scene_points: int = param(800, "the same of all objects of a keyframe together", ge=30)
-    shape_yaws: int = param(24, "yaw angles that one object is laid upon another with", ge=1, le=360)
+    shape_yaws: int = param(16, "yaw angles that one object is laid upon another with", ge=1, le=360)
     shape_offsets: tuple[float, ...] = param(
         (0.1, 0.25), "how much deeper the middle of an object may lie than what is seen of it, in its widths"
     )
