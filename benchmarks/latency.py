@@ -55,7 +55,7 @@ class Witness:
         self._node = rclpy.create_node("witness", context=self._context)
         self._node.create_subscription(CompressedImage, "image/compressed", self._see, qos.sensor(True))
         self._node.create_subscription(Header, "finished", self._finish, qos.room(depth=1000))
-        self._node.create_subscription(Odometry, "constraints", self._hear, qos.latched(1000))
+        self._node.create_subscription(Odometry, "constraints", self._hear, qos.latched(qos.KEPT_CONSTRAINTS))
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._executor.spin, daemon=True)

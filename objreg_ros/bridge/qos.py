@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
+KEPT_CONSTRAINTS = 1000  # of the latched constraints: what a mapper that comes late still gets
+
 
 def sensor(reliable: bool) -> QoSProfile:
     """What a camera sends. Best effort matches every publisher; reliable only reliable ones, and loses nothing.

@@ -27,7 +27,7 @@ try:
 except ImportError:  # optional: the topic carries the same
     TransformBroadcaster = None
 
-KEPT_CONSTRAINTS = 1000  # as many as the registrar keeps for a mapper that comes late
+MOST_WAITING = qos.KEPT_CONSTRAINTS  # constraints without odometry yet; the oldest go when there are more
 
 
 class MapperNode(Door):
@@ -42,13 +42,13 @@ class MapperNode(Door):
         self._graph_lock = threading.Lock()
         self._waiting: list[LoopClosure] = []
         self._enabled, self._odometry_count, self._odom_frame = True, 0, "odom"
-        self._start_anew()
+        self._begin()
         self._path = self.create_publisher(PathMsg, "path", qos.latched())
         self._correction = self.create_publisher(TransformStamped, "correction", qos.latched())
         self._broadcaster = None if TransformBroadcaster is None else TransformBroadcaster(self)
         self._serve()
         self.listen(OdometryMsg, "odom", self._hear_odometry, self.sensor(), watched="odom")
-        self.listen(OdometryMsg, "constraints", self._hear_constraint, qos.latched(KEPT_CONSTRAINTS))
+        self.listen(OdometryMsg, "constraints", self._hear_constraint, qos.latched(qos.KEPT_CONSTRAINTS))
         self.expect("odom", "odom")
 
     def _serve(self) -> None:
@@ -56,9 +56,17 @@ class MapperNode(Door):
         self.create_service(Trigger, "~/save", self._save)
         self.create_service(SetBool, "~/enable", self._enable)
 
-    def _start_anew(self) -> None:
+    def _begin(self) -> None:
         self._graph = PoseGraph(self.settings.of(MapperParams), self._inputs.mounting)
         self._summary = Summary(0, (), ())
+
+    def _start_anew(self, reason: str) -> None:
+        """An empty map; the constraints that wait are about moments of the old one, and are dropped."""
+        with self._graph_lock:
+            self._begin()
+        waiting, self._waiting = self._waiting, []
+        for closure in waiting:
+            self.drop(closure.to_ns, reason)
 
     # Odometry
 
@@ -80,8 +88,7 @@ class MapperNode(Door):
         known = self._graph.odometry.stamps_ns
         if known and odometry.stamp_ns < known[-1]:
             self.get_logger().warning(f"time jumped back by {(known[-1] - odometry.stamp_ns) / 1e9:.3f} s: a new map")
-            with self._graph_lock:
-                self._start_anew()
+            self._start_anew("time_jump")
         return not known or odometry.stamp_ns != known[-1]
 
     # Constraints
@@ -110,6 +117,8 @@ class MapperNode(Door):
                 self.drop(closure.to_ns, "before_odometry", "odometry begins after the first moment of the constraint")
             else:
                 self._waiting.append(closure)
+        while len(self._waiting) > MOST_WAITING:
+            self.drop(self._waiting.pop(0).to_ns, "queue_full", "no odometry covers the moments of the constraint")
 
     def _came_too_early(self, closure: LoopClosure) -> bool:
         known = self._graph.odometry.stamps_ns
@@ -128,9 +137,8 @@ class MapperNode(Door):
             if graph is self._graph:
                 self._summary = graph.adopt(problem, solution)
         self._publish_path(stamp_ns)
-        self._correction.publish(
-            self._correction_message(stamp_ns)
-        )  # as TF only with odometry: its time must not go back
+        # The topic alone: TF is sent with odometry only, for its time must not go back.
+        self._correction.publish(self._correction_message(stamp_ns))
         return True
 
     # Publish
@@ -164,8 +172,7 @@ class MapperNode(Door):
     # Services
 
     def _reset(self, _: Any, response: Any) -> Any:
-        with self._graph_lock:
-            self._start_anew()
+        self._start_anew("reset")
         response.success, response.message = True, "started a new map"
         return response
 

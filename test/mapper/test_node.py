@@ -136,6 +136,28 @@ def test_a_jump_back_in_time_starts_a_new_map(outside: Outside) -> None:
     assert keyframes > 3
 
 
+def test_constraints_that_wait_do_not_outlive_a_jump_back_in_time_or_a_reset(outside: Outside) -> None:
+    door, ahead = outside.door, [closure(TRUE, 10, 90), closure(TRUE, 12, 92)]
+    outside.drive(BENT[:40])
+    outside.send(ahead[:1])
+    outside.wait(lambda: door.extra_diagnostics()["constraints without odometry"] == 1)
+    outside.odom.publish(to_msg.odometry(odometry(BENT)[0]))
+    outside.wait(lambda: door.ledger.balance().dropped == {"time_jump": 1})
+    outside.send(ahead[1:])
+    outside.wait(lambda: door.extra_diagnostics()["constraints without odometry"] == 1)
+    assert door._reset(None, Trigger.Response()).success
+    assert door.ledger.balance().dropped == {"time_jump": 1, "reset": 1}
+    assert outside.settled() and door.extra_diagnostics()["constraints without odometry"] == 0
+
+
+def test_without_odometry_the_oldest_constraints_make_room(outside: Outside, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("objreg_ros.mapper.node.MOST_WAITING", 2)
+    outside.send(ROUND_TRIP[:3])
+    outside.wait(lambda: outside.door.ledger.balance().received == 3)
+    assert outside.door.ledger.balance().dropped == {"queue_full": 1}
+    assert [word.to_ns for word in outside.door._waiting] == [word.to_ns for word in ROUND_TRIP[1:3]]
+
+
 def test_the_services_answer(outside: Outside, tmp_path: Path) -> None:
     outside.drive(BENT[:40])
     door = outside.door

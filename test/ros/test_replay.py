@@ -100,7 +100,7 @@ def end_keyframe(graph: Graph) -> None:
 @pytest.mark.slow
 def test_a_recording_gives_the_same_constraints_live_and_offline(fresh: Graph, shared: Path, tmp_path: Path) -> None:
     kitchen, model = shared / "data/redkitchen_a", shared / "models/ssd_mobilenet_v1_coco_int8.onnx"
-    fresh.hear(Odometry, "constraints", qos.latched(1000))
+    fresh.hear(Odometry, "constraints", qos.latched(qos.KEPT_CONSTRAINTS))
     start(fresh, model, "-p threshold:=0.4")
     objreg(fresh, "replay", str(kitchen), "--lossless", "--end", "4", "--wait", str(START_S))
     end_keyframe(fresh)
