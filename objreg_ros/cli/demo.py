@@ -17,10 +17,12 @@ from objreg_ros.bridge import from_msg
 from objreg_ros.cli import live_table, options
 from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
 from objreg_ros.cli.played import as_rosbag2, simulated_room
+from objreg_ros.cli.settings import read_settings
 from objreg_ros.data import ColourImage
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
 from objreg_ros.registrar.export import constraint
+from objreg_ros.registrar.params import RegistrarNodeParams
 from objreg_ros.report.live_pictures import draw_sight, draw_way
 from objreg_ros.report.write import write_report
 from objreg_ros.truth import Truth, summarise
@@ -67,11 +69,12 @@ def run(asked: Asked) -> None:
     """The whole demo; ValueError or OSError if it cannot be, or if the books do not balance."""
     recording = asked.recording or simulated_room(asked.out)
     inputs = _inputs(recording, asked.remaps)
+    T_base_camera = mounting_of(asked)
     bag = as_rosbag2(recording, asked.out, asked.seconds)
     with open_recording(bag) as source:
         live = run_live(bag, setup_of(asked), asked.out / "logs", _say)
         truth = Truth.of(source, inputs.ground_truth)
-        _write(asked.out / "demo.json", bag, live, truth)
+        _write(asked.out / "demo.json", bag, live, truth, T_base_camera)
         _draw(asked.out, live, truth, source, inputs)
         sent = _sent(source, inputs, asked.seconds, live)
     write_report(asked.out / "report.html", [asked.out / "demo.json"])
@@ -131,10 +134,16 @@ def _errors(live: Live, truth: Truth) -> dict[str, Any]:
     return summarise([error for closure in live.closures if (error := truth.error(closure)) is not None])
 
 
-def _write(file: Path, bag: Path, live: Live, truth: Truth) -> None:
+def mounting_of(asked: Asked) -> tuple[float, ...]:
+    """The registrar's ``T_base_camera``: x y z qx qy qz qw, or nothing."""
+    return read_settings(asked.params_file, asked.changes).of("registrar", RegistrarNodeParams).T_base_camera
+
+
+def _write(file: Path, bag: Path, live: Live, truth: Truth, T_base_camera: tuple[float, ...]) -> None:
     """The run as JSON."""
     summary = {
         "recording": str(bag),
+        "T_base_camera": T_base_camera,
         "nodes": {room: asdict(books) for room, books in live.books.items()},
         "constraints": [constraint(closure) for closure in live.closures],
         "rejected": dict(live.rejected),

@@ -13,6 +13,7 @@ import numpy as np
 
 from objreg_ros.bridge import from_msg
 from objreg_ros.data import Array
+from objreg_ros.geometry import mounting
 from objreg_ros.recording import Recording
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.opening import open_recording
@@ -43,24 +44,27 @@ def _chapter(file: Path, stack: ExitStack) -> tuple[Story, Album | None]:
         return Story.of(file.stem, summary, Truth([])), None
     recording = stack.enter_context(open_recording(place))
     inputs = choose_inputs(recording.topics)
-    glimpses = _with_odometry(summary.get("glimpses", ()), recording, inputs.odom)
+    T_base_camera = mounting(summary.get("T_base_camera", ()))
+    glimpses = _with_odometry(summary.get("glimpses", ()), recording, inputs.odom, T_base_camera)
     told = {**_of_nodes(summary), **summary, "glimpses": glimpses}
     story = Story.of(place.resolve().name, told, Truth.of(recording, inputs.ground_truth))
     return story, Album(recording, inputs)
 
 
 def _with_odometry(
-    glimpses: Sequence[Mapping[str, Any]], recording: Recording, topic: str | None
+    glimpses: Sequence[Mapping[str, Any]], recording: Recording, topic: str | None, T_base_camera: Array | None
 ) -> list[Mapping[str, Any]]:
-    """The frames of a run, those that were told without a pose with that of the recording's odometry.
+    """The frames of a run, those that were told without a pose with the camera's by the recording's odometry.
 
-    Without any frame, the odometry alone.
+    The odometry is of the body that carries the camera at ``T_base_camera``; None where the two are one. Without any
+    frame, the odometry alone.
     """
     if any("T_odom_camera" in row for row in glimpses):
         return list(glimpses)
     records = recording.records([topic]) if topic else ()
     words = (from_msg.odometry(record.message) for record in records)
-    poses = {word.stamp_ns: word.T_odom_body.tolist() for word in words}
+    T_body_camera = np.eye(4) if T_base_camera is None else T_base_camera
+    poses = {word.stamp_ns: (word.T_odom_body @ T_body_camera).tolist() for word in words}
     rows = glimpses or [{"stamp_ns": stamp} for stamp in sorted(poses)]
     stamps = np.array(sorted(poses), np.int64)
     return [{**row, "T_odom_camera": poses.get(_nearest(stamps, row["stamp_ns"]))} for row in rows]

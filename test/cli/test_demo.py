@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from recording.folders import tum_folder
 
-from objreg_ros.cli.demo import Asked, run, setup_of
+from objreg_ros.cli.demo import Asked, mounting_of, run, setup_of
 from objreg_ros.cli.played import as_rosbag2
 from objreg_ros.recording import open_recording
 
@@ -39,6 +39,12 @@ def test_lossless_asks_every_node_for_reliable_delivery_and_keeps_no_pace() -> N
 def test_a_change_of_no_node_is_refused() -> None:
     with pytest.raises(ValueError, match=r"expected NODE\.NAME=VALUE"):
         setup_of(replace(ASKED, changes=("seed=4",)))
+
+
+def test_the_report_learns_where_the_camera_is_on_the_body_of_the_odometry() -> None:
+    changes = ("registrar.T_base_camera=[0.3,0,1.1,-0.5,0.5,-0.5,0.5]",)
+    assert mounting_of(ASKED) == ()
+    assert mounting_of(replace(ASKED, changes=changes)) == (0.3, 0.0, 1.1, -0.5, 0.5, -0.5, 0.5)
 
 
 def test_a_folder_of_pictures_becomes_a_rosbag2_once(shared: Path, tmp_path: Path) -> None:

@@ -6,10 +6,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from recording.folders import records
 
 from objreg_ros.recording import write_rosbag2
+from objreg_ros.report.story import Story
 from objreg_ros.report.write import write_report
 
 from .runs import summary
@@ -49,6 +51,22 @@ def test_frames_without_a_pose_get_that_of_the_odometry_at_their_time(tmp_path: 
     write_report(tmp_path / "out.html", [tmp_path / "demo.json"])
     text = (tmp_path / "out.html").read_text()
     assert "Object map" in text and "cup, " in text
+
+
+def test_a_camera_that_is_mounted_on_the_body_of_the_odometry_is_placed_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[Story] = []
+    monkeypatch.setattr("objreg_ros.report.write.page", lambda chapters: told.append(chapters[0][0]) or "")
+    write_rosbag2(tmp_path / "bag", records(3))
+    rows = [{"stamp_ns": record.stamp_ns, "labels": [], "objects": []} for record in records(3)][::4]
+    mounted = [0.3, 0.0, 1.1, -0.5, 0.5, -0.5, 0.5]  # looks ahead: optical z is the body's x
+    run = {"recording": str(tmp_path / "bag"), "constraints": [], "glimpses": rows, "T_base_camera": mounted}
+    (tmp_path / "demo.json").write_text(json.dumps(run))
+    write_report(tmp_path / "out.html", [tmp_path / "demo.json"])
+    for k, glimpse in enumerate(told[0].glimpses):
+        metre_ahead = glimpse.T_odom_camera @ [0.0, 0.0, 1.0, 1.0]
+        assert np.allclose(metre_ahead[:3], [0.1 * k + 0.3 + 1.0, 0.0, 1.1])
 
 
 @pytest.mark.parametrize("text", ["", "[1]", '{"frames": 3}'])
