@@ -9,7 +9,7 @@ simulation our constraints know that the camera is calibrated well (covariance_c
 
     python benchmarks/closure.py --quick
     python benchmarks/closure.py --simulate loop:0,1,2,3,4 --simulate moved:0,1,2,3,4 --json OUT --figure closure.png
-    python benchmarks/closure.py ../shared/data/redkitchen_a --model ../shared/models/ssd_mobilenet_v1_coco_int8.onnx
+    python benchmarks/closure.py REC --model MODEL
 
 Simulated recordings and the figures of every method are kept in a folder, so that another run goes on where one ended;
 ``--again objreg`` measures a method anew.
@@ -28,14 +28,17 @@ from typing import Any
 import click
 import closers
 from closure_table import draw, grouped, table, table_of_totals, totals
+from command_line import quick_values
 from peers import peers
 from sources import Source, detector_of, read_source
 
 from objreg_ros.detector.params import DetectorParams
+from objreg_ros.simulation.scenarios import SCENARIOS
 from objreg_ros.simulation.write import simulate
 
 OURS, ORACLE = "objreg", "oracle"
-QUICK = {"scenarios": ("loop:0",), "frames": 300, "names": "orb_pnp", "candidates": 1}
+QUICK = {"frames": 300, "names": "orb_pnp", "candidates": 1}
+QUICK_STORY = ("loop:0",)
 
 
 @dataclass(frozen=True)
@@ -128,11 +131,15 @@ def _remove(folder: Path) -> None:
 
 
 def stories(texts: Sequence[str]) -> list[tuple[str, int]]:
-    """``loop:0,1`` as (loop, 0), (loop, 1)."""
+    """``loop:0,1`` as (loop, 0), (loop, 1); `click.BadParameter` for what is no scenario or no seed."""
     found = []
     for text in texts:
         name, _, seeds = text.partition(":")
-        found += [(name, int(seed)) for seed in (seeds or "0").split(",")]
+        numbers = (seeds or "0").split(",")
+        if name not in SCENARIOS or not all(number.isdecimal() for number in numbers):
+            expected = f"SCENARIO:SEED,SEED… with a scenario of {', '.join(SCENARIOS)} and seeds from 0"
+            raise click.BadParameter(f"expected {expected}, got {text!r}", param_hint="--simulate")
+        found += [(name, int(number)) for number in numbers]
     return found
 
 
@@ -152,15 +159,26 @@ def stories(texts: Sequence[str]) -> list[tuple[str, int]]:
     "--keep", type=click.Path(file_okay=False, path_type=Path), default=Path("out/closure"), show_default=True
 )
 @click.option("--again", multiple=True, metavar="METHOD", help="Measure this method anew.")
-@click.option("--quick", is_flag=True, help="One short loop beside one peer.")
-def main(recordings: tuple[Path, ...], keep: Path, again: tuple[str, ...], quick: bool, **options: Any) -> None:
+@click.option("--quick", is_flag=True, help="One peer, and one short loop without RECORDINGS.")
+@click.pass_context
+def main(
+    context: click.Context,
+    recordings: tuple[Path, ...],
+    keep: Path,
+    again: tuple[str, ...],
+    quick: bool,
+    **options: Any,
+) -> None:
     """Compare loop closure on RECORDINGS that have ground truth."""
-    options |= QUICK if quick else {}
+    options |= quick_values(context, quick, QUICK if recordings else QUICK | {"scenarios": QUICK_STORY})
+    told = stories(options["scenarios"])
+    if not recordings and not told:
+        raise click.UsageError("expected RECORDINGS or --simulate SCENARIO:SEED, got neither")
     names = tuple(n for n in options["names"].split(",") if n)
     detector = detector_of(options["model"], options["threshold"])
     asked = Asked(detector, names, options["candidates"], options["seed"], options["drift"])
     paths = [partial(Path, path) for path in recordings]
-    paths += [partial(simulated, keep, *story, options["frames"]) for story in stories(options["scenarios"])]
+    paths += [partial(simulated, keep, *story, options["frames"]) for story in told]
     rows: dict[str, dict[str, Any]] = {}
     for make in paths:
         path = make()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How good and how fast the detector is.
 
-    python benchmarks/detector.py --seed 1 --json OUT [--quick] [--model MODEL] [--pictures FOLDER]
+    python benchmarks/detector.py --seed 1 --json OUT [--quick] [--model MODEL] [--coco MODEL] [--pictures FOLDER]
 
 ``map50_sim``, ``ap50`` per label: average precision at IoU 0.5 (VOC, all points) on simulated pictures of scenes that
 no training has seen (``training/validation.py`` says which), of objects that registration can use: half of it visible,
@@ -9,7 +9,8 @@ box of at least 32 x 32 px, which COCO calls medium. ``map50_sim_all``, ``ap50_a
 and has 400 px^2; ``map50_sim_large``, ``ap50_large``: of boxes from 64 x 64 px. What is not asked for is difficult in
 VOC's sense, neither a miss nor a false alarm, and so is a wrong box that is smaller than what is asked for.
 ``objects``, with the same endings: how many are asked for. ``ms_p50``, ``ms_p95``: one 640 x 480 picture through
-`Detector.detect` with two threads, and the same of the COCO model in ``coco`` where it is at hand. ``real``: what is
+`Detector.detect` with two threads, and the same of the COCO model in ``coco`` (``--coco``, else
+that of a sibling folder `shared`, else what `objreg fetch-model` got) where there is one. ``real``: what is
 found on real pictures beside the project; ``found`` counts boxes by label; ``of_truth`` is how many of the labelled
 objects (YCB-Video) and ``of_coco`` how many of the COCO model's boxes of the same meaning are met by a box of the right
 label at IoU 0.5.
@@ -34,6 +35,7 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(REPOSITORY))
 
 from objreg_ros import share  # noqa: E402
+from objreg_ros.cli.fetch_model import MODELS  # noqa: E402
 from objreg_ros.data import Array, ColourImage, Detections  # noqa: E402
 from objreg_ros.detector.boxes import iou  # noqa: E402
 from objreg_ros.detector.mobilenet_ssd import Detector  # noqa: E402
@@ -41,7 +43,11 @@ from objreg_ros.detector.params import DetectorParams  # noqa: E402
 from training.validation import EVERYTHING, LARGE, RANKING, REASONABLE, Labelled, look, pictures, precisions  # noqa: E402
 
 SHARED = Path(os.environ.get("OBJREG_SHARED", REPOSITORY.parent / "shared"))
-COCO_MODEL = SHARED / "models" / "ssd_mobilenet_v1_coco_int8.onnx"
+COCO_MODELS = (
+    SHARED / "models" / "ssd_mobilenet_v1_coco_int8.onnx",
+    *(share.user_models() / MODELS[name].file for name in ("ssd-mobilenet-v1-int8", "ssd-mobilenet-v1")),
+)
+"""Where a COCO model may be, best first."""
 COCO_THRESHOLD = 0.4
 Met = dict[str, list[int]]
 SAME_MEANING = {"tv": "monitor", "keyboard": "keyboard", "book": "book", "chair": "chair", "bowl": "bowl"}
@@ -149,19 +155,25 @@ def _draw(rgb: Array, seen: Detections, path: Path) -> None:
     cv2.imwrite(str(path), picture)
 
 
+def coco_at_hand(asked: str | None) -> Path | None:
+    """The COCO model that is asked for, or the best one that is there, or None; FileNotFoundError for a wrong name."""
+    return share.model(asked) if asked else next((path for path in COCO_MODELS if path.is_file()), None)
+
+
 @click.command()
 @click.option("--seed", type=int, default=1, help="Another seed gives other scenes.")
 @click.option("--json", "out", type=click.Path(path_type=Path), required=True, help="Where the figures go.")
 @click.option("--quick", is_flag=True, help="Fewer pictures: within 50 s.")
 @click.option("--model", default=DetectorParams().model, help="Another model.")
+@click.option("--coco", "coco_model", metavar="MODEL", help="A COCO model to compare with, if not the one at hand.")
 @click.option("--pictures", "folder", type=click.Path(path_type=Path), help="Draw what is found on real pictures here.")
-def main(seed: int, out: Path, quick: bool, model: str, folder: Path | None) -> None:
+def main(seed: int, out: Path, quick: bool, model: str, coco_model: str | None, folder: Path | None) -> None:
     """Measure the detector."""
-    path = share.model(model)
+    path, coco_path = share.model(model), coco_at_hand(coco_model)
     counts = {name: few if quick else many for name, (many, few) in COUNTS.items()}
     figures = simulated(Detector(RANKING, path), seed, counts["pictures"], QUICK_S if quick else float("inf"))
     ours = Detector(DetectorParams(threads=2), path)
-    coco = Detector(DetectorParams(threads=2, threshold=COCO_THRESHOLD), COCO_MODEL) if COCO_MODEL.is_file() else None
+    coco = Detector(DetectorParams(threads=2, threshold=COCO_THRESHOLD), coco_path) if coco_path else None
     speed = timed({"ours": ours} | ({"coco": coco} if coco else {}), counts["timings"])
     figures |= {"seed": seed, "model": path.name, **speed["ours"], "coco": speed.get("coco")}
     figures["real"] = {

@@ -74,7 +74,15 @@ class Witness:
 
     @property
     def span(self) -> tuple[float, float]:
-        """From the first image to the last receipt, in seconds of the clock that never jumps."""
+        """From the first image to the last receipt, in seconds of the clock that never jumps.
+
+        `click.ClickException` where nothing was heard.
+        """
+        if not self.seen or not self.done:
+            raise click.ClickException(
+                "expected images on image/compressed and receipts on finished, "
+                f"got {len(self.seen)} and {len(self.done)}; does the ROS_DOMAIN_ID reach this process?"
+            )
         return min(self.seen.values()), max(self.done.values())
 
     def latency_ms(self, node: str) -> dict[str, float]:

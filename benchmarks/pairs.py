@@ -19,6 +19,7 @@ from typing import Any
 import click
 import cv2
 import numpy as np
+from command_line import quick_values
 from frame_pairs import Pair, Truths, draw_pairs
 from pair_figures import Row, figures, line
 from pair_pictures import draw_failures
@@ -35,6 +36,8 @@ from objreg_ros.registrar.keyframe import Keyframe
 from objreg_ros.registrar.keyframes import Keyframer, Stretch
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.verify import verify
+
+QUICK = {"wanted": 15, "names": "paper,orb_pnp"}
 
 
 def single(frame: Frame, params: RegistrarParams) -> Keyframe:
@@ -196,7 +199,9 @@ def compare(source: Source, params: RegistrarParams, options: dict[str, Any]) ->
 @click.option("--peers", "names", default="paper,orb_pnp,sift_pnp,fpfh_icp", show_default=True)
 @click.option("--pictures", type=click.Path(file_okay=False, path_type=Path), help="Draw the worst failures here.")
 @click.option("--seed", default=1, show_default=True)
+@click.pass_context
 def main(
+    context: click.Context,
     recording: Path,
     json_file: Path | None,
     keyframes: bool,
@@ -210,10 +215,11 @@ def main(
 ) -> None:
     """Register pairs of frames of RECORDING by every method and compare."""
     cv2.setNumThreads(1)
+    few = quick_values(context, quick, QUICK)
     options: dict[str, Any] = {
         "keyframes": keyframes,
-        "wanted": 15 if quick else wanted,
-        "peers": [name for name in ("paper,orb_pnp" if quick else names).split(",") if name],
+        "wanted": few.get("wanted", wanted),
+        "peers": [name for name in few.get("names", names).split(",") if name],
         "pictures": pictures,
         "seed": seed,
     }

@@ -22,6 +22,7 @@ from typing import Any
 
 import click
 import numpy as np
+from command_line import quick_values
 from pose_figures import SUCCESS
 from scipy.spatial import cKDTree
 
@@ -335,9 +336,12 @@ def show(cell: dict[str, Any]) -> str:
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
 @click.option("--figure", type=click.Path(dir_okay=False, path_type=Path), help="Draw the line graph here (svg, png).")
 @click.option("--quick", is_flag=True, help="One instance, and only table 1 and one object of table 2.")
-def main(seeds: int, seed: int, step: str, json_file: Path | None, figure: Path | None, quick: bool) -> None:
+@click.pass_context
+def main(
+    context: click.Context, seeds: int, seed: int, step: str, json_file: Path | None, figure: Path | None, quick: bool
+) -> None:
     """Reproduce the founding document's tables in simulation."""
-    bench = Bench(range(seed, seed + (1 if quick else seeds)))
+    bench = Bench(range(seed, seed + quick_values(context, quick, {"seeds": 1}).get("seeds", seeds)))
     bench.cell("book", (0.0, 0.0, 0.0), 0.0)  # compiles what has to be compiled
     bench.pairs.clear()
     table = []

@@ -8,9 +8,11 @@ another object, each in a room of its own; an accepted pose of the camera beyond
 `success`, `joint_success` and `ms` are of the objects' shapes and the views, prepared before; `engine_*`, what is
 accepted and the covariance are of the whole engine and its gate, the latter without what a wrong calibration adds: the
 simulated camera has none. With `stored` the object is known from four sides.
+`recall_accepted` is of the pairs for which the engine's best pose is right: what the gate lets through.
+`accepted_share` is of all pairs that show the same: found right and accepted.
 Beside ours, in the same run: the usual ways to register two object clouds, on the same looks, at some of the angles.
 
-    python benchmarks/registration.py --seed 7 --cache /tmp/shots --json registration.json
+    python benchmarks/registration.py --seed 7 --cache CACHE --json registration.json
 
 `--cache` keeps every finished piece, so that a run that was stopped goes on where it was. Each condition has a process
 of its own; `--processes 1` runs them one after the other, for times that nothing disturbs. `--quick` is small pieces of
@@ -33,6 +35,7 @@ from typing import Any
 import click
 import numpy as np
 from cloud_peers import Peer, cloud_peers
+from command_line import given
 from looks import Setting, Shot, Shots, around, four
 from paper import TABLE_1, Stage, keyframe
 from pose_figures import SUCCESS, error_at, grouped, judged, mean, median, nees, percentiles
@@ -205,6 +208,7 @@ class Bench:
             "negatives": len(self.negatives),
             "tried": len(both) + len(self.negatives),
             "false_accepted": sum(row["false"] for row in both) + sum(row["accepted"] for row in self.negatives),
+            "accepted_share": sum(row["accepted"] for row in closable) / len(both) if both else None,
             "recall_accepted": mean(closable, "accepted"),
             "recall_accepted_single": mean([row for row in closable if "label" in row], "accepted"),
             "recall_accepted_joint": mean([row for row in closable if "label" not in row], "accepted"),
@@ -359,7 +363,9 @@ def run(
 @click.option("--reps", default=2, show_default=True, help="Instances of each object.")
 @click.option("--every", default=2, show_default=True, help="The peers see every so many angles of one instance.")
 @click.option("--processes", default=2, show_default=True, help="1 where the times count: one condition at a time.")
+@click.pass_context
 def main(
+    context: click.Context,
     seed: int,
     json_file: Path | None,
     quick: bool,
@@ -370,6 +376,9 @@ def main(
     processes: int,
 ) -> None:
     """Register simulated objects and scenes, and refuse what is not the same."""
+    sized = [f"--{name}" for name in ("reps", "negatives", "every") if given(context, name)]
+    if quick and sized:
+        raise click.UsageError(f"expected --quick or a size of the whole, got --quick and {' '.join(sized)}")
     start = time.time()
     stop = start + QUICK_SECONDS if quick else math.inf
     size = None if quick else (reps, negatives, every)

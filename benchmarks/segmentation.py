@@ -2,7 +2,7 @@
 """Is it the whole object and nothing but the object? Ours and the founding filter by true masks, and how long it takes.
 
     python benchmarks/segmentation.py --seed 0 --json OUT [--quick]
-    python benchmarks/segmentation.py --recording ../shared/data/redkitchen_a --model MODEL.onnx
+    python benchmarks/segmentation.py --recording REC --model MODEL
 
 Intersection over union of the returned points and the object's true points, both as pixels. ``sim``: rooms of the
 simulator, objects of the nine classes that are at least 60 % visible within 1.75 m, boxes up to 10 % too large at each

@@ -5,7 +5,7 @@
 compared with the stored keyframes that may show the same place, and stored; ``keep`` is the same without a comparison,
 as for a keyframe that a newer one overtook. The times are of this machine as it was, so leave it alone meanwhile.
 
-    python benchmarks/stages.py ../shared/data/redkitchen_a --model ../shared/models/ssd_mobilenet_v1_coco_int8.onnx
+    python benchmarks/stages.py REC --model MODEL
 """
 
 from __future__ import annotations

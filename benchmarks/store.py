@@ -6,10 +6,10 @@
 ``sizes``: for each number of stored objects ``insert_ms`` (one keyframe, on the disk), ``query_ms`` (one object against
 the index), ``keyframe_query_ms`` (all objects of a keyframe), each with p50 and p95, ``open_s``, ``memory_mb``, and
 ``disk_mb`` (none at 10^5, where the stored objects are light to spare the disk). ``kills``: how often a writing process
-was killed at a random moment, what it had acknowledged, what was lost. The content is made up, of the size that a
-Kinect gives; all objects are of one of nine labels, and all in reach by odometry. ``frames``: what a frame costs the
-registrar, everything included, beside so many light objects of other places (`frame_cost`), and ``frame_ratio`` that
-of the most to the fewest.
+was killed at a random moment, how many keyframes it had acknowledged, how many of those were lost. The content is made
+up, of the size that a Kinect gives; all objects are of one of nine labels, and all in reach by odometry. ``frames``:
+what a frame costs the registrar, everything included, beside so many light objects of other places (`frame_cost`), and
+``frame_ratio`` that of the most to the fewest.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from typing import Any, TextIO
 
 import click
 import numpy as np
+from command_line import quick_values
 from frame_cost import frame_costs, table_frames
 from tqdm import tqdm
 
@@ -43,7 +44,9 @@ CAMERA = Intrinsics(fx=131.25, fy=131.25, cx=79.625, cy=59.625, width=160, heigh
 LABELS = ("cup", "book", "chair", "tv", "keyboard", "bottle", "bowl", "mouse", "laptop")
 PER_KEYFRAME = 8
 SIZES = (100, 1_000, 10_000, 100_000)
+PARTS = ("sizes", "frames", "kills")
 SAMPLES = 60
+QUICK_KILLS = 10
 POINTS = 1500  # of an object
 LIGHT = 30  # of an object where as many as 10^5 would fill the disk
 VIEWS = 8  # keyframes that a landmark is seen in
@@ -123,7 +126,7 @@ def measure_kills(kills: int, folder: Path) -> dict[str, int]:
         said.close()
         if k % 20 == 19 or k == kills - 1:
             lost |= _lost(path, acknowledged)
-    return {"kills": kills, "acknowledged": len(acknowledged), "lost": len(lost)}
+    return {"kills": kills, "acknowledged_keyframes": len(acknowledged), "lost": len(lost)}
 
 
 def _fork_writer(path: Path, seed: int) -> tuple[int, TextIO]:
@@ -217,23 +220,32 @@ def _resident_mb() -> float:
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
+def _parts(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
+    parts = tuple(text.split(","))
+    if set(parts) - set(PARTS):
+        raise click.BadParameter(f"expected some of {','.join(PARTS)}, got {text!r}")
+    return parts
+
+
 @click.command(help=__doc__)
 @click.option("--json", "out", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
-@click.option("--quick", is_flag=True, help="Up to 10^4 objects and 10 kills.")
+@click.option("--quick", is_flag=True, help="Up to 10^4 objects and fewer kills.")
 @click.option("--kills", type=click.IntRange(min=0), default=200, show_default=True)
-@click.option("--parts", default="sizes,frames,kills", show_default=True, help="What is measured.")
-def main(out: Path | None, quick: bool, kills: int, parts: str) -> None:
+@click.option("--parts", default=",".join(PARTS), show_default=True, callback=_parts, help="What is measured.")
+@click.pass_context
+def main(context: click.Context, out: Path | None, quick: bool, kills: int, parts: tuple[str, ...]) -> None:
     """Measure and print."""
-    sizes, asked = SIZES[:3] if quick else SIZES, parts.split(",")
+    sizes = SIZES[:3] if quick else SIZES
+    kills = quick_values(context, quick, {"kills": QUICK_KILLS}).get("kills", kills)
     figures: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        if "sizes" in asked:
+        if "sizes" in parts:
             figures["sizes"] = {str(n): measure_size(n, folder) for n in tqdm(sizes, desc="sizes")}
-        if "frames" in asked:
+        if "frames" in parts:
             figures |= measure_frames(sizes, folder)
-        if "kills" in asked:
-            figures["kills"] = measure_kills(min(kills, 10) if quick else kills, folder)
+        if "kills" in parts:
+            figures["kills"] = measure_kills(kills, folder)
     print(json.dumps(figures, indent=1))
     if out is not None:
         out.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")

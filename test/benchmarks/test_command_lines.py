@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the benchmarks answer to a command line that they cannot follow, and what ``--quick`` leaves alone."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import click
+import pytest
+from click.testing import CliRunner
+
+Benchmark = Callable[[str], ModuleType]
+
+
+@pytest.fixture
+def benchmark(repository: Path, monkeypatch: pytest.MonkeyPatch) -> Benchmark:
+    def named(name: str) -> ModuleType:
+        monkeypatch.setattr(sys, "path", [*sys.path, str(repository / "benchmarks")])
+        return importlib.import_module(name)
+
+    return named
+
+
+def refusal(command: click.Command, *arguments: str) -> str:
+    result = CliRunner().invoke(command, arguments)
+    assert result.exit_code == 2, result.output
+    return " ".join(result.output.replace("│", "").split())
+
+
+def test_without_recordings_closure_says_what_it_needs(benchmark: Benchmark, tmp_path: Path) -> None:
+    said = refusal(benchmark("closure").main, "--json", str(tmp_path / "x.json"), "--keep", str(tmp_path))
+    assert "expected RECORDINGS or --simulate SCENARIO:SEED, got neither" in said
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("story", ["foo:0", "loop:x", "loop:1,", "loop:-1"])
+def test_what_is_no_scenario_and_seed_is_refused(benchmark: Benchmark, tmp_path: Path, story: str) -> None:
+    said = refusal(benchmark("closure").main, "--simulate", story, "--keep", str(tmp_path))
+    assert "expected SCENARIO:SEED" in said and f"got '{story}'" in said
+
+
+def test_a_scenario_without_seeds_is_that_of_seed_0(benchmark: Benchmark) -> None:
+    assert benchmark("closure").stories(["loop", "moved:1,2"]) == [("loop", 0), ("moved", 1), ("moved", 2)]
+
+
+def test_parts_of_the_store_that_there_are_not_are_refused(benchmark: Benchmark) -> None:
+    said = refusal(benchmark("store").main, "--parts", "sizes,nonsense")
+    assert "expected some of sizes,frames,kills, got 'sizes,nonsense'" in said
+
+
+def test_a_quick_registration_has_no_size_to_choose(benchmark: Benchmark) -> None:
+    said = refusal(benchmark("registration").main, "--quick", "--reps", "3")
+    assert "expected --quick or a size of the whole, got --quick and --reps" in said
+
+
+def test_quick_changes_defaults_and_nothing_that_was_named(benchmark: Benchmark) -> None:
+    quick_values, taken = benchmark("command_line").quick_values, []
+
+    @click.command()
+    @click.option("--frames", default=600)
+    @click.option("--seed", default=1)
+    @click.option("--quick", is_flag=True)
+    @click.pass_context
+    def command(context: click.Context, quick: bool, **_: int) -> None:
+        taken.append(quick_values(context, quick, {"frames": 300, "seed": 7}))
+
+    for arguments in (["--quick"], ["--quick", "--frames", "600"], []):
+        CliRunner().invoke(command, arguments, catch_exceptions=False)
+    assert taken == [{"frames": 300, "seed": 7}, {"seed": 7}, {}]
+
+
+def test_a_witness_that_heard_nothing_says_so(benchmark: Benchmark) -> None:
+    pytest.importorskip("rclpy", reason="the witness listens with ROS 2")
+    deaf = object.__new__(benchmark("latency").Witness)
+    deaf.seen, deaf.done = {}, {}
+    with pytest.raises(click.ClickException, match="expected images on image/compressed and receipts on finished"):
+        _ = deaf.span
