@@ -20,9 +20,9 @@ from training.augment import background
 from training.labels import LABELS
 from training.priors import INPUT_HW
 from training.samples import Sample, write_shard
-from training.scenes import plain_scene, training_scene, training_view
+from training.scenes import hard_scene, plain_scene, training_scene, training_view
 
-VIEWS_PER_SCENE = 10
+VIEWS_PER_SCENE, VIEWS_PER_HARD_SCENE = 10, 6
 SHARD = 200
 PLAIN_SHARE = 0.8
 """Of the scenes, so many are the simulator's own, seen by its own camera; the others are made to differ."""
@@ -62,6 +62,15 @@ def samples(rng: np.random.Generator) -> Iterator[Sample]:
             yield sample
 
 
+def hard_samples(rng: np.random.Generator) -> Iterator[Sample]:
+    """Pictures of one scene by the simulator's own Kinect, full of what is hardest to learn."""
+    scene, poses = hard_scene(rng)
+    for _ in range(VIEWS_PER_HARD_SCENE):
+        sample = _plain_sample(scene, poses, rng)
+        if not sample.difficult.all() or rng.random() < EMPTY_SHARE:
+            yield sample
+
+
 def _plain_sample(scene: Scene, poses: Array, rng: np.random.Generator) -> Sample:
     """What the detector gets of the simulator's own Kinect."""
     T = poses[int(rng.integers(len(poses)))] if len(poses) else random_view(scene, int(rng.integers(2**31)))
@@ -96,7 +105,9 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--seed", type=int, default=1, help="other seeds give other pictures and may run beside it")
     parser.add_argument("--shards", type=int, default=160, help=f"of {SHARD} pictures each")
+    parser.add_argument("--hard", action="store_true", help="only scenes full of what is hardest to learn")
     arguments = parser.parse_args()
+    some = hard_samples if arguments.hard else samples
     arguments.folder.mkdir(parents=True, exist_ok=True)
     for number in range(arguments.shards):
         path = arguments.folder / f"{arguments.seed:03d}-{number:05d}.npz"
@@ -105,7 +116,7 @@ def main() -> None:
         rng = np.random.default_rng([arguments.seed, number])
         pictures: list[Sample] = []
         while len(pictures) < SHARD:
-            pictures += samples(rng)
+            pictures += some(rng)
         write_shard(path, pictures[:SHARD])
         print(f"{path}", flush=True)
 

@@ -39,6 +39,14 @@ STORY_FRAMES = 120
 """A story of so few frames costs little and passes every place."""
 
 
+HARD_LABELS = (
+    *LABELS * 2, *("flashlight", "book") * 12, *("cereal_box", "soda_can") * 4, *("bowl",) * 3, *("keyboard",) * 2
+)  # fmt: skip
+"""The labels of a scene that is full of flashlights, of books, and of what is taken for them."""
+
+LOOK_ALIKES, LOOK_ALIKE_SHARE = ("stick", "stick", "stick", "papers", "carton", "bottle", "vase"), 0.6
+
+
 def training_scene(rng: Rng) -> tuple[Scene, Array]:
     """A scene of a random kind under random light, and camera poses ``(N, 4, 4)`` that belong to it, N maybe 0."""
     kind = rng.random()
@@ -59,6 +67,32 @@ def plain_scene(rng: Rng) -> tuple[Scene, Array]:
     """A room or a scenario just as the simulator makes it, and the camera poses of the scenario ``(N, 4, 4)``."""
     if rng.random() < 0.5:
         return random_scene(_seed(rng)), np.zeros((0, 4, 4))
+    return _story(rng)
+
+
+def hard_scene(rng: Rng) -> tuple[Scene, Array]:
+    """The same, but the rooms, three of four, are full of what is hardest to tell from other things, and of these."""
+    if rng.random() < 0.75:
+        scene, poses = random_scene(_seed(rng), HARD_LABELS, rng.uniform(0.25, 0.55)), np.zeros((0, 4, 4))
+    else:
+        scene, poses = _story(rng)
+    return (with_look_alikes(scene, rng) if rng.random() < 0.5 else scene), poses
+
+
+def with_look_alikes(scene: Scene, rng: Rng) -> Scene:
+    """The scene with most of the distractors that stand in it replaced by what is taken for flashlights and books."""
+
+    def other(placed: Placed) -> Placed:
+        stands = placed.T_world_object[2, 2] > 0.99
+        if not (placed.is_distractor and stands and rng.random() < LOOK_ALIKE_SHARE):
+            return placed
+        return replace(placed, model=make_distractor(str(rng.choice(LOOK_ALIKES)), _seed(rng)))
+
+    return scene.with_objects([other(placed) for placed in scene.objects])
+
+
+def _story(rng: Rng) -> tuple[Scene, Array]:
+    """One of the scenes of a scenario and the camera poses in it."""
     story = make_story(str(rng.choice(list(SCENARIOS))), _seed(rng), STORY_FRAMES)
     chosen = int(rng.integers(len(story.scenes)))
     return story.scenes[chosen], story.T_world_camera[story.scene_of == chosen]

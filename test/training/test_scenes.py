@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 
 from training.labels import LABELS
 from training.render import samples
-from training.scenes import desk, wild
+from training.scenes import LOOK_ALIKES, desk, hard_scene, plain_scene, wild, with_look_alikes
 from training.validation import FIRST_SCENE, pictures
 
 
@@ -18,6 +20,23 @@ def test_a_desk_has_what_a_desk_needs() -> None:
 
 def test_a_wild_scene_has_some_of_the_nine_classes() -> None:
     assert any(not placed.is_distractor for placed in wild(np.random.default_rng(2)).objects)
+
+
+def test_three_of_ten_objects_of_hard_scenes_and_more_are_flashlights_and_books() -> None:
+    rng = np.random.default_rng(3)
+    scenes = [hard_scene(rng)[0] for _ in range(6)]
+    found = Counter(placed.label for scene in scenes for placed in scene.objects if not placed.is_distractor)
+    assert found["flashlight"] + found["book"] > 0.3 * found.total()  # of ordinary rooms they are less than a quarter
+
+
+def test_look_alikes_take_the_places_of_other_distractors_and_leave_the_objects_alone() -> None:
+    scene = plain_scene(np.random.default_rng(4))[0]
+    changed = with_look_alikes(scene, np.random.default_rng(4))
+    pairs = list(zip(scene.objects, changed.objects, strict=True))
+    assert all(np.array_equal(a.T_world_object, b.T_world_object) for a, b in pairs)
+    replaced = [(a, b) for a, b in pairs if a.model is not b.model]
+    assert replaced and all(a.is_distractor and b.is_distractor for a, b in replaced)
+    assert {b.label for _, b in replaced} <= set(LOOK_ALIKES)
 
 
 def test_pictures_of_one_scene_have_boxes_inside_and_known_classes() -> None:
