@@ -16,10 +16,13 @@ TO_STRIDE_16 = ((256, 2), (256, 1), (256, 1), (256, 1), (256, 1))
 TO_STRIDE_32 = ((384, 2), (384, 1))
 TO_STRIDE_64 = ((256, 2),)
 TO_STRIDE_128 = ((128, 2),)
-DEEPER = (0, 3, 2, 0, 0)
+DEEPER = (0, 4, 3, 0, 0)
 """So many residual blocks end each of these stages."""
 
 HEAD_WIDTH = 96
+
+TOWERS_DEEPER = (1, 1, 1, 0, 0)
+"""So many end the tower of each level: small things are told by detail and context, and only here do both meet."""
 
 RARE = -4.0
 """The log odds of an object at a prior, to begin with."""
@@ -60,6 +63,11 @@ def stage(inputs: int, blocks: tuple[tuple[int, int], ...], deeper: int = 0) -> 
     return nn.Sequential(*plain, *(Residual(widths[-1]) for _ in range(deeper)))
 
 
+def tower(inputs: int, deeper: int) -> nn.Sequential:
+    """What stands between a level and its head."""
+    return stage(inputs, ((HEAD_WIDTH, 1), (HEAD_WIDTH, 1)), deeper)
+
+
 class MobileNetSsd(nn.Module):
     """``(B, 3, H, W)`` in about -1..1 to ``loc (B, A, 4)`` and the log odds of the classes ``(B, A, C)``."""
 
@@ -73,9 +81,7 @@ class MobileNetSsd(nn.Module):
         self.stages[0] = nn.Sequential(stem, self.stages[0])
         self.laterals = nn.ModuleList([nn.Conv2d(width, HEAD_WIDTH, 1) for width in widths[1:4]])
         towers = [HEAD_WIDTH] * 3 + widths[4:]
-        self.towers = nn.ModuleList(
-            [nn.Sequential(separable(width, HEAD_WIDTH), separable(HEAD_WIDTH, HEAD_WIDTH)) for width in towers]
-        )
+        self.towers = nn.ModuleList([tower(*parts) for parts in zip(towers, TOWERS_DEEPER, strict=True)])
         self.heads = nn.ModuleList([nn.Conv2d(HEAD_WIDTH, 4 + classes, 1) for _ in towers])
         self.apply(_initialise)
         for head in self.heads:
@@ -92,7 +98,7 @@ class MobileNetSsd(nn.Module):
 
     def tower_maps(self, levels: list[Tensor]) -> list[Tensor]:
         """What the heads see, of the maps of all stages."""
-        return [tower(level) for tower, level in zip(self.towers, self._top_down(levels), strict=True)]
+        return [one(level) for one, level in zip(self.towers, self._top_down(levels), strict=True)]
 
     def _top_down(self, levels: list[Tensor]) -> list[Tensor]:
         """The three finest levels with the context from above, the others as they are."""
