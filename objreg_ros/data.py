@@ -318,15 +318,26 @@ class Alignment:
 
 @word
 class ObjectMatch:
-    """One object registered between two moments: the object ``label`` of *to* seen in *from*."""
+    """An object that lies upon itself under a closure: its label and the id of its landmark."""
 
     label: str
     object_id: int
-    T_from_to: Array
-    overlap: float
+
+
+@word
+class Observation:
+    """An object as a keyframe saw it: its label, the id of its landmark, and its middle ``xyz (3,)`` m in the camera.
+
+    The id stays the same over keyframes and sessions, until two landmarks turn out to be one: then the older one's
+    stays.
+    """
+
+    label: str
+    object_id: int
+    xyz: Array
 
     def __post_init__(self) -> None:
-        _hold_pose(self, "T_from_to")
+        _hold(self, "xyz", np.float64, (3,), {})
 
 
 @word
@@ -334,7 +345,7 @@ class LoopClosure:
     """Two moments that saw the same place: ``T_from_to`` maps points of the camera at *to* into the camera at *from*.
 
     ``covariance (6, 6) float64`` in ROS order [tx ty tz rx ry rz], of the pose in the *from* frame; ``labels`` of the
-    objects that closed it; ``matches`` the registration of each; ``evidence`` named numbers of the verification.
+    objects that closed it; ``matches`` those with their landmarks; ``evidence`` named numbers of the verification.
     """
 
     from_ns: int

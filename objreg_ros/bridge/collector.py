@@ -20,9 +20,9 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from objreg_ros.bridge import from_msg, qos
-from objreg_ros.bridge.diagnostics import REJECTED, balance_of
+from objreg_ros.bridge.diagnostics import REFUSAL, REJECTED, balance_of, refusal_of
 from objreg_ros.bridge.ledger import Balance
-from objreg_ros.data import Detections, LoopClosure, ObjectCloud
+from objreg_ros.data import Detections, LoopClosure, ObjectCloud, Rejected
 
 RECENT = 100  # detections that wait for their objects
 KEPT_CONSTRAINTS = 1000
@@ -45,6 +45,7 @@ class Collector(Node):
         self.books: dict[str, Balance] = {}
         self.rejected: dict[str, int] = {}
         self.closures: list[LoopClosure] = []
+        self.refusals: list[Rejected] = []
         self.sight: Sight | None = None
         self.glimpses: dict[int, dict[str, Any]] = {}  # stamp → labels detected, middles of objects
         self._names: Mapping[int, str] = {}
@@ -82,7 +83,9 @@ class Collector(Node):
 
     def _hear_books(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            if status.hardware_id == "objreg_ros":
+            if status.hardware_id == "objreg_ros" and status.name.endswith(REFUSAL):
+                self.refusals.append(refusal_of(status))
+            elif status.hardware_id == "objreg_ros":
                 self.books[status.name.removesuffix(": frames")] = balance_of(status)
                 refused = {v.key: int(v.value) for v in status.values if v.key.startswith(REJECTED)}
                 self.rejected.update({key.removeprefix(REJECTED): count for key, count in refused.items()})

@@ -3,18 +3,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Iterable, Mapping
 
+import numpy as np
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
 
 from objreg_ros.bridge.ledger import Balance
+from objreg_ros.data import Reason, Rejected
 
 DROPPED = "dropped: "
 LOST = "lost in transport: "
 LATENCY = "latency "
 REJECTED = "rejected: "
+REFUSAL = ": refusal"  # behind the name of a node
 CONNECTED = "connected: "
 
 
@@ -35,6 +39,32 @@ def diagnostic(
         values=[KeyValue(key=key, value=str(value)) for key, value in {**_counts(balance, rate_hz), **extra}.items()],
     )
     return DiagnosticArray(header=Header(stamp=now), status=[status])
+
+
+def refusals(node: str, now: Time, rejected: Iterable[Rejected]) -> DiagnosticArray:
+    """A status for every refusal: the reason with its numbers, the two moments, and the pose that was turned down."""
+    return DiagnosticArray(header=Header(stamp=now), status=[_refusal(node, item) for item in rejected])
+
+
+def _refusal(node: str, rejected: Rejected) -> DiagnosticStatus:
+    pose = None if rejected.T_from_to is None else rejected.T_from_to.tolist()
+    values = {"from [ns]": rejected.from_ns, "to [ns]": rejected.to_ns, "T_from_to": json.dumps(pose)}
+    return DiagnosticStatus(
+        level=DiagnosticStatus.OK,
+        name=f"{node}{REFUSAL}",
+        message=f"{rejected.reason.value}: {rejected.detail}",
+        hardware_id="objreg_ros",
+        values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+    )
+
+
+def refusal_of(status: DiagnosticStatus) -> Rejected:
+    """The refusal that a status of `refusals` tells."""
+    values = {pair.key: pair.value for pair in status.values}
+    reason, _, detail = status.message.partition(": ")
+    pose = json.loads(values["T_from_to"])
+    moments = {"from_ns": int(values["from [ns]"]), "to_ns": int(values["to [ns]"])}
+    return Rejected(reason=Reason(reason), **moments, detail=detail, T_from_to=None if pose is None else np.array(pose))
 
 
 def _counts(balance: Balance, rate_hz: float) -> dict[str, object]:

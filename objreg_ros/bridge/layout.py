@@ -49,6 +49,8 @@ OBJECTS = np.dtype(
     ]
 )
 
+LANDMARKS = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("object_id", "<u4"), ("class_id", "<u2")])
+
 VIEW = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("rgb", "<u4")])
 
 PACKED = ("rgb", "rgba")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from array import array
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2, PointField
 from std_msgs.msg import Header, String
 
-from objreg_ros.bridge.layout import DETECTIONS, OBJECTS, SUPPORT_ID, VIEW, fields_of
+from objreg_ros.bridge.layout import DETECTIONS, LANDMARKS, OBJECTS, SUPPORT_ID, VIEW, fields_of
 from objreg_ros.data import (
     ColourImage,
     DepthImage,
@@ -31,6 +31,7 @@ from objreg_ros.data import (
     Intrinsics,
     LoopClosure,
     ObjectCloud,
+    Observation,
     Odometry,
     PointCloud,
 )
@@ -298,9 +299,26 @@ def constraint(closure: LoopClosure) -> OdometryMsg:
 
 
 def transforms(closure: LoopClosure) -> list[TransformStamped]:
-    """What each object of a closure says by itself; the child frame is ``"<moment of to>/<label>"``."""
+    """The registration once for each object that lies upon itself under it.
+
+    The child frame is ``"<moment of to>/<label>_<id of the landmark>"``.
+    """
     parent, child = moment(closure.frame_id, closure.from_ns), moment(closure.frame_id, closure.to_ns)
-    return [transform(match.T_from_to, closure.to_ns, parent, f"{child}/{match.label}") for match in closure.matches]
+    names = [f"{child}/{match.label}_{match.object_id}" for match in closure.matches]
+    return [transform(closure.T_from_to, closure.to_ns, parent, name) for name in names]
+
+
+def landmarks(observations: Sequence[Observation], stamp_ns: int, frame_id: str, names: Labels) -> PointCloud2:
+    """The objects of a keyframe in the camera ``frame_id``, one record each, with the ids of their landmarks.
+
+    ValueError for a label that ``names`` does not hold.
+    """
+    records, numbers = np.zeros((1, len(observations)), LANDMARKS), _numbers(names)
+    for axis, name in enumerate("xyz"):
+        records[name] = [seen.xyz[axis] for seen in observations]
+    records["object_id"] = [seen.object_id for seen in observations]
+    records["class_id"] = [_number(seen.label, numbers) for seen in observations]
+    return _table(records, stamp_ns, frame_id)
 
 
 def transform(T_parent_child: Array, stamp_ns: int, parent: str, child: str) -> TransformStamped:

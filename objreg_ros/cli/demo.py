@@ -19,6 +19,7 @@ from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
 from objreg_ros.cli.played import as_rosbag2, simulated_room
 from objreg_ros.cli.settings import read_settings
 from objreg_ros.data import ColourImage
+from objreg_ros.offline import refusal
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
 from objreg_ros.registrar.export import constraint
@@ -148,6 +149,7 @@ def _write(file: Path, bag: Path, live: Live, truth: Truth, T_base_camera: tuple
         "constraints": [constraint(closure) for closure in live.closures],
         "rejected": dict(live.rejected),
         "truth": _errors(live, truth),
+        "refusals": [refusal(rejected) for rejected in live.refusals],
         "glimpses": live.glimpses,
     }
     file.write_text(json.dumps(summary, indent=1))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from objreg_ros.bridge.ledger import Balance
 from objreg_ros.cli.processes import Processes
-from objreg_ros.data import LoopClosure
+from objreg_ros.data import LoopClosure, Rejected
 
 if TYPE_CHECKING:
     from objreg_ros.bridge.collector import Collector, Sight
@@ -31,7 +31,8 @@ class Live:
     books: Mapping[str, Balance]
     rejected: Mapping[str, int]
     closures: tuple[LoopClosure, ...]
-    sight: Sight | None
+    sight: Sight | None = None
+    refusals: tuple[Rejected, ...] = ()
     glimpses: tuple[Mapping[str, Any], ...] = ()
 
 
@@ -62,7 +63,8 @@ def run_live(recording: Path, setup: Setup, folder: Path, say: Callable[[str], N
         _drain(collector)
         books = {name.strip("/"): balance for name, balance in collector.books.items()}
         glimpses = tuple(glimpse for _, glimpse in sorted(collector.glimpses.items()))
-        return Live(books, collector.rejected, tuple(collector.closures), collector.sight, glimpses)
+        closures, refusals = tuple(collector.closures), tuple(collector.refusals)
+        return Live(books, collector.rejected, closures, collector.sight, refusals, glimpses)
 
 
 def private_environment() -> dict[str, str]:

@@ -99,6 +99,7 @@ def constraint(closure: LoopClosure) -> dict[str, Any]:
         "T_from_to": closure.T_from_to.tolist(),
         "covariance": closure.covariance.tolist(),
         "labels": list(closure.labels),
+        "objects": [{"label": match.label, "object_id": match.object_id} for match in closure.matches],
         "evidence": closure.evidence,
     }
 

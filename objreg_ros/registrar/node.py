@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The door of the registrar: ``objects``, ``view``, ``view/camera_info``, ``gravity``, ``labels`` and ``odom`` in;
-``constraints``, ``transforms`` and ``markers`` out."""
+``constraints``, ``transforms``, ``landmarks`` and ``markers`` out."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import MarkerArray
 
 from objreg_ros.bridge import from_msg, qos, to_msg
-from objreg_ros.bridge.diagnostics import REJECTED
+from objreg_ros.bridge.diagnostics import REJECTED, refusals
 from objreg_ros.bridge.door import DroppedError
 from objreg_ros.bridge.markers import Scene
 from objreg_ros.bridge.matching import MatchingDoor
@@ -51,7 +51,8 @@ class RegistrarNode(MatchingDoor):
         self._enabled = True
         self._counts = dict(self._registrar.counts())
         self._accepted, self._unsearched, self._refused = 0, 0, Counter[str]()
-        self._last_refusal = ""
+        self._last_refusals: dict[str, str] = {}  # by reason
+        self._names: Mapping[int, str] = {}
         self._scene, self._odom_frame = Scene(), "odom"
         self.searcher: Backlog[tuple[int, Stretch]] = Backlog(self._search, self._keep, self.fail, GIVING_WAY)
         self._announce()
@@ -61,6 +62,7 @@ class RegistrarNode(MatchingDoor):
     def _announce(self) -> None:
         self._constraints = self.create_publisher(Odometry, "constraints", qos.latched(KEPT_CONSTRAINTS))
         self._transforms = self.create_publisher(TransformStamped, "transforms", qos.room(depth=100))
+        self._landmarks = self.create_publisher(PointCloud2, "landmarks", qos.room(depth=100))
         self._markers = self.create_publisher(MarkerArray, "markers", qos.latched())
 
     def _serve(self) -> None:
@@ -83,6 +85,7 @@ class RegistrarNode(MatchingDoor):
     def _hear_labels(self, message: Any) -> None:
         names = self.read_aside("labels", from_msg.labels, message)
         if names is not None:
+            self._names = names
             self.feed("labels", 0, names)
 
     def _hear(self, topic: str) -> Callable[[Any], None]:
@@ -130,9 +133,14 @@ class RegistrarNode(MatchingDoor):
                 self._transforms.publish(transform)
         self._accepted += len(outcome.closures)
         self._refused.update(refusal.reason.value for refusal in outcome.rejected)
-        self._last_refusal = next((f"{r.reason.value}: {r.detail}" for r in outcome.rejected[-1:]), self._last_refusal)
+        self._last_refusals.update((refusal.reason.value, refusal.detail) for refusal in outcome.rejected)
+        if outcome.rejected:
+            node, now = self.get_fully_qualified_name(), self.get_clock().now().to_msg()
+            self._diagnostics.publish(refusals(node, now, outcome.rejected))
         self._counts = dict(self._registrar.counts())
         if outcome.keyframe_ns is not None:
+            seen = outcome.observations, outcome.keyframe_ns, outcome.frame_id
+            self._landmarks.publish(to_msg.landmarks(*seen, self._names))
             self._scene.settle(outcome.keyframe_ns, outcome.closures, outcome.rejected)
             self._show(outcome.keyframe_ns)
 
@@ -141,11 +149,11 @@ class RegistrarNode(MatchingDoor):
         self._markers.publish(self._scene.markers(objects, stamp_ns, self._odom_frame))
 
     def extra_diagnostics(self) -> Mapping[str, object]:
-        """What is stored, what was accepted, what was refused by reason, and the last refusal with its numbers."""
+        """What is stored, what was accepted, what was refused by reason, and of each the last with its numbers."""
         stored = {f"stored {what}": count for what, count in self._counts.items()}
         refused = {f"{REJECTED}{reason}": count for reason, count in sorted(self._refused.items())}
         counts = {"constraints": self._accepted, "stored unsearched": self._unsearched}
-        last = {"last rejected": self._last_refusal} if self._last_refusal else {}
+        last = {f"last rejected: {reason}": detail for reason, detail in sorted(self._last_refusals.items())}
         return {**super().extra_diagnostics(), **stored, **counts, **refused, **last}
 
     # Services

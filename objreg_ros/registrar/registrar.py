@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from objreg_ros.data import Array, Frame, LoopClosure, ObjectMatch, Reason, Rejected
+from objreg_ros.data import Array, Frame, LoopClosure, ObjectMatch, Observation, Reason, Rejected
 from objreg_ros.geometry import transform
 from objreg_ros.registrar.candidate import Candidate
 from objreg_ros.registrar.covariance import covariance_of
@@ -39,11 +39,16 @@ RECENT = 500  # landmarks that are told of after every keyframe
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What became of a frame: accepted closures, refusals with reasons, and the keyframe that it completed, if any."""
+    """What became of a frame: accepted closures, refusals with reasons, and the keyframe that it completed, if any.
+
+    With the objects of that keyframe under the ids of their landmarks.
+    """
 
     closures: tuple[LoopClosure, ...] = ()
     rejected: tuple[Rejected, ...] = ()
     keyframe_ns: int | None = None
+    observations: tuple[Observation, ...] = ()
+    frame_id: str = "camera"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -121,8 +126,15 @@ class Registrar:
             self._path.follow(keyframe)
             sightings = sightings_of(keyframe, self._path.travelled, self._path.turned)
             accepted, rejected = self._try_places(keyframe, sightings, deadline)
-            closures = self._remember(keyframe, sightings, accepted)
-            return Outcome(closures=closures, rejected=rejected, keyframe_ns=keyframe.stamp_ns)
+            closures, named = self._remember(keyframe, sightings, accepted)
+            seen = observations(keyframe, named)
+            return Outcome(
+                closures=closures,
+                rejected=rejected,
+                keyframe_ns=keyframe.stamp_ns,
+                observations=seen,
+                frame_id=keyframe.frame_id,
+            )
 
     def reset(self) -> None:
         """Forget everything, in the store too."""
@@ -210,8 +222,11 @@ class Registrar:
 
     def _remember(
         self, keyframe: Keyframe, sightings: Sequence[Sighting], accepted: Sequence[_Accepted]
-    ) -> tuple[LoopClosure, ...]:
-        """Give the objects their landmarks, write everything down, and forget what has become superfluous."""
+    ) -> tuple[tuple[LoopClosure, ...], tuple[Sighting, ...]]:
+        """Give the objects their landmarks, write everything down, and forget what has become superfluous.
+
+        Returns the closures, and the sightings with their landmarks.
+        """
         links = [link for item in accepted for link in self._links(keyframe, item)]
         named, merged = self._landmarks.assign(sightings, links)
         closures = tuple(closure_of(keyframe, named, item, self.params) for item in accepted)
@@ -224,7 +239,7 @@ class Registrar:
             self._store.remove(spare)
             self._index.remove(spare)
             self._landmarks.forget(spare)
-        return closures
+        return closures, named
 
     def _links(self, keyframe: Keyframe, item: _Accepted) -> list[Link]:
         stored = {sighting.instance: sighting for sighting in self._store.sightings(item.target.keyframe_id)}
@@ -243,13 +258,7 @@ def closure_of(
     """The constraint of an accepted candidate; ``sightings`` are the keyframe's, with their landmarks."""
     candidate = item.candidate
     matches = tuple(
-        ObjectMatch(
-            label=pair.label,
-            object_id=sightings[pair.source].landmark,
-            T_from_to=candidate.T_target_source,
-            overlap=candidate.alignment.overlap,
-        )
-        for pair in candidate.explained
+        ObjectMatch(label=pair.label, object_id=sightings[pair.source].landmark) for pair in candidate.explained
     )
     return LoopClosure(
         from_ns=item.target.stamp_ns,
@@ -260,6 +269,14 @@ def closure_of(
         matches=matches,
         evidence=_evidence(candidate) | _moved(keyframe, item),
         frame_id=keyframe.frame_id,
+    )
+
+
+def observations(keyframe: Keyframe, sightings: Sequence[Sighting]) -> tuple[Observation, ...]:
+    """The objects of a keyframe under the ids of the landmarks that its ``sightings`` are of."""
+    return tuple(
+        Observation(label=sighting.label, object_id=sighting.landmark, xyz=item.centroid)
+        for item, sighting in zip(keyframe.objects, sightings, strict=True)
     )
 
 

@@ -157,7 +157,7 @@ def _reasons(story: Story) -> str:
         for name, count in sorted(counts.items(), key=lambda item: -item[1])
     ]
     body = "".join(_reason_row(*row) for row in rows)
-    example = "for example" if examples else ""  # the live graph tells counts only
+    example = "for example" if examples else ""
     head = f"<tr><th>refused because</th><th class=number>times</th><th>meaning</th><th>{example}</th></tr>"
     return f"<div class=card><table>{head}{body}</table></div>"
 

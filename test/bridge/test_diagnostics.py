@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rclpy", reason="the messages of ROS 2 are not installed")
@@ -8,8 +9,9 @@ pytest.importorskip("rclpy", reason="the messages of ROS 2 are not installed")
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from objreg_ros.bridge.diagnostics import balance_of, connected_of, diagnostic
+from objreg_ros.bridge.diagnostics import balance_of, connected_of, diagnostic, refusal_of, refusals
 from objreg_ros.bridge.ledger import Balance
+from objreg_ros.data import Reason, Rejected
 
 BOOKS = Balance(
     received=10,
@@ -43,3 +45,13 @@ def test_a_silent_input_makes_a_warning_that_names_it() -> None:
     assert status({}).level == DiagnosticStatus.OK and status({}).message == "30.0 frames/s"
     warned = status({"image": "nothing on /image for 5 s"})
     assert warned.level == DiagnosticStatus.WARN and warned.message == "nothing on /image for 5 s"
+
+
+def test_a_refusal_comes_back_with_its_reason_its_numbers_and_its_pose() -> None:
+    turned_down = Rejected(reason=Reason.SLACK, from_ns=5, to_ns=2**61, detail="sigma 0.1 m: no", T_from_to=np.eye(4))
+    untried = Rejected(reason=Reason.NO_CANDIDATE, from_ns=7, to_ns=7, detail="none of 3")
+    message = refusals("/registrar", Time(sec=4), [turned_down, untried])
+    assert message.status[0].message == "slides_along_a_plane: sigma 0.1 m: no"
+    first, second = map(refusal_of, message.status)
+    assert (first.reason, first.from_ns, first.to_ns, first.detail) == (Reason.SLACK, 5, 2**61, "sigma 0.1 m: no")
+    assert np.array_equal(first.T_from_to, np.eye(4)) and second.T_from_to is None

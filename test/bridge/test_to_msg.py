@@ -20,6 +20,7 @@ from objreg_ros.data import (
     LoopClosure,
     ObjectCloud,
     ObjectMatch,
+    Observation,
     Odometry,
     PointCloud,
     PointFlag,
@@ -203,10 +204,21 @@ def test_a_constraint_comes_back_with_both_moments_and_its_covariance() -> None:
 
 
 def test_each_object_of_a_closure_is_one_transform_that_names_it() -> None:
-    T = pose(rotation_from_vector(np.array([0.0, 0.0, 0.5])), np.array([3.0, 2.0, 1.0]))
-    (message,) = to_msg.transforms(closure(ObjectMatch(label="cup", object_id=3, T_from_to=T, overlap=0.5)))
-    assert message.child_frame_id == "kinect@1700000000.123456789/cup"
-    assert np.allclose(from_msg.odometry(message).T_odom_body, T, atol=1e-12)
+    sent = closure(ObjectMatch(label="cup", object_id=3), ObjectMatch(label="cup", object_id=8))
+    messages = to_msg.transforms(sent)
+    assert [m.child_frame_id for m in messages] == [f"kinect@1700000000.123456789/cup_{n}" for n in (3, 8)]
+    assert all(np.allclose(from_msg.odometry(m).T_odom_body, sent.T_from_to, atol=1e-12) for m in messages)
+
+
+def test_landmarks_tell_where_each_object_of_a_keyframe_was_and_which_it_is() -> None:
+    seen = [
+        Observation(label=label, object_id=k, xyz=np.array([k, 0.5, 2.0])) for k, label in ((7, "cup"), (9, "book"))
+    ]
+    message = to_msg.landmarks(seen, STAMP, "kinect", {4: "book", 6: "cup"})
+    records = table(message, "object_id", "class_id")[0]
+    assert (from_msg.stamp_ns(message), message.header.frame_id) == (STAMP, "kinect")
+    assert records["object_id"].tolist() == [7, 9] and records["class_id"].tolist() == [6, 4]
+    assert np.allclose([records[axis] for axis in "xyz"], [[7, 9], [0.5, 0.5], [2, 2]])
 
 
 def test_a_path_keeps_the_time_and_the_place_of_each_pose() -> None:

@@ -80,6 +80,16 @@ def test_a_refusal_tells_the_pose_that_was_turned_down() -> None:
     assert rejected[0].reason is Reason.NO_CANDIDATE and rejected[0].T_from_to is None
 
 
+def test_an_object_that_is_met_again_is_observed_under_the_id_that_it_had() -> None:
+    registrar = Registrar(PARAMS)
+    outcomes = [registrar.process(frame) for frame in (_frame(0, HERE), _frame(30, BESIDE))] + [registrar.finish()]
+    first, second = ({seen.object_id: seen.label for seen in o.observations} for o in outcomes if o.observations)
+    (closure,) = outcomes[-1].closures
+    assert closure.matches and min(first) >= 1
+    for match in closure.matches:
+        assert first[match.object_id] == second[match.object_id] == match.label
+
+
 def test_the_same_frames_give_the_same_closures() -> None:
     frames = (_frame(0, HERE), _frame(30, BESIDE))
     first, second = (_run(Registrar(PARAMS), *frames)[0] for _ in range(2))

@@ -20,7 +20,7 @@ from rclpy.node import Node
 from std_msgs.msg import Header
 
 from objreg_ros.bridge import from_msg, profile, qos
-from objreg_ros.bridge.diagnostics import balance_of, connected_of
+from objreg_ros.bridge.diagnostics import REFUSAL, balance_of, connected_of
 from objreg_ros.bridge.ledger import Balance
 
 START_S = 600.0  # a first start compiles kernels, on a machine that may be busy
@@ -138,6 +138,8 @@ class Graph:
 
     def _take_books(self, message: DiagnosticArray) -> None:
         for status in message.status:
+            if status.name.endswith(REFUSAL):
+                continue
             name = status.name.removesuffix(": frames")
             self.books[name], self.connected[name] = balance_of(status), connected_of(status)
 

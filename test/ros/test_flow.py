@@ -13,6 +13,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
 from objreg_ros.bridge import from_msg, qos
+from objreg_ros.bridge.layout import table
 
 from .graph import ANSWER_S, REPOSITORY, START_S, Graph
 from .moments import Moment, drawn, recorded
@@ -40,7 +41,8 @@ def running(graph: Graph, tiny_model: Path) -> Graph:
     graph.hear(Header, "finished")
     for topic, kind in WIRE.items():
         graph.hear(kind, topic)
-    graph.hear(PointCloud2, "detections_table")
+    for topic in ("detections_table", "landmarks"):
+        graph.hear(PointCloud2, topic)
     return graph
 
 
@@ -103,6 +105,8 @@ def test_a_disabled_registrar_drops_its_frames_as_disabled_until_it_is_enabled(
 
 def test_the_registrar_saves_and_forgets_on_demand(running: Graph) -> None:
     assert call(running, Trigger, "registrar/save")[0]
+    running.wait_for(lambda: bool(running.heard["landmarks"]), what="the objects of the keyframe that was saved")
+    assert all((table(message, "object_id")["object_id"] >= 1).all() for message in running.heard["landmarks"])
     assert call(running, Trigger, "registrar/reset") == (True, "forgot every keyframe")
 
 
