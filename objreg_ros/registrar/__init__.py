@@ -12,9 +12,11 @@ poses from chains       `engine` asks `hypotheses`, fed by `prepared`: `features
                         `scene_search` (`shape`, `silhouette`, `shape_search`, `shape_icp`, `shape_score`, `worth`)
                         on objects
 refinement              `icp` brings many to their basin; `refine` ends a few, with `direct` where there is grey
+                        and `contradiction` to say how well the surfaces hold the pose
 evidence                `verify` and `visibility` (views), `objects` (explained or moved), `symmetry`, `sliding`
 yes or no               `gate`, on a `candidate` with its evidence; then `covariance` and `thinning`
 ======================  ==========================================================================================
 
-`paper` is the founding method; `warm` compiles every kernel before the first frame.
+`paper` is the founding method; `warm` compiles every kernel before the first frame; `params` are what a user may
+set; `node` is the door.
 """
