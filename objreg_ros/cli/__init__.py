@@ -28,6 +28,7 @@ SUMMARIES = {
 }
 FOLDER = Path(__file__).parent
 BROKEN, INTERRUPTED = 1, 130
+FIRST_TIME = "the first time compiles for a minute"
 
 
 class LazyGroup(click.Group):

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from objreg_ros.bridge.ledger import Balance
+from objreg_ros.cli import FIRST_TIME
 from objreg_ros.cli.processes import Processes
 from objreg_ros.data import LoopClosure, Rejected
 
@@ -51,7 +52,7 @@ def run_live(recording: Path, setup: Setup, folder: Path, say: Callable[[str], N
         for room in ROOMS:
             arguments = ["--ros-args", *setup.node_args.get(room, ())] if setup.node_args.get(room) else []
             processes.start(room, f"objreg_ros.{room}.node", arguments)
-        say("starting three nodes (the first time compiles for a minute)")
+        say(f"starting three nodes ({FIRST_TIME})")
         _wait_for_nodes(collector, processes)
         say("playing")
         player = processes.start(

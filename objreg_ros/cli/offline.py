@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
-from objreg_ros.cli import options
+from objreg_ros.cli import FIRST_TIME, options
 from objreg_ros.cli.settings import Settings, read_settings
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.offline import Run, Timing, build_rooms, run_offline
@@ -109,6 +109,7 @@ def _only(depth_source: str, asked: dict[str, str]) -> dict[str, str]:
 
 def _run(source: Recording, inputs: Inputs, settings: Settings, max_frames: int | None, odometry: str | None) -> Run:
     timing = _timing(settings)
+    click.echo(f"preparing the rooms ({FIRST_TIME})", err=True)
     rooms, close = build_rooms(
         settings.of("detector", DetectorParams),
         settings.of("segmenter", SegmenterParams),

@@ -24,6 +24,10 @@ def command(context: click.Context, runs: tuple[Path, ...], out: Path, model: st
     It opens offline and holds the trajectory against the truth, a timeline of closures and refusals, pictures of
     registrations, the object map and the times.
     """
+    for missing in [run for run in runs if not run.expanduser().exists()]:
+        raise FileNotFoundError(
+            f"expected the JSON of `objreg offline --json` or a recording, got nothing at {missing}"
+        )
     with tempfile.TemporaryDirectory() as folder:
         files = []
         for number, run in enumerate(runs):

@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from objreg_ros.cli.report import command
+
+
+@pytest.mark.parametrize("name", ["nothere.json", "nothere"])
+def test_what_is_not_there_is_refused_before_anything_runs(tmp_path: Path, name: str) -> None:
+    runs = [str(tmp_path), str(tmp_path / name)]
+    with pytest.raises(FileNotFoundError, match=r"expected the JSON of .* or a recording, got nothing at .*nothere"):
+        CliRunner().invoke(command, [*runs, "--out", str(tmp_path / "out.html")], catch_exceptions=False)
+    assert not list(tmp_path.iterdir())
