@@ -51,7 +51,7 @@ class MapperNodeParams(Params):
 
     map_frame: str = param("map", "the frame of the corrected map")
     T_base_camera: tuple[float, ...] = param(
-        (), "where the camera's optical frame is on the body of the odometry: x y z qx qy qz qw; empty: there"
+        (), "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: the odometry is the camera's"
     )
     graph_path: str = param("objreg_map.g2o", "where ~/save writes the pose graph")
 

@@ -50,7 +50,7 @@ class SegmenterNodeParams(Params):
     colour: bool = param(True, "take the colour of the points from `image` when depth comes as an image")
     level_odom: bool = param(False, "take gravity from `odom`, whose frame an IMU keeps level with z up")
     T_base_camera: tuple[float, ...] = param(
-        (), "where the camera's optical frame is on the body of the odometry: x y z qx qy qz qw; empty: there"
+        (), "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: the odometry is the camera's"
     )
 
     def __post_init__(self) -> None:

@@ -14,7 +14,7 @@ class DepthParams(Params):
 
     noise_floor: float = param(0.0012, "standard deviation of depth at 0.4 m", "m", ge=0.0, le=0.1)
     noise_growth: float = param(
-        0.0019, "its growth with the square of the distance beyond 0.4 m", "1/m", ge=0.0, le=0.1
+        0.0019, "growth of the deviation of depth with the square of the distance beyond 0.4 m", "1/m", ge=0.0, le=0.1
     )
     quantum: float = param(0.00285, "step of depth at 1 m; grows with the square of distance", "m", ge=0.0, le=0.1)
     baseline: float = param(
