@@ -143,6 +143,19 @@ def rotation_between(source: Array, target: Array) -> Array:
     return np.eye(3) + K + K @ K / (1.0 + cosine)
 
 
+def rigid_fit(source: Array, target: Array) -> Array:
+    """``T_target_source (4, 4)`` that brings points (N, 3) closest to their partners, in the sum of squares.
+
+    Never a mirror (Umeyama, 1991). ValueError without any points, and for unequal numbers of them.
+    """
+    if len(source) == 0 or source.shape != target.shape:
+        raise ValueError(f"expected as many points as partners, at least 1, got {source.shape} and {target.shape}")
+    middle_source, middle_target = source.mean(axis=0), target.mean(axis=0)
+    U, _, Vt = np.linalg.svd((target - middle_target).T @ (source - middle_source))
+    R = U @ np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))]) @ Vt
+    return pose(R, middle_target - R @ middle_source)
+
+
 def interpolate(T_a: Array, T_b: Array, fraction: float) -> Array:
     """The pose at ``fraction`` 0..1 from ``T_a`` to ``T_b``: linear in position, shortest arc in rotation."""
     R = T_a[:3, :3] @ rotation_from_vector(fraction * vector_from_rotation(T_a[:3, :3].T @ T_b[:3, :3]))

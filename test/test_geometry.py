@@ -152,6 +152,16 @@ def test_a_mounting_is_seven_numbers_or_none_at_all() -> None:
         g.mounting((0.0,) * 7)
 
 
+def test_the_rigid_fit_finds_the_motion_and_never_a_mirror() -> None:
+    T = g.pose(g.rotation_from_vector(np.array([0.3, -2.0, 1.1])), np.array([4.0, -1.0, 2.0]))
+    xyz = np.random.default_rng(3).normal(size=(30, 3)) * [1.0, 1.0, 0.01]
+    np.testing.assert_allclose(g.rigid_fit(xyz, g.transform(T, xyz)), T, atol=1e-9)
+    assert np.linalg.det(g.rigid_fit(xyz * [1.0, 1.0, -1.0], xyz)[:3, :3]) == pytest.approx(1)
+    for few, many in ((0, 0), (3, 4)):
+        with pytest.raises(ValueError, match="expected as many points as partners, at least 1"):
+            g.rigid_fit(xyz[:few], xyz[:many])
+
+
 @given(VECTORS, VECTORS)
 def test_skew_is_the_cross_product(v: np.ndarray, w: np.ndarray) -> None:
     assert np.allclose(g.skew(v) @ w, np.cross(v, w))

@@ -101,10 +101,5 @@ def balance_of(status: DiagnosticStatus) -> Balance:
     )
 
 
-def connected_of(status: DiagnosticStatus) -> dict[str, int]:
-    """Full topic name → the publishers that a node is connected to, as its status tells."""
-    return _counts_of({pair.key: pair.value for pair in status.values}, CONNECTED)
-
-
 def _counts_of(values: Mapping[str, str], prefix: str) -> dict[str, int]:
     return {key.removeprefix(prefix): int(value) for key, value in values.items() if key.startswith(prefix)}

@@ -103,7 +103,7 @@ class Landmarks:
             oldest = min(numbers)
             merged.update({number: oldest for number in numbers if number != oldest})
             taken.add(oldest)
-            named.append(sighting.of_landmark(oldest, self._axes(sighting, claims, here)))
+            named.append(sighting.of_landmark(oldest, self._axes(claims, here)))
         return tuple(named), merged
 
     def add(self, sightings: Iterable[Sighting], merged: dict[int, int] | None = None) -> None:
@@ -162,7 +162,7 @@ class Landmarks:
         wander = MIDDLE_WANDERS * min(sighting.extent, last.extent)
         return params.landmark_radius + wander + min(drift, params.landmark_radius)
 
-    def _axes(self, sighting: Sighting, claims: Sequence[Link], here: int) -> Array:
+    def _axes(self, claims: Sequence[Link], here: int) -> Array:
         if claims:
             return np.asarray(claims[0].of.R_landmark_session @ claims[0].R_there_here)
         return self._known[here].last.R_landmark_session

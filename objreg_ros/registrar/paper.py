@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from objreg_ros.data import Alignment, Array
-from objreg_ros.geometry import pose, transform
+from objreg_ros.geometry import rigid_fit, transform
 from objreg_ros.registrar.candidate import Candidate
 from objreg_ros.registrar.engine import gravity_error_deg
 from objreg_ros.registrar.keyframe import Keyframe
@@ -81,7 +81,7 @@ def register(source: Array, target: Array, T_target_source: Array, params: Regis
         pairs = _correspond(tree, transform(T, source.astype(float)), params.paper_distance)
         if len(pairs.source) < LEAST_PAIRS:
             return None
-        T = _fit(source[pairs.source].astype(float), target[pairs.target].astype(float))
+        T = rigid_fit(source[pairs.source].astype(float), target[pairs.target].astype(float))
         before, error = error, float(np.mean(pairs.distance))
         converged = abs(before - error) < params.paper_tolerance
         iterations += 1
@@ -104,14 +104,6 @@ def _correspond(tree: cKDTree, moved: Array, most: float) -> _Pairs:
     _, first = np.unique(target[source], return_index=True)
     kept = source[first]
     return _Pairs(source=kept, target=target[kept], distance=distance[kept])
-
-
-def _fit(source: Array, target: Array) -> Array:
-    """The rigid (4, 4) motion of least squared distance between corresponding points (N, 3)."""
-    a, b = source.mean(axis=0), target.mean(axis=0)
-    U, _, Vt = np.linalg.svd((target - b).T @ (source - a))
-    R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
-    return pose(R, b - R @ a)
 
 
 def _information(source: Array, T: Array, distance: Array) -> Array:

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from objreg_ros.data import Array, LoopClosure, Odometry, Reason, Rejected
-from objreg_ros.geometry import transform
+from objreg_ros.geometry import rigid_fit, transform
 from objreg_ros.mapper.pose_graph import PoseGraph
-from objreg_ros.report.trajectory_error import absolute_errors, align
+from objreg_ros.report.trajectory_error import absolute_errors
 from objreg_ros.truth import FALSE, Error, Truth, within
 
 
@@ -141,7 +141,7 @@ def positions(poses: Sequence[Array]) -> Array:
 
 
 def _laid_over(poses: Sequence[Array], true: Sequence[Array]) -> Array:
-    return transform(align(positions(poses), positions(true)), positions(poses))
+    return transform(rigid_fit(positions(poses), positions(true)), positions(poses))
 
 
 def _glimpse(row: Mapping[str, Any]) -> Glimpse:

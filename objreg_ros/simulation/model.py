@@ -30,11 +30,6 @@ class Symmetry:
     centre: Array | None = None
     turns: Array | None = None
 
-    @property
-    def is_trivial(self) -> bool:
-        """Whether only the identity leaves the shape as it is."""
-        return self.axis is None and (self.turns is None or len(self.turns) == 1)
-
     def pose_error(self, T_estimated: Array, T_true: Array) -> tuple[float, float]:
         """(degrees, centimetres) between two poses of the object, by the symmetric motion that makes it least.
 

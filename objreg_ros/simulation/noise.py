@@ -67,8 +67,8 @@ def _wander(seed, y, x):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, nogil=True)
-def _noise_row(seed, y, cell_y, cell_x, out):  # type: ignore[no-untyped-def]
-    """Lattice values for row ``y`` of smooth noise: ``out[j]`` belongs to column ``j * cell_x``. Variance about 1."""
+def _noise_row(seed, y, cell_y, out):  # type: ignore[no-untyped-def]
+    """Lattice values for row ``y`` of smooth noise, one for each column of the lattice. Variance about 1."""
     i = y // cell_y
     a = np.float32(y - i * cell_y) / np.float32(cell_y)
     for j in range(out.shape[0]):
@@ -143,8 +143,8 @@ def _sense(  # type: ignore[no-untyped-def]
     common, single = np.float32(np.sqrt(1 - WHITE_SHARE)), np.float32(np.sqrt(WHITE_SHARE))
     for y in range(y_first, y_last):
         _shadow_row(nearness, y, fx * baseline, shadow)
-        _noise_row(seed + 6, y, cell_y, cell_x, smooth)
-        _noise_row(seed + 7, y, BLOTCH_PX, BLOTCH_PX, blotch)
+        _noise_row(seed + 6, y, cell_y, smooth)
+        _noise_row(seed + 7, y, BLOTCH_PX, blotch)
         dy = (np.float32(y) - cy) / fy
         for x in range(width):
             depth[y, x] = 0

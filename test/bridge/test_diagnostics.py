@@ -9,7 +9,7 @@ pytest.importorskip("rclpy", reason="the messages of ROS 2 are not installed")
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from objreg_ros.bridge.diagnostics import balance_of, connected_of, diagnostic, refusal_of, refusals
+from objreg_ros.bridge.diagnostics import balance_of, diagnostic, refusal_of, refusals
 from objreg_ros.bridge.ledger import Balance
 from objreg_ros.data import Reason, Rejected
 
@@ -29,11 +29,6 @@ def status(silent: dict[str, str]) -> DiagnosticStatus:
 
 def test_the_books_survive_the_way_over_the_wire() -> None:
     assert balance_of(status({})) == BOOKS
-
-
-def test_the_connections_of_a_node_are_told_by_topic() -> None:
-    told = diagnostic("/detector", Time(), BOOKS, 0.0, {}, {"connected: /image": 1, "connected: /labels": 0})
-    assert connected_of(told.status[0]) == {"/image": 1, "/labels": 0}
 
 
 def test_what_a_node_adds_is_shown() -> None:

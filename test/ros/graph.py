@@ -13,14 +13,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Header
 
 from objreg_ros.bridge import from_msg, profile, qos
-from objreg_ros.bridge.diagnostics import REFUSAL, balance_of, connected_of
+from objreg_ros.bridge.diagnostics import CONNECTED, REFUSAL, balance_of
 from objreg_ros.bridge.ledger import Balance
 
 START_S = 600.0  # a first start compiles kernels, on a machine that may be busy
@@ -141,7 +141,13 @@ class Graph:
             if status.name.endswith(REFUSAL):
                 continue
             name = status.name.removesuffix(": frames")
-            self.books[name], self.connected[name] = balance_of(status), connected_of(status)
+            self.books[name], self.connected[name] = balance_of(status), _connected_of(status)
 
     def _logs(self) -> str:
         return "\n".join(f"--- {name}\n{self.log(name)}" for name in self.processes)
+
+
+def _connected_of(status: DiagnosticStatus) -> dict[str, int]:
+    """Full topic name → the publishers that a node is connected to, as its status tells."""
+    told = ((pair.key, pair.value) for pair in status.values if pair.key.startswith(CONNECTED))
+    return {key.removeprefix(CONNECTED): int(value) for key, value in told}
