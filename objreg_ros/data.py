@@ -370,7 +370,6 @@ class Reason(Enum):
     """Why something was refused. The value is what diagnostics and JSON show."""
 
     NO_CANDIDATE = "no_candidate"
-    FEW_POINTS = "few_points"
     NO_HYPOTHESIS = "no_hypothesis"
     NOT_CONVERGED = "not_converged"
     LOW_OVERLAP = "low_overlap"

@@ -63,7 +63,7 @@ class Candidate:
     yaw_known: bool = False
     margin: float = 0.0
     resistance: float | None = None
-    floating: float = 0.0
+    floating: float = 1.0
     warp: Array = field(default_factory=lambda: np.zeros((6, 6)))
 
     @property

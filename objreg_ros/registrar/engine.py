@@ -14,6 +14,7 @@ from objreg_ros.data import Alignment, Array
 from objreg_ros.registrar.candidate import Candidate
 from objreg_ros.registrar.consensus import distinct
 from objreg_ros.registrar.covariance import spread_of, worst_translation
+from objreg_ros.registrar.evidence import gather, gravity_error_deg, resistance_of
 from objreg_ros.registrar.hypotheses import Hypothesis, from_centroids, from_features, from_objects, from_prior
 from objreg_ros.registrar.icp import align
 from objreg_ros.registrar.keyframe import Keyframe
@@ -22,8 +23,8 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Pantry, Prepared
 from objreg_ros.registrar.refine import refine, settle, warp
 from objreg_ros.registrar.scene_search import from_shapes
-from objreg_ros.registrar.sliding import preferred, resistance, steadied
-from objreg_ros.registrar.verify import WORST, floating, rank, verify
+from objreg_ros.registrar.sliding import preferred, steadied
+from objreg_ros.registrar.verify import WORST, rank
 
 APART = (np.radians(4.0), 0.04)  # rad and m: hypotheses are distinct beyond before they are settled
 ALIKE = (np.radians(0.5), 0.01)  # and after
@@ -143,26 +144,15 @@ class Engine:
         """Finish a hypothesis and gather the evidence; ``seeds`` are all that may agree with it."""
         params, source, target = self._params, pair.source, pair.target
         alignment = self._refined(pair, seed.T_target_source)
-        T = alignment.T_target_source
-        explained, moved = explain(source, target, T, params)
         poses = np.array([other.T_target_source for other in seeds])
-        same = [same_pose(poses, T_known, source.middle, params) for T_known in (seed.T_target_source, T)]
-        candidate = Candidate(
-            alignment=alignment,
-            chain=seed.chain,
-            agreeing_chains=tuple(sorted({seeds[k].chain for k in np.flatnonzero(same[0] | same[1])})),
-            verification=verify(source.sight, target.sight, T, params),
-            explained=explained,
-            moved=moved,
-            likeness=likeness(source, target, explained, T, params),
-            yaw_known=any(source.yaw_known[pair.source] and target.yaw_known[pair.target] for pair in explained),
-            gravity_error_deg=gravity_error_deg(source, target, T),
-            floating=floating(source.sight, target.sight, T, params),
-            warp=warp(source, target, T, params),
-        )
+        found = seed.T_target_source, alignment.T_target_source
+        same = [same_pose(poses, T_known, source.middle, params) for T_known in found]
+        agreeing = [seeds[k].chain for k in np.flatnonzero(same[0] | same[1])]
+        candidate = gather(source, target, alignment, (seed.chain, *agreeing), params)
         if is_held(candidate, params):
             candidate = replace(candidate, alignment=held(alignment))
-        return self._steadied(pair, replace(candidate, resistance=self._resistance(pair, candidate)))
+        pushed = resistance_of(candidate, source, target, params)
+        return self._steadied(pair, replace(candidate, resistance=pushed))
 
     def _refined(self, pair: Pair, T_target_source: Array) -> Alignment:
         """The refined pose; where that is known badly, the one that the views like best of all that it could be."""
@@ -173,13 +163,6 @@ class Engine:
             return alignment
         better = preferred(source, target, alignment.T_target_source, C, params)
         return alignment if better is None else refine(source, target, better, params)
-
-    def _resistance(self, pair: Pair, candidate: Candidate) -> float | None:
-        """How the views resist a push to where the pose would be false; None where it is known well."""
-        C = spread_of(candidate.alignment, self._params) + candidate.warp
-        if worst_translation(C) <= self._params.doubtful_sigma:
-            return None
-        return resistance(pair.source, pair.target, candidate.T_target_source, C, self._params)
 
     def _steadied(self, pair: Pair, candidate: Candidate) -> Candidate:
         """The candidate with what the views tell of a doubtful position that does not slide freely."""
@@ -201,13 +184,6 @@ def is_held(candidate: Candidate, params: RegistrarParams) -> bool:
 def held(alignment: Alignment) -> Alignment:
     """The alignment without its slack."""
     return replace(alignment, slack=np.zeros((0, 6)))
-
-
-def gravity_error_deg(source: Prepared, target: Prepared, T_target_source: Array) -> float | None:
-    """The angle between the two gravities under a pose; None where one is unknown."""
-    if source.up is None or target.up is None:
-        return None
-    return float(np.degrees(np.arccos(np.clip(T_target_source[:3, :3] @ source.up @ target.up, -1.0, 1.0))))
 
 
 def merged(candidates: list[Candidate], middle: Array, params: RegistrarParams) -> list[Candidate]:

@@ -29,7 +29,7 @@ def judge(candidates: Sequence[Candidate], params: RegistrarParams, prior: Prior
     instance because it could slide, the next best is an alias.
     """
     if not candidates:
-        return Reason.NO_HYPOTHESIS, "no chain proposed a pose"
+        return Reason.NO_HYPOTHESIS, f"no chain proposed a pose, or fewer than {params.min_points} points were seen"
     refusals = []
     best = candidates[0].verification.score
     for candidate in candidates:
@@ -162,11 +162,11 @@ def _held(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
     """
     sigma, drop = worst_translation(spread_of(candidate.alignment, params) + candidate.warp), candidate.resistance
     least = params.rival_margin * max(1.0, (sigma / params.max_slack_sigma) ** 2)
-    if drop is None:
-        held, by = sigma <= params.max_slack_sigma, "not tried"
-    else:
-        held, by = drop >= least, f"{drop:.2f} < {least:.2f}"
-    return None if held else (Reason.SLACK, f"sigma {sigma:.3f} m, V falls by {by} over {params.pushes[-1]:.2f} m")
+    if drop is None and sigma > params.max_slack_sigma:
+        return Reason.SLACK, f"sigma {sigma:.3f} m > {params.max_slack_sigma:.3f} m, not pushed"
+    if drop is None or drop >= least:
+        return None
+    return Reason.SLACK, f"sigma {sigma:.3f} m, V falls by {drop:.2f} < {least:.2f} over {params.pushes[-1]:.2f} m"
 
 
 def _odometry(candidate: Candidate, params: RegistrarParams, prior: Prior) -> Refusal | None:

@@ -3,12 +3,13 @@
 
 Besl and McKay, "A method for registration of 3-D shapes" (1992): nearest neighbours from a kd-tree, pairs rejected by
 distance and thinned to one-to-one, the motion from the singular value decomposition (Arun et al., "Least-squares
-fitting of two 3-D point sets", 1987), from rest, until it settles. It answers to the same gate as every other method.
+fitting of two 3-D point sets", 1987), from rest, until it settles. It answers to the same gate as every other method,
+with the same evidence.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -16,12 +17,11 @@ from scipy.spatial import cKDTree
 from objreg_ros.data import Alignment, Array
 from objreg_ros.geometry import rigid_fit, transform
 from objreg_ros.registrar.candidate import Candidate
-from objreg_ros.registrar.engine import gravity_error_deg
+from objreg_ros.registrar.engine import merged
+from objreg_ros.registrar.evidence import gather, resistance_of
 from objreg_ros.registrar.keyframe import Keyframe
-from objreg_ros.registrar.objects import explain
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.prepared import Pantry
-from objreg_ros.registrar.verify import verify
+from objreg_ros.registrar.prepared import Pantry, Prepared
 
 LEAST_PAIRS = 6
 
@@ -56,21 +56,13 @@ class PaperEngine:
             for b in target.objects
             if a.label == b.label
         ]
-        found = [self._candidate(source, target, alignment) for alignment in alignments if alignment is not None]
-        return tuple(sorted(found, key=lambda candidate: -candidate.verification.score))
+        pair = self._pantry.get(source), self._pantry.get(target)
+        found = [self._candidate(*pair, alignment) for alignment in alignments if alignment is not None]
+        return tuple(merged(found, pair[0].middle, self._params))
 
-    def _candidate(self, source: Keyframe, target: Keyframe, alignment: Alignment) -> Candidate:
-        a, b, T = self._pantry.get(source), self._pantry.get(target), alignment.T_target_source
-        explained, moved = explain(a, b, T, self._params)
-        return Candidate(
-            alignment=alignment,
-            chain="paper",
-            agreeing_chains=("paper",),
-            verification=verify(a.sight, b.sight, T, self._params),
-            explained=explained,
-            moved=moved,
-            gravity_error_deg=gravity_error_deg(a, b, T),
-        )
+    def _candidate(self, source: Prepared, target: Prepared, alignment: Alignment) -> Candidate:
+        candidate = gather(source, target, alignment, ("paper",), self._params)
+        return replace(candidate, resistance=resistance_of(candidate, source, target, self._params))
 
 
 def register(source: Array, target: Array, T_target_source: Array, params: RegistrarParams) -> Alignment | None:

@@ -18,7 +18,6 @@ from objreg_ros.report.style import CSS
 
 MEANINGS = {
     "no_candidate": "no stored place has such objects",
-    "few_points": "too little was measured to register",
     "no_hypothesis": "no pose explains the two moments",
     "not_converged": "refinement found no rest",
     "low_overlap": "the two views hardly see the same",

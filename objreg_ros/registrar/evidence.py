@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What there is for and against a pose, gathered alike whichever engine found it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from objreg_ros.data import Alignment, Array
+from objreg_ros.registrar.candidate import Candidate
+from objreg_ros.registrar.covariance import spread_of, worst_translation
+from objreg_ros.registrar.objects import explain, likeness
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.prepared import Prepared
+from objreg_ros.registrar.refine import warp
+from objreg_ros.registrar.sliding import resistance
+from objreg_ros.registrar.verify import floating, verify
+
+
+def gather(
+    source: Prepared, target: Prepared, alignment: Alignment, chains: Iterable[str], params: RegistrarParams
+) -> Candidate:
+    """The candidate of an alignment that ``chains`` came to, the first of which proposed it; not yet pushed."""
+    T, (chain, *others) = alignment.T_target_source, chains
+    explained, moved = explain(source, target, T, params)
+    return Candidate(
+        alignment=alignment,
+        chain=chain,
+        agreeing_chains=tuple(sorted({chain, *others})),
+        verification=verify(source.sight, target.sight, T, params),
+        explained=explained,
+        moved=moved,
+        likeness=likeness(source, target, explained, T, params),
+        yaw_known=any(source.yaw_known[pair.source] and target.yaw_known[pair.target] for pair in explained),
+        gravity_error_deg=gravity_error_deg(source, target, T),
+        floating=floating(source.sight, target.sight, T, params),
+        warp=warp(source, target, T, params),
+    )
+
+
+def resistance_of(candidate: Candidate, source: Prepared, target: Prepared, params: RegistrarParams) -> float | None:
+    """How the views resist a push to where the pose would be false; None where it is known well."""
+    C = spread_of(candidate.alignment, params) + candidate.warp
+    if worst_translation(C) <= params.doubtful_sigma:
+        return None
+    return resistance(source, target, candidate.T_target_source, C, params)
+
+
+def gravity_error_deg(source: Prepared, target: Prepared, T_target_source: Array) -> float | None:
+    """The angle between the two gravities under a pose; None where one is unknown."""
+    if source.up is None or target.up is None:
+        return None
+    return float(np.degrees(np.arccos(np.clip(T_target_source[:3, :3] @ source.up @ target.up, -1.0, 1.0))))
