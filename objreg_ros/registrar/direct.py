@@ -12,7 +12,7 @@ import numba
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.registrar.icp import _normal_equations, _solve, _step
+from objreg_ros.registrar.icp import move, normal_equations, solve
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.visibility import SHADELESS
@@ -49,7 +49,7 @@ def _finish(shape, T, reach, own, image, others, other_image, grey_sigma, shape_
     H, g, k = np.zeros((6, 6)), np.zeros(6), np.zeros(6)
     back = np.eye(4)
     for _ in range(STEPS):
-        _normal_equations(P, N, Q, M, closest, low, cell, T, reach, H, g)
+        normal_equations(P, N, Q, M, closest, low, cell, T, reach, H, g)
         K[:], k[:] = 0.0, 0.0
         _add_grey(own, T, other_image, T, False, grey_sigma, slops, K, k)
         _invert(T, back)
@@ -59,8 +59,8 @@ def _finish(shape, T, reach, own, image, others, other_image, grey_sigma, shape_
                 H[i, j] = H[i, j] / shape_sigma**2 + K[i, j]
             H[i, i] += 1.0 + 1e-6 * H[i, i]
             k[i] = -(g[i] / shape_sigma**2 + k[i])
-        _solve(H, k)
-        if _step(T, k) < SETTLED:
+        solve(H, k)
+        if move(T, k) < SETTLED:
             break
 
 

@@ -77,7 +77,7 @@ class Fit(NamedTuple):
 def fit(xyz: Array, normals: Array, surface: Surface, T: Array, reach: float) -> Fit:
     """The fit of one pose (4, 4): what of the points (M, 3) has a partner within ``reach`` m."""
     H, g = np.zeros((6, 6)), np.zeros(6)
-    count, weight, squared, spread = _normal_equations(
+    count, weight, squared, spread = normal_equations(
         xyz, normals, surface.xyz, surface.normals, surface.closest, surface.low, surface.cell, T, reach, H, g
     )
     rmse = float(np.sqrt(squared / max(1e-9, weight)))
@@ -110,7 +110,7 @@ def _closest(xyz, low, cell, shape, reach):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def _normal_equations(P, N, Q, M, closest, low, cell, T, reach, H, g):  # type: ignore[no-untyped-def]
+def normal_equations(P, N, Q, M, closest, low, cell, T, reach, H, g):  # type: ignore[no-untyped-def]
     """Fill H (6, 6) and g (6,) of the step [t r] at pose T; returns pairs, their weight, error and spread."""
     H[:], g[:] = 0.0, 0.0
     J = np.empty(6)
@@ -163,7 +163,7 @@ def _normal_equations(P, N, Q, M, closest, low, cell, T, reach, H, g):  # type: 
 
 
 @numba.njit(cache=True, nogil=True)
-def _solve(A, b):  # type: ignore[no-untyped-def]
+def solve(A, b):  # type: ignore[no-untyped-def]
     """Turn ``b`` (n,) into the x of A x = b for a positive definite ``A`` (n, n), by Cholesky; A is spoilt.
 
     Plain loops: they compile in a tenth of the time of numpy's solver.
@@ -186,7 +186,7 @@ def _solve(A, b):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _step(T, step):  # type: ignore[no-untyped-def]
+def move(T, step):  # type: ignore[no-untyped-def]
     """Move a pose ``T`` (4, 4) by a left ``step`` (6,) [t r], in place; returns the largest of its parts."""
     x, y, z = step[3], step[4], step[5]
     angle = np.sqrt(x * x + y * y + z * z)
@@ -214,16 +214,16 @@ def _align(P, N, Q, M, closest, low, cell, poses, reach, last_reach, iterations)
     for k in range(len(poses)):
         for iteration in range(iterations):
             now = reach * (last_reach / reach) ** (iteration / max(1, iterations - 3))
-            count, _, _, _ = _normal_equations(P, N, Q, M, closest, low, cell, poses[k], max(now, last_reach), H, g)
+            count, _, _, _ = normal_equations(P, N, Q, M, closest, low, cell, poses[k], max(now, last_reach), H, g)
             if count < 20:
                 break
             for a in range(6):
                 H[a, a] += 1e-3 + 1e-6 * H[a, a]
                 g[a] = -g[a]
-            _solve(H, g)
-            if _step(poses[k], g) < 2e-4 and now <= last_reach:
+            solve(H, g)
+            if move(poses[k], g) < 2e-4 and now <= last_reach:
                 break
-        count, weight, squared, _ = _normal_equations(P, N, Q, M, closest, low, cell, poses[k], last_reach, H, g)
+        count, weight, squared, _ = normal_equations(P, N, Q, M, closest, low, cell, poses[k], last_reach, H, g)
         share[k] = count / len(P)
         rmse[k] = np.sqrt(squared / weight)
     return share, rmse

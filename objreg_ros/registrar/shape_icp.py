@@ -6,7 +6,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from objreg_ros.registrar.icp import _solve
+from objreg_ros.registrar.icp import solve
 
 COMPATIBLE = 0.5  # cosine between the normals of a pair
 LARGEST_TURN = 0.3  # rad in one step
@@ -67,7 +67,7 @@ def settle(P, N, most, surface, motion, reach, last_reach, iterations):  # type:
         A[0, 0] += 1e-6 + 1e-4 * A[0, 0]
         A[1, 1] += 1e-3
         A[2, 2] += 1e-3
-        _solve(A, g)
+        solve(A, g)
         motion[0] -= min(LARGEST_TURN, max(-LARGEST_TURN, g[0]))
         motion[1] -= g[1]
         motion[2] -= g[2]
