@@ -25,7 +25,6 @@ from objreg_ros.bridge.ledger import Balance
 from objreg_ros.data import Detections, LoopClosure, ObjectCloud, Rejected
 
 RECENT = 100  # detections that wait for their objects
-KEPT_CONSTRAINTS = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +55,7 @@ class Collector(Node):
 
     def _listen(self) -> None:
         self.create_subscription(DiagnosticArray, "/diagnostics", self._hear_books, qos.room(depth=100))
-        self.create_subscription(Odometry, "constraints", self._hear_constraint, qos.latched(KEPT_CONSTRAINTS))
+        self.create_subscription(Odometry, "constraints", self._hear_constraint, qos.latched(qos.KEPT_CONSTRAINTS))
         self.create_subscription(String, "labels", self._hear_labels, qos.latched())
         self.create_subscription(PointCloud2, "detections_table", self._hear_detections, qos.room())
         self.create_subscription(PointCloud2, "objects", self._hear_objects, qos.room())

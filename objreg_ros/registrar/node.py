@@ -31,7 +31,6 @@ from objreg_ros.registrar.registrar import Outcome, Registrar, Stretch
 from objreg_ros.registrar.warm import warm
 
 GIVING_WAY = 10  # niceness of the search: the next image must not wait for it
-KEPT_CONSTRAINTS = 1000  # what a mapper that comes late still gets
 
 
 class RegistrarNode(MatchingDoor):
@@ -60,7 +59,7 @@ class RegistrarNode(MatchingDoor):
         self._listen(round(inputs.odom_slop * 1e9))
 
     def _announce(self) -> None:
-        self._constraints = self.create_publisher(Odometry, "constraints", qos.latched(KEPT_CONSTRAINTS))
+        self._constraints = self.create_publisher(Odometry, "constraints", qos.latched(qos.KEPT_CONSTRAINTS))
         self._transforms = self.create_publisher(TransformStamped, "transforms", qos.room(depth=100))
         self._landmarks = self.create_publisher(PointCloud2, "landmarks", qos.room(depth=100))
         self._markers = self.create_publisher(MarkerArray, "markers", qos.latched())
