@@ -43,10 +43,18 @@ class RegistrarParams(Params):
     )
     min_gap: float = param(2.0, "least time between the two moments of a constraint", "s", ge=0.0)
     odometry_radius: float = param(1.0, "stored objects of the session farther than this are not tried", "m", ge=0.0)
-    odometry_translation_noise: float = param(0.03, "standard deviation of odometry over no distance", "m", ge=0.0)
-    odometry_rotation_noise: float = param(1.0, "standard deviation of odometry over no distance", "deg", ge=0.0)
-    odometry_drift: float = param(0.1, "growth of the first two with each metre of path", "m/m", ge=0.0)
-    odometry_rotation_drift: float = param(0.05, "growth of the third with each degree turned", "deg/deg", ge=0.0)
+    odometry_translation_noise: float = param(
+        0.03, "standard deviation of odometry's position over no distance", "m", ge=0.0
+    )
+    odometry_rotation_noise: float = param(
+        1.0, "standard deviation of odometry's rotation over no distance", "deg", ge=0.0
+    )
+    odometry_drift: float = param(
+        0.1, "growth of the deviation of odometry's position with each metre of path", "m/m", ge=0.0
+    )
+    odometry_rotation_drift: float = param(
+        0.05, "growth of the deviation of odometry's rotation with each degree turned", "deg/deg", ge=0.0
+    )
     prior_translation: float = param(0.20, "odometry less certain than this proposes no pose", "m", ge=0.0)
     prior_rotation: float = param(6.0, "odometry less certain than this proposes no pose", "deg", ge=0.0)
     thin_seconds: float = param(1.0, "closures whose both ends are nearer than this are one closure", "s", ge=0.0)
@@ -63,33 +71,49 @@ class RegistrarParams(Params):
     seeds_per_chain: int = param(120, "hypotheses that each chain proposes", ge=1)
     yaw_steps: int = param(36, "yaw angles that are tried for one object upon another", ge=4, le=360)
     glance_yaws: int = param(12, "yaw angles that one object is laid upon another with at a glance", ge=1, le=360)
-    glance: int = param(100, "points a side that rank those", ge=20)
+    glance: int = param(100, "points a side by which poses of one object upon another are ranked at a glance", ge=20)
     seeds_per_object_chain: int = param(60, "hypotheses that the chain of single objects proposes", ge=1)
     shape_points: int = param(400, "most points of an object that are laid upon another", ge=30)
-    scene_points: int = param(800, "the same of all objects of a keyframe together", ge=30)
+    scene_points: int = param(
+        800, "most points of all objects of a keyframe together that are laid upon another's", ge=30
+    )
     shape_yaws: int = param(16, "yaw angles that one object is laid upon another with", ge=1, le=360)
     shape_offsets: tuple[float, ...] = param(
         (0.1, 0.25), "how much deeper the middle of an object may lie than what is seen of it, in its widths"
     )
-    shape_glance: int = param(100, "points a side that rank those", ge=20)
-    shape_kept: int = param(5, "motions that are refined", ge=1)
-    shape_climbed: int = param(3, "motions whose score is climbed", ge=1)
-    shape_rounds: int = param(8, "most rounds of that climb", ge=0)
-    scene_seeds: int = param(8, "poses that the middles of the objects propose for all together", ge=0)
-    drawn: int = param(2, "such poses that are drawn to where the room fits", ge=0)
-    drawing_points: int = param(300, "points of all that was seen that draw them", ge=20)
-    drawing_rounds: int = param(10, "iterations of that", ge=0)
-    drawing_reach: float = param(0.06, "a pose that this moves the objects farther stays as it was", "m", ge=0.0)
-    upright_likeness: float = param(1.0, "what likeness adds to V when upright poses of objects are compared", ge=0.0)
-    upright_violations: float = param(5.0, "and weight of seen free space beyond its weight in V", ge=0.0)
-    climb_points: int = param(120, "points a side, of objects and of views, that such a pose is then climbed by", ge=20)
-    climb_turns: tuple[float, ...] = param(
-        (3.0, 6.0, 10.0, 15.0, 20.0, 25.0), "turns about the objects, either way, with which it may begin", "deg"
+    shape_glance: int = param(
+        100, "points a side by which poses of objects are ranked before the best are refined", ge=20
     )
-    shape_violations: float = param(12.0, "weight of points in seen free space", ge=0.0)
-    shape_hidden: float = param(0.6, "weight of points behind what was seen", ge=0.0)
-    shape_residual: float = param(1.2, "weight of squared distances from what was seen", ge=0.0)
-    shape_grey: float = param(3.0, "weight of the grey's correlation", ge=0.0)
+    shape_kept: int = param(5, "poses of objects that are refined", ge=1)
+    shape_climbed: int = param(3, "poses of objects whose score is climbed to its top", ge=1)
+    shape_rounds: int = param(8, "most rounds of the climb of an object's pose", ge=0)
+    scene_seeds: int = param(8, "poses that the middles of the objects propose for all together", ge=0)
+    drawn: int = param(2, "best upright poses that are drawn to where the room fits", ge=0)
+    drawing_points: int = param(300, "points of all that was seen that draw a pose to where the room fits", ge=20)
+    drawing_rounds: int = param(10, "iterations that draw a pose to where the room fits", ge=0)
+    drawing_reach: float = param(
+        0.06, "a pose stays as it was if drawing it to the room moves the objects farther", "m", ge=0.0
+    )
+    upright_likeness: float = param(1.0, "what likeness adds to V when upright poses of objects are compared", ge=0.0)
+    upright_violations: float = param(
+        5.0, "weight of seen free space, beyond its weight in V, when upright poses are compared", ge=0.0
+    )
+    climb_points: int = param(120, "points a side, of objects and of views, by which an upright pose is climbed", ge=20)
+    climb_turns: tuple[float, ...] = param(
+        (3.0, 6.0, 10.0, 15.0, 20.0, 25.0),
+        "turns about the objects, either way, with which the climb of an upright pose may begin",
+        "deg",
+    )
+    shape_violations: float = param(
+        12.0, "weight of an object's points in seen free space, in the score of its pose", ge=0.0
+    )
+    shape_hidden: float = param(
+        0.6, "weight of an object's points behind what was seen, in the score of its pose", ge=0.0
+    )
+    shape_residual: float = param(
+        1.2, "weight of squared distances from what was seen, in the score of an object's pose", ge=0.0
+    )
+    shape_grey: float = param(3.0, "weight of the grey's correlation in the score of an object's pose", ge=0.0)
     shape_grey_expected: float = param(0.3, "correlation of grey that says nothing", ge=-1.0, le=1.0)
     shape_grey_noise: float = param(12.0, "standard deviation of grey that is noise", ge=0.0)
     surface_voxel: float = param(0.03, "distance of the points of a surface that others are aligned to", "m", ge=0.005)
@@ -112,32 +136,50 @@ class RegistrarParams(Params):
     grey_rounds: int = param(3, "most times that grey finishes a pose, coarse to fine", ge=1)
     shape_sigma: float = param(0.03, "distance from a surface that weighs as much", "m", ge=0.001)
     depth_noise: float = param(0.0012, "standard deviation of depth at 0.4 m", "m", ge=1e-5)
-    depth_noise_growth: float = param(0.0019, "its growth with the square of the depth beyond", "1/m", ge=0.0)
+    depth_noise_growth: float = param(
+        0.0019, "growth of the deviation of depth with the square of the depth beyond 0.4 m", "1/m", ge=0.0
+    )
     slack_share: float = param(0.01, "a direction that less of the surface resists is free to slide", ge=0.0, le=0.3)
     pushes: tuple[float, ...] = param(
-        (0.05, 0.1, 0.15), "a pose pushed so far along such a direction that the views like it less is held there", "m"
+        (0.05, 0.1, 0.15),
+        "how far a pose is pushed along a free direction; what the views like less is held there",
+        "m",
     )
     depth_warp: float = param(
         0.005, "error of depth that a patch of surface shares, as a share of its distance", ge=0.0, le=0.1
     )
     doubtful_sigma: float = param(
-        0.006, "a position that is known less well than this is pushed as far as the last of these", "m", ge=0.0
+        0.006, "a position that is known less well than this is pushed as far as the last of the pushes", "m", ge=0.0
     )
-    search_step: float = param(0.05, "and looked for about where it is, in the plane where it may err", "m", ge=0.01)
-    search_steps: int = param(4, "so many steps each way; 0: not at all", ge=0, le=10)
-    searched: int = param(2, "best places of those that grey finishes", ge=1)
+    search_step: float = param(
+        0.05,
+        "step of the search for a better place about a doubtful position, in the plane where it may err",
+        "m",
+        ge=0.01,
+    )
+    search_steps: int = param(4, "steps each way of the search about a doubtful position; 0: no search", ge=0, le=10)
+    searched: int = param(2, "best places of the search about a doubtful position that grey finishes", ge=1)
     steadying_texture: float = param(
         0.4, "grey that correlates so well holds a position as far as pushes are resisted", ge=0.0, le=1.0
     )
-    steadying_push: float = param(0.06, "the longest push that may be needed for that", "m", ge=0.0)
+    steadying_push: float = param(
+        0.06, "longest push until the views like a pose less at which grey still steadies a position", "m", ge=0.0
+    )
     holding_texture: float = param(0.5, "grey that correlates so well holds what shape lets slide", ge=0.0, le=1.0)
-    holding_likeness: float = param(0.3, "so does an object that looks so much alike", ge=-1.0, le=1.0)
+    holding_likeness: float = param(
+        0.3, "an object that looks so much alike holds what shape lets slide", ge=-1.0, le=1.0
+    )
     symmetry_share: float = param(0.07, "an object whose surface resists a turn less has no yaw", ge=0.0, le=1.0)
     symmetry_violations: float = param(
-        0.12, "unless, turned about its axis, so much of it is where its camera saw through", ge=0.0, le=1.0
+        0.12,
+        "an object has a yaw after all if so much of it, turned about its axis, is where its camera saw through",
+        ge=0.0,
+        le=1.0,
     )
     depth_tolerance: float = param(0.02, "depths this close agree, at the camera", "m", ge=0.001)
-    depth_tolerance_growth: float = param(0.006, "growth of that tolerance with the square of depth", "1/m", ge=0.0)
+    depth_tolerance_growth: float = param(
+        0.006, "growth of the tolerance of depth with the square of depth", "1/m", ge=0.0
+    )
     detail_sigma: float = param(3.0, "blur that the high pass of grey takes away", "px", ge=0.5)
     agreement_rotation: float = param(5.0, "chains agree within this rotation", "deg", ge=0.0)
     agreement_translation: float = param(0.15, "chains agree within this distance", "m", ge=0.0)
@@ -145,31 +187,44 @@ class RegistrarParams(Params):
     likeness_weight: float = param(0.5, "what the likeness of explained objects adds to V", ge=0.0)
     explained_distance: float = param(0.06, "an object is explained when the middles are this close", "m", ge=0.0)
     explained_share: float = param(
-        0.28, "and so much of its extent farther, since a large thing is never seen whole", ge=0.0
+        0.28,
+        "share of its extent that an object's middle may be farther, since a large thing is never seen whole",
+        ge=0.0,
     )
 
     # The founding method.
-    paper_distance: float = param(0.10, "pairs of points farther apart are rejected", "m", ge=0.001)
-    paper_iterations: int = param(100, "most iterations", ge=1)
-    paper_tolerance: float = param(1e-6, "change of the mean distance that ends the iterations", "m", ge=0.0)
+    paper_distance: float = param(
+        0.10, "pairs of points farther apart are rejected by the founding method", "m", ge=0.001
+    )
+    paper_iterations: int = param(100, "most iterations of the founding method", ge=1)
+    paper_tolerance: float = param(
+        1e-6, "change of the mean distance that ends the iterations of the founding method", "m", ge=0.0
+    )
 
     # What decides a closure.
     min_tested: int = param(600, "least number of pixels that both views must see", ge=1)
     min_inliers: float = param(0.45, "least share of tested pixels whose depth agrees", ge=0.0, le=1.0)
     max_violations: float = param(0.07, "largest share of tested pixels in seen free space", ge=0.0, le=1.0)
     max_floating_alone: float = param(
-        0.008, "largest share of them far in it, where a single object is explained", ge=0.0, le=1.0
+        0.008,
+        "largest share of tested pixels far in seen free space, where a single object is explained",
+        ge=0.0,
+        le=1.0,
     )
     min_texture: float = param(0.25, "least correlation of the high-passed grey, where there is grey", ge=-1.0, le=1.0)
     min_score: float = param(0.10, "least verification score V", ge=-3.0, le=2.0)
     rival_margin: float = param(0.1, "a candidate this much below the best in V is not considered", ge=0.0)
     min_chains: int = param(2, "chains that must agree when fewer objects than min_objects are explained", ge=1)
     min_objects: int = param(2, "explained objects that make up for chains that do not agree", ge=1)
-    min_likeness_alone: float = param(0.1, "a lone object that chains agree on looks as much alike", ge=-1.0, le=1.0)
-    min_margin_alone: float = param(0.2, "or its pose is worth so much more than any other", ge=0.0)
-    min_likeness_unrivalled: float = param(-0.5, "and it looks at least as much alike", ge=-1.0, le=1.0)
+    min_likeness_alone: float = param(0.1, "least likeness of a lone object that chains agree on", ge=-1.0, le=1.0)
+    min_margin_alone: float = param(
+        0.2, "least worth of a lone object's pose above that of any other, where chains do not agree", ge=0.0
+    )
+    min_likeness_unrivalled: float = param(
+        -0.5, "least likeness of a lone object whose pose has no rival", ge=-1.0, le=1.0
+    )
     min_margin_painted: float = param(
-        0.45, "so much more where grey correlates by holding_texture and the object itself says nothing", ge=0.0
+        0.45, "least worth above that of any other pose where grey, but not the lone object, confirms it", ge=0.0
     )
     max_gravity_error: float = param(5.0, "largest angle between the gravities", "deg", ge=0.0, le=180.0)
     max_translation: float = param(5.0, "largest distance between the two cameras", "m", ge=0.0)
@@ -196,7 +251,7 @@ class RegistrarNodeParams(Params):
 
     odom_slop: float = param(0.02, "largest distance in time between a frame and its odometry", "s", ge=0.0)
     T_base_camera: tuple[float, ...] = param(
-        (), "where the camera's optical frame is on the body of the odometry: x y z qx qy qz qw; empty: there"
+        (), "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: the odometry is the camera's"
     )
     search_seconds: float = param(0.0, "longest search for one keyframe; 0: as long as it takes", "s", ge=0.0)
 

@@ -82,3 +82,19 @@ def test_outside_of_a_checkout_nothing_is_written(tmp_path: Path) -> None:
 def test_the_command_shows_both_forms() -> None:
     assert CliRunner().invoke(command, ["--yaml"]).output == yaml_text()
     assert CliRunner().invoke(command, []).output == table_text()
+
+
+DANGLING = re.compile(
+    r"(and|or|so|the same|its|such|unless|at which|of that)\b|.*(: there|\bthose|\bthat)$", re.IGNORECASE
+)
+
+
+def test_a_parameter_explains_itself_without_its_neighbours() -> None:
+    leaning = [
+        f"{node}.{declaration.name}: {declaration.doc}"
+        for node, kinds in NODES.items()
+        for kind in kinds
+        for declaration in kind.declarations()
+        if DANGLING.match(declaration.doc)
+    ]
+    assert not leaning, "`ros2 param describe` shows one at a time"
