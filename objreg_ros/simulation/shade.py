@@ -137,6 +137,37 @@ def _illuminate(  # type: ignore[no-untyped-def]
             light[at, 3 + c] += lamp_colour[k, c] * peak
 
 
+@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, inline="always")
+def _enlighten(  # type: ignore[no-untyped-def]
+    f, m, at, z, dx, dy, ox, oy, fx, R, eye, edges, faces, normals, detail, open_surface, texture_size,
+    response, lamp_position, lamp_colour, ambient, moments, rotation, position, pinhole, reference,
+    normal, lights, levels,
+):  # fmt: skip
+    """Find the light and the mip level of a pixel on face ``f`` of material ``m``, into the rows ``at``.
+
+    ``dx, dy`` are its ray at depth 1, ``ox, oy`` its place in the face's bounds; ``normal (3, 4)`` is scratch.
+    """
+    one = np.float32(1.0)
+    rx = R[0, 0] * dx + R[0, 1] * dy + R[0, 2]
+    ry = R[1, 0] * dx + R[1, 1] * dy + R[1, 2]
+    rz = R[2, 0] * dx + R[2, 1] * dy + R[2, 2]
+    for c in range(3):
+        _load(normals, faces, edges, f, c, normal[c])
+    nx, ny, nz = _value(normal[0], ox, oy, z), _value(normal[1], ox, oy, z), _value(normal[2], ox, oy, z)
+    ray = one / np.sqrt(rx * rx + ry * ry + rz * rz)
+    norm = one / np.sqrt(nx * nx + ny * ny + nz * nz + np.float32(1e-12))
+    facing = (nx * rx + ny * ry + nz * rz) * norm
+    if open_surface[f] and facing > 0:
+        norm = -norm
+    levels[at, 0], levels[at, 1] = _mip_level(texture_size[m], detail[f] * z / fx, abs(facing) * ray)
+    _illuminate(
+        eye[0] + z * rx, eye[1] + z * ry, eye[2] + z * rz, nx * norm, ny * norm, nz * norm,
+        rx * ray, ry * ray, rz * ray, response[m, 0], int(response[m, 1]),
+        lamp_position, lamp_colour, ambient,
+        moments, rotation, position, pinhole, reference, lights, at,
+    )  # fmt: skip
+
+
 @nb.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _shade(  # type: ignore[no-untyped-def]
     nearness, triangle, y_first, y_last, camera, R, eye, bounds, edges,
@@ -177,23 +208,10 @@ def _shade(  # type: ignore[no-untyped-def]
             at = j if keeps or shared else own
             if not shared:
                 dx = (np.float32(x) - cx) / fx
-                rx = R[0, 0] * dx + R[0, 1] * dy + R[0, 2]
-                ry = R[1, 0] * dx + R[1, 1] * dy + R[1, 2]
-                rz = R[2, 0] * dx + R[2, 1] * dy + R[2, 2]
-                for c in range(3):
-                    _load(normals, faces, edges, f, c, normal[c])
-                nx, ny, nz = _value(normal[0], ox, oy, z), _value(normal[1], ox, oy, z), _value(normal[2], ox, oy, z)
-                ray = one / np.sqrt(rx * rx + ry * ry + rz * rz)
-                norm = one / np.sqrt(nx * nx + ny * ny + nz * nz + np.float32(1e-12))
-                facing = (nx * rx + ny * ry + nz * rz) * norm
-                if open_surface[f] and facing > 0:
-                    norm = -norm
-                levels[at, 0], levels[at, 1] = _mip_level(texture_size[m], detail[f] * z / fx, abs(facing) * ray)
-                _illuminate(
-                    eye[0] + z * rx, eye[1] + z * ry, eye[2] + z * rz, nx * norm, ny * norm, nz * norm,
-                    rx * ray, ry * ray, rz * ray, response[m, 0], int(response[m, 1]),
-                    lamp_position, lamp_colour, ambient,
-                    moments, rotation, position, pinhole, reference, lights, at,
+                _enlighten(
+                    f, m, at, z, dx, dy, ox, oy, fx, R, eye, edges, faces, normals, detail, open_surface, texture_size,
+                    response, lamp_position, lamp_colour, ambient, moments, rotation, position, pinhole, reference,
+                    normal, lights, levels,
                 )  # fmt: skip
             start = level_start[m, levels[at, 0]]
             tu, tv = _value(picture[0], ox, oy, z), _value(picture[1], ox, oy, z)
