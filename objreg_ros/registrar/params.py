@@ -158,6 +158,9 @@ class RegistrarParams(Params):
         ge=0.01,
     )
     search_steps: int = param(4, "steps each way of the search about a doubtful position; 0: no search", ge=0, le=10)
+    search_turns: tuple[float, ...] = param(
+        (5.0,), "turns about the objects, each way, from which grey finishes a doubtful pose too", "deg"
+    )
     searched: int = param(2, "best places of the search about a doubtful position that grey finishes", ge=1)
     steadying_texture: float = param(
         0.4, "grey that correlates so well holds a position as far as pushes are resisted", ge=0.0, le=1.0

@@ -75,7 +75,8 @@ def preferred(
 
     Far away a shift looks like a turn, and what repeats itself looks alike on either side of the truth: a pose may come
     to rest beside it. So the views are asked all over the plane in which the position is known least, and what they
-    like there, aside from the pose itself, is finished by grey. Nothing is preferred without grey.
+    like there, aside from the pose itself, is finished by grey, and so is the pose turned about the objects. Nothing is
+    preferred without grey.
     """
     if not (source.sight.textured and target.sight.textured):
         return None
@@ -84,12 +85,24 @@ def preferred(
     poses = np.array([pushed(T_target_source, motion) for motion in pushes @ weakest(C)])
     V = rank(source.sight, target.sight, poses, params, params.quick_sample).astype(np.float32)
     best, score = None, verify(source.sight, target.sight, T_target_source, params, params.grey_points).score + CLEARLY
-    for k in _peaks(V, len(steps))[: params.searched]:
-        finished, _ = finish(source, target, poses[k], params)
+    peaks = poses[_peaks(V, len(steps))[: params.searched]]
+    for T in (*peaks, *_turned(source, target, T_target_source, params)):
+        finished, _ = finish(source, target, T, params)
         seen = verify(source.sight, target.sight, finished, params, params.grey_points)
         if seen.score > score:
             best, score = finished, seen.score
     return best
+
+
+def _turned(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> list[Array]:
+    """The pose turned about the vertical through the objects, both ways; nothing where that is unknown."""
+    if target.up is None or len(source.centroids) == 0:
+        return []
+    middle = transform(T_target_source, source.centroids.mean(axis=0))
+    turns = [
+        rotation_from_vector(way * turn * target.up) for turn in np.radians(params.search_turns) for way in (-1, 1)
+    ]
+    return [pose(R, middle - R @ middle) @ T_target_source for R in turns]
 
 
 def _peaks(V: Array, width: int) -> list[int]:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.geometry import inverse, pose, pose_error
+from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector, transform
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared, prepare
 from objreg_ros.registrar.sliding import HELD, preferred, pushed, resistance, resisted, steadied
@@ -75,6 +75,17 @@ def test_a_pose_that_came_to_rest_beside_the_truth_is_left_for_it() -> None:
     found = preferred(*pair, pushed(TRUTH, across), C, PARAMS)
     assert found is not None and pose_error(found, TRUTH)[1] < 1.0
     assert preferred(*pair, TRUTH, C, PARAMS) is None
+
+
+def test_a_pose_that_came_to_rest_turned_about_the_objects_is_left_for_the_truth() -> None:
+    source, target = (prepare(keyframe(seen_from(a), TABLE, seed=k), PARAMS) for k, a in enumerate((0.0, 20.0)))
+    middle = transform(TRUTH, source.centroids.mean(axis=0))
+    R = rotation_from_vector(np.radians(6.0) * target.up)
+    turned = pose(R, middle - R @ middle) @ TRUTH
+    known = np.diag([1e-4] * 3 + [1e-8] * 3)
+    found = preferred(source, target, turned, known, PARAMS)
+    assert found is not None and pose_error(found, TRUTH)[0] < 0.5
+    assert preferred(source, target, turned, known, PARAMS.replaced(search_turns=())) is None
 
 
 def test_nothing_is_preferred_without_grey() -> None:
