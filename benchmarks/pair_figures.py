@@ -64,8 +64,8 @@ def summed(pairs: Sequence[Pair], rows: Sequence[Row]) -> dict[str, Any]:
 def figures(pairs: Sequence[Pair], rows: Sequence[Row], middle: int) -> dict[str, Any]:
     """A method's figures: over all, by view change, and by half of the recording.
 
-    Our thresholds are fixed on the first half: ``fitted`` are the pairs within it, ``held_out`` those within the
-    second, ``across`` those of one frame of each.
+    A recording on which thresholds were fixed by its first half shows in the second how far they carry; ``across`` are
+    the pairs of one frame of each.
     """
     out = summed(pairs, rows)
     out["by_view_change"] = {}
@@ -76,10 +76,10 @@ def figures(pairs: Sequence[Pair], rows: Sequence[Row], middle: int) -> dict[str
             out["by_view_change"][f"{low}-{high}"] = {
                 key: part[key] for key in ("could_close", "loose", "accepted_recall", "wrong")
             }
-    sides: dict[str, list[int]] = {"fitted": [], "held_out": [], "across": []}
+    sides: dict[str, list[int]] = {"first": [], "second": [], "across": []}
     for k, pair in enumerate(pairs):
         late = (pair.source >= middle) + (pair.target >= middle)
-        sides[("fitted", "across", "held_out")[late]].append(k)
+        sides[("first", "across", "second")[late]].append(k)
     parts = {name: summed([pairs[k] for k in side], [rows[k] for k in side]) for name, side in sides.items() if side}
     shown = ("tried", "could_close", "loose", "accepted_recall", "wrong")
     out["half"] = {name: {key: part[key] for key in shown} for name, part in parts.items()}
