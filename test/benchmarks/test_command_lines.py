@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import importlib
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -17,12 +16,8 @@ Benchmark = Callable[[str], ModuleType]
 
 
 @pytest.fixture
-def benchmark(repository: Path, monkeypatch: pytest.MonkeyPatch) -> Benchmark:
-    def named(name: str) -> ModuleType:
-        monkeypatch.setattr(sys, "path", [*sys.path, str(repository / "benchmarks")])
-        return importlib.import_module(name)
-
-    return named
+def benchmark() -> Benchmark:
+    return importlib.import_module
 
 
 def refusal(command: click.Command, *arguments: str) -> str:
