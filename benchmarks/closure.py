@@ -90,6 +90,9 @@ class Kept:
 def compare(path: Path, asked: Asked, kept: Kept) -> dict[str, Any]:
     """Every method on one recording; those that were measured before come from ``kept``."""
     missing = kept.missing(asked.methods)
+    known = [name for name in asked.methods if name not in missing]
+    if known:
+        click.echo(f"{path.name}: {', '.join(known)} as measured before; --again METHOD measures anew", err=True)
     if missing:
         click.echo(f"{path.name}: detecting and segmenting", err=True)
         with read_source(path, asked.detector, asked.seed, asked.drift) as source:
