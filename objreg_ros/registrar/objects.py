@@ -7,11 +7,12 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import inverse, transform
-from objreg_ros.registrar.candidate import ObjectPair
+from objreg_ros.registrar.candidate import ObjectPair, Verification
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.shape import upright_motion
 from objreg_ros.registrar.shape_score import alike
+from objreg_ros.registrar.verify import verify
 from objreg_ros.registrar.visibility import SEEN, VIOLATIONS, count
 
 Pairs = tuple[ObjectPair, ...]
@@ -38,6 +39,15 @@ def likeness(source: Prepared, target: Prepared, explained: Pairs, T: Array, par
     shapes = [(source.shapes[pair.source], target.shapes[pair.target]) for pair in explained]
     scores = [alike(a, b, upright_motion(a, b, T), params) for a, b in shapes if a is not None and b is not None]
     return float(np.clip(scores, -1.0, 1.0).mean()) if scores else None
+
+
+def liked(
+    source: Prepared, target: Prepared, T_target_source: Array, explained: Pairs, params: RegistrarParams
+) -> tuple[float, Verification]:
+    """What a pose is worth to the views and to the ``explained`` objects, and what the views say."""
+    seen = verify(source.sight, target.sight, T_target_source, params, params.grey_points)
+    same = likeness(source, target, explained, T_target_source, params) or 0.0
+    return seen.score + params.likeness_weight * same, seen
 
 
 def gaps(source: Prepared, target: Prepared, T_target_source: Array) -> Array:

@@ -12,15 +12,13 @@ import numpy as np
 
 from objreg_ros.data import Alignment, Array
 from objreg_ros.geometry import skew, transform
-from objreg_ros.registrar.candidate import Verification
 from objreg_ros.registrar.contradiction import information, warped
 from objreg_ros.registrar.direct import finish
 from objreg_ros.registrar.icp import Fit, align, fit
-from objreg_ros.registrar.objects import Pairs, explain, likeness
+from objreg_ros.registrar.objects import explain, liked
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.sliding import resisted
-from objreg_ros.registrar.verify import verify
 
 LITTLE = 0.02  # gain of V after which another round is not worth its time
 
@@ -67,10 +65,10 @@ def _finished(source: Prepared, target: Prepared, T: Array, params: RegistrarPar
     if not (source.sight.textured and target.sight.textured):
         return T, held
     explained, _ = explain(source, target, T, params)
-    best, _ = _liked(source, target, T, explained, params)
+    best, _ = liked(source, target, T, explained, params)
     for _ in range(params.grey_rounds):
         finished, grey = finish(source, target, T, params)
-        worth, seen = _liked(source, target, finished, explained, params)
+        worth, seen = liked(source, target, finished, explained, params)
         if worth < best:
             break
         gain, best, T = worth - best, worth, finished
@@ -78,14 +76,6 @@ def _finished(source: Prepared, target: Prepared, T: Array, params: RegistrarPar
         if gain < LITTLE:
             break
     return T, held
-
-
-def _liked(
-    source: Prepared, target: Prepared, T: Array, explained: Pairs, params: RegistrarParams
-) -> tuple[float, Verification]:
-    """What a pose is worth to the views and to the ``explained`` objects, and what the views say."""
-    seen = verify(source.sight, target.sight, T, params, params.grey_points)
-    return seen.score + params.likeness_weight * (likeness(source, target, explained, T, params) or 0.0), seen
 
 
 def about_camera(H: Array, T_target_source: Array) -> Array:

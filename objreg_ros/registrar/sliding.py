@@ -15,13 +15,14 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.geometry import pose, rotation_from_vector, transform
 from objreg_ros.registrar.direct import finish
+from objreg_ros.registrar.objects import explain, liked
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.verify import rank, verify
 
 HELD = 1.0 / 3.0  # of a push that is clearly resisted: one sigma of a pose that the views hold
 AROUND = 8  # ways in which a pose is pushed to see whether it is resisted
-CLEARLY = 0.02  # gain of V for which a pose is left for another
+CLEARLY = 0.02  # gain for which a pose is left for another
 HOPE = 0.3  # of V, what grey may add to a pose by finishing it
 DIRECTIONS = 4  # in which a pose is pushed to hold it, one after the other
 
@@ -71,12 +72,12 @@ def weakest(C: Array) -> Array:
 def preferred(
     source: Prepared, target: Prepared, T_target_source: Array, C: Array, params: RegistrarParams
 ) -> Array | None:
-    """A pose that the views like better where one of covariance ``C (6, 6)`` could as well be; None if there is none.
+    """A pose that views and objects like better where one of covariance ``C (6, 6)`` could as well be, or None.
 
     Far away a shift looks like a turn, and what repeats itself looks alike on either side of the truth: a pose may come
     to rest beside it. So the views are asked all over the plane in which the position is known least, and what they
     like there, aside from the pose itself, is finished by grey, and so is the pose turned about the objects. Nothing is
-    preferred without grey.
+    preferred without grey. The objects have a say, as views of little in common like a wrong pose a hair better.
     """
     if not (source.sight.textured and target.sight.textured):
         return None
@@ -84,13 +85,14 @@ def preferred(
     pushes = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     poses = np.array([pushed(T_target_source, motion) for motion in pushes @ weakest(C)])
     V = rank(source.sight, target.sight, poses, params, params.quick_sample).astype(np.float32)
-    best, score = None, verify(source.sight, target.sight, T_target_source, params, params.grey_points).score + CLEARLY
+    explained, _ = explain(source, target, T_target_source, params)
+    best, most = None, liked(source, target, T_target_source, explained, params)[0] + CLEARLY
     peaks = poses[_peaks(V, len(steps))[: params.searched]]
     for T in (*peaks, *_turned(source, target, T_target_source, params)):
         finished, _ = finish(source, target, T, params)
-        seen = verify(source.sight, target.sight, finished, params, params.grey_points)
-        if seen.score > score:
-            best, score = finished, seen.score
+        worth, _ = liked(source, target, finished, explained, params)
+        if worth > most:
+            best, most = finished, worth
     return best
 
 
