@@ -101,7 +101,7 @@ def test_objects_that_look_alike_are_not_taken_apart_by_grey(pair, monkeypatch) 
         score = 0.5 + T[0, 3] - TRUTH[0, 3]
         return Verification(inliers=1.0, violations=0.0, occluded=0.0, texture=0.5, tested=1000, score=score)
 
-    monkeypatch.setattr("objreg_ros.registrar.refine.verify", rightwards)
+    monkeypatch.setattr("objreg_ros.registrar.objects.verify", rightwards)
     assert np.allclose(refine(*pair, TRUTH, PARAMS).T_target_source, TRUTH)
     careless = PARAMS.replaced(likeness_weight=0.0)
     assert pose_error(refine(*pair, TRUTH, careless).T_target_source, TRUTH)[1] > 2.0
