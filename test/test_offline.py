@@ -157,7 +157,15 @@ def test_the_json_has_the_keys_that_others_rely_on() -> None:
     summary = run_offline(records(4), rooms, INPUTS).summary(Truth([(10**9, np.eye(4)), (11 * 10**8, np.eye(4))]))
     wanted = {"frames", "detections", "objects", "constraints", "rejected", "stage_ms", "truth"}
     assert wanted <= set(summary)
-    assert set(summary["constraints"][0]) == {"from_ns", "to_ns", "T_from_to", "covariance", "labels", "evidence"}
+    assert set(summary["constraints"][0]) == {
+        "from_ns",
+        "to_ns",
+        "T_from_to",
+        "covariance",
+        "labels",
+        "objects",
+        "evidence",
+    }
     assert summary["truth"]["count"] == 1 and summary["truth"]["translation_cm"]["max"] == pytest.approx(10)
 
 
