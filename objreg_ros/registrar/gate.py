@@ -98,10 +98,11 @@ def _texture(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
 
 def _score(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
-    seen = candidate.verification
-    if seen.score >= params.min_score:
-        return None
-    return Reason.LOW_OVERLAP, f"score {seen.score:.2f} < {params.min_score:.2f}"
+    """The views must like the pose; more where a lone object holds it and they hardly like a push less."""
+    score, drop = candidate.verification.score, candidate.resistance
+    doubtful = len(candidate.explained) < 2 and drop is not None and drop < params.firm_margin
+    least = params.min_score_alone if doubtful else params.min_score
+    return None if score >= least else (Reason.LOW_OVERLAP, f"score {score:.2f} < {least:.2f}")
 
 
 def _agreement(candidate: Candidate, params: RegistrarParams) -> Refusal | None:

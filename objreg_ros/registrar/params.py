@@ -216,6 +216,13 @@ class RegistrarParams(Params):
     )
     min_texture: float = param(0.25, "least correlation of the high-passed grey, where there is grey", ge=-1.0, le=1.0)
     min_score: float = param(0.10, "least verification score V", ge=-3.0, le=2.0)
+    min_score_alone: float = param(
+        0.40,
+        "least V where a single object is explained and a push makes it fall by less than firm_margin",
+        ge=-3.0,
+        le=2.0,
+    )
+    firm_margin: float = param(0.4, "fall of V over a push that tells that the views hold a pose firmly", ge=0.0)
     rival_margin: float = param(0.1, "a candidate this much below the best in V is not considered", ge=0.0)
     min_chains: int = param(2, "chains that must agree when fewer objects than min_objects are explained", ge=1)
     min_objects: int = param(2, "explained objects that make up for chains that do not agree", ge=1)

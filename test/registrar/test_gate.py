@@ -65,6 +65,18 @@ def test_a_lone_object_must_respect_free_space_more_than_several() -> None:
     assert refuse(candidate(**far), PARAMS) is None
 
 
+def test_a_lone_object_that_views_like_little_must_resist_a_push() -> None:
+    little = {"score": 0.5 * (PARAMS.min_score + PARAMS.min_score_alone), "margin": 1.0}
+    for explained, resistance, accepted in (
+        ((CUP,), 0.9 * PARAMS.firm_margin, False),
+        ((CUP,), 1.1 * PARAMS.firm_margin, True),
+        ((CUP,), None, True),
+        ((CUP, ObjectPair(1, 1, "book")), 0.9 * PARAMS.firm_margin, True),
+    ):
+        refusal = refuse(candidate(explained=explained, resistance=resistance, **little), PARAMS)
+        assert (refusal is None) is accepted, (explained, resistance, refusal)
+
+
 def test_two_objects_make_up_for_a_chain_that_is_alone() -> None:
     assert refuse(candidate(agreeing_chains=("features",)), PARAMS) is None
 
