@@ -148,16 +148,18 @@ def _clear(
     """
     last_push, last_drop = 0.0, 0.0
     for push in params.pushes:
-        scores = [
-            verify(source.sight, target.sight, pushed(T, way * push * motion), params, params.grey_points).score
-            for way in (-1, 1)
-        ]
-        drop = score - max(scores)
+        drop = _fall(source, target, T, push * motion, score, params)
         if drop >= params.rival_margin:
             between = (last_push, push) if last_push > 0.0 else (push, push)
             return float(np.interp(params.rival_margin, (last_drop, drop), between))
         last_push, last_drop = push, max(0.0, drop)
     return None
+
+
+def _fall(source: Prepared, target: Prepared, T: Array, motion: Array, score: float, params: RegistrarParams) -> float:
+    """How much less than ``score`` the views like a pose after a motion, the way that they like more."""
+    poses = [pushed(T, way * motion) for way in (-1, 1)]
+    return score - max(verify(source.sight, target.sight, P, params, params.grey_points).score for P in poses)
 
 
 def pushed(T_target_source: Array, motion: Array) -> Array:
@@ -177,10 +179,6 @@ def _reach(
 ) -> float | None:
     """The least push in m that the views like clearly less, either way; None where there is none."""
     for push in params.pushes:
-        scores = [
-            verify(source.sight, target.sight, pushed(T, way * unit), params, params.grey_points).score
-            for way in (-push, push)
-        ]
-        if max(scores) <= score - params.rival_margin:
+        if _fall(source, target, T, push * unit, score, params) >= params.rival_margin:
             return push
     return None
