@@ -14,11 +14,11 @@ from objreg_ros.data import Alignment, Array
 from objreg_ros.registrar.candidate import Candidate
 from objreg_ros.registrar.consensus import distinct
 from objreg_ros.registrar.covariance import spread_of, worst_translation
-from objreg_ros.registrar.evidence import gather, gravity_error_deg, resistance_of
+from objreg_ros.registrar.evidence import agreement, gather, gravity_error_deg, lead, resistance_of, worth
 from objreg_ros.registrar.hypotheses import Hypothesis, from_centroids, from_features, from_objects, from_prior
 from objreg_ros.registrar.icp import align
 from objreg_ros.registrar.keyframe import Keyframe
-from objreg_ros.registrar.objects import Pairs, explain, likeness
+from objreg_ros.registrar.objects import explain, likeness
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Pantry, Prepared
 from objreg_ros.registrar.refine import refine, settle, warp
@@ -198,24 +198,7 @@ def merged(candidates: list[Candidate], middle: Array, params: RegistrarParams) 
             chains = {chain for j in np.flatnonzero(same) for chain in ranked[j].agreeing_chains}
             kept.append(replace(candidate, agreeing_chains=tuple(sorted(chains))))
             known |= same
-    return [replace(candidate, margin=_margin(candidate, kept, params)) for candidate in kept]
-
-
-def _margin(candidate: Candidate, others: list[Candidate], params: RegistrarParams) -> float:
-    rivals = [worth(other, params) for other in others if other is not candidate]
-    return worth(candidate, params) - max(rivals, default=WORST)
-
-
-def worth(candidate: Candidate, params: RegistrarParams) -> float:
-    """What candidates are ranked by: the views' verdict, and the objects' where rooms repeat themselves."""
-    more = agreement(candidate.explained, candidate.moved, candidate.likeness, params)
-    return candidate.verification.score + more
-
-
-def agreement(explained: Pairs, moved: Pairs, likeness: float | None, params: RegistrarParams) -> float:
-    """What the objects add to V."""
-    stand = params.object_bonus * (min(2, len(explained)) - min(2, len(moved)))
-    return stand + params.likeness_weight * (likeness or 0.0)
+    return [replace(candidate, margin=lead(candidate, kept, params)) for candidate in kept]
 
 
 def same_pose(T: Array, T_known: Array, middle: Array, params: RegistrarParams) -> Array:

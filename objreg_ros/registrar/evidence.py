@@ -10,12 +10,12 @@ import numpy as np
 from objreg_ros.data import Alignment, Array
 from objreg_ros.registrar.candidate import Candidate
 from objreg_ros.registrar.covariance import spread_of, worst_translation
-from objreg_ros.registrar.objects import explain, likeness
+from objreg_ros.registrar.objects import Pairs, explain, likeness
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.refine import warp
 from objreg_ros.registrar.sliding import resistance
-from objreg_ros.registrar.verify import floating, verify
+from objreg_ros.registrar.verify import WORST, floating, verify
 
 
 def gather(
@@ -52,3 +52,21 @@ def gravity_error_deg(source: Prepared, target: Prepared, T_target_source: Array
     if source.up is None or target.up is None:
         return None
     return float(np.degrees(np.arccos(np.clip(T_target_source[:3, :3] @ source.up @ target.up, -1.0, 1.0))))
+
+
+def worth(candidate: Candidate, params: RegistrarParams) -> float:
+    """What candidates are ranked by: the views' verdict, and the objects' where rooms repeat themselves."""
+    more = agreement(candidate.explained, candidate.moved, candidate.likeness, params)
+    return candidate.verification.score + more
+
+
+def agreement(explained: Pairs, moved: Pairs, likeness: float | None, params: RegistrarParams) -> float:
+    """What the objects add to V."""
+    stand = params.object_bonus * (min(2, len(explained)) - min(2, len(moved)))
+    return stand + params.likeness_weight * (likeness or 0.0)
+
+
+def lead(candidate: Candidate, rivals: Iterable[Candidate], params: RegistrarParams) -> float:
+    """How much more a candidate is worth than the best of its rivals; than the lowest score where it has none."""
+    others = (worth(rival, params) for rival in rivals if rival is not candidate)
+    return worth(candidate, params) - max(others, default=WORST)

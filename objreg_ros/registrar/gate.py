@@ -9,6 +9,7 @@ Publishing nothing is better than a false closure.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from objreg_ros.data import Reason
 from objreg_ros.geometry import pose_error
 from objreg_ros.registrar.candidate import Candidate
 from objreg_ros.registrar.covariance import spread_of, worst_translation
+from objreg_ros.registrar.evidence import lead
 from objreg_ros.registrar.odometry import Prior
 from objreg_ros.registrar.params import RegistrarParams
 
@@ -31,24 +33,31 @@ def judge(candidates: Sequence[Candidate], params: RegistrarParams, prior: Prior
     if not candidates:
         return Reason.NO_HYPOTHESIS, f"no chain proposed a pose, or fewer than {params.min_points} points were seen"
     refusals = []
-    best = candidates[0].verification.score
+    best, rivals = candidates[0].verification.score, [one for one in candidates if is_possible(one, params)]
     for candidate in candidates:
         if candidate.verification.score < best - params.rival_margin:
             break
-        refusal = refuse(candidate, params, prior)
+        refusal = refuse(candidate, params, prior, rivals)
         if refusal is None:
             return candidate
         refusals.append(refusal)
     return refusals[0]
 
 
-def refuse(candidate: Candidate, params: RegistrarParams, prior: Prior | None = None) -> Refusal | None:
-    """Why this candidate is no closure, with the numbers; None if it is one."""
-    for check in CHECKS:
-        refusal = check(candidate, params)
-        if refusal is not None:
-            return refusal
-    return None if prior is None else _odometry(candidate, params, prior)
+def refuse(
+    candidate: Candidate, params: RegistrarParams, prior: Prior | None = None, rivals: Sequence[Candidate] = ()
+) -> Refusal | None:
+    """Why this candidate is no closure, with the numbers; None if it is one. ``rivals`` are the possible others."""
+    checks: list[Check] = [*CHECKS, partial(_agreement, rivals=rivals), _held]
+    if prior is not None:
+        checks.append(partial(_odometry, prior=prior))
+    refusals = (check(candidate, params) for check in checks)
+    return next((refusal for refusal in refusals if refusal is not None), None)
+
+
+def is_possible(candidate: Candidate, params: RegistrarParams) -> bool:
+    """Whether a pose may be the true one for all that is seen: it explains an object, and free space allows it."""
+    return bool(candidate.explained) and not any(check(candidate, params) for check in (_gravity, _free_space))
 
 
 def _converged(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
@@ -91,21 +100,27 @@ def _free_space(candidate: Candidate, params: RegistrarParams) -> Refusal | None
 
 
 def _texture(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
-    texture = candidate.verification.texture
-    if texture is None or texture >= params.min_texture:
+    """The print must be that of the other view; a plain table has none, but several objects stand where they should."""
+    texture, several = candidate.verification.texture, len(candidate.explained) >= params.min_objects_plain
+    least = min(0.0, params.min_texture) if several else params.min_texture
+    if texture is None or texture >= least:
         return None
-    return Reason.TEXTURE, f"correlation {texture:.2f} < {params.min_texture:.2f}"
+    return Reason.TEXTURE, f"correlation {texture:.2f} < {least:.2f}"
 
 
 def _score(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
-    """The views must like the pose; more where a lone object holds it and they hardly like a push less."""
+    """The views must like the pose; more, or its object does, where a lone one holds it and a push is hardly worse."""
     score, drop = candidate.verification.score, candidate.resistance
-    doubtful = len(candidate.explained) < 2 and drop is not None and drop < params.firm_margin
-    least = params.min_score_alone if doubtful else params.min_score
-    return None if score >= least else (Reason.LOW_OVERLAP, f"score {score:.2f} < {least:.2f}")
+    if score < params.min_score:
+        return Reason.LOW_OVERLAP, f"score {score:.2f} < {params.min_score:.2f}"
+    liked = score + params.likeness_weight * max(0.0, candidate.likeness or 0.0)
+    firm = drop is None or drop >= params.firm_margin
+    if len(candidate.explained) >= 2 or firm or liked >= params.min_score_alone:
+        return None
+    return Reason.LOW_OVERLAP, f"score with likeness {liked:.2f} < {params.min_score_alone:.2f}"
 
 
-def _agreement(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
+def _agreement(candidate: Candidate, params: RegistrarParams, rivals: Sequence[Candidate]) -> Refusal | None:
     """Several objects, or one that speaks for the pose itself, or one and the grey of the views.
 
     Without an object rooms that repeat themselves look alike. So do plain rooms with one object of a kind in them:
@@ -114,13 +129,15 @@ def _agreement(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
     chains, explained = len(candidate.agreeing_chains), len(candidate.explained)
     if explained >= params.min_objects:
         return None
-    if explained and any(says(candidate, params) for says in (_speaking, _unrivalled, _painted)):
+    margin = lead(candidate, rivals, params)
+    unrivalled = margin >= params.min_margin_alone and _not_otherwise(candidate, params)
+    if explained and (unrivalled or _speaking(candidate, params) or _painted(candidate, params)):
         return None
     if explained == 0:
         return Reason.FEW_OBJECTS, "0 objects < 1"
     return Reason.CHAINS_DISAGREE, (
         f"{explained} objects < {params.min_objects}, {chains} chains, "
-        f"likeness {candidate.likeness or 0.0:.2f}, margin {candidate.margin:.2f}"
+        f"likeness {candidate.likeness or 0.0:.2f}, margin {margin:.2f}"
     )
 
 
@@ -131,16 +148,15 @@ def _speaking(candidate: Candidate, params: RegistrarParams) -> bool:
     return alike and candidate.yaw_known and chains >= params.min_chains
 
 
-def _unrivalled(candidate: Candidate, params: RegistrarParams) -> bool:
-    """Whether no other pose comes near it, and the object does not look otherwise; it tells the yaw, or grey does."""
+def _not_otherwise(candidate: Candidate, params: RegistrarParams) -> bool:
+    """Whether the object does not look otherwise, and tells the yaw, or the grey of the views does."""
     likeness, plain = candidate.likeness, candidate.verification.texture is None
     least = params.min_likeness_alone if plain else params.min_likeness_unrivalled
-    alike = likeness is not None and likeness >= least and (candidate.yaw_known or not plain)
-    return alike and candidate.margin >= params.min_margin_alone
+    return likeness is not None and likeness >= least and (candidate.yaw_known or not plain)
 
 
 def _painted(candidate: Candidate, params: RegistrarParams) -> bool:
-    """Whether the grey of the views holds the pose, and no other pose comes anywhere near it."""
+    """Whether the grey of the views holds the pose, and no other comes anywhere near it, possible or not."""
     texture = candidate.verification.texture
     return texture is not None and texture >= params.holding_texture and candidate.margin >= params.min_margin_painted
 
@@ -183,7 +199,7 @@ def _odometry(candidate: Candidate, params: RegistrarParams, prior: Prior) -> Re
 
 
 Check = Callable[[Candidate, RegistrarParams], Refusal | None]
-CHECKS: tuple[Check, ...] = (
+CHECKS: tuple[Check, ...] = (  # of a candidate alone, before what others and odometry say
     _converged,
     _plausible,
     _gravity,
@@ -192,6 +208,4 @@ CHECKS: tuple[Check, ...] = (
     _texture,
     _score,
     _stationary,
-    _agreement,
-    _held,
 )

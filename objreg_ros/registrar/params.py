@@ -218,14 +218,18 @@ class RegistrarParams(Params):
     min_score: float = param(0.10, "least verification score V", ge=-3.0, le=2.0)
     min_score_alone: float = param(
         0.40,
-        "least V where a single object is explained and a push makes it fall by less than firm_margin",
+        "least V, with what its likeness adds, of a single object's pose that is worth less by less than firm_margin "
+        "after a push",
         ge=-3.0,
         le=2.0,
     )
-    firm_margin: float = param(0.4, "fall of V over a push that tells that the views hold a pose firmly", ge=0.0)
+    firm_margin: float = param(0.4, "fall of V and likeness over a push that tells of a pose held firmly", ge=0.0)
     rival_margin: float = param(0.1, "a candidate this much below the best in V is not considered", ge=0.0)
     min_chains: int = param(2, "chains that must agree when fewer objects than min_objects are explained", ge=1)
     min_objects: int = param(2, "explained objects that make up for chains that do not agree", ge=1)
+    min_objects_plain: int = param(
+        3, "explained objects that make up for grey that does not correlate, as on a plain table", ge=1
+    )
     min_likeness_alone: float = param(0.1, "least likeness of a lone object that chains agree on", ge=-1.0, le=1.0)
     min_margin_alone: float = param(
         0.2, "least worth of a lone object's pose above that of any other, where chains do not agree", ge=0.0

@@ -77,6 +77,23 @@ def test_a_lone_object_that_views_like_little_must_resist_a_push() -> None:
         assert (refusal is None) is accepted, (explained, resistance, refusal)
 
 
+def test_an_object_that_looks_alike_makes_up_for_views_that_like_little() -> None:
+    little = {"score": 0.2, "resistance": 0.5 * PARAMS.firm_margin, "yaw_known": True, "margin": 1.0}
+    alike, otherwise = (candidate(explained=(CUP,), likeness=likeness, **little) for likeness in (1.0, 0.2))
+    assert refuse(alike, PARAMS) is None
+    refusal = refuse(otherwise, PARAMS)
+    assert refusal is not None and refusal[0] is Reason.LOW_OVERLAP
+
+
+def test_a_plain_table_needs_no_print_where_several_objects_stand_where_they_should() -> None:
+    several = tuple(ObjectPair(k, k, "cup") for k in range(PARAMS.min_objects_plain))
+    plain = {"texture": 0.5 * PARAMS.min_texture}
+    assert refuse(candidate(explained=several, **plain), PARAMS) is None
+    for evidence in ({"explained": several[:-1], **plain}, {"explained": several, "texture": -0.1}):
+        refusal = refuse(candidate(**evidence), PARAMS)
+        assert refusal is not None and refusal[0] is Reason.TEXTURE
+
+
 def test_two_objects_make_up_for_a_chain_that_is_alone() -> None:
     assert refuse(candidate(agreeing_chains=("features",)), PARAMS) is None
 
@@ -122,20 +139,33 @@ def lone(**evidence: object) -> Candidate:
     return candidate(**{**alone, "likeness": 0.6, "yaw_known": True, "margin": 0.4, **evidence})
 
 
+def rival(one: Candidate, behind: float, **evidence: object) -> Candidate:
+    """Another pose of the same object, worth so much less."""
+    return lone(score=one.verification.score - behind, likeness=one.likeness, **evidence)
+
+
 def test_a_lone_object_that_is_unmistakable_needs_no_second_chain() -> None:
     assert refuse(lone(), PARAMS) is None
 
 
 def test_a_lone_object_that_has_a_rival_needs_a_second_chain() -> None:
-    refusal = refuse(lone(margin=0.05), PARAMS)
+    refusal = refuse(lone(), PARAMS, rivals=[rival(lone(), 0.05)])
     assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
-    assert refuse(lone(margin=0.05, agreeing_chains=("features", "objects")), PARAMS) is None
+    confirmed = lone(agreeing_chains=("features", "objects"))
+    assert refuse(confirmed, PARAMS, rivals=[rival(confirmed, 0.05)]) is None
+
+
+@pytest.mark.parametrize("against", [{"violations": 0.4}, {"floating": 0.3}, {"explained": ()}], ids=str)
+def test_a_pose_that_cannot_be_true_is_no_rival(against: dict) -> None:
+    one = lone()
+    assert isinstance(judge((one, rival(one, 0.05)), PARAMS), tuple)
+    assert judge((one, rival(one, 0.05, **against)), PARAMS) is one
 
 
 @pytest.mark.parametrize("doubt", [{"yaw_known": False}, {"likeness": -0.1}, {"likeness": None}], ids=str)
 def test_chains_that_agree_in_a_plain_room_do_not_speak_for_an_object_that_could_be_another(doubt: dict) -> None:
-    doubt = {**doubt, "margin": 0.1}
-    refusal = refuse(lone(**doubt, agreeing_chains=("features", "objects")), PARAMS)
+    doubted = lone(**doubt, margin=0.1, agreeing_chains=("features", "objects"))
+    refusal = refuse(doubted, PARAMS, rivals=[rival(doubted, 0.1)])
     assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
     assert refuse(lone(**{**doubt, "texture": 0.6, "margin": 0.6}), PARAMS) is None
 
