@@ -206,7 +206,7 @@ class RegistrarParams(Params):
 
     # What decides a closure.
     min_tested: int = param(600, "least number of pixels that both views must see", ge=1)
-    min_inliers: float = param(0.45, "least share of tested pixels whose depth agrees", ge=0.0, le=1.0)
+    min_inliers: float = param(0.35, "least share of tested pixels whose depth agrees", ge=0.0, le=1.0)
     max_violations: float = param(0.07, "largest share of tested pixels in seen free space", ge=0.0, le=1.0)
     max_floating_alone: float = param(
         0.008,

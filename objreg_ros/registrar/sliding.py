@@ -147,12 +147,16 @@ def steadied(source: Prepared, target: Prepared, T_target_source: Array, C: Arra
 
 
 def _worth(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> Worth:
-    """What poses (K, 4, 4) are worth to the views, and to the objects that a pose explains: (K,)."""
+    """What poses (K, 4, 4) are worth to the views, and to the objects that look alike under a pose: (K,).
+
+    Those that look otherwise under it have no say: they do as soon as they lie beside each other.
+    """
     explained, _ = explain(source, target, T_target_source, params)
+    alike = [pair for pair in explained if (likeness(source, target, (pair,), T_target_source, params) or 0.0) > 0.0]
 
     def worth(poses: Array) -> Array:
         V = rank(source.sight, target.sight, poses, params, params.grey_points)
-        same = [likeness(source, target, explained, T, params) or 0.0 for T in poses]
+        same = [likeness(source, target, tuple(alike), T, params) or 0.0 for T in poses]
         return np.asarray(V + params.likeness_weight * np.array(same))
 
     return worth
