@@ -82,8 +82,9 @@ def preferred(
 
     Far away a shift looks like a turn, and what repeats itself looks alike on either side of the truth: a pose may come
     to rest beside it. So the views are asked all over the plane in which the position is known least, and what they
-    like there, aside from the pose itself, is finished by grey, and so is the pose turned about the objects. Nothing is
-    preferred without grey. The objects have a say, as views of little in common like a wrong pose a hair better.
+    like there, aside from the pose itself, is finished by grey; and so is the pose turned about the objects, which is
+    taken as it is too, as grey leads astray where it says little. Nothing is preferred without grey. The objects have a
+    say, as views of little in common like a wrong pose a hair better.
     """
     if not (source.sight.textured and target.sight.textured):
         return None
@@ -94,11 +95,11 @@ def preferred(
     explained, _ = explain(source, target, T_target_source, params)
     best, most = None, liked(source, target, T_target_source, explained, params)[0] + CLEARLY
     peaks = poses[_peaks(V, len(steps))[: params.searched]]
-    for T in (*peaks, *_turned(source, target, T_target_source, params)):
-        finished, _ = finish(source, target, T, params)
-        worth, _ = liked(source, target, finished, explained, params)
+    turned = _turned(source, target, T_target_source, params)
+    for T in (*turned, *(finish(source, target, start, params)[0] for start in (*peaks, *turned))):
+        worth, _ = liked(source, target, T, explained, params)
         if worth > most:
-            best, most = finished, worth
+            best, most = T, worth
     return best
 
 
