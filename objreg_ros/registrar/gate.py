@@ -109,15 +109,21 @@ def _texture(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
 
 def _score(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
-    """The views must like the pose; more, or its object does, where a lone one holds it and a push is hardly worse."""
-    score, drop = candidate.verification.score, candidate.resistance
+    """The views must like the pose; more, or its object does, where only a lone and doubtful one holds it."""
+    score = candidate.verification.score
     if score < params.min_score:
         return Reason.LOW_OVERLAP, f"score {score:.2f} < {params.min_score:.2f}"
     liked = score + params.likeness_weight * max(0.0, candidate.likeness or 0.0)
-    firm = drop is None or drop >= params.firm_margin
-    if len(candidate.explained) >= 2 or firm or liked >= params.min_score_alone:
+    if liked >= params.min_score_alone or len(candidate.explained) > 1 or not _doubtful(candidate, params):
         return None
     return Reason.LOW_OVERLAP, f"score with likeness {liked:.2f} < {params.min_score_alone:.2f}"
+
+
+def _doubtful(candidate: Candidate, params: RegistrarParams) -> bool:
+    """Whether a push is hardly worse than the pose, under which some of what was seen floats already."""
+    drop = candidate.resistance
+    soft = drop is not None and drop < params.firm_margin
+    return soft and candidate.verification.violations > params.max_violations_doubtful
 
 
 def _agreement(candidate: Candidate, params: RegistrarParams, rivals: Sequence[Candidate]) -> Refusal | None:

@@ -66,7 +66,8 @@ def test_a_lone_object_must_respect_free_space_more_than_several() -> None:
 
 
 def test_a_lone_object_that_views_like_little_must_resist_a_push() -> None:
-    little = {"score": 0.5 * (PARAMS.min_score + PARAMS.min_score_alone), "margin": 1.0}
+    floating = 1.5 * PARAMS.max_violations_doubtful
+    little = {"score": 0.5 * (PARAMS.min_score + PARAMS.min_score_alone), "margin": 1.0, "violations": floating}
     for explained, resistance, accepted in (
         ((CUP,), 0.9 * PARAMS.firm_margin, False),
         ((CUP,), 1.1 * PARAMS.firm_margin, True),
@@ -77,8 +78,15 @@ def test_a_lone_object_that_views_like_little_must_resist_a_push() -> None:
         assert (refusal is None) is accepted, (explained, resistance, refusal)
 
 
+def test_a_lone_object_that_views_like_little_need_not_resist_a_push_where_next_to_nothing_floats() -> None:
+    little = {"score": 0.5 * (PARAMS.min_score + PARAMS.min_score_alone), "margin": 1.0, "explained": (CUP,)}
+    soft = candidate(resistance=0.9 * PARAMS.firm_margin, violations=0.5 * PARAMS.max_violations_doubtful, **little)
+    assert refuse(soft, PARAMS) is None
+
+
 def test_an_object_that_looks_alike_makes_up_for_views_that_like_little() -> None:
-    little = {"score": 0.2, "resistance": 0.5 * PARAMS.firm_margin, "yaw_known": True, "margin": 1.0}
+    little = {"score": 0.2, "violations": 1.5 * PARAMS.max_violations_doubtful, "yaw_known": True, "margin": 1.0}
+    little["resistance"] = 0.5 * PARAMS.firm_margin
     alike, otherwise = (candidate(explained=(CUP,), likeness=likeness, **little) for likeness in (1.0, 0.2))
     assert refuse(alike, PARAMS) is None
     refusal = refuse(otherwise, PARAMS)
