@@ -29,7 +29,7 @@ import click
 import closers
 from closure_table import draw, grouped, table, table_of_totals, totals
 from command_line import quick_values
-from peers import peers
+from peers import PEERS, named
 from sources import Source, detector_of, read_source
 
 from objreg_ros.detector.params import DetectorParams
@@ -37,7 +37,7 @@ from objreg_ros.simulation.scenarios import SCENARIOS
 from objreg_ros.simulation.write import simulate
 
 OURS, ORACLE = "objreg", "oracle"
-QUICK = {"frames": 300, "names": "orb_pnp", "candidates": 1}
+QUICK = {"frames": 300, "names": ("orb_pnp",), "candidates": 1}
 QUICK_STORY = ("loop:0",)
 
 
@@ -106,7 +106,7 @@ def _measure(source: Source, asked: Asked, names: Sequence[str], kept: Kept) -> 
     found = closers.loops_of(keyframes, source.truth)
     pairs = closers.candidate_pairs(keyframes, asked.candidates)
     work = {OURS: partial(closers.ours, source, asked.seed), ORACLE: partial(closers.oracle, source, found)}
-    work |= {peer.name: partial(closers.theirs, peer, source, keyframes, pairs) for peer in peers(asked.names)}
+    work |= {name: partial(closers.theirs, PEERS[name](), source, keyframes, pairs) for name in asked.names}
     kept.row |= {"frames": len(source.frames), "keyframes": len(keyframes), "revisits": len(found)}
     kept.row["path_m"] = round(source.truth.length, 2)
     for name in names:
@@ -154,7 +154,9 @@ def stories(texts: Sequence[str]) -> list[tuple[str, int]]:
 @click.option("--figure", type=click.Path(dir_okay=False, path_type=Path), help="Draw them here (svg, png).")
 @click.option("--model", default="", help="ONNX model; `truth` takes the true boxes of a simulated recording.")
 @click.option("--threshold", default=0.5, show_default=True, help="Least score of a detection; COCO models want 0.4.")
-@click.option("--peers", "names", default="orb_pnp,fpfh_icp,paper", show_default=True, help="Methods to compare with.")
+@click.option(
+    "--peers", "names", default="orb_pnp,fpfh_icp,paper", show_default=True, callback=named, help="Compared with these."
+)
 @click.option("--candidates", default=1, show_default=True, help="Pairs that a peer may try for each keyframe.")
 @click.option("--seed", default=1, show_default=True, help="Of the synthetic drift and of the registrar.")
 @click.option("--drift", default=1.0, show_default=True, help="Synthetic odometry drifts so many times 2 % and 1°/m.")
@@ -177,9 +179,8 @@ def main(
     told = stories(options["scenarios"])
     if not recordings and not told:
         raise click.UsageError("expected RECORDINGS or --simulate SCENARIO:SEED, got neither")
-    names = tuple(n for n in options["names"].split(",") if n)
     detector = detector_of(options["model"], options["threshold"])
-    asked = Asked(detector, names, options["candidates"], options["seed"], options["drift"])
+    asked = Asked(detector, options["names"], options["candidates"], options["seed"], options["drift"])
     paths = [partial(Path, path) for path in recordings]
     paths += [partial(simulated, keep, *story, options["frames"]) for story in told]
     rows: dict[str, dict[str, Any]] = {}

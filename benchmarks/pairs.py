@@ -23,7 +23,7 @@ from command_line import quick_values
 from frame_pairs import Pair, Truths, draw_pairs
 from pair_figures import Row, figures, line
 from pair_pictures import draw_failures
-from peers import Answer, Peer, Shot, peers
+from peers import PEERS, Answer, Peer, Shot, named
 from sources import Source, detector_of, read_source
 
 from objreg_ros.data import Array, Frame, Reason
@@ -37,7 +37,7 @@ from objreg_ros.registrar.keyframes import Keyframer, Stretch
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.verify import verify
 
-QUICK = {"wanted": 15, "names": "paper,orb_pnp"}
+QUICK = {"wanted": 15, "names": ("paper", "orb_pnp")}
 
 
 def single(frame: Frame, params: RegistrarParams) -> Keyframe:
@@ -158,7 +158,7 @@ def methods_of(
         return source.shot(frames[keyframes[index].stamp_ns])
 
     methods: dict[str, Callable[[Pair], Row]] = {"ours": Ours(keyframes, params)}
-    for peer in peers(tuple(names)):
+    for peer in (PEERS[name]() for name in names):
         methods[peer.name] = Theirs(peer, shot)
         if peer.name in ("sift_pnp", "fpfh_icp"):
             finished = Finished(peer)
@@ -196,7 +196,9 @@ def compare(source: Source, params: RegistrarParams, options: dict[str, Any]) ->
 @click.option("--wanted", default=200, show_default=True, help="Pairs of each kind.")
 @click.option("--model", default="", help="ONNX model; empty: the default one.")
 @click.option("--threshold", default=0.5, show_default=True, help="Least score of a detection; COCO models want 0.4.")
-@click.option("--peers", "names", default="paper,orb_pnp,sift_pnp,fpfh_icp", show_default=True)
+@click.option(
+    "--peers", "names", default="paper,orb_pnp,sift_pnp,fpfh_icp", show_default=True, callback=named, help="Methods."
+)
 @click.option("--pictures", type=click.Path(file_okay=False, path_type=Path), help="Draw the worst failures here.")
 @click.option("--seed", default=1, show_default=True)
 @click.pass_context
@@ -209,7 +211,7 @@ def main(
     wanted: int,
     model: str,
     threshold: float,
-    names: str,
+    names: tuple[str, ...],
     pictures: Path | None,
     seed: int,
 ) -> None:
@@ -219,7 +221,7 @@ def main(
     options: dict[str, Any] = {
         "keyframes": keyframes,
         "wanted": few.get("wanted", wanted),
-        "peers": [name for name in few.get("names", names).split(",") if name],
+        "peers": few.get("names", names),
         "pictures": pictures,
         "seed": seed,
     }

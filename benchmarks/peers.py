@@ -7,9 +7,11 @@ whether it would accept it, by the test that is usual for it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
+import click
 import cv2
 import numpy as np
 
@@ -185,15 +187,18 @@ class Founding:
         return float(np.mean(moved.compute_point_cloud_distance(target))), T
 
 
-def peers(names: tuple[str, ...]) -> list[Peer]:
-    """Peers by name; ValueError for one that there is not."""
-    known: dict[str, Any] = {
-        "orb_pnp": lambda: FeaturesPnP("orb_pnp"),
-        "sift_pnp": lambda: FeaturesPnP("sift_pnp"),
-        "fpfh_icp": WholeFrame,
-        "paper": Founding,
-    }
-    unknown = sorted(set(names) - set(known))
+PEERS: dict[str, Callable[[], Peer]] = {
+    "orb_pnp": lambda: FeaturesPnP("orb_pnp"),
+    "sift_pnp": lambda: FeaturesPnP("sift_pnp"),
+    "fpfh_icp": WholeFrame,
+    "paper": Founding,
+}
+
+
+def named(context: click.Context, option: click.Parameter, text: str) -> tuple[str, ...]:
+    """The names of ``PEERS`` that an option lists, commas between; `click.BadParameter` for one that there is not."""
+    names = tuple(name for name in text.split(",") if name)
+    unknown = sorted(set(names) - set(PEERS))
     if unknown:
-        raise ValueError(f"expected peers of {', '.join(known)}, got {', '.join(unknown)}")
-    return [known[name]() for name in names]
+        raise click.BadParameter(f"expected peers of {', '.join(PEERS)}, got {', '.join(unknown)}")
+    return names

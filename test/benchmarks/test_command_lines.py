@@ -38,6 +38,12 @@ def test_what_is_no_scenario_and_seed_is_refused(benchmark: Benchmark, tmp_path:
     assert "expected SCENARIO:SEED" in said and f"got '{story}'" in said
 
 
+@pytest.mark.parametrize(("name", "needed"), [("closure", ()), ("pairs", (".",))])
+def test_a_peer_that_there_is_not_is_refused_at_once(benchmark: Benchmark, name: str, needed: tuple[str, ...]) -> None:
+    said = refusal(benchmark(name).main, *needed, "--peers", "orb_pnp,nonsense")
+    assert "expected peers of orb_pnp, sift_pnp, fpfh_icp, paper, got nonsense" in said
+
+
 def test_a_scenario_without_seeds_is_that_of_seed_0(benchmark: Benchmark) -> None:
     assert benchmark("closure").stories(["loop", "moved:1,2"]) == [("loop", 0), ("moved", 1), ("moved", 2)]
 
