@@ -55,8 +55,10 @@ SAME_MEANING = {"tv": "monitor", "keyboard": "keyboard", "book": "book", "chair"
 YCB_MEANING = {"003_cracker_box": "cereal_box", "024_bowl": "bowl", "002_master_chef_can": "soda_can"}
 """The YCB objects that are one of ours, or nearly: the can is a tin of coffee, wider than a drinks can."""
 REAL = {"ycb_video": "**/*-color.png", "fr2_desk_rgb": "*.jpg", "redkitchen_a": "rgb/*"}
-COUNTS = {"pictures": (600, 120), "timings": (200, 60), "redkitchen_a": (50, 8)}
+COUNTS = {"pictures": (600, 240), "timings": (200, 60), "redkitchen_a": (50, 8)}
 DEMANDS = {"": REASONABLE, "_all": EVERYTHING, "_large": LARGE}
+PROCESSES = min(os.cpu_count() or 1, 4)
+"""So many make pictures side by side."""
 QUICK_S = 30.0
 """A quick run stops making pictures after so long, whatever the machine."""
 
@@ -68,7 +70,7 @@ def simulated(detector: Detector, seed: int, count: int, limit_s: float) -> dict
     def in_time(picture: Labelled) -> bool:
         return time.monotonic() - begin < limit_s
 
-    used = list(takewhile(in_time, pictures(seed, count)))
+    used = list(takewhile(in_time, pictures(seed, count, PROCESSES)))
     seen = look(detector, used)
     figures: dict[str, Any] = {"pictures": len(used)}
     for suffix, demand in DEMANDS.items():

@@ -11,7 +11,10 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
+from itertools import chain, islice
 from itertools import count as count_from
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +32,7 @@ from training.samples import Sample, Shard, write_shard
 FIRST_SCENE = 2**31
 SCENES_PER_SEED = 10_000
 VIEWS_PER_SCENE = 6
+PICTURES_PER_ROUND = 2 * VIEWS_PER_SCENE
 STORY_FRAMES = 120
 
 
@@ -84,20 +88,33 @@ class Labelled:
         return Sample(self.rgb, self.boxes, self.classes, self.difficult(demand))
 
 
-def pictures(seed: int, count: int) -> Iterator[Labelled]:
-    """``count`` labelled pictures; other seeds share no scene."""
-    for number, (scene, T_world_camera) in zip(range(count), _views(seed), strict=False):
-        yield labelled(render(scene, T_world_camera, seed=number))
+def pictures(seed: int, count: int, processes: int = 1) -> Iterator[Labelled]:
+    """``count`` labelled pictures; other seeds share no scene. The number of ``processes`` changes the time only."""
+    if processes == 1:
+        yield from islice(chain.from_iterable(_round(seed, number) for number in count_from()), count)
+        return
+    rounds = range(-(-count // PICTURES_PER_ROUND))
+    with get_context("spawn").Pool(processes) as pool:
+        yield from islice(chain.from_iterable(pool.imap(partial(_whole_round, seed), rounds)), count)
 
 
-def _views(seed: int) -> Iterator[tuple[Scene, Array]]:
-    """Scenes and ``T_world_camera`` without end: views of a room, then as many frames of a scenario, and so on."""
-    for number in count_from(FIRST_SCENE + seed * SCENES_PER_SEED):
-        scene = random_scene(number)
-        yield from ((scene, random_view(scene, number + view)) for view in range(VIEWS_PER_SCENE))
-        story = make_story(list(SCENARIOS)[number % len(SCENARIOS)], number, STORY_FRAMES)
-        for frame in np.linspace(0, STORY_FRAMES - 1, VIEWS_PER_SCENE + 2).astype(int)[1:-1]:
-            yield story.scenes[story.scene_of[frame]], story.T_world_camera[frame]
+def _whole_round(seed: int, number: int) -> list[Labelled]:
+    return list(_round(seed, number))
+
+
+def _round(seed: int, number: int) -> Iterator[Labelled]:
+    """Views of one room, then as many frames of a scenario."""
+    for place, (scene, T_world_camera) in enumerate(_views(FIRST_SCENE + seed * SCENES_PER_SEED + number)):
+        yield labelled(render(scene, T_world_camera, seed=number * PICTURES_PER_ROUND + place))
+
+
+def _views(number: int) -> Iterator[tuple[Scene, Array]]:
+    """Scenes and ``T_world_camera`` of one round."""
+    scene = random_scene(number)
+    yield from ((scene, random_view(scene, number + view)) for view in range(VIEWS_PER_SCENE))
+    story = make_story(list(SCENARIOS)[number % len(SCENARIOS)], number, STORY_FRAMES)
+    for frame in np.linspace(0, STORY_FRAMES - 1, VIEWS_PER_SCENE + 2).astype(int)[1:-1]:
+        yield story.scenes[story.scene_of[frame]], story.T_world_camera[frame]
 
 
 def labelled(rendering: Rendering) -> Labelled:

@@ -54,3 +54,9 @@ def test_validation_repeats_itself_and_lies_beyond_the_training_seeds() -> None:
     first, again = next(pictures(seed=4, count=1)), next(pictures(seed=4, count=1))
     assert np.array_equal(first.rgb, again.rgb) and np.array_equal(first.boxes, again.boxes)
     assert not np.array_equal(first.rgb, next(pictures(seed=5, count=1)).rgb)
+
+
+def test_validation_is_the_same_in_other_processes() -> None:
+    here, there = pictures(seed=4, count=2), pictures(seed=4, count=2, processes=2)
+    for one, other in zip(here, there, strict=True):
+        assert np.array_equal(one.rgb, other.rgb) and np.array_equal(one.boxes, other.boxes)
