@@ -199,7 +199,7 @@ def change_light(rgb: Array, rng: Rng) -> Array:
         grey = cv2.cvtColor(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY), cv2.COLOR_GRAY2RGB)
         amount = float(rng.choice([0.0, rng.uniform(0, 1), rng.uniform(1, 1.8)], p=[0.1, 0.5, 0.4]))
         rgb = cv2.addWeighted(rgb, amount, grey, 1 - amount, 0)
-    if rng.random() < 0.05:
+    if rng.random() < 0.15:
         rgb = np.ascontiguousarray(rgb[..., rng.permutation(3)])
     return rgb
 

@@ -26,6 +26,9 @@ LEAST_REACH_PX = 6.0
 
 BOX_WEIGHT = 2.0
 
+CLASS_WEIGHTS = (1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 1.0)
+"""How much it counts to tell each label, in their order, from all else: flashlights and books are hardest to tell."""
+
 NOTHING, WANTED, DIFFICULT = 0.0, 1.0, 2.0
 """The last number of a row of truth: padding, an object to find, an object neither to find nor to rule out."""
 
@@ -127,7 +130,8 @@ class MultiboxLoss:
         wanted = assign(logits.sigmoid(), boxes, self.priors[:, :2], truth)
         count = wanted.alignment.sum().clamp(min=1.0)
         target = functional.one_hot(wanted.classes, logits.shape[2]) * wanted.alignment[..., None]
-        entropy = functional.binary_cross_entropy_with_logits(logits, target, reduction="none").sum(dim=2)
+        entropy = functional.binary_cross_entropy_with_logits(logits, target, reduction="none")
+        entropy = (entropy * entropy.new_tensor(CLASS_WEIGHTS)).sum(dim=2)
         chosen = wanted.alignment > 0
         apart = (1 - generalised_iou(boxes[chosen], wanted.boxes[chosen])) * wanted.alignment[chosen]
         return BOX_WEIGHT * apart.sum() / count, (entropy * wanted.counted).sum() / count

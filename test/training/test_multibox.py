@@ -9,6 +9,7 @@ import pytest
 torch = pytest.importorskip("torch", reason="training needs torch")
 
 from objreg_ros.detector import boxes as detector_boxes  # noqa: E402
+from training.labels import LABELS  # noqa: E402
 from training.multibox import (  # noqa: E402
     ANSWERS,
     DIFFICULT,
@@ -88,3 +89,12 @@ def test_the_right_answer_costs_less_than_the_wrong_one() -> None:
     assert float(LOSS(offsets(box), right, known)[0]) == pytest.approx(0.0, abs=1e-3)
     assert float(LOSS(offsets(box), right, known)[1]) < 0.1
     assert float(LOSS(offsets(box), wrong, known)[1]) > 5
+
+
+def test_a_wrong_flashlight_costs_twice_as_much_as_a_wrong_cap() -> None:
+    cost = {}
+    for label in ("cap", "flashlight"):
+        said = torch.full((1, len(PRIORS), CLASSES), -30.0)
+        said[0, 0, LABELS.index(label)] = 10.0
+        cost[label] = float(LOSS(torch.zeros(1, len(PRIORS), 4), said, truth())[1])
+    assert cost["flashlight"] == pytest.approx(2 * cost["cap"], rel=1e-3)
