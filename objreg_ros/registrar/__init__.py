@@ -9,8 +9,8 @@ frames to keyframes     `keyframes` (when one ends), `tracking` (motion without 
 what is remembered      `keyframe`, `sighting`, `landmarks`; in `store` through `codec`; seen by `survey`, `export`
 which to try            `retrieve`, by `likest` objects: `descriptor` and `labels`
 poses from chains       `engine` asks `hypotheses`, fed by `prepared`: `features` and `consensus` on the context,
-                        `scene_search` (`shape`, `silhouette`, `shape_search`, `shape_icp`, `shape_score`, `worth`)
-                        on objects
+                        `scene_search` (`shape`, `silhouette`, `shape_search`, `shape_hull`, `shape_icp`,
+                        `shape_score`, `worth`) on objects
 refinement              `icp` brings many to their basin; `refine` ends a few, with `direct` where there is grey
                         and `contradiction` to say how well the surfaces hold the pose
 evidence                `evidence`, of `verify` and `visibility` (views), `objects` (explained or moved), `symmetry`,

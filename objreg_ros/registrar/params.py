@@ -78,14 +78,17 @@ class RegistrarParams(Params):
         800, "most points of all objects of a keyframe together that are laid upon another's", ge=30
     )
     shape_yaws: int = param(16, "yaw angles that one object is laid upon another with", ge=1, le=360)
-    shape_offsets: tuple[float, ...] = param(
-        (0.1, 0.25), "how much deeper the middle of an object may lie than what is seen of it, in its widths"
+    shape_offset: float = param(
+        0.1, "how much deeper the middle of an object is taken to lie than what is seen of it, in its widths", ge=0.0
     )
     shape_glance: int = param(
         100, "points a side by which poses of objects are ranked before the best are refined", ge=20
     )
     shape_kept: int = param(5, "poses of objects that are refined", ge=1)
     shape_climbed: int = param(3, "poses of objects whose score is climbed to its top", ge=1)
+    shape_margin: float = param(
+        1.0, "score or worth below the best at which a pose of objects is neither climbed nor drawn to the room", ge=0.0
+    )
     shape_rounds: int = param(8, "most rounds of the climb of an object's pose", ge=0)
     scene_seeds: int = param(8, "poses that the middles of the objects propose for all together", ge=0)
     drawn: int = param(2, "best upright poses that are drawn to where the room fits", ge=0)

@@ -41,6 +41,7 @@ def from_shapes(source: Prepared, target: Prepared, params: RegistrarParams) -> 
     motions = np.array([upright_motion(a, b, fit.T_target_source) for fit in found])
     worth = scale.of(motions)
     best = np.argsort(-worth, kind="stable")[: params.drawn]
+    best = best[worth[best] >= worth[best[0]] - params.shape_margin]
     for better in (partial(_drawn, source, target, a, b, params=params), scale.climbed):
         tried = np.array([better(motion) for motion in motions[best]])
         after = scale.of(tried)

@@ -23,6 +23,7 @@ LEVEL = 0.9  # cosine of a surface that things stand on with up
 CLEAR = 0.005  # m: what an object stands on is at most so much higher than the lowest that is seen of it
 STEP = 0.02  # m: a level surface lies within as much of height
 SEEN = 5  # points of the context that make one
+LAYER = 0.05  # of the points of the widest: less is a rung or a rim, and nothing stands on it
 BESIDE, AROUND = 0.02, 0.25  # m beyond the object: nearer points may be its own
 WIDE = 0.6  # m beyond the object: what lies there in the same plane tells which way is up
 THICK = (0.03, 0.02, 0.015, 0.015)  # m beside a plane, round by round
@@ -64,7 +65,7 @@ class Shape:
         """The points and what the camera saw, for the kernels."""
         s, few = self.silhouette, slice(self.most)
         points = self.xyz[few], self.normals[few], self.shades[few]
-        return (*points, self.R_upright_camera, self.origin, s.depth, s.mask, s.grey, s.camera)
+        return (*points, self.R_upright_camera, self.origin, s.depth, s.mask, s.grey, s.camera, s.inward, s.edges)
 
 
 def prepare_shape(keyframe: Keyframe, indices: Sequence[int], most: int, seed: int = 0) -> Shape | None:
@@ -168,12 +169,12 @@ def footing(keyframe: Keyframe, index: int, R_upright_camera: Array) -> float:
     (x, y, z), (a, b, _) = around.T, points.T
     beyond = np.maximum(np.maximum(a.min() - x, x - a.max()), np.maximum(b.min() - y, y - b.max()))
     near = (beyond > BESIDE) & (beyond < AROUND)
-    heights = np.sort(z[level & near & (z < lowest + CLEAR)])[::-1]
-    for first in range(len(heights) - SEEN + 1):  # from the top: the first height where a surface is
-        within = heights[first:][heights[first:] > heights[first] - STEP]
-        if len(within) >= SEEN:
-            return float(np.median(within))
-    return lowest
+    heights = np.sort(z[level & near & (z < lowest + CLEAR)])
+    if len(heights) < SEEN:
+        return lowest
+    within = np.arange(1, len(heights) + 1) - np.searchsorted(heights, heights - STEP, side="right")
+    last = int(np.flatnonzero(within >= max(SEEN, LAYER * within.max()))[-1])  # the highest, not the widest: a shelf
+    return float(np.median(heights[last + 1 - within[last] : last + 1]))
 
 
 def upright_pose(source: Shape, target: Shape, motion: Array) -> Array:

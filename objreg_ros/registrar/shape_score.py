@@ -47,6 +47,12 @@ def alike(source: Shape, target: Shape, motion: Array, params: RegistrarParams) 
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
+def slack_at(z):  # type: ignore[no-untyped-def]
+    """How far two depths of one surface may differ at a depth z, m."""
+    return FLOOR + GROWTH * (z - KNEE) * (z - KNEE)
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
 def tally(P, N, S, most, R, t, depth, mask, grey, camera, extent, out):  # type: ignore[no-untyped-def]
     """Add to ``out (9,)`` what a silhouette says of the first ``most`` points under (R, t), camera from points."""
     fx, fy, cx, cy = camera[0], camera[1], camera[2], camera[3]
@@ -67,7 +73,7 @@ def tally(P, N, S, most, R, t, depth, mask, grey, camera, extent, out):  # type:
         if d <= 0.0:
             continue
         on = mask[row, column]
-        slack = FLOOR + GROWTH * (z - KNEE) * (z - KNEE)
+        slack = slack_at(z)
         e = z - d
         if e < -slack:
             if on != RIM:
@@ -111,8 +117,8 @@ def likeness(out, n, weights):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True, nogil=True, fastmath=True)
 def ask(source, target, motion, extent, most, out):  # type: ignore[no-untyped-def]
     """Fill ``out`` with what both cameras say of a motion (yaw, x, y, rise); returns how many points were asked."""
-    P, N, S, Rs, os, depth_s, mask_s, grey_s, camera_s = source
-    Q, M, G, Rt, ot, depth_t, mask_t, grey_t, camera_t = target
+    P, N, S, Rs, os, depth_s, mask_s, grey_s, camera_s, _, _ = source
+    Q, M, G, Rt, ot, depth_t, mask_t, grey_t, camera_t, _, _ = target
     c, s = np.cos(motion[0]), np.sin(motion[0])
     R, t = np.empty((3, 3)), np.empty(3)
     out[:] = 0.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The registration of one shape upon another: every yaw, to its basin, scored by both silhouettes, the best climbed."""
+"""The registration of one shape upon another: every yaw, out of seen free space, to its basin, the best climbed."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.shape import Shape, upright_motion, upright_pose
+from objreg_ros.registrar.shape_hull import clear
 from objreg_ros.registrar.shape_icp import settle
 from objreg_ros.registrar.shape_score import climb, two_way, weights_of
 
@@ -20,6 +21,7 @@ SAME_SHIFT = 0.015  # m
 ALIKE_TURN, CROWD = 0.5, 2  # rad within which motions turn alike, and how many of them are refined
 CLIMB = (0.05, 0.012)  # rad and m: the first steps of a climb
 WIDEST_REACH = 0.07  # m within which a point finds a partner at first
+CLEARED, CLEARED_AT_A_GLANCE, CLEARED_AT_LAST = (100, 6), (50, 4), (200, 5)  # points a side and steps out of free space
 
 
 class Fitting(NamedTuple):
@@ -31,23 +33,23 @@ class Fitting(NamedTuple):
 
 def register_shapes(source: Shape, target: Shape, params: RegistrarParams) -> list[Fitting]:
     """The best distinct poses of ``source`` upon ``target``, both upright on what they stand on, best first."""
-    motions, scores = _begun(source, target, params.shape_yaws, params.shape_offsets, params.shape_glance, params)
+    motions, scores = _begun(source, target, params.shape_yaws, CLEARED, params.shape_glance, params)
     return _finished(source, target, motions, scores, 0.5 * _reach(source, target), params)
 
 
 def glance(source: Shape, target: Shape, most: int, params: RegistrarParams) -> list[Array]:
     """The poses of ``source`` upon ``target`` that look best at first, at most so many: a tenth of a registration."""
-    motions, scores = _begun(source, target, params.glance_yaws, params.shape_offsets[:1], params.glance, params)
+    motions, scores = _begun(source, target, params.glance_yaws, CLEARED_AT_A_GLANCE, params.glance, params)
     return [upright_pose(source, target, motions[k]) for k in np.argsort(-scores, kind="stable")[:most]]
 
 
 def _begun(
-    source: Shape, target: Shape, yaws: int, offsets: tuple[float, ...], sample: int, params: RegistrarParams
+    source: Shape, target: Shape, yaws: int, cleared: tuple[int, int], sample: int, params: RegistrarParams
 ) -> tuple[Array, Array]:
     extent = 0.5 * (source.extent + target.extent)
-    starts = _starts(yaws, np.array(offsets) * extent)
-    reach = _reach(source, target)
-    return _started(source.sight, target.sight, _grid(target), starts, extent, weights_of(params), sample, reach)
+    starts = _starts(yaws, params.shape_offset * extent)
+    settling = extent, weights_of(params), sample, _reach(source, target)
+    return _started(source.sight, target.sight, _grid(target), starts, *settling, cleared)
 
 
 def _reach(source: Shape, target: Shape) -> float:
@@ -61,14 +63,14 @@ def improve(source: Shape, target: Shape, poses: Sequence[Array], params: Regist
     """
     motions = np.array([upright_motion(source, target, T) for T in poses]).reshape(-1, 4)
     extent = 0.5 * (source.extent + target.extent)
-    weights, sample = weights_of(params), params.shape_glance
-    moved, scores = _started(source.sight, target.sight, _grid(target), motions, extent, weights, sample, WIDEST_REACH)
+    settling = extent, weights_of(params), params.shape_glance, WIDEST_REACH
+    moved, scores = _started(source.sight, target.sight, _grid(target), motions, *settling, CLEARED)
     return _finished(source, target, moved, scores, 0.5 * WIDEST_REACH, params)
 
 
-def _starts(yaws: int, offsets: Array) -> Array:
-    """Motions (K, 4) of every yaw; both cameras look along x, and the unseen middle lies deeper by an offset."""
-    yaw, deeper = (a.ravel() for a in np.meshgrid(2.0 * np.pi * np.arange(yaws) / yaws, offsets, indexing="ij"))
+def _starts(yaws: int, deeper: float) -> Array:
+    """Motions (K, 4) of every yaw; both cameras look along x, and the unseen middle lies so much deeper, in m."""
+    yaw = 2.0 * np.pi * np.arange(yaws) / yaws
     return np.stack([yaw, deeper - np.cos(yaw) * deeper, -np.sin(yaw) * deeper, np.zeros_like(yaw)], axis=1)
 
 
@@ -76,9 +78,9 @@ def _finished(
     source: Shape, target: Shape, motions: Array, scores: Array, reach: float, params: RegistrarParams
 ) -> list[Fitting]:
     extent = 0.5 * (source.extent + target.extent)
-    numbers = params.shape_kept, params.shape_climbed, params.shape_rounds
+    numbers, margin = (params.shape_kept, params.shape_climbed, params.shape_rounds), params.shape_margin
     found, worth = _finish(
-        source.sight, target.sight, _grid(target), motions, scores, extent, weights_of(params), numbers, reach
+        source.sight, target.sight, _grid(target), motions, scores, extent, weights_of(params), numbers, margin, reach
     )
     order = np.argsort(-worth, kind="stable")
     return [Fitting(upright_pose(source, target, found[k]), float(worth[k])) for k in order]
@@ -90,29 +92,45 @@ def _grid(shape: Shape) -> tuple[Array, Array, Array, Array, float]:
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def _started(source, target, grid, starts, extent, weights, glance, reach):  # type: ignore[no-untyped-def]
-    """Each start in its basin, unless the silhouettes like it better where it is: (motions (K, 4), scores (K,)).
+def _started(source, target, grid, starts, extent, weights, glance, reach, cleared):  # type: ignore[no-untyped-def]
+    """Each start brought to where it floats least, and from there to its basin: (motions (K, 4), scores (K,)).
 
-    Opposite sides of an object have next to no surface in common, and would be drawn together.
+    The latter only where both silhouettes like it: opposite sides of an object have next to no surface in common, and
+    would be drawn together.
     """
     motions, scores = starts.copy(), np.empty(len(starts))
+    trial = np.empty(4)
     for k in range(len(starts)):
-        settle(source[0], source[1], glance, grid, motions[k], reach, 0.4 * reach, 8)
+        clear(source, target, motions[k], *cleared)
         scores[k] = two_way(source, target, motions[k], extent, weights, glance)
-        before = two_way(source, target, starts[k], extent, weights, glance)
-        if before > scores[k]:
-            scores[k] = before
-            motions[k] = starts[k]
+        trial[:] = motions[k]
+        settle(source[0], source[1], glance, grid, trial, reach, 0.4 * reach, 8)
+        scores[k] = _better(source, target, trial, motions[k], scores[k], extent, weights, glance)
     return motions, scores
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def _finish(source, target, grid, motions, scores, extent, weights, numbers, reach):  # type: ignore[no-untyped-def]
-    """The best distinct motions, refined with every point, the first of them climbed: (motions, scores)."""
+def _better(source, target, trial, motion, score, extent, weights, most):  # type: ignore[no-untyped-def]
+    """The higher of two scores, and in ``motion`` what has it: itself, or ``trial``."""
+    found = two_way(source, target, trial, extent, weights, most)
+    if found < score:
+        return score
+    motion[:] = trial
+    return found
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _finish(  # type: ignore[no-untyped-def]
+    source, target, grid, motions, scores, extent, weights, numbers, margin, reach
+):
+    """The best distinct motions, refined with every point, the first of them climbed: (motions, scores).
+
+    What is below the best by more than ``margin`` is not climbed.
+    """
     kept, climbed, rounds = numbers
     P, N = source[0], source[1]
     every, cell = len(P), grid[4]
-    best, n = np.empty((kept, 4)), 0
+    best, n, trial = np.empty((kept, 4)), 0, np.empty(4)
     order = np.empty(len(scores), np.int64)
     _rank(scores, order)
     for start in order:
@@ -121,16 +139,22 @@ def _finish(source, target, grid, motions, scores, extent, weights, numbers, rea
             n += 1
     best, worth = best[:n], np.empty(n)
     for k in range(n):
-        settle(P, N, every, grid, best[k], reach, max(1.5 * cell, 0.008), 12)
         worth[k] = two_way(source, target, best[k], extent, weights, every)
+        trial[:] = best[k]
+        clear(source, target, trial, *CLEARED_AT_LAST)
+        worth[k] = _better(source, target, trial, best[k], worth[k], extent, weights, every)
+        trial[:] = best[k]
+        settle(P, N, every, grid, trial, reach, max(1.5 * cell, 0.008), 12)
+        worth[k] = _better(source, target, trial, best[k], worth[k], extent, weights, every)
     _rank(worth, order)
+    top = worth[order[0]] if n else 0.0
     for k in order[: min(n, climbed)]:
+        if worth[k] < top - margin:
+            break
         worth[k] = climb(source, target, best[k], extent, weights, every, CLIMB[0], CLIMB[1], rounds)
-        polished = best[k].copy()
-        settle(P, N, every, grid, polished, max(1.5 * cell, 0.010), max(1.2 * cell, 0.006), 8)
-        after = two_way(source, target, polished, extent, weights, every)
-        if after >= worth[k]:
-            best[k], worth[k] = polished, after
+        trial[:] = best[k]
+        settle(P, N, every, grid, trial, max(1.5 * cell, 0.010), max(1.2 * cell, 0.006), 8)
+        worth[k] = _better(source, target, trial, best[k], worth[k], extent, weights, every)
     return best, worth
 
 

@@ -27,12 +27,17 @@ class Silhouette:
 
     0 where nothing was measured; ``mask (h, w) uint8`` is BESIDE, INSIDE or RIM (too close to tell); ``grey (h, w)
     float32`` is the object's own; ``camera (4,) float64`` fx fy cx cy of the window.
+
+    ``inward (h, w, 2) int16`` px leads from each pixel to the nearest inside; ``edges (4,) bool`` tells which sides of
+    the window, left, top, right and bottom, are those of the whole picture: nothing is known beyond.
     """
 
     depth: Array
     mask: Array
     grey: Array
     camera: Array
+    inward: Array
+    edges: Array
 
 
 def draw(xyz: Array, grey: Array, view: View) -> Silhouette:
@@ -42,8 +47,8 @@ def draw(xyz: Array, grey: Array, view: View) -> Silhouette:
     lens = np.array([camera.fx, camera.fy, camera.cx + 0.5, camera.cy + 0.5]) * scale
     u, v = (lens[k] * xyz[:, k] / xyz[:, 2] + lens[2 + k] for k in (0, 1))
     left, top = (max(0, int(np.floor(c.min())) - MARGIN) for c in (u, v))
-    right = min(int(np.ceil(camera.width * scale)), int(u.max()) + MARGIN + 1)
-    bottom = min(int(np.ceil(camera.height * scale)), int(v.max()) + MARGIN + 1)
+    width, height = (int(np.ceil(n * scale)) for n in (camera.width, camera.height))
+    right, bottom = min(width, int(u.max()) + MARGIN + 1), min(height, int(v.max()) + MARGIN + 1)
     shape = max(bottom - top, 1), max(right - left, 1)
     depth, shade = np.full(shape, np.inf, np.float32), np.zeros(shape, np.float32)
     _splat(u - left, v - top, xyz[:, 2], grey, depth, shade)
@@ -56,7 +61,20 @@ def draw(xyz: Array, grey: Array, view: View) -> Silhouette:
         mask=np.where(mask > 0, INSIDE, np.where(near > 0, RIM, BESIDE)).astype(np.uint8),
         grey=shade,
         camera=lens,
+        inward=_inward(mask),
+        edges=np.array([left == 0, top == 0, right == width, bottom == height]),
     )
+
+
+def _inward(mask: Array) -> Array:
+    """(h, w, 2) int16: columns and rows from each pixel to the nearest that the mask (h, w) holds; 0 without any."""
+    if not mask.any():
+        return np.zeros((*mask.shape, 2), np.int16)
+    _, nearest = cv2.distanceTransformWithLabels(1 - mask, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    held, pixels = np.nonzero(mask), np.indices(mask.shape)[::-1]
+    lookup = np.zeros((2, int(nearest.max()) + 1), np.int16)
+    lookup[:, nearest[held]] = held[::-1]
+    return np.ascontiguousarray(np.moveaxis(lookup[:, nearest] - pixels, 0, -1), np.int16)
 
 
 def _scale(xyz: Array, view: View) -> float:

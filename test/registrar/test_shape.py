@@ -39,6 +39,21 @@ def test_a_seat_is_not_what_a_chair_stands_on() -> None:
     assert abs(transform(from_side(-30.0, 1.6), foot)[2]) < 0.03
 
 
+def test_a_rung_under_an_object_is_not_what_it_stands_on() -> None:
+    key = keyframe(from_side(20.0), {"box": BOX})
+    R = upright_axes(-np.asarray(key.gravity))
+    level = key.context.normals @ R[2].astype(np.float32) > 0.9
+    low = footing(key, 0, R)
+    beside = key.context.xyz[level & (np.linalg.norm(key.context.xyz - key.objects[0].centroid, axis=1) < 0.25)][:8]
+    rung = beside + (0.1 * R[2]).astype(np.float32)
+    lifted = replace(key.objects[0].cloud, xyz=key.objects[0].cloud.xyz + (0.2 * R[2]).astype(np.float32))
+    upon = Context(
+        xyz=np.concatenate([key.context.xyz, rung]),
+        normals=np.concatenate([key.context.normals, np.tile(R[2].astype(np.float32), (len(rung), 1))]),
+    )
+    assert abs(footing(replace(key, objects=(KeyObject(cloud=lifted),), context=upon), 0, R) - low) < 0.005
+
+
 def test_the_plane_under_an_object_tells_up_better_than_gravity() -> None:
     key = keyframe(from_side(20.0), {"box": BOX})
     truth = -np.asarray(key.gravity)

@@ -77,4 +77,4 @@ def test_both_ways_round_are_kept_of_what_looks_much_the_same_after_half_a_turn(
     found = register_shapes(shape_of(BOX, 20.0, 1), shape_of(BOX, 0.0, 2), PARAMS)
     turns = [error(fit.T_target_source, 20.0, 0.0)[0] for fit in found]
     assert min(turns) < 5.0 and max(turns) > 175.0
-    assert sum(turn < 20.0 for turn in turns) <= 2
+    assert sum(turn < 20.0 for turn in turns) < PARAMS.shape_kept - 1

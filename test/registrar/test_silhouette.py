@@ -49,3 +49,19 @@ def test_what_stands_in_front_hides_and_is_not_free_space() -> None:
     silhouette = drawn({"box": BOX, "near": (NEAR,)})
     mask, depth, z = at(silhouette, (0.10, -0.035, 0.03))
     assert mask == BESIDE and 0.0 < depth < z
+
+
+def test_every_pixel_knows_the_way_into_the_outline() -> None:
+    silhouette = drawn({"box": BOX})
+    rows, columns = np.indices(silhouette.mask.shape)
+    to_row, to_column = rows + silhouette.inward[..., 1], columns + silhouette.inward[..., 0]
+    assert (silhouette.mask[to_row, to_column] == INSIDE).all()
+    inside = silhouette.mask == INSIDE
+    assert not silhouette.inward[inside].any() and silhouette.inward[~inside].any(axis=-1).all()
+
+
+def test_the_edges_of_the_picture_are_told_from_those_of_the_window() -> None:
+    whole = drawn({"box": BOX})
+    wide = drawn({"box": (((0.0, -3.0, 0.0), (0.1, 3.0, 0.1)),)})
+    assert not whole.edges.any()
+    assert wide.edges.tolist() == [True, False, True, False]
