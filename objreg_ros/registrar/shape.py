@@ -170,10 +170,11 @@ def footing(keyframe: Keyframe, index: int, R_upright_camera: Array) -> float:
     beyond = np.maximum(np.maximum(a.min() - x, x - a.max()), np.maximum(b.min() - y, y - b.max()))
     near = (beyond > BESIDE) & (beyond < AROUND)
     heights = np.sort(z[level & near & (z < lowest + CLEAR)])
-    if len(heights) < SEEN:
-        return lowest
     within = np.arange(1, len(heights) + 1) - np.searchsorted(heights, heights - STEP, side="right")
-    last = int(np.flatnonzero(within >= max(SEEN, LAYER * within.max()))[-1])  # the highest, not the widest: a shelf
+    layers = np.flatnonzero(within >= max(SEEN, LAYER * within.max(initial=0)))
+    if len(layers) == 0:
+        return lowest
+    last = int(layers[-1])  # the highest, not the widest: a shelf
     return float(np.median(heights[last + 1 - within[last] : last + 1]))
 
 

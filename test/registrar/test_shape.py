@@ -14,6 +14,8 @@ from objreg_ros.registrar.shape import footing, prepare_shape, standing, upright
 
 from .shapes import BOX, ELL, from_side, keyframe
 
+NOTHING = Context(xyz=np.zeros((0, 3), np.float32), normals=np.zeros((0, 3), np.float32))
+
 
 def test_the_footing_is_the_table_under_the_object() -> None:
     key = keyframe(from_side(20.0), {"book": (((-0.1, -0.1, 0.0), (0.1, 0.1, 0.02)),)})
@@ -64,16 +66,24 @@ def test_the_plane_under_an_object_tells_up_better_than_gravity() -> None:
 def test_a_board_that_tilts_much_is_not_level_and_without_a_board_gravity_tells_up() -> None:
     key = keyframe(from_side(20.0), {"box": BOX})
     guess = rotation_from_vector(np.radians([9.0, 0.0, 0.0])) @ -np.asarray(key.gravity)
-    bare = replace(key, context=Context(xyz=np.zeros((0, 3), np.float32), normals=np.zeros((0, 3), np.float32)))
+    bare = replace(key, context=NOTHING)
     assert np.array_equal(standing(key, [0], guess), guess)
     assert np.array_equal(standing(bare, [0], guess), guess)
 
 
 def test_without_a_surface_the_lowest_points_are_the_footing() -> None:
     key = keyframe(from_side(20.0), {"box": BOX})
-    bare = replace(key, context=Context(xyz=np.zeros((0, 3), np.float32), normals=np.zeros((0, 3), np.float32)))
+    bare = replace(key, context=NOTHING)
     R = upright_axes(-np.asarray(key.gravity))
     assert abs(footing(bare, 0, R) - footing(key, 0, R)) < 0.02
+
+
+def test_level_points_of_all_heights_are_no_surface() -> None:
+    key = keyframe(from_side(20.0), {"box": BOX})
+    R = upright_axes(-np.asarray(key.gravity))
+    beside = key.objects[0].centroid + 0.2 * R[0] - np.linspace(0.1, 1.0, 12)[:, None] * R[2]
+    steps = Context(xyz=beside.astype(np.float32), normals=np.tile(R[2].astype(np.float32), (len(beside), 1)))
+    assert footing(replace(key, context=steps), 0, R) == pytest.approx(footing(replace(key, context=NOTHING), 0, R))
 
 
 def test_too_few_points_or_no_gravity_make_no_shape() -> None:
