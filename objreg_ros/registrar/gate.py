@@ -120,10 +120,10 @@ def _score(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
 
 def _doubtful(candidate: Candidate, params: RegistrarParams) -> bool:
-    """Whether a push is hardly worse than the pose, under which some of what was seen floats already."""
-    drop = candidate.resistance
+    """Whether a push is hardly worse than the pose, under which some of what was seen floats, or one chain is alone."""
+    drop, alone = candidate.resistance, len(candidate.agreeing_chains) < params.min_chains
     soft = drop is not None and drop < params.firm_margin
-    return soft and candidate.verification.violations > params.max_violations_doubtful
+    return alone or (soft and candidate.verification.violations > params.max_violations_doubtful)
 
 
 def _agreement(candidate: Candidate, params: RegistrarParams, rivals: Sequence[Candidate]) -> Refusal | None:

@@ -221,15 +221,16 @@ class RegistrarParams(Params):
     min_score: float = param(0.10, "least verification score V", ge=-3.0, le=2.0)
     min_score_alone: float = param(
         0.40,
-        "least V, with what its likeness adds, of a single object's pose that is doubtful: worth less by less than "
-        "firm_margin after a push, with a share of more than max_violations_doubtful in seen free space",
+        "least V, with what its likeness adds, of a single object's pose that is doubtful: proposed by fewer than "
+        "min_chains, or with a V that falls by less than firm_margin over a push and a share of more than "
+        "max_violations_doubtful in seen free space",
         ge=-3.0,
         le=2.0,
     )
     max_violations_doubtful: float = param(
         0.02, "share of tested pixels in seen free space up to which no pose is doubtful", ge=0.0, le=1.0
     )
-    firm_margin: float = param(0.4, "fall of V and likeness over a push that tells of a pose held firmly", ge=0.0)
+    firm_margin: float = param(0.4, "fall of V over a push that tells that the views hold a pose firmly", ge=0.0)
     rival_margin: float = param(0.1, "a candidate this much below the best in V is not considered", ge=0.0)
     min_chains: int = param(2, "chains that must agree when fewer objects than min_objects are explained", ge=1)
     min_objects: int = param(2, "explained objects that make up for chains that do not agree", ge=1)

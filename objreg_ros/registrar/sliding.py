@@ -1,16 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far a pose may slide where the surfaces let it: as far as views and objects like it no less.
+"""How far a pose may slide where the surfaces let it: as far as the views like it no less.
 
 Two views of a table from opposite sides share little but its top, on which one can be pushed along the other. What
-stands on it resists, with too few points to count as surface; yet a pose that was pushed is seen to be worse, by the
-views and by the outlines of the objects upon each other. So a pose is pushed, and where both ways are clearly worse it
-is held, to a third of the push. Where its position is known badly all the same, a better one is looked for about it,
-and then whether views and objects resist it all around.
+stands on it resists, with too few points to count as surface; yet a pose that was pushed is seen to be worse. So a pose
+is pushed, and where both ways are clearly worse it is held by the views, to a third of the push. Where its position is
+known badly all the same, the views are asked for a better one about it, and then whether they resist it all around.
 """
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import cv2
 import numpy as np
@@ -18,7 +15,7 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.geometry import pose, rotation_from_vector, transform
 from objreg_ros.registrar.direct import finish
-from objreg_ros.registrar.objects import explain, liked, likeness
+from objreg_ros.registrar.objects import explain, liked
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.verify import rank, verify
@@ -29,8 +26,6 @@ CLEARLY = 0.02  # gain for which a pose is left for another
 HOPE = 0.3  # of V, what grey may add to a pose by finishing it
 DIRECTIONS = 4  # in which a pose is pushed to hold it, one after the other
 
-Worth = Callable[[Array], Array]  # of poses (K, 4, 4): (K,)
-
 
 def resisted(
     source: Prepared, target: Prepared, T_target_source: Array, slack: Array, extent: float, params: RegistrarParams
@@ -40,14 +35,13 @@ def resisted(
     Directions and motions [t r] are of the source camera's pose in the target's axes. ``extent`` m is the lever that
     makes a turn of what was seen comparable to a shift. All are free where the views do not like the pose itself.
     """
-    known = verify(source.sight, target.sight, T_target_source, params, params.grey_points).score >= params.min_score
-    worth = _worth(source, target, T_target_source, params)
+    score = verify(source.sight, target.sight, T_target_source, params, params.grey_points).score
     free, held = [], []
     for direction in slack:
         unit = direction / _length(
             direction, transform(T_target_source, source.middle) - T_target_source[:3, 3], extent
         )
-        reach = _reach(worth, T_target_source, unit, params) if known else None
+        reach = _reach(source, target, T_target_source, unit, score, params) if score >= params.min_score else None
         if reach is None:
             free.append(direction)
         else:
@@ -56,7 +50,7 @@ def resisted(
 
 
 def resistance(source: Prepared, target: Prepared, T_target_source: Array, C: Array, params: RegistrarParams) -> float:
-    """How much less views and objects like the pose, at least, when it is pushed any way where it is known least.
+    """How much less the views like the pose, at least, when it is pushed any way where it is known least.
 
     ``C (6, 6)`` [t r] is its covariance in the target's axes. In the plane in which it is largest the pose is pushed
     all around as far as the last of ``params.pushes``, the way that its errors go: a camera that looks at one far thing
@@ -65,8 +59,8 @@ def resistance(source: Prepared, target: Prepared, T_target_source: Array, C: Ar
     angles = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
     pushes = params.pushes[-1] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     poses = np.array([T_target_source, *(pushed(T_target_source, motion) for motion in pushes @ weakest(C))])
-    own, *others = _worth(source, target, T_target_source, params)(poses)
-    return float(own - max(others))
+    score, *others = rank(source.sight, target.sight, poses, params, params.grey_points)
+    return float(score - max(others))
 
 
 def weakest(C: Array) -> Array:
@@ -131,7 +125,6 @@ def steadied(source: Prepared, target: Prepared, T_target_source: Array, C: Arra
     """
     own = verify(source.sight, target.sight, T_target_source, params, params.grey_points)
     known, added = np.linalg.inv(C), np.zeros((6, 6))
-    worth = _worth(source, target, T_target_source, params)
     if (own.texture or 0.0) < params.steadying_texture:
         return added
     for _ in range(DIRECTIONS):
@@ -140,37 +133,23 @@ def steadied(source: Prepared, target: Prepared, T_target_source: Array, C: Arra
         if values[-1] <= params.doubtful_sigma**2:
             break
         across = vectors[:, -1]
-        reach = _clear(worth, T_target_source, spread[:, :3] @ across / values[-1], params)
+        reach = _clear(source, target, T_target_source, spread[:, :3] @ across / values[-1], own.score, params)
         if reach is None or reach > params.steadying_push:
             break
         added[:3, :3] += np.outer(across, across) / (HELD * reach) ** 2
     return added
 
 
-def _worth(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> Worth:
-    """What poses (K, 4, 4) are worth to the views, and to the objects that look alike under a pose: (K,).
-
-    Those that look otherwise under it have no say: they do as soon as they lie beside each other.
-    """
-    explained, _ = explain(source, target, T_target_source, params)
-    alike = [pair for pair in explained if (likeness(source, target, (pair,), T_target_source, params) or 0.0) > 0.0]
-
-    def worth(poses: Array) -> Array:
-        V = rank(source.sight, target.sight, poses, params, params.grey_points)
-        same = [likeness(source, target, tuple(alike), T, params) or 0.0 for T in poses]
-        return np.asarray(V + params.likeness_weight * np.array(same))
-
-    return worth
-
-
-def _clear(worth: Worth, T: Array, motion: Array, params: RegistrarParams) -> float | None:
-    """The least push in m along a motion that is clearly worth less, either way, between those that are tried.
+def _clear(
+    source: Prepared, target: Prepared, T: Array, motion: Array, score: float, params: RegistrarParams
+) -> float | None:
+    """The least push in m along a motion that the views like clearly less, either way, between those that are tried.
 
     None where there is none.
     """
     last_push, last_drop = 0.0, 0.0
     for push in params.pushes:
-        drop = _fall(worth, T, push * motion)
+        drop = _fall(source, target, T, push * motion, score, params)
         if drop >= params.rival_margin:
             between = (last_push, push) if last_push > 0.0 else (push, push)
             return float(np.interp(params.rival_margin, (last_drop, drop), between))
@@ -178,10 +157,10 @@ def _clear(worth: Worth, T: Array, motion: Array, params: RegistrarParams) -> fl
     return None
 
 
-def _fall(worth: Worth, T: Array, motion: Array) -> float:
-    """How much less a pose is worth after a motion, the way that it is worth more."""
-    own, *others = worth(np.array([T, *(pushed(T, way * motion) for way in (-1, 1))]))
-    return float(own - max(others))
+def _fall(source: Prepared, target: Prepared, T: Array, motion: Array, score: float, params: RegistrarParams) -> float:
+    """How much less than ``score`` the views like a pose after a motion, the way that they like more."""
+    poses = [pushed(T, way * motion) for way in (-1, 1)]
+    return score - max(verify(source.sight, target.sight, P, params, params.grey_points).score for P in poses)
 
 
 def pushed(T_target_source: Array, motion: Array) -> Array:
@@ -196,6 +175,11 @@ def _length(direction: Array, lever: Array, extent: float) -> float:
     return float(np.hypot(np.linalg.norm(shift), np.linalg.norm(turn) * extent))
 
 
-def _reach(worth: Worth, T: Array, unit: Array, params: RegistrarParams) -> float | None:
-    """The least push in m that is clearly worth less, either way; None where there is none."""
-    return next((push for push in params.pushes if _fall(worth, T, push * unit) >= params.rival_margin), None)
+def _reach(
+    source: Prepared, target: Prepared, T: Array, unit: Array, score: float, params: RegistrarParams
+) -> float | None:
+    """The least push in m that the views like clearly less, either way; None where there is none."""
+    for push in params.pushes:
+        if _fall(source, target, T, push * unit, score, params) >= params.rival_margin:
+            return push
+    return None

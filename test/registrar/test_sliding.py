@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -60,14 +58,6 @@ def test_views_resist_a_push_along_a_table_and_not_along_a_bare_wall() -> None:
     C = 1e-8 * np.eye(6)
     C[:3, :3] += 0.06**2 * np.outer(along, along)
     assert resistance(wall, wall, np.eye(4), C, PARAMS) < PARAMS.rival_margin
-
-
-def test_objects_that_look_alike_resist_a_push_beside_the_views() -> None:
-    seen = views(TABLE, 0.0, 20.0)
-    shapeless = [replace(one, shapes=(None,) * len(one.shapes)) for one in seen]
-    known = np.diag([0.06**2, 1e-6, 1e-6, 1e-8, 1e-8, 1e-8])
-    more, less = (resistance(*both, TRUTH, known, PARAMS) for both in (seen, shapeless))
-    assert more > less + PARAMS.rival_margin
 
 
 def test_a_position_that_views_with_grey_hold_is_known_better_and_one_without_is_not() -> None:
