@@ -109,21 +109,21 @@ def _texture(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
 
 def _score(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
-    """The views must like the pose; more, or its object does, where only a lone and doubtful one holds it."""
+    """The views must like the pose; more, or its objects do, where it is doubtful."""
     score = candidate.verification.score
     if score < params.min_score:
         return Reason.LOW_OVERLAP, f"score {score:.2f} < {params.min_score:.2f}"
     liked = score + params.likeness_weight * max(0.0, candidate.likeness or 0.0)
-    if liked >= params.min_score_alone or len(candidate.explained) > 1 or not _doubtful(candidate, params):
+    if liked >= params.min_score_doubtful or not _doubtful(candidate, params):
         return None
-    return Reason.LOW_OVERLAP, f"score with likeness {liked:.2f} < {params.min_score_alone:.2f}"
+    return Reason.LOW_OVERLAP, f"score with likeness {liked:.2f} < {params.min_score_doubtful:.2f}"
 
 
 def _doubtful(candidate: Candidate, params: RegistrarParams) -> bool:
-    """Whether a push is hardly worse than the pose, under which some of what was seen floats, or one chain is alone."""
-    drop, alone = candidate.resistance, len(candidate.agreeing_chains) < params.min_chains
-    soft = drop is not None and drop < params.firm_margin
-    return alone or (soft and candidate.verification.violations > params.max_violations_doubtful)
+    """Whether a push is hardly worse than a pose under which something floats, or one chain found a lone object's."""
+    drop, floating = candidate.resistance, candidate.verification.violations > params.max_violations_doubtful
+    alone = len(candidate.explained) < 2 and len(candidate.agreeing_chains) < params.min_chains
+    return alone or (floating and drop is not None and drop < params.firm_margin)
 
 
 def _agreement(candidate: Candidate, params: RegistrarParams, rivals: Sequence[Candidate]) -> Refusal | None:

@@ -219,11 +219,10 @@ class RegistrarParams(Params):
     )
     min_texture: float = param(0.25, "least correlation of the high-passed grey, where there is grey", ge=-1.0, le=1.0)
     min_score: float = param(0.10, "least verification score V", ge=-3.0, le=2.0)
-    min_score_alone: float = param(
+    min_score_doubtful: float = param(
         0.40,
-        "least V, with what its likeness adds, of a single object's pose that is doubtful: proposed by fewer than "
-        "min_chains, or with a V that falls by less than firm_margin over a push and a share of more than "
-        "max_violations_doubtful in seen free space",
+        "least V, with what likeness adds, of a doubtful pose: a single object's that fewer than min_chains proposed, "
+        "or one where V falls by less than firm_margin over a push with more than max_violations_doubtful in free space",
         ge=-3.0,
         le=2.0,
     )

@@ -65,23 +65,30 @@ def test_a_lone_object_must_respect_free_space_more_than_several() -> None:
     assert refuse(candidate(**far), PARAMS) is None
 
 
-def test_a_lone_object_that_views_like_little_must_resist_a_push() -> None:
+def test_a_pose_that_views_like_little_and_under_which_something_floats_must_resist_a_push() -> None:
     floating = 1.5 * PARAMS.max_violations_doubtful
-    little = {"score": 0.5 * (PARAMS.min_score + PARAMS.min_score_alone), "margin": 1.0, "violations": floating}
+    little = {"score": 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful), "margin": 1.0, "violations": floating}
     for explained, resistance, accepted in (
         ((CUP,), 0.9 * PARAMS.firm_margin, False),
         ((CUP,), 1.1 * PARAMS.firm_margin, True),
         ((CUP,), None, True),
-        ((CUP, ObjectPair(1, 1, "book")), 0.9 * PARAMS.firm_margin, True),
+        ((CUP, ObjectPair(1, 1, "book")), 0.9 * PARAMS.firm_margin, False),
     ):
         refusal = refuse(candidate(explained=explained, resistance=resistance, **little), PARAMS)
         assert (refusal is None) is accepted, (explained, resistance, refusal)
 
 
 def test_a_lone_object_that_views_like_little_need_not_resist_a_push_where_next_to_nothing_floats() -> None:
-    little = {"score": 0.5 * (PARAMS.min_score + PARAMS.min_score_alone), "margin": 1.0, "explained": (CUP,)}
+    little = {"score": 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful), "margin": 1.0, "explained": (CUP,)}
     soft = candidate(resistance=0.9 * PARAMS.firm_margin, violations=0.5 * PARAMS.max_violations_doubtful, **little)
     assert refuse(soft, PARAMS) is None
+
+
+def test_a_lone_object_that_views_like_little_needs_two_chains() -> None:
+    little = {"score": 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful), "margin": 1.0, "explained": (CUP,)}
+    refusal = refuse(candidate(agreeing_chains=("objects",), **little), PARAMS)
+    assert refusal is not None and refusal[0] is Reason.LOW_OVERLAP
+    assert refuse(candidate(agreeing_chains=("features", "objects"), **little), PARAMS) is None
 
 
 def test_an_object_that_looks_alike_makes_up_for_views_that_like_little() -> None:
