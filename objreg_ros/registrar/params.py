@@ -222,7 +222,7 @@ class RegistrarParams(Params):
     min_score_doubtful: float = param(
         0.40,
         "least V, with what likeness adds, of a doubtful pose: a single object's that fewer than min_chains proposed, "
-        "or one where V falls by less than firm_margin over a push with more than max_violations_doubtful in free space",
+        "or one where V falls by less than firm_margin over a push, with more than max_violations_doubtful floating",
         ge=-3.0,
         le=2.0,
     )
