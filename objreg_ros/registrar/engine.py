@@ -67,8 +67,8 @@ class Engine:
         apart = np.radians(self._params.agreement_rotation), self._params.agreement_translation
         best = distinct(T, worth, pair.source.middle, self._params.finished, *apart)
         best = [k for k in best if worth[k] >= worth.max() - self._params.finished_margin]
-        candidates = [self._judge(pair, seeds[k], seeds) for k in best]
-        return tuple(merged(candidates, pair.source.middle, self._params))
+        candidates = merged([self._judge(pair, seeds[k], seeds) for k in best], pair.source.middle, self._params)
+        return tuple(self._pushed(pair, one) if self._promises(one, candidates[0]) else one for one in candidates)
 
     def _seeds(self, pair: Pair, prior: Array | None) -> list[Hypothesis]:
         """The hypotheses of each chain that the views like best."""
@@ -149,10 +149,17 @@ class Engine:
         same = [same_pose(poses, T_known, source.middle, params) for T_known in found]
         agreeing = [seeds[k].chain for k in np.flatnonzero(same[0] | same[1])]
         candidate = gather(source, target, alignment, (seed.chain, *agreeing), params)
-        if is_held(candidate, params):
-            candidate = replace(candidate, alignment=held(alignment))
-        pushed = resistance_of(candidate, source, target, params)
-        return self._steadied(pair, replace(candidate, resistance=pushed))
+        return replace(candidate, alignment=held(alignment)) if is_held(candidate, params) else candidate
+
+    def _promises(self, candidate: Candidate, best: Candidate) -> bool:
+        """Whether the gate may come to a candidate, so that it is worth pushing."""
+        least = max(self._params.min_score, best.verification.score - self._params.rival_margin)
+        return candidate.verification.score >= least
+
+    def _pushed(self, pair: Pair, candidate: Candidate) -> Candidate:
+        """The candidate with how the views resist a push."""
+        drop = resistance_of(candidate, pair.source, pair.target, self._params)
+        return self._steadied(pair, replace(candidate, resistance=drop))
 
     def _refined(self, pair: Pair, T_target_source: Array) -> Alignment:
         """The refined pose; where that is known badly, the one that the views like best of all that it could be."""

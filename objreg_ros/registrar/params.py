@@ -166,7 +166,7 @@ class RegistrarParams(Params):
     )
     searched: int = param(2, "best places of the search about a doubtful position that grey finishes", ge=1)
     steadying_texture: float = param(
-        0.4, "grey that correlates so well holds a position as far as pushes are resisted", ge=0.0, le=1.0
+        0.5, "grey that correlates so well holds a position as far as pushes are resisted", ge=0.0, le=1.0
     )
     steadying_push: float = param(
         0.06, "longest push until the views like a pose less at which grey still steadies a position", "m", ge=0.0
@@ -217,7 +217,7 @@ class RegistrarParams(Params):
         ge=0.0,
         le=1.0,
     )
-    min_texture: float = param(0.25, "least correlation of the high-passed grey, where there is grey", ge=-1.0, le=1.0)
+    min_texture: float = param(0.35, "least correlation of the high-passed grey, where there is grey", ge=-1.0, le=1.0)
     min_score: float = param(0.10, "least verification score V", ge=-3.0, le=2.0)
     min_score_doubtful: float = param(
         0.40,

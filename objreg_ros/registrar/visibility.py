@@ -2,7 +2,7 @@
 """What one view says of points that another view measured: seen there, floating in free space, or hidden.
 
 A `Sight` is a `View` made ready for that question: the nearest and the farthest depth around each pixel (colour and
-depth are a few pixels apart on real cameras, and edges are ragged), the high-passed grey, and the points to ask with.
+depth are a few pixels apart on real cameras, and edges are ragged), the grey and its bands, and the points to ask with.
 """
 
 from __future__ import annotations
@@ -23,13 +23,14 @@ EDGE = 0.06  # of the depth: a larger range around a pixel is a depth jump
 SHADELESS = 1e6  # the shade of a point at a depth jump: not to be compared
 FINEST = 0.5  # px: a blur that takes pixel noise away
 BLURS = (2.5, 1.0)  # of the bands, the coarse one first
+SMOOTH = 0.7  # px: the blur of grey that is laid into another view
 LEAST_CONTRAST = 2.0  # grey levels; less is noise, not texture
 WINDOW = 9  # px: what is in front of everything so far around is in front, however ragged edges are
 NEAREST = 0.3  # m; nearer depth is noise on every structured-light camera
 
 
 class Band(NamedTuple):
-    """Grey without its slow part: ``detail (h, w) float32`` of the image and ``shades (P,) float32`` of its points."""
+    """Grey, or a part of it: ``detail (h, w) float32`` of the image and ``shades (P,) float32`` of its points."""
 
     detail: Array
     shades: Array
@@ -37,7 +38,10 @@ class Band(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Sight:
-    """A view made ready. ``near``, ``far (h, w) float32`` m, 0 where nothing was measured; ``bands``, coarse first.
+    """A view made ready. ``near``, ``far (h, w) float32`` m, 0 where nothing was measured.
+
+    ``bands`` are its grey without the slow part, coarse first; ``grey`` is all of it, smoothed within surfaces,
+    SHADELESS at depth jumps and where nothing was measured.
 
     ``front (h, w) float32`` m is the nearest depth in a wide window around each pixel, 0 where nothing was measured.
 
@@ -50,6 +54,7 @@ class Sight:
     front: Array
     points: Array
     bands: tuple[Band, ...]
+    grey: Band
     textured: bool
     intrinsics: Intrinsics
 
@@ -82,6 +87,7 @@ def prepare_sight(view: View, sight_range: float, detail_sigma: float, seed: int
         front=nearest_depth(depth, WINDOW),
         points=np.ascontiguousarray(view.xyz.reshape(-1, 3)[chosen]),
         bands=tuple(_band(view.grey, blur * FINEST, blur * detail_sigma, jump, chosen) for blur in BLURS),
+        grey=_smoothed(view.grey, (depth > 0) & ~jump, chosen),
         textured=view.grey is not None,
         intrinsics=view.intrinsics,
     )
@@ -102,6 +108,17 @@ def _band(grey: Array | None, fine: float, slow: float, jump: Array, chosen: Arr
     detail = np.zeros(jump.shape, np.float32) if grey is None else band_pass(grey, fine, slow)
     shades = np.where(jump, np.float32(SHADELESS), detail)
     return Band(detail, np.ascontiguousarray(shades.ravel()[chosen]))
+
+
+def _smoothed(grey: Array | None, surface: Array, chosen: Array) -> Band:
+    """Grey blurred within the ``surface (h, w) bool``, and the points' own."""
+    if grey is None:
+        nothing = np.full(surface.shape, SHADELESS, np.float32)
+        return Band(nothing, nothing.ravel()[chosen])
+    weighed = np.dstack([grey * surface, surface]).astype(np.float32)
+    total, weight = np.moveaxis(cv2.GaussianBlur(weighed, (0, 0), SMOOTH), -1, 0)
+    detail = np.where(surface, total / np.maximum(weight, np.float32(1e-6)), np.float32(SHADELESS))
+    return Band(detail, np.where(surface, grey, SHADELESS).astype(np.float32).ravel()[chosen])
 
 
 def band_pass(grey: Array, fine: float, slow: float) -> Array:

@@ -17,7 +17,7 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.shape import Shape
 from objreg_ros.registrar.shape_score import two_way, weights_of
-from objreg_ros.registrar.verify import rated
+from objreg_ros.registrar.verify import rated_quickly
 from objreg_ros.registrar.visibility import SEEN, VIOLATIONS, Sight, count
 
 STEPS = (0.08, 0.015)  # rad and m: the first of a climb
@@ -107,7 +107,7 @@ def _liked(views, source, target, motion, violated, most):  # type: ignore[no-un
     backward = count(others[:most], their_shades[:most], back, near, far, detail, camera, slops[0], slops[1])
     asked = min(most, len(points)) + min(most, len(others))
     floating = max(forward[VIOLATIONS] / max(forward[SEEN], 1.0), backward[VIOLATIONS] / max(backward[SEEN], 1.0))
-    return rated(forward, backward, textured, asked)[1] - violated * floating
+    return rated_quickly(forward, backward, textured, asked) - violated * floating
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of the correlation of grey in the same image."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from objreg_ros.geometry import inverse, pose, rotation_from_vector
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.texture import NARROW, compare, texture
+from objreg_ros.registrar.verify import verify
+from objreg_ros.registrar.visibility import SHADED, Sight, correlation, prepare_sight
+
+from .rooms import keyframe, seen_from
+
+PARAMS = RegistrarParams()
+
+
+def sight(angle: float, brightness: float = 1.0) -> Sight:
+    view = keyframe(seen_from(angle), seed=round(angle)).view
+    assert view.grey is not None
+    return prepare_sight(replace(view, grey=(brightness * view.grey).astype(np.uint8)), 4.0, 3.0)
+
+
+def between(source: float, target: float) -> np.ndarray:
+    """T_target_source of two looks at the table."""
+    return inverse(seen_from(target)) @ seen_from(source)
+
+
+def test_a_view_is_its_own_print() -> None:
+    assert texture(sight(0.0), sight(0.0), np.eye(4), PARAMS) > 0.99
+
+
+@pytest.mark.parametrize("angle", [60.0, 90.0])
+def test_a_print_is_known_again_from_the_side_better_than_by_each_image_s_own_bands(angle: float) -> None:
+    pair, T = (sight(0.0), sight(angle)), between(0.0, angle)
+    own_bands = verify(*pair, T, PARAMS, sample=100_000).texture
+    assert own_bands is not None
+    assert texture(*pair, T, PARAMS) > own_bands + 0.1
+
+
+def test_a_print_that_is_shifted_does_not_correlate() -> None:
+    shifted = pose(np.eye(3), np.array([0.08, 0.0, 0.0])) @ between(0.0, 25.0)
+    assert texture(sight(0.0), sight(25.0), shifted, PARAMS) < 0.5 * texture(
+        sight(0.0), sight(25.0), between(0.0, 25.0), PARAMS
+    )
+
+
+def test_a_darker_picture_has_the_same_print() -> None:
+    bright, dark = (texture(sight(0.0), sight(25.0, by), between(0.0, 25.0), PARAMS) for by in (1.0, 0.5))
+    assert dark == pytest.approx(bright, abs=0.02)
+
+
+def test_both_ways_round_give_the_same_texture() -> None:
+    pair, T = (sight(0.0), sight(25.0)), between(0.0, 25.0)
+    assert texture(*pair, T, PARAMS) == pytest.approx(texture(*pair[::-1], inverse(T), PARAMS), abs=1e-6)
+
+
+def test_views_that_do_not_meet_have_no_texture() -> None:
+    away = pose(rotation_from_vector(np.array([0.0, np.pi, 0.0])), np.zeros(3))
+    assert texture(sight(0.0), sight(25.0), away, PARAMS) == 0.0
+
+
+def test_a_narrow_window_sees_a_small_push_better() -> None:
+    pair, T = (sight(0.0), sight(25.0)), between(0.0, 25.0)
+    pushed = pose(np.eye(3), np.array([0.03, 0.0, 0.0])) @ T
+    fall = [
+        correlation(compare(*pair, T, PARAMS, *window)) - correlation(compare(*pair, pushed, PARAMS, *window))
+        for window in ((), (NARROW,))
+    ]
+    assert fall[1] > fall[0] > 0.0
+
+
+def test_only_pixels_that_both_see_are_compared() -> None:
+    pair, T = (sight(0.0), sight(25.0)), between(0.0, 25.0)
+    behind = pose(np.eye(3), np.array([0.0, 0.0, 0.5])) @ T
+    assert compare(*pair, behind, PARAMS)[SHADED] < 0.2 * compare(*pair, T, PARAMS)[SHADED]
