@@ -64,13 +64,20 @@ QUICK_S = 30.0
 
 
 def simulated(detector: Detector, seed: int, count: int, limit_s: float) -> dict[str, Any]:
-    """Average precision on up to ``count`` simulated pictures, as many as fit into the time."""
+    """Average precision on up to ``count`` simulated pictures, as many as fit into the time.
+
+    `click.ClickException` where not even one does.
+    """
     begin = time.monotonic()
 
     def in_time(picture: Labelled) -> bool:
         return time.monotonic() - begin < limit_s
 
     used = list(takewhile(in_time, pictures(seed, count, PROCESSES)))
+    if not used:
+        raise click.ClickException(
+            f"expected a simulated picture within {limit_s:.0f} s, got none; stop other work, or run it without --quick"
+        )
     seen = look(detector, used)
     figures: dict[str, Any] = {"pictures": len(used)}
     for suffix, demand in DEMANDS.items():
@@ -157,29 +164,47 @@ def _draw(rgb: Array, seen: Detections, path: Path) -> None:
     cv2.imwrite(str(path), picture)
 
 
-def coco_at_hand(asked: str | None) -> Path | None:
-    """The COCO model that is asked for, or the best one that is there, or None; FileNotFoundError for a wrong name."""
-    return share.model(asked) if asked else next((path for path in COCO_MODELS if path.is_file()), None)
+def coco_at_hand(asked: Path | None) -> Path | None:
+    """The COCO model that is asked for, or the best one that is there, or None."""
+    return asked or next((path for path in COCO_MODELS if path.is_file()), None)
+
+
+def model_file(_: click.Context, __: click.Parameter, name: str | None) -> Path | None:
+    """The file of the model that an option names; `click.BadParameter` where there is none."""
+    try:
+        return share.model(name) if name else None
+    except FileNotFoundError as error:
+        raise click.BadParameter(
+            f"expected a path, or the name of a file in {share.user_models()} or in models/, got {name!r}; "
+            "`objreg fetch-model` gets one"
+        ) from error
+
+
+def load(path: Path, params: DetectorParams) -> Detector:
+    """The detector; `click.UsageError` for a file that is no model for it."""
+    try:
+        return Detector(params, path)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from error
 
 
 @click.command()
 @click.option("--seed", type=int, default=1, help="Another seed gives other scenes.")
 @click.option("--json", "out", type=click.Path(path_type=Path), required=True, help="Where the figures go.")
 @click.option("--quick", is_flag=True, help="Fewer pictures: within 50 s.")
-@click.option("--model", default=DetectorParams().model, help="Another model.")
-@click.option("--coco", "coco_model", metavar="MODEL", help="A COCO model to compare with, if not the one at hand.")
+@click.option("--model", default=DetectorParams().model, callback=model_file, help="Another model.")
+@click.option("--coco", metavar="MODEL", callback=model_file, help="A COCO model to compare with, if not that at hand.")
 @click.option("--pictures", "folder", type=click.Path(path_type=Path), help="Draw what is found on real pictures here.")
-def main(seed: int, out: Path, quick: bool, model: str, coco_model: str | None, folder: Path | None) -> None:
+def main(seed: int, out: Path, quick: bool, model: Path, coco: Path | None, folder: Path | None) -> None:
     """Measure the detector."""
-    path, coco_path = share.model(model), coco_at_hand(coco_model)
     counts = {name: few if quick else many for name, (many, few) in COUNTS.items()}
-    figures = simulated(Detector(RANKING, path), seed, counts["pictures"], QUICK_S if quick else float("inf"))
-    ours = Detector(DetectorParams(threads=2), path)
-    coco = Detector(DetectorParams(threads=2, threshold=COCO_THRESHOLD), coco_path) if coco_path else None
-    speed = timed({"ours": ours} | ({"coco": coco} if coco else {}), counts["timings"])
-    figures |= {"seed": seed, "model": path.name, **speed["ours"], "coco": speed.get("coco")}
+    ours, coco_path = load(model, DetectorParams(threads=2)), coco_at_hand(coco)
+    other = load(coco_path, DetectorParams(threads=2, threshold=COCO_THRESHOLD)) if coco_path else None
+    figures = simulated(load(model, RANKING), seed, counts["pictures"], QUICK_S if quick else float("inf"))
+    speed = timed({"ours": ours} | ({"coco": other} if other else {}), counts["timings"])
+    figures |= {"seed": seed, "model": model.name, **speed["ours"], "coco": speed.get("coco")}
     figures["real"] = {
-        name: on_real(ours, coco, SHARED / "data" / name, counts.get(name), folder)
+        name: on_real(ours, other, SHARED / "data" / name, counts.get(name), folder)
         for name in REAL
         if (SHARED / "data" / name).is_dir()
     }

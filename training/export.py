@@ -33,9 +33,6 @@ OPSET = 13
 
 CALIBRATION_PICTURES = 60
 
-SCORES = "/logits/"
-"""The heads of the scores, by their name in the graph, stay in floats: precision is a matter of their order."""
-
 
 def metadata(provenance: Mapping[str, str]) -> dict[str, str]:
     """What the detector must know of the model, and where the model comes from."""
@@ -61,7 +58,7 @@ def export(
         if calibration is None:
             graph = _graph_of(FromPixels(embedded), torch.uint8, raw)
         else:
-            graph = quantise(_graph_of(embedded, torch.float32, raw), calibration, floating=SCORES)
+            graph = quantise(_graph_of(embedded, torch.float32, raw), calibration)
     onnx.helper.set_model_props(graph, metadata(provenance))
     onnx.checker.check_model(graph)
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -6,6 +6,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
@@ -23,6 +25,9 @@ HEAD_WIDTH = 96
 
 TOWERS_DEEPER = (1, 1, 1, 0, 0)
 """So many end the tower of each level: small things are told by detail and context, and only here do both meet."""
+
+Enlarge = Callable[[Tensor, torch.Size], Tensor]
+"""A map ``(B, C, h, w)`` and a size (H, W) to the map ``(B, C, H, W)`` of nearest neighbours."""
 
 RARE = -4.0
 """The log odds of an object at a prior, to begin with."""
@@ -96,17 +101,17 @@ class MobileNetSsd(nn.Module):
         joined = torch.cat([self._rows(head(x)) for head, x in zip(self.heads, maps, strict=True)], dim=1)
         return joined[..., :4], joined[..., 4:]
 
-    def tower_maps(self, levels: list[Tensor]) -> list[Tensor]:
-        """What the heads see, of the maps of all stages."""
-        return [one(level) for one, level in zip(self.towers, self._top_down(levels), strict=True)]
+    def tower_maps(self, levels: list[Tensor], enlarge: Enlarge = functional.interpolate) -> list[Tensor]:
+        """What the heads see, of the maps of all stages; ``enlarge`` is nearest neighbours by whatever operations."""
+        return [one(level) for one, level in zip(self.towers, self._top_down(levels, enlarge), strict=True)]
 
-    def _top_down(self, levels: list[Tensor]) -> list[Tensor]:
+    def _top_down(self, levels: list[Tensor], enlarge: Enlarge) -> list[Tensor]:
         """The three finest levels with the context from above, the others as they are."""
         coarse = self.laterals[2](levels[2])
         merged = [coarse]
         for level in (1, 0):
             size = levels[level].shape[2:]
-            coarse = self.laterals[level](levels[level]) + functional.interpolate(coarse, size=size, mode="nearest")
+            coarse = self.laterals[level](levels[level]) + enlarge(coarse, size)
             merged.insert(0, coarse)
         return merged + levels[3:]
 

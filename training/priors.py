@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 INPUT_HW = (480, 640)
-"""Four fifths of a Kinect's 640 x 480, as much as the processor has time for: objects of 32 px keep 26. Both are
-multiples of the coarsest stride, so that every cell lies where its prior is."""
+"""A Kinect's whole picture. The two coarsest strides do not divide its height: there the priors are spread evenly and
+lie a few pixels from the middles of their cells, which training makes good."""
 
 STRIDES = (8, 16, 32, 64, 128)
 

@@ -22,6 +22,12 @@ from training.embedded import CENTRE, SCALE
 
 INPUT = "rgb"
 
+QUANTISED = ["Conv", "Relu", "Add", "Transpose", "Reshape", "Gather", "Gemm"]
+"""The operations of the network; what only joins and parts the answers of its heads is not among them."""
+
+ANSWERS = ["Gemm"]
+"""The heads, whose sums become floats at once: precision is a matter of the order of the scores."""
+
 
 class Pictures(CalibrationDataReader):  # type: ignore[misc]
     """Pictures ``(H, W, 3) uint8`` as the float graph takes them."""
@@ -35,12 +41,11 @@ class Pictures(CalibrationDataReader):  # type: ignore[misc]
         return None if rgb is None else {INPUT: ((rgb[None].astype(np.float32) - CENTRE) * SCALE).astype(np.float32)}
 
 
-def quantise(graph: onnx.ModelProto, pictures: Iterable[Array], floating: str) -> onnx.ModelProto:
+def quantise(graph: onnx.ModelProto, pictures: Iterable[Array]) -> onnx.ModelProto:
     """The int8 form of a graph whose one input `INPUT` is of centred pixels; its input is uint8 pixels.
 
     The range of an activation is the mean of its ranges in ``pictures``: the greatest would coarsen all for the sake of
-    one. Weights have 7 bits: processors without VNNI add two products in 16 bits, where 8 bits may overflow. Nodes with
-    ``floating`` in their name stay in floats.
+    one. Weights have 7 bits: processors without VNNI add two products in 16 bits, where 8 bits may overflow.
     """
     with tempfile.TemporaryDirectory() as folder:
         paths = [str(Path(folder) / f"{name}.onnx") for name in ("floats", "ready", "int8")]
@@ -52,10 +57,13 @@ def quantise(graph: onnx.ModelProto, pictures: Iterable[Array], floating: str) -
         quantize_static(
             paths[1], paths[2], Pictures(pictures), quant_format=QuantFormat.QDQ, per_channel=True, reduce_range=True,
             activation_type=QuantType.QUInt8, weight_type=QuantType.QInt8,
-            nodes_to_exclude=[node.name for node in ready.graph.node if floating in node.name],
-            extra_options={"CalibMovingAverage": True, "TensorQuantOverrides": {_first_operand(ready): [exact]}},
+            op_types_to_quantize=QUANTISED,
+            extra_options={
+                "CalibMovingAverage": True, "TensorQuantOverrides": {_first_operand(ready): [exact]},
+                "OpTypesToExcludeOutputQuantization": ANSWERS,
+            },
         )  # fmt: skip
-        return _from_pixels(onnx.load(paths[2]))
+        return _of_own_operations(_from_pixels(onnx.load(paths[2])))
 
 
 def _first_operand(model: onnx.ModelProto) -> str:
@@ -90,4 +98,13 @@ def _from_pixels(model: onnx.ModelProto) -> onnx.ModelProto:
     graph.node.remove(first)
     del graph.value_info[:]
     graph.input[0].type.tensor_type.elem_type = onnx.TensorProto.UINT8
+    return model
+
+
+def _of_own_operations(model: onnx.ModelProto) -> onnx.ModelProto:
+    """The graph without the names of sets of operations it has none of, which older onnxruntimes refuse to know."""
+    used = {node.domain for node in model.graph.node}
+    kept = [one for one in model.opset_import if one.domain in used]
+    del model.opset_import[:]
+    model.opset_import.extend(kept)
     return model

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -18,6 +19,16 @@ Benchmark = Callable[[str], ModuleType]
 @pytest.fixture
 def benchmark() -> Benchmark:
     return importlib.import_module
+
+
+@pytest.fixture
+def detector(repository: Path) -> ModuleType:
+    """A folder of tests has the same name, so it is found by its path."""
+    spec = importlib.util.spec_from_file_location("detector_benchmark", repository / "benchmarks" / "detector.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def refusal(command: click.Command, *arguments: str) -> str:
@@ -42,6 +53,28 @@ def test_what_is_no_scenario_and_seed_is_refused(benchmark: Benchmark, tmp_path:
 def test_a_peer_that_there_is_not_is_refused_at_once(benchmark: Benchmark, name: str, needed: tuple[str, ...]) -> None:
     said = refusal(benchmark(name).main, *needed, "--peers", "orb_pnp,nonsense")
     assert "expected peers of orb_pnp, sift_pnp, fpfh_icp, paper, got nonsense" in said
+
+
+@pytest.mark.parametrize("option", ["--model", "--coco"])
+def test_a_model_that_there_is_not_is_refused_with_where_it_may_be(
+    detector: ModuleType, tmp_path: Path, option: str
+) -> None:
+    said = refusal(detector.main, "--json", str(tmp_path / "x.json"), option, "nonsense.onnx")
+    assert f"'{option}'" in said and "expected a path, or the name of a file in" in said
+    assert "got 'nonsense.onnx'; `objreg fetch-model` gets one" in said
+
+
+@pytest.mark.parametrize("option", ["--model", "--coco"])
+def test_a_file_that_is_no_model_is_refused(detector: ModuleType, tmp_path: Path, option: str) -> None:
+    (tmp_path / "text.onnx").write_text("no model")
+    said = refusal(detector.main, "--json", str(tmp_path / "x.json"), option, str(tmp_path / "text.onnx"))
+    assert "expected an ONNX file that onnxruntime loads, got" in said and not (tmp_path / "x.json").exists()
+
+
+def test_a_run_that_has_no_time_for_a_picture_says_so(detector: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(detector, "pictures", lambda *_: iter([object()]))
+    with pytest.raises(click.ClickException, match=r"within 0 s, got none; .* without --quick"):
+        detector.simulated(None, 1, 240, limit_s=0.0)
 
 
 def test_a_scenario_without_seeds_is_that_of_seed_0(benchmark: Benchmark) -> None:

@@ -6,9 +6,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import onnxruntime
 import pytest
 
-from objreg_ros.detector.runtime import Port, Runtime
+from objreg_ros.detector.runtime import SPIN_US, Port, Runtime, make_options
 
 from .tiny_model import save_constant_model
 
@@ -35,3 +36,13 @@ def test_a_file_that_is_no_model_is_refused(content: bytes, tmp_path: Path) -> N
     path.write_bytes(content)
     with pytest.raises(ValueError, match="expected an ONNX file that onnxruntime loads, got"):
         Runtime(path, threads=1)
+
+
+@pytest.mark.parametrize(("version", "spins"), [("1.17.3", "0"), ("1.25.0", "0"), ("1.26.1", "1"), ("2.0.0", "1")])
+def test_threads_spin_only_within_a_picture_and_only_where_that_is_brief(
+    version: str, spins: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(onnxruntime, "__version__", version)
+    entry = make_options(2).get_session_config_entry
+    assert entry("session.intra_op.allow_spinning") == spins and entry("session.inter_op.allow_spinning") == "0"
+    assert entry("session.intra_op.spin_duration_us") == str(SPIN_US) and entry("session.force_spinning_stop") == "1"

@@ -7,7 +7,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
-from training.embedded import Embedded, FromPixels, GroupedStem, centred  # noqa: E402
+from training.embedded import Embedded, FromPixels, GroupedStem, centred, enlarged  # noqa: E402
 from training.network import MobileNetSsd, Residual, convolution  # noqa: E402
 
 
@@ -39,6 +39,13 @@ def test_the_deployed_network_gives_the_answers_of_the_trained_one_and_a_backgro
         deployed, logits = FromPixels(Embedded(network))(pixels)
     assert torch.allclose(loc, deployed, atol=1e-4) and torch.allclose(odds, logits[..., 1:], atol=1e-4)
     assert (logits[..., 0] == 0).all()
+
+
+@pytest.mark.parametrize("size", [(4, 6), (6, 9), (5, 8)])
+def test_a_map_enlarged_by_copies_is_that_of_nearest_neighbours(size: tuple[int, int]) -> None:
+    features = torch.rand(1, 7, 2, 3)
+    expected = torch.nn.functional.interpolate(features, size, mode="nearest")
+    assert torch.equal(expected, enlarged(features, torch.Size(size)))
 
 
 def test_a_residual_block_adds_nothing_to_begin_with() -> None:

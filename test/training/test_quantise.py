@@ -12,7 +12,7 @@ torch = pytest.importorskip("torch", reason="training needs torch")
 onnx = pytest.importorskip("onnx", reason="the export needs onnx")
 onnxruntime = pytest.importorskip("onnxruntime")
 
-from training.export import export  # noqa: E402
+from training.export import OPSET, export  # noqa: E402
 from training.labels import LABELS  # noqa: E402
 from training.network import MobileNetSsd  # noqa: E402
 from training.priors import INPUT_HW  # noqa: E402
@@ -53,6 +53,17 @@ def test_the_int8_model_is_small_and_takes_pixels_without_a_word_in_floats(model
     assert model.graph.input[0].type.tensor_type.elem_type == onnx.TensorProto.UINT8
     assert models[1].stat().st_size < 0.45 * models[0].stat().st_size
     assert {node.op_type for node in model.graph.node}.isdisjoint({"Cast", "Sub", "Div", "Mul", "Pad", "Relu"})
+
+
+def test_nothing_between_pixels_and_answers_is_in_floats_or_known_to_new_runtimes_alone(
+    models: tuple[Path, Path],
+) -> None:
+    model = onnx.load(str(models[1]))
+    made_by = {name: node.op_type for node in model.graph.node for name in node.output}
+    products = [node for node in model.graph.node if node.op_type in ("Conv", "Gemm")]
+    assert {made_by[name] for node in products for name in node.input[:2]} == {"DequantizeLinear"}
+    assert "Resize" not in made_by.values() and list(made_by.values()).count("Gemm") == 5
+    assert [(one.domain, one.version) for one in model.opset_import] == [("", OPSET)]
 
 
 def test_weights_leave_the_headroom_that_processors_without_vnni_need(models: tuple[Path, Path]) -> None:
