@@ -18,8 +18,9 @@ from objreg_ros.registrar.direct import finish
 from objreg_ros.registrar.objects import explain, liked
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
+from objreg_ros.registrar.pushing import Stand, pushed
 from objreg_ros.registrar.texture import texture
-from objreg_ros.registrar.verify import rank, rank_sharply
+from objreg_ros.registrar.verify import rank
 
 HELD = 1.0 / 3.0  # of a push that is clearly resisted: one sigma of a pose that the views hold
 AROUND = 8  # ways in which a pose is pushed to see whether it is resisted
@@ -36,13 +37,12 @@ def resisted(
     Directions and motions [t r] are of the source camera's pose in the target's axes. ``extent`` m is the lever that
     makes a turn of what was seen comparable to a shift. All are free where the views do not like the pose itself.
     """
-    score = rank_sharply(source.sight, target.sight, T_target_source[None], params, params.grey_points)[0]
     free, held = [], []
+    lever = transform(T_target_source, source.middle) - T_target_source[:3, 3]
+    stand = Stand(source, target, T_target_source, params) if len(slack) else None
     for direction in slack:
-        unit = direction / _length(
-            direction, transform(T_target_source, source.middle) - T_target_source[:3, 3], extent
-        )
-        reach = _reach(source, target, T_target_source, unit, params) if score >= params.min_score else None
+        unit = direction / _length(direction, lever, extent)
+        reach = _reach(stand, unit, params) if stand is not None and stand.score >= params.min_score else None
         if reach is None:
             free.append(direction)
         else:
@@ -59,8 +59,7 @@ def resistance(source: Prepared, target: Prepared, T_target_source: Array, C: Ar
     """
     angles = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
     pushes = params.pushes[-1] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    poses = np.array([pushed(T_target_source, motion) for motion in pushes @ weakest(C)])
-    return float(_falls(source, target, T_target_source, poses, params).min())
+    return float(Stand(source, target, T_target_source, params).falls(pushes @ weakest(C)).min())
 
 
 def weakest(C: Array) -> Array:
@@ -128,51 +127,33 @@ def steadied(source: Prepared, target: Prepared, T_target_source: Array, C: Arra
         return added
     if texture(source.sight, target.sight, T_target_source, params) < params.steadying_texture:
         return added
+    stand = Stand(source, target, T_target_source, params)
     for _ in range(DIRECTIONS):
         spread = np.linalg.inv(known + added)
         values, vectors = np.linalg.eigh(spread[:3, :3])
         if values[-1] <= params.doubtful_sigma**2:
             break
         across = vectors[:, -1]
-        reach = _clear(source, target, T_target_source, spread[:, :3] @ across / values[-1], params)
+        reach = _clear(stand, spread[:, :3] @ across / values[-1], params)
         if reach is None or reach > params.steadying_push:
             break
         added[:3, :3] += np.outer(across, across) / (HELD * reach) ** 2
     return added
 
 
-def _clear(source: Prepared, target: Prepared, T: Array, motion: Array, params: RegistrarParams) -> float | None:
+def _clear(stand: Stand, motion: Array, params: RegistrarParams) -> float | None:
     """The least push in m along a motion that the views like clearly less, either way, between those that are tried.
 
     None where there is none.
     """
     last_push, last_drop = 0.0, 0.0
     for push in params.pushes:
-        drop = _fall(source, target, T, push * motion, params)
+        drop = stand.fall(push * motion)
         if drop >= params.rival_margin:
             between = (last_push, push) if last_push > 0.0 else (push, push)
             return float(np.interp(params.rival_margin, (last_drop, drop), between))
         last_push, last_drop = push, max(0.0, drop)
     return None
-
-
-def _fall(source: Prepared, target: Prepared, T: Array, motion: Array, params: RegistrarParams) -> float:
-    """How much less the views like a pose after a motion, the way that they like more."""
-    poses = np.array([pushed(T, way * motion) for way in (-1, 1)])
-    return float(_falls(source, target, T, poses, params).min())
-
-
-def _falls(source: Prepared, target: Prepared, T: Array, others: Array, params: RegistrarParams) -> Array:
-    """How much less the views like ``others (K, 4, 4)`` near a pose (K,): by whichever grey tells them apart more."""
-    poses = np.concatenate([T[None], others])
-    V = np.array([look(source.sight, target.sight, poses, params, params.grey_points) for look in (rank, rank_sharply)])
-    return np.asarray((V[:, :1] - V[:, 1:]).max(axis=0))
-
-
-def pushed(T_target_source: Array, motion: Array) -> Array:
-    """The pose (4, 4) after a motion [t r]."""
-    R, t = T_target_source[:3, :3], T_target_source[:3, 3]
-    return pose(rotation_from_vector(motion[3:]) @ R, t + motion[:3])
 
 
 def _length(direction: Array, lever: Array, extent: float) -> float:
@@ -181,9 +162,6 @@ def _length(direction: Array, lever: Array, extent: float) -> float:
     return float(np.hypot(np.linalg.norm(shift), np.linalg.norm(turn) * extent))
 
 
-def _reach(source: Prepared, target: Prepared, T: Array, unit: Array, params: RegistrarParams) -> float | None:
+def _reach(stand: Stand, unit: Array, params: RegistrarParams) -> float | None:
     """The least push in m that the views like clearly less, either way; None where there is none."""
-    for push in params.pushes:
-        if _fall(source, target, T, push * unit, params) >= params.rival_margin:
-            return push
-    return None
+    return next((push for push in params.pushes if stand.fall(push * unit) >= params.rival_margin), None)

@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector, transform
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared, prepare
-from objreg_ros.registrar.sliding import HELD, preferred, pushed, resistance, resisted, steadied
+from objreg_ros.registrar.pushing import pushed
+from objreg_ros.registrar.sliding import HELD, preferred, resistance, resisted, steadied
 
 from .rooms import ROOM, keyframe, seen_from
 
@@ -42,12 +42,6 @@ def test_a_pose_that_the_views_do_not_like_is_free_everywhere() -> None:
     wrong = TRUTH @ pose(np.eye(3), np.array([0.0, 0.0, 0.8]))
     free, held = resisted(*views(TABLE, 0.0, 20.0), wrong, SIDEWAYS, 1.0, PARAMS)
     assert len(free) == 1 and len(held) == 0
-
-
-def test_a_push_moves_the_camera_where_it_stands() -> None:
-    moved = pushed(TRUTH, np.array([0.1, 0.0, 0.0, 0.0, 0.0, np.radians(2.0)]))
-    rotation, centimetres = pose_error(moved, TRUTH)
-    assert rotation == pytest.approx(2.0) and centimetres == pytest.approx(10.0)
 
 
 def test_views_resist_a_push_along_a_table_and_not_along_a_bare_wall() -> None:

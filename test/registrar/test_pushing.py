@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of what the views think of a push."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from objreg_ros.geometry import inverse, pose_error
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.prepared import prepare
+from objreg_ros.registrar.pushing import Stand, pushed
+from objreg_ros.registrar.verify import rank
+
+from .rooms import keyframe, seen_from
+
+PARAMS = RegistrarParams()
+TRUTH = inverse(seen_from(20.0)) @ seen_from(0.0)
+ACROSS = np.array([0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
+def stand(grey: bool = True) -> Stand:
+    views = [prepare(keyframe(seen_from(a), grey=grey, seed=k), PARAMS) for k, a in enumerate((0.0, 20.0))]
+    return Stand(*views, TRUTH, PARAMS)
+
+
+def test_a_push_moves_the_camera_where_it_stands() -> None:
+    moved = pushed(TRUTH, np.array([0.1, 0.0, 0.0, 0.0, 0.0, np.radians(2.0)]))
+    rotation, centimetres = pose_error(moved, TRUTH)
+    assert rotation == pytest.approx(2.0) and centimetres == pytest.approx(10.0)
+
+
+def test_the_truth_falls_whichever_way_it_is_pushed_and_the_farther_the_more() -> None:
+    near, far = stand().falls((0.3 * ACROSS, ACROSS))
+    assert 0.0 < near < far
+
+
+def test_of_two_ways_the_one_that_is_liked_more_counts() -> None:
+    here = stand()
+    assert here.fall(ACROSS) == pytest.approx(here.falls((ACROSS, -ACROSS)).min())
+
+
+def test_no_push_is_no_fall() -> None:
+    assert stand().falls((np.zeros(6),))[0] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_fall_is_never_less_than_that_of_the_images_own_bands() -> None:
+    views = [prepare(keyframe(seen_from(a), seed=k), PARAMS).sight for k, a in enumerate((0.0, 20.0))]
+    own, other = rank(*views, np.array([TRUTH, pushed(TRUTH, ACROSS)]), PARAMS, PARAMS.grey_points)
+    assert stand().falls((ACROSS,))[0] >= own - other
+
+
+def test_views_without_grey_are_asked_for_free_space_alone() -> None:
+    assert stand(grey=False).fall(ACROSS) > PARAMS.rival_margin
