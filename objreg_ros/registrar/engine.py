@@ -22,11 +22,12 @@ from objreg_ros.registrar.objects import explain, likeness
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Pantry, Prepared
 from objreg_ros.registrar.refine import refine, settle, warp
-from objreg_ros.registrar.scene_search import from_shapes
+from objreg_ros.registrar.scene_search import from_shapes, half_turned
 from objreg_ros.registrar.sliding import preferred, steadied
-from objreg_ros.registrar.verify import WORST, rank
+from objreg_ros.registrar.verify import WORST, rank, verify
 
 APART = (np.radians(4.0), 0.04)  # rad and m: hypotheses are distinct beyond before they are settled
+HOPELESS = 2.0  # times the violations that the gate allows: what is not refined any more
 ALIKE = (np.radians(0.5), 0.01)  # and after
 
 
@@ -68,6 +69,11 @@ class Engine:
         best = distinct(T, worth, pair.source.middle, self._params.finished, *apart)
         best = [k for k in best if worth[k] >= worth.max() - self._params.finished_margin]
         candidates = merged([self._judge(pair, seeds[k], seeds) for k in best], pair.source.middle, self._params)
+        rivals = [
+            rival for one in candidates if self._promises(one, candidates[0]) for rival in self._turned(pair, one)
+        ]
+        if rivals:
+            candidates = merged([*candidates, *rivals], pair.source.middle, self._params)
         return tuple(self._pushed(pair, one) if self._promises(one, candidates[0]) else one for one in candidates)
 
     def _seeds(self, pair: Pair, prior: Array | None) -> list[Hypothesis]:
@@ -150,6 +156,18 @@ class Engine:
         agreeing = [seeds[k].chain for k in np.flatnonzero(same[0] | same[1])]
         candidate = gather(source, target, alignment, (seed.chain, *agreeing), params)
         return replace(candidate, alignment=held(alignment)) if is_held(candidate, params) else candidate
+
+    def _turned(self, pair: Pair, candidate: Candidate) -> list[Candidate]:
+        """The half turn of a lone object's pose, judged, where free space may allow it: the gate has to know of it."""
+        if len(candidate.explained) != 1:
+            return []
+        source, target, params = pair.source, pair.target, self._params
+        T = half_turned(source, target, candidate.explained[0], candidate.T_target_source, params)
+        if T is None:
+            return []
+        seed = Hypothesis(T_target_source=T, chain="objects", worth=0.0)
+        seen = verify(source.sight, target.sight, T, params, params.grey_points)
+        return [self._judge(pair, seed, [seed])] if seen.violations <= HOPELESS * params.max_violations else []
 
     def _promises(self, candidate: Candidate, best: Candidate) -> bool:
         """Whether the gate may come to a candidate, so that it is worth pushing."""

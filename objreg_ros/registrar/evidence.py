@@ -67,6 +67,15 @@ def agreement(explained: Pairs, moved: Pairs, likeness: float | None, params: Re
 
 
 def lead(candidate: Candidate, rivals: Iterable[Candidate], params: RegistrarParams) -> float:
-    """How much more a candidate is worth than the best of its rivals; than the lowest score where it has none."""
-    others = (worth(rival, params) for rival in rivals if rival is not candidate)
-    return worth(candidate, params) - max(others, default=WORST)
+    """How much more a candidate is worth than the best of its rivals; than the lowest score where it has none.
+
+    What is hidden says nothing of which of two poses is the right one. V counts it against a pose all the same, as
+    wrong ones hide much; but so does the true one where the views see a large thing from either side.
+    """
+    others = (_unhidden(rival, params) for rival in rivals if rival is not candidate)
+    return _unhidden(candidate, params) - max(others, default=WORST)
+
+
+def _unhidden(candidate: Candidate, params: RegistrarParams) -> float:
+    """The worth, had all that is hidden been seen to agree."""
+    return worth(candidate, params) + candidate.verification.occluded

@@ -127,7 +127,7 @@ def _doubtful(candidate: Candidate, params: RegistrarParams) -> bool:
 
 
 def _agreement(candidate: Candidate, params: RegistrarParams, rivals: Sequence[Candidate]) -> Refusal | None:
-    """Several objects, or one that speaks for the pose itself, or one and the grey of the views.
+    """Several objects, or one whose pose has no rival, and that speaks for it or has the grey of the views to do so.
 
     Without an object rooms that repeat themselves look alike. So do plain rooms with one object of a kind in them:
     chains agree on it, and an object that tells no yaw, or is seen to look otherwise, does not confirm them.
@@ -135,12 +135,12 @@ def _agreement(candidate: Candidate, params: RegistrarParams, rivals: Sequence[C
     chains, explained = len(candidate.agreeing_chains), len(candidate.explained)
     if explained >= params.min_objects:
         return None
-    margin = lead(candidate, rivals, params)
-    unrivalled = margin >= params.min_margin_alone and _not_otherwise(candidate, params)
-    if explained and (unrivalled or _speaking(candidate, params) or _painted(candidate, params)):
-        return None
     if explained == 0:
         return Reason.FEW_OBJECTS, "0 objects < 1"
+    margin = lead(candidate, rivals, params)
+    confirmed = any(check(candidate, params) for check in (_not_otherwise, _speaking, _painted))
+    if margin >= params.min_margin_alone and confirmed:
+        return None
     return Reason.CHAINS_DISAGREE, (
         f"{explained} objects < {params.min_objects}, {chains} chains, "
         f"likeness {candidate.likeness or 0.0:.2f}, margin {margin:.2f}"

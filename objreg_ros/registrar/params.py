@@ -238,10 +238,10 @@ class RegistrarParams(Params):
     )
     min_likeness_alone: float = param(0.1, "least likeness of a lone object that chains agree on", ge=-1.0, le=1.0)
     min_margin_alone: float = param(
-        0.2, "least worth of a lone object's pose above that of any other, where chains do not agree", ge=0.0
+        0.2, "least worth of a lone object's pose above that of any other that may be, if all hidden agreed", ge=0.0
     )
     min_likeness_unrivalled: float = param(
-        -0.5, "least likeness of a lone object whose pose has no rival", ge=-1.0, le=1.0
+        -0.2, "least likeness of a lone object that grey alone confirms", ge=-1.0, le=1.0
     )
     min_margin_painted: float = param(
         0.45, "least worth above that of any other pose where grey, but not the lone object, confirms it", ge=0.0

@@ -13,6 +13,7 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import transform
+from objreg_ros.registrar.candidate import ObjectPair
 from objreg_ros.registrar.hypotheses import Hypothesis, from_centroids, look_alikes
 from objreg_ros.registrar.icp import align
 from objreg_ros.registrar.params import RegistrarParams
@@ -22,6 +23,7 @@ from objreg_ros.registrar.shape_search import Fitting, glance, improve, register
 from objreg_ros.registrar.worth import Worth
 
 EACH = 2  # poses that each pair of objects proposes
+THICK = (0.0, 0.5, 1.0)  # of the usual depth of an object of its size: how far its back may lie behind its front
 
 
 def from_shapes(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Hypothesis]:
@@ -42,14 +44,41 @@ def from_shapes(source: Prepared, target: Prepared, params: RegistrarParams) -> 
     worth = scale.of(motions)
     best = np.argsort(-worth, kind="stable")[: params.drawn]
     best = best[worth[best] >= worth[best[0]] - params.shape_margin]
-    for better in (partial(_drawn, source, target, a, b, params=params), scale.climbed):
-        tried = np.array([better(motion) for motion in motions[best]])
-        after = scale.of(tried)
-        gain = after > worth[best]
-        motions[best[gain]], worth[best[gain]] = tried[gain], after[gain]
+    motions[best], worth[best] = _improved(source, target, a, b, motions[best], scale, params)
     order = np.argsort(-worth, kind="stable")
     poses = [(upright_pose(a, b, motions[k]), float(worth[k])) for k in order]
     return [Hypothesis(T_target_source=T, chain="objects", worth=value) for T, value in poses]
+
+
+def half_turned(
+    source: Prepared, target: Prepared, pair: ObjectPair, T_target_source: Array, params: RegistrarParams
+) -> Array | None:
+    """The pose (4, 4) with a ``pair`` of objects turned half about their middle, where views and they like that best.
+
+    Front and back of a screen look alike, and the true pose, in which they share nothing, is liked less than the one
+    that lays them upon each other. Who has to tell them apart needs both. None where an object has no shape.
+    """
+    a, b = source.shapes[pair.source], target.shapes[pair.target]
+    if a is None or b is None:
+        return None
+    yaw, x, y, rise = upright_motion(a, b, T_target_source)
+    through = params.shape_offset * (a.extent + b.extent) * np.array(THICK)
+    turned = [(yaw + np.pi, x + gone * np.cos(yaw), y + gone * np.sin(yaw), rise) for gone in through]
+    motions, worth = _improved(source, target, a, b, np.array(turned), Worth(source, target, a, b, params), params)
+    return upright_pose(a, b, motions[np.argmax(worth)])
+
+
+def _improved(
+    source: Prepared, target: Prepared, a: Shape, b: Shape, motions: Array, scale: Worth, params: RegistrarParams
+) -> tuple[Array, Array]:
+    """Upright motions (K, 4) drawn to the room, then climbed, each where it is worth more; and what they are worth."""
+    best, worth = motions.copy(), scale.of(motions)
+    for better in (partial(_drawn, source, target, a, b, params=params), scale.climbed):
+        tried = np.array([better(motion) for motion in best])
+        after = scale.of(tried)
+        gain = after > worth
+        best[gain], worth[gain] = tried[gain], after[gain]
+    return best, worth
 
 
 def _drawn(source: Prepared, target: Prepared, a: Shape, b: Shape, motion: Array, params: RegistrarParams) -> Array:

@@ -163,11 +163,18 @@ def test_a_lone_object_that_is_unmistakable_needs_no_second_chain() -> None:
     assert refuse(lone(), PARAMS) is None
 
 
-def test_a_lone_object_that_has_a_rival_needs_a_second_chain() -> None:
-    refusal = refuse(lone(), PARAMS, rivals=[rival(lone(), 0.05)])
+def test_a_lone_object_whose_pose_has_a_rival_is_refused_whichever_chains_agree() -> None:
+    for chains in (("objects",), ("features", "objects")):
+        one = lone(agreeing_chains=chains)
+        refusal = refuse(one, PARAMS, rivals=[rival(one, 0.05)])
+        assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
+
+
+def test_a_rival_that_hides_more_is_the_rival_that_it_were_if_all_of_that_agreed() -> None:
+    one = lone()
+    assert refuse(one, PARAMS, rivals=[rival(one, 0.6)]) is None
+    refusal = refuse(one, PARAMS, rivals=[rival(one, 0.6, occluded=0.5)])
     assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
-    confirmed = lone(agreeing_chains=("features", "objects"))
-    assert refuse(confirmed, PARAMS, rivals=[rival(confirmed, 0.05)]) is None
 
 
 @pytest.mark.parametrize("against", [{"violations": 0.4}, {"floating": 0.3}, {"explained": ()}], ids=str)

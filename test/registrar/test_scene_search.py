@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objreg_ros.geometry import inverse, pose, rotation_from_vector
+from objreg_ros.geometry import inverse, pose, rotation_from_vector, transform
+from objreg_ros.registrar.candidate import ObjectPair
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import prepare
-from objreg_ros.registrar.scene_search import _drawn, from_shapes, register_scenes
+from objreg_ros.registrar.scene_search import _drawn, from_shapes, half_turned, register_scenes
 from objreg_ros.registrar.shape import upright_motion
 
 from .shapes import BOX, ELL, error, from_side, keyframe
@@ -57,3 +58,26 @@ def test_what_was_seen_around_objects_draws_their_pose() -> None:
     drawn = _drawn(source, target, a, b, start, PARAMS)
     assert np.abs(drawn - upright_motion(a, b, truth)).max() < 0.5 * np.abs(start - upright_motion(a, b, truth)).max()
     assert np.array_equal(_drawn(source, target, a, b, start, PARAMS.replaced(drawing_reach=0.0)), start)
+
+
+PAIR = ObjectPair(0, 0, "ell")
+
+
+@pytest.mark.parametrize("angle", [30.0, 160.0])
+def test_from_the_pose_that_takes_front_for_back_a_half_turn_comes_near_the_true_one(angle: float) -> None:
+    source = prepare(keyframe(from_side(angle), {"ell": ELL}, seed=1), PARAMS)
+    target = prepare(keyframe(from_side(0.0), {"ell": ELL}, seed=2), PARAMS)
+    truth = inverse(from_side(0.0)) @ from_side(angle)
+    assert target.up is not None
+    R, middle = rotation_from_vector(np.pi * target.up), transform(truth, source.centroids[0])
+    alias = pose(R, middle - R @ middle) @ truth
+    found = half_turned(source, target, PAIR, alias, PARAMS)
+    assert found is not None
+    degrees, centimetres = error(found, angle, 0.0)
+    assert degrees < 15.0 and centimetres < 6.0
+
+
+def test_an_object_without_a_shape_is_not_turned() -> None:
+    key = replace(keyframe(from_side(0.0), {"ell": ELL}), gravity=None)
+    one = prepare(key, PARAMS)
+    assert half_turned(one, one, PAIR, np.eye(4), PARAMS) is None
