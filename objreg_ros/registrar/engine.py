@@ -14,7 +14,7 @@ from objreg_ros.data import Alignment, Array
 from objreg_ros.registrar.candidate import Candidate
 from objreg_ros.registrar.consensus import distinct
 from objreg_ros.registrar.covariance import spread_of, worst_translation
-from objreg_ros.registrar.evidence import agreement, gather, gravity_error_deg, lead, resistance_of, worth
+from objreg_ros.registrar.evidence import agreement, gather, gravity_error_deg, lead, resistance_of, unhidden, worth
 from objreg_ros.registrar.hypotheses import Hypothesis, from_centroids, from_features, from_objects, from_prior
 from objreg_ros.registrar.icp import align
 from objreg_ros.registrar.keyframe import Keyframe
@@ -158,16 +158,18 @@ class Engine:
         return replace(candidate, alignment=held(alignment)) if is_held(candidate, params) else candidate
 
     def _turned(self, pair: Pair, candidate: Candidate) -> list[Candidate]:
-        """The half turn of a lone object's pose, judged, where free space may allow it: the gate has to know of it."""
+        """The half turn of a lone object's pose, where the views may allow it: the gate has to know of it."""
         if len(candidate.explained) != 1:
             return []
         source, target, params = pair.source, pair.target, self._params
         T = half_turned(source, target, candidate.explained[0], candidate.T_target_source, params)
         if T is None:
             return []
-        seed = Hypothesis(T_target_source=T, chain="objects", worth=0.0)
         seen = verify(source.sight, target.sight, T, params, params.grey_points)
-        return [self._judge(pair, seed, [seed])] if seen.violations <= HOPELESS * params.max_violations else []
+        behind = unhidden(candidate.verification) - unhidden(seen)
+        if behind > params.finished_margin or seen.violations > HOPELESS * params.max_violations:
+            return []
+        return [gather(source, target, refine(source, target, T, params), ("objects",), params)]
 
     def _promises(self, candidate: Candidate, best: Candidate) -> bool:
         """Whether the gate may come to a candidate, so that it is worth pushing."""

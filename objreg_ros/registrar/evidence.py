@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from objreg_ros.data import Alignment, Array
-from objreg_ros.registrar.candidate import Candidate
+from objreg_ros.registrar.candidate import Candidate, Verification
 from objreg_ros.registrar.covariance import spread_of, worst_translation
 from objreg_ros.registrar.objects import Pairs, explain, likeness
 from objreg_ros.registrar.params import RegistrarParams
@@ -72,10 +72,15 @@ def lead(candidate: Candidate, rivals: Iterable[Candidate], params: RegistrarPar
     What is hidden says nothing of which of two poses is the right one. V counts it against a pose all the same, as
     wrong ones hide much; but so does the true one where the views see a large thing from either side.
     """
-    others = (_unhidden(rival, params) for rival in rivals if rival is not candidate)
-    return _unhidden(candidate, params) - max(others, default=WORST)
+    others = (_unhidden_worth(rival, params) for rival in rivals if rival is not candidate)
+    return _unhidden_worth(candidate, params) - max(others, default=WORST)
 
 
-def _unhidden(candidate: Candidate, params: RegistrarParams) -> float:
-    """The worth, had all that is hidden been seen to agree."""
-    return worth(candidate, params) + candidate.verification.occluded
+def _unhidden_worth(candidate: Candidate, params: RegistrarParams) -> float:
+    seen = candidate.verification
+    return worth(candidate, params) - seen.score + unhidden(seen)
+
+
+def unhidden(seen: Verification) -> float:
+    """V, had all that is hidden been seen to agree."""
+    return seen.score + seen.occluded
