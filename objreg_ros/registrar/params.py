@@ -171,7 +171,7 @@ class RegistrarParams(Params):
     steadying_push: float = param(
         0.06, "longest push until the views like a pose less at which grey still steadies a position", "m", ge=0.0
     )
-    holding_texture: float = param(0.5, "grey that correlates so well holds what shape lets slide", ge=0.0, le=1.0)
+    holding_texture: float = param(0.45, "grey that correlates so well holds what shape lets slide", ge=0.0, le=1.0)
     holding_likeness: float = param(
         0.3, "an object that looks so much alike holds what shape lets slide", ge=-1.0, le=1.0
     )
@@ -217,7 +217,7 @@ class RegistrarParams(Params):
         ge=0.0,
         le=1.0,
     )
-    min_texture: float = param(0.35, "least correlation of the high-passed grey, where there is grey", ge=-1.0, le=1.0)
+    min_texture: float = param(0.3, "least correlation of the high-passed grey, where there is grey", ge=-1.0, le=1.0)
     min_score: float = param(0.10, "least verification score V", ge=-3.0, le=2.0)
     min_score_doubtful: float = param(
         0.40,

@@ -78,3 +78,16 @@ def test_only_pixels_that_both_see_are_compared() -> None:
     pair, T = (sight(0.0), sight(25.0)), between(0.0, 25.0)
     behind = pose(np.eye(3), np.array([0.0, 0.0, 0.5])) @ T
     assert compare(*pair, behind, PARAMS)[SHADED] < 0.2 * compare(*pair, T, PARAMS)[SHADED]
+
+
+def test_one_strong_edge_that_many_rooms_have_is_no_print() -> None:
+    view = keyframe(seen_from(0.0)).view
+    assert view.grey is not None
+    bright_side = np.where(np.arange(view.grey.shape[1]) > 80, 200.0, 60.0)
+    rooms = [
+        replace(view, grey=(bright_side + np.random.default_rng(k).normal(0.0, 12.0, view.grey.shape)).astype(np.uint8))
+        for k in range(2)
+    ]
+    first, second = (prepare_sight(room, 4.0, 3.0) for room in rooms)
+    assert texture(first, second, np.eye(4), PARAMS) < PARAMS.min_texture
+    assert texture(first, first, np.eye(4), PARAMS) > 0.9
