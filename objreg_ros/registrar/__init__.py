@@ -13,8 +13,8 @@ poses from chains       `engine` asks `hypotheses`, fed by `prepared`: `features
                         `shape_score`, `worth`) on objects
 refinement              `icp` brings many to their basin; `refine` ends a few, with `direct` where there is grey
                         and `contradiction` to say how well the surfaces hold the pose
-evidence                `evidence`, of `verify`, `visibility` and `texture` (views), `objects` (explained or moved),
-                        `symmetry`, `sliding` and `pushing`
+evidence                `evidence`, of `verify`, `visibility` and `texture` (views, through `projection`), `objects`
+                        (explained or moved), `symmetry`, `sliding` and `pushing`
 yes or no               `gate`, on a `candidate` with its evidence; then `covariance` and `thinning`
 ======================  ==========================================================================================
 

@@ -15,6 +15,7 @@ from objreg_ros.data import Array
 from objreg_ros.registrar.icp import move, normal_equations, solve
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
+from objreg_ros.registrar.projection import INDEX, between, lands, nearest, project
 from objreg_ros.registrar.visibility import SHADELESS
 
 STEPS = 8  # a level
@@ -81,50 +82,66 @@ def _add_grey(asked, T, image, T_target_source, backwards, sigma, slops, H, g): 
     Backwards the points are the target's: a step moves the source's image the other way under them.
     """
     points, shades = asked
-    near, far, detail, camera = image
+    _, _, detail, camera = image
     fx, fy, cx, cy = camera
-    height, width = near.shape
-    J = np.empty(6)
-    for i in range(len(points)):
-        x, y, z = _moved(T, points[i])
-        if shades[i] >= SHADELESS or z < 0.1:
-            continue
-        u, v = fx * x / z + cx, fy * y / z + cy
-        if u < 0.0 or v < 0.0 or u > width - 1.001 or v > height - 1.001:
-            continue
-        low, high = near[int(v + 0.5), int(u + 0.5)], far[int(v + 0.5), int(u + 0.5)]
-        slop = 2.0 * (slops[0] + slops[1] * z * z)
-        if high <= 0.0 or z < low - slop or z > high + slop or high - low > slop:
-            continue
-        shade, du, dv = _shade(detail, u, v)
-        error = (shade - shades[i]) / sigma
-        e = np.array([du * fx / z, dv * fy / z, -(du * fx * x + dv * fy * y) / (z * z)]) / sigma
+    us, vs, zs = project(points, T, camera)
+    met = _met(us, vs, zs, shades, image, slops)
+    J, error, weight = np.empty((6, len(met))), np.empty(len(met)), np.empty(len(met))
+    for k in range(len(met)):
+        i = met[k]
+        u, v, z = us[i], vs[i], zs[i]
+        shade, du, dv = between(detail, u, v)
+        error[k] = (shade - shades[i]) / sigma
+        weight[k] = 1.0 / (1.0 + error[k] * error[k]) ** 2
+        nearness = 1.0 / (z * sigma)
+        a, b, c = du * fx * nearness, dv * fy * nearness, -(du * (u - cx) + dv * (v - cy)) * nearness
+        x, y = (u - cx) / fx * z, (v - cy) / fy * z
         if backwards:
-            e = -(T_target_source[:3, 0] * e[0] + T_target_source[:3, 1] * e[1] + T_target_source[:3, 2] * e[2])
+            a, b, c = _turned(T_target_source, -a, -b, -c)
             x, y, z = float(points[i, 0]), float(points[i, 1]), float(points[i, 2])
-        J[:3] = e
-        J[3], J[4], J[5] = y * e[2] - z * e[1], z * e[0] - x * e[2], x * e[1] - y * e[0]
-        weight = 1.0 / (1.0 + error * error) ** 2
-        for k in range(6):
-            g[k] += weight * J[k] * error
-            for m in range(6):
-                H[k, m] += weight * J[k] * J[m]
+        J[0, k], J[1, k], J[2, k] = a, b, c
+        J[3, k], J[4, k], J[5, k] = y * c - z * b, z * a - x * c, x * b - y * a
+    _add_normal_equations(J, error, weight, H, g)
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _met(us, vs, zs, shades, image, slops):  # type: ignore[no-untyped-def]
+    """Which of the projected points the image meets at their depth, on a surface of both: (n,) indices."""
+    near, far, _, _ = image
+    met, n = np.empty(len(us), INDEX), 0
+    for i in range(len(us)):
+        u, v, z = us[i], vs[i], zs[i]
+        if not lands(u, v, z, near):
+            continue
+        row, column = nearest(u, v)
+        low, high = near[row, column], far[row, column]
+        slop = 2.0 * (slops[0] + slops[1] * z * z)
+        agrees = (high > 0.0) & (z >= low - slop) & (z <= high + slop)
+        met[n] = i
+        n += agrees & (high - low <= slop) & (shades[i] < SHADELESS)
+    return met[:n]
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _add_normal_equations(J, error, weight, H, g):  # type: ignore[no-untyped-def]
+    """Add to H (6, 6) and g (6,) those of errors (n,) with a weight and a Jacobian (6, n)."""
+    for k in range(6):
+        weighed = weight * J[k]
+        for i in range(len(error)):
+            g[k] += weighed[i] * error[i]
+        for m in range(k + 1):
+            total = 0.0
+            for i in range(len(error)):
+                total += weighed[i] * J[m, i]
+            H[k, m] += total
+            if m != k:
+                H[m, k] += total
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True, inline="always")
-def _moved(T, p):  # type: ignore[no-untyped-def]
+def _turned(T, a, b, c):  # type: ignore[no-untyped-def]
     return (
-        T[0, 0] * p[0] + T[0, 1] * p[1] + T[0, 2] * p[2] + T[0, 3],
-        T[1, 0] * p[0] + T[1, 1] * p[1] + T[1, 2] * p[2] + T[1, 3],
-        T[2, 0] * p[0] + T[2, 1] * p[1] + T[2, 2] * p[2] + T[2, 3],
+        T[0, 0] * a + T[0, 1] * b + T[0, 2] * c,
+        T[1, 0] * a + T[1, 1] * b + T[1, 2] * c,
+        T[2, 0] * a + T[2, 1] * b + T[2, 2] * c,
     )
-
-
-@numba.njit(cache=True, nogil=True, fastmath=True, inline="always")
-def _shade(detail, u, v):  # type: ignore[no-untyped-def]
-    """The bilinear shade at a pixel and its slopes along u and v."""
-    left, top = int(u), int(v)
-    a, b = u - left, v - top
-    p, q, r, s = detail[top, left], detail[top, left + 1], detail[top + 1, left], detail[top + 1, left + 1]
-    shade = (1.0 - b) * ((1.0 - a) * p + a * q) + b * ((1.0 - a) * r + a * s)
-    return shade, (1.0 - b) * (q - p) + b * (s - r), (1.0 - a) * (r - p) + a * (s - q)

@@ -13,6 +13,7 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.projection import INDEX, LEAST_DEPTH, project
 from objreg_ros.registrar.shape import Shape
 from objreg_ros.registrar.silhouette import INSIDE, RIM
 
@@ -53,22 +54,15 @@ def slack_at(z):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def tally(P, N, S, most, R, t, depth, mask, grey, camera, extent, out):  # type: ignore[no-untyped-def]
-    """Add to ``out (9,)`` what a silhouette says of the first ``most`` points under (R, t), camera from points."""
-    fx, fy, cx, cy = camera[0], camera[1], camera[2], camera[3]
-    h, w = depth.shape
-    n = min(most, len(P))
-    for i in range(n):
-        a, b, c = P[i, 0], P[i, 1], P[i, 2]
-        z = R[2, 0] * a + R[2, 1] * b + R[2, 2] * c + t[2]
-        if z < 0.1:
+def tally(P, N, S, most, T, depth, mask, grey, camera, extent, out):  # type: ignore[no-untyped-def]
+    """Add to ``out (10,)`` what a silhouette says of the first ``most`` points under T (3, 4), camera from points."""
+    height, width = depth.shape
+    us, vs, zs = project(P[:most], T, camera)
+    for i in range(len(us)):
+        u, v, z = us[i], vs[i], zs[i]
+        if not ((z >= LEAST_DEPTH) & (u >= 0.0) & (v >= 0.0) & (u < width) & (v < height)):
             continue
-        x = R[0, 0] * a + R[0, 1] * b + R[0, 2] * c + t[0]
-        y = R[1, 0] * a + R[1, 1] * b + R[1, 2] * c + t[1]
-        u, v = fx * x / z + cx, fy * y / z + cy
-        if not (u >= 0 and v >= 0 and u < w and v < h):
-            continue
-        column, row = int(u), int(v)
+        row, column = INDEX(v), INDEX(u)
         d = depth[row, column]
         if d <= 0.0:
             continue
@@ -80,13 +74,7 @@ def tally(P, N, S, most, R, t, depth, mask, grey, camera, extent, out):  # type:
                 out[VIOLATIONS] += 1.0
         elif e > slack:
             out[HIDDEN] += min(1.0, max(0.0, e / extent - 0.5)) if on == INSIDE else 0.5
-        elif on != 0:
-            p, q, r = N[i, 0], N[i, 1], N[i, 2]
-            nx = R[0, 0] * p + R[0, 1] * q + R[0, 2] * r
-            ny = R[1, 0] * p + R[1, 1] * q + R[1, 2] * r
-            nz = R[2, 0] * p + R[2, 1] * q + R[2, 2] * r
-            if nx * x + ny * y + nz * z >= 0.0:
-                continue
+        elif on != 0 and _faces(T, N[i], (u - camera[2]) / camera[0], (v - camera[3]) / camera[1]):
             out[INLIERS] += 1.0
             out[RESIDUAL] += e * e / (slack * slack)
             if on == INSIDE:
@@ -97,7 +85,16 @@ def tally(P, N, S, most, R, t, depth, mask, grey, camera, extent, out):  # type:
                 out[SUM_AA] += f * f
                 out[SUM_BB] += g * g
                 out[SUM_AB] += f * g
-    return n
+    return len(us)
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True, inline="always")
+def _faces(T, normal, x, y):  # type: ignore[no-untyped-def]
+    """Whether a normal that is turned by T looks back along the ray (x, y, 1)."""
+    a, b, c = normal[0], normal[1], normal[2]
+    along_x = T[0, 0] * a + T[0, 1] * b + T[0, 2] * c
+    along_y = T[1, 0] * a + T[1, 1] * b + T[1, 2] * c
+    return along_x * x + along_y * y + T[2, 0] * a + T[2, 1] * b + T[2, 2] * c < 0.0
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
@@ -120,20 +117,20 @@ def ask(source, target, motion, extent, most, out):  # type: ignore[no-untyped-d
     P, N, S, Rs, os, depth_s, mask_s, grey_s, camera_s, _, _ = source
     Q, M, G, Rt, ot, depth_t, mask_t, grey_t, camera_t, _, _ = target
     c, s = np.cos(motion[0]), np.sin(motion[0])
-    R, t = np.empty((3, 3)), np.empty(3)
+    T = np.empty((3, 4))
     out[:] = 0.0
     # upright source -> upright target -> target camera: Rt' (turn p + shift + ot)
     for k in range(3):
         a, b, d = Rt[0, k], Rt[1, k], Rt[2, k]
-        R[k, 0], R[k, 1], R[k, 2] = a * c + b * s, b * c - a * s, d
-        t[k] = a * (motion[1] + ot[0]) + b * (motion[2] + ot[1]) + d * (motion[3] + ot[2])
-    n = tally(P, N, S, most, R, t, depth_t, mask_t, grey_t, camera_t, extent, out)
+        T[k, 0], T[k, 1], T[k, 2] = a * c + b * s, b * c - a * s, d
+        T[k, 3] = a * (motion[1] + ot[0]) + b * (motion[2] + ot[1]) + d * (motion[3] + ot[2])
+    n = tally(P, N, S, most, T, depth_t, mask_t, grey_t, camera_t, extent, out)
     # and back: Rs' (turn' (q - shift) + os)
     for k in range(3):
         a, b, d = Rs[0, k], Rs[1, k], Rs[2, k]
-        R[k, 0], R[k, 1], R[k, 2] = a * c - b * s, a * s + b * c, d
-        t[k] = a * os[0] + b * os[1] + d * (os[2] - motion[3]) - R[k, 0] * motion[1] - R[k, 1] * motion[2]
-    return n + tally(Q, M, G, most, R, t, depth_s, mask_s, grey_s, camera_s, extent, out)
+        T[k, 0], T[k, 1], T[k, 2] = a * c - b * s, a * s + b * c, d
+        T[k, 3] = a * os[0] + b * os[1] + d * (os[2] - motion[3]) - T[k, 0] * motion[1] - T[k, 1] * motion[2]
+    return n + tally(Q, M, G, most, T, depth_s, mask_s, grey_s, camera_s, extent, out)
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)

@@ -16,6 +16,7 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.geometry import inverse
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.projection import lands, nearest, project, spread
 from objreg_ros.registrar.visibility import (
     SHADED,
     SHADELESS,
@@ -34,6 +35,7 @@ NARROW = 9  # px: sees best that a pose was pushed
 CONTRAST = 3.0  # grey levels that are added to the contrast of a window: sensor noise is no print
 COVERED = 0.1  # weight of the points about a pixel from which on it has a grey
 COUNTS = 10  # of `visibility.count`
+LAYERS = 5  # that are summed in a window: where there is grey, either grey, and its square
 OURS, THEIRS = [SUM_A, SUM_AA], [SUM_B, SUM_BB]
 
 
@@ -47,67 +49,138 @@ def texture(source: Sight, target: Sight, T_target_source: Array, params: Regist
 
 def compare(asked: Sight, seen: Sight, T_seen_asked: Array, params: RegistrarParams, window: int = WINDOW) -> Array:
     """The sums (10,) of `visibility.count` for a correlation, over the pixels of ``seen`` that ``asked`` meets."""
-    image, slops = (seen.near, seen.far, seen.camera), (params.depth_tolerance, params.depth_tolerance_growth)
-    laid = cv2.GaussianBlur(_laid(asked.points, asked.grey.shades, T_seen_asked, image, slops), (0, 0), SMOOTH)
-    both = ((laid[..., 1] > COVERED) & (seen.grey.detail < SHADELESS)).astype(np.float32)
-    theirs, ours = both * laid[..., 0] / np.maximum(laid[..., 1], COVERED), both * seen.grey.detail
-    layers = np.dstack([both, theirs, ours, theirs * theirs, ours * ours])
-    return np.asarray(_sums(both, theirs, ours, cv2.blur(layers, (window, window))))
+    slops = params.depth_tolerance, params.depth_tolerance_growth
+    laid = _laid(asked.grey.points, asked.grey.shades, T_seen_asked, seen.near, seen.far, seen.camera, slops)
+    return np.asarray(_sums(cv2.GaussianBlur(laid, (0, 0), SMOOTH), seen.grey.detail, window))
 
 
-@numba.njit(cache=True, nogil=True)
-def _laid(points, greys, T, image, slops):  # type: ignore[no-untyped-def]
-    """The grey of ``points`` moved by ``T`` where ``image`` agrees with their depth, spread over four pixels each.
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _laid(points, greys, T, near, far, camera, slops):  # type: ignore[no-untyped-def]
+    """The grey of ``points`` moved by ``T`` where an image agrees with their depth, spread over four pixels each.
 
     (h, w, 2) float32: the sums of grey and of weights.
     """
-    near, far, (fx, fy, cx, cy) = image
-    height, width = near.shape
-    out = np.zeros((height, width, 2), np.float32)
+    out = np.zeros((*near.shape, 2), np.float32)
+    us, vs, zs = project(points, T, camera)
     for i in range(len(points)):
-        px, py, pz, grey = points[i, 0], points[i, 1], points[i, 2], greys[i]
-        z = T[2, 0] * px + T[2, 1] * py + T[2, 2] * pz + T[2, 3]
-        if z < 0.1 or grey >= SHADELESS:
+        u, v, z = us[i], vs[i], zs[i]
+        if not lands(u, v, z, near):
             continue
-        u = fx * (T[0, 0] * px + T[0, 1] * py + T[0, 2] * pz + T[0, 3]) / z + cx
-        v = fy * (T[1, 0] * px + T[1, 1] * py + T[1, 2] * pz + T[1, 3]) / z + cy
-        if u < 0.0 or v < 0.0 or u > width - 1.001 or v > height - 1.001:
-            continue
-        low, high = near[int(v + 0.5), int(u + 0.5)], far[int(v + 0.5), int(u + 0.5)]
+        row, column = nearest(u, v)
+        low, high = near[row, column], far[row, column]
         slop = slops[0] + slops[1] * z * z
-        if high <= 0.0 or z < low - slop or z > high + slop:
+        if (high > 0.0) & (z >= low - slop) & (z <= high + slop):
+            spread(out, u, v, greys[i])
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _sums(laid, detail, window):  # type: ignore[no-untyped-def]
+    """The sums over two greys, each less its mean and by its contrast in a window about a pixel, where both have one.
+
+    ``laid (h, w, 2)`` is a smoothed grey times its weight, and the weight; ``detail (h, w)`` is the other. Beyond the
+    rim of the image lies its mirror. The sums in the window run along: each pixel enters and leaves them but once.
+    """
+    both, theirs, ours = _greys(laid, detail)
+    (height, width), half = detail.shape, window // 2
+    columns, sums, out = np.zeros((LAYERS, width + window)), np.empty((LAYERS, width)), np.zeros(COUNTS)
+    for row in range(-half, half):
+        _add_row(both, theirs, ours, _mirrored(row, height), 1.0, columns, half)
+    for row in range(height):
+        _add_row(both, theirs, ours, _mirrored(row + half, height), 1.0, columns, half)
+        _mirror_rim(columns, half, width)
+        _run(columns, window, sums)
+        _compare_row(both[row], theirs[row], ours[row], sums, out)
+        _add_row(both, theirs, ours, _mirrored(row - half, height), -1.0, columns, half)
+    return out
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _greys(laid, detail):  # type: ignore[no-untyped-def]
+    """Where both have a grey, 1 or 0 (h, w) float32; and their greys there, 0 elsewhere."""
+    both, theirs, ours = np.empty_like(detail), np.empty_like(detail), np.empty_like(detail)
+    least = np.float32(COVERED)
+    for row in range(detail.shape[0]):
+        for column in range(detail.shape[1]):
+            weight, grey = laid[row, column, 1], detail[row, column]
+            covered = np.float32((weight > least) & (grey < SHADELESS))
+            both[row, column] = covered
+            theirs[row, column] = covered * laid[row, column, 0] / max(weight, least)
+            ours[row, column] = covered * grey
+    return both, theirs, ours
+
+
+@numba.njit(cache=True, nogil=True)
+def _mirrored(place, size):  # type: ignore[no-untyped-def]
+    """The row or column that is seen in a place beyond the first or the last."""
+    return max(0, min(abs(place), 2 * size - 2 - place))
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _add_row(both, theirs, ours, row, sign, columns, half):  # type: ignore[no-untyped-def]
+    """Add a row of the images to the sums (5, w + window) over the window's rows, of each column."""
+    for column in range(both.shape[1]):
+        a, b = float(theirs[row, column]), float(ours[row, column])
+        columns[0, half + column] += sign * both[row, column]
+        columns[1, half + column] += sign * a
+        columns[2, half + column] += sign * b
+        columns[3, half + column] += sign * a * a
+        columns[4, half + column] += sign * b * b
+
+
+@numba.njit(cache=True, nogil=True)
+def _mirror_rim(columns, half, width):  # type: ignore[no-untyped-def]
+    """Fill the columns on either side of the image."""
+    for k in range(half):
+        left, right = half + _mirrored(k - half, width), half + _mirrored(width + k, width)
+        for layer in range(LAYERS):
+            columns[layer, k] = columns[layer, left]
+            columns[layer, half + width + k] = columns[layer, right]
+
+
+@numba.njit(cache=True, nogil=True)
+def _run(columns, window, sums):  # type: ignore[no-untyped-def]
+    """The sums (5, w) of the columns in the window about each pixel of a row; all at once, as each waits for itself."""
+    n, a, b, aa, bb = columns[0, 0], columns[1, 0], columns[2, 0], columns[3, 0], columns[4, 0]
+    for k in range(1, window):
+        n, a, b = n + columns[0, k], a + columns[1, k], b + columns[2, k]
+        aa, bb = aa + columns[3, k], bb + columns[4, k]
+    for k in range(sums.shape[1]):
+        sums[0, k], sums[1, k], sums[2, k], sums[3, k], sums[4, k] = n, a, b, aa, bb
+        enters = k + window
+        n += columns[0, enters] - columns[0, k]
+        a += columns[1, enters] - columns[1, k]
+        b += columns[2, enters] - columns[2, k]
+        aa += columns[3, enters] - columns[3, k]
+        bb += columns[4, enters] - columns[4, k]
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _compare_row(both, theirs, ours, sums, out):  # type: ignore[no-untyped-def]
+    """Add the pixels of a row to the sums ``out (10,)``, given those of the windows about them."""
+    shaded = sum_a = sum_b = sum_aa = sum_bb = sum_ab = 0.0
+    for k in range(len(both)):
+        if both[k] == 0.0:
             continue
-        left, top = int(u), int(v)
-        a, b = u - left, v - top
-        for row, down in ((top, 1.0 - b), (top + 1, b)):
-            for column, right in ((left, 1.0 - a), (left + 1, a)):
-                out[row, column, 0] += down * right * grey
-                out[row, column, 1] += down * right
-    return out
+        share = 1.0 / sums[0, k]
+        mean_a, mean_b = sums[1, k] * share, sums[2, k] * share
+        a = (theirs[k] - mean_a) / _contrast(mean_a, sums[3, k] * share)
+        b = (ours[k] - mean_b) / _contrast(mean_b, sums[4, k] * share)
+        shaded += 1.0
+        sum_a += a
+        sum_b += b
+        sum_aa += a * a
+        sum_bb += b * b
+        sum_ab += a * b
+    out[SHADED] += shaded
+    out[SUM_A] += sum_a
+    out[SUM_B] += sum_b
+    out[SUM_AA] += sum_aa
+    out[SUM_BB] += sum_bb
+    out[SUM_AB] += sum_ab
 
 
-@numba.njit(cache=True, nogil=True)
-def _sums(both, theirs, ours, means):  # type: ignore[no-untyped-def]
-    """The sums over two greys, each less its mean and by its contrast about a pixel, where ``both (h, w)`` have one."""
-    out = np.zeros(COUNTS)
-    for row in range(both.shape[0]):
-        for column in range(both.shape[1]):
-            if both[row, column] == 0.0:
-                continue
-            share = means[row, column, 0]
-            mean_a, mean_b = means[row, column, 1] / share, means[row, column, 2] / share
-            a = (theirs[row, column] - mean_a) / _contrast(mean_a, means[row, column, 3] / share)
-            b = (ours[row, column] - mean_b) / _contrast(mean_b, means[row, column, 4] / share)
-            out[SHADED] += 1.0
-            out[SUM_A] += a
-            out[SUM_B] += b
-            out[SUM_AA] += a * a
-            out[SUM_BB] += b * b
-            out[SUM_AB] += a * b
-    return out
-
-
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, fastmath=True)
 def _contrast(mean, mean_square):  # type: ignore[no-untyped-def]
     """What a difference from the mean is measured by: the standard deviation, and what is noise at least."""
     return np.sqrt(max(mean_square - mean * mean, 0.0)) + CONTRAST

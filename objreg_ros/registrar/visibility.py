@@ -15,6 +15,7 @@ import numba
 import numpy as np
 
 from objreg_ros.data import Array, Intrinsics, View
+from objreg_ros.registrar.projection import between, lands, nearest, project
 
 # What `count` counts, in the order of its result.
 SEEN, INLIERS, VIOLATIONS, OCCLUDED, SHADED, SUM_A, SUM_B, SUM_AA, SUM_BB, SUM_AB = range(10)
@@ -36,12 +37,20 @@ class Band(NamedTuple):
     shades: Array
 
 
+class Print(NamedTuple):
+    """Grey to be laid into another view: ``detail (h, w) float32`` of the image, smoothed within surfaces and SHADELESS
+    elsewhere; the ``points (Q, 3) float32`` m on surfaces, row by row, and their ``shades (Q,) float32``."""
+
+    detail: Array
+    points: Array
+    shades: Array
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Sight:
     """A view made ready. ``near``, ``far (h, w) float32`` m, 0 where nothing was measured.
 
-    ``bands`` are its grey without the slow part, coarse first; ``grey`` is all of it, smoothed within surfaces,
-    SHADELESS at depth jumps and where nothing was measured.
+    ``bands`` are its grey without the slow part, coarse first; ``grey`` is all of it.
 
     ``front (h, w) float32`` m is the nearest depth in a wide window around each pixel, 0 where nothing was measured.
 
@@ -54,7 +63,7 @@ class Sight:
     front: Array
     points: Array
     bands: tuple[Band, ...]
-    grey: Band
+    grey: Print
     textured: bool
     intrinsics: Intrinsics
 
@@ -87,7 +96,7 @@ def prepare_sight(view: View, sight_range: float, detail_sigma: float, seed: int
         front=nearest_depth(depth, WINDOW),
         points=np.ascontiguousarray(view.xyz.reshape(-1, 3)[chosen]),
         bands=tuple(_band(view.grey, blur * FINEST, blur * detail_sigma, jump, chosen) for blur in BLURS),
-        grey=_smoothed(view.grey, (depth > 0) & ~jump, chosen),
+        grey=_print(view, (depth > 0) & ~jump),
         textured=view.grey is not None,
         intrinsics=view.intrinsics,
     )
@@ -110,15 +119,15 @@ def _band(grey: Array | None, fine: float, slow: float, jump: Array, chosen: Arr
     return Band(detail, np.ascontiguousarray(shades.ravel()[chosen]))
 
 
-def _smoothed(grey: Array | None, surface: Array, chosen: Array) -> Band:
-    """Grey blurred within the ``surface (h, w) bool``, and the points' own."""
-    if grey is None:
-        nothing = np.full(surface.shape, SHADELESS, np.float32)
-        return Band(nothing, nothing.ravel()[chosen])
-    weighed = np.dstack([grey * surface, surface]).astype(np.float32)
+def _print(view: View, surface: Array) -> Print:
+    """The grey of a view, blurred within the ``surface (h, w) bool``."""
+    if view.grey is None:
+        nothing = np.zeros((0, 3), np.float32)
+        return Print(np.full(surface.shape, SHADELESS, np.float32), nothing, nothing[:, 0])
+    weighed = np.dstack([view.grey * surface, surface]).astype(np.float32)
     total, weight = np.moveaxis(cv2.GaussianBlur(weighed, (0, 0), SMOOTH), -1, 0)
     detail = np.where(surface, total / np.maximum(weight, np.float32(1e-6)), np.float32(SHADELESS))
-    return Band(detail, np.where(surface, grey, SHADELESS).astype(np.float32).ravel()[chosen])
+    return Print(detail, view.xyz[surface], view.grey[surface].astype(np.float32))
 
 
 def band_pass(grey: Array, fine: float, slow: float) -> Array:
@@ -135,49 +144,37 @@ def count(points, shades, T, near, far, detail, camera, tolerance, growth):  # t
     A depth agrees within ``tolerance + growth z^2``. Returns (10,) float64 in the order SEEN ... SUM_AB; the sums are
     of the shades of the inliers (A) and of the detail where they land (B).
     """
-    fx, fy, cx, cy = camera
-    height, width = near.shape
-    out = np.zeros(10)
+    inliers = violations = occluded = shaded = 0
+    a = b = aa = bb = ab = 0.0
+    us, vs, zs = project(points, T, camera)
     for i in range(len(points)):
-        px, py, pz = points[i, 0], points[i, 1], points[i, 2]
-        z = T[2, 0] * px + T[2, 1] * py + T[2, 2] * pz + T[2, 3]
-        if z < 0.1:
+        u, v, z = us[i], vs[i], zs[i]
+        if not lands(u, v, z, near):
             continue
-        u = fx * (T[0, 0] * px + T[0, 1] * py + T[0, 2] * pz + T[0, 3]) / z + cx
-        v = fy * (T[1, 0] * px + T[1, 1] * py + T[1, 2] * pz + T[1, 3]) / z + cy
-        if u < 0.0 or v < 0.0 or u > width - 1.001 or v > height - 1.001:
-            continue
-        column, row = int(u + 0.5), int(v + 0.5)
+        row, column = nearest(u, v)
         low, high = near[row, column], far[row, column]
-        if high <= 0.0:
-            continue
         slop = tolerance + growth * z * z
-        if z < low - slop:
-            out[SEEN] += 1.0
-            out[VIOLATIONS] += 1.0
-            continue
-        if z > high + slop:
-            out[SEEN] += 1.0
-            out[OCCLUDED] += 1.0
-            continue
-        if z > low + slop and z < high - slop:  # between the two sides of an edge: says nothing
-            continue
-        out[SEEN] += 1.0
-        out[INLIERS] += 1.0
+        measured = high > 0.0
+        before, behind = measured & (z < low - slop), measured & (z > high + slop)
+        between_sides = (z > low + slop) & (z < high - slop)  # of an edge: says nothing
+        on = measured & ~(before | behind | between_sides)
+        violations += before
+        occluded += behind
+        inliers += on
         own = shades[i]
-        if own >= SHADELESS or high - low > 2.0 * slop:  # silhouettes look alike everywhere
+        if not (on & (own < SHADELESS) & (high - low <= 2.0 * slop)):  # silhouettes look alike everywhere
             continue
-        left, top = int(u), int(v)
-        a, b = u - left, v - top
-        shade = (1.0 - b) * ((1.0 - a) * detail[top, left] + a * detail[top, left + 1]) + b * (
-            (1.0 - a) * detail[top + 1, left] + a * detail[top + 1, left + 1]
-        )
-        out[SHADED] += 1.0
-        out[SUM_A] += own
-        out[SUM_B] += shade
-        out[SUM_AA] += own * own
-        out[SUM_BB] += shade * shade
-        out[SUM_AB] += own * shade
+        shade, _, _ = between(detail, u, v)
+        shaded += 1
+        a += own
+        b += shade
+        aa += own * own
+        bb += shade * shade
+        ab += own * shade
+    out = np.empty(10)
+    out[SEEN], out[INLIERS], out[VIOLATIONS] = inliers + violations + occluded, inliers, violations
+    out[OCCLUDED], out[SHADED] = occluded, shaded
+    out[SUM_A], out[SUM_B], out[SUM_AA], out[SUM_BB], out[SUM_AB] = a, b, aa, bb, ab
     return out
 
 
