@@ -59,7 +59,7 @@ def resistance(source: Prepared, target: Prepared, T_target_source: Array, C: Ar
     """
     angles = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
     pushes = params.pushes[-1] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    return float(Stand(source, target, T_target_source, params).falls(pushes @ weakest(C)).min())
+    return Stand(source, target, T_target_source, params).least_fall(pushes @ weakest(C))
 
 
 def weakest(C: Array) -> Array:

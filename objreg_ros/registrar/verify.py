@@ -37,7 +37,6 @@ def verify(
     )
     if min(way[SEEN] for way in ways) < 1:
         return Verification(inliers=0.0, violations=1.0, occluded=0.0, texture=None, tested=0, score=WORST)
-    asked = sum(min(len(sight.points), sample or len(sight.points)) for sight in (source, target))
     grey = _grey(source, target, T_target_source, params, None if sample is None else ways[0] + ways[1])
     return Verification(
         inliers=float(min(way[INLIERS] / way[SEEN] for way in ways)),
@@ -45,7 +44,7 @@ def verify(
         occluded=float(max(way[OCCLUDED] / way[SEEN] for way in ways)),
         texture=grey,
         tested=int(ways[0][SEEN] + ways[1][SEEN]),
-        score=float(rated(ways[0], ways[1], NO_TEXTURE if grey is None else grey, asked)),
+        score=float(rated(ways[0], ways[1], NO_TEXTURE if grey is None else grey, _asked(source, target, sample))),
     )
 
 
@@ -58,27 +57,45 @@ def _grey(source: Sight, target: Sight, T: Array, params: RegistrarParams, count
 
 def rank(source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams, sample: int) -> Array:
     """V of many poses (K, 4, 4) at once, from the first ``sample`` points a side; -3 where the views do not meet."""
+    return rate(source, target, *looks(source, target, T_target_source, params, sample), sample)
+
+
+def looks(
+    source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams, sample: int
+) -> tuple[Array, Array]:
+    """`look` at many poses (K, 4, 4), forward and backward: (K, 10) each."""
     slops = params.depth_tolerance, params.depth_tolerance_growth
     forward = count_many(source.points[:sample], source.shades[:sample], T_target_source, *_image(target), *slops)
     back = inverses(T_target_source)
-    backward = count_many(target.points[:sample], target.shades[:sample], back, *_image(source), *slops)
-    asked = min(sample, len(source.points)) + min(sample, len(target.points))
-    return np.asarray(_rated_many(forward, backward, source.textured and target.textured, asked))
+    return forward, count_many(target.points[:sample], target.shades[:sample], back, *_image(source), *slops)
 
 
-def rank_sharply(source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams, sample: int) -> Array:
-    """`rank` with all of the source's grey laid into the target's image: it takes ten times as long, and falls by more.
+def rate(source: Sight, target: Sight, forward: Array, backward: Array, sample: int) -> Array:
+    """V (K,) of what `looks` counted, with the grey of each image's own band."""
+    textured = source.textured and target.textured
+    return np.asarray(_rated_many(forward, backward, textured, _asked(source, target, sample)))
 
-    One way, as the other says much the same; for poses near each other, which tell a push from none.
+
+def rate_sharply(
+    source: Sight,
+    target: Sight,
+    T_target_source: Array,
+    ways: tuple[Array, Array],
+    params: RegistrarParams,
+    sample: int,
+) -> float:
+    """V of one pose (4, 4) with all of the source's grey laid into the target's image: slower, and it falls by more.
+
+    ``ways`` are what `looks` counted there, (10,) each. Grey one way, as the other says much the same; for poses near
+    each other, which tell a push from none. Both views must have grey.
     """
-    if not (source.textured and target.textured):
-        return rank(source, target, T_target_source, params, sample)
-    V = np.full(len(T_target_source), WORST)
-    for k, T in enumerate(T_target_source):
-        ways = look(source, target, T, params, sample), look(target, source, inverse(T), params, sample)
-        asked = min(sample, len(source.points)) + min(sample, len(target.points))
-        V[k] = rated(*ways, correlation(compare(source, target, T, params, NARROW)), asked)
-    return V
+    grey = correlation(compare(source, target, T_target_source, params, NARROW))
+    return float(rated(*ways, grey, _asked(source, target, sample)))
+
+
+def _asked(source: Sight, target: Sight, sample: int | None) -> int:
+    """How many points are asked, both ways."""
+    return sum(min(len(sight.points), sample or len(sight.points)) for sight in (source, target))
 
 
 def look(source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams, sample: int | None) -> Array:
