@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
-
 Word = TypeVar("Word")
 
 
@@ -47,11 +46,8 @@ def _hold(owner: Any, name: str, dtype: Any, shape: tuple[int | str | None, ...]
 
 
 def _expected(owner: Any, name: str, dtype: Any, shape: tuple[int | str | None, ...]) -> str:
-    return f"{type(owner).__name__}.{name}: expected {np.dtype(dtype)} of shape {_shape_text(shape)}"
-
-
-def _shape_text(shape: tuple[int | str | None, ...]) -> str:
-    return "(" + ", ".join("any" if s is None else str(s) for s in shape) + ("," if len(shape) == 1 else "") + ")"
+    sizes = ", ".join("any" if size is None else str(size) for size in shape) + ("," if len(shape) == 1 else "")
+    return f"{type(owner).__name__}.{name}: expected {np.dtype(dtype)} of shape ({sizes})"
 
 
 def _hold_pose(owner: Any, name: str) -> None:
@@ -310,10 +306,8 @@ class Alignment:
 
     def __post_init__(self) -> None:
         _hold_pose(self, "T_target_source")
-        _hold(self, "middle", np.float64, (3,), {})
-        _hold(self, "information", np.float64, (6, 6), {})
-        _hold(self, "slack", np.float64, (None, 6), {})
-        _hold(self, "held", np.float64, (None, 6), {})
+        for name, shape in (("middle", (3,)), ("information", (6, 6)), ("slack", (None, 6)), ("held", (None, 6))):
+            _hold(self, name, np.float64, shape, {})
 
 
 @word
