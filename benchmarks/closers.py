@@ -164,7 +164,7 @@ def trajectory_errors(
     for closure in closures:
         graph.add_closure(closure)
     pruned = len(graph.optimise().pruned)
-    known = [(stamp, T, true) for stamp, T in graph.odometry if (true := truth.at(stamp)) is not None]
+    known = [(stamp, T, there) for stamp, T in graph.odometry if (there := truth.at(stamp)) is not None]
     true = [row[2] for row in known]
     before = absolute_trajectory_error([row[1] for row in known], true)
     after = absolute_trajectory_error(graph.corrected(row[0] for row in known), true)

@@ -43,7 +43,7 @@ def summed(pairs: Sequence[Pair], rows: Sequence[Row]) -> dict[str, Any]:
     """The figures of one method over some pairs."""
     could = [(p, r) for p, r in zip(pairs, rows, strict=True) if p.could_close]
     share = lambda test: float(np.mean([test(r) for _, r in could])) if could else None  # noqa: E731
-    found = [r.error for _, r in could if r.within(LOOSE)]
+    found = [r.error for _, r in could if r.error is not None and r.within(LOOSE)]
     return {
         "tried": len(pairs),
         "could_close": len(could),

@@ -35,7 +35,7 @@ def picture(images: tuple[DepthImage, DepthImage], T_target_source: Array, text:
 
 
 def draw_failures(
-    folder: Path, pairs: Sequence[Pair], rows: Sequence[Row], image: Callable[[int], DepthImage], most: int = 12
+    folder: Path, pairs: Sequence[Pair], rows: Sequence[Row], image: Callable[[int], DepthImage | None], most: int = 12
 ) -> None:
     """The worst of a method as pictures: what was accepted and wrong first, then the largest errors."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -46,8 +46,9 @@ def draw_failures(
     ]
     for wrong, failed, _, k in sorted(worth, reverse=True)[:most]:
         pair, row = pairs[k], rows[k]
-        if not (wrong or failed) or row.T is None or row.error is None:
+        first, second = image(pair.source), image(pair.target)
+        if not (wrong or failed) or row.T is None or row.error is None or first is None or second is None:
             continue
         text = f"{'ACCEPTED' if row.accepted else row.reason} {row.error[0]:.1f} deg {row.error[1]:.0f} cm"
-        sheet = picture((image(pair.source), image(pair.target)), row.T, f"{text}, turned {pair.turned:.0f} deg")
+        sheet = picture((first, second), row.T, f"{text}, turned {pair.turned:.0f} deg")
         cv2.imwrite(str(folder / f"{pair.source:04d}_{pair.target:04d}.jpg"), sheet)

@@ -155,8 +155,8 @@ class Bench:
         shots = {(label, n): self._stranger(label, n) for label in labels for n in rooms}
         rows = []
         for k in range(count):
-            first = labels[rng.integers(len(labels))]
-            second = first if k % 2 == 0 else labels[rng.integers(len(labels))]
+            first = labels[int(rng.integers(len(labels)))]
+            second = first if k % 2 == 0 else labels[int(rng.integers(len(labels)))]
             i, j = rng.choice(rooms, 2, replace=False)
             verdict = judge(self.engine.propose(shots[first, i].key, shots[second, j].key), self.params)
             rows.append({"labels": [first, second], "accepted": isinstance(verdict, Candidate)})
@@ -303,7 +303,7 @@ def compile_half(half: int) -> None:
         stage = Stage.of("soda_can", 99, ASIDE)
         render(stage.scene, stage.camera((0.0, 0.0, 0.0), np.random.default_rng(0)), seed=0)
         params = RegistrarParams()
-        Engine(params).propose(*(keyframe(drawn(stamp), params) for stamp in (0, 1)))
+        Engine(params).propose(keyframe(drawn(0), params), keyframe(drawn(1), params))
 
 
 Piece = tuple[str, Callable[[Bench], None]]

@@ -20,6 +20,7 @@ import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -98,8 +99,8 @@ def draw(labelled: LabelledImage, thing: Thing, got: Array, box: tuple[int, int,
 
 def contact_sheet(results: list[Result], path: Path) -> None:
     """The pictures of ours, the worst first."""
-    worst = sorted((r for r in results if r.tile is not None), key=lambda r: r.iou)[: COLUMNS * ROWS]
-    tiles = [r.tile for r in worst]
+    worst = sorted(results, key=lambda r: r.iou)
+    tiles = [r.tile for r in worst if r.tile is not None][: COLUMNS * ROWS]
     tiles += [np.zeros((TILE, TILE, 3), np.uint8)] * (-len(tiles) % COLUMNS)
     rows = [np.hstack(tiles[k : k + COLUMNS]) for k in range(0, len(tiles), COLUMNS)]
     cv2.imwrite(str(path), np.vstack(rows)[..., ::-1])
@@ -130,8 +131,8 @@ def timings(images: list[LabelledImage], segmenter: Segmenter, repeats: int, rng
         four = [jittered(labelled.things[k % len(labelled.things)].xyxy, 0.0, 0.1, rng) for k in range(BOXES)]
         asked = detections(four, ["object"] * BOXES, labelled.image)
         boxes = pixel_boxes(asked, *labelled.image.depth.shape)
-        own = [_clock(lambda a=asked, i=labelled.image: segmenter.segment(a, i)) for _ in range(repeats)]
-        theirs = [_clock(lambda i=labelled, b=boxes: remove_planes(i, b)) for _ in range(max(1, repeats // 2))]
+        own = [_clock(partial(segmenter.segment, asked, labelled.image)) for _ in range(repeats)]
+        theirs = [_clock(partial(remove_planes, labelled, boxes)) for _ in range(max(1, repeats // 2))]
         wall += [w for w, _ in own]
         cpu += [c for _, c in own]
         ratios.append(float(np.median([c for _, c in theirs]) / np.median([c for _, c in own])))
