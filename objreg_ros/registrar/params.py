@@ -107,6 +107,11 @@ class RegistrarParams(Params):
         "turns about the objects, either way, with which the climb of an upright pose may begin",
         "deg",
     )
+    scrutiny_worth: float = param(
+        1.0, "worth below which the best pose of an object alone is looked at more closely; -3: never", ge=-3.0
+    )
+    scrutinised: int = param(2, "best poses of an object that are looked at more closely, and climbed then", ge=1)
+    scrutiny_steps: int = param(40, "poses that a closer climb may look at", ge=4)
     shape_violations: float = param(
         12.0, "weight of an object's points in seen free space, in the score of its pose", ge=0.0
     )

@@ -19,12 +19,12 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.shape import Shape, prepare_shape
 from objreg_ros.registrar.symmetry import tells_yaw
 from objreg_ros.registrar.tracking import view_normals
-from objreg_ros.registrar.visibility import Sight, prepare_sight
+from objreg_ros.registrar.visibility import Sight, halved, prepare_sight
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Prepared:
-    """All that was seen, thinned: ``surface`` to be aligned to, ``xyz`` and ``normals (M, 3)`` to align with.
+    """All that was seen, thinned: ``sight`` and, at half its size, ``coarse`` to look with, ``surface`` to be aligned to, ``xyz`` and ``normals (M, 3)`` to align with.
 
     ``up (3,)`` is against gravity, or None; ``groups`` the confusable group of each object, ``centroids (K, 3)`` their
     middles and ``extents (K,)`` m, ``shapes`` what is laid upon others and ``yaw_known`` whether that tells a turn;
@@ -33,6 +33,7 @@ class Prepared:
 
     keyframe: Keyframe
     sight: Sight
+    coarse: Sight
     surface: Surface
     features: Features
     xyz: Array
@@ -55,9 +56,11 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
     groups = LabelGroups(params.label_groups)
     up = None if keyframe.gravity is None else -np.asarray(keyframe.gravity, float)
     shapes = tuple(prepare_shape(keyframe, [i], params.shape_points) for i in range(len(keyframe.objects)))
+    seeing = params.context_range, params.detail_sigma, params.seed
     return Prepared(
         keyframe=keyframe,
-        sight=prepare_sight(keyframe.view, params.context_range, params.detail_sigma, params.seed),
+        sight=prepare_sight(keyframe.view, *seeing),
+        coarse=prepare_sight(halved(keyframe.view), *seeing),
         surface=prepare_surface(*joined(fine, things), params.grid_cell, params.grid_reach),
         features=salient(describe(*coarse, params.feature_radius), params.feature_points),
         **_shuffled(*joined(coarse, sampled(things, params.thing_points, params.seed)), params.seed),

@@ -18,6 +18,7 @@ from objreg_ros.registrar.hypotheses import Hypothesis, from_centroids, look_ali
 from objreg_ros.registrar.icp import align
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
+from objreg_ros.registrar.scrutiny import Scrutiny
 from objreg_ros.registrar.shape import Shape, upright_motion, upright_pose
 from objreg_ros.registrar.shape_search import Fitting, glance, improve, register_shapes
 from objreg_ros.registrar.worth import Worth
@@ -46,6 +47,10 @@ def from_shapes(source: Prepared, target: Prepared, params: RegistrarParams) -> 
     best = best[worth[best] >= worth[best[0]] - params.shape_margin]
     motions[best], worth[best] = _improved(source, target, a, b, motions[best], scale, params)
     order = np.argsort(-worth, kind="stable")
+    if alone and worth[order[0]] < params.scrutiny_worth and source.sight.textured and target.sight.textured:
+        closer = Scrutiny(source, target, a, b, params).improved(motions[order])
+        motions, worth = np.concatenate([closer[0], motions]), np.concatenate([closer[1], worth])
+        order = np.argsort(-worth, kind="stable")
     poses = [(upright_pose(a, b, motions[k]), float(worth[k])) for k in order]
     return [Hypothesis(T_target_source=T, chain="objects", worth=value) for T, value in poses]
 

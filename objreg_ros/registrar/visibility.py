@@ -102,6 +102,13 @@ def prepare_sight(view: View, sight_range: float, detail_sigma: float, seed: int
     )
 
 
+def halved(view: View) -> View:
+    """The view at half its size, its grey smoothed before."""
+    odd = slice(1, None, 2)
+    grey = None if view.grey is None else cv2.GaussianBlur(view.grey, (0, 0), 1.0)[odd, odd]
+    return View(xyz=view.xyz[odd, odd], grey=grey, intrinsics=view.intrinsics.scaled(2))
+
+
 def depth_bounds(depth: Array) -> tuple[Array, Array]:
     """The nearest and the farthest measured depth in the 3 x 3 pixels around each; 0 where none was measured."""
     return nearest_depth(depth, 3), cv2.dilate(depth, np.ones((3, 3), np.uint8))

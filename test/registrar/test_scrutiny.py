@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of the closer look at poses of one object upon another."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from objreg_ros.data import Array
+from objreg_ros.geometry import inverse, transform
+from objreg_ros.registrar.keyframe import Keyframe
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.prepared import prepare
+from objreg_ros.registrar.scrutiny import Scrutiny
+from objreg_ros.registrar.shape import upright_motion, upright_pose
+from objreg_ros.registrar.verify import WORST
+
+from .rooms import shade
+from .shapes import ELL, error, from_side, keyframe
+
+PARAMS = RegistrarParams()
+ANGLE = 110.0
+
+
+def printed(T_world_camera: Array) -> Keyframe:
+    """The thing on a table with a print."""
+    key = keyframe(T_world_camera, {"ell": ELL}, seed=1)
+    return replace(key, view=replace(key.view, grey=shade(transform(T_world_camera, np.nan_to_num(key.view.xyz)))))
+
+
+@pytest.fixture(scope="module")
+def looked():
+    """A closer look at two sides of a thing that share nothing, and the motion between them."""
+    source, target = (prepare(printed(from_side(a)), PARAMS) for a in (ANGLE, 0.0))
+    a, b = source.shapes[0], target.shapes[0]
+    assert a is not None and b is not None
+    truth = upright_motion(a, b, inverse(from_side(0.0)) @ from_side(ANGLE))
+    return Scrutiny(source, target, a, b, PARAMS), truth, lambda motion: error(upright_pose(a, b, motion), ANGLE, 0.0)
+
+
+@pytest.mark.parametrize("off", [(0.15, 0.0, 0.0), (0.0, 0.06, 0.0), (0.0, 0.0, -0.06), (np.pi, 0.0, 0.0)])
+def test_the_true_motion_is_worth_more_than_one_that_is_off(looked, off: tuple) -> None:
+    scrutiny, truth, _ = looked
+    assert scrutiny.of(truth) > scrutiny.of(truth + np.array([*off, 0.0])) + 0.1
+
+
+def test_a_motion_under_which_the_views_do_not_meet_is_worth_least(looked) -> None:
+    scrutiny, truth, _ = looked
+    assert scrutiny.of(truth + np.array([0.0, 30.0, 0.0, 0.0])) == WORST
+
+
+@pytest.mark.parametrize("off", [(0.08, 0.03, 0.02), (0.0, -0.08, 0.0), (np.pi, 0.0, 0.0)])
+def test_it_finds_the_thickness_that_no_side_shows_and_what_was_taken_front_for_back(looked, off: tuple) -> None:
+    scrutiny, truth, error_of = looked
+    motions, worth = scrutiny.improved([truth + np.array([*off, 0.0])])
+    degrees, centimetres = error_of(motions[np.argmax(worth)])
+    assert degrees < 5.0 and centimetres < 2.0
+
+
+def test_it_leaves_the_motions_that_it_was_given_as_they_were(looked) -> None:
+    scrutiny, truth, _ = looked
+    start = truth + np.array([0.1, 0.02, 0.0, 0.0])
+    kept = start.copy()
+    motions, worth = scrutiny.improved([start])
+    assert np.array_equal(start, kept)
+    assert worth.max() >= scrutiny.of(start) and len(motions) == len(worth) == PARAMS.scrutinised
