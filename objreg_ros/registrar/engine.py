@@ -23,6 +23,7 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Pantry, Prepared
 from objreg_ros.registrar.refine import refine, settle, warp
 from objreg_ros.registrar.scene_search import from_shapes, half_turned
+from objreg_ros.registrar.scrutiny import liked_closely
 from objreg_ros.registrar.sliding import preferred, steadied
 from objreg_ros.registrar.verify import WORST, rank, verify
 
@@ -131,9 +132,10 @@ class Engine:
         T = np.array([seed.T_target_source for seed in seeds]).reshape(-1, 4, 4)
         V = rank(source.sight, target.sight, T, params, params.grey_points)
         apart = distinct(T, V, source.middle, len(seeds), *ALIKE)
+        sharp, *_ = liked_closely(source, target, T[apart], params, params.grey_points)
         rated = [replace(seed, worth=WORST) for seed in seeds]
-        for k in apart:
-            seed, v = seeds[k], V[k]
+        for k, v in zip(apart, sharp, strict=True):
+            seed = seeds[k]
             explained, moved = explain(source, target, seed.T_target_source, params)
             same = likeness(source, target, explained, seed.T_target_source, params)
             rated[k] = replace(seed, worth=float(v) + agreement(explained, moved, same, params))

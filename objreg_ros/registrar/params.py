@@ -85,7 +85,7 @@ class RegistrarParams(Params):
         100, "points a side by which poses of objects are ranked before the best are refined", ge=20
     )
     shape_kept: int = param(5, "poses of objects that are refined", ge=1)
-    shape_climbed: int = param(3, "poses of objects whose score is climbed to its top", ge=1)
+    shape_climbed: int = param(2, "poses of objects whose score is climbed to its top", ge=1)
     shape_margin: float = param(
         1.0, "score or worth below the best at which a pose of objects is neither climbed nor drawn to the room", ge=0.0
     )
@@ -111,7 +111,7 @@ class RegistrarParams(Params):
         1.0, "worth below which the best pose of an object alone is looked at more closely; -3: never", ge=-3.0
     )
     scrutinised: int = param(2, "best poses of an object that are looked at more closely, and climbed then", ge=1)
-    scrutiny_steps: int = param(40, "poses that a closer climb may look at", ge=4)
+    scrutiny_steps: int = param(32, "poses that a closer climb may look at", ge=4)
     shape_violations: float = param(
         12.0, "weight of an object's points in seen free space, in the score of its pose", ge=0.0
     )

@@ -24,11 +24,12 @@ from objreg_ros.registrar.visibility import Sight, halved, prepare_sight
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Prepared:
-    """All that was seen, thinned: ``sight`` and, at half its size, ``coarse`` to look with, ``surface`` to be aligned to, ``xyz`` and ``normals (M, 3)`` to align with.
+    """All that was seen, thinned: ``sight`` and, at half its size, ``coarse`` to look with.
 
-    ``up (3,)`` is against gravity, or None; ``groups`` the confusable group of each object, ``centroids (K, 3)`` their
-    middles and ``extents (K,)`` m, ``shapes`` what is laid upon others and ``yaw_known`` whether that tells a turn;
-    ``scene`` is all of them as one shape; ``middle (3,)`` that of everything: where poses are compared.
+    ``surface`` to be aligned to, ``xyz`` and ``normals (M, 3)`` to align with; ``up (3,)`` is against gravity, or None;
+    ``groups`` the confusable group of each object, ``centroids (K, 3)`` their middles and ``extents (K,)`` m,
+    ``shapes`` what is laid upon others and ``yaw_known`` whether that tells a turn; ``scene`` is all of them as one
+    shape; ``middle (3,)`` that of everything: where poses are compared.
     """
 
     keyframe: Keyframe

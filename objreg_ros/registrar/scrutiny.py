@@ -2,28 +2,26 @@
 """A closer look at upright poses of one object upon another, where the first look leaves doubt.
 
 Two sides of a thing share next to none of its surface. What it stands on tells where it is, by grey that is laid from
-one view into the other's image (`texture`): a measure so sharp that it has to be asked near the truth, and two hundred
-times as dear as `worth`. So it is asked of views at half size, about the poses that were found: farther and nearer along
-either line of sight, since it is the thickness of the thing that is not known, and turned half, since many a front
-looks like its back.
+one view into the other's image (`texture`): a measure so sharp that it has to be asked near the truth, and several
+times as dear as `worth`. So it is asked of views at half size, about the poses that were found: farther and nearer
+along either line of sight, since it is the thickness of the thing that is not known, and turned half, since many a
+front looks like its back.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from scipy.optimize import minimize
 
 from objreg_ros.data import Array
-from objreg_ros.geometry import inverse
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.shape import Shape, upright_pose
 from objreg_ros.registrar.shape_score import alike
-from objreg_ros.registrar.texture import NARROW, compare
-from objreg_ros.registrar.verify import WORST, look, rated
-from objreg_ros.registrar.visibility import OCCLUDED, SEEN, VIOLATIONS, correlation
+from objreg_ros.registrar.verify import WORST, looks, rate, rate_sharply
+from objreg_ros.registrar.visibility import OCCLUDED, SEEN, VIOLATIONS
 
 ALONG = (-0.4, -0.25, -0.12, 0.12, 0.25, 0.4)  # widths along a line of sight at which a thing may stand as well
 THICK = (0.0, 0.2, 0.4)  # usual thicknesses of a thing, in its widths: how far its back may lie behind its front
@@ -38,25 +36,22 @@ class Scrutiny:
     """
 
     def __init__(self, source: Prepared, target: Prepared, a: Shape, b: Shape, params: RegistrarParams) -> None:
-        self._source, self._target, self._shapes, self._params = source, target, (a, b), params
+        self._views, self._shapes, self._params = (source, target), (a, b), params
         self._extent = 0.5 * (a.extent + b.extent)
 
     def of(self, motion: Array) -> float:
         """V as if all that is hidden had been seen to agree, and what the objects say; as `worth` weighs them."""
-        params, source, target = self._params, self._source, self._target
-        T = upright_pose(*self._shapes, motion)
-        views = (source.sight, target.sight, T), (target.sight, source.sight, inverse(T))
-        ways = [look(*view, params, params.quick_sample) for view in views]
-        if min(way[SEEN] for way in ways) < 1:
+        params, T = self._params, upright_pose(*self._shapes, motion)
+        (V,), (forward,), (backward,) = liked_closely(*self._views, T[None], params, params.quick_sample)
+        ways = forward, backward
+        if V == WORST:
             return WORST
-        grey = correlation(compare(source.coarse, target.coarse, T, params, NARROW))
-        V = rated(*ways, grey, 2 * params.quick_sample)
         hidden, floating = (max(way[what] / way[SEEN] for way in ways) for what in (OCCLUDED, VIOLATIONS))
-        likeness = np.clip(alike(*self._shapes, motion, params), -1.0, 1.0)
+        likeness = min(1.0, max(-1.0, alike(*self._shapes, motion, params)))
         return float(V + hidden + params.upright_likeness * likeness - params.upright_violations * floating)
 
-    def improved(self, motions: Sequence[Array]) -> tuple[Array, Array]:
-        """The best of the motions, and of those that they may be taken for, climbed: (K, 4), and their worth (K,)."""
+    def improved(self, motions: Array) -> tuple[Array, Array]:
+        """The first of the motions (N, 4), or what they may be taken for, climbed: the best (K, 4) and their worth."""
         tried = np.array([other for motion in motions[: self._params.scrutinised] for other in self._taken_for(motion)])
         best = np.argsort([-self.of(motion) for motion in tried], kind="stable")[: self._params.scrutinised]
         climbed = [self._climbed(tried[k]) for k in best]
@@ -67,16 +62,36 @@ class Scrutiny:
         ahead = np.array([1.0, 0.0]), np.array([np.cos(motion[0]), np.sin(motion[0])])
         return [
             motion,
-            *(_shifted(motion, 0.0, share * self._extent * way) for share in ALONG for way in ahead),
-            *(_shifted(motion, np.pi, share * self._extent * ahead[1]) for share in THICK),
+            *(_moved(motion, 0.0, *(share * self._extent * way)) for share in ALONG for way in ahead),
+            *(_moved(motion, np.pi, *(share * self._extent * ahead[1])) for share in THICK),
         ]
 
     def _climbed(self, motion: Array) -> tuple[Array, float]:
-        """The motion brought to where it is worth most (Nelder and Mead, "A simplex method", 1965), and what that is."""
+        """The motion brought to where it is worth most, and what that is.
+
+        By the simplex of Nelder and Mead, "A simplex method for function minimization", 1965.
+        """
         most = {"initial_simplex": FIRST, "maxfev": self._params.scrutiny_steps, **LAST}
-        found = minimize(lambda step: -self.of(motion + [*step, 0.0]), FIRST[0], method="Nelder-Mead", options=most)
-        return motion + [*found.x, 0.0], -float(found.fun)
+        moved = partial(_moved, motion)
+        found = minimize(lambda step: -self.of(moved(*step)), FIRST[0], method="Nelder-Mead", options=most)
+        return moved(*found.x), -float(found.fun)
 
 
-def _shifted(motion: Array, turn: float, shift: Array) -> Array:
-    return np.asarray(motion + [turn, *shift, 0.0])
+def _moved(motion: Array, turn: float, x: float, y: float) -> Array:
+    return np.asarray(motion + np.array([turn, x, y, 0.0]))
+
+
+def liked_closely(
+    source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams, sample: int
+) -> tuple[Array, Array, Array]:
+    """V (K,) of poses (K, 4, 4) with the grey of both in one image, at half size, and what `looks` counts each way.
+
+    ``sample`` limits the points that are asked on either side. Views without grey have the V of `rank`.
+    """
+    a, b = source.sight, target.sight
+    forward, backward = looks(a, b, T_target_source, params, sample)
+    if not (a.textured and b.textured):
+        return rate(a, b, forward, backward, sample), forward, backward
+    pictures, ways = (source.coarse, target.coarse), zip(forward, backward, strict=True)
+    V = [rate_sharply(*pictures, T, way, params, sample) for T, way in zip(T_target_source, ways, strict=True)]
+    return np.array(V), forward, backward

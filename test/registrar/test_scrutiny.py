@@ -54,7 +54,7 @@ def test_a_motion_under_which_the_views_do_not_meet_is_worth_least(looked) -> No
 @pytest.mark.parametrize("off", [(0.08, 0.03, 0.02), (0.0, -0.08, 0.0), (np.pi, 0.0, 0.0)])
 def test_it_finds_the_thickness_that_no_side_shows_and_what_was_taken_front_for_back(looked, off: tuple) -> None:
     scrutiny, truth, error_of = looked
-    motions, worth = scrutiny.improved([truth + np.array([*off, 0.0])])
+    motions, worth = scrutiny.improved(truth[None] + np.array([*off, 0.0]))
     degrees, centimetres = error_of(motions[np.argmax(worth)])
     assert degrees < 5.0 and centimetres < 2.0
 
@@ -63,6 +63,6 @@ def test_it_leaves_the_motions_that_it_was_given_as_they_were(looked) -> None:
     scrutiny, truth, _ = looked
     start = truth + np.array([0.1, 0.02, 0.0, 0.0])
     kept = start.copy()
-    motions, worth = scrutiny.improved([start])
+    motions, worth = scrutiny.improved(start[None])
     assert np.array_equal(start, kept)
     assert worth.max() >= scrutiny.of(start) and len(motions) == len(worth) == PARAMS.scrutinised
