@@ -76,17 +76,20 @@ def preferred(
     Far away a shift looks like a turn, and what repeats itself looks alike on either side of the truth: a pose may come
     to rest beside it. So the views are asked all over the plane in which the position is known least, and what they
     like there, aside from the pose itself, is finished by grey; and so is the pose turned about the objects, which is
-    taken as it is too, as grey leads astray where it says little. Nothing is preferred without grey. The objects have a
-    say, as views of little in common like a wrong pose a hair better.
+    taken as it is too, as grey leads astray where it says little. The objects have a say, as views of little in common
+    like a wrong pose a hair better. Nothing is preferred without grey, nor to a pose beyond what grey may mend.
     """
     if not (source.sight.textured and target.sight.textured):
+        return None
+    explained, _ = explain(source, target, T_target_source, params)
+    own, seen = liked(source, target, T_target_source, explained, params)
+    if seen.score < params.min_score - 2.0 * HOPE:
         return None
     steps = params.search_step * np.arange(-params.search_steps, params.search_steps + 1)
     pushes = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     poses = np.array([pushed(T_target_source, motion) for motion in pushes @ weakest(C)])
     V = rank(source.sight, target.sight, poses, params, params.quick_sample).astype(np.float32)
-    explained, _ = explain(source, target, T_target_source, params)
-    best, most = None, liked(source, target, T_target_source, explained, params)[0] + CLEARLY
+    best, most = None, own + CLEARLY
     peaks = poses[_peaks(V, len(steps))[: params.searched]]
     turned = _turned(source, target, T_target_source, params)
     for T in (*turned, *(finish(source, target, start, params)[0] for start in (*peaks, *turned))):
