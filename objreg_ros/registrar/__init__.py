@@ -10,7 +10,7 @@ what is remembered      `keyframe`, `sighting`, `landmarks`; in `store` through 
 which to try            `retrieve`, by `likest` objects: `descriptor` and `labels`
 poses from chains       `engine` asks `hypotheses`, fed by `prepared`: `features` and `consensus` on the context,
                         `scene_search` (`shape`, `silhouette`, `shape_search`, `shape_hull`, `shape_icp`,
-                        `shape_score`, `worth`) on objects
+                        `shape_score`, `worth`, `scrutiny`) on objects
 refinement              `icp` brings many to their basin; `refine` ends a few, with `direct` where there is grey
                         and `contradiction` to say how well the surfaces hold the pose
 evidence                `evidence`, of `verify`, `visibility` and `texture` (views, through `projection`), `objects`

@@ -84,10 +84,10 @@ class RegistrarParams(Params):
     shape_glance: int = param(
         100, "points a side by which poses of objects are ranked before the best are refined", ge=20
     )
-    shape_kept: int = param(5, "poses of objects that are refined", ge=1)
+    shape_kept: int = param(4, "poses of objects that are refined", ge=1)
     shape_climbed: int = param(2, "poses of objects whose score is climbed to its top", ge=1)
     shape_margin: float = param(
-        1.0, "score or worth below the best at which a pose of objects is neither climbed nor drawn to the room", ge=0.0
+        0.5, "score or worth below the best at which a pose of objects is neither climbed nor drawn to the room", ge=0.0
     )
     shape_rounds: int = param(8, "most rounds of the climb of an object's pose", ge=0)
     scene_seeds: int = param(8, "poses that the middles of the objects propose for all together", ge=0)
