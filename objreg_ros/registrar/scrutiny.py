@@ -25,6 +25,7 @@ from objreg_ros.registrar.visibility import OCCLUDED, SEEN, VIOLATIONS
 
 ALONG = (-0.4, -0.25, -0.12, 0.12, 0.25, 0.4)  # widths along a line of sight at which a thing may stand as well
 THICK = (0.0, 0.2, 0.4)  # usual thicknesses of a thing, in its widths: how far its back may lie behind its front
+HOPELESS = -2.0  # worth of what no climb brings up
 FIRST = np.array([[0.0, 0.0, 0.0], [0.08, 0.0, 0.0], [0.0, 0.02, 0.0], [0.0, 0.0, 0.02]])  # rad and m: of a descent
 LAST = {"xatol": 0.002, "fatol": 0.004}  # and where it ends
 
@@ -51,11 +52,16 @@ class Scrutiny:
         return float(V + hidden + params.upright_likeness * likeness - params.upright_violations * floating)
 
     def improved(self, motions: Array) -> tuple[Array, Array]:
-        """The first of the motions (N, 4), or what they may be taken for, climbed: the best (K, 4) and their worth."""
+        """The first of the motions (N, 4), or what they may be taken for, climbed: the best (K, 4) and their worth.
+
+        None of what is hopeless already.
+        """
         tried = np.array([other for motion in motions[: self._params.scrutinised] for other in self._taken_for(motion)])
-        best = np.argsort([-self.of(motion) for motion in tried], kind="stable")[: self._params.scrutinised]
+        worth = np.array([self.of(motion) for motion in tried])
+        least = max(HOPELESS, worth.max() - self._params.shape_margin)
+        best = [k for k in np.argsort(-worth, kind="stable")[: self._params.scrutinised] if worth[k] > least]
         climbed = [self._climbed(tried[k]) for k in best]
-        return np.array([motion for motion, _ in climbed]), np.array([worth for _, worth in climbed])
+        return np.array([motion for motion, _ in climbed]).reshape(-1, 4), np.array([worth for _, worth in climbed])
 
     def _taken_for(self, motion: Array) -> list[Array]:
         """The motion itself, farther and nearer along either line of sight, and turned half."""

@@ -65,4 +65,10 @@ def test_it_leaves_the_motions_that_it_was_given_as_they_were(looked) -> None:
     kept = start.copy()
     motions, worth = scrutiny.improved(start[None])
     assert np.array_equal(start, kept)
-    assert worth.max() >= scrutiny.of(start) and len(motions) == len(worth) == PARAMS.scrutinised
+    assert worth.max() >= scrutiny.of(start) and 1 <= len(motions) == len(worth) <= PARAMS.scrutinised
+
+
+def test_what_is_hopeless_is_not_climbed(looked) -> None:
+    scrutiny, truth, _ = looked
+    motions, worth = scrutiny.improved(truth[None] + np.array([0.0, 30.0, 0.0, 0.0]))
+    assert motions.shape == (0, 4) and worth.shape == (0,)
