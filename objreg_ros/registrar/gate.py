@@ -90,11 +90,15 @@ def _overlap(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
 
 def _free_space(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
-    """Stricter for a lone object: a half turn about it is seen in free space alone, by what floats beyond doubt."""
+    """Stricter for a lone object: a half turn about it is seen in free space alone, by what floats beyond doubt.
+
+    And for several that look otherwise: they stand where others stood.
+    """
     violations, floating = candidate.verification.violations, candidate.floating
+    otherwise = candidate.likeness is not None and candidate.likeness < params.min_likeness_unrivalled
     if violations > params.max_violations:
         return Reason.FREE_SPACE, f"violations {violations:.3f} > {params.max_violations:.3f}"
-    if len(candidate.explained) < 2 and floating > params.max_floating_alone:
+    if (len(candidate.explained) < 2 or otherwise) and floating > params.max_floating_alone:
         return Reason.FREE_SPACE, f"{floating:.3f} float > {params.max_floating_alone:.3f}"
     return None
 

@@ -180,7 +180,7 @@ class RegistrarParams(Params):
     holding_likeness: float = param(
         0.3, "an object that looks so much alike holds what shape lets slide", ge=-1.0, le=1.0
     )
-    symmetry_share: float = param(0.07, "an object whose surface resists a turn less has no yaw", ge=0.0, le=1.0)
+    symmetry_share: float = param(0.12, "an object whose surface resists a turn less has no yaw", ge=0.0, le=1.0)
     symmetry_violations: float = param(
         0.12,
         "an object has a yaw after all if so much of it, turned about its axis, is where its camera saw through",
@@ -218,7 +218,8 @@ class RegistrarParams(Params):
     max_violations: float = param(0.07, "largest share of tested pixels in seen free space", ge=0.0, le=1.0)
     max_floating_alone: float = param(
         0.008,
-        "largest share of tested pixels far in seen free space, where a single object is explained",
+        "largest share of tested pixels far in seen free space, where a single object is explained or several look "
+        "otherwise",
         ge=0.0,
         le=1.0,
     )
@@ -246,7 +247,10 @@ class RegistrarParams(Params):
         0.2, "least worth of a lone object's pose above that of any other that may be, if all hidden agreed", ge=0.0
     )
     min_likeness_unrivalled: float = param(
-        -0.2, "least likeness of a lone object that grey alone confirms", ge=-1.0, le=1.0
+        -0.2,
+        "least likeness of a lone object that grey alone confirms, and below which several look otherwise",
+        ge=-1.0,
+        le=1.0,
     )
     min_margin_painted: float = param(
         0.45, "least worth above that of any other pose where grey, but not the lone object, confirms it", ge=0.0

@@ -31,7 +31,8 @@ def from_shapes(source: Prepared, target: Prepared, params: RegistrarParams) -> 
     """Poses that lay objects upon those of their kind, those that objects and views like best first.
 
     Upright as the objects stand; the best also drawn to all that was seen, or climbed to what both like best, where
-    that is worth more: far views of a thin thing share nothing of it, and its room still tells where it is.
+    that is worth more: far views of a thin thing share nothing of it, and its room still tells where it is. A lone
+    object whose best pose is liked little even so is looked at more closely.
     """
     pairs = shape_pairs(source, target)
     alone = len(pairs) == 1

@@ -65,6 +65,13 @@ def test_a_lone_object_must_respect_free_space_more_than_several() -> None:
     assert refuse(candidate(**far), PARAMS) is None
 
 
+def test_several_objects_that_look_otherwise_may_not_float_either() -> None:
+    far = {"floating": 2.0 * PARAMS.max_floating_alone}
+    assert refuse(candidate(**far, likeness=0.0), PARAMS) is None
+    refusal = refuse(candidate(**far, likeness=PARAMS.min_likeness_unrivalled - 0.1), PARAMS)
+    assert refusal is not None and refusal[0] is Reason.FREE_SPACE
+
+
 def test_a_pose_that_views_like_little_and_under_which_something_floats_must_resist_a_push() -> None:
     floating = 1.5 * PARAMS.max_violations_doubtful
     little = {"score": 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful), "margin": 1.0, "violations": floating}
