@@ -17,7 +17,8 @@ class Processes:
     """A context manager: whatever happens inside, every process has ended when it is left. Output goes to log files."""
 
     def __init__(self, folder: Path, environment: Mapping[str, str]) -> None:
-        self._folder, self._environment = folder, dict(environment)
+        self._folder = folder
+        self._environment = {**environment, "PYTHONUNBUFFERED": "1"}  # last words come last
         self._running: dict[str, subprocess.Popen[bytes]] = {}
 
     def __enter__(self) -> Self:
