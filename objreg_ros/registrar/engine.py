@@ -25,7 +25,7 @@ from objreg_ros.registrar.refine import refine, settle, warp
 from objreg_ros.registrar.scene_search import from_shapes, half_turned
 from objreg_ros.registrar.scrutiny import liked_closely
 from objreg_ros.registrar.sliding import preferred, steadied
-from objreg_ros.registrar.verify import WORST, rank, verify
+from objreg_ros.registrar.verify import WORST, looks, rank, rate, verify
 
 APART = (np.radians(4.0), 0.04)  # rad and m: hypotheses are distinct beyond before they are settled
 HOPELESS = 2.0  # times the violations that the gate allows: what is not refined any more
@@ -130,9 +130,11 @@ class Engine:
         """The hypotheses with their worth for the views and the objects; of those that are one pose the best has it."""
         params, source, target = self._params, pair.source, pair.target
         T = np.array([seed.T_target_source for seed in seeds]).reshape(-1, 4, 4)
-        V = rank(source.sight, target.sight, T, params, params.grey_points)
+        forward, backward = looks(source.sight, target.sight, T, params, params.grey_points)
+        V = rate(source.sight, target.sight, forward, backward, params.grey_points)
         apart = distinct(T, V, source.middle, len(seeds), *ALIKE)
-        sharp, *_ = liked_closely(source, target, T[apart], params, params.grey_points)
+        ways = forward[apart], backward[apart]
+        sharp = liked_closely(source, target, T[apart], ways, params, params.grey_points)
         rated = [replace(seed, worth=WORST) for seed in seeds]
         for k, v in zip(apart, sharp, strict=True):
             seed = seeds[k]

@@ -19,7 +19,7 @@ from objreg_ros.registrar.icp import align
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.scrutiny import Scrutiny
-from objreg_ros.registrar.shape import Shape, upright_motion, upright_pose
+from objreg_ros.registrar.shape import Shape, turned_half, upright_motion, upright_pose
 from objreg_ros.registrar.shape_search import Fitting, glance, improve, register_shapes
 from objreg_ros.registrar.worth import Worth
 
@@ -67,10 +67,9 @@ def half_turned(
     a, b = source.shapes[pair.source], target.shapes[pair.target]
     if a is None or b is None:
         return None
-    yaw, x, y, rise = upright_motion(a, b, T_target_source)
     through = params.shape_offset * (a.extent + b.extent) * np.array(THICK)
-    turned = [(yaw + np.pi, x + gone * np.cos(yaw), y + gone * np.sin(yaw), rise) for gone in through]
-    motions, worth = _improved(source, target, a, b, np.array(turned), Worth(source, target, a, b, params), params)
+    turned = turned_half(upright_motion(a, b, T_target_source), through)
+    motions, worth = _improved(source, target, a, b, turned, Worth(source, target, a, b, params), params)
     return upright_pose(a, b, motions[np.argmax(worth)])
 
 

@@ -18,7 +18,7 @@ from scipy.optimize import minimize
 from objreg_ros.data import Array
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
-from objreg_ros.registrar.shape import Shape, upright_pose
+from objreg_ros.registrar.shape import Shape, turned_half, upright_pose
 from objreg_ros.registrar.shape_score import alike
 from objreg_ros.registrar.verify import WORST, looks, rate, rate_sharply
 from objreg_ros.registrar.visibility import OCCLUDED, SEEN, VIOLATIONS
@@ -42,9 +42,9 @@ class Scrutiny:
 
     def of(self, motion: Array) -> float:
         """V as if all that is hidden had been seen to agree, and what the objects say; as `worth` weighs them."""
-        params, T = self._params, upright_pose(*self._shapes, motion)
-        (V,), (forward,), (backward,) = liked_closely(*self._views, T[None], params, params.quick_sample)
-        ways = forward, backward
+        params, T, (source, target) = self._params, upright_pose(*self._shapes, motion), self._views
+        seen = looks(source.sight, target.sight, T[None], params, params.quick_sample)
+        (V,), ways = liked_closely(source, target, T[None], seen, params, params.quick_sample), [way[0] for way in seen]
         if V == WORST:
             return WORST
         hidden, floating = (max(way[what] / way[SEEN] for way in ways) for what in (OCCLUDED, VIOLATIONS))
@@ -66,11 +66,8 @@ class Scrutiny:
     def _taken_for(self, motion: Array) -> list[Array]:
         """The motion itself, farther and nearer along either line of sight, and turned half."""
         ahead = np.array([1.0, 0.0]), np.array([np.cos(motion[0]), np.sin(motion[0])])
-        return [
-            motion,
-            *(_moved(motion, 0.0, *(share * self._extent * way)) for share in ALONG for way in ahead),
-            *(_moved(motion, np.pi, *(share * self._extent * ahead[1])) for share in THICK),
-        ]
+        along = [_moved(motion, 0.0, *(share * self._extent * way)) for share in ALONG for way in ahead]
+        return [motion, *along, *turned_half(motion, self._extent * np.array(THICK))]
 
     def _climbed(self, motion: Array) -> tuple[Array, float]:
         """The motion brought to where it is worth most, and what that is.
@@ -88,16 +85,19 @@ def _moved(motion: Array, turn: float, x: float, y: float) -> Array:
 
 
 def liked_closely(
-    source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams, sample: int
-) -> tuple[Array, Array, Array]:
-    """V (K,) of poses (K, 4, 4) with the grey of both in one image, at half size, and what `looks` counts each way.
+    source: Prepared,
+    target: Prepared,
+    T_target_source: Array,
+    ways: tuple[Array, Array],
+    params: RegistrarParams,
+    sample: int,
+) -> Array:
+    """V (K,) of poses (K, 4, 4) with the grey of both in one image, at half size; as `rate` has it without grey.
 
-    ``sample`` limits the points that are asked on either side. Views without grey have the V of `rank`.
+    ``ways`` are what `looks` counted there with the same ``sample``.
     """
     a, b = source.sight, target.sight
-    forward, backward = looks(a, b, T_target_source, params, sample)
     if not (a.textured and b.textured):
-        return rate(a, b, forward, backward, sample), forward, backward
-    pictures, ways = (source.coarse, target.coarse), zip(forward, backward, strict=True)
-    V = [rate_sharply(*pictures, T, way, params, sample) for T, way in zip(T_target_source, ways, strict=True)]
-    return np.array(V), forward, backward
+        return rate(a, b, *ways, sample)
+    pictures, each = (source.coarse, target.coarse), zip(T_target_source, *ways, strict=True)
+    return np.array([rate_sharply(*pictures, T, (there, back), params, sample) for T, there, back in each])

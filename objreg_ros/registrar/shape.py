@@ -194,3 +194,12 @@ def upright_motion(source: Shape, target: Shape, T_target_source: Array) -> Arra
     at = source.R_upright_camera.T @ source.origin
     moved = target.R_upright_camera @ (T_target_source[:3, :3] @ at + T_target_source[:3, 3]) - target.origin
     return np.array([yaw, *moved])
+
+
+def turned_half(motion: Array, through: Array) -> Array:
+    """The motions (K, 4) with the source's shape turned half about its middle, its back so far ``through (K,)`` m.
+
+    Its front lies where its back did, and it is that thick between them, along the line of sight of its camera.
+    """
+    c, s = np.cos(motion[0]), np.sin(motion[0])
+    return np.array([motion + np.array([np.pi, gone * c, gone * s, 0.0]) for gone in through])

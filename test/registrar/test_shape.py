@@ -10,7 +10,15 @@ import pytest
 
 from objreg_ros.geometry import inverse, pose_error, rotation_from_vector, transform
 from objreg_ros.registrar.keyframe import Context, KeyObject
-from objreg_ros.registrar.shape import footing, prepare_shape, standing, upright_axes, upright_motion, upright_pose
+from objreg_ros.registrar.shape import (
+    footing,
+    prepare_shape,
+    standing,
+    turned_half,
+    upright_axes,
+    upright_motion,
+    upright_pose,
+)
 
 from .shapes import BOX, ELL, from_side, keyframe
 
@@ -112,3 +120,11 @@ def test_an_upright_motion_is_a_pose_and_back(angle: float) -> None:
     degrees, centimetres = pose_error(upright_pose(source, target, motion), truth)
     assert degrees < 0.05 and centimetres < 0.05  # as far as the two planes tell which way is up
     assert abs(motion[3]) < 0.003
+
+
+def test_a_motion_turned_half_twice_is_the_motion_again() -> None:
+    motion = np.array([0.3, 0.1, -0.2, 0.01])
+    (turned,) = turned_half(motion, np.array([0.1]))
+    (back,) = turned_half(turned, np.array([0.1]))
+    assert np.allclose(turned[1:3] - motion[1:3], 0.1 * np.array([np.cos(0.3), np.sin(0.3)]))
+    assert np.allclose(back - motion, [2.0 * np.pi, 0.0, 0.0, 0.0])
