@@ -36,9 +36,9 @@ def rotate(T_a_b: Array, vectors_b: Array) -> Array:
 
 
 def pose(R: Array, t: Array) -> Array:
-    """The (4, 4) pose of a (3, 3) rotation and a (3,) translation."""
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = R, t
+    """The poses (..., 4, 4) of rotations (..., 3, 3) and translations (..., 3)."""
+    T = np.zeros((*R.shape[:-2], 4, 4))
+    T[..., :3, :3], T[..., :3, 3], T[..., 3, 3] = R, t, 1.0
     return T
 
 
@@ -63,18 +63,19 @@ def is_rigid(T: Array, tolerance: float = 1e-5) -> bool:
 
 
 def skew(v: Array) -> Array:
-    """The (3, 3) cross-product matrix: ``skew(v) @ w == cross(v, w)``."""
-    x, y, z = v
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    """The cross-product matrices (..., 3, 3) of vectors (..., 3): ``skew(v) @ w == cross(v, w)``."""
+    K = np.zeros((*np.shape(v), 3))
+    x, y, z = np.moveaxis(v, -1, 0)
+    K[..., 0, 1], K[..., 0, 2], K[..., 1, 2] = -z, y, -x
+    K[..., 1, 0], K[..., 2, 0], K[..., 2, 1] = z, -y, x
+    return K
 
 
 def rotation_from_vector(rotation_vector: Array) -> Array:
-    """Rodrigues' formula: the (3, 3) rotation about a (3,) axis by its length in radians."""
-    angle = float(np.linalg.norm(rotation_vector))
-    if angle < 1e-12:
-        return np.eye(3) + skew(rotation_vector)
-    K = skew(rotation_vector / angle)
-    return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * (K @ K)
+    """Rodrigues' formula: the rotations (..., 3, 3) about axes (..., 3) by their lengths in radians."""
+    angle = np.linalg.norm(rotation_vector, axis=-1)[..., None, None]
+    K = skew(rotation_vector) / np.maximum(angle, np.finfo(float).tiny)
+    return np.asarray(np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * (K @ K))
 
 
 def vector_from_rotation(R: Array) -> Array:

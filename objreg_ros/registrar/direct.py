@@ -12,7 +12,7 @@ import numba
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.registrar.icp import move, normal_equations, solve
+from objreg_ros.registrar.icp import add_normal_equations, move, normal_equations, solve
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.projection import INDEX, between, lands, nearest, project
@@ -101,7 +101,7 @@ def _add_grey(asked, T, image, T_target_source, backwards, sigma, slops, H, g): 
             x, y, z = float(points[i, 0]), float(points[i, 1]), float(points[i, 2])
         J[0, k], J[1, k], J[2, k] = a, b, c
         J[3, k], J[4, k], J[5, k] = y * c - z * b, z * a - x * c, x * b - y * a
-    _add_normal_equations(J, error, weight, H, g)
+    add_normal_equations(J, error, weight, H, g)
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
@@ -120,22 +120,6 @@ def _met(us, vs, zs, shades, image, slops):  # type: ignore[no-untyped-def]
         met[n] = i
         n += agrees & (high - low <= slop) & (shades[i] < SHADELESS)
     return met[:n]
-
-
-@numba.njit(cache=True, nogil=True, fastmath=True)
-def _add_normal_equations(J, error, weight, H, g):  # type: ignore[no-untyped-def]
-    """Add to H (6, 6) and g (6,) those of errors (n,) with a weight and a Jacobian (6, n)."""
-    for k in range(6):
-        weighed = weight * J[k]
-        for i in range(len(error)):
-            g[k] += weighed[i] * error[i]
-        for m in range(k + 1):
-            total = 0.0
-            for i in range(len(error)):
-                total += weighed[i] * J[m, i]
-            H[k, m] += total
-            if m != k:
-                H[m, k] += total
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True, inline="always")

@@ -61,14 +61,12 @@ def from_objects(source: Prepared, target: Prepared, params: RegistrarParams) ->
     """Poses that lay one object upon one of its kind and turn about gravity, every yaw; those the views like best."""
     if source.up is None or target.up is None:
         return []
-    pairs = look_alikes(source, target)
-    upright = rotation_between(source.up, target.up)
-    turns = [
-        rotation_from_vector(yaw * target.up) @ upright
-        for yaw in np.linspace(0.0, 2.0 * np.pi, params.yaw_steps, endpoint=False)
-    ]
-    T = np.array([pose(R, target.centroids[j] - R @ source.centroids[i]) for i, j in pairs for R in turns])
-    worth = rank(source.sight, target.sight, T.reshape(-1, 4, 4), params, params.glance)
+    i, j = np.array(look_alikes(source, target), int).reshape(-1, 2).T
+    yaws = np.linspace(0.0, 2.0 * np.pi, params.yaw_steps, endpoint=False)
+    R = rotation_from_vector(yaws[:, None] * target.up) @ rotation_between(source.up, target.up)
+    moved = np.einsum("kab,ib->ika", R, source.centroids[i])
+    T = pose(np.broadcast_to(R, (len(i), *R.shape)), target.centroids[j][:, None] - moved).reshape(-1, 4, 4)
+    worth = rank(source.sight, target.sight, T, params, params.glance)
     best = np.argsort(-worth, kind="stable")[: params.seeds_per_object_chain]
     return [Hypothesis(T_target_source=T[k], chain="objects", worth=float(worth[k])) for k in best]
 

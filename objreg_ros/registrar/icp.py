@@ -14,8 +14,10 @@ import numba
 import numpy as np
 
 from objreg_ros.data import Array
+from objreg_ros.registrar.projection import INDEX
 
 MOST_CELLS = 4_000_000
+FACING = 0.6  # cosine between the normals of a pair, at least
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -111,55 +113,99 @@ def _closest(xyz, low, cell, shape, reach):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
 def normal_equations(P, N, Q, M, closest, low, cell, T, reach, H, g):  # type: ignore[no-untyped-def]
-    """Fill H (6, 6) and g (6,) of the step [t r] at pose T; returns pairs, their weight, error and spread."""
-    H[:], g[:] = 0.0, 0.0
-    J = np.empty(6)
-    count, weight, squared = 0, 1e-9, 0.0
-    sums, squares = np.zeros(3), 0.0
-    for i in range(len(P)):
-        x = T[0, 0] * P[i, 0] + T[0, 1] * P[i, 1] + T[0, 2] * P[i, 2] + T[0, 3]
-        y = T[1, 0] * P[i, 0] + T[1, 1] * P[i, 1] + T[1, 2] * P[i, 2] + T[1, 3]
-        z = T[2, 0] * P[i, 0] + T[2, 1] * P[i, 1] + T[2, 2] * P[i, 2] + T[2, 3]
-        a, b, c = int((x - low[0]) / cell), int((y - low[1]) / cell), int((z - low[2]) / cell)
-        if x < low[0] or y < low[1] or z < low[2]:
-            continue
-        if a >= closest.shape[0] or b >= closest.shape[1] or c >= closest.shape[2]:
-            continue
-        j = closest[a, b, c]
-        if j < 0:
-            continue
-        dx, dy, dz = x - Q[j, 0], y - Q[j, 1], z - Q[j, 2]
-        d2 = dx * dx + dy * dy + dz * dz
-        if d2 > reach * reach:
-            continue
+    """Fill H (6, 6) and g (6,) of the step [t r] at pose T; returns pairs, their weight, error and spread.
+
+    As in `projection.py` everything is looked up first and doubted afterwards: what is no pair weighs nothing.
+    """
+    x, y, z = moved(P, T)
+    met, partner = _partners(x, y, z, closest, low, cell)
+    xx, xy, xz = T[0, 0], T[0, 1], T[0, 2]
+    yx, yy, yz = T[1, 0], T[1, 1], T[1, 2]
+    zx, zy, zz = T[2, 0], T[2, 1], T[2, 2]
+    J, residual, weight = np.empty((6, len(met))), np.empty(len(met)), np.empty(len(met))
+    nearness = 1.0 / (reach * reach)
+    count, total, squared = 0, 1e-9, 0.0
+    sum_x, sum_y, sum_z, squares = 0.0, 0.0, 0.0, 0.0
+    for k in range(len(met)):
+        i, j = met[k], partner[k]
+        a, b, c = x[i], y[i], z[i]
         nx, ny, nz = M[j, 0], M[j, 1], M[j, 2]
+        dx, dy, dz = a - Q[j, 0], b - Q[j, 1], c - Q[j, 2]
         facing = (
-            nx * (T[0, 0] * N[i, 0] + T[0, 1] * N[i, 1] + T[0, 2] * N[i, 2])
-            + ny * (T[1, 0] * N[i, 0] + T[1, 1] * N[i, 1] + T[1, 2] * N[i, 2])
-            + nz * (T[2, 0] * N[i, 0] + T[2, 1] * N[i, 1] + T[2, 2] * N[i, 2])
+            (xx * nx + yx * ny + zx * nz) * N[i, 0]
+            + (xy * nx + yy * ny + zy * nz) * N[i, 1]
+            + (xz * nx + yz * ny + zz * nz) * N[i, 2]
         )
-        if facing < 0.6:
-            continue
-        w = (1.0 - d2 / (reach * reach)) ** 2
-        r = nx * dx + ny * dy + nz * dz
-        J[0], J[1], J[2] = nx, ny, nz
-        J[3], J[4], J[5] = y * nz - z * ny, z * nx - x * nz, x * ny - y * nx
-        for k in range(6):
-            g[k] += w * J[k] * r
-            for m in range(k + 1):
-                H[k, m] += w * J[k] * J[m]
-        count += 1
-        weight += w
+        near = 1.0 - (dx * dx + dy * dy + dz * dz) * nearness
+        w, r = near * near, nx * dx + ny * dy + nz * dz
+        n = count
+        J[0, n], J[1, n], J[2, n] = nx, ny, nz
+        J[3, n], J[4, n], J[5, n] = b * nz - c * ny, c * nx - a * nz, a * ny - b * nx
+        residual[n], weight[n] = r, w
+        pair = (near > 0.0) & (facing >= FACING)
+        count += pair
+        w *= pair
+        total += w
         squared += w * r * r
-        sums[0] += w * x
-        sums[1] += w * y
-        sums[2] += w * z
-        squares += w * (x * x + y * y + z * z)
+        sum_x += w * a
+        sum_y += w * b
+        sum_z += w * c
+        squares += w * (a * a + b * b + c * c)
+    J, residual, weight = J[:, :count], residual[:count], weight[:count]
+    H[:], g[:] = 0.0, 0.0
+    add_normal_equations(J, residual, weight, H, g)
+    spread = squares / total - (sum_x * sum_x + sum_y * sum_y + sum_z * sum_z) / (total * total)
+    return count, total, squared, max(0.0, spread)
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def moved(points, T):  # type: ignore[no-untyped-def]
+    """The x, y and z (N,) of ``points (N, 3)`` moved by ``T (4, 4)``."""
+    xx, xy, xz, x0 = T[0, 0], T[0, 1], T[0, 2], T[0, 3]
+    yx, yy, yz, y0 = T[1, 0], T[1, 1], T[1, 2], T[1, 3]
+    zx, zy, zz, z0 = T[2, 0], T[2, 1], T[2, 2], T[2, 3]
+    x, y, z = np.empty(len(points)), np.empty(len(points)), np.empty(len(points))
+    for i in range(len(points)):
+        a, b, c = points[i, 0], points[i, 1], points[i, 2]
+        x[i] = xx * a + xy * b + xz * c + x0
+        y[i] = yx * a + yy * b + yz * c + y0
+        z[i] = zx * a + zy * b + zz * c + z0
+    return x, y, z
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _partners(x, y, z, closest, low, cell):  # type: ignore[no-untyped-def]
+    """Which of the places (N,) have a closest point in their cell of the grid, and which that is: (n,) indices each."""
+    met, partner, n = np.empty(len(x), INDEX), np.empty(len(x), INDEX), 0
+    rows, columns, layers = closest.shape
+    x0, y0, z0, scale = float(low[0]), float(low[1]), float(low[2]), 1.0 / cell
+    for i in range(len(x)):
+        a, b, c = (x[i] - x0) * scale, (y[i] - y0) * scale, (z[i] - z0) * scale
+        if not ((a >= 0.0) & (b >= 0.0) & (c >= 0.0) & (a < rows) & (b < columns) & (c < layers)):
+            continue
+        j = closest[INDEX(a), INDEX(b), INDEX(c)]
+        met[n], partner[n] = i, max(j, 0)
+        n += j >= 0
+    return met[:n], partner[:n]
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def add_normal_equations(J, error, weight, H, g):  # type: ignore[no-untyped-def]
+    """Add to H (6, 6) and g (6,) those of errors (n,) with a weight and a Jacobian (6, n)."""
+    weighed = np.empty(len(error))
     for k in range(6):
-        for m in range(k):
-            H[m, k] = H[k, m]
-    spread = squares / weight - (sums[0] ** 2 + sums[1] ** 2 + sums[2] ** 2) / weight**2
-    return count, weight, squared, max(0.0, spread)
+        pull = 0.0
+        for i in range(len(error)):
+            weighed[i] = weight[i] * J[k, i]
+            pull += weighed[i] * error[i]
+        g[k] += pull
+        for m in range(k + 1):
+            total = 0.0
+            for i in range(len(error)):
+                total += weighed[i] * J[m, i]
+            H[k, m] += total
+            if m != k:
+                H[m, k] += total
 
 
 @numba.njit(cache=True, nogil=True)

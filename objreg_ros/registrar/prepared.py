@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,32 +51,38 @@ class Prepared:
 
 
 def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
-    """Everything about one keyframe that does not depend on its partner."""
+    """Everything about one keyframe that does not depend on its partner.
+
+    Surface and features are made beside the rest: together they take as long, and let go of the interpreter.
+    """
     fine = thin(*seen(keyframe, params), params.surface_voxel)
     coarse = thin(*fine, params.feature_voxel)
     things = thin(*of_objects(keyframe), params.thing_voxel)
     groups = LabelGroups(params.label_groups)
     up = None if keyframe.gravity is None else -np.asarray(keyframe.gravity, float)
-    shapes = tuple(prepare_shape(keyframe, [i], params.shape_points) for i in range(len(keyframe.objects)))
     seeing = params.context_range, params.detail_sigma, params.seed
-    return Prepared(
-        keyframe=keyframe,
-        sight=prepare_sight(keyframe.view, *seeing),
-        coarse=prepare_sight(halved(keyframe.view), *seeing),
-        surface=prepare_surface(*joined(fine, things), params.grid_cell, params.grid_reach),
-        features=salient(describe(*coarse, params.feature_radius), params.feature_points),
-        **_shuffled(*joined(coarse, sampled(things, params.thing_points, params.seed)), params.seed),
-        up=up,
-        groups=tuple(groups.of(label) for label in keyframe.labels),
-        yaw_known=tuple(
-            tells_yaw(item.cloud, up, shape, params) for item, shape in zip(keyframe.objects, shapes, strict=True)
-        ),
-        shapes=shapes,
-        scene=prepare_shape(keyframe, range(len(keyframe.objects)), params.scene_points),
-        centroids=np.array([item.centroid for item in keyframe.objects]).reshape(-1, 3),
-        extents=np.array([item.extent for item in keyframe.objects]),
-        middle=np.asarray(coarse[0].mean(axis=0) if len(coarse[0]) else np.zeros(3), float),
-    )
+    with ThreadPoolExecutor(1, "prepare") as beside:
+        surface = beside.submit(prepare_surface, *joined(fine, things), params.grid_cell, params.grid_reach)
+        features = beside.submit(describe, *coarse, params.feature_radius)
+        shapes = tuple(prepare_shape(keyframe, [i], params.shape_points) for i in range(len(keyframe.objects)))
+        return Prepared(
+            keyframe=keyframe,
+            sight=prepare_sight(keyframe.view, *seeing),
+            coarse=prepare_sight(halved(keyframe.view), *seeing),
+            **_shuffled(*joined(coarse, sampled(things, params.thing_points, params.seed)), params.seed),
+            up=up,
+            groups=tuple(groups.of(label) for label in keyframe.labels),
+            yaw_known=tuple(
+                tells_yaw(item.cloud, up, shape, params) for item, shape in zip(keyframe.objects, shapes, strict=True)
+            ),
+            shapes=shapes,
+            scene=prepare_shape(keyframe, range(len(keyframe.objects)), params.scene_points),
+            centroids=np.array([item.centroid for item in keyframe.objects]).reshape(-1, 3),
+            extents=np.array([item.extent for item in keyframe.objects]),
+            middle=np.asarray(coarse[0].mean(axis=0) if len(coarse[0]) else np.zeros(3), float),
+            surface=surface.result(),
+            features=salient(features.result(), params.feature_points),
+        )
 
 
 def seen(keyframe: Keyframe, params: RegistrarParams) -> tuple[Array, Array]:

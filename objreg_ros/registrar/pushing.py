@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 
 from objreg_ros.data import Array
@@ -30,15 +28,15 @@ class Stand:
 
     def fall(self, motion: Array) -> float:
         """How much less the views like the pose after a motion either way, the way that they like more."""
-        return self.least_fall((-motion, motion))
+        return self.least_fall(np.array([-motion, motion]))
 
-    def least_fall(self, motions: Iterable[Array]) -> float:
-        """How much less the views like the pose after that of the motions that they like most.
+    def least_fall(self, motions: Array) -> float:
+        """How much less the views like the pose after that of the motions (K, 6) that they like most.
 
         A look at the grey of both in one image takes ten times as long as the other, so where that one finds a larger
         fall than there is elsewhere it is spared.
         """
-        poses = np.array([pushed(self._T_target_source, motion) for motion in motions])
+        poses = pushed(self._T_target_source, motions)
         quick, ways = self._seen(poses)
         least = np.inf
         for k in np.argsort(-quick):
@@ -61,7 +59,7 @@ class Stand:
         return rate_sharply(*self._sights, T_target_source, ways, self._params, self._params.grey_points)
 
 
-def pushed(T_target_source: Array, motion: Array) -> Array:
-    """The pose (4, 4) after a motion [t r]."""
+def pushed(T_target_source: Array, motions: Array) -> Array:
+    """The poses (..., 4, 4) that a pose (4, 4) becomes by motions [t r] (..., 6)."""
     R, t = T_target_source[:3, :3], T_target_source[:3, 3]
-    return pose(rotation_from_vector(motion[3:]) @ R, t + motion[:3])
+    return pose(rotation_from_vector(motions[..., 3:]) @ R, t + motions[..., :3])

@@ -57,6 +57,10 @@ class _Accepted:
     candidate: Candidate
 
 
+_Try = tuple[Place, Callable[[], _Accepted | Rejected] | None]
+"""A place that is being tried, and what waits for its verdict."""
+
+
 class Registrar:
     """Finds the loops. Holds the store at ``params.store`` until `close`; StoreError (an OSError) if that is bad."""
 
@@ -127,6 +131,8 @@ class Registrar:
             sightings = sightings_of(keyframe, self._path.travelled, self._path.turned)
             accepted, rejected = self._try_places(keyframe, sightings, deadline)
             closures, named = self._remember(keyframe, sightings, accepted)
+            if time.monotonic() < deadline:
+                self._pool.submit(self._engine.prepare, keyframe)  # while nothing waits: it will be met again
             seen = observations(keyframe, named)
             return Outcome(
                 closures=closures,
@@ -163,41 +169,40 @@ class Registrar:
         if not places:
             refusal = Reason.NO_CANDIDATE, f"none of {len(self._index)} stored objects is alike and may be here"
             rejected.append(_rejected(keyframe.stamp_ns, keyframe, refusal))
-        tries = self.params.candidates
-        while places and tries > 0 and len(accepted) < self.params.closures:
-            for place, ask in self._begun(keyframe, places, min(tries, self.params.threads), deadline):
-                if len(accepted) == self.params.closures:
-                    break
-                if ask is None or self._thinning.redundant(place.stamp_ns, keyframe.stamp_ns):
-                    refusal = Reason.REDUNDANT, f"an accepted closure is nearer than {self.params.thin_seconds} s"
-                    rejected.append(_rejected(place.stamp_ns, keyframe, refusal))
-                    continue
-                tries -= 1
-                verdict = ask()
-                if isinstance(verdict, _Accepted):
-                    self._thinning.accept(place.stamp_ns, keyframe.stamp_ns)
-                    accepted.append(verdict)
-                else:
-                    rejected.append(verdict)
+        tries, trying = self.params.candidates, deque[_Try]()
+        while len(accepted) < self.params.closures:
+            self._begin(keyframe, places, trying, tries, self.params.closures - len(accepted), deadline)
+            if not trying:
+                break
+            place, ask = trying.popleft()
+            if ask is None or self._thinning.redundant(place.stamp_ns, keyframe.stamp_ns):
+                refusal = Reason.REDUNDANT, f"an accepted closure is nearer than {self.params.thin_seconds} s"
+                rejected.append(_rejected(place.stamp_ns, keyframe, refusal))
+                continue
+            tries -= 1
+            verdict = ask()
+            if isinstance(verdict, _Accepted):
+                self._thinning.accept(place.stamp_ns, keyframe.stamp_ns)
+                accepted.append(verdict)
+            else:
+                rejected.append(verdict)
         return accepted, tuple(rejected)
 
-    def _begun(
-        self, keyframe: Keyframe, places: deque[Place], count: int, deadline: float
-    ) -> list[tuple[Place, Callable[[], _Accepted | Rejected] | None]]:
-        """Take places off until ``count`` are being tried, all at once; with each what waits for its verdict.
+    def _begin(
+        self, keyframe: Keyframe, places: deque[Place], trying: deque[_Try], tries: int, wanted: int, deadline: float
+    ) -> None:
+        """Take places off until as many are ``trying`` as there are threads and ``tries`` left.
 
-        None for one that would say what is said already. Verdicts are asked for in the order of the places, so that it
-        does not matter which is done first.
+        While some are, no more than would be ``wanted`` if all were accepted. Without a try is what would say what is
+        said already. Verdicts are asked for in the order of the places, so it does not matter which is done first.
         """
-        begun: list[tuple[Place, Callable[[], _Accepted | Rejected] | None]] = []
-        while places and count > 0:
+        busy = sum(ask is not None for _, ask in trying)
+        most = min(tries, self.params.threads if busy == 0 else min(wanted, self.params.threads))
+        while places and busy < most:
             place = places.popleft()
-            if self._thinning.redundant(place.stamp_ns, keyframe.stamp_ns):
-                begun.append((place, None))
-                continue
-            begun.append((place, self._try_place(keyframe, place, deadline)))
-            count -= 1
-        return begun
+            redundant = self._thinning.redundant(place.stamp_ns, keyframe.stamp_ns)
+            trying.append((place, None if redundant else self._try_place(keyframe, place, deadline)))
+            busy += not redundant
 
     def _try_place(self, keyframe: Keyframe, place: Place, deadline: float) -> Callable[[], _Accepted | Rejected]:
         """Begin to register a place in a thread of its own; what comes back waits for the verdict."""

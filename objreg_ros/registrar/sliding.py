@@ -87,7 +87,7 @@ def preferred(
         return None
     steps = params.search_step * np.arange(-params.search_steps, params.search_steps + 1)
     pushes = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-    poses = np.array([pushed(T_target_source, motion) for motion in pushes @ weakest(C)])
+    poses = pushed(T_target_source, pushes @ weakest(C))
     V = rank(source.sight, target.sight, poses, params, params.quick_sample).astype(np.float32)
     best, most = None, own + CLEARLY
     peaks = poses[_peaks(V, len(steps))[: params.searched]]
@@ -104,10 +104,9 @@ def _turned(source: Prepared, target: Prepared, T_target_source: Array, params: 
     if target.up is None or len(source.centroids) == 0:
         return []
     middle = transform(T_target_source, source.centroids.mean(axis=0))
-    turns = [
-        rotation_from_vector(way * turn * target.up) for turn in np.radians(params.search_turns) for way in (-1, 1)
-    ]
-    return [pose(R, middle - R @ middle) @ T_target_source for R in turns]
+    turns = np.radians([way * turn for turn in params.search_turns for way in (-1, 1)])
+    R = rotation_from_vector(turns[:, None] * target.up)
+    return list(pose(R, middle - R @ middle) @ T_target_source)
 
 
 def _peaks(V: Array, width: int) -> list[int]:

@@ -32,29 +32,29 @@ def test_a_push_moves_the_camera_where_it_stands() -> None:
 
 def test_the_truth_falls_whichever_way_it_is_pushed_and_the_farther_the_more() -> None:
     here = stand()
-    assert 0.0 < here.least_fall((0.3 * ACROSS,)) < here.least_fall((ACROSS,))
+    assert 0.0 < here.least_fall(0.3 * ACROSS[None]) < here.least_fall(ACROSS[None])
 
 
 def test_of_two_ways_the_one_that_is_liked_more_counts() -> None:
     here = stand()
-    ways = [here.least_fall((way,)) for way in (ACROSS, -ACROSS)]
+    ways = [here.least_fall(way[None]) for way in (ACROSS, -ACROSS)]
     assert here.fall(ACROSS) == min(ways) < max(ways)
 
 
 def test_of_many_motions_the_one_that_is_liked_most_counts_though_not_all_are_looked_at_closely() -> None:
     here, rng = stand(), np.random.default_rng(5)
     motions = rng.uniform(-0.1, 0.1, (12, 6))
-    assert here.least_fall(motions) == min(here.least_fall((motion,)) for motion in motions)
+    assert here.least_fall(motions) == min(here.least_fall(motion[None]) for motion in motions)
 
 
 def test_no_push_is_no_fall() -> None:
-    assert stand().least_fall((np.zeros(6),)) == pytest.approx(0.0, abs=1e-9)
+    assert stand().least_fall(np.zeros((1, 6))) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_fall_is_never_less_than_that_of_the_images_own_bands() -> None:
     views = [prepare(keyframe(seen_from(a), seed=k), PARAMS).sight for k, a in enumerate((0.0, 20.0))]
     own, other = rank(*views, np.array([TRUTH, pushed(TRUTH, ACROSS)]), PARAMS, PARAMS.grey_points)
-    assert stand().least_fall((ACROSS,)) >= own - other
+    assert stand().least_fall(ACROSS[None]) >= own - other
 
 
 def test_views_without_grey_are_asked_for_free_space_alone() -> None:
