@@ -28,8 +28,7 @@ def finish(source: Prepared, target: Prepared, T_target_source: Array, params: R
     The information (6, 6) is of a left step [t r], in the units of `icp.fit`: 1 is a point that holds its plane.
     Both views must have grey.
     """
-    surface, few = target.surface, slice(params.grey_points)
-    shape = (source.xyz, source.normals, surface.xyz, surface.normals, surface.closest, surface.low, surface.cell)
+    few, shape = slice(params.grey_points), (source.xyz, source.normals, *target.surface.grid)
     a, b = source.sight, target.sight
     slops = params.depth_tolerance, params.depth_tolerance_growth
     T, K = np.ascontiguousarray(T_target_source, np.float64).copy(), np.zeros((6, 6))

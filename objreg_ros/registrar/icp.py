@@ -33,6 +33,11 @@ class Surface:
     def __len__(self) -> int:
         return len(self.xyz)
 
+    @property
+    def grid(self) -> tuple[Array, Array, Array, Array, float]:
+        """The points, their normals and the grid, for the kernels."""
+        return self.xyz, self.normals, self.closest, self.low, self.cell
+
 
 def prepare_surface(xyz: Array, normals: Array, cell: float, reach: float) -> Surface:
     """A surface whose grid knows the closest point out to ``reach`` m; ``cell`` m grows for a very large cloud."""
@@ -59,10 +64,7 @@ def align(
     if len(T) == 0 or len(xyz) == 0 or len(surface) == 0:
         return np.array(T, float).reshape(-1, 4, 4), np.zeros(len(T)), np.full(len(T), np.inf)
     poses = np.ascontiguousarray(T, np.float64).copy()
-    share, rmse = _align(
-        xyz, normals, surface.xyz, surface.normals, surface.closest, surface.low, surface.cell,
-        poses, reach, last_reach, iterations,
-    )  # fmt: skip
+    share, rmse = _align(xyz, normals, *surface.grid, poses, reach, last_reach, iterations)
     return poses, share, rmse
 
 
@@ -79,9 +81,7 @@ class Fit(NamedTuple):
 def fit(xyz: Array, normals: Array, surface: Surface, T: Array, reach: float) -> Fit:
     """The fit of one pose (4, 4): what of the points (M, 3) has a partner within ``reach`` m."""
     H, g = np.zeros((6, 6)), np.zeros(6)
-    count, weight, squared, spread = normal_equations(
-        xyz, normals, surface.xyz, surface.normals, surface.closest, surface.low, surface.cell, T, reach, H, g
-    )
+    count, weight, squared, spread = normal_equations(xyz, normals, *surface.grid, T, reach, H, g)
     rmse = float(np.sqrt(squared / max(1e-9, weight)))
     return Fit(H, float(weight), int(count), rmse, max(0.05, float(np.sqrt(spread))))
 
@@ -113,19 +113,38 @@ def _closest(xyz, low, cell, shape, reach):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
 def normal_equations(P, N, Q, M, closest, low, cell, T, reach, H, g):  # type: ignore[no-untyped-def]
-    """Fill H (6, 6) and g (6,) of the step [t r] at pose T; returns pairs, their weight, error and spread.
+    """Fill H (6, 6) and g (6,) of the step [t r] at pose T; returns pairs, their weight, error and spread."""
+    _, at, J, residual, weight = pair(P, N, Q, M, closest, low, cell, T, reach)
+    H[:], g[:] = 0.0, 0.0
+    add_normal_equations(J, residual, weight, H, g)
+    total, squared, x, y, z, squares = 1e-9, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(len(weight)):
+        w, a, b, c = weight[k], at[0, k], at[1, k], at[2, k]
+        total += w
+        squared += w * residual[k] * residual[k]
+        x += w * a
+        y += w * b
+        z += w * c
+        squares += w * (a * a + b * b + c * c)
+    spread = squares / total - (x * x + y * y + z * z) / (total * total)
+    return len(weight), total, squared, max(0.0, spread)
 
-    As in `projection.py` everything is looked up first and doubted afterwards: what is no pair weighs nothing.
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def pair(P, N, Q, M, closest, low, cell, T, reach):  # type: ignore[no-untyped-def]
+    """The points P that T brings within ``reach`` m of the point closest to them, of a normal that is compatible.
+
+    Their indices (n,), where they are (3, n), the Jacobian (6, n) of a left step [t r], the residual (n,) m and Tukey's
+    weight (n,). As in `projection.py` everything is looked up first and doubted afterwards.
     """
     x, y, z = moved(P, T)
     met, partner = _partners(x, y, z, closest, low, cell)
     xx, xy, xz = T[0, 0], T[0, 1], T[0, 2]
     yx, yy, yz = T[1, 0], T[1, 1], T[1, 2]
     zx, zy, zz = T[2, 0], T[2, 1], T[2, 2]
-    J, residual, weight = np.empty((6, len(met))), np.empty(len(met)), np.empty(len(met))
-    nearness = 1.0 / (reach * reach)
-    count, total, squared = 0, 1e-9, 0.0
-    sum_x, sum_y, sum_z, squares = 0.0, 0.0, 0.0, 0.0
+    at, J = np.empty((3, len(met))), np.empty((6, len(met)))
+    residual, weight = np.empty(len(met)), np.empty(len(met))
+    nearness, n = 1.0 / (reach * reach), 0
     for k in range(len(met)):
         i, j = met[k], partner[k]
         a, b, c = x[i], y[i], z[i]
@@ -137,25 +156,12 @@ def normal_equations(P, N, Q, M, closest, low, cell, T, reach, H, g):  # type: i
             + (xz * nx + yz * ny + zz * nz) * N[i, 2]
         )
         near = 1.0 - (dx * dx + dy * dy + dz * dz) * nearness
-        w, r = near * near, nx * dx + ny * dy + nz * dz
-        n = count
+        met[n], residual[n], weight[n] = i, nx * dx + ny * dy + nz * dz, near * near
+        at[0, n], at[1, n], at[2, n] = a, b, c
         J[0, n], J[1, n], J[2, n] = nx, ny, nz
         J[3, n], J[4, n], J[5, n] = b * nz - c * ny, c * nx - a * nz, a * ny - b * nx
-        residual[n], weight[n] = r, w
-        pair = (near > 0.0) & (facing >= FACING)
-        count += pair
-        w *= pair
-        total += w
-        squared += w * r * r
-        sum_x += w * a
-        sum_y += w * b
-        sum_z += w * c
-        squares += w * (a * a + b * b + c * c)
-    J, residual, weight = J[:, :count], residual[:count], weight[:count]
-    H[:], g[:] = 0.0, 0.0
-    add_normal_equations(J, residual, weight, H, g)
-    spread = squares / total - (sum_x * sum_x + sum_y * sum_y + sum_z * sum_z) / (total * total)
-    return count, total, squared, max(0.0, spread)
+        n += (near > 0.0) & (facing >= FACING)
+    return met[:n], at[:, :n], J[:, :n], residual[:n], weight[:n]
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)

@@ -49,7 +49,7 @@ def _begun(
     extent = 0.5 * (source.extent + target.extent)
     starts = _starts(yaws, params.shape_offset * extent)
     settling = extent, weights_of(params), sample, _reach(source, target)
-    return _started(source.sight, target.sight, _grid(target), starts, *settling, cleared)
+    return _started(source.sight, target.sight, target.surface.grid, starts, *settling, cleared)
 
 
 def _reach(source: Shape, target: Shape) -> float:
@@ -64,7 +64,7 @@ def improve(source: Shape, target: Shape, poses: Sequence[Array], params: Regist
     motions = np.array([upright_motion(source, target, T) for T in poses]).reshape(-1, 4)
     extent = 0.5 * (source.extent + target.extent)
     settling = extent, weights_of(params), params.shape_glance, WIDEST_REACH
-    moved, scores = _started(source.sight, target.sight, _grid(target), motions, *settling, CLEARED)
+    moved, scores = _started(source.sight, target.sight, target.surface.grid, motions, *settling, CLEARED)
     return _finished(source, target, moved, scores, 0.5 * WIDEST_REACH, params)
 
 
@@ -79,16 +79,10 @@ def _finished(
 ) -> list[Fitting]:
     extent = 0.5 * (source.extent + target.extent)
     numbers, margin = (params.shape_kept, params.shape_climbed, params.shape_rounds), params.shape_margin
-    found, worth = _finish(
-        source.sight, target.sight, _grid(target), motions, scores, extent, weights_of(params), numbers, margin, reach
-    )
+    sights = source.sight, target.sight, target.surface.grid
+    found, worth = _finish(*sights, motions, scores, extent, weights_of(params), numbers, margin, reach)
     order = np.argsort(-worth, kind="stable")
     return [Fitting(upright_pose(source, target, found[k]), float(worth[k])) for k in order]
-
-
-def _grid(shape: Shape) -> tuple[Array, Array, Array, Array, float]:
-    surface = shape.surface
-    return surface.xyz, surface.normals, surface.closest, surface.low, surface.cell
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
