@@ -29,6 +29,7 @@ from objreg_ros.registrar.verify import WORST, looks, rank, rate, verify
 
 APART = (np.radians(4.0), 0.04)  # rad and m: hypotheses are distinct beyond before they are settled
 HOPELESS = 2.0  # times the violations that the gate allows: what is not refined any more
+TILTED = 1.5  # times the error of gravity that the gate allows: the same
 ALIKE = (np.radians(0.5), 0.01)  # and after
 
 
@@ -123,7 +124,7 @@ class Engine:
         Two views of nothing in common may look alike by chance: V sees what little meets, and that is not refused.
         """
         errors = [gravity_error_deg(pair.source, pair.target, seed.T_target_source) or 0.0 for seed in seeds]
-        good = held & (np.array(errors) <= self._params.max_gravity_error)
+        good = held & (np.array(errors) <= TILTED * self._params.max_gravity_error)
         return [seed for seed, hopeful in zip(seeds, good, strict=True) if hopeful] or seeds
 
     def _rated(self, pair: Pair, seeds: list[Hypothesis]) -> list[Hypothesis]:

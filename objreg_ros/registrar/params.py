@@ -255,7 +255,7 @@ class RegistrarParams(Params):
     min_margin_painted: float = param(
         0.45, "least worth above that of any other pose where grey, but not the lone object, confirms it", ge=0.0
     )
-    max_gravity_error: float = param(5.0, "largest angle between the gravities", "deg", ge=0.0, le=180.0)
+    max_gravity_error: float = param(3.5, "largest angle between the gravities", "deg", ge=0.0, le=180.0)
     max_translation: float = param(5.0, "largest distance between the two cameras", "m", ge=0.0)
     max_slack_sigma: float = param(
         0.03, "standard deviation of a position beyond which the views must resist a push more", "m", ge=0.001
