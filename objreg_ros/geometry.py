@@ -36,7 +36,7 @@ def rotate(T_a_b: Array, vectors_b: Array) -> Array:
 
 
 def pose(R: Array, t: Array) -> Array:
-    """The poses (..., 4, 4) of rotations (..., 3, 3) and translations (..., 3)."""
+    """The poses (..., 4, 4) of rotations (..., 3, 3) and as many translations (..., 3)."""
     T = np.zeros((*R.shape[:-2], 4, 4))
     T[..., :3, :3], T[..., :3, 3], T[..., 3, 3] = R, t, 1.0
     return T
@@ -73,8 +73,9 @@ def skew(v: Array) -> Array:
 
 def rotation_from_vector(rotation_vector: Array) -> Array:
     """Rodrigues' formula: the rotations (..., 3, 3) about axes (..., 3) by their lengths in radians."""
-    angle = np.linalg.norm(rotation_vector, axis=-1)[..., None, None]
-    K = skew(rotation_vector) / np.maximum(angle, np.finfo(float).tiny)
+    vector = np.asarray(rotation_vector, float)
+    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
+    K = skew(vector) / np.maximum(angle, np.finfo(float).tiny)
     return np.asarray(np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * (K @ K))
 
 

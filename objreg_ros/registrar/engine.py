@@ -28,9 +28,9 @@ from objreg_ros.registrar.sliding import preferred, steadied
 from objreg_ros.registrar.verify import WORST, looks, rank, rate, verify
 
 APART = (np.radians(4.0), 0.04)  # rad and m: hypotheses are distinct beyond before they are settled
-HOPELESS = 2.0  # times the violations that the gate allows: what is not refined any more
-TILTED = 1.5  # times the error of gravity that the gate allows: the same
 ALIKE = (np.radians(0.5), 0.01)  # and after
+HOPELESS = 2.0  # times the violations that the gate allows: what is not refined any more
+TILTED = 1.5  # times the error of gravity that the gate allows: what is not refined either
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

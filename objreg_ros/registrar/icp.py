@@ -137,7 +137,7 @@ def pair(P, N, Q, M, closest, low, cell, T, reach):  # type: ignore[no-untyped-d
     Their indices (n,), where they are (3, n), the Jacobian (6, n) of a left step [t r], the residual (n,) m and Tukey's
     weight (n,). As in `projection.py` everything is looked up first and doubted afterwards.
     """
-    x, y, z = moved(P, T)
+    x, y, z = _moved(P, T)
     met, partner = _partners(x, y, z, closest, low, cell)
     xx, xy, xz = T[0, 0], T[0, 1], T[0, 2]
     yx, yy, yz = T[1, 0], T[1, 1], T[1, 2]
@@ -165,7 +165,7 @@ def pair(P, N, Q, M, closest, low, cell, T, reach):  # type: ignore[no-untyped-d
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def moved(points, T):  # type: ignore[no-untyped-def]
+def _moved(points, T):  # type: ignore[no-untyped-def]
     """The x, y and z (N,) of ``points (N, 3)`` moved by ``T (4, 4)``."""
     xx, xy, xz, x0 = T[0, 0], T[0, 1], T[0, 2], T[0, 3]
     yx, yy, yz, y0 = T[1, 0], T[1, 1], T[1, 2], T[1, 3]

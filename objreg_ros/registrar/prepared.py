@@ -53,7 +53,7 @@ class Prepared:
 def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
     """Everything about one keyframe that does not depend on its partner.
 
-    Surface and features are made beside the rest: together they take as long, and let go of the interpreter.
+    Surface and features are made beside the rest: they take as long as all of it, and let go of the interpreter.
     """
     fine = thin(*seen(keyframe, params), params.surface_voxel)
     coarse = thin(*fine, params.feature_voxel)

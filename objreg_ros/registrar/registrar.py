@@ -131,8 +131,6 @@ class Registrar:
             sightings = sightings_of(keyframe, self._path.travelled, self._path.turned)
             accepted, rejected = self._try_places(keyframe, sightings, deadline)
             closures, named = self._remember(keyframe, sightings, accepted)
-            if time.monotonic() < deadline:
-                self._pool.submit(self._engine.prepare, keyframe)  # while nothing waits: it will be met again
             seen = observations(keyframe, named)
             return Outcome(
                 closures=closures,
@@ -191,10 +189,11 @@ class Registrar:
     def _begin(
         self, keyframe: Keyframe, places: deque[Place], trying: deque[_Try], tries: int, wanted: int, deadline: float
     ) -> None:
-        """Take places off until as many are ``trying`` as there are threads and ``tries`` left.
+        """Begin to try the next places: as many at once as there are threads, and never more than ``tries``.
 
-        While some are, no more than would be ``wanted`` if all were accepted. Without a try is what would say what is
-        said already. Verdicts are asked for in the order of the places, so it does not matter which is done first.
+        While some are being tried, no more than would be ``wanted`` if all of them were accepted. What would say what
+        is said already is put aside without a try. Verdicts are asked for in the order of the places, so it does not
+        matter which is done first.
         """
         busy = sum(ask is not None for _, ask in trying)
         most = min(tries, self.params.threads if busy == 0 else min(wanted, self.params.threads))

@@ -47,6 +47,14 @@ def test_each_kind_of_evidence_alone_can_refuse(evidence: dict[str, object], rea
     assert any(letter.isdigit() for letter in refusal[1])
 
 
+def test_gravity_may_tilt_by_what_the_planes_of_two_views_err_and_no_more() -> None:
+    most = PARAMS.max_gravity_error
+    assert most < 4.0
+    assert refuse(candidate(gravity_error_deg=most - 0.1), PARAMS) is None
+    refusal = refuse(candidate(gravity_error_deg=most + 0.1), PARAMS)
+    assert refusal is not None and refusal[0] is Reason.GRAVITY
+
+
 def test_a_candidate_without_grey_or_gravity_is_judged_by_the_rest() -> None:
     assert refuse(candidate(texture=None, gravity_error_deg=None), PARAMS) is None
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
-from objreg_ros.registrar.icp import align, fit, prepare_surface
+from objreg_ros.registrar.icp import align, fit, pair, prepare_surface
 
 from .rooms import keyframe, seen_from
 
@@ -41,6 +41,21 @@ def test_a_start_out_of_reach_stays_and_shares_nothing(scene) -> None:
     away = pose(np.eye(3), np.array([30.0, 0.0, 0.0]))
     poses, share, _ = align(*scene, away[None], 0.15, 0.05, 25)
     assert np.array_equal(poses[0], away) and share[0] == 0.0
+
+
+def test_pairs_are_near_face_alike_and_have_the_distance_to_the_plane_as_residual(scene) -> None:
+    xyz, normals, surface = scene
+    index, at, J, residual, weight = pair(xyz, normals, *surface.grid, TRUTH, 0.05)
+    moved = xyz[index] @ TRUTH[:3, :3].T + TRUTH[:3, 3]
+    assert len(index) > 0.5 * len(xyz) and np.allclose(at.T, moved, atol=1e-5)
+    assert np.median(np.abs(residual)) < 0.01 and weight.min() > 0.0 and weight.max() <= 1.0
+    assert np.allclose(J[3:].T, np.cross(at.T, J[:3].T))
+
+
+def test_nothing_pairs_out_of_reach(scene) -> None:
+    away = pose(np.eye(3), np.array([30.0, 0.0, 0.0]))
+    index, at, J, residual, weight = pair(*scene[:2], *scene[2].grid, away, 0.05)
+    assert [part.shape for part in (index, at, J, residual, weight)] == [(0,), (3, 0), (6, 0), (0,), (0,)]
 
 
 def test_the_grid_names_the_closest_point() -> None:
