@@ -36,8 +36,8 @@ def rotate(T_a_b: Array, vectors_b: Array) -> Array:
 
 
 def pose(R: Array, t: Array) -> Array:
-    """The poses (..., 4, 4) of rotations (..., 3, 3) and as many translations (..., 3)."""
-    T = np.zeros((*R.shape[:-2], 4, 4))
+    """The poses (..., 4, 4) of rotations (..., 3, 3) and translations (..., 3), which broadcast."""
+    T = np.zeros((*np.broadcast_shapes(np.shape(R)[:-2], np.shape(t)[:-1]), 4, 4))
     T[..., :3, :3], T[..., :3, 3], T[..., 3, 3] = R, t, 1.0
     return T
 

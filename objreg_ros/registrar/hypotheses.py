@@ -65,7 +65,7 @@ def from_objects(source: Prepared, target: Prepared, params: RegistrarParams) ->
     yaws = np.linspace(0.0, 2.0 * np.pi, params.yaw_steps, endpoint=False)
     R = rotation_from_vector(yaws[:, None] * target.up) @ rotation_between(source.up, target.up)
     moved = np.einsum("kab,ib->ika", R, source.centroids[i])
-    T = pose(np.broadcast_to(R, (len(i), *R.shape)), target.centroids[j][:, None] - moved).reshape(-1, 4, 4)
+    T = pose(R, target.centroids[j][:, None] - moved).reshape(-1, 4, 4)
     worth = rank(source.sight, target.sight, T, params, params.glance)
     best = np.argsort(-worth, kind="stable")[: params.seeds_per_object_chain]
     return [Hypothesis(T_target_source=T[k], chain="objects", worth=float(worth[k])) for k in best]

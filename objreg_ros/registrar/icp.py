@@ -14,7 +14,7 @@ import numba
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.registrar.projection import INDEX
+from objreg_ros.registrar.projection import INDEX, moved
 
 MOST_CELLS = 4_000_000
 FACING = 0.6  # cosine between the normals of a pair, at least
@@ -137,7 +137,7 @@ def pair(P, N, Q, M, closest, low, cell, T, reach):  # type: ignore[no-untyped-d
     Their indices (n,), where they are (3, n), the Jacobian (6, n) of a left step [t r], the residual (n,) m and Tukey's
     weight (n,). As in `projection.py` everything is looked up first and doubted afterwards.
     """
-    x, y, z = _moved(P, T)
+    x, y, z = moved(P, T)
     met, partner = _partners(x, y, z, closest, low, cell)
     xx, xy, xz = T[0, 0], T[0, 1], T[0, 2]
     yx, yy, yz = T[1, 0], T[1, 1], T[1, 2]
@@ -162,21 +162,6 @@ def pair(P, N, Q, M, closest, low, cell, T, reach):  # type: ignore[no-untyped-d
         J[3, n], J[4, n], J[5, n] = b * nz - c * ny, c * nx - a * nz, a * ny - b * nx
         n += (near > 0.0) & (facing >= FACING)
     return met[:n], at[:, :n], J[:, :n], residual[:n], weight[:n]
-
-
-@numba.njit(cache=True, nogil=True, fastmath=True)
-def _moved(points, T):  # type: ignore[no-untyped-def]
-    """The x, y and z (N,) of ``points (N, 3)`` moved by ``T (4, 4)``."""
-    xx, xy, xz, x0 = T[0, 0], T[0, 1], T[0, 2], T[0, 3]
-    yx, yy, yz, y0 = T[1, 0], T[1, 1], T[1, 2], T[1, 3]
-    zx, zy, zz, z0 = T[2, 0], T[2, 1], T[2, 2], T[2, 3]
-    x, y, z = np.empty(len(points)), np.empty(len(points)), np.empty(len(points))
-    for i in range(len(points)):
-        a, b, c = points[i, 0], points[i, 1], points[i, 2]
-        x[i] = xx * a + xy * b + xz * c + x0
-        y[i] = yx * a + yy * b + yz * c + y0
-        z[i] = zx * a + zy * b + zz * c + z0
-    return x, y, z
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)

@@ -17,20 +17,29 @@ ONE = INDEX(1)
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def project(points, T, camera):  # type: ignore[no-untyped-def]
-    """The pixels u, v and the depths z (N,) of ``points (N, 3)`` moved by ``T (4, 4)``; for `lands` to sort out."""
-    fx, fy, cx, cy = camera[0], camera[1], camera[2], camera[3]
+def moved(points, T):  # type: ignore[no-untyped-def]
+    """The x, y and z (N,) of ``points (N, 3)`` moved by ``T (4, 4)``."""
     xx, xy, xz, x0 = T[0, 0], T[0, 1], T[0, 2], T[0, 3]
     yx, yy, yz, y0 = T[1, 0], T[1, 1], T[1, 2], T[1, 3]
     zx, zy, zz, z0 = T[2, 0], T[2, 1], T[2, 2], T[2, 3]
-    u, v, z = np.empty(len(points)), np.empty(len(points)), np.empty(len(points))
+    x, y, z = np.empty(len(points)), np.empty(len(points)), np.empty(len(points))
     for i in range(len(points)):
         a, b, c = points[i, 0], points[i, 1], points[i, 2]
-        depth = zx * a + zy * b + zz * c + z0
-        inverse = 1.0 / max(depth, LEAST_DEPTH)
-        u[i] = fx * (xx * a + xy * b + xz * c + x0) * inverse + cx
-        v[i] = fy * (yx * a + yy * b + yz * c + y0) * inverse + cy
-        z[i] = depth
+        x[i] = xx * a + xy * b + xz * c + x0
+        y[i] = yx * a + yy * b + yz * c + y0
+        z[i] = zx * a + zy * b + zz * c + z0
+    return x, y, z
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def project(points, T, camera):  # type: ignore[no-untyped-def]
+    """The pixels u, v and the depths z (N,) of ``points (N, 3)`` moved by ``T (4, 4)``; for `lands` to sort out."""
+    fx, fy, cx, cy = camera[0], camera[1], camera[2], camera[3]
+    u, v, z = moved(points, T)
+    for i in range(len(points)):
+        inverse = 1.0 / max(z[i], LEAST_DEPTH)
+        u[i] = fx * u[i] * inverse + cx
+        v[i] = fy * v[i] * inverse + cy
     return u, v, z
 
 
