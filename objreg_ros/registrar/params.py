@@ -196,6 +196,9 @@ class RegistrarParams(Params):
     agreement_translation: float = param(0.15, "chains agree within this distance", "m", ge=0.0)
     object_bonus: float = param(0.25, "what an explained object adds to V when candidates are ranked", ge=0.0)
     likeness_weight: float = param(0.5, "what the likeness of explained objects adds to V", ge=0.0)
+    telling_grey: float = param(
+        1000.0, "points whose grey, if it hardly correlates, says as much of where exactly a pose is as objects", ge=0.0
+    )
     explained_distance: float = param(0.06, "an object is explained when the middles are this close", "m", ge=0.0)
     explained_share: float = param(
         0.28,

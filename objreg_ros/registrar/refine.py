@@ -15,7 +15,7 @@ from objreg_ros.geometry import skew, transform
 from objreg_ros.registrar.contradiction import information, warped
 from objreg_ros.registrar.direct import finish
 from objreg_ros.registrar.icp import Fit, align, fit
-from objreg_ros.registrar.objects import explain, liked
+from objreg_ros.registrar.objects import explain, gain, liked
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.sliding import resisted
@@ -65,15 +65,16 @@ def _finished(source: Prepared, target: Prepared, T: Array, params: RegistrarPar
     if not (source.sight.textured and target.sight.textured):
         return T, held
     explained, _ = explain(source, target, T, params)
-    best, _ = liked(source, target, T, explained, params)
+    best = liked(source, target, T, explained, params)
     for _ in range(params.grey_rounds):
         finished, grey = finish(source, target, T, params)
-        worth, seen = liked(source, target, finished, explained, params)
-        if worth < best:
+        found = liked(source, target, finished, explained, params)
+        gained = gain(found, best, params)
+        if gained < 0.0:
             break
-        gain, best, T = worth - best, worth, finished
-        held = grey if (seen.texture or 0.0) >= params.holding_texture else np.zeros((6, 6))
-        if gain < LITTLE:
+        best, T = found, finished
+        held = grey if (found.seen.texture or 0.0) >= params.holding_texture else np.zeros((6, 6))
+        if gained < LITTLE:
             break
     return T, held
 

@@ -15,7 +15,7 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.geometry import pose, rotation_from_vector, transform
 from objreg_ros.registrar.direct import finish
-from objreg_ros.registrar.objects import explain, liked
+from objreg_ros.registrar.objects import explain, gain, liked
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.pushing import Stand, pushed
@@ -82,20 +82,20 @@ def preferred(
     if not (source.sight.textured and target.sight.textured):
         return None
     explained, _ = explain(source, target, T_target_source, params)
-    own, seen = liked(source, target, T_target_source, explained, params)
-    if seen.score < params.min_score - 2.0 * HOPE:
+    own = liked(source, target, T_target_source, explained, params)
+    if own.seen.score < params.min_score - 2.0 * HOPE:
         return None
     steps = params.search_step * np.arange(-params.search_steps, params.search_steps + 1)
     pushes = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     poses = pushed(T_target_source, pushes @ weakest(C))
     V = rank(source.sight, target.sight, poses, params, params.quick_sample).astype(np.float32)
-    best, most = None, own + CLEARLY
+    best, most = None, CLEARLY
     peaks = poses[_peaks(V, len(steps))[: params.searched]]
     turned = _turned(source, target, T_target_source, params)
     for T in (*turned, *(finish(source, target, start, params)[0] for start in (*peaks, *turned))):
-        worth, _ = liked(source, target, T, explained, params)
-        if worth > most:
-            best, most = T, worth
+        gained = gain(liked(source, target, T, explained, params), own, params)
+        if gained > most:
+            best, most = T, gained
     return best
 
 

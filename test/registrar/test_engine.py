@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import View
-from objreg_ros.geometry import inverse, pose, pose_error
+from objreg_ros.geometry import inverse, pose_error
 from objreg_ros.registrar.engine import Engine
 from objreg_ros.registrar.keyframe import Context
-from objreg_ros.registrar.objects import explain
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.prepared import prepare
 
 from .rooms import ROOM, keyframe, seen_from
 
@@ -47,17 +45,6 @@ def test_objects_that_stand_still_are_explained(engine: Engine) -> None:
     best = engine.propose(keyframe(seen_from(0.0), seed=1), keyframe(seen_from(20.0), seed=2))[0]
     assert {pair.label for pair in best.explained} >= {"book", "cup", "bottle"}
     assert best.moved == ()
-
-
-def test_the_middle_of_a_large_thing_may_wander_with_the_side_that_is_seen() -> None:
-    here = prepare(keyframe(seen_from(0.0), seed=1), PARAMS)
-    aside = pose(np.eye(3), np.array([0.13, 0.0, 0.0]))
-
-    def explained(extent: float) -> int:
-        grown = replace(here, extents=np.full(len(here.extents), extent))
-        return len(explain(grown, grown, aside, PARAMS)[0])
-
-    assert explained(0.1) == 0 and explained(1.0) == len(here.groups)
 
 
 def test_an_object_that_moved_is_reported_and_outvoted(engine: Engine) -> None:
