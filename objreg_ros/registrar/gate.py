@@ -168,7 +168,8 @@ def _not_otherwise(candidate: Candidate, params: RegistrarParams) -> bool:
 def _painted(candidate: Candidate, params: RegistrarParams) -> bool:
     """Whether the grey of the views holds the pose, and no other comes anywhere near it, possible or not."""
     texture = candidate.verification.texture
-    return texture is not None and texture >= params.holding_texture and candidate.margin >= params.min_margin_painted
+    painted = texture is not None and texture >= params.min_texture_painted
+    return painted and candidate.margin >= params.min_margin_painted
 
 
 def _stationary(candidate: Candidate, params: RegistrarParams) -> Refusal | None:

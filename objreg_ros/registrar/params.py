@@ -157,7 +157,7 @@ class RegistrarParams(Params):
         0.005, "error of depth that a patch of surface shares, as a share of its distance", ge=0.0, le=0.1
     )
     doubtful_sigma: float = param(
-        0.006, "a position that is known less well than this is pushed as far as the last of the pushes", "m", ge=0.0
+        0.0055, "a position that is known less well than this is pushed as far as the last of the pushes", "m", ge=0.0
     )
     search_step: float = param(
         0.05,
@@ -255,18 +255,21 @@ class RegistrarParams(Params):
         ge=-1.0,
         le=1.0,
     )
+    min_texture_painted: float = param(
+        0.5, "least correlation of grey that confirms a pose where the lone object does not", ge=-1.0, le=1.0
+    )
     min_margin_painted: float = param(
         0.45, "least worth above that of any other pose where grey, but not the lone object, confirms it", ge=0.0
     )
     max_gravity_error: float = param(3.5, "largest angle between the gravities", "deg", ge=0.0, le=180.0)
     max_translation: float = param(5.0, "largest distance between the two cameras", "m", ge=0.0)
     max_slack_sigma: float = param(
-        0.03, "standard deviation of a position beyond which the views must resist a push more", "m", ge=0.001
+        0.0275, "standard deviation of a position beyond which the views must resist a push more", "m", ge=0.001
     )
     odometry_sigmas: float = param(4.0, "largest distance from odometry in its standard deviations", ge=0.0)
 
     # How wrong an accepted pose may be; config/covariance.yaml says how these were calibrated.
-    covariance_scale: float = param(1.0, "factor of the covariance of a registration", ge=0.0)
+    covariance_scale: float = param(0.83, "factor of the covariance of a registration", ge=0.0)
     covariance_patch: float = param(0.8, "edge of a patch of surface whose points err together", "m", ge=0.01)
     covariance_calibration: float = param(
         0.035, "error of a motion, as a share of it, by a camera that is not quite as its calibration says", ge=0.0

@@ -60,8 +60,9 @@ def test_a_candidate_without_grey_or_gravity_is_judged_by_the_rest() -> None:
 
 
 def test_one_object_closes_a_loop_when_grey_holds_the_pose_and_no_other_comes_near() -> None:
-    assert refuse(candidate(explained=(CUP,), margin=1.0), PARAMS) is None
-    for doubt in ({"margin": 0.3}, {"texture": 0.4}, {"texture": None}):
+    least = PARAMS.min_texture_painted
+    assert refuse(candidate(explained=(CUP,), margin=1.0, texture=least + 0.01), PARAMS) is None
+    for doubt in ({"margin": 0.3}, {"texture": least - 0.01}, {"texture": None}):
         refusal = refuse(candidate(**{"explained": (CUP,), "margin": 1.0, **doubt}), PARAMS)
         assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
 
