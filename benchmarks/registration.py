@@ -43,7 +43,7 @@ from pose_figures import SUCCESS, error_at, grouped, judged, mean, median, nees,
 from objreg_ros.data import DepthImage, Detections
 from objreg_ros.geometry import inverse, pose_error, transform
 from objreg_ros.registrar.candidate import Candidate
-from objreg_ros.registrar.covariance import spread_of
+from objreg_ros.registrar.covariance import covariance_of
 from objreg_ros.registrar.engine import Engine
 from objreg_ros.registrar.gate import judge
 from objreg_ros.registrar.hypotheses import Hypothesis
@@ -75,6 +75,7 @@ class Bench:
 
     def __init__(self, condition: str, seed: int, cache: Path | None = None) -> None:
         self.params = RegistrarParams()
+        self.calibrated = self.params.replaced(covariance_calibration=0.0)
         self.engine = Engine(self.params)
         self.seed = seed
         self.setting = Setting(CONDITIONS[condition], seed, self.params)
@@ -183,7 +184,7 @@ class Bench:
             row["right"] = within(row["pose_error"], FALSE)
             row["false"] = row["accepted"] and not row["right"]
             if row["accepted"]:
-                row["nees"] = nees(best.T_target_source, truth, spread_of(best.alignment, self.params))
+                row["nees"] = nees(best.T_target_source, truth, covariance_of(best.alignment, self.calibrated))
         return row
 
     def figures(self) -> dict[str, Any]:

@@ -12,7 +12,8 @@ poses from chains       `engine` asks `hypotheses`, fed by `prepared`: `features
                         `scene_search` (`shape`, `silhouette`, `shape_search`, `shape_hull`, `shape_icp`,
                         `shape_score`, `worth`, `scrutiny`) on objects
 refinement              `icp` brings many to their basin; `refine` ends a few, with `direct` where there is grey
-                        and `contradiction` to say how well the surfaces hold the pose
+                        and `contradiction` to say how well the surfaces hold the pose; `liking` compares
+                        poses near each other
 evidence                `evidence`, of `verify`, `visibility` and `texture` (views, through `projection`), `objects`
                         (explained or moved), `symmetry`, `sliding` and `pushing`
 yes or no               `gate`, on a `candidate` with its evidence; then `covariance` and `thinning`

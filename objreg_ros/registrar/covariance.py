@@ -19,12 +19,16 @@ NEAREST = 0.3  # m: nothing is seen nearer
 
 def covariance_of(alignment: Alignment, params: RegistrarParams) -> Array:
     """(6, 6) float64 [tx ty tz rx ry rz] of ``T_target_source`` in the target frame, positive definite."""
-    return spread_of(alignment, params) + _miscalibrated(alignment, params.covariance_calibration)
+    C = spread_of(alignment, params, params.covariance_scale)
+    return C + _miscalibrated(alignment, params.covariance_calibration)
 
 
-def spread_of(alignment: Alignment, params: RegistrarParams) -> Array:
-    """The same of a camera that is as its calibration says: how far the pose may lie from the best one."""
-    C = params.covariance_scale * _inverse(alignment.information) + _floor(params)
+def spread_of(alignment: Alignment, params: RegistrarParams, scale: float = 1.0) -> Array:
+    """The same of a camera that is as its calibration says: how far the pose may lie from the best one.
+
+    What is decided is decided by the registration as it is, of ``scale`` 1.
+    """
+    C = scale * _inverse(alignment.information) + _floor(params)
     for direction in alignment.slack:
         C = C + _opened(direction, params)
     C = C + alignment.held.T @ alignment.held

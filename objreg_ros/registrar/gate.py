@@ -166,10 +166,10 @@ def _not_otherwise(candidate: Candidate, params: RegistrarParams) -> bool:
 
 
 def _painted(candidate: Candidate, params: RegistrarParams) -> bool:
-    """Whether the grey of the views holds the pose, and no other comes anywhere near it, possible or not."""
+    """Whether the grey of the views confirms the pose, and no other comes anywhere near it, possible or not."""
     texture = candidate.verification.texture
-    painted = texture is not None and texture >= params.min_texture_painted
-    return painted and candidate.margin >= params.min_margin_painted
+    correlates = texture is not None and texture >= params.min_texture_painted
+    return correlates and candidate.margin >= params.min_margin_painted
 
 
 def _stationary(candidate: Candidate, params: RegistrarParams) -> Refusal | None:

@@ -3,18 +3,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import inverse, transform
-from objreg_ros.registrar.candidate import ObjectPair, Verification
+from objreg_ros.registrar.candidate import ObjectPair
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.shape import upright_motion
 from objreg_ros.registrar.shape_score import alike
-from objreg_ros.registrar.verify import verify
 from objreg_ros.registrar.visibility import SEEN, VIOLATIONS, count
 
 Pairs = tuple[ObjectPair, ...]
@@ -41,41 +38,6 @@ def likeness(source: Prepared, target: Prepared, explained: Pairs, T: Array, par
     shapes = [(source.shapes[pair.source], target.shapes[pair.target]) for pair in explained]
     scores = [alike(a, b, upright_motion(a, b, T), params) for a, b in shapes if a is not None and b is not None]
     return float(np.clip(scores, -1.0, 1.0).mean()) if scores else None
-
-
-class Liking(NamedTuple):
-    """What the views say of a pose, and how alike the explained objects look under it, from -1 to 1."""
-
-    seen: Verification
-    likeness: float
-
-
-def liked(
-    source: Prepared, target: Prepared, T_target_source: Array, explained: Pairs, params: RegistrarParams
-) -> Liking:
-    """What the views, by their ``grey_points``, and the ``explained`` objects say of a pose."""
-    seen = verify(source.sight, target.sight, T_target_source, params, params.grey_points)
-    return Liking(seen, likeness(source, target, explained, T_target_source, params) or 0.0)
-
-
-def gain(other: Liking, own: Liking, params: RegistrarParams) -> float:
-    """How much more another pose near by is worth; the objects have a say as far as the grey leaves doubt.
-
-    The likeness of an object tells its front from its back, but not half a degree: whether a thin leg falls beside its
-    pixels is chance. Grey that both views see much of tells a tenth of that, and grey that they see little of does not.
-    """
-    doubt = min(_doubt(liking.seen, params) for liking in (other, own))
-    more_alike = other.likeness - own.likeness
-    return other.seen.score - own.seen.score + params.likeness_weight * doubt * more_alike
-
-
-def _doubt(seen: Verification, params: RegistrarParams) -> float:
-    """How little the grey says of where exactly a pose is, 1 at most.
-
-    The log likelihood of a correlation r of n points, -n/2 log(1 - r^2), changes by n r / (1 - r^2) with it.
-    """
-    r, n = seen.texture or 0.0, seen.tested
-    return min(1.0, params.telling_grey * (1.0 - r**2) / (r * n)) if r > 0.0 and n > 0 else 1.0
 
 
 def gaps(source: Prepared, target: Prepared, T_target_source: Array) -> Array:

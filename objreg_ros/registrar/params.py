@@ -157,7 +157,7 @@ class RegistrarParams(Params):
         0.005, "error of depth that a patch of surface shares, as a share of its distance", ge=0.0, le=0.1
     )
     doubtful_sigma: float = param(
-        0.0055, "a position that is known less well than this is pushed as far as the last of the pushes", "m", ge=0.0
+        0.006, "a position that is known less well than this is pushed as far as the last of the pushes", "m", ge=0.0
     )
     search_step: float = param(
         0.05,
@@ -195,9 +195,16 @@ class RegistrarParams(Params):
     agreement_rotation: float = param(5.0, "chains agree within this rotation", "deg", ge=0.0)
     agreement_translation: float = param(0.15, "chains agree within this distance", "m", ge=0.0)
     object_bonus: float = param(0.25, "what an explained object adds to V when candidates are ranked", ge=0.0)
-    likeness_weight: float = param(0.5, "what the likeness of explained objects adds to V", ge=0.0)
+    likeness_weight: float = param(
+        0.5,
+        "what the likeness of explained objects adds to V; at most, where poses near each other are compared",
+        ge=0.0,
+    )
     telling_grey: float = param(
-        1000.0, "points whose grey, if it hardly correlates, says as much of where exactly a pose is as objects", ge=0.0
+        1000.0,
+        "n r / (1 - r^2), of n points (2 grey_points at most) whose grey correlates by r, beyond which objects have "
+        "less say in where exactly a pose is",
+        ge=0.0,
     )
     explained_distance: float = param(0.06, "an object is explained when the middles are this close", "m", ge=0.0)
     explained_share: float = param(
@@ -264,7 +271,7 @@ class RegistrarParams(Params):
     max_gravity_error: float = param(3.5, "largest angle between the gravities", "deg", ge=0.0, le=180.0)
     max_translation: float = param(5.0, "largest distance between the two cameras", "m", ge=0.0)
     max_slack_sigma: float = param(
-        0.0275, "standard deviation of a position beyond which the views must resist a push more", "m", ge=0.001
+        0.03, "standard deviation of a position beyond which the views must resist a push more", "m", ge=0.001
     )
     odometry_sigmas: float = param(4.0, "largest distance from odometry in its standard deviations", ge=0.0)
 

@@ -15,12 +15,13 @@ from objreg_ros.geometry import skew, transform
 from objreg_ros.registrar.contradiction import information, warped
 from objreg_ros.registrar.direct import finish
 from objreg_ros.registrar.icp import Fit, align, fit
-from objreg_ros.registrar.objects import explain, gain, liked
+from objreg_ros.registrar.liking import gain, liked
+from objreg_ros.registrar.objects import explain
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.sliding import resisted
 
-LITTLE = 0.02  # gain of V after which another round is not worth its time
+LITTLE = 0.02  # gain after which another round is not worth its time
 
 
 def settle(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> tuple[Array, Array]:
@@ -57,9 +58,9 @@ def refine(source: Prepared, target: Prepared, T_target_source: Array, params: R
 def _finished(source: Prepared, target: Prepared, T: Array, params: RegistrarParams) -> tuple[Array, Array]:
     """The pose after grey had its say, and what grey adds to its information: nothing where it does not correlate.
 
-    Again while views and objects like it clearly better, since each round sees more of the other view; the pose as it
-    was, where they like it less: views that share little may like a pose a hair better that is centimetres off, and
-    the objects then look less alike.
+    Again while views and objects like it clearly better (`liking`), since each round sees more of the other view; the
+    pose as it was, where they like it less: views that share little may like a pose a hair better that is centimetres
+    off, and the objects then look less alike.
     """
     held = np.zeros((6, 6))
     if not (source.sight.textured and target.sight.textured):

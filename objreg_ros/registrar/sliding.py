@@ -15,7 +15,8 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.geometry import pose, rotation_from_vector, transform
 from objreg_ros.registrar.direct import finish
-from objreg_ros.registrar.objects import explain, gain, liked
+from objreg_ros.registrar.liking import gain, liked
+from objreg_ros.registrar.objects import explain
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.pushing import Stand, pushed
@@ -76,8 +77,9 @@ def preferred(
     Far away a shift looks like a turn, and what repeats itself looks alike on either side of the truth: a pose may come
     to rest beside it. So the views are asked all over the plane in which the position is known least, and what they
     like there, aside from the pose itself, is finished by grey; and so is the pose turned about the objects, which is
-    taken as it is too, as grey leads astray where it says little. The objects have a say, as views of little in common
-    like a wrong pose a hair better. Nothing is preferred without grey, nor to a pose beyond what grey may mend.
+    taken as it is too, as grey leads astray where it says little. The objects have a say as far as the grey leaves
+    doubt (`liking`), as views of little in common like a wrong pose a hair better. Nothing is preferred without grey,
+    nor to a pose beyond what grey may mend.
     """
     if not (source.sight.textured and target.sight.textured):
         return None
@@ -89,13 +91,13 @@ def preferred(
     pushes = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
     poses = pushed(T_target_source, pushes @ weakest(C))
     V = rank(source.sight, target.sight, poses, params, params.quick_sample).astype(np.float32)
-    best, most = None, CLEARLY
+    best, liking = None, own
     peaks = poses[_peaks(V, len(steps))[: params.searched]]
     turned = _turned(source, target, T_target_source, params)
     for T in (*turned, *(finish(source, target, start, params)[0] for start in (*peaks, *turned))):
-        gained = gain(liked(source, target, T, explained, params), own, params)
-        if gained > most:
-            best, most = T, gained
+        found = liked(source, target, T, explained, params)
+        if gain(found, own, params) > CLEARLY and gain(found, liking, params) > 0.0:
+            best, liking = T, found
     return best
 
 

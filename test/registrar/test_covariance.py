@@ -84,6 +84,14 @@ def test_a_wrong_calibration_turns_by_no_more_than_its_share(angle: float) -> No
     assert np.sqrt(np.diag(C)[3:]) == pytest.approx([0.05] * 3, rel=0.02)
 
 
+def test_the_scale_is_of_what_is_published_and_not_of_what_decides() -> None:
+    alignment = candidate(information=1e3 * np.eye(6)).alignment
+    once, twice = (RegistrarParams(covariance_scale=scale) for scale in (1.0, 2.0))
+    assert np.array_equal(spread_of(alignment, once), spread_of(alignment, twice))
+    more = covariance_of(alignment, twice) - covariance_of(alignment, once)
+    assert np.allclose(more, 1e-3 * np.eye(6))
+
+
 def test_the_file_that_tells_of_the_calibration_holds_the_values_of_the_code(repository: Path) -> None:
     text = (repository / "config" / "covariance.yaml").read_text(encoding="utf-8")
     values = dict(re.findall(r"^    (\w+): ([\d.]+)$", text, re.MULTILINE))
