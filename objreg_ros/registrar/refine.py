@@ -34,8 +34,8 @@ def settle(source: Prepared, target: Prepared, T_target_source: Array, params: R
 def refine(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> Alignment:
     """Finish a settled pose; ``converged`` is False where next to nothing holds it.
 
-    Grey has its say, and keeps it where the views like the pose no less. The information is that of patches of surface,
-    because neighbouring points err together.
+    Grey has its say, and keeps it where views and objects like the pose no less. The information is that of patches of
+    surface, because neighbouring points err together.
     """
     T, grey = _finished(source, target, T_target_source, params)
     found = fit(source.xyz, source.normals, target.surface, T, params.reaches[-1])
