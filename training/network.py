@@ -12,6 +12,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from training.thinning import ThinningConvolution
+
 STEM = ((16, 2), (32, 2), (32, 1))
 TO_STRIDE_8 = ((96, 2), (128, 1), (128, 1))
 TO_STRIDE_16 = ((256, 2), (256, 1), (256, 1), (256, 1), (256, 1))
@@ -35,8 +37,11 @@ RARE = -4.0
 
 def convolution(inputs: int, outputs: int, kernel: int, stride: int = 1, groups: int = 1) -> nn.Sequential:
     """Convolution, batch normalisation, ReLU."""
+    thins = stride == 2 and groups == inputs == outputs
     return nn.Sequential(
-        nn.Conv2d(inputs, outputs, kernel, stride, kernel // 2, groups=groups, bias=False),
+        ThinningConvolution(inputs)
+        if thins
+        else nn.Conv2d(inputs, outputs, kernel, stride, kernel // 2, groups=groups, bias=False),
         nn.BatchNorm2d(outputs),
         nn.ReLU(inplace=True),
     )
