@@ -124,7 +124,7 @@ def flip(sample: Sample) -> Sample:
     width = sample.rgb.shape[1]
     boxes = sample.boxes.copy()
     boxes[:, [0, 2]] = width - sample.boxes[:, [2, 0]]
-    return replace(sample, rgb=np.ascontiguousarray(sample.rgb[:, ::-1]), boxes=boxes)
+    return replace(sample, rgb=cv2.flip(sample.rgb, 1), boxes=boxes)
 
 
 def random_window(shape: tuple[int, int], rng: Rng) -> Array:

@@ -23,27 +23,32 @@ MOST_OBJECTS = 64
 
 
 def example(sample: Sample) -> Example:
-    """A sample of the network's size as picture ``(3, H, W) uint8`` and truth ``(MOST_OBJECTS, 6)``."""
+    """A sample of the network's size as picture ``(H, W, 3) uint8`` and truth ``(MOST_OBJECTS, 6)``."""
     truth = np.zeros((MOST_OBJECTS, 6), np.float32)
     rows = truth[: len(sample.boxes)]
     rows[:, :4] = sample.boxes[:MOST_OBJECTS]
     rows[:, 4] = sample.classes[:MOST_OBJECTS]
     rows[:, 5] = np.where(sample.difficult[:MOST_OBJECTS], DIFFICULT, WANTED)
-    return torch.from_numpy(np.ascontiguousarray(sample.rgb.transpose(2, 0, 1))), torch.from_numpy(truth)
+    return torch.from_numpy(np.ascontiguousarray(sample.rgb)), torch.from_numpy(truth)
 
 
 class Stream(IterableDataset[Example]):
     """Augmented examples in random order without end; new shards join as they appear."""
 
     def __init__(
-        self, folder: Path, seed: int, mosaic_share: float, mistakes: Path | None = None, look_again_every: int = 2000
+        self,
+        folder: Path,
+        seed: tuple[int, ...],
+        mosaic_share: float,
+        mistakes: Path | None = None,
+        look_again_every: int = 2000,
     ) -> None:
         self.pool, self.mistakes = Pool(folder), Pool(mistakes) if mistakes else None
         self.seed, self.mosaic_share, self.look_again_every = seed, mosaic_share, look_again_every
 
     def __iter__(self) -> Iterator[Example]:
         worker = get_worker_info()
-        rng = np.random.default_rng([self.seed, worker.id if worker else 0])
+        rng = np.random.default_rng([*self.seed, worker.id if worker else 0])
         torch.set_num_threads(1)
         cv2.setNumThreads(0)
         pick = partial(self.pool.pick, rng)

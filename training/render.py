@@ -22,7 +22,7 @@ from training.priors import INPUT_HW
 from training.samples import Sample, write_shard
 from training.scenes import hard_scene, plain_scene, training_scene, training_view
 
-VIEWS_PER_SCENE, VIEWS_PER_HARD_SCENE = 10, 6
+VIEWS_PER_SCENE, VIEWS_PER_HARD_SCENE = 6, 6
 SHARD = 200
 PLAIN_SHARE = 0.8
 """Of the scenes, so many are the simulator's own, seen by its own camera; the others are made to differ."""

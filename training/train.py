@@ -2,6 +2,7 @@
 """Train the detector from random weights on shards of simulated pictures; start it again and it goes on.
 
 python -m training.train --data DATA --validation VALIDATION --out OUT --steps 7000
+torchrun --nproc-per-node 2 -m training.train …     # the same on two cores: each has batches of its own
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from torch import Tensor
+from torch import Tensor, distributed
 from torch.utils.data import DataLoader
 
 from training.dataset import Example, Stream
@@ -30,6 +31,10 @@ from training.priors import INPUT_HW, VARIANCES, make_priors
 from training.validation import describe, validate_model
 
 WARM_UP_STEPS = 200
+COOL_DOWN = 0.3
+"""In the last of the steps the rate falls, until then it stays: a training can be made longer before that share begins
+(Hagele et al., "Scaling Laws and Compute-Optimal Training Beyond Fixed Training Durations", 2024)."""
+
 AVERAGE_DECAY = 0.999
 WEIGHT_DECAY = 0.02
 GRADIENT_LIMIT = 10.0
@@ -67,12 +72,13 @@ class Training:
         for group in self.optimiser.param_groups:
             group["lr"] = learning_rate(self.step, steps, self.rate)
         truth = truth[:, : int((truth[..., 5] != NOTHING).sum(dim=1).max())]
-        x = picture.to(memory_format=torch.channels_last, dtype=torch.float32)
+        x = picture.permute(0, 3, 1, 2).to(torch.bfloat16 if self.half else torch.float32)
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.half):
             loc, logits = self.network(centred(x))
         location, confidence = self.loss(loc.float(), logits.float(), truth)
         self.optimiser.zero_grad(set_to_none=True)
         (location + confidence).backward()
+        average_gradients(self.network)
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), GRADIENT_LIMIT)
         self.optimiser.step()
         self.step += 1
@@ -115,9 +121,30 @@ class Training:
 
 
 def learning_rate(step: int, steps: int, top: float) -> float:
-    """A linear start, then half a cosine down to a hundredth."""
+    """A linear start, the top, and in the last of the steps half a cosine down to a hundredth."""
     start = min(1.0, (step + 1) / WARM_UP_STEPS)
-    return top * start * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * min(1.0, step / steps))))
+    fall = min(1.0, max(0.0, (step / steps - 1) / COOL_DOWN + 1))
+    return top * start * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * fall)))
+
+
+def join_others() -> int:
+    """Join the processes that `torchrun` has started; this one's rank, 0 where it is alone."""
+    if "WORLD_SIZE" not in os.environ:
+        return 0
+    distributed.init_process_group("gloo")
+    return distributed.get_rank()
+
+
+def average_gradients(network: MobileNetSsd) -> None:
+    """Give every process the mean of all their gradients."""
+    if not distributed.is_initialized():
+        return
+    gradients = [p.grad for p in network.parameters() if p.grad is not None]
+    flat = torch.cat([gradient.reshape(-1) for gradient in gradients])
+    distributed.all_reduce(flat)
+    means = (flat / distributed.get_world_size()).split([gradient.numel() for gradient in gradients])
+    for gradient, mean in zip(gradients, means, strict=True):
+        gradient.copy_(mean.reshape(gradient.shape))
 
 
 def _groups(network: MobileNetSsd) -> list[dict[str, Any]]:
@@ -131,9 +158,10 @@ def _state(network: MobileNetSsd) -> Iterator[Tensor]:
     return iter(network.state_dict().values())
 
 
-def run(training: Training, arguments: argparse.Namespace) -> None:
-    """Train until the last step, with a checkpoint, an ONNX file and a validation every now and then."""
-    stream = Stream(arguments.data, arguments.seed + training.step, arguments.mosaic, arguments.mistakes)
+def run(training: Training, arguments: argparse.Namespace, rank: int) -> None:
+    """Train until the last step; rank 0 writes a checkpoint and an ONNX file and validates every now and then."""
+    seed = (arguments.seed, training.step, rank)
+    stream = Stream(arguments.data, seed, arguments.mosaic, arguments.mistakes)
     batches = iter(DataLoader(stream, batch_size=arguments.batch, num_workers=arguments.workers, prefetch_factor=4))
     recent: list[tuple[float, float]] = []
     begin = time.monotonic()
@@ -141,6 +169,8 @@ def run(training: Training, arguments: argparse.Namespace) -> None:
     while training.step < last:
         recent.append(training.advance(next(batches), arguments.steps))
         training.seconds, begin = training.seconds + time.monotonic() - begin, time.monotonic()
+        if rank > 0:
+            continue
         if training.step % 100 == 0:
             location, confidence = (sum(part) / len(recent) for part in zip(*recent, strict=True))
             recent.clear()
@@ -169,7 +199,7 @@ def parse(words: list[str]) -> argparse.Namespace:
     parser.add_argument("--mistakes", type=Path, help="folder of crops from training.mistakes for half of the mosaics")
     parser.add_argument("--steps", type=int, default=7000, help="length of the schedule")
     parser.add_argument("--until", type=int, help="stop at this step, before the schedule ends")
-    parser.add_argument("--batch", type=int, default=16)
+    parser.add_argument("--batch", type=int, default=16, help="pictures a step, of each process")
     parser.add_argument("--rate", type=float, default=1.5e-3)
     parser.add_argument(
         "--device", default="cuda" if torch.cuda.is_available() else "cpu", help="a GPU where there is one"
@@ -194,6 +224,7 @@ def recipe(arguments: argparse.Namespace) -> str:
 def main() -> None:
     """Start, or go on."""
     arguments = parse(sys.argv[1:])
+    rank = join_others()
     torch.manual_seed(arguments.seed)
     torch.set_num_threads(arguments.threads)
     arguments.out.mkdir(parents=True, exist_ok=True)
@@ -205,7 +236,7 @@ def main() -> None:
         training.start_from(arguments.backbone)
     if arguments.freeze_stem:
         training.freeze_stem()
-    run(training, arguments)
+    run(training, arguments, rank)
 
 
 if __name__ == "__main__":

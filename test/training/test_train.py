@@ -17,7 +17,7 @@ from training.train import Training, learning_rate, parse, recipe  # noqa: E402
 def batch() -> tuple[torch.Tensor, torch.Tensor]:
     truth = torch.zeros(2, 4, 6)
     truth[:, 0] = torch.tensor([40.0, 60.0, 120.0, 160.0, 3.0, WANTED])
-    return torch.zeros(2, 3, *INPUT_HW, dtype=torch.uint8), truth
+    return torch.zeros(2, *INPUT_HW, 3, dtype=torch.uint8), truth
 
 
 def test_a_checkpoint_brings_back_weights_average_optimiser_and_step(tmp_path: Path) -> None:
@@ -46,9 +46,14 @@ def test_a_training_starts_from_whatever_weights_fit(tmp_path: Path) -> None:
     assert ours["heads.0.weight"].shape == (13, 96, 1, 1)
 
 
-def test_the_learning_rate_rises_then_falls_to_a_hundredth() -> None:
+def test_the_learning_rate_rises_stays_and_falls_to_a_hundredth() -> None:
     rates = [learning_rate(step, 1000, 1.0) for step in range(1001)]
-    assert rates[0] < 0.01 and max(rates) == pytest.approx(0.92, abs=0.03) and rates[-1] == pytest.approx(0.01)
+    assert rates[0] < 0.01 and rates[-1] == pytest.approx(0.01)
+    assert rates[200:700] == [1.0] * 500 and rates[850] == pytest.approx(0.505)
+
+
+def test_a_training_made_longer_while_the_rate_stays_is_the_same_until_then() -> None:
+    assert [learning_rate(step, 1000, 1.0) for step in range(701)] == [learning_rate(s, 2000, 1.0) for s in range(701)]
 
 
 def test_the_recipe_in_the_model_names_no_folder_of_this_machine() -> None:
