@@ -18,7 +18,7 @@ from pathlib import Path
 import cv2
 import onnx
 import torch
-from torch import Tensor, nn
+from torch import nn
 
 from objreg_ros.data import Array
 from training.embedded import Embedded, FromPixels
@@ -88,14 +88,6 @@ def provenance_of(checkpoint: Mapping[str, object]) -> dict[str, str]:
     }
 
 
-def blended(weights: Mapping[str, Tensor], before: Mapping[str, Tensor], share: float) -> dict[str, Tensor]:
-    """``share`` of weights and the rest of those from before a training went on: often better on what neither has seen
-    (Wortsman et al., "Robust fine-tuning of zero-shot models", 2022)."""
-    return {
-        name: before[name].lerp(value, share) if value.is_floating_point() else value for name, value in weights.items()
-    }
-
-
 def calibration_pictures(folder: Path) -> Iterator[Array]:
     """`CALIBRATION_PICTURES` pictures from all over a folder of shards, of the network's size."""
     shards = [Shard(path) for path in sorted(folder.glob("*.npz"))]
@@ -112,20 +104,12 @@ def main() -> None:
     parser.add_argument("checkpoint", type=Path)
     parser.add_argument("model", type=Path)
     parser.add_argument("--calibration", type=Path, help="shards from training.render; makes the model int8")
-    parser.add_argument("--before", type=Path, help="checkpoint from which the training went on, to blend with")
-    parser.add_argument("--share", type=float, default=0.65, help="of the later checkpoint in the blend")
-    parser.add_argument("--history", help="how it came about, where the last command does not tell it all")
     arguments = parser.parse_args()
     checkpoint = torch.load(arguments.checkpoint, map_location="cpu", weights_only=True)
     network = MobileNetSsd(len(LABELS))
-    weights = checkpoint["average"]
-    if arguments.before is not None:
-        before = torch.load(arguments.before, map_location="cpu", weights_only=True)
-        weights = blended(weights, before["average"], arguments.share)
-    network.load_state_dict(weights)
-    history = {"history": arguments.history} if arguments.history else {}
+    network.load_state_dict(checkpoint["average"])
     pictures = calibration_pictures(arguments.calibration) if arguments.calibration else None
-    export(network, arguments.model, provenance_of(checkpoint) | history, pictures)
+    export(network, arguments.model, provenance_of(checkpoint), pictures)
     print(f"{arguments.model}: {arguments.model.stat().st_size / 1e6:.2f} MB, step {checkpoint['step']}")
 
 

@@ -231,7 +231,8 @@ def main() -> None:
     training = Training(arguments.rate, recipe(arguments), arguments.bf16, arguments.device)
     if (arguments.out / "checkpoint.pt").is_file():
         training.load(arguments.out / "checkpoint.pt")
-        print(f"goes on at step {training.step}", flush=True)
+        if rank == 0:
+            print(f"goes on at step {training.step}", flush=True)
     elif arguments.backbone is not None:
         training.start_from(arguments.backbone)
     if arguments.freeze_stem:

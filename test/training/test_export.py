@@ -14,7 +14,7 @@ pytest.importorskip("onnx", reason="the export needs onnx")
 from objreg_ros.data import ColourImage  # noqa: E402
 from objreg_ros.detector.mobilenet_ssd import Detector  # noqa: E402
 from objreg_ros.detector.params import DetectorParams  # noqa: E402
-from training.export import blended, export  # noqa: E402
+from training.export import export  # noqa: E402
 from training.labels import LABELS  # noqa: E402
 from training.network import MobileNetSsd  # noqa: E402
 
@@ -29,8 +29,3 @@ def test_a_network_that_sees_one_thing_is_exported_and_seen_by_the_detector(tmp_
     detector = Detector(DetectorParams(), tmp_path / "m.onnx")
     seen = detector.detect(ColourImage(rgb=np.zeros((480, 640, 3), np.uint8), stamp_ns=0))
     assert detector.labels == LABELS and set(seen.label) == {"bowl"}
-
-
-def test_a_blend_lies_between_two_networks_and_counts_like_the_later_one() -> None:
-    before, after = ({"w": torch.tensor([w]), "batches": torch.tensor(n)} for w, n in ((0.0, 3), (4.0, 7)))
-    assert blended(after, before, 0.75) == {"w": torch.tensor([3.0]), "batches": torch.tensor(7)}
