@@ -9,9 +9,11 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
+from training.labels import LABELS  # noqa: E402
 from training.multibox import WANTED  # noqa: E402
+from training.network import MobileNetSsd  # noqa: E402
 from training.priors import INPUT_HW  # noqa: E402
-from training.train import Training, learning_rate, parse, recipe  # noqa: E402
+from training.train import Training, average_gradients, learning_rate, parse, recipe  # noqa: E402
 
 
 def batch() -> tuple[torch.Tensor, torch.Tensor]:
@@ -44,6 +46,25 @@ def test_a_training_starts_from_whatever_weights_fit(tmp_path: Path) -> None:
     ours = other.network.state_dict()
     assert torch.equal(ours["laterals.0.weight"], weights["laterals.0.weight"])
     assert ours["heads.0.weight"].shape == (13, 96, 1, 1)
+
+
+def share_gradients(rank: int, folder: Path) -> None:
+    torch.distributed.init_process_group("gloo", f"file://{folder / 'meet'}", rank=rank, world_size=2)
+    network = MobileNetSsd(len(LABELS)).to(memory_format=torch.channels_last)
+    for number, parameter in enumerate(network.parameters()):
+        if number > 0:  # the first is frozen
+            parameter.grad = torch.full_like(parameter, float(number * (1 + 2 * rank)))
+    average_gradients(network)
+    torch.save([parameter.grad for parameter in network.parameters()], folder / f"{rank}.pt")
+    torch.distributed.destroy_process_group()
+
+
+def test_two_processes_step_along_the_mean_of_their_gradients(tmp_path: Path) -> None:
+    torch.multiprocessing.spawn(share_gradients, (tmp_path,), nprocs=2)
+    for rank in (0, 1):
+        first, *others = torch.load(tmp_path / f"{rank}.pt")
+        assert first is None
+        assert all(bool((gradient == 2.0 * number).all()) for number, gradient in enumerate(others, 1))
 
 
 def test_the_learning_rate_rises_stays_and_falls_to_a_hundredth() -> None:
