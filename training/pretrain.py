@@ -8,6 +8,7 @@ and a detector that starts from it learns within an hour what it would not learn
 from __future__ import annotations
 
 import argparse
+import os
 import time
 from pathlib import Path
 
@@ -55,7 +56,9 @@ def train(arguments: argparse.Namespace) -> None:
                   f"{right / seen:.3f} of the crops right", flush=True)  # fmt: skip
             right = seen = 0
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
-    torch.save(network.state_dict(), arguments.out)
+    temporary = arguments.out.with_suffix(".part")
+    torch.save(network.state_dict(), temporary)
+    os.replace(temporary, arguments.out)
 
 
 def main() -> None:

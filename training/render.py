@@ -22,7 +22,7 @@ from training.priors import INPUT_HW
 from training.samples import Sample, write_shard
 from training.scenes import hard_scene, plain_scene, training_scene, training_view
 
-VIEWS_PER_SCENE, VIEWS_PER_HARD_SCENE = 6, 6
+VIEWS_PER_SCENE = 6
 SHARD = 200
 PLAIN_SHARE = 0.8
 """Of the scenes, so many are the simulator's own, seen by its own camera; the others are made to differ."""
@@ -65,7 +65,7 @@ def samples(rng: np.random.Generator) -> Iterator[Sample]:
 def hard_samples(rng: np.random.Generator) -> Iterator[Sample]:
     """Pictures of one scene by the simulator's own Kinect, full of what is hardest to learn."""
     scene, poses = hard_scene(rng)
-    for _ in range(VIEWS_PER_HARD_SCENE):
+    for _ in range(VIEWS_PER_SCENE):
         sample = _plain_sample(scene, poses, rng)
         if not sample.difficult.all() or rng.random() < EMPTY_SHARE:
             yield sample

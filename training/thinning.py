@@ -14,8 +14,9 @@ class ThinningConvolution(nn.Conv2d):
     """A depthwise 3 x 3 convolution of stride 2, as `torch.nn.Conv2d` computes it.
 
     oneDNN has no fast kernel for the gradient by its input in bfloat16: 20 to 40 ms a layer for a batch of 8 where the
-    convolution itself takes one. Hence that gradient is a convolution of stride 1 here, of the outputs' gradient with
-    zeros in between and the kernel turned (Dumoulin and Visin, "A guide to convolution arithmetic", 2016, section 4.5).
+    convolution itself takes one or two. Hence that gradient is a convolution of stride 1 here, of the outputs'
+    gradient with zeros in between and the kernel turned (Dumoulin and Visin, "A guide to convolution arithmetic",
+    2016, section 4.5).
     """
 
     def __init__(self, width: int) -> None:

@@ -2,7 +2,7 @@
 """Train the detector from random weights on shards of simulated pictures; start it again and it goes on.
 
 python -m training.train --data DATA --validation VALIDATION --out OUT --steps 7000
-torchrun --nproc-per-node 2 -m training.train …     # the same on two cores: each has batches of its own
+torchrun --nproc-per-node 2 -m training.train …     # on two cores: each has a batch of its own, twice as many a step
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from training.validation import describe, validate_model
 
 WARM_UP_STEPS = 200
 COOL_DOWN = 0.3
-"""In the last of the steps the rate falls, until then it stays: a training can be made longer before that share begins
-(Hagele et al., "Scaling Laws and Compute-Optimal Training Beyond Fixed Training Durations", 2024)."""
+"""In this last share of the steps the rate falls, until then it stays: a training can be made longer before it begins
+(Hägele et al., "Scaling Laws and Compute-Optimal Training Beyond Fixed Training Durations", 2024)."""
 
 AVERAGE_DECAY = 0.999
 WEIGHT_DECAY = 0.02
@@ -121,7 +121,7 @@ class Training:
 
 
 def learning_rate(step: int, steps: int, top: float) -> float:
-    """A linear start, the top, and in the last of the steps half a cosine down to a hundredth."""
+    """A linear start, the top, and in the last share of the steps half a cosine down to a hundredth."""
     start = min(1.0, (step + 1) / WARM_UP_STEPS)
     fall = min(1.0, max(0.0, (step / steps - 1) / COOL_DOWN + 1))
     return top * start * (0.01 + 0.99 * 0.5 * (1 + math.cos(math.pi * fall)))
@@ -215,10 +215,11 @@ def parse(words: list[str]) -> argparse.Namespace:
 
 
 def recipe(arguments: argparse.Namespace) -> str:
-    """The command that does the same elsewhere: the options without this machine's folders."""
+    """The command that goes on like this elsewhere: its processes and options, without this machine's folders."""
     chosen = {name: value for name, value in vars(arguments).items() if not isinstance(value, Path | None)}
     flags = [f"--{name.replace('_', '-')}" + ("" if value is True else f" {value}") for name, value in chosen.items()]
-    return " ".join(["python -m training.train", *(flag for flag in flags if not flag.endswith(" False"))])
+    start = f"torchrun --nproc-per-node {os.environ.get('WORLD_SIZE', '1')} -m training.train"
+    return " ".join([start, *(flag for flag in flags if not flag.endswith(" False"))])
 
 
 def main() -> None:
