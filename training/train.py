@@ -19,6 +19,7 @@ from typing import Any
 
 import torch
 from torch import Tensor, distributed
+from torch.nn.parallel import DistributedDataParallel
 from torch.utils.data import DataLoader
 
 from training.dataset import Example, Stream
@@ -46,6 +47,7 @@ class Training:
     def __init__(self, rate: float, command: str, half: bool = False, device: str = "cpu") -> None:
         self.device = torch.device(device)
         self.network = MobileNetSsd(len(LABELS)).to(self.device, memory_format=torch.channels_last)
+        self.forward: torch.nn.Module = self.network
         self.average = copy.deepcopy(self.network).eval()
         priors = torch.from_numpy(make_priors()) * torch.tensor([INPUT_HW[1], INPUT_HW[0]] * 2)
         self.loss = MultiboxLoss(priors.to(self.device), torch.tensor(VARIANCES, device=self.device))
@@ -66,6 +68,10 @@ class Training:
         """Leave the first layers as they are: a fifth of the time for what changes least late in a training."""
         self.network.stages[0][0].requires_grad_(False).eval()
 
+    def share(self) -> None:
+        """Step along the mean of all processes' gradients from now on, from the weights of the first; all must call."""
+        self.forward = DistributedDataParallel(self.network, forward_sync_buffers=False)
+
     def advance(self, batch: Example, steps: int) -> tuple[float, float]:
         """One step on one batch; what the boxes and what the classes cost."""
         picture, truth = (part.to(self.device, non_blocking=True) for part in batch)
@@ -74,11 +80,10 @@ class Training:
         truth = truth[:, : int((truth[..., 5] != NOTHING).sum(dim=1).max())]
         x = picture.permute(0, 3, 1, 2).to(torch.bfloat16 if self.half else torch.float32)
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.half):
-            loc, logits = self.network(centred(x))
+            loc, logits = self.forward(centred(x))
         location, confidence = self.loss(loc.float(), logits.float(), truth)
         self.optimiser.zero_grad(set_to_none=True)
         (location + confidence).backward()
-        average_gradients(self.network)
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), GRADIENT_LIMIT)
         self.optimiser.step()
         self.step += 1
@@ -128,23 +133,9 @@ def learning_rate(step: int, steps: int, top: float) -> float:
 
 
 def join_others() -> int:
-    """Join the processes that `torchrun` has started; this one's rank, 0 where it is alone."""
-    if "WORLD_SIZE" not in os.environ:
-        return 0
+    """Join the processes that `torchrun` has started; this one's rank."""
     distributed.init_process_group("gloo")
     return distributed.get_rank()
-
-
-def average_gradients(network: MobileNetSsd) -> None:
-    """Give every process the mean of all their gradients."""
-    if not distributed.is_initialized():
-        return
-    gradients = [p.grad for p in network.parameters() if p.grad is not None]
-    flat = torch.cat([gradient.reshape(-1) for gradient in gradients])
-    distributed.all_reduce(flat)
-    means = (flat / distributed.get_world_size()).split([gradient.numel() for gradient in gradients])
-    for gradient, mean in zip(gradients, means, strict=True):
-        gradient.copy_(mean.reshape(gradient.shape))
 
 
 def _groups(network: MobileNetSsd) -> list[dict[str, Any]]:
@@ -225,7 +216,7 @@ def recipe(arguments: argparse.Namespace) -> str:
 def main() -> None:
     """Start, or go on."""
     arguments = parse(sys.argv[1:])
-    rank = join_others()
+    rank = join_others() if distributed.is_torchelastic_launched() else 0
     torch.manual_seed(arguments.seed)
     torch.set_num_threads(arguments.threads)
     arguments.out.mkdir(parents=True, exist_ok=True)
@@ -238,6 +229,8 @@ def main() -> None:
         training.start_from(arguments.backbone)
     if arguments.freeze_stem:
         training.freeze_stem()
+    if distributed.is_initialized():
+        training.share()
     run(training, arguments, rank)
 
 
