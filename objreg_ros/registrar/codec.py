@@ -47,7 +47,7 @@ def unpack(blob: bytes) -> tuple[Any, ...]:
     return tuple(arrays)
 
 
-def keyframe_row(keyframe: Keyframe, sightings: Sequence[Sighting]) -> Row:
+def keyframe_row(keyframe: Keyframe) -> Row:
     """The columns of a keyframe."""
     view = keyframe.view
     camera = {name: getattr(view.intrinsics, name) for name in Intrinsics.__slots__}  # type: ignore[attr-defined]
@@ -56,8 +56,8 @@ def keyframe_row(keyframe: Keyframe, sightings: Sequence[Sighting]) -> Row:
         "session": keyframe.session,
         "stamp_ns": keyframe.stamp_ns,
         "frame_id": keyframe.frame_id,
-        "travelled": sightings[0].travelled if sightings else 0.0,
-        "turned": sightings[0].turned if sightings else 0.0,
+        "travelled": keyframe.travelled,
+        "turned": keyframe.turned,
         "T_odom_camera": _bytes(keyframe.T_odom_camera),
         "by_odometry": keyframe.by_odometry,
         "gravity": _bytes(keyframe.gravity),
@@ -106,6 +106,8 @@ def keyframe_from_rows(row: Mapping[str, Any], objects: Sequence[Mapping[str, An
         gravity_confidence=row["gravity_confidence"],
         T_odom_camera=_array(row["T_odom_camera"], (4, 4)),
         by_odometry=bool(row["by_odometry"]),
+        travelled=row["travelled"],
+        turned=row["turned"],
     )
 
 
@@ -123,7 +125,6 @@ def sighting_from_row(row: Mapping[str, Any]) -> Sighting:
         position=np.frombuffer(row["position"], float),
         camera=np.frombuffer(row["camera"], float),
         travelled=row["travelled"],
-        turned=row["turned"],
         landmark=row["landmark"],
         R_landmark_session=np.frombuffer(row["R_landmark_session"], float).reshape(3, 3),
     )

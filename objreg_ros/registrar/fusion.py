@@ -41,6 +41,8 @@ def fuse(stretch: Stretch, params: RegistrarParams) -> Keyframe:
         gravity_confidence=reference.gravity_confidence,
         T_odom_camera=_rigid(stretch.T_session_first @ stretch.T_first_frame[chosen]),
         by_odometry=stretch.by_odometry,
+        travelled=stretch.travelled,
+        turned=stretch.turned,
     )
 
 

@@ -65,7 +65,8 @@ class Keyframe:
     ``keyframe_id`` is unique in a store and grows with time, ``session`` counts the runs that wrote into it;
     ``gravity (3,)`` is of length 1 or None; ``T_odom_camera`` is the pose of the reference frame in the
     frame of its session, and says something about another keyframe of the same session only: the odometry's where
-    ``by_odometry``, else that of our own tracking, which may slip unnoticed.
+    ``by_odometry``, else that of our own tracking, which may slip unnoticed. Until then the camera had gone
+    ``travelled`` m and turned ``turned`` degrees in the session.
     """
 
     keyframe_id: int
@@ -79,6 +80,8 @@ class Keyframe:
     gravity_confidence: float
     T_odom_camera: Array | None
     by_odometry: bool = False
+    travelled: float = 0.0
+    turned: float = 0.0
 
     @property
     def labels(self) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from objreg_ros.data import Array, Frame
 from objreg_ros.geometry import inverse, rotation_angle
+from objreg_ros.registrar.odometry import Way
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.tracking import Surface, surface_of, view_motion
 
@@ -24,7 +25,8 @@ class Stretch:
     """Frames of one moment: ``T_first_frame`` maps the camera of each frame into that of the first.
 
     ``T_session_first`` is the pose of the first camera in the frame of its session: the odometry's, or our own
-    tracking's where there is no odometry; ``session`` counts from 0 and changes where the track was lost.
+    tracking's where odometry had a gap or there is none; ``by_odometry`` says which. ``session`` counts from 0 and
+    changes where the track was lost. By then the camera had gone ``travelled`` m in it and turned ``turned`` degrees.
     """
 
     frames: tuple[Frame, ...]
@@ -32,19 +34,41 @@ class Stretch:
     T_session_first: Array
     session: int
     by_odometry: bool = False
+    travelled: float = 0.0
+    turned: float = 0.0
+
+
+@dataclass(slots=True, eq=False)
+class _Session:
+    """A run of frames whose poses are known in one frame: the odometry's, or that of our own tracking."""
+
+    number: int
+    in_odometry: bool
+    way: Way
+    first: Frame  # of the last stretch
+    last_ns: int  # of the last frame that was followed
+
+    def goes_on(self, frame: Frame) -> bool:
+        """Whether a frame may belong to it: later, of the same camera, and with odometry only if the session has it."""
+        later, same = frame.stamp_ns > self.first.stamp_ns, frame.frame_id == self.first.frame_id
+        return later and same and (self.in_odometry or frame.T_odom_camera is None)
 
 
 @dataclass(slots=True, eq=False)
 class _Open:
     """The stretch that is being collected."""
 
+    session: _Session
     first: Frame
     surface: Surface
     T_session_first: Array
-    by_odometry: bool
     frames: list[Frame] = field(default_factory=list)
     motions: list[Array] = field(default_factory=list)
     T_first_last: Array = field(default_factory=lambda: np.eye(4))
+
+    @property
+    def by_odometry(self) -> bool:
+        return self.first.T_odom_camera is not None
 
 
 class Keyframer:
@@ -53,32 +77,56 @@ class Keyframer:
     def __init__(self, params: RegistrarParams) -> None:
         self._params = params
         self._open: _Open | None = None
-        self._session = 0
+        self._session: _Session | None = None
         self._last: tuple[int, Array, Counter[str]] | None = None  # session, pose and labels of the last stretch
 
     def add(self, frame: Frame) -> Stretch | None:
         """Track the frame and collect it. A lost track or a jump back in time begins a new session."""
-        if self._open is None:
-            self._begin(frame)
+        session, stretch = self._session, self._open
+        if session is None or not session.goes_on(frame):
+            return self._start(frame)
+        T_session_frame = self._follow(frame)
+        if T_session_frame is None:
+            return None if self._may_come_back(session, frame) else self._start(frame)
+        session.last_ns = frame.stamp_ns
+        if stretch is None:
+            self._begin(session, frame, T_session_frame)
             return None
-        T_first_frame = self._motion(self._open, frame)
-        if T_first_frame is None:
-            ended = self.finish()
-            self._begin(frame)
-            return ended
-        if not self._ends(self._open, frame, T_first_frame):
-            self._collect(self._open, frame, T_first_frame)
+        T_first_frame = inverse(stretch.T_session_first) @ T_session_frame
+        if not self._ends(stretch, frame, T_first_frame):
+            self._collect(stretch, frame, T_first_frame)
             return None
-        T_session_frame, by_odometry = self._open.T_session_first @ T_first_frame, self._open.by_odometry
         ended = self._end()
-        self._begin(frame, T_session_frame, by_odometry)
+        self._begin(session, frame, T_session_frame)
         return ended
 
     def finish(self) -> Stretch | None:
-        """End the stretch that is being collected, and the session: None if there is none or it shows nothing new."""
+        """End the stretch that is being collected: None if there is none or it shows nothing new.
+
+        The session goes on with the next frame where odometry says where that is; else it begins another.
+        """
+        return self._end()
+
+    def _start(self, frame: Frame) -> Stretch | None:
+        """End what is being collected, and start another session with this frame."""
         ended = self._end()
-        self._session += 1
+        T_session_frame = np.eye(4) if frame.T_odom_camera is None else frame.T_odom_camera
+        self._session = _Session(
+            number=0 if self._session is None else self._session.number + 1,
+            in_odometry=frame.T_odom_camera is not None,
+            way=Way(T_session_frame),
+            first=frame,
+            last_ns=frame.stamp_ns,
+        )
+        self._begin(self._session, frame, T_session_frame)
         return ended
+
+    def _begin(self, session: _Session, frame: Frame, T_session_frame: Array) -> None:
+        """Begin a stretch with this frame. The way there counts whether or not it becomes a keyframe."""
+        session.first = frame
+        session.way.go(T_session_frame)
+        self._open = _Open(session, frame, surface_of(frame.view), T_session_frame)
+        self._collect(self._open, frame, np.eye(4))
 
     def _end(self) -> Stretch | None:
         stretch, self._open = self._open, None
@@ -89,31 +137,27 @@ class Keyframer:
             labels |= Counter(item.label for item in frame.objects)
         if labels.total() < self._params.keyframe_min_objects or not self._is_news(stretch, labels):
             return None
-        self._last = (self._session, stretch.T_session_first, labels)
+        self._last = (stretch.session.number, stretch.T_session_first, labels)
         return Stretch(
             frames=tuple(stretch.frames),
             T_first_frame=tuple(stretch.motions),
             T_session_first=stretch.T_session_first,
-            session=self._session,
+            session=stretch.session.number,
             by_odometry=stretch.by_odometry,
+            travelled=stretch.session.way.travelled,
+            turned=stretch.session.way.turned,
         )
 
-    def _begin(self, frame: Frame, T_session_frame: Array | None = None, by_odometry: bool = False) -> None:
-        """Start a stretch with this frame; without a pose it is the first of a session."""
-        if frame.T_odom_camera is not None:
-            T_session_frame, by_odometry = frame.T_odom_camera, True
-        T = np.eye(4) if T_session_frame is None else T_session_frame
-        self._open = _Open(frame, surface_of(frame.view), T, by_odometry)
-        self._collect(self._open, frame, np.eye(4))
+    def _follow(self, frame: Frame) -> Array | None:
+        """The pose of a frame in its session, in a gap of the odometry by the views; None if the track is lost."""
+        if frame.T_odom_camera is not None or self._open is None:
+            return frame.T_odom_camera
+        T_first_frame = view_motion(frame.view, self._open.surface, self._open.T_first_last)
+        return None if T_first_frame is None else self._open.T_session_first @ T_first_frame
 
-    def _motion(self, stretch: _Open, frame: Frame) -> Array | None:
-        if frame.stamp_ns <= stretch.first.stamp_ns or frame.frame_id != stretch.first.frame_id:
-            return None
-        if frame.T_odom_camera is None:  # a gap in the odometry is bridged by the views
-            return view_motion(frame.view, stretch.surface, stretch.T_first_last)
-        if not stretch.by_odometry:  # odometry begins: its frame is not the one that we tracked in
-            return None
-        return inverse(stretch.T_session_first) @ frame.T_odom_camera
+    def _may_come_back(self, session: _Session, frame: Frame) -> bool:
+        """Whether odometry is only a moment late: such a frame is passed over."""
+        return session.in_odometry and 1e-9 * (frame.stamp_ns - session.last_ns) < self._params.keyframe_seconds
 
     def _collect(self, stretch: _Open, frame: Frame, T_first_frame: Array) -> None:
         stretch.T_first_last = T_first_frame
@@ -125,11 +169,13 @@ class Keyframer:
             stretch.motions.append(T_first_frame)
 
     def _ends(self, stretch: _Open, frame: Frame, T_first_frame: Array) -> bool:
+        """Whether the frame is of another moment, or odometry is back: it tells no motion from a pose of our own."""
         lasted = 1e-9 * (frame.stamp_ns - stretch.first.stamp_ns)
-        return lasted > self._params.keyframe_seconds or self._moved(T_first_frame, 1.0)
+        back = frame.T_odom_camera is not None and stretch.session.in_odometry and not stretch.by_odometry
+        return back or lasted > self._params.keyframe_seconds or self._moved(T_first_frame, 1.0)
 
     def _is_news(self, stretch: _Open, labels: Counter[str]) -> bool:
-        if self._last is None or self._last[0] != self._session:
+        if self._last is None or self._last[0] != stretch.session.number:
             return True
         _, T_session_last, known = self._last
         return bool(labels - known) or self._moved(inverse(T_session_last) @ stretch.T_session_first, 0.5)

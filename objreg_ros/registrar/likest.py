@@ -25,11 +25,11 @@ NOWHERE = np.float32(np.inf)  # half the squared length of a row that is free
 class Block:
     """The rows of one label group, which double when they are full; rows that are given up are used again.
 
-    ``where (n, 5)`` float64 are x, y, z, travelled and turned, ``when (n, 3)`` int64 stamp_ns, session and keyframe_id.
+    ``where (n, 4)`` float64 are x, y, z and travelled, ``when (n, 3)`` int64 stamp_ns, session and keyframe_id.
     """
 
     def __init__(self) -> None:
-        self.where, self.when = np.zeros((LANES, 5)), np.zeros((LANES, 3), np.int64)
+        self.where, self.when = np.zeros((LANES, 4)), np.zeros((LANES, 3), np.int64)
         self._descriptors = np.zeros((1, SIZE, LANES), np.float32)
         self._half_norms = np.full((1, LANES), NOWHERE)
         self._used = 0  # rows below which all others are
@@ -47,7 +47,7 @@ class Block:
         tile, lane = divmod(i, LANES)
         self._descriptors[tile, :, lane] = sighting.descriptor
         self._half_norms[tile, lane] = 0.5 * float(sighting.descriptor @ sighting.descriptor)
-        self.where[i] = *sighting.position, sighting.travelled, sighting.turned
+        self.where[i] = *sighting.position, sighting.travelled
         self.when[i] = sighting.stamp_ns, sighting.session, sighting.keyframe_id
         return i
 

@@ -31,44 +31,33 @@ class Prior:
         return self.translation_m <= params.prior_translation and self.rotation_deg <= params.prior_rotation
 
 
-class Path:
-    """The camera's way through a session, over the keyframes: how far it has gone and turned."""
+@dataclass(slots=True, eq=False)
+class Way:
+    """The camera's way through a session, from ``T_session_camera`` on: how far it has gone and turned until now."""
 
-    def __init__(self) -> None:
-        self._session: int | None = None
-        self._T_session_camera: Array = np.eye(4)
-        self.travelled = 0.0
-        self.turned = 0.0
+    T_session_camera: Array
+    travelled: float = 0.0
+    turned: float = 0.0
 
-    @property
-    def session(self) -> int | None:
-        """The session that goes on, None before the first keyframe."""
-        return self._session
+    def go(self, T_session_camera: Array) -> None:
+        """Go on to another pose, straight."""
+        motion = inverse(self.T_session_camera) @ T_session_camera
+        self.travelled += float(np.linalg.norm(motion[:3, 3]))
+        self.turned += float(np.degrees(rotation_angle(motion[:3, :3])))
+        self.T_session_camera = T_session_camera
 
-    def follow(self, keyframe: Keyframe) -> None:
-        """Go on to a keyframe; another session starts at 0."""
-        T_session_camera = np.eye(4) if keyframe.T_odom_camera is None else keyframe.T_odom_camera
-        if keyframe.session != self._session:
-            self._session, self.travelled, self.turned = keyframe.session, 0.0, 0.0
-        else:
-            motion = inverse(self._T_session_camera) @ T_session_camera
-            self.travelled += float(np.linalg.norm(motion[:3, 3]))
-            self.turned += float(np.degrees(rotation_angle(motion[:3, :3])))
-        self._T_session_camera = T_session_camera
 
-    def prior(
-        self, source: Keyframe, target: Keyframe, travelled: float, turned: float, params: RegistrarParams
-    ) -> Prior | None:
-        """What is expected between the newest keyframe and one at which the path was ``travelled`` and ``turned`` long.
+def expect(source: Keyframe, target: Keyframe, params: RegistrarParams) -> Prior | None:
+    """What is expected between two keyframes: the less certain, the longer the way between them was.
 
-        None where the two are of different sessions.
-        """
-        if source.session != target.session or source.T_odom_camera is None or target.T_odom_camera is None:
-            return None
-        way, turn = self.travelled - travelled, self.turned - turned
-        return Prior(
-            T_target_source=inverse(target.T_odom_camera) @ source.T_odom_camera,
-            rotation_deg=params.odometry_rotation_noise + params.odometry_rotation_drift * turn,
-            translation_m=params.odometry_translation_noise + params.odometry_drift * way,
-            trusted=source.by_odometry and target.by_odometry,
-        )
+    None where the two are of different sessions.
+    """
+    if source.session != target.session or source.T_odom_camera is None or target.T_odom_camera is None:
+        return None
+    way, turn = abs(source.travelled - target.travelled), abs(source.turned - target.turned)
+    return Prior(
+        T_target_source=inverse(target.T_odom_camera) @ source.T_odom_camera,
+        rotation_deg=params.odometry_rotation_noise + params.odometry_rotation_drift * turn,
+        translation_m=params.odometry_translation_noise + params.odometry_drift * way,
+        trusted=source.by_odometry and target.by_odometry,
+    )

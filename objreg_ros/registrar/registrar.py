@@ -26,7 +26,7 @@ from objreg_ros.registrar.gate import Refusal, judge
 from objreg_ros.registrar.keyframe import Keyframe
 from objreg_ros.registrar.keyframes import Keyframer, Stretch
 from objreg_ros.registrar.landmarks import Landmark, Landmarks, Link
-from objreg_ros.registrar.odometry import Path
+from objreg_ros.registrar.odometry import expect
 from objreg_ros.registrar.paper import PaperEngine
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.retrieve import Index, Place
@@ -80,7 +80,7 @@ class Registrar:
         self._index.add(self._store.sightings())
         self._landmarks = Landmarks(self.params, self._store.sightings())
         self._thinning = Thinning(self.params.thin_seconds, ((c.from_ns, c.to_ns) for c in self._store.closures()))
-        self._path = Path()
+        self._session: int | None = None  # the one that goes on, None before the first keyframe
 
     @property
     def landmarks(self) -> tuple[Landmark, ...]:
@@ -92,7 +92,7 @@ class Registrar:
     def landmarks_here(self) -> tuple[Landmark, ...]:
         """The landmarks of late whose position is in the frame of the session that goes on now, at most `RECENT`."""
         with self._lock:
-            return self._landmarks.recent(self._path.session, RECENT)
+            return self._landmarks.recent(self._session, RECENT)
 
     def counts(self) -> dict[str, int]:
         """How many keyframes, objects, landmarks, sessions and closures the store holds."""
@@ -127,8 +127,8 @@ class Registrar:
         with self._lock:
             keyframe = fuse(stretch, self.params)
             keyframe = keyframe.numbered(self._store.next_keyframe(), self._first_session + stretch.session)
-            self._path.follow(keyframe)
-            sightings = sightings_of(keyframe, self._path.travelled, self._path.turned)
+            self._session = keyframe.session
+            sightings = sightings_of(keyframe)
             accepted, rejected = self._try_places(keyframe, sightings, deadline)
             closures, named = self._remember(keyframe, sightings, accepted)
             seen = observations(keyframe, named)
@@ -211,7 +211,7 @@ class Registrar:
             return lambda: _rejected(place.stamp_ns, keyframe, refusal)
         self._engine.prepare(keyframe)
         target = self._store.keyframe(place.keyframe_id)
-        prior = self._path.prior(keyframe, target, place.travelled, place.turned, self.params)
+        prior = expect(keyframe, target, self.params)
         start = prior.T_target_source if prior is not None and prior.tight(self.params) else None
         proposed = self._pool.submit(self._engine.propose, keyframe, target, start)
 

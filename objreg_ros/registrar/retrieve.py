@@ -35,8 +35,6 @@ class Place(NamedTuple):
 
     keyframe_id: int
     stamp_ns: int
-    travelled: float
-    turned: float
     session: int
     votes: float
 
@@ -79,8 +77,8 @@ class Index:
         most, here = SPARE * self._params.candidates, here[order]
         taken = order[np.concatenate([np.flatnonzero(~here)[:most], np.flatnonzero(here)[:most]])]
         taken = taken[self._spread(where[taken], when[taken])]
-        chosen = zip(where[taken].tolist(), when[taken].tolist(), votes[taken].tolist(), strict=True)
-        return [Place(number, ns, way, turn, session, vote) for (*_, way, turn), (ns, session, number), vote in chosen]
+        chosen = zip(when[taken].tolist(), votes[taken].tolist(), strict=True)
+        return [Place(number, stamp_ns, session, vote) for (stamp_ns, session, number), vote in chosen]
 
     def _ballot(self, sighting: Sighting, stored: int) -> tuple[Array, Array, Array]:
         """Where and when the objects were seen that look most like this one, the likest first, and their votes."""

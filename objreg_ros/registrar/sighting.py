@@ -18,9 +18,9 @@ class Sighting:
     """Object ``instance`` of a keyframe, in the frame of its session.
 
     ``extent`` m of the object, ``position (3,)`` of its middle and ``camera (3,)`` of the camera, m; ``travelled`` m
-    and ``turned`` degrees of the camera's path in the session until then; ``landmark`` the id that the object has
-    wherever it is seen, 0 before it has one; ``R_landmark_session (3, 3)`` turns this session's axes into those of the
-    session that saw the landmark first.
+    of the camera's path in the session until then; ``landmark`` the id that the object has wherever it is seen, 0
+    before it has one; ``R_landmark_session (3, 3)`` turns this session's axes into those of the session that saw the
+    landmark first.
     """
 
     keyframe_id: int
@@ -34,7 +34,6 @@ class Sighting:
     position: Array
     camera: Array
     travelled: float = 0.0
-    turned: float = 0.0
     landmark: int = 0
     R_landmark_session: Array = field(default_factory=lambda: np.eye(3))
 
@@ -48,7 +47,7 @@ class Sighting:
         return replace(self, landmark=landmark, R_landmark_session=R_landmark_session)
 
 
-def sightings_of(keyframe: Keyframe, travelled: float = 0.0, turned: float = 0.0) -> tuple[Sighting, ...]:
+def sightings_of(keyframe: Keyframe) -> tuple[Sighting, ...]:
     """A sighting for each object, in their order, without landmarks yet."""
     T_session_camera = np.eye(4) if keyframe.T_odom_camera is None else keyframe.T_odom_camera
     return tuple(
@@ -63,8 +62,7 @@ def sightings_of(keyframe: Keyframe, travelled: float = 0.0, turned: float = 0.0
             descriptor=describe(item.cloud),
             position=transform(T_session_camera, item.centroid),
             camera=np.array(T_session_camera[:3, 3]),
-            travelled=travelled,
-            turned=turned,
+            travelled=keyframe.travelled,
         )
         for item in keyframe.objects
     )

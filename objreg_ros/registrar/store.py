@@ -48,7 +48,7 @@ CREATE TABLE closure (
 """
 SIGHTINGS = (
     "SELECT object.keyframe, session, stamp_ns, instance, label, score, extent, descriptor, position,"
-    " object.camera, travelled, turned, landmark, R_landmark_session"
+    " object.camera, travelled, landmark, R_landmark_session"
     " FROM object JOIN keyframe ON keyframe.id = object.keyframe"
 )
 
@@ -95,7 +95,7 @@ class Store:
         """
         try:
             with self._connection as transaction:
-                _insert(transaction, "keyframe", keyframe_row(keyframe, sightings))
+                _insert(transaction, "keyframe", keyframe_row(keyframe))
                 for item, sighting in zip(keyframe.objects, sightings, strict=True):
                     _insert(transaction, "object", object_row(item, sighting))
                 for closure in closures:

@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from objreg_ros.data import Frame
+from objreg_ros.data import Frame, View
 from objreg_ros.registrar.keyframes import Keyframer, Stretch
 from objreg_ros.registrar.params import RegistrarParams
 
-from .samples import box, frame, moved, scene_view
+from .samples import CAMERA, box, frame, moved, scene_view
 
 PARAMS = RegistrarParams(keyframe_translation=0.1, keyframe_rotation=10.0, keyframe_seconds=1.0, keyframe_frames=4)
 CUP = (box("cup", (0, 0, 1)),)
@@ -18,6 +19,12 @@ CUP = (box("cup", (0, 0, 1)),)
 def _run(keyframer: Keyframer, frames: list[Frame]) -> list[Stretch]:
     ended = [keyframer.add(item) for item in frames] + [keyframer.finish()]
     return [stretch for stretch in ended if stretch is not None]
+
+
+def blind(seconds: float) -> Frame:
+    """A frame of which nothing says where it was taken."""
+    nothing = np.full((120, 160, 3), np.nan, np.float32)
+    return frame(seconds, CUP, None, View(xyz=nothing, grey=None, intrinsics=CAMERA))
 
 
 def test_a_moving_camera_makes_a_keyframe_each_time_it_has_moved_enough() -> None:
@@ -47,15 +54,7 @@ def test_without_odometry_the_views_give_the_motion() -> None:
 
 
 def test_a_lost_track_and_a_jump_back_in_time_begin_a_new_session() -> None:
-    blind = frame(
-        0.1,
-        CUP,
-        None,
-        type(scene_view())(
-            xyz=np.full((120, 160, 3), np.nan, np.float32), grey=None, intrinsics=scene_view().intrinsics
-        ),
-    )
-    sessions = [s.session for s in _run(Keyframer(PARAMS), [frame(0.0, CUP), blind])]
+    sessions = [s.session for s in _run(Keyframer(PARAMS), [frame(0.0, CUP), blind(0.1)])]
     assert sessions == [0, 1]
     looped = [frame(5.0, CUP, np.eye(4)), frame(1.0, CUP, np.eye(4)), frame(1.1, CUP, np.eye(4))]
     assert [s.session for s in _run(Keyframer(PARAMS), looped)] == [0, 1]
@@ -73,5 +72,38 @@ def test_a_gap_in_the_odometry_is_bridged_by_the_views() -> None:
         frame(0.1 * i, CUP, None if i in (2, 4) else poses[i], scene_view(moved(0.03 * i))) for i in range(len(poses))
     ]
     stretches = _run(Keyframer(PARAMS), frames)
-    assert {s.session for s in stretches} == {0} and all(s.by_odometry for s in stretches)
+    assert {s.session for s in stretches} == {0}
     assert np.allclose(stretches[-1].T_session_first, moved(5.12), atol=0.005)
+
+
+def test_a_keyframe_that_begins_in_a_gap_is_of_our_own_tracking_and_ends_where_odometry_comes_back() -> None:
+    frames = [frame(0.1 * i, CUP, moved(0.06 * i) if i < 2 else None, scene_view(moved(0.06 * i))) for i in range(5)]
+    slipped = [frame(0.1 * i, CUP, moved(0.06 * i + 0.03), scene_view(moved(0.06 * i))) for i in range(5, 8)]
+    stretches = _run(Keyframer(PARAMS), frames + slipped)
+    assert [s.by_odometry for s in stretches] == [True, False, False, True, True]
+    assert {s.session for s in stretches} == {0}
+    assert all(item.T_odom_camera is None for s in stretches if not s.by_odometry for item in s.frames)
+    assert np.allclose(stretches[3].T_session_first, moved(0.33))
+
+
+def test_a_frame_that_neither_odometry_nor_the_views_can_place_is_passed_over_for_a_moment() -> None:
+    late = [frame(0.0, CUP, np.eye(4)), blind(0.1), frame(0.2, CUP, moved(0.05))]
+    assert [s.session for s in _run(Keyframer(PARAMS), late)] == [0]
+    gone = [frame(0.0, CUP, np.eye(4)), blind(0.1), blind(1.2), frame(1.3, CUP, moved(0.05))]
+    assert [s.session for s in _run(Keyframer(PARAMS), gone)] == [0, 1, 2]
+
+
+def test_the_session_goes_on_after_what_was_collected_is_asked_for() -> None:
+    keyframer = Keyframer(PARAMS)
+    stretches = _run(keyframer, [frame(0.0, CUP, np.eye(4))]) + _run(keyframer, [frame(0.5, CUP, moved(2.0))])
+    assert [s.session for s in stretches] == [0, 0] and stretches[1].travelled == pytest.approx(2.0)
+    tracked = Keyframer(PARAMS)
+    assert [s.session for s in _run(tracked, [frame(0.0, CUP)]) + _run(tracked, [frame(0.1, CUP)])] == [0, 1]
+
+
+def test_the_way_counts_where_nothing_is_seen_too() -> None:
+    there, back = [0.5 * i for i in range(9)], [4.0 - 0.5 * i for i in range(1, 9)]
+    book = box("book", (0.5, 0, 1))
+    frames = [frame(0.1 * i, (), moved(x)) for i, x in enumerate((there + back)[1:-1], start=1)]
+    stretches = _run(Keyframer(PARAMS), [frame(0.0, CUP, np.eye(4)), *frames, frame(1.8, (*CUP, book), np.eye(4))])
+    assert [round(s.travelled, 3) for s in stretches] == [0.0, 8.0]

@@ -18,7 +18,7 @@ CUP, BOOK = box("cup", (0, 0, 1)), box("book", (0.5, 0, 1))
 
 
 def _seen(number: int, *objects: ObjectCloud, session: int = 0, x: float = 0.0) -> tuple[Sighting, ...]:
-    return sightings_of(keyframe(number, number, objects, session, moved(x)), travelled=0.0)
+    return sightings_of(keyframe(number, number, objects, session, moved(x)))
 
 
 def _take(landmarks: Landmarks, sightings: tuple[Sighting, ...], links: list[Link] | None = None) -> list[int]:

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from objreg_ros.registrar.odometry import Path, Prior
+from objreg_ros.registrar.odometry import Prior, Way, expect
 from objreg_ros.registrar.params import RegistrarParams
 
 from .samples import keyframe, moved
@@ -16,11 +18,11 @@ PARAMS = RegistrarParams(odometry_translation_noise=0.03, odometry_drift=0.1, od
 
 def _prior(*x: float, sessions: tuple[int, int] = (0, 0)) -> Prior | None:
     """What is expected of the last of several keyframes along x against the first."""
-    path = Path()
-    stops = [keyframe(i, i, session=sessions[i > 0], T_odom_camera=moved(at)) for i, at in enumerate(x)]
-    for stop in stops:
-        path.follow(stop)
-    return path.prior(stops[-1], stops[0], 0.0, 0.0, PARAMS)
+    way = Way(moved(x[0]))
+    for at in x:
+        way.go(moved(at))
+    first, last = (keyframe(i, i, session=sessions[i], T_odom_camera=moved(x[-i])) for i in (0, 1))
+    return expect(replace(last, travelled=way.travelled, turned=way.turned), first, PARAMS)
 
 
 def test_the_motion_is_that_of_the_odometry_and_its_uncertainty_grows_with_the_path() -> None:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from objreg_ros.data import ObjectCloud
@@ -16,7 +18,7 @@ PARAMS = RegistrarParams(min_gap=2.0, candidates=3, thin_seconds=1.0)
 
 
 def _seen(number: int, seconds: float, *objects: ObjectCloud, session: int = 0, x: float = 0.0) -> list[Sighting]:
-    return list(sightings_of(keyframe(number, seconds, objects, session, moved(x)), travelled=seconds))
+    return list(sightings_of(replace(keyframe(number, seconds, objects, session, moved(x)), travelled=seconds)))
 
 
 def _index(*keyframes: list[Sighting], params: RegistrarParams = PARAMS) -> Index:

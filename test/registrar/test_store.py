@@ -10,6 +10,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -31,21 +32,21 @@ store = Store(sys.argv[1])
 while True:
     number = store.next_keyframe()
     written = keyframe(number, float(number))
-    store.add(written, sightings_of(written, 0.0))
+    store.add(written, sightings_of(written))
     print(number, flush=True)
 """
 
 
 def _add(store: Store, seconds: float = 0.0, **kwargs: object) -> int:
     written = keyframe(store.next_keyframe(), seconds, **kwargs)
-    store.add(written, sightings_of(written, 0.5))
+    store.add(written, sightings_of(written))
     return written.keyframe_id
 
 
 def test_a_keyframe_comes_back_as_it_went_in(tmp_path: Path) -> None:
     with_pose = keyframe(1, 3.5, objects=(box("cup", (0, 0, 1)), box("book", (0.3, 0, 1), instance=2)))
     store = Store(tmp_path / "place.db")
-    store.add(with_pose, sightings_of(with_pose, 0.5))
+    store.add(with_pose, sightings_of(with_pose))
     store.close()
     back = Store(tmp_path / "place.db").keyframe(1)
     assert (back.stamp_ns, back.session, back.labels, back.frame_id) == (3_500_000_000, 0, ("cup", "book"), "camera")
@@ -65,11 +66,14 @@ def test_a_store_in_memory_needs_no_file() -> None:
 
 def test_sightings_come_back_with_landmark_position_and_descriptor(tmp_path: Path) -> None:
     store = Store(tmp_path / "place.db")
-    written = keyframe(1, objects=(box("cup", (0.2, 0, 1)),), T_odom_camera=moved(1.0))
-    (sighting,) = sightings_of(written, 0.5)
+    written = replace(
+        keyframe(1, objects=(box("cup", (0.2, 0, 1)),), T_odom_camera=moved(1.0)), travelled=0.5, turned=7.0
+    )
+    (sighting,) = sightings_of(written)
     store.add(written, [sighting.of_landmark(7, np.eye(3))])
     (back,) = store.sightings()
     assert (back.landmark, back.label, back.travelled) == (7, "cup", 0.5)
+    assert (store.keyframe(1).travelled, store.keyframe(1).turned) == (0.5, 7.0)
     assert np.allclose(back.position, (1.2, 0, 1), atol=0.02) and np.allclose(back.camera, (1, 0, 0))
     assert np.array_equal(back.descriptor, sighting.descriptor)
 
@@ -92,9 +96,9 @@ def test_an_unknown_keyframe_is_a_key_error() -> None:
 def test_merged_landmarks_are_written(tmp_path: Path) -> None:
     store = Store()
     written = keyframe(1)
-    store.add(written, [sightings_of(written, 0.0)[0].of_landmark(9, np.eye(3))])
+    store.add(written, [sightings_of(written)[0].of_landmark(9, np.eye(3))])
     later = keyframe(2, 5.0)
-    store.add(later, [sightings_of(later, 0.0)[0].of_landmark(2, np.eye(3))], merged={9: 2})
+    store.add(later, [sightings_of(later)[0].of_landmark(2, np.eye(3))], merged={9: 2})
     assert [sighting.landmark for sighting in store.sightings()] == [2, 2]
 
 
@@ -104,7 +108,7 @@ def test_a_closure_comes_back_with_its_covariance(tmp_path: Path) -> None:
         from_ns=1, to_ns=2, T_from_to=moved(0.3), covariance=0.01 * np.eye(6), labels=("cup",), evidence={"score": 0.5}
     )
     written = keyframe(1)
-    store.add(written, sightings_of(written, 0.0), [closure])
+    store.add(written, sightings_of(written), [closure])
     store.close()
     (back,) = Store(tmp_path / "place.db").closures()
     assert np.array_equal(back.T_from_to, closure.T_from_to) and np.array_equal(back.covariance, closure.covariance)
