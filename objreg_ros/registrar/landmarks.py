@@ -88,12 +88,15 @@ class Landmarks:
     def assign(
         self, sightings: Sequence[Sighting], links: Sequence[Link] = ()
     ) -> tuple[tuple[Sighting, ...], dict[int, int]]:
-        """The sightings of a new keyframe with their landmarks, and which landmarks turned out to be which older."""
+        """The sightings of a new keyframe with their landmarks, and which landmarks turned out to be which older.
+
+        A landmark is one object of a keyframe at most: of two that closures put upon it the first has it.
+        """
         merged: dict[int, int] = {}
         named: list[Sighting] = []
         taken: set[int] = set()
         for index, sighting in enumerate(sightings):
-            claims = [link for link in links if link.index == index]
+            claims = [link for link in links if link.index == index and _root(merged, link.of.landmark) not in taken]
             here = self._same_place(sighting, taken)
             numbers = {_root(merged, link.of.landmark) for link in claims} | ({here} if here else set())
             if not numbers:
@@ -102,7 +105,7 @@ class Landmarks:
                 continue
             oldest = min(numbers)
             merged.update({number: oldest for number in numbers if number != oldest})
-            taken.add(oldest)
+            taken |= numbers
             named.append(sighting.of_landmark(oldest, self._axes(claims, here)))
         return tuple(named), merged
 

@@ -39,6 +39,26 @@ def test_two_objects_of_one_keyframe_are_never_one_landmark() -> None:
     assert _take(landmarks, _seen(2, CUP, box("cup", (0.02, 0, 1)))) == [1, 2]
 
 
+def test_an_object_beside_one_that_a_closure_knows_does_not_get_an_id_that_this_merges_away() -> None:
+    landmarks = Landmarks(PARAMS)
+    first = _seen(1, CUP)
+    _take(landmarks, first)
+    _take(landmarks, _seen(2, CUP, session=1))
+    stored, _ = landmarks.assign(first)
+    link = Link(index=0, of=stored[0], R_there_here=np.eye(3))
+    assert _take(landmarks, _seen(3, CUP, box("cup", (0.08, 0, 1)), session=1), [link]) == [1, 3]
+    assert [known.landmark for known in landmarks.known()] == [1, 3]
+
+
+def test_of_two_objects_that_closures_put_upon_one_the_first_has_it() -> None:
+    landmarks = Landmarks(PARAMS)
+    first = _seen(1, CUP)
+    _take(landmarks, first)
+    stored, _ = landmarks.assign(first)
+    links = [Link(index=index, of=stored[0], R_there_here=np.eye(3)) for index in (0, 1)]
+    assert _take(landmarks, _seen(2, CUP, box("cup", (2, 0, 1)), session=1), links) == [1, 2]
+
+
 def test_another_session_sees_new_objects_until_a_closure_says_otherwise() -> None:
     landmarks = Landmarks(PARAMS)
     first = _seen(1, CUP)
