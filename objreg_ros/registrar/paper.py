@@ -85,6 +85,7 @@ def register(source: Array, target: Array, T_target_source: Array, params: Regis
         rmse=float(np.sqrt(np.mean(np.square(pairs.distance)))),
         iterations=iterations,
         converged=converged,
+        middle=transform(T, source.astype(float)).mean(axis=0),
     )
 
 

@@ -44,6 +44,12 @@ def test_a_start_from_the_truth_stays_there_and_its_covariance_is_valid() -> Non
     assert np.linalg.eigvalsh(covariance_of(found, PARAMS)).min() > 0
 
 
+def test_the_middle_of_what_was_aligned_is_that_of_the_points_in_the_target_frame() -> None:
+    xyz = _corner()
+    found = register(xyz, xyz, np.eye(4), PARAMS)
+    assert found is not None and np.allclose(found.middle, xyz.mean(axis=0))
+
+
 def test_points_out_of_reach_of_each_other_give_nothing() -> None:
     assert register(_corner(), np.add(_corner(), 5.0), np.eye(4), PARAMS) is None
 
