@@ -131,7 +131,7 @@ def _doubtful(candidate: Candidate, params: RegistrarParams) -> bool:
 
 
 def _agreement(candidate: Candidate, params: RegistrarParams, rivals: Sequence[Candidate]) -> Refusal | None:
-    """Several objects, or one whose pose has no rival, and that speaks for it or has the grey of the views to do so.
+    """Several objects, or one whose pose has no rival, and that does not look otherwise or has the views' grey for it.
 
     Without an object rooms that repeat themselves look alike. So do plain rooms with one object of a kind in them:
     chains agree on it, and an object that tells no yaw, or is seen to look otherwise, does not confirm them.
@@ -142,20 +142,13 @@ def _agreement(candidate: Candidate, params: RegistrarParams, rivals: Sequence[C
     if explained == 0:
         return Reason.FEW_OBJECTS, "0 objects < 1"
     margin = lead(candidate, rivals, params)
-    confirmed = any(check(candidate, params) for check in (_not_otherwise, _speaking, _painted))
+    confirmed = any(check(candidate, params) for check in (_not_otherwise, _painted))
     if margin >= params.min_margin_alone and confirmed:
         return None
     return Reason.CHAINS_DISAGREE, (
         f"{explained} objects < {params.min_objects}, {chains} chains, "
         f"likeness {candidate.likeness or 0.0:.2f}, margin {margin:.2f}"
     )
-
-
-def _speaking(candidate: Candidate, params: RegistrarParams) -> bool:
-    """Whether an object's own shape and print hold the pose that chains agree on."""
-    likeness, chains = candidate.likeness, len(candidate.agreeing_chains)
-    alike = likeness is not None and likeness >= params.min_likeness_alone
-    return alike and candidate.yaw_known and chains >= params.min_chains
 
 
 def _not_otherwise(candidate: Candidate, params: RegistrarParams) -> bool:

@@ -17,7 +17,7 @@ class RegistrarParams(Params):
     method: str = param(
         "objreg", "how keyframes are registered; paper is the founding point-to-point ICP", choices=("objreg", "paper")
     )
-    seed: int = param(0, "seed of everything that draws at random", ge=0)
+    seed: int = param(0, "seed of what a registration draws at random", ge=0)
 
     store: str = param("", "the SQLite file that remembers; empty: memory only, forgotten at the end")
     max_views: int = param(8, "views of one object that are kept, the most diverse", ge=1)
@@ -247,12 +247,12 @@ class RegistrarParams(Params):
     )
     firm_margin: float = param(0.4, "fall of V over a push that tells that the views hold a pose firmly", ge=0.0)
     rival_margin: float = param(0.1, "a candidate this much below the best in V is not considered", ge=0.0)
-    min_chains: int = param(2, "chains that must agree when fewer objects than min_objects are explained", ge=1)
-    min_objects: int = param(2, "explained objects that make up for chains that do not agree", ge=1)
+    min_chains: int = param(2, "chains that must agree on a lone object's pose for it not to be doubtful", ge=1)
+    min_objects: int = param(2, "explained objects that need no more evidence than the views; a lone one does", ge=1)
     min_objects_plain: int = param(
         3, "explained objects that make up for grey that does not correlate, as on a plain table", ge=1
     )
-    min_likeness_alone: float = param(0.1, "least likeness of a lone object that chains agree on", ge=-1.0, le=1.0)
+    min_likeness_alone: float = param(0.1, "least likeness of a lone object where grey is missing", ge=-1.0, le=1.0)
     min_margin_alone: float = param(
         0.2, "least worth of a lone object's pose above that of any other that may be, if all hidden agreed", ge=0.0
     )

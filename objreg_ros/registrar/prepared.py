@@ -64,7 +64,9 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
     with ThreadPoolExecutor(1, "prepare") as beside:
         surface = beside.submit(prepare_surface, *joined(fine, things), params.grid_cell, params.grid_reach)
         features = beside.submit(describe, *coarse, params.feature_radius)
-        shapes = tuple(prepare_shape(keyframe, [i], params.shape_points) for i in range(len(keyframe.objects)))
+        shapes = tuple(
+            prepare_shape(keyframe, [i], params.shape_points, params.seed) for i in range(len(keyframe.objects))
+        )
         return Prepared(
             keyframe=keyframe,
             sight=prepare_sight(keyframe.view, *seeing),
@@ -76,7 +78,7 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
                 tells_yaw(item.cloud, up, shape, params) for item, shape in zip(keyframe.objects, shapes, strict=True)
             ),
             shapes=shapes,
-            scene=prepare_shape(keyframe, range(len(keyframe.objects)), params.scene_points),
+            scene=prepare_shape(keyframe, range(len(keyframe.objects)), params.scene_points, params.seed),
             centroids=np.array([item.centroid for item in keyframe.objects]).reshape(-1, 3),
             extents=np.array([item.extent for item in keyframe.objects]),
             middle=np.asarray(coarse[0].mean(axis=0) if len(coarse[0]) else np.zeros(3), float),
