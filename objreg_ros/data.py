@@ -339,7 +339,8 @@ class LoopClosure:
     """Two moments that saw the same place: ``T_from_to`` maps points of the camera at *to* into the camera at *from*.
 
     ``covariance (6, 6) float64`` in ROS order [tx ty tz rx ry rz], of the pose in the *from* frame; ``labels`` of the
-    objects that closed it; ``matches`` those with their landmarks; ``evidence`` named numbers of the verification.
+    objects that closed it; ``matches`` those with their landmarks; ``evidence`` named numbers of the verification;
+    ``from_frame_id`` and ``to_frame_id`` the names of the two cameras, which may be two of one robot.
     """
 
     from_ns: int
@@ -349,7 +350,8 @@ class LoopClosure:
     labels: tuple[str, ...]
     matches: tuple[ObjectMatch, ...] = ()
     evidence: dict[str, float] = field(default_factory=dict)
-    frame_id: str = "camera"
+    from_frame_id: str = "camera"
+    to_frame_id: str = "camera"
 
     def __post_init__(self) -> None:
         _hold_pose(self, "T_from_to")
@@ -378,6 +380,7 @@ class Reason(Enum):
     MOVED = "objects_moved"
     REDUNDANT = "redundant"
     OVER_BUDGET = "over_budget"
+    UNREADABLE = "unreadable"
 
 
 @word

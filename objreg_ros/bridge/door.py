@@ -65,7 +65,7 @@ class Door(Node):
     # What a subclass fills in
 
     def compute(self, stamp_ns: int, payload: Any) -> bool:
-        """Read → compute → write for one frame; runs on the worker. `DroppedError` or ValueError if it cannot be.
+        """Read → compute → write for one frame, on the worker. `DroppedError`, ValueError or OSError if it cannot be.
 
         True when that was all; False when the frame goes on to another worker, which calls `conclude`.
         """
@@ -169,7 +169,7 @@ class Door(Node):
             done = work()
         except DroppedError as dropped:
             self.drop(stamp_ns, dropped.reason, str(dropped))
-        except ValueError as error:
+        except (ValueError, OSError) as error:
             self.drop(stamp_ns, "refused", str(error))
         else:
             if done:

@@ -155,11 +155,16 @@ def _pose(message: Any) -> Array:
 
 def loop_closure(message: Any) -> LoopClosure:
     """A constraint (nav_msgs/Odometry, frames ``name@sec.nsec``); its labels and evidence do not travel with it."""
-    frame_id, from_ns = moment(message.header.frame_id)
-    _, to_ns = moment(message.child_frame_id)
-    covariance = np.asarray(message.pose.covariance, np.float64).reshape(6, 6)
+    from_frame_id, from_ns = moment(message.header.frame_id)
+    to_frame_id, to_ns = moment(message.child_frame_id)
     return LoopClosure(
-        from_ns=from_ns, to_ns=to_ns, T_from_to=_pose(message), covariance=covariance, labels=(), frame_id=frame_id
+        from_ns=from_ns,
+        to_ns=to_ns,
+        T_from_to=_pose(message),
+        covariance=np.asarray(message.pose.covariance, np.float64).reshape(6, 6),
+        labels=(),
+        from_frame_id=from_frame_id,
+        to_frame_id=to_frame_id,
     )
 
 
@@ -244,6 +249,8 @@ def objects(message: Any, names: Mapping[int, str]) -> tuple[tuple[ObjectCloud, 
         order = np.argsort(instance, kind="stable")
         rows, instance = rows[:, order], instance[order]
     starts = np.flatnonzero(np.diff(instance)) + 1
+    if not (rows["z"] > 0).all():
+        raise ValueError(f"objects: expected points in front of the camera, got one at z = {rows['z'].min()} m")
     clouds = [_object(part, names) for part in np.split(rows, starts, axis=1) if part.size]
     support = next((cloud for cloud in clouds if cloud.instance == 0), None)
     return tuple(cloud for cloud in clouds if cloud.instance > 0), support

@@ -248,9 +248,13 @@ def _numbers(names: Labels) -> dict[str, int]:
     return {name: number for number, name in reversed(list(names.items()))}
 
 
+def _is_numbered(label: str, numbers: Mapping[str, int]) -> bool:
+    return label in numbers or (label.isdecimal() and int(label) < SUPPORT_ID)
+
+
 def _number(label: str, numbers: Mapping[str, int]) -> int:
     """The id of a label. A class without a name is called by its number on the way in, and so on the way out."""
-    if label not in numbers and not (label.isdecimal() and int(label) < SUPPORT_ID):
+    if not _is_numbered(label, numbers):
         raise ValueError(f"label {label!r}: expected one of the {len(numbers)} published labels")
     return numbers[label] if label in numbers else int(label)
 
@@ -291,11 +295,16 @@ def odometry(word: Odometry) -> OdometryMsg:
 
 def constraint(closure: LoopClosure) -> OdometryMsg:
     """A loop closure: frame *from* in the header, frame *to* as the child, the stamp of *to*."""
-    message = OdometryMsg(header=header(closure.to_ns, moment(closure.frame_id, closure.from_ns)))
-    message.child_frame_id = moment(closure.frame_id, closure.to_ns)
+    parent, child = _moments(closure)
+    message = OdometryMsg(header=header(closure.to_ns, parent), child_frame_id=child)
     message.pose.pose = pose(closure.T_from_to)
     message.pose.covariance = closure.covariance.ravel()
     return message
+
+
+def _moments(closure: LoopClosure) -> tuple[str, str]:
+    """The names of *from* and *to*."""
+    return moment(closure.from_frame_id, closure.from_ns), moment(closure.to_frame_id, closure.to_ns)
 
 
 def transforms(closure: LoopClosure) -> list[TransformStamped]:
@@ -303,7 +312,7 @@ def transforms(closure: LoopClosure) -> list[TransformStamped]:
 
     The child frame is ``"<moment of to>/<label>_<id of the landmark>"``.
     """
-    parent, child = moment(closure.frame_id, closure.from_ns), moment(closure.frame_id, closure.to_ns)
+    parent, child = _moments(closure)
     names = [f"{child}/{match.label}_{match.object_id}" for match in closure.matches]
     return [transform(closure.T_from_to, closure.to_ns, parent, name) for name in names]
 
@@ -311,13 +320,15 @@ def transforms(closure: LoopClosure) -> list[TransformStamped]:
 def landmarks(observations: Sequence[Observation], stamp_ns: int, frame_id: str, names: Labels) -> PointCloud2:
     """The objects of a keyframe in the camera ``frame_id``, one record each, with the ids of their landmarks.
 
-    ValueError for a label that ``names`` does not hold.
+    Without those of a label that ``names`` does not hold: it is of a model that another has replaced meanwhile.
     """
-    records, numbers = np.zeros((1, len(observations)), LANDMARKS), _numbers(names)
+    numbers = _numbers(names)
+    told = [seen for seen in observations if _is_numbered(seen.label, numbers)]
+    records = np.zeros((1, len(told)), LANDMARKS)
     for axis, name in enumerate("xyz"):
-        records[name] = [seen.xyz[axis] for seen in observations]
-    records["object_id"] = [seen.object_id for seen in observations]
-    records["class_id"] = [_number(seen.label, numbers) for seen in observations]
+        records[name] = [seen.xyz[axis] for seen in told]
+    records["object_id"] = [seen.object_id for seen in told]
+    records["class_id"] = [_number(seen.label, numbers) for seen in told]
     return _table(records, stamp_ns, frame_id)
 
 

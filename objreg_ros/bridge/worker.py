@@ -106,6 +106,10 @@ class Backlog(Worker[Job]):
         return waiting
 
     def _in_order(self, job: Job) -> None:
-        while self._aside:
-            self._settle(self._aside.popleft())
+        while (older := self._oldest()) is not None:
+            self._settle(older)
         self._newest(job)
+
+    def _oldest(self) -> Job | None:
+        with self._ready:  # `rest` may empty it between a look and a grasp
+            return self._aside.popleft() if self._aside else None

@@ -23,7 +23,7 @@ CENTRE_SPREAD = 0.05  # m: how far the middle of one small object wanders betwee
 
 
 def fuse(stretch: Stretch, params: RegistrarParams) -> Keyframe:
-    """The keyframe of a stretch, in the camera frame of its reference frame; its ids are 0 until a store gives them."""
+    """The keyframe of a stretch, in the camera frame of its reference frame; its id is 0 until a store gives one."""
     chosen = reference_index(stretch.frames)
     reference = stretch.frames[chosen]
     T_reference_first = inverse(stretch.T_first_frame[chosen])

@@ -88,6 +88,6 @@ class Keyframe:
         """The label of each object, in their order."""
         return tuple(item.label for item in self.objects)
 
-    def numbered(self, keyframe_id: int, session: int) -> Keyframe:
-        """The same keyframe under the ids that a store gave it."""
-        return replace(self, keyframe_id=keyframe_id, session=session)
+    def numbered(self, keyframe_id: int) -> Keyframe:
+        """The same keyframe under the id that a store gave it."""
+        return replace(self, keyframe_id=keyframe_id)

@@ -25,7 +25,7 @@ class Stretch:
     """Frames of one moment: ``T_first_frame`` maps the camera of each frame into that of the first.
 
     ``T_session_first`` is the pose of the first camera in the frame of its session: the odometry's, or our own
-    tracking's where odometry had a gap or there is none; ``by_odometry`` says which. ``session`` counts from 0 and
+    tracking's where odometry had a gap or there is none; ``by_odometry`` says which. ``session`` counts and
     changes where the track was lost. By then the camera had gone ``travelled`` m in it and turned ``turned`` degrees.
     """
 
@@ -72,10 +72,14 @@ class _Open:
 
 
 class Keyframer:
-    """Collects frames into stretches. ``add`` returns the stretch that a frame ended, or None."""
+    """Collects frames into stretches. ``add`` returns the stretch that a frame ended, or None.
 
-    def __init__(self, params: RegistrarParams) -> None:
+    Sessions count from ``next_session`` on.
+    """
+
+    def __init__(self, params: RegistrarParams, next_session: int = 0) -> None:
         self._params = params
+        self.next_session = next_session
         self._open: _Open | None = None
         self._session: _Session | None = None
         self._last: tuple[int, Array, Counter[str]] | None = None  # session, pose and labels of the last stretch
@@ -112,12 +116,13 @@ class Keyframer:
         ended = self._end()
         T_session_frame = np.eye(4) if frame.T_odom_camera is None else frame.T_odom_camera
         self._session = _Session(
-            number=0 if self._session is None else self._session.number + 1,
+            number=self.next_session,
             in_odometry=frame.T_odom_camera is not None,
             way=Way(T_session_frame),
             first=frame,
             last_ns=frame.stamp_ns,
         )
+        self.next_session += 1
         self._begin(self._session, frame, T_session_frame)
         return ended
 

@@ -46,7 +46,7 @@ class RegistrarNode(MatchingDoor):
         self._T_base_camera, self._seconds = inputs.mounting, inputs.limit
         warm(self.settings.of(RegistrarParams))
         self._registrar = Registrar(self.settings.of(RegistrarParams))
-        self._tracking = threading.Lock()
+        self._tracking, self._telling = threading.Lock(), threading.Lock()
         self._enabled = True
         self._counts = dict(self._registrar.counts())
         self._accepted, self._unsearched, self._refused = 0, 0, Counter[str]()
@@ -126,6 +126,10 @@ class RegistrarNode(MatchingDoor):
         return True
 
     def _publish(self, outcome: Outcome) -> None:
+        with self._telling:  # the searcher's thread and that of ~/save
+            self._tell(outcome)
+
+    def _tell(self, outcome: Outcome) -> None:
         for closure in outcome.closures:
             self._constraints.publish(to_msg.constraint(closure))
             for transform in to_msg.transforms(closure):
@@ -168,12 +172,17 @@ class RegistrarNode(MatchingDoor):
         return response
 
     def _save(self, _: Any, response: Any) -> Any:
-        """Also ends the keyframe in hand: what the last frames closed is published before the answer."""
-        with self._tracking:
-            self._publish(self._registrar.finish())
+        """Also ends the keyframe in hand: what the last frames closed is published before the answer.
+
+        With odometry the session goes on; without, our own tracking begins another.
+        """
         try:
+            with self._tracking:
+                stretch = self._registrar.end()
+            if stretch is not None:
+                self._publish(self._registrar.search(stretch, self._seconds))
             response.success, response.message = True, self._registrar.save()
-        except OSError as error:
+        except (ValueError, OSError) as error:
             response.success, response.message = False, str(error)
         return response
 

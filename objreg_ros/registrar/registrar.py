@@ -31,7 +31,7 @@ from objreg_ros.registrar.paper import PaperEngine
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.retrieve import Index, Place
 from objreg_ros.registrar.sighting import Sighting, sightings_of
-from objreg_ros.registrar.store import Store
+from objreg_ros.registrar.store import Store, StoreError
 from objreg_ros.registrar.thinning import Thinning
 
 RECENT = 500  # landmarks that are told of after every keyframe
@@ -70,12 +70,11 @@ class Registrar:
         self._store = Store(params.store)
         self._lock = threading.RLock()
         self._pool = ThreadPoolExecutor(params.threads, "register")
-        self._start()
+        self._start(self._store.next_session())
 
-    def _start(self) -> None:
-        """Everything that lives in memory, from what is in the store."""
-        self._keyframer = Keyframer(self.params)
-        self._first_session = self._store.next_session()
+    def _start(self, session: int) -> None:
+        """Everything that lives in memory, from what is in the store; ``session`` is the first that is new."""
+        self._keyframer, self._first_session = Keyframer(self.params, session), session
         self._index = Index(self.params)
         self._index.add(self._store.sightings())
         self._landmarks = Landmarks(self.params, self._store.sightings())
@@ -121,16 +120,23 @@ class Registrar:
         """Make a keyframe of the stretch, look for places that it shows again, and remember it.
 
         The likeliest places come first; those that are not reached within ``seconds`` are refused as over budget: with
-        none the keyframe is only stored. Without a limit the outcome depends on the frames alone.
+        none the keyframe is only stored. Without a limit the outcome depends on the frames alone. StoreError where it
+        cannot be stored; then it closes nothing. Of a stretch that a `reset` overtook nothing comes.
         """
         deadline = time.monotonic() + seconds
         with self._lock:
-            keyframe = fuse(stretch, self.params)
-            keyframe = keyframe.numbered(self._store.next_keyframe(), self._first_session + stretch.session)
+            if stretch.session < self._first_session:  # `reset` came first
+                return Outcome()
+            keyframe = fuse(stretch, self.params).numbered(self._store.next_keyframe())
             self._session = keyframe.session
             sightings = sightings_of(keyframe)
             accepted, rejected = self._try_places(keyframe, sightings, deadline)
-            closures, named = self._remember(keyframe, sightings, accepted)
+            try:
+                closures, named = self._remember(keyframe, sightings, accepted)
+            except StoreError:
+                for item in accepted:
+                    self._thinning.withdraw(item.target.stamp_ns, keyframe.stamp_ns)
+                raise
             seen = observations(keyframe, named)
             return Outcome(
                 closures=closures,
@@ -144,7 +150,7 @@ class Registrar:
         """Forget everything, in the store too."""
         with self._lock:
             self._store.clear()
-            self._start()
+            self._start(self._keyframer.next_session)
 
     def save(self, path: str = "") -> str:
         """Bring the store's file up to date, or write a copy of it to ``path``; returns where it is."""
@@ -209,8 +215,12 @@ class Registrar:
         if late > 0:
             refusal = Reason.OVER_BUDGET, f"{1e3 * late:.0f} ms after the end of the search"
             return lambda: _rejected(place.stamp_ns, keyframe, refusal)
+        try:
+            target = self._store.keyframe(place.keyframe_id)
+        except StoreError as error:
+            refusal = Reason.UNREADABLE, str(error)
+            return lambda: _rejected(place.stamp_ns, keyframe, refusal)
         self._engine.prepare(keyframe)
-        target = self._store.keyframe(place.keyframe_id)
         prior = expect(keyframe, target, self.params)
         start = prior.T_target_source if prior is not None and prior.tight(self.params) else None
         proposed = self._pool.submit(self._engine.propose, keyframe, target, start)
@@ -272,7 +282,8 @@ def closure_of(
         labels=tuple(dict.fromkeys(match.label for match in matches)) or tuple(dict.fromkeys(keyframe.labels)),
         matches=matches,
         evidence=_evidence(candidate) | _moved(keyframe, item),
-        frame_id=keyframe.frame_id,
+        from_frame_id=item.target.frame_id,
+        to_frame_id=keyframe.frame_id,
     )
 
 

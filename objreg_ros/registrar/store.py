@@ -13,7 +13,7 @@ import os
 import sqlite3
 from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, contextmanager
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ from objreg_ros.registrar.sighting import Sighting
 
 MAGIC = b"SQLite format 3\0"
 APPLICATION_ID = 0x4F424A52  # "OBJR" at byte 68 of the file
-SCHEMA_VERSION = 1  # at byte 60
+SCHEMA_VERSION = 2  # at byte 60
 CACHED = 64  # decoded keyframes in memory, about 1 MB each
 SCHEMA = """
 CREATE TABLE keyframe (
@@ -43,9 +43,17 @@ CREATE TABLE object (
 CREATE INDEX object_of_keyframe ON object (keyframe);
 CREATE INDEX object_of_landmark ON object (landmark);
 CREATE TABLE closure (
-  id INTEGER PRIMARY KEY, from_ns INTEGER NOT NULL, to_ns INTEGER NOT NULL, frame_id TEXT NOT NULL,
+  id INTEGER PRIMARY KEY, from_ns INTEGER NOT NULL, to_ns INTEGER NOT NULL,
+  from_frame_id TEXT NOT NULL, to_frame_id TEXT NOT NULL,
   T_from_to BLOB NOT NULL, covariance BLOB NOT NULL, labels TEXT NOT NULL, evidence TEXT NOT NULL);
 """
+RENEWALS = {  # what makes of a version the next one
+    1: """
+ALTER TABLE closure RENAME COLUMN frame_id TO to_frame_id;
+ALTER TABLE closure ADD COLUMN from_frame_id TEXT NOT NULL DEFAULT '';
+UPDATE closure SET from_frame_id = to_frame_id;
+""",
+}
 SIGHTINGS = (
     "SELECT object.keyframe, session, stamp_ns, instance, label, score, extent, descriptor, position,"
     " object.camera, travelled, landmark, R_landmark_session"
@@ -60,26 +68,27 @@ class StoreError(OSError):
 class Store:
     """The store at ``path``, made if it is not there; in memory only if the path is empty. StoreError if it is bad.
 
-    With ``read_only`` nothing is made or changed, and a path without a store is a StoreError too.
+    With ``read_only`` nothing is made or changed, and a path without a store is a StoreError too. Whatever the file
+    refuses later (a full disk, a lock that another process holds) is a StoreError as well.
     """
 
     def __init__(self, path: str | Path = "", read_only: bool = False) -> None:
-        self.path = str(path)
+        self.path = str(Path(path).expanduser()) if str(path) else ""
         self._cache: OrderedDict[int, Keyframe] = OrderedDict()
         self._sessions: dict[int, int] = {}  # of the keyframes, the oldest first: to count them is to read the file
         if not self.path and not read_only:
             self._connection = _connect(":memory:")
             self._connection.executescript(_birth())
             return
-        if not Path(self.path).is_file():
-            if read_only:
-                raise StoreError(f"{self.path}: expected a store of objreg_ros, got no file")
-            _create(Path(self.path))
-        _check(Path(self.path))
-        self._connection = _connect(_read_only_uri(Path(self.path)) if read_only else self.path)
-        if not read_only:
-            self._connection.execute("PRAGMA journal_mode = WAL")
-        self._sessions.update(self._connection.execute("SELECT id, session FROM keyframe ORDER BY id"))
+        with self._told("open"):
+            if not Path(self.path).is_file():
+                _create(Path(self.path), read_only)
+            _check(Path(self.path))
+            self._connection = _connect(_read_only_uri(Path(self.path)) if read_only else self.path)
+            if not read_only:
+                self._connection.execute("PRAGMA journal_mode = WAL")
+                _renew(self._connection)
+            self._sessions.update(self._connection.execute("SELECT id, session FROM keyframe ORDER BY id"))
 
     def add(
         self,
@@ -93,19 +102,14 @@ class Store:
         ``merged`` says which landmarks became which: known objects that turned out to be the same. StoreError where it
         cannot be written: then nothing of it is.
         """
-        try:
-            with self._connection as transaction:
-                _insert(transaction, "keyframe", keyframe_row(keyframe))
-                for item, sighting in zip(keyframe.objects, sightings, strict=True):
-                    _insert(transaction, "object", object_row(item, sighting))
-                for closure in closures:
-                    _insert(transaction, "closure", _closure_row(closure))
-                for old, new in (merged or {}).items():
-                    transaction.execute("UPDATE object SET landmark = ? WHERE landmark = ?", (new, old))
-        except sqlite3.Error as error:
-            raise StoreError(
-                f"{self.path or 'memory'}: cannot write keyframe {keyframe.keyframe_id}: {error}"
-            ) from error
+        with self._told(f"write keyframe {keyframe.keyframe_id}"), self._connection as transaction:
+            _insert(transaction, "keyframe", keyframe_row(keyframe))
+            for item, sighting in zip(keyframe.objects, sightings, strict=True):
+                _insert(transaction, "object", object_row(item, sighting))
+            for closure in closures:
+                _insert(transaction, "closure", _closure_row(closure))
+            for old, new in (merged or {}).items():
+                transaction.execute("UPDATE object SET landmark = ? WHERE landmark = ?", (new, old))
         self._sessions[keyframe.keyframe_id] = keyframe.session
         self._remember(keyframe)
 
@@ -114,25 +118,25 @@ class Store:
         if keyframe_id in self._cache:
             self._cache.move_to_end(keyframe_id)
             return self._cache[keyframe_id]
-        row = self._connection.execute("SELECT * FROM keyframe WHERE id = ?", (keyframe_id,)).fetchone()
-        if row is None:
-            raise KeyError(keyframe_id)
-        objects = self._connection.execute("SELECT * FROM object WHERE keyframe = ? ORDER BY id", (keyframe_id,))
-        try:
+        with self._told(f"read keyframe {keyframe_id}"):
+            row = self._connection.execute("SELECT * FROM keyframe WHERE id = ?", (keyframe_id,)).fetchone()
+            if row is None:
+                raise KeyError(keyframe_id)
+            objects = self._connection.execute("SELECT * FROM object WHERE keyframe = ? ORDER BY id", (keyframe_id,))
             keyframe = keyframe_from_rows(row, objects.fetchall())
-        except ValueError as error:
-            raise StoreError(f"{self.path}: keyframe {keyframe_id}: {error}") from error
         self._remember(keyframe)
         return keyframe
 
     def sightings(self, keyframe_id: int | None = None) -> Iterator[Sighting]:
         """Every stored object without its points, or those of one keyframe, oldest first."""
         only = "" if keyframe_id is None else f" WHERE object.keyframe = {int(keyframe_id)}"
-        return map(sighting_from_row, self._connection.execute(f"{SIGHTINGS}{only} ORDER BY object.id"))
+        with self._told("read the objects"):
+            yield from map(sighting_from_row, self._connection.execute(f"{SIGHTINGS}{only} ORDER BY object.id"))
 
     def closures(self) -> Iterator[LoopClosure]:
         """Every stored closure, oldest first, without the registrations of its objects."""
-        return map(_closure, self._connection.execute("SELECT * FROM closure ORDER BY id"))
+        with self._told("read the closures"):
+            yield from map(_closure, self._connection.execute("SELECT * FROM closure ORDER BY id"))
 
     def keyframe_ids(self) -> list[int]:
         """The ids of the stored keyframes, oldest first."""
@@ -144,7 +148,7 @@ class Store:
 
     def remove(self, keyframe_ids: Sequence[int]) -> None:
         """Forget keyframes and their objects; their closures stay."""
-        with self._connection as transaction:
+        with self._told("remove keyframes"), self._connection as transaction:
             transaction.executemany("DELETE FROM keyframe WHERE id = ?", [(k,) for k in keyframe_ids])
         for keyframe_id in keyframe_ids:
             self._cache.pop(keyframe_id, None)
@@ -152,7 +156,7 @@ class Store:
 
     def clear(self) -> None:
         """Forget everything."""
-        with self._connection as transaction:
+        with self._told("forget everything"), self._connection as transaction:
             for table in ("closure", "object", "keyframe"):
                 transaction.execute(f"DELETE FROM {table}")
         self._cache.clear()
@@ -160,8 +164,7 @@ class Store:
 
     def next_keyframe(self) -> int:
         """An id that no keyframe ever had here."""
-        highest = self._connection.execute("SELECT seq FROM sqlite_sequence WHERE name = 'keyframe'").fetchone()
-        return 1 + (int(highest[0]) if highest else 0)
+        return 1 + self._one("SELECT COALESCE(MAX(seq), 0) FROM sqlite_sequence WHERE name = 'keyframe'")
 
     def next_session(self) -> int:
         """The number of a session that nothing is stored of yet."""
@@ -179,19 +182,29 @@ class Store:
 
     def save(self, path: str | Path = "") -> str:
         """Fold the write-ahead log into the file, or write a copy to ``path``. Returns where it is."""
-        if path:
-            with closing(sqlite3.connect(path)) as copy:
-                self._connection.backup(copy)
-            return str(path)
-        self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
-        return self.path
+        with self._told("save it" if not path else f"copy it to {path}"):
+            if path:
+                with closing(sqlite3.connect(path)) as copy:
+                    self._connection.backup(copy)
+                return str(path)
+            self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            return self.path
 
     def close(self) -> None:
         """End it; everything that was added is already written."""
         self._connection.close()
 
     def _one(self, query: str) -> int:
-        return int(self._connection.execute(query).fetchone()[0])
+        with self._told("count"):
+            return int(self._connection.execute(query).fetchone()[0])
+
+    @contextmanager
+    def _told(self, what: str) -> Iterator[None]:
+        """Say of any error of the database or of what it holds which file it is and what could not be done."""
+        try:
+            yield
+        except (sqlite3.Error, ValueError) as error:
+            raise StoreError(f"{self.path or 'memory'}: cannot {what}: {error}") from error
 
     def _remember(self, keyframe: Keyframe) -> None:
         self._cache[keyframe.keyframe_id] = keyframe
@@ -216,8 +229,14 @@ def _connect(path: str) -> sqlite3.Connection:
     return connection
 
 
-def _create(path: Path) -> None:
+def _create(path: Path, read_only: bool) -> None:
     """An empty store, made beside its place and moved there: a process that is killed here leaves no half of one."""
+    if read_only:
+        raise StoreError(f"{path}: expected a store of objreg_ros, got no file")
+    if path.exists() or not path.parent.is_dir():
+        raise StoreError(
+            f"{path}: expected a file in a folder that is there, got none; make the folder, or use another"
+        )
     beside = path.with_name(f"{path.name}.new{os.getpid()}")
     beside.unlink(missing_ok=True)
     with closing(sqlite3.connect(beside)) as connection:
@@ -227,6 +246,13 @@ def _create(path: Path) -> None:
 
 def _birth() -> str:
     return f"PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {SCHEMA_VERSION}; {SCHEMA}"
+
+
+def _renew(connection: sqlite3.Connection) -> None:
+    """Bring a store of an older version to this one, in one transaction for each version."""
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    for old in range(version, SCHEMA_VERSION):
+        connection.executescript(f"BEGIN; {RENEWALS[old]} PRAGMA user_version = {old + 1}; COMMIT;")
 
 
 def _check(path: Path) -> None:
@@ -275,7 +301,8 @@ def _closure_row(closure: LoopClosure) -> dict[str, Any]:
     return {
         "from_ns": closure.from_ns,
         "to_ns": closure.to_ns,
-        "frame_id": closure.frame_id,
+        "from_frame_id": closure.from_frame_id,
+        "to_frame_id": closure.to_frame_id,
         "T_from_to": np.ascontiguousarray(closure.T_from_to).tobytes(),
         "covariance": np.ascontiguousarray(closure.covariance).tobytes(),
         "labels": json.dumps(closure.labels),
@@ -287,7 +314,8 @@ def _closure(row: Mapping[str, Any]) -> LoopClosure:
     return LoopClosure(
         from_ns=row["from_ns"],
         to_ns=row["to_ns"],
-        frame_id=row["frame_id"],
+        from_frame_id=row["from_frame_id" if "from_frame_id" in row.keys() else "frame_id"],  # noqa: SIM118
+        to_frame_id=row["to_frame_id" if "to_frame_id" in row.keys() else "frame_id"],  # noqa: SIM118
         T_from_to=np.frombuffer(row["T_from_to"]).reshape(4, 4),
         covariance=np.frombuffer(row["covariance"]).reshape(6, 6),
         labels=tuple(json.loads(row["labels"])),

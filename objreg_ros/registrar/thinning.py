@@ -22,6 +22,10 @@ class Thinning:
         pairs = (pair for k in (-1, 0, 1) for pair in self._pairs.get(to_ns // span + k, ()))
         return any(abs(a - from_ns) < span and abs(b - to_ns) < span for a, b in pairs)
 
+    def withdraw(self, from_ns: int, to_ns: int) -> None:
+        """Forget a closure that was accepted, and came to nothing."""
+        self._pairs[to_ns // self._span_ns].remove((from_ns, to_ns))
+
     def accept(self, from_ns: int, to_ns: int) -> None:
         """Remember an accepted closure."""
         self._pairs[to_ns // self._span_ns].append((from_ns, to_ns))

@@ -32,9 +32,10 @@ MEANINGS = {
     "objects_moved": "the objects have been moved since",
     "redundant": "a closure of this revisit was accepted already",
     "over_budget": "time ran out before this place was tried",
+    "unreadable": "what the store holds of this place is damaged",
 }
 
-UNTRIED = ("no_candidate", "redundant", "over_budget")
+UNTRIED = ("no_candidate", "redundant", "over_budget", "unreadable")
 
 
 def page(chapters: Sequence[tuple[Story, Album | None]]) -> str:

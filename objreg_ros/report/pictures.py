@@ -21,7 +21,7 @@ from objreg_ros.segmenter.organise import organise
 WINDOW_NS = 150_000_000  # how far from a moment its pictures may have been recorded
 WIDTH = 320  # px of one picture
 QUALITY = 82
-UNTRIED = (Reason.NO_CANDIDATE, Reason.REDUNDANT, Reason.OVER_BUDGET)  # refused before anything was registered
+UNTRIED = (Reason.NO_CANDIDATE, Reason.REDUNDANT, Reason.OVER_BUDGET, Reason.UNREADABLE)  # nothing was registered
 
 
 class Album:

@@ -41,6 +41,16 @@ def test_a_message_that_breaks_its_contract_is_dropped_by_the_name_of_its_topic(
     assert dropped.value.reason == "malformed_image"
 
 
+@pytest.mark.parametrize("error", [ValueError("too far"), OSError("the disk is full")])
+def test_what_breaks_on_one_frame_is_counted_and_the_node_lives(door: Door, error: Exception) -> None:
+    def work() -> bool:
+        raise error
+
+    door.accept(5)
+    door.conclude(5, work)
+    assert door.ledger.balance().dropped == {"refused": 1} and not door.failure.done()
+
+
 def test_a_message_aside_that_breaks_its_contract_is_nothing(door: Door) -> None:
     assert door.read_aside("labels", refuse, "x") is None
     assert door.read_aside("labels", str.upper, "x") == "X"

@@ -183,9 +183,10 @@ def test_a_pose_without_a_rotation_is_refused() -> None:
 
 def test_a_constraint_tells_its_two_moments() -> None:
     message = messages.odometry(at=(0.1, 0, 0), frame_id="camera@12.000000034")
-    message.child_frame_id = "camera@99.500000000"
+    message.child_frame_id = "rear@99.500000000"
     closure = from_msg.loop_closure(message)
-    assert (closure.from_ns, closure.to_ns, closure.frame_id) == (12_000_000_034, 99_500_000_000, "camera")
+    assert (closure.from_ns, closure.to_ns) == (12_000_000_034, 99_500_000_000)
+    assert (closure.from_frame_id, closure.to_frame_id) == ("camera", "rear")
     assert closure.T_from_to[0, 3] == 0.1 and np.array_equal(closure.covariance, np.eye(6))
 
 
@@ -244,7 +245,7 @@ def object_rows() -> np.ndarray:
     rows = np.zeros(5, OBJECTS)
     rows["instance"] = [2, 0, 1, 2, 1]
     rows["class_id"] = [3, SUPPORT_ID, 4, 3, 4]
-    rows["x"] = [20, 0, 10, 21, 11]
+    rows["x"], rows["z"] = [20, 0, 10, 21, 11], 1
     rows["normal_z"], rows["score"], rows["density"], rows["flags"] = -1, 0.5, 1000, 5
     rows["rgb"] = 0x010203
     return rows
@@ -256,6 +257,14 @@ def test_objects_come_in_order_with_the_support_apart() -> None:
     assert support is not None and support.label == "support" and len(support) == 1
     assert clouds[0].rgb is not None and clouds[0].rgb[0].tolist() == [1, 2, 3]
     assert (clouds[1].score, clouds[1].density, clouds[1].flags.tolist()) == (0.5, 1000.0, [5, 5])
+
+
+@pytest.mark.parametrize("z", [0.0, -1.0, np.nan])
+def test_a_point_that_no_camera_sees_is_refused(z: float) -> None:
+    rows = object_rows()
+    rows["z"][2] = z
+    with pytest.raises(ValueError, match="objects: expected points in front of the camera"):
+        from_msg.objects(messages.own_table(rows), {})
 
 
 def test_no_objects_are_no_objects() -> None:

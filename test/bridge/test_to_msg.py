@@ -35,11 +35,13 @@ RNG = np.random.default_rng(4)
 
 
 def cloud_of(label: str, instance: int, count: int, coloured: bool = True) -> ObjectCloud:
+    xyz = RNG.normal(size=(count, 3)).astype(np.float32)
+    xyz[:, 2] = 1 + np.abs(xyz[:, 2])
     return ObjectCloud(
         label=label,
         score=float(np.float32(0.75)),
         instance=instance,
-        xyz=RNG.normal(size=(count, 3)).astype(np.float32),
+        xyz=xyz,
         normals=RNG.normal(size=(count, 3)).astype(np.float32),
         rgb=RNG.integers(0, 256, (count, 3), dtype=np.uint8) if coloured else None,
         flags=np.full(count, PointFlag.EDGE | PointFlag.CUT_BY_BOX, np.uint16),
@@ -71,7 +73,8 @@ def closure(*matches: ObjectMatch) -> LoopClosure:
         covariance=A @ A.T + np.eye(6),
         labels=("cup",),
         matches=matches,
-        frame_id="kinect",
+        from_frame_id="front",
+        to_frame_id="kinect",
     )
 
 
@@ -196,10 +199,10 @@ def test_gravity_carries_its_confidence_as_its_length() -> None:
 def test_a_constraint_comes_back_with_both_moments_and_its_covariance() -> None:
     sent = closure()
     message = to_msg.constraint(sent)
-    assert message.header.frame_id == "kinect@0.000000005"
+    assert message.header.frame_id == "front@0.000000005"
     assert message.child_frame_id == "kinect@1700000000.123456789"
     back = from_msg.loop_closure(message)
-    assert (back.from_ns, back.to_ns, back.frame_id) == (5, STAMP, "kinect")
+    assert (back.from_ns, back.to_ns, back.from_frame_id, back.to_frame_id) == (5, STAMP, "front", "kinect")
     assert np.allclose(back.T_from_to, sent.T_from_to, atol=1e-12) and np.array_equal(back.covariance, sent.covariance)
 
 
@@ -219,6 +222,8 @@ def test_landmarks_tell_where_each_object_of_a_keyframe_was_and_which_it_is() ->
     assert (from_msg.stamp_ns(message), message.header.frame_id) == (STAMP, "kinect")
     assert records["object_id"].tolist() == [7, 9] and records["class_id"].tolist() == [6, 4]
     assert np.allclose([records[axis] for axis in "xyz"], [[7, 9], [0.5, 0.5], [2, 2]])
+    (left,) = table(to_msg.landmarks(seen, STAMP, "kinect", {3: "book"}), "object_id", "class_id")
+    assert left["object_id"].tolist() == [9], "cup is of a model that is no longer there"
 
 
 def test_a_path_keeps_the_time_and_the_place_of_each_pose() -> None:

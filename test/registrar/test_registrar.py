@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sqlite3
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from objreg_ros.data import Array, Frame, LoopClosure, Reason, Rejected
 from objreg_ros.geometry import inverse, pose_error
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
+from objreg_ros.registrar.store import StoreError
 
 from . import rooms
 
@@ -179,3 +181,43 @@ def test_landmarks_of_another_session_are_known_but_not_here(tmp_path: Path) -> 
         _run(registrar, _frame(0, HERE, True))
         assert registrar.landmarks_here
         registrar.close()
+
+
+def test_a_stored_keyframe_that_is_damaged_is_refused_and_the_others_are_tried(tmp_path: Path) -> None:
+    registrar = Registrar(RegistrarParams(store=str(tmp_path / "place.db")))
+    _run(registrar, *(_frame(3.0 * k, T, True) for k, T in enumerate((HERE, AWAY, BESIDE, AWAY))))
+    registrar.close()
+    with sqlite3.connect(tmp_path / "place.db") as connection:
+        connection.execute("UPDATE keyframe SET context = x'00ff00' WHERE id = 1")
+    connection.close()
+    again = Registrar(RegistrarParams(store=str(tmp_path / "place.db")))
+    closures, rejected = _run(again, _frame(100, HERE, True))
+    assert [r.from_ns for r in rejected if r.reason is Reason.UNREADABLE] == [0]
+    assert 6_000_000_000 in [closure.from_ns for closure in closures]
+    again.close()
+
+
+def test_a_keyframe_that_cannot_be_stored_closes_nothing_and_is_in_no_later_ones_way() -> None:
+    registrar = Registrar(PARAMS)
+    _run(registrar, _frame(0, HERE, True))
+    add = registrar._store.add
+    registrar._store.add = refuse  # type: ignore[method-assign]
+    with pytest.raises(StoreError, match="disk"):
+        _run(registrar, _frame(30, BESIDE, True))
+    registrar._store.add = add  # type: ignore[method-assign]
+    closures, _ = _run(registrar, _frame(30.5, HERE, True))
+    assert [closure.from_ns for closure in closures] == [0]
+
+
+def refuse(*_: object) -> None:
+    raise StoreError("the disk is full")
+
+
+def test_a_keyframe_of_before_a_reset_is_not_stored_after_it() -> None:
+    registrar = Registrar(PARAMS)
+    registrar.track(_frame(0, HERE, True))
+    stretch = registrar.end()
+    registrar.reset()
+    assert stretch is not None and registrar.search(stretch).keyframe_ns is None
+    _run(registrar, _frame(10, HERE, True))
+    assert registrar.counts()["keyframes"] == 1

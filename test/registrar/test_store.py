@@ -115,6 +115,42 @@ def test_a_closure_comes_back_with_its_covariance(tmp_path: Path) -> None:
     assert (back.labels, back.evidence) == (("cup",), {"score": 0.5})
 
 
+def test_a_store_of_the_first_version_is_read_as_it_is_and_renewed_when_it_is_written(tmp_path: Path) -> None:
+    path = tmp_path / "place.db"
+    store = Store(path)
+    closure = LoopClosure(from_ns=1, to_ns=2, T_from_to=moved(0.3), covariance=np.eye(6), labels=("cup",))
+    written = keyframe(1)
+    store.add(written, sightings_of(written), [closure])
+    store._connection.executescript(
+        "ALTER TABLE closure DROP COLUMN from_frame_id;"
+        "ALTER TABLE closure RENAME COLUMN to_frame_id TO frame_id; PRAGMA user_version = 1;"
+    )
+    store.close()
+    for read_only in (True, False, True):
+        opened = Store(path, read_only=read_only)
+        (back,) = opened.closures()
+        assert (back.from_frame_id, back.to_frame_id, opened.keyframe(1).labels) == ("camera", "camera", ("cup",))
+        opened.close()
+    with sqlite3.connect(path) as connection:
+        assert connection.execute("PRAGMA user_version").fetchone() == (2,)
+
+
+def test_a_place_where_no_store_can_be_made_is_a_store_error(tmp_path: Path) -> None:
+    for path in (tmp_path / "nowhere" / "place.db", tmp_path):
+        with pytest.raises(StoreError, match="expected a file in a folder"):
+            Store(path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_the_database_refuses_later_is_a_store_error_too(tmp_path: Path) -> None:
+    store = Store(tmp_path / "place.db")
+    number = _add(store)
+    store.close()
+    for refused in (store.clear, store.counts, store.next_keyframe, lambda: store.remove([number])):
+        with pytest.raises(StoreError, match=r"place\.db: cannot"):
+            refused()
+
+
 def test_what_cannot_be_written_is_a_store_error_and_leaves_the_store_as_it_was() -> None:
     store = Store()
     number = _add(store)
@@ -188,7 +224,7 @@ def test_a_newer_file_is_refused_and_left_untouched(tmp_path: Path) -> None:
         connection.execute("PRAGMA user_version = 99")
     connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     connection.close()
-    _refused(path, "version 1 or older, got 99")
+    _refused(path, "version 2 or older, got 99")
 
 
 def test_a_file_of_another_kind_is_refused_and_left_untouched(tmp_path: Path) -> None:

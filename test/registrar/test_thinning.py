@@ -16,5 +16,12 @@ def test_a_pair_near_an_accepted_one_at_both_ends_is_redundant() -> None:
     assert not thinning.redundant(5 * SECOND, 60 * SECOND)
 
 
+def test_what_came_to_nothing_is_not_in_the_way() -> None:
+    thinning = Thinning(1.0)
+    thinning.accept(0, 60 * SECOND)
+    thinning.withdraw(0, 60 * SECOND)
+    assert not thinning.redundant(0, 60 * SECOND)
+
+
 def test_what_was_accepted_before_a_restart_still_counts() -> None:
     assert Thinning(1.0, [(0, 60 * SECOND)]).redundant(0, 60 * SECOND)
