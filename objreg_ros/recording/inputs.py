@@ -20,6 +20,8 @@ POSES = (
     "geometry_msgs/msg/PoseWithCovarianceStamped",
     "geometry_msgs/msg/TransformStamped",
 )
+# What the nodes themselves publish, in any namespace: no input of theirs, unless a remap says so.
+OWN = re.compile(r"(^|/)(detections_table|objects|view(/camera_info)?|constraints|transforms|landmarks|correction)$")
 TRUTH = r"ground_?truth|(^|/)gt(/|$|_)|vicon|mocap|vrpn|optitrack"
 
 
@@ -54,7 +56,7 @@ RULES = {
     ),
     "points": Rule(
         ("sensor_msgs/msg/PointCloud2",),
-        r"objects|view|detections_table|velodyne|lidar|ouster|livox|map",
+        r"objects|view|velodyne|lidar|ouster|livox|map",
         (r"^/?points$", r"depth_registered/points", r"hd/points|qhd/points|sd/points", r"points2?$", r"points|cloud"),
     ),
     "depth": Rule(
@@ -129,15 +131,16 @@ _INPUT_OF = {topic: name for name, topic in GRAPH_TOPICS.items()}
 def choose_inputs(topics: Mapping[str, Topic], remaps: Mapping[str, str] | None = None) -> Inputs:
     """The best topic for each input. ``remaps`` say it outright: input → topic, or input → "" for none.
 
-    A depth image with its camera_info goes before points: it is the same measurement in a thirteenth of the bytes.
-    Points go before a depth image whose name does not say that it is registered to colour. ValueError for a remap
-    that names no input, no topic of the recording, a topic of another type or a topic that another remap names.
+    What the nodes publish is never taken unasked: a recording may hold it too. A depth image with its camera_info goes
+    before points: it is the same measurement in a thirteenth of the bytes. Points go before a depth image whose name
+    does not say that it is registered to colour. ValueError for a remap that names no input, no topic of the recording,
+    a topic of another type or a topic that another remap names.
     """
     asked = {_input_name(name): topic for name, topic in (remaps or {}).items()}
     _require_known(asked, topics)
     _require_types(asked, topics)
     _require_different(asked)
-    free = [topic for topic in topics.values() if topic.name not in asked.values()]
+    free = [topic for topic in topics.values() if topic.name not in asked.values() and not OWN.search(topic.name)]
     found = {name: asked[name] if name in asked else _best(rule, free) for name, rule in RULES.items()}
     if "depth" not in asked and NATIVE in (found["image"] or ""):
         found["depth"] = _best(RULES["depth_native"], free)
@@ -210,11 +213,11 @@ def _rank(rule: Rule, name: str) -> int:
 
 
 def _camera_info_of(pictures: Iterable[str | None], topics: Mapping[str, Topic]) -> str | None:
-    """The camera_info beside the first of the pictures that has one, else the only one."""
-    infos = [t.name for t in topics.values() if t.msgtype == CAMERA_INFO and t.count]
+    """The camera_info beside the first of the pictures that has one, else the only one; the shorter name of equals."""
+    infos = [t.name for t in topics.values() if t.msgtype == CAMERA_INFO and t.count and not OWN.search(t.name)]
     for picture in filter(None, pictures):
-        shared, nearest = max(((_shared(info, picture), info) for info in infos), default=(0, ""))
-        if nearest and shared >= _folders(picture):
+        unshared, _, nearest = min(((-_shared(info, picture), len(info), info) for info in infos), default=(0, 0, ""))
+        if nearest and -unshared >= _folders(picture):
             return nearest
     return infos[0] if len(infos) == 1 else None
 

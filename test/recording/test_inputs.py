@@ -12,6 +12,7 @@ KINDS = {
     "points": "sensor_msgs/msg/PointCloud2",
     "odom": "nav_msgs/msg/Odometry",
     "pose": "geometry_msgs/msg/PoseStamped",
+    "transform": "geometry_msgs/msg/TransformStamped",
     "jpeg": "sensor_msgs/msg/CompressedImage",
 }
 
@@ -78,6 +79,32 @@ DRIVERS = {
 def test_the_topics_of_a_driver_are_recognised(driver: str) -> None:
     there, expected = DRIVERS[driver]
     assert choose_inputs(topics(there)).chosen() == dict(pair.split("=") for pair in expected.split())
+
+
+OWN = (
+    "/detections_table:points /objects:points /view:points /view/camera_info:info /landmarks:points /constraints:odom "
+    "/gt/transforms:transform /gt/correction:transform"
+)
+
+
+@pytest.mark.parametrize("namespace", ["", "/robot"])
+def test_what_the_nodes_published_is_no_input_of_theirs(namespace: str) -> None:
+    own = OWN.replace(" /", f" {namespace}/").replace("/detections_table", f"{namespace}/detections_table", 1)
+    assert choose_inputs(topics(own)).chosen() == {}
+    assert choose_inputs(topics(f"/image /depth/image /camera_info:info {own}")).chosen() == {
+        "image": "/image",
+        "depth": "/depth/image",
+        "camera_info": "/camera_info",
+    }
+
+
+def test_a_remap_may_name_what_the_nodes_published() -> None:
+    assert choose_inputs(topics("/constraints:odom"), {"odom": "/constraints"}).odom == "/constraints"
+
+
+def test_of_two_infos_that_fit_equally_the_shorter_name_wins() -> None:
+    there = topics("/image /depth/image /camera_info:info /zed/camera_info:info")
+    assert choose_inputs(there).camera_info == "/camera_info"
 
 
 def test_a_remap_wins_over_everything() -> None:
