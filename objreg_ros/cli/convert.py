@@ -11,7 +11,6 @@ from tqdm import tqdm
 
 from objreg_ros.cli import options
 from objreg_ros.recording import Record, Recording, open_recording, write_rosbag2
-from objreg_ros.recording.messages import standard_types
 from objreg_ros.recording.writer import STORAGES
 
 
@@ -22,13 +21,13 @@ from objreg_ros.recording.writer import STORAGES
 def command(recording: Path, out: Path, storage: str) -> None:
     """Write RECORDING (rosbag1, rosbag2 or a TUM RGB-D folder) as the rosbag2 folder OUT.
 
-    Topics of a type that ROS 2 does not ship are left out, and named.
+    Topics of a type that ROS 2 does not ship, or not with the same fields, are left out, and named.
     """
     with open_recording(recording) as source:
-        kept = {topic.name for topic in source.topics.values() if topic.msgtype in standard_types().types}
-        for name in sorted(set(source.topics) - kept):
-            click.echo(f"left out: {name} ({source.topics[name].msgtype})", err=True)
-        count = write_rosbag2(out, _with_progress(source, kept), storage)
+        obstacles = source.obstacles()
+        for name, reason in obstacles.items():
+            click.echo(f"left out: {name} ({reason})", err=True)
+        count = write_rosbag2(out, _with_progress(source, set(source.topics) - set(obstacles)), storage)
     click.echo(f"{out}: {count} records")
 
 

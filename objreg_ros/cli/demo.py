@@ -60,7 +60,7 @@ def command(**asked: Any) -> None:
     """Play RECORDING (or a simulated room) through three live nodes and show what came out.
 
     Ends with the books of every node, latencies, constraints and their true error, and with pictures in the folder of
-    --out. A recording that is no rosbag2 is written as one first.
+    --out. Of a recording that is no rosbag2, what the graph uses is written as one first.
     """
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that the with blocks end the nodes
     run(Asked(**asked))
@@ -71,9 +71,9 @@ def run(asked: Asked) -> None:
     recording = asked.recording or simulated_room(asked.out)
     inputs = _inputs(recording, asked.remaps)
     T_base_camera = mounting_of(asked)
-    bag = as_rosbag2(recording, asked.out, asked.seconds)
+    bag = as_rosbag2(recording, inputs, asked.out, asked.seconds)
     with open_recording(bag) as source:
-        live = run_live(bag, setup_of(asked), asked.out / "logs", _say)
+        live = run_live(bag, setup_of(asked, inputs), asked.out / "logs", _say)
         truth = Truth.of(source, inputs.ground_truth)
         _write(asked.out / "demo.json", bag, live, truth, T_base_camera)
         _draw(asked.out, live, truth, source, inputs)
@@ -96,8 +96,8 @@ def _say(text: str) -> None:
     click.echo(text, err=True)
 
 
-def setup_of(asked: Asked) -> Setup:
-    """The arguments of the nodes and of the player."""
+def setup_of(asked: Asked, inputs: Inputs) -> Setup:
+    """The arguments of the nodes and of the player, which plays just these inputs."""
     everywhere = [] if asked.params_file is None else ["--params-file", str(asked.params_file)]
     everywhere += ["-p", "reliable:=true"] if asked.lossless else []
     node_args = {room: list(everywhere) for room in ROOMS}
@@ -108,7 +108,8 @@ def setup_of(asked: Asked) -> Setup:
         node_args[room] += ["-p", f"{name}:={value}"]
     replay = ["--lossless"] if asked.lossless else ["--rate", str(asked.rate)]
     replay += [] if asked.seconds is None else ["--end", str(asked.seconds)]
-    return Setup(node_args, [*replay, *(word for remap in asked.remaps for word in ("--remap", remap))])
+    remaps = [f"{name}:={topic}" for name, topic in inputs.outright.items()]
+    return Setup(node_args, [*replay, *(word for remap in remaps for word in ("--remap", remap))])
 
 
 def _parse(change: str) -> tuple[str, str, str]:

@@ -4,12 +4,16 @@
 from __future__ import annotations
 
 import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import click
 from tqdm import tqdm
 
 from objreg_ros.recording import open_recording, write_rosbag2
+from objreg_ros.recording.inputs import Inputs
 
 SCENARIO, SEED, FRAMES, RATE_HZ = "loop", 1, 600, 30.0
 
@@ -21,16 +25,15 @@ def simulated_room(out: Path) -> Path:
 
     bag = out / f"simulated_{SCENARIO}_{SEED}"
     if not bag.exists():
-        unfinished = _unfinished(bag)
-        with tqdm(total=FRAMES, unit="frame", desc="simulating a room", disable=None) as bar:
+        bar = tqdm(total=FRAMES, unit="frame", desc="simulating a room", disable=None)
+        with bar, _whole(bag) as unfinished:
             sensors = sensors_of(camera_of("kinect", None), stress=False, settings=())
             simulate(unfinished, SCENARIO, SEED, FRAMES, RATE_HZ, sensors, progress=lambda n: bar.update(n - bar.n))
-        unfinished.rename(bag)
     return bag
 
 
-def as_rosbag2(recording: Path, out: Path, seconds: float | None) -> Path:
-    """The recording itself if it is a rosbag2, else a copy of its first ``seconds`` as one, made once."""
+def as_rosbag2(recording: Path, inputs: Inputs, out: Path, seconds: float | None) -> Path:
+    """The recording itself if it is a rosbag2, else a copy of the first ``seconds`` of its inputs as one, made once."""
     with open_recording(recording) as source:
         if source.kind.startswith("rosbag2"):
             return recording
@@ -39,13 +42,19 @@ def as_rosbag2(recording: Path, out: Path, seconds: float | None) -> Path:
         if not bag.exists():
             click.echo(f"writing {recording} as {bag}", err=True)
             end_ns = None if seconds is None else source.start_ns + round(seconds * 1e9)
-            unfinished = _unfinished(bag)
-            write_rosbag2(unfinished, source.records(end_ns=end_ns))
-            unfinished.rename(bag)
+            with _whole(bag) as unfinished:
+                write_rosbag2(unfinished, source.records(set(inputs.chosen().values()), end_ns=end_ns))
     return bag
 
 
-def _unfinished(bag: Path) -> Path:
-    """Where it is written until it is whole."""
+@contextmanager
+def _whole(bag: Path) -> Iterator[Path]:
+    """Where it is written until it is whole; what fails leaves nothing."""
     bag.parent.mkdir(parents=True, exist_ok=True)
-    return bag.with_name(f"{bag.name}.{os.getpid()}")
+    unfinished = bag.with_name(f"{bag.name}.{os.getpid()}")
+    try:
+        yield unfinished
+    except BaseException:
+        shutil.rmtree(unfinished, ignore_errors=True)
+        raise
+    unfinished.rename(bag)

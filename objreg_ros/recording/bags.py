@@ -13,6 +13,7 @@ from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.rosbag1 import ReaderError as Rosbag1Error
 from rosbags.rosbag2 import ReaderError as Rosbag2Error
 from rosbags.serde import SerdeError
+from rosbags.typesys.store import Typestore
 
 from objreg_ros.recording.messages import serialise, standard_types
 from objreg_ros.recording.record import Record, Recording, Topic
@@ -60,6 +61,9 @@ class BagRecording(Recording):
         with _broken_means_value_error(self.path):
             for connection, stamp_ns, raw in self._reader.messages(wanted, start_ns, end_ns):
                 yield self._record(connection, stamp_ns, raw)
+
+    def _types(self) -> Typestore:
+        return standard_types() if self._reader.is2 else self._reader.typestore
 
     def close(self) -> None:
         """Close the file."""

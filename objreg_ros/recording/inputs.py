@@ -102,6 +102,11 @@ class Inputs:
         return {f.name: topic for f in fields(self) if (topic := getattr(self, f.name)) is not None}
 
     @property
+    def outright(self) -> dict[str, str]:
+        """The remaps with which `choose_inputs` makes the same choice again: a topic for every input, "" for none."""
+        return {f.name: getattr(self, f.name) or "" for f in fields(self)}
+
+    @property
     def complete(self) -> bool:
         """Whether the graph can run on it: colour, and a depth of one kind."""
         return self.image is not None and (self.points is not None or None not in (self.depth, self.camera_info))

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
@@ -20,6 +21,7 @@ from objreg_ros.geometry import quaternion_from_rotation
 
 Array = NDArray[Any]
 
+MISSING = object()
 CDR_PREFIX = 4  # bytes before the fields; the second says the byte order
 
 
@@ -60,12 +62,38 @@ def modernise(old: Any) -> Any:
     return kind(**{field.name: _modern_value(old, field.name) for field in _fields(kind)})
 
 
+def obstacle(msgtype: str, types: Typestore) -> str:
+    """Why messages of a type, as ``types`` know it, cannot be brought up to date, in words; empty if they can."""
+    modern = standard_types().fielddefs.get(msgtype)
+    if modern is None:
+        return f"ROS 2 does not ship {msgtype}"
+    there = dict(types.fielddefs.get(msgtype, modern)[1])
+    for name, _ in modern[1]:
+        field = there.get(name, there.get(name.upper()))
+        if field is None:
+            return f"{msgtype} has no {name}, which it has in ROS 2"
+        inner = _inner_type(field)
+        if inner and (why := obstacle(inner, types)):
+            return why
+    return ""
+
+
+def _inner_type(field: Any) -> str:
+    """The message type of a field or of its elements; empty for numbers and text."""
+    kind, of = field
+    if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+        return _inner_type(of[0])
+    return str(of) if kind is Nodetype.NAME else ""
+
+
 def _fields(kind: Any) -> Sequence[Any]:
     return [field for field in dataclasses.fields(kind) if field.init]
 
 
 def _modern_value(old: Any, name: str) -> Any:
-    value = getattr(old, name) if hasattr(old, name) else getattr(old, name.upper())
+    value = getattr(old, name, getattr(old, name.upper(), MISSING))
+    if value is MISSING:
+        raise ValueError(f"{old.__msgtype__}: expected {name}, as in ROS 2, got no such field; leave its topic out")
     if hasattr(value, "__msgtype__"):
         return modernise(value)
     if isinstance(value, list):

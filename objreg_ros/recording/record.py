@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
-from objreg_ros.recording.messages import serialise
+from rosbags.typesys.store import Typestore
+
+from objreg_ros.recording.messages import obstacle, serialise, standard_types
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +50,7 @@ class Record:
 
     @property
     def cdr(self) -> bytes:
-        """The message as ROS 2 sends it; ValueError if it is of a ROS 1 type that ROS 2 does not know."""
+        """The message as ROS 2 sends it; ValueError if it is of a ROS 1 type that ROS 2 does not have."""
         return self.encode()
 
 
@@ -67,6 +69,15 @@ class Recording(ABC):
         self, topics: Collection[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
     ) -> Iterator[Record]:
         """The records of some topics (None: of all) from ``start_ns`` and before ``end_ns``, in order of time."""
+
+    def obstacles(self) -> dict[str, str]:
+        """The topics whose records ROS 2 cannot have (`Record.cdr` refuses them), each with the reason."""
+        reasons = {topic.name: obstacle(topic.msgtype, self._types()) for topic in self.topics.values()}
+        return {name: reason for name, reason in reasons.items() if reason}
+
+    def _types(self) -> Typestore:
+        """The message types as the recording knows them."""
+        return standard_types()
 
     def close(self) -> None:  # noqa: B027  a folder has nothing to close
         """Let go of the files."""

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import shutil
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,7 +22,7 @@ def write_rosbag2(path: Path | str, records: Iterable[Record], storage: str = "m
     """Write records in order to a new folder; their number comes back.
 
     ValueError for a storage that there is not or a type that ROS 2 does not ship, FileExistsError for a folder that is
-    already there, OSError for one that cannot be made.
+    already there, OSError for one that cannot be made. What fails leaves no folder.
     """
     if storage not in STORAGES:
         raise ValueError(f"storage: expected one of {', '.join(STORAGES)}, got {storage!r}")
@@ -28,7 +30,10 @@ def write_rosbag2(path: Path | str, records: Iterable[Record], storage: str = "m
         raise FileExistsError(f"{path}: expected a new folder, got one that exists; choose another name or remove it")
     _make_parents(Path(path))
     count = 0
-    with Writer(Path(path), version=METADATA_VERSION, storage_plugin=STORAGES[storage]) as writer:
+    with (
+        _whole_or_gone(Path(path)),
+        Writer(Path(path), version=METADATA_VERSION, storage_plugin=STORAGES[storage]) as writer,
+    ):
         connections: dict[tuple[str, str], Any] = {}
         for record in records:
             key = (record.topic, record.msgtype)
@@ -37,6 +42,16 @@ def write_rosbag2(path: Path | str, records: Iterable[Record], storage: str = "m
             writer.write(connections[key], record.stamp_ns, record.cdr)
             count += 1
     return count
+
+
+@contextmanager
+def _whole_or_gone(path: Path) -> Iterator[None]:
+    """Removes the folder where it could not be finished."""
+    try:
+        yield
+    except BaseException:
+        shutil.rmtree(path, ignore_errors=True)
+        raise
 
 
 def _make_parents(path: Path) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from recording.folders import tum_folder
+from recording.folders import noetic_bag, tum_folder
 
 from objreg_ros.bridge import from_msg
 from objreg_ros.cli.convert import command
@@ -29,6 +29,16 @@ def test_a_rosbag1_becomes_a_rosbag2_with_the_same_points(shared: Path, tmp_path
         assert before.stamp_ns == after.stamp_ns
         clouds = [from_msg.point_cloud(record.message) for record in (before, after)]
         assert clouds[0].xyz.tobytes() == clouds[1].xyz.tobytes() and clouds[0].stamp_ns == clouds[1].stamp_ns
+
+
+def test_topics_that_ros_2_does_not_have_are_left_out_by_name(tmp_path: Path) -> None:
+    result = CliRunner().invoke(command, [str(noetic_bag(tmp_path / "one.bag")), str(tmp_path / "bag")])
+    assert result.exit_code == 0 and "12 records" in result.output
+    assert "left out: /tf (ROS 2 does not ship tf/msg/tfMessage)" in result.output
+    assert "left out: /rosout (ROS 2 does not ship rosgraph_msgs/msg/Log)" in result.output
+    assert "left out: /markers (visualization_msgs/msg/Marker has no texture_resource, which" in result.output
+    with open_recording(tmp_path / "bag") as bag:
+        assert set(bag.topics) == {"/image", "/depth/image", "/camera_info", "/odom"}
 
 
 def test_what_is_there_is_not_overwritten(tmp_path: Path) -> None:

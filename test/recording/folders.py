@@ -5,9 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+from rosbags.rosbag1 import Writer as Rosbag1Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
 
 from objreg_ros.data import Intrinsics
 from objreg_ros.recording import Record, messages
@@ -52,3 +56,35 @@ def records(frames: int = 3) -> Iterator[Record]:
         yield Record.of("/image", messages.image(rgb, "rgb8", stamp_ns, "camera"), stamp_ns)
         depth = np.full((48, 64), 1000 + i, np.uint16)
         yield Record.of("/depth/image", messages.image(depth, "16UC1", stamp_ns, "camera"), stamp_ns)
+
+
+def noetic_bag(path: Path, frames: int = 3) -> Path:
+    """A rosbag1 with `records`, and with what any robot of ROS 1 says besides: /tf, /rosout and /markers."""
+    types = get_typestore(Stores.ROS1_NOETIC)
+    types.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", "tf/msg/tfMessage"))
+    made = types.types
+    header = made["std_msgs/msg/Header"](seq=0, stamp=made["builtin_interfaces/msg/Time"](1, 0), frame_id="map")
+    words = {"level": 2, "name": "n", "msg": "m", "file": "f", "function": "f", "line": 1, "topics": []}
+    others = {
+        "/tf": made["tf/msg/tfMessage"](transforms=[]),
+        "/rosout": made["rosgraph_msgs/msg/Log"](header=header, **words),
+        "/markers": made["visualization_msgs/msg/MarkerArray"](markers=[]),
+    }
+    with Rosbag1Writer(path) as writer:
+        open_topics: dict[str, Any] = {}
+        said = [(record.topic, _old(record.message, types), record.stamp_ns) for record in records(frames)]
+        for topic, message, stamp_ns in [*((topic, message, 10**9) for topic, message in others.items()), *said]:
+            kind = message.__msgtype__
+            if topic not in open_topics:
+                open_topics[topic] = writer.add_connection(topic, kind, typestore=types)
+            writer.write(open_topics[topic], stamp_ns, types.serialize_ros1(message, kind))
+    return path
+
+
+def _old(message: Any, types: Typestore) -> Any:
+    """A message with the fields that its type has in ROS 1."""
+    if not hasattr(message, "__msgtype__"):
+        return message
+    names = [name for name, _ in types.fielddefs[message.__msgtype__][1]]
+    values = {name: _old(getattr(message, name, getattr(message, name.lower(), 0)), types) for name in names}
+    return types.types[message.__msgtype__](**values)

@@ -114,6 +114,14 @@ def test_a_remap_wins_over_everything() -> None:
     assert (inputs.points, inputs.depth) == ("/points", None)
 
 
+@pytest.mark.parametrize("driver", DRIVERS)
+def test_a_choice_that_is_said_outright_is_made_again(driver: str) -> None:
+    there = topics(DRIVERS[driver][0])
+    chosen = choose_inputs(there)
+    assert choose_inputs(there, chosen.outright) == chosen
+    assert choose_inputs({name: there[name] for name in chosen.chosen().values()}, chosen.outright) == chosen
+
+
 def test_an_input_can_be_left_out() -> None:
     inputs = choose_inputs(topics("/image /depth/image /camera_info:info /odom:odom"), {"odom": ""})
     assert inputs.odom is None and inputs.complete

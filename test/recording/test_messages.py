@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from rosbags.typesys import Stores, get_typestore
 
 from objreg_ros.bridge import from_msg
 from objreg_ros.bridge.layout import OBJECTS, VIEW, table
@@ -57,6 +58,21 @@ def test_the_stamp_is_read_from_the_bytes_alone(stamp_ns: int) -> None:
 def test_bytes_without_room_for_a_stamp_are_refused() -> None:
     with pytest.raises(ValueError, match="got 7 bytes"):
         messages.header_stamp_ns(bytes(7))
+
+
+def test_a_message_that_lacks_a_field_of_ros_2_is_refused() -> None:
+    old = SimpleNamespace(__msgtype__="geometry_msgs/msg/Point", x=1.0, Y=2.0)
+    with pytest.raises(ValueError, match=r"geometry_msgs/msg/Point: expected z, as in ROS 2, .*leave its topic out"):
+        messages.serialise(old)
+
+
+def test_what_keeps_an_old_type_from_being_brought_up_to_date_is_told() -> None:
+    noetic = get_typestore(Stores.ROS1_NOETIC)
+    assert messages.obstacle("sensor_msgs/msg/CameraInfo", noetic) == ""
+    assert messages.obstacle("visualization_msgs/msg/MarkerArray", noetic).startswith(
+        "visualization_msgs/msg/Marker has no texture_resource"
+    )
+    assert messages.obstacle("rosgraph_msgs/msg/Log", noetic) == "ROS 2 does not ship rosgraph_msgs/msg/Log"
 
 
 def test_a_type_that_ros_2_does_not_ship_is_refused() -> None:

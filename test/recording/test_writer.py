@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -32,3 +33,13 @@ def test_a_type_that_ros_2_does_not_ship_is_refused(tmp_path: Path) -> None:
     odd = Record("/odd", "my_msgs/msg/Odd", 1, lambda: None, lambda: b"")
     with pytest.raises(ValueError, match="expected a type that ROS 2 ships, got my_msgs/msg/Odd"):
         write_rosbag2(tmp_path / "bag", [odd])
+
+
+def test_what_fails_leaves_no_folder(tmp_path: Path) -> None:
+    def broken() -> Iterator[Record]:
+        yield from records()
+        raise ValueError("a broken picture")
+
+    with pytest.raises(ValueError, match="a broken picture"):
+        write_rosbag2(tmp_path / "bag", broken())
+    assert list(tmp_path.iterdir()) == []
