@@ -9,7 +9,7 @@ from itertools import chain, count
 from typing import Any
 
 from objreg_ros.bridge.door import Door
-from objreg_ros.bridge.sync import Stream, Synchroniser
+from objreg_ros.bridge.sync import Drop, Need, Stream, Synchroniser
 from objreg_ros.params import Params
 
 EARLY = 30  # messages of a stream that are kept until it is known how they are matched
@@ -56,7 +56,14 @@ class MatchingDoor(Door):
 
     def _unmatched(self, name: str, stamp_ns: int, why: str) -> None:
         if name == self._reference:
-            self.drop(stamp_ns, why)
+            self.drop(stamp_ns, why, self._wanting(stamp_ns, why))
+
+    def _wanting(self, stamp_ns: int, why: str) -> str:
+        """What a frame that found no partner waited for, in words."""
+        if self._sync is None or why == Drop.TIME_JUMP.value:
+            return "time went back to before it while it waited"
+        wanted = " and ".join(map(_partner, self._sync.lacking(stamp_ns)))
+        return f"expected {wanted}, got none; does its node run and keep up?"
 
     def extra_diagnostics(self) -> Mapping[str, object]:
         """What the other streams have brought, and how much of it found no partner."""
@@ -66,3 +73,10 @@ class MatchingDoor(Door):
             f"{name} {why}": count for name, queue in others.items() for why, count in sorted(queue.dropped.items())
         }
         return {**{f"{name} received": queue.received for name, queue in others.items()}, **unused}
+
+
+def _partner(stream: Stream) -> str:
+    if stream.need is Need.LATCHED:
+        return f"{stream.name} before it"
+    slop = f"within {stream.slop_ns * 1e-6:g} ms of it (slop)" if stream.slop_ns else "of its very stamp"
+    return f"{stream.name} {slop}"

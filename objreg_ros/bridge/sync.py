@@ -86,6 +86,12 @@ class Queue:
         near = min(self.items, key=lambda item: abs(item.stamp_ns - stamp_ns), default=None)
         return near if near is not None and abs(near.stamp_ns - stamp_ns) <= self.stream.slop_ns else None
 
+    def lacks(self, stamp_ns: int) -> bool:
+        """Whether there can be no match at a time for want of an item of this stream."""
+        if self.stream.need is Need.LATCHED:
+            return self.latched is None
+        return self.stream.need is Need.REQUIRED and self.nearest(stamp_ns) is None
+
     def settled(self, stamp_ns: int) -> bool:
         """Whether no item that may still come can be nearer to a time than those that are here."""
         if self.last_ns is None:
@@ -168,6 +174,10 @@ class Synchroniser:
         """Drop everything that waits, counted like a jump in time; latched values stay."""
         self._forget_after(-(2**63))
 
+    def lacking(self, stamp_ns: int) -> list[Stream]:
+        """The streams that a match at a time needs and that have nothing for it now."""
+        return [queue.stream for queue in self._others if queue.lacks(stamp_ns)]
+
     def _forget_after(self, stamp_ns: int) -> None:
         for queue in self.queues.values():
             queue.drop_after(stamp_ns)
@@ -198,7 +208,7 @@ class Synchroniser:
     def _resolve(self, item: Item, why: Drop = Drop.UNMATCHED) -> list[Match]:
         """Take the first reference item out: a match, or a drop."""
         partners = {queue.stream.name: queue.nearest(item.stamp_ns) for queue in self._others if not _latched(queue)}
-        if self._lacks(partners):
+        if self.lacking(item.stamp_ns):
             self._reference.drop_oldest(why)
             return []
         self._reference.use(item)
@@ -208,10 +218,6 @@ class Synchroniser:
             payloads[name] = None if partner is None else partner.payload
             self._spend(self.queues[name], partner)
         return [Match(item.stamp_ns, {self._reference.stream.name: item.payload, **payloads})]
-
-    def _lacks(self, partners: Mapping[str, Item | None]) -> bool:
-        required = any(p is None and self.queues[name].stream.need is Need.REQUIRED for name, p in partners.items())
-        return required or any(_latched(queue) and queue.latched is None for queue in self._others)
 
     @staticmethod
     def _spend(queue: Queue, partner: Item | None) -> None:

@@ -12,6 +12,7 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 import rclpy
 
 from objreg_ros.bridge.door import DroppedError
+from objreg_ros.bridge.log import ThrottledLog
 from objreg_ros.bridge.matching import MatchingDoor
 from objreg_ros.bridge.sync import Match, Need, Stream
 
@@ -50,6 +51,14 @@ def door() -> Iterator[Pairs]:
     rclpy.try_shutdown()
 
 
+@pytest.fixture
+def said(door: Pairs) -> list[str]:
+    """The warnings of the door."""
+    lines: list[str] = []
+    door.throttled = ThrottledLog(lines.append)
+    return lines
+
+
 def test_a_frame_goes_to_the_worker_with_its_partner_and_is_booked_as_published(door: Pairs) -> None:
     door.begin([Stream("a"), Stream("b")])
     door.feed("a", 5, "a5")
@@ -84,6 +93,32 @@ def test_a_frame_whose_partner_never_came_is_dropped_as_unmatched(door: Pairs) -
     door.feed("b", 6, "b6")
     books = door.ledger.balance()
     assert (books.received, books.dropped, books.waiting) == (1, {"unmatched": 1}, 0)
+
+
+def test_the_log_says_what_a_frame_without_a_partner_lacked(door: Pairs, said: list[str]) -> None:
+    door.begin([Stream("a"), Stream("b", slop_ns=20_000_000), Stream("names", Need.LATCHED)])
+    door.feed("b", 0, "b")
+    door.feed("names", 0, "cup")
+    door.feed("a", 30_000_000, "a")
+    door.feed("b", 60_000_000, "b")
+    assert said == [
+        "frame dropped, unmatched: expected b within 20 ms of it (slop), got none; does its node run and keep up?"
+    ]
+
+
+def test_the_log_names_all_that_a_frame_waited_for_until_the_queue_was_full(door: Pairs, said: list[str]) -> None:
+    door.begin([Stream("a", depth=1), Stream("b"), Stream("names", Need.LATCHED)])
+    door.feed("a", 5, "a5")
+    door.feed("a", 6, "a6")
+    assert len(said) == 1
+    assert said[0].startswith("frame dropped, queue full: expected b of its very stamp and names before it, got none")
+
+
+def test_the_log_says_that_time_went_back(door: Pairs, said: list[str]) -> None:
+    door.begin([Stream("a"), Stream("b")])
+    door.feed("a", 5, "a5")
+    door.feed("a", 3, "a3")
+    assert said == ["frame dropped, time jump: time went back to before it while it waited"]
 
 
 @pytest.mark.parametrize(

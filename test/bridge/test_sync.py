@@ -107,6 +107,15 @@ def test_a_full_queue_drops_its_oldest_with_a_reason() -> None:
     assert other.queues["depth"].dropped == {"queue_full": 2} and accounts_hold(sync) and accounts_hold(other)
 
 
+def test_what_a_match_lacks_is_told() -> None:
+    streams = [Stream("image"), Stream("depth", slop_ns=10), Stream("odom", Need.OPTIONAL), Stream("k", Need.LATCHED)]
+    sync = Synchroniser(streams)
+    assert [stream.name for stream in sync.lacking(100)] == ["depth", "k"]
+    sync.add("depth", 109, "d")
+    sync.add("k", 0, "camera")
+    assert sync.lacking(100) == [] and [stream.name for stream in sync.lacking(98)] == ["depth"]
+
+
 def test_a_looped_recording_matches_as_well_the_second_time() -> None:
     sync = Synchroniser(EXACT)
     passes = [sum(len(sync.add(name, t, t)) for t in range(50) for name in ("image", "depth")) for _ in range(3)]
