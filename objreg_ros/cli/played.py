@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from hashlib import sha256
 from pathlib import Path
 
 import click
@@ -34,17 +35,32 @@ def simulated_room(out: Path) -> Path:
 
 def as_rosbag2(recording: Path, inputs: Inputs, out: Path, seconds: float | None) -> Path:
     """The recording itself if it is a rosbag2, else a copy of the first ``seconds`` of its inputs as one, made once."""
+    topics = set(inputs.chosen().values())
     with open_recording(recording) as source:
         if source.kind.startswith("rosbag2"):
             return recording
         part = "" if seconds is None else f"_{seconds:g}s"
-        bag = out / f"{recording.resolve().stem}{part}"
-        if not bag.exists():
-            click.echo(f"writing {recording} as {bag}", err=True)
-            end_ns = None if seconds is None else source.start_ns + round(seconds * 1e9)
-            with _whole(bag) as unfinished:
-                write_rosbag2(unfinished, source.records(set(inputs.chosen().values()), end_ns=end_ns))
+        bag = out / f"{source.path.resolve().name.removesuffix('.bag')}{part}_{_mark(source.path, topics, out)}"
+        if bag.exists():
+            click.echo(f"playing {bag}, which was written of {recording} before", err=True)
+            return bag
+        click.echo(f"writing {recording} as {bag}", err=True)
+        end_ns = None if seconds is None else source.start_ns + round(seconds * 1e9)
+        with _whole(bag) as unfinished:
+            write_rosbag2(unfinished, source.records(topics, end_ns=end_ns))
     return bag
+
+
+def _mark(recording: Path, topics: Iterable[str], out: Path) -> str:
+    """Eight digits that change with the place, the bytes and the time of a recording, and with what is taken of it.
+
+    What this command writes to ``out`` does not count, should that lie in the recording's folder.
+    """
+    place, own = recording.resolve(), out.resolve()
+    files = [place] if place.is_file() else [file for file in place.rglob("*") if file.is_file()]
+    stats = [file.stat() for file in files if own not in file.parents or own == place]
+    told = (str(place), sum(s.st_size for s in stats), max(s.st_mtime_ns for s in stats), sorted(topics))
+    return sha256(repr(told).encode()).hexdigest()[:8]
 
 
 @contextmanager

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import os
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -22,6 +25,40 @@ def test_a_folder_of_pictures_becomes_a_rosbag2_once(tmp_path: Path) -> None:
     assert as_rosbag2(folder, INPUTS, tmp_path / "out", seconds=0.15) == bag
     assert (bag / "metadata.yaml").stat().st_mtime_ns == written
     assert as_rosbag2(bag, INPUTS, tmp_path / "out", seconds=None) == bag
+
+
+def copied(recording: Path, out: Path, inputs: Inputs = INPUTS) -> Path:
+    return as_rosbag2(recording, inputs, out, seconds=None)
+
+
+def test_a_copy_that_is_played_again_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag = copied(tum_folder(tmp_path / "run"), tmp_path / "out")
+    assert f"writing {tmp_path / 'run'} as {bag}" in capsys.readouterr().err
+    copied(tmp_path / "run", tmp_path / "out")
+    assert f"playing {bag}, which was written of {tmp_path / 'run'} before" in capsys.readouterr().err
+
+
+def test_recordings_of_one_name_have_copies_of_their_own(tmp_path: Path) -> None:
+    places = [tmp_path / "a" / "run", tmp_path / "b" / "run", tmp_path / "b" / "run.1", tmp_path / "b" / "run.2"]
+    assert len({copied(tum_folder(place), tmp_path / "out") for place in places}) == 4
+
+
+def test_a_recording_that_has_changed_is_copied_anew(tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path / "run")
+    before = copied(folder, tmp_path / "out")
+    os.utime(folder / "rgb/0.000000.png", ns=(0, time.time_ns() + 10**9))
+    assert copied(folder, tmp_path / "out") != before
+
+
+def test_other_inputs_of_a_recording_are_copied_anew(tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path / "run")
+    truth = replace(INPUTS, ground_truth="/ground_truth")
+    assert copied(folder, tmp_path / "out") != copied(folder, tmp_path / "out", truth)
+
+
+def test_a_copy_within_the_recordings_own_folder_is_played_again(tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path / "run")
+    assert copied(folder, folder / "out") == copied(folder, folder / "out")
 
 
 def test_of_a_rosbag1_only_the_inputs_are_written(tmp_path: Path) -> None:
