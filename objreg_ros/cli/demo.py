@@ -7,6 +7,7 @@ import json
 import signal
 import sys
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -75,7 +76,8 @@ def run(asked: Asked) -> None:
     with open_recording(bag) as source:
         live = run_live(bag, setup_of(asked, inputs), asked.out / "logs", _say)
         truth = Truth.of(source, inputs.ground_truth)
-        _write(asked.out / "demo.json", bag, live, truth, T_base_camera)
+        told = {"recording": str(bag), "name": recording.resolve().name, "inputs": inputs.outright}
+        _write(asked.out / "demo.json", {**told, "T_base_camera": T_base_camera}, live, truth)
         _draw(asked.out, live, truth, source, inputs)
         sent = _sent(source, inputs, asked.seconds, live)
     write_report(asked.out / "report.html", [asked.out / "demo.json"])
@@ -141,11 +143,10 @@ def mounting_of(asked: Asked) -> tuple[float, ...]:
     return read_settings(asked.params_file, asked.changes).of("registrar", RegistrarNodeParams).T_base_camera
 
 
-def _write(file: Path, bag: Path, live: Live, truth: Truth, T_base_camera: tuple[float, ...]) -> None:
-    """The run as JSON."""
+def _write(file: Path, told: Mapping[str, Any], live: Live, truth: Truth) -> None:
+    """The run as JSON, after what is told of its recording."""
     summary = {
-        "recording": str(bag),
-        "T_base_camera": T_base_camera,
+        **told,
         "nodes": {room: asdict(books) for room, books in live.books.items()},
         "constraints": [constraint(closure) for closure in live.closures],
         "rejected": dict(live.rejected),

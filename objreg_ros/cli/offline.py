@@ -65,7 +65,8 @@ def command(
     summary = run.summary(truth)
     _say(run, summary)
     if json_file is not None:
-        json_file.write_text(json.dumps({"recording": str(recording), "odometry": inputs.odom, **summary}, indent=1))
+        told = {"recording": str(recording), "inputs": inputs.outright, "odometry": inputs.odom}
+        json_file.write_text(json.dumps({**told, **summary}, indent=1))
 
 
 def _require_writable(file: Path) -> None:

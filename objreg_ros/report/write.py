@@ -43,12 +43,21 @@ def _chapter(file: Path, stack: ExitStack) -> tuple[Story, Album | None]:
     if not summary.get("recording") or not place.exists():
         return Story.of(file.stem, summary, Truth([])), None
     recording = stack.enter_context(open_recording(place))
-    inputs = choose_inputs(recording.topics)
+    inputs = choose_inputs(recording.topics, _inputs_of(summary, recording))
     T_base_camera = mounting(summary.get("T_base_camera", ()))
     glimpses = _with_odometry(summary.get("glimpses", ()), recording, inputs.odom, T_base_camera)
     told = {**_of_nodes(summary), **summary, "glimpses": glimpses}
-    story = Story.of(place.resolve().name, told, Truth.of(recording, inputs.ground_truth))
+    story = Story.of(summary.get("name", place.resolve().name), told, Truth.of(recording, inputs.ground_truth))
     return story, Album(recording, inputs)
+
+
+def _inputs_of(summary: Mapping[str, Any], recording: Recording) -> dict[str, str]:
+    """The inputs that the run took, as remaps; none where an older JSON does not tell.
+
+    A topic that the recording lacks was made for the run, like an odometry that drifts: there is nothing to read.
+    """
+    told = summary.get("inputs", {})
+    return {name: topic if topic in recording.topics else "" for name, topic in told.items()}
 
 
 def _with_odometry(

@@ -11,6 +11,7 @@ from recording.folders import tum_folder
 
 from objreg_ros.cli.offline import command
 from objreg_ros.offline import Run
+from objreg_ros.recording.inputs import Inputs
 
 KEYS = {"frames", "detections", "objects", "constraints", "rejected", "stage_ms", "truth"}
 
@@ -35,6 +36,10 @@ def test_a_folder_goes_through_the_real_rooms_and_gives_its_json(model: Path, tm
     assert "4 frames, 4 detections" in output and "the first time compiles for a minute" in output
     summary = json.loads(file.read_text())
     assert set(summary) >= KEYS and summary["frames"] == 4 and summary["odometry"] is None
+    assert summary["inputs"] == {
+        **Inputs(image="/image", depth="/depth/image", camera_info="/camera_info").outright,
+        "ground_truth": "/ground_truth",
+    }
     assert summary["stage_ms"].keys() == {"decode", "detect", "segment", "register"}
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from recording.folders import records
 
 from objreg_ros.recording import write_rosbag2
+from objreg_ros.recording.inputs import Inputs
 from objreg_ros.report.story import Story
 from objreg_ros.report.write import write_report
 
@@ -67,6 +69,34 @@ def test_a_camera_that_is_mounted_on_the_body_of_the_odometry_is_placed_there(
     for k, glimpse in enumerate(told[0].glimpses):
         metre_ahead = glimpse.T_odom_camera @ [0.0, 0.0, 1.0, 1.0]
         assert np.allclose(metre_ahead[:3], [0.1 * k + 0.3 + 1.0, 0.0, 1.1])
+
+
+@pytest.fixture
+def chosen(monkeypatch: pytest.MonkeyPatch) -> list[Inputs]:
+    """What the pictures of a report are taken from."""
+    seen: list[Inputs] = []
+    monkeypatch.setattr("objreg_ros.report.write.Album", lambda recording, inputs: seen.append(inputs))
+    return seen
+
+
+def test_the_pictures_are_of_the_inputs_that_the_run_took(tmp_path: Path, chosen: list[Inputs]) -> None:
+    other = [replace(record, topic=f"/other{record.topic}") for record in records(3)]
+    write_rosbag2(tmp_path / "bag", [*records(3), *other])
+    taken = Inputs(image="/other/image", depth="/other/depth/image", camera_info="/other/camera_info")
+    for inputs in (taken.outright, {**taken.outright, "odom": "/drifting_odom"}):
+        run = {"recording": str(tmp_path / "bag"), "inputs": inputs, "constraints": [], "name": "a walk"}
+        (tmp_path / "run.json").write_text(json.dumps(run))
+        write_report(tmp_path / "out.html", [tmp_path / "run.json"])
+    assert chosen == [taken, taken] and "<h1>a walk</h1>" in (tmp_path / "out.html").read_text()
+
+
+def test_an_older_json_that_does_not_tell_its_inputs_is_shown_by_what_would_be_taken(
+    tmp_path: Path, chosen: list[Inputs]
+) -> None:
+    write_rosbag2(tmp_path / "bag", records(3))
+    (tmp_path / "run.json").write_text(json.dumps({"recording": str(tmp_path / "bag"), "constraints": []}))
+    write_report(tmp_path / "out.html", [tmp_path / "run.json"])
+    assert [(inputs.image, inputs.odom) for inputs in chosen] == [("/image", "/odom")]
 
 
 @pytest.mark.parametrize("text", ["", "[1]", '{"frames": 3}'])
