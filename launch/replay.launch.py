@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The three nodes on a recording: ``ros2 launch objreg_ros replay.launch.py recording:=my_bag lossless:=true``.
 
-Every argument of objreg.launch.py is taken too. The launch ends with the recording.
+Every argument of objreg.launch.py is taken too: the player publishes where the nodes listen, and /clock too with
+use_sim_time; lossless asks for reliable delivery. The launch ends with the recording.
 """
 
+import runpy
 import sys
 from pathlib import Path
 
@@ -13,6 +15,7 @@ from launch.actions import (
     IncludeLaunchDescription,
     OpaqueFunction,
     RegisterEventHandler,
+    SetLaunchConfiguration,
     Shutdown,
 )
 from launch.event_handlers import OnProcessExit
@@ -21,6 +24,8 @@ from launch.substitutions import LaunchConfiguration
 
 from launch import LaunchContext, LaunchDescription
 
+NODES_FILE = str(Path(__file__).with_name("objreg.launch.py"))
+NODES = runpy.run_path(NODES_FILE)
 OPTIONS = {
     "rate": "speed, 1 is that of the recording",
     "lossless": "true to wait for every frame instead of keeping the pace",
@@ -29,22 +34,41 @@ OPTIONS = {
 
 def generate_launch_description() -> LaunchDescription:
     """The nodes, the player, and the end of both."""
-    nodes = PythonLaunchDescriptionSource(str(Path(__file__).with_name("objreg.launch.py")))
     return LaunchDescription(
         [
             DeclareLaunchArgument("recording", description="rosbag1, rosbag2 or TUM RGB-D folder"),
             *(DeclareLaunchArgument(name, default_value="", description=text) for name, text in OPTIONS.items()),
-            IncludeLaunchDescription(nodes, launch_arguments={"reliable": LaunchConfiguration("lossless")}.items()),
+            OpaqueFunction(function=_delivery),
+            IncludeLaunchDescription(PythonLaunchDescriptionSource(NODES_FILE)),
             OpaqueFunction(function=_player),
         ]
     )
 
 
+def _delivery(context: LaunchContext) -> list:
+    """A lossless replay needs reliable delivery; without it, delivery is as the user says."""
+    lossless = _is_true(LaunchConfiguration("lossless").perform(context))
+    return [SetLaunchConfiguration("reliable", "true")] if lossless else []
+
+
 def _player(context: LaunchContext) -> list:
-    said = {name: LaunchConfiguration(name).perform(context) for name in ("recording", *OPTIONS, "namespace")}
+    names = ("recording", *OPTIONS, *NODES["OPTIONS"], *NODES["TOPICS"])
+    said = {name: LaunchConfiguration(name).perform(context) for name in names}
+    player = ExecuteProcess(cmd=_command(said), name="player", output="screen")
+    return [player, RegisterEventHandler(OnProcessExit(target_action=player, on_exit=Shutdown()))]
+
+
+def _command(said: dict[str, str]) -> list[str]:
+    """The player as a command line."""
     command = [sys.executable, "-m", "objreg_ros.cli", "replay", said["recording"]]
     command += ["--rate", said["rate"]] if said["rate"] else []
-    command += ["--lossless"] if said["lossless"].lower() == "true" else []
-    command += ["--", "--ros-args", "-r", f"__ns:=/{said['namespace'].strip('/')}"] if said["namespace"] else []
-    player = ExecuteProcess(cmd=command, name="player", output="screen")
-    return [player, RegisterEventHandler(OnProcessExit(target_action=player, on_exit=Shutdown()))]
+    command += ["--lossless"] if _is_true(said["lossless"]) else []
+    command += ["--clock"] if _is_true(said["use_sim_time"]) else []
+    rules = [("__ns", f"/{said['namespace'].strip('/')}")] if said["namespace"] else []
+    rules += NODES["_remappings"](said)
+    words = [word for name, topic in rules for word in ("-r", f"{name}:={topic}")]
+    return [*command, "--", "--ros-args", *words] if words else command
+
+
+def _is_true(text: str) -> bool:
+    return text.lower() == "true"

@@ -7,6 +7,7 @@ import runpy
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ import pytest
 pytest.importorskip("launch_ros", reason="launch and launch_ros are not installed")
 
 from recording.folders import tum_folder
+
+from launch import LaunchContext
 
 from .graph import START_S, Graph
 
@@ -40,8 +43,16 @@ def said(repository: Path) -> dict[str, Any]:
     return dict.fromkeys([*file["OPTIONS"], *file["TOPICS"]], "")
 
 
-def launch_file(repository: Path) -> dict[str, Any]:
-    return runpy.run_path(str(repository / "launch" / "objreg.launch.py"))
+def launch_file(repository: Path, name: str = "objreg") -> dict[str, Any]:
+    return runpy.run_path(str(repository / "launch" / f"{name}.launch.py"))
+
+
+@pytest.fixture
+def replayed(repository: Path, said: dict[str, Any]) -> Callable[..., list[str]]:
+    """The words of the player behind ``replay`` for some arguments of replay.launch.py."""
+    file = launch_file(repository, "replay")
+    nothing = {**said, **dict.fromkeys(file["OPTIONS"], ""), "recording": "my_bag"}
+    return lambda **arguments: file["_command"]({**nothing, **arguments})[4:]
 
 
 def test_without_arguments_no_parameter_is_set_and_nothing_is_remapped(repository: Path, said: dict[str, Any]) -> None:
@@ -66,6 +77,36 @@ def test_what_is_said_goes_over_the_users_file_and_only_the_detector_has_a_model
     given = {**said, "params_file": "my.yaml", "model": "my.onnx", "reliable": "true"}
     assert parameters("detector", given) == ["my.yaml", {"reliable": True, "model": "my.onnx"}]
     assert parameters("segmenter", given) == ["my.yaml", {"reliable": True}]
+
+
+def test_without_arguments_the_player_plays_as_it_is(replayed: Callable[..., list[str]]) -> None:
+    assert replayed() == ["my_bag"]
+
+
+def test_the_player_publishes_where_the_nodes_listen(replayed: Callable[..., list[str]]) -> None:
+    rules = ["__ns:=/robot", "points:=/kinect/points", "odom:=/wheels"]
+    words = replayed(namespace="robot", points="/kinect/points", odom="/wheels")
+    assert words == ["my_bag", "--", "--ros-args", *(word for rule in rules for word in ("-r", rule))]
+
+
+def test_nodes_with_the_time_of_a_clock_get_one(replayed: Callable[..., list[str]]) -> None:
+    assert replayed(use_sim_time="true", rate="2", lossless="True") == [
+        "my_bag", "--rate", "2", "--lossless", "--clock",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("lossless", "reliable", "expected"),
+    [("", "", ""), ("", "true", "true"), ("false", "true", "true"), ("true", "", "true"), ("true", "false", "true")],
+)
+def test_delivery_is_as_the_user_says_where_the_replay_is_not_lossless(
+    lossless: str, reliable: str, expected: str, repository: Path
+) -> None:
+    context = LaunchContext()
+    context.launch_configurations.update(lossless=lossless, reliable=reliable)
+    for action in launch_file(repository, "replay")["_delivery"](context):
+        action.visit(context)
+    assert context.launch_configurations["reliable"] == expected
 
 
 def test_the_nodes_of_a_launch_live_in_its_namespace_and_end_with_it(
@@ -93,7 +134,7 @@ def test_a_replay_brings_every_frame_through_the_nodes_and_ends_the_launch(
     folder = tum_folder(tmp_path / "tum", frames=5)
     launched = subprocess.run(
         [sys.executable, "-c", PROGRAM, str(repository / "launch" / "replay.launch.py"), f"recording:={folder}",
-         "lossless:=true", f"model:={tiny_model}"],
+         "lossless:=true", f"model:={tiny_model}", "image:=/kinect/rgb", "depth:=/kinect/z"],
         env={**graph.environment(), "ROS_LOG_DIR": str(tmp_path)}, cwd=repository, timeout=3 * START_S,
         capture_output=True, text=True,
     )  # fmt: skip
