@@ -36,6 +36,7 @@ OPTIONS = {
     "params_file": "YAML of parameters, in the form of config/objreg.yaml",
     "namespace": "namespace of the nodes and of their topics",
     "model": "ONNX model of the detector",
+    "source": "where the segmenter takes depth from: auto, points or depth",
     "use_sim_time": "true to follow /clock",
     "reliable": "true to ask cameras for reliable delivery",
 }
@@ -66,9 +67,10 @@ def _nodes(context: LaunchContext) -> list[Node]:
 
 def _parameters(room: str, said: dict[str, str]) -> list:
     """The user's file, and over it what was said on the command line."""
-    values = {name: said[name].lower() == "true" for name in ("use_sim_time", "reliable") if said[name]}
-    if room == "detector" and said["model"]:
-        values["model"] = said["model"]
+    values: dict = {name: said[name].lower() == "true" for name in ("use_sim_time", "reliable") if said[name]}
+    for owner, name in (("detector", "model"), ("segmenter", "source")):
+        if room == owner and said[name]:
+            values[name] = said[name]
     return [given for given in (said["params_file"], values) if given]
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The three nodes on a recording: ``ros2 launch objreg_ros replay.launch.py recording:=my_bag lossless:=true``.
 
-Every argument of objreg.launch.py is taken too: the player publishes where the nodes listen, and /clock too with
-use_sim_time; lossless asks for reliable delivery. The launch ends with the recording.
+Every argument of objreg.launch.py is taken too: the player publishes where the nodes listen, the depth of source, and
+/clock with use_sim_time; lossless asks for reliable delivery. The launch ends with the recording.
 """
 
 import runpy
@@ -62,6 +62,7 @@ def _command(said: dict[str, str]) -> list[str]:
     """The player as a command line."""
     command = [sys.executable, "-m", "objreg_ros.cli", "replay", said["recording"]]
     command += ["--rate", said["rate"]] if said["rate"] else []
+    command += ["--source", said["source"]] if said["source"] else []
     command += ["--lossless"] if _is_true(said["lossless"]) else []
     command += ["--clock"] if _is_true(said["use_sim_time"]) else []
     rules = [("__ns", f"/{said['namespace'].strip('/')}")] if said["namespace"] else []

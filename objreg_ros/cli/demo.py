@@ -27,6 +27,7 @@ from objreg_ros.registrar.export import constraint
 from objreg_ros.registrar.params import RegistrarNodeParams
 from objreg_ros.report.live_pictures import draw_sight, draw_way
 from objreg_ros.report.write import write_report
+from objreg_ros.segmenter.params import SegmenterNodeParams
 from objreg_ros.truth import Truth, summarise
 
 
@@ -70,7 +71,7 @@ def command(**asked: Any) -> None:
 def run(asked: Asked) -> None:
     """The whole demo; ValueError or OSError if it cannot be, or if the books do not balance."""
     recording = asked.recording or simulated_room(asked.out)
-    inputs = _inputs(recording, asked.remaps)
+    inputs = _inputs(recording, asked)
     T_base_camera = mounting_of(asked)
     bag = as_rosbag2(recording, inputs, asked.out, asked.seconds)
     with open_recording(bag) as source:
@@ -86,12 +87,14 @@ def run(asked: Asked) -> None:
     live_table.require_balance(live, sent)
 
 
-def _inputs(recording: Path, remaps: tuple[str, ...]) -> Inputs:
+def _inputs(recording: Path, asked: Asked) -> Inputs:
+    depth_source = read_settings(asked.params_file, asked.changes).of("segmenter", SegmenterNodeParams).source
     with open_recording(recording) as source:
-        inputs = choose_inputs(source.topics, parse_remaps(remaps))
+        inputs = choose_inputs(source.topics, parse_remaps(asked.remaps), depth_source)
         if inputs.complete:
             return inputs
-        raise ValueError(f"{recording}: expected {inputs.missing}, got {', '.join(source.topics)}; see --remap")
+        wanted = inputs.wanted(depth_source)
+        raise ValueError(f"{recording}: expected {wanted}, got {', '.join(source.topics)}; see --remap")
 
 
 def _say(text: str) -> None:

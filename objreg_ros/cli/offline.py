@@ -83,29 +83,19 @@ def _model_changes(model: str | None, labels: str | None) -> list[str]:
 
 
 def _inputs(source: Recording, remaps: tuple[str, ...], odometry: str | None, depth_source: str) -> Inputs:
-    asked = _only(depth_source, parse_remaps(remaps))
+    asked = parse_remaps(remaps)
     if odometry is not None:
         asked["odom"] = "" if odometry == "none" or odometry.startswith(DRIFT) else odometry
-    inputs = choose_inputs(source.topics, asked)
+    inputs = choose_inputs(source.topics, asked, depth_source)
     if not inputs.complete:
         there = ", ".join(f"{topic.name} ({topic.msgtype})" for topic in source.topics.values()) or "no topics"
-        wanted = inputs.missing + ("" if depth_source == "auto" else f" for segmenter.source={depth_source}")
+        wanted = inputs.wanted(depth_source)
         raise ValueError(f"{source.path}: expected {wanted}, got {there}; choose with --remap input:=/topic")
     if (odometry or "").startswith(DRIFT):
         if inputs.ground_truth is None:
             raise ValueError(f"{source.path}: --odometry {odometry} needs a ground truth, and there is none")
         return Inputs(**{**inputs.chosen(), "odom": ODOM})
     return inputs
-
-
-def _only(depth_source: str, asked: dict[str, str]) -> dict[str, str]:
-    """What is asked for, and of the two kinds of depth only the segmenter's ``source``; ValueError for the other."""
-    other = {"points": "depth", "depth": "points"}.get(depth_source)
-    if other is None:
-        return asked
-    if asked.get(other):
-        raise ValueError(f"--remap: expected no {other} with segmenter.source={depth_source}, got {asked[other]}")
-    return {**asked, other: ""}
 
 
 def _run(source: Recording, inputs: Inputs, settings: Settings, max_frames: int | None, odometry: str | None) -> Run:

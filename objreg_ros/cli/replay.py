@@ -13,7 +13,7 @@ from tqdm import tqdm
 from objreg_ros.bridge.receipts import DEPTH, IMAGE, Receipts
 from objreg_ros.cli import options
 from objreg_ros.recording import Recording, open_recording
-from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
+from objreg_ros.recording.inputs import SOURCES, Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.messages import header_stamp_ns
 from objreg_ros.recording.replay import Selection, graph_names, read_ahead, recorded_names
 
@@ -35,6 +35,9 @@ if TYPE_CHECKING:
     "--patience", type=click.FloatRange(min=0), default=300.0, show_default=True, help="Seconds for a frame, lossless."
 )
 @options.remap
+@click.option(
+    "--source", "depth_source", type=click.Choice(SOURCES), default="auto", help="Which depth, as segmenter.source."
+)
 @click.argument("ros_args", nargs=-1, type=click.UNPROCESSED)
 def command(
     recording: Path,
@@ -48,6 +51,7 @@ def command(
     wait: float,
     patience: float,
     remaps: tuple[str, ...],
+    depth_source: str,
     ros_args: tuple[str, ...],
 ) -> None:
     """Publish RECORDING under the names that the nodes listen to.
@@ -60,7 +64,7 @@ def command(
     from objreg_ros.bridge.player import Player
 
     with open_recording(recording) as source:
-        inputs = choose_inputs(source.topics, parse_remaps(remaps))
+        inputs = choose_inputs(source.topics, parse_remaps(remaps), depth_source)
         names = recorded_names(source) if everything else graph_names(source, inputs)
         if not names:
             raise ValueError(f"{recording}: expected topics that the graph can use, got {', '.join(source.topics)}")

@@ -83,6 +83,7 @@ RULES["depth_native"] = Rule(PICTURES, RULES["depth"].never + "|depth_to_rgb", (
 NATIVE = "rgb_to_depth"  # colour in the geometry of the native depth
 REGISTERED = RULES["depth"].prefer.index(r"depth/image_rect")  # the names before it say that they are registered
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
+SOURCES = ("auto", "points", "depth")  # as the segmenter's parameter of this name
 COMPRESSED = re.compile(r"/(compressed|compressedDepth)$")
 
 
@@ -121,6 +122,10 @@ class Inputs:
             lacks.append("the camera_info of the depth image")
         return " and ".join(lacks)
 
+    def wanted(self, source: str) -> str:
+        """What is missing, for a refusal that names the segmenter's ``source`` where it narrowed the choice."""
+        return self.missing + ("" if source == "auto" else f" for segmenter.source={source}")
+
 
 GRAPH_TOPICS = {  # the names that the nodes subscribe to
     "image": "image",
@@ -133,15 +138,16 @@ GRAPH_TOPICS = {  # the names that the nodes subscribe to
 _INPUT_OF = {topic: name for name, topic in GRAPH_TOPICS.items()}
 
 
-def choose_inputs(topics: Mapping[str, Topic], remaps: Mapping[str, str] | None = None) -> Inputs:
-    """The best topic for each input. ``remaps`` say it outright: input → topic, or input → "" for none.
+def choose_inputs(topics: Mapping[str, Topic], remaps: Mapping[str, str] | None = None, source: str = "auto") -> Inputs:
+    """The best topic for each input. ``remaps`` say it outright: input → topic, or input → "" for none. ``source`` is
+    the segmenter's: of the two kinds of depth only ``points``, only ``depth``, or the better one.
 
     What the nodes publish is never taken unasked: a recording may hold it too. A depth image with its camera_info goes
     before points: it is the same measurement in a thirteenth of the bytes. Points go before a depth image whose name
     does not say that it is registered to colour. ValueError for a remap that names no input, no topic of the recording,
-    a topic of another type or a topic that another remap names.
+    a topic of another type, a topic that another remap names or the kind of depth that ``source`` leaves out.
     """
-    asked = {_input_name(name): topic for name, topic in (remaps or {}).items()}
+    asked = _only(source, {_input_name(name): topic for name, topic in (remaps or {}).items()})
     _require_known(asked, topics)
     _require_types(asked, topics)
     _require_different(asked)
@@ -156,6 +162,18 @@ def choose_inputs(topics: Mapping[str, Topic], remaps: Mapping[str, str] | None 
         found["depth"] = None
         found["camera_info"] = asked.get("camera_info", _camera_info_of((found["image"], found["points"]), topics))
     return Inputs(**{field.name: found[field.name] or None for field in fields(Inputs)})
+
+
+def _only(source: str, asked: Mapping[str, str]) -> dict[str, str]:
+    """What is asked for, and of the two kinds of depth only ``source``; ValueError where the other is asked for."""
+    other = {"points": "depth", "depth": "points"}.get(source)
+    if other is None:
+        return dict(asked)
+    if asked.get(other):
+        raise ValueError(
+            f"remap: expected no {other} with segmenter.source={source}, got {asked[other]}; change one of the two"
+        )
+    return {**asked, other: ""}
 
 
 def _depth_wins(found: Mapping[str, str | None], asked: Mapping[str, str]) -> bool:

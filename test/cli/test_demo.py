@@ -52,6 +52,13 @@ def test_the_report_learns_where_the_camera_is_on_the_body_of_the_odometry() -> 
     assert mounting_of(replace(ASKED, changes=changes)) == (0.3, 0.0, 1.1, -0.5, 0.5, -0.5, 0.5)
 
 
+def test_a_demo_plays_the_depth_that_its_segmenter_takes(tmp_path: Path) -> None:
+    asked = replace(ASKED, recording=tum_folder(tmp_path / "tum"), changes=("segmenter.source=points",))
+    with pytest.raises(ValueError, match=r"expected points or a depth image for segmenter\.source=points, got /"):
+        run(replace(asked, out=tmp_path / "out"))
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_recording_that_the_graph_cannot_use_is_refused_before_anything_is_written(tmp_path: Path) -> None:
     recording = tum_folder(tmp_path / "tum")
     out = tmp_path / "out"

@@ -3,8 +3,9 @@ from __future__ import annotations
 
 import pytest
 
-from objreg_ros.recording.inputs import choose_inputs, parse_remaps
+from objreg_ros.recording.inputs import SOURCES, choose_inputs, parse_remaps
 from objreg_ros.recording.record import Topic
+from objreg_ros.segmenter.params import SegmenterNodeParams
 
 IMAGE, INFO = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo"
 KINDS = {
@@ -120,6 +121,25 @@ def test_a_choice_that_is_said_outright_is_made_again(driver: str) -> None:
     chosen = choose_inputs(there)
     assert choose_inputs(there, chosen.outright) == chosen
     assert choose_inputs({name: there[name] for name in chosen.chosen().values()}, chosen.outright) == chosen
+
+
+def test_the_segmenters_source_decides_between_points_and_depth() -> None:
+    there = topics("/image /depth/image /camera_info:info /points:points")
+    assert choose_inputs(there, source="auto").depth == choose_inputs(there, source="depth").depth == "/depth/image"
+    inputs = choose_inputs(there, source="points")
+    assert (inputs.points, inputs.depth) == ("/points", None)
+    lacking = choose_inputs(topics("/image /depth/image"), source="points")
+    assert lacking.wanted("points") == "points or a depth image for segmenter.source=points"
+
+
+def test_a_remap_to_the_depth_that_the_segmenter_leaves_out_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"expected no depth with segmenter\.source=points, got /depth/image"):
+        choose_inputs(topics("/image /depth/image"), {"depth/image": "/depth/image"}, "points")
+
+
+def test_the_sources_are_those_of_the_segmenter() -> None:
+    declared = next(d for d in SegmenterNodeParams.declarations() if d.name == "source")
+    assert declared.choices == SOURCES
 
 
 def test_an_input_can_be_left_out() -> None:

@@ -70,13 +70,14 @@ def test_an_image_is_remapped_with_its_compressed_form(repository: Path, said: d
     ]
 
 
-def test_what_is_said_goes_over_the_users_file_and_only_the_detector_has_a_model(
+def test_what_is_said_goes_over_the_users_file_to_the_node_that_it_is_for(
     repository: Path, said: dict[str, Any]
 ) -> None:
     parameters = launch_file(repository)["_parameters"]
-    given = {**said, "params_file": "my.yaml", "model": "my.onnx", "reliable": "true"}
+    given = {**said, "params_file": "my.yaml", "model": "my.onnx", "reliable": "true", "source": "points"}
     assert parameters("detector", given) == ["my.yaml", {"reliable": True, "model": "my.onnx"}]
-    assert parameters("segmenter", given) == ["my.yaml", {"reliable": True}]
+    assert parameters("segmenter", given) == ["my.yaml", {"reliable": True, "source": "points"}]
+    assert parameters("registrar", given) == ["my.yaml", {"reliable": True}]
 
 
 def test_without_arguments_the_player_plays_as_it_is(replayed: Callable[..., list[str]]) -> None:
@@ -89,9 +90,9 @@ def test_the_player_publishes_where_the_nodes_listen(replayed: Callable[..., lis
     assert words == ["my_bag", "--", "--ros-args", *(word for rule in rules for word in ("-r", rule))]
 
 
-def test_nodes_with_the_time_of_a_clock_get_one(replayed: Callable[..., list[str]]) -> None:
-    assert replayed(use_sim_time="true", rate="2", lossless="True") == [
-        "my_bag", "--rate", "2", "--lossless", "--clock",
+def test_the_player_knows_of_the_clock_and_the_depth_that_the_nodes_want(replayed: Callable[..., list[str]]) -> None:
+    assert replayed(use_sim_time="true", rate="2", lossless="True", source="points") == [
+        "my_bag", "--rate", "2", "--source", "points", "--lossless", "--clock",
     ]  # fmt: skip
 
 
