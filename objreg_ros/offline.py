@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -95,8 +94,7 @@ def build_rooms(
     from objreg_ros.segmenter.organise import organise
     from objreg_ros.segmenter.segment import Segmenter
 
-    labels = Path(detector.labels).expanduser() if detector.labels else None
-    detects = Detector(detector, share.model(detector.model), labels)
+    detects = Detector.of(detector, share.model)
     segments = Segmenter(segmenter)
     segments.warm()
     warm(registrar)

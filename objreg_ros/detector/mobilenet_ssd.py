@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,12 @@ class Detector:
             self._runtime.inputs, self._runtime.outputs, self._runtime.metadata, self._probe(),
             len(self.labels), params.label_offset,
         )  # fmt: skip
+
+    @classmethod
+    def of(cls, params: DetectorParams, find_model: Callable[[str], Path]) -> Detector:
+        """The detector that the parameters name; ``find_model`` gives the file of a model's name."""
+        labels = Path(params.labels).expanduser() if params.labels else None
+        return cls(params, find_model(params.model), labels)
 
     def detect(self, image: ColourImage) -> Detections:
         """What is in ``image``, best first; no detections (N = 0) when nothing reaches the threshold."""

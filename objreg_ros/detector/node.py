@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 from typing import Any
 
 from sensor_msgs.msg import CompressedImage, Image, PointCloud2
@@ -26,8 +25,7 @@ class DetectorNode(Door):
     def __init__(self) -> None:
         super().__init__("detector", DetectorParams)
         params = self.settings.of(DetectorParams)
-        labels = Path(params.labels) if params.labels else None
-        self._detector = Detector(params, share.model(params.model), labels)
+        self._detector = Detector.of(params, share.model)
         self._names = dict(enumerate(self._detector.labels))
         self._table = self.create_publisher(PointCloud2, "detections_table", qos.room())
         self._array = self.create_publisher(to_msg.Detection2DArray, "detections", qos.room()) if self._vision else None

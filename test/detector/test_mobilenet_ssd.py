@@ -36,6 +36,16 @@ def test_a_box_comes_back_in_pixels_with_its_name_and_the_stamp_of_the_image(tmp
     assert (seen.stamp_ns, seen.frame_id, seen.image_hw) == (5, "kinect", (480, 640))
 
 
+def test_the_model_and_the_labels_that_the_parameters_name_are_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    detector(tmp_path, [BOX], [2], [0.8])
+    (tmp_path / "mine.txt").write_text("cup\ntv\nhome\n")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    made = Detector.of(DetectorParams(model="m.onnx", labels="~/mine.txt"), lambda name: tmp_path / name)
+    assert made.detect(picture()).label == ("home",)
+
+
 def test_nothing_above_the_threshold_gives_no_detection(tmp_path: Path) -> None:
     seen = detector(tmp_path, [BOX], [2], [0.8], threshold=0.81).detect(picture())
     assert len(seen) == 0 and seen.xyxy.shape == (0, 4)
