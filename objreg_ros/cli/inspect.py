@@ -8,8 +8,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import click
-import cv2
-import numpy as np
 
 from objreg_ros.cli import options
 from objreg_ros.recording import Recording, open_recording
@@ -17,6 +15,7 @@ from objreg_ros.recording.inputs import GRAPH_TOPICS, Inputs, choose_inputs, par
 from objreg_ros.recording.summary import describe_topics, warnings
 from objreg_ros.registrar.store import is_store
 from objreg_ros.registrar.survey import describe, draw, survey
+from objreg_ros.report.live_pictures import write_picture
 from objreg_ros.truth import Truth
 
 
@@ -45,7 +44,7 @@ def command(recording: Path, remaps: tuple[str, ...], picture: Path | None) -> N
 def _say_store(store: Path, picture: Path | None) -> None:
     click.echo(describe(store))
     if picture is not None:
-        cv2.imwrite(str(picture), np.ascontiguousarray(draw(survey(store))[..., ::-1]))
+        write_picture(picture, draw(survey(store)))
         click.echo(f"  drawn into {picture}")
 
 

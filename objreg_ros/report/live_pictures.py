@@ -26,8 +26,17 @@ def draw_sight(
         _draw_points(picture, item.xyz, camera, _colour(item.instance))
     for box, score, label in zip(detections.xyxy, detections.score, detections.label, strict=True):
         _draw_box(picture, box, f"{label} {score:.2f}")
-    if not cv2.imwrite(str(file), picture):
-        raise OSError(f"{file}: expected a place that can be written to")
+    write_picture(file, picture[..., ::-1])
+
+
+def write_picture(file: Path, rgb: Array) -> None:
+    """Write (H, W, 3) uint8 RGB in the format of the file's name; OSError if it cannot be."""
+    try:
+        written = cv2.imwrite(str(file), np.ascontiguousarray(rgb[..., ::-1]))
+    except cv2.error as error:  # no format of this name
+        raise OSError(f"{file}: expected a name like picture.png, got one of no known format; rename it") from error
+    if not written:
+        raise OSError(f"{file}: expected a place that can be written to; create its folder or choose another")
 
 
 def _colour(instance: int) -> tuple[int, int, int]:

@@ -8,6 +8,7 @@ from click.testing import CliRunner
 from recording.folders import tum_folder
 
 from objreg_ros.cli.inspect import columns, command
+from objreg_ros.registrar.store import Store
 
 
 def test_a_recording_is_told_with_its_inputs_and_its_truth(tmp_path: Path) -> None:
@@ -27,6 +28,13 @@ def test_a_real_bag_is_told(shared: Path) -> None:
     result = CliRunner().invoke(command, [str(shared / "data/bag_soda_can/perception_tutorial.bag")])
     assert "640 × 480 organised, x y z rgb, 32 bytes a point" in result.output
     assert "expected a colour image" in result.output
+
+
+@pytest.mark.parametrize("name", ["nowhere/map.png", "map.xyz"])
+def test_a_picture_that_cannot_be_drawn_is_not_said_to_be(name: str, tmp_path: Path) -> None:
+    Store(tmp_path / "place.db").close()
+    result = CliRunner().invoke(command, [str(tmp_path / "place.db"), "--picture", str(tmp_path / name)])
+    assert isinstance(result.exception, OSError) and "drawn into" not in result.output
 
 
 def test_nothing_is_refused(tmp_path: Path) -> None:

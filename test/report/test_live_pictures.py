@@ -9,7 +9,7 @@ import pytest
 
 from objreg_ros.data import Detections, Intrinsics, LoopClosure, ObjectCloud
 from objreg_ros.geometry import pose
-from objreg_ros.report.live_pictures import RIGHT, WRONG, draw_sight, draw_way
+from objreg_ros.report.live_pictures import RIGHT, WRONG, draw_sight, draw_way, write_picture
 from objreg_ros.truth import Truth
 
 CAMERA = Intrinsics(fx=100.0, fy=100.0, cx=50.0, cy=40.0, width=100, height=80)
@@ -39,6 +39,20 @@ def test_a_box_is_drawn_with_its_name(tmp_path: Path) -> None:
     draw_sight(tmp_path / "sight.png", np.zeros((80, 100, 3), np.uint8), CAMERA, seen, [])
     picture = cv2.imread(str(tmp_path / "sight.png"))
     assert (picture[50, 20:61] > 100).all() and picture[52:].max() == 0 and picture[14:26, 22:50].max() > 100
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [("nowhere/a.png", "expected a place that can be written to"), ("a.xyz", r"expected a name like picture\.png")],
+)
+def test_a_picture_that_cannot_be_written_is_refused(name: str, expected: str, tmp_path: Path) -> None:
+    with pytest.raises(OSError, match=expected):
+        write_picture(tmp_path / name, np.zeros((4, 4, 3), np.uint8))
+
+
+def test_a_picture_is_written_in_its_colours(tmp_path: Path) -> None:
+    write_picture(tmp_path / "red.png", np.full((4, 4, 3), (255, 0, 0), np.uint8))
+    assert cv2.imread(str(tmp_path / "red.png"))[0, 0].tolist() == [0, 0, 255]
 
 
 def hexadecimal(colour: str) -> np.ndarray:
