@@ -129,6 +129,8 @@ def _way(story: Story, tracks: Tracks | None) -> str:
     words = "From above. Closures tie places that were seen twice; the pose graph takes the drift out of odometry."
     if story.pruned:
         words += f" The mapper pruned {len(story.pruned)} of {len(story.closures)} closures."
+    if story.left_out:
+        words += f" {story.left_out} frames are left out: their time is not later than that of the frames before them."
     drawing = f"<figure class=card>{legend(entries)}{figures.way(story, tracks)}</figure>"
     error = figures.error_over_time(story, tracks)
     if error:

@@ -85,6 +85,12 @@ class Story:
         error = self.error(closure)
         return error is not None and not within(error, FALSE)
 
+    @property
+    def left_out(self) -> int:
+        """How many frames with odometry are not on the map because time does not advance at them."""
+        posed = sum(glimpse.T_odom_camera is not None for glimpse in self.glimpses)
+        return posed - len(advancing(self.glimpses))
+
     def tracks(self) -> Tracks | None:
         """Odometry, corrected and true way, over each other; None without odometry."""
         stamps, odometry, corrected = poses_before_and_after(self.graph)
@@ -108,7 +114,7 @@ class Story:
 
     def objects(self) -> list[tuple[str, Array, Array]]:
         """(label, position by odometry, position in the map) of every object seen with odometry."""
-        seen = [glimpse for glimpse in self.glimpses if glimpse.T_odom_camera is not None and glimpse.objects]
+        seen = [glimpse for glimpse in advancing(self.glimpses) if glimpse.objects]
         corrected = self.graph.corrected(glimpse.stamp_ns for glimpse in seen)
         return [
             (label, transform(glimpse.T_odom_camera, xyz), transform(T_map_camera, xyz))
@@ -118,10 +124,19 @@ class Story:
         ]
 
 
-def mapped(glimpses: Sequence[Glimpse], closures: Sequence[LoopClosure]) -> PoseGraph:
-    """The pose graph of the frames that have odometry, with every closure between them."""
-    graph = PoseGraph()
+def advancing(glimpses: Sequence[Glimpse]) -> list[Glimpse]:
+    """The frames with odometry that are later than all before them: stamps repeat and go back where a bag is looped."""
+    later: list[Glimpse] = []
     for glimpse in glimpses:
+        if glimpse.T_odom_camera is not None and (not later or glimpse.stamp_ns > later[-1].stamp_ns):
+            later.append(glimpse)
+    return later
+
+
+def mapped(glimpses: Sequence[Glimpse], closures: Sequence[LoopClosure]) -> PoseGraph:
+    """The pose graph of the frames that have odometry and at which time advances, with every closure between them."""
+    graph = PoseGraph()
+    for glimpse in advancing(glimpses):
         if glimpse.T_odom_camera is not None:
             graph.add_odometry(Odometry(T_odom_body=glimpse.T_odom_camera, stamp_ns=glimpse.stamp_ns))
     for closure in closures:

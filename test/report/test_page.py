@@ -55,5 +55,12 @@ def test_a_run_that_closed_nothing_says_so() -> None:
     assert "No loop was closed" in page([(Story.of("empty", told, Truth([])), None)])
 
 
+def test_frames_that_are_left_out_are_counted() -> None:
+    told = summary()
+    assert "left out" not in page([(Story.of("walk", told, TRUTH), None)])
+    told["glimpses"] += told["glimpses"][-2:]
+    assert " 2 frames are left out: their time is not later" in page([(Story.of("walk", told, TRUTH), None)])
+
+
 def test_names_are_escaped() -> None:
     assert "<b>" not in page([(Story.of("<b>", summary(), TRUTH), None)])

@@ -45,6 +45,17 @@ def test_one_object_is_one_place_in_the_map_and_several_by_odometry() -> None:
     assert in_map < 0.5 * by_odometry
 
 
+def test_frames_whose_time_does_not_advance_are_left_out_and_counted() -> None:
+    told = summary()
+    again = [dict(told["glimpses"][k]) for k in (119, 7, 0)]
+    early = {**again[0], "stamp_ns": -5}
+    story = Story.of("walk", {**told, "glimpses": [*told["glimpses"], *again, early]}, TRUTH)
+    once = Story.of("walk", told, TRUTH)
+    assert (once.left_out, story.left_out) == (0, 4)
+    np.testing.assert_array_equal(story.tracks().corrected, once.tracks().corrected)
+    assert len(story.objects()) == len(once.objects())
+
+
 def test_an_older_json_without_frames_is_told_all_the_same() -> None:
     told = {key: value for key, value in summary().items() if key not in ("glimpses", "refusals")}
     story = Story.of("walk", told, TRUTH)
