@@ -54,9 +54,6 @@ def image(message: Any) -> ColourImage:
     return ColourImage(rgb=colour_pixels(message), **_when_and_where(message))
 
 
-compressed_image = image
-
-
 def depth(message: Any) -> Array:
     """Metres (H, W) float32, 0 where there is none, of an Image (16UC1, mono16: mm; 32FC1: m) or a compressedDepth."""
     return depth_metres(message)
@@ -189,12 +186,11 @@ def labels(message: Any) -> dict[int, str]:
 
 
 def detections(message: Any, names: Mapping[int, str], image_hw: tuple[int, int] = (1, 1)) -> Detections:
-    """A ``detections_table`` or a vision_msgs/Detection2DArray. A class without a name is called by its number.
+    """A ``detections_table``. A class without a name is called by its number.
 
-    ``image_hw`` is what to believe where the message does not tell: an empty table, a Detection2DArray.
+    ``image_hw`` is what to believe where the message does not tell: an empty table.
     """
-    rows = _rows_of_array(message, names) if hasattr(message, "detections") else _rows_of_table(message, names)
-    xyxy, score, label, told_hw = rows
+    xyxy, score, label, told_hw = _rows_of_table(message, names)
     order = np.argsort(-score, kind="stable")
     return Detections(
         xyxy=np.ascontiguousarray(xyxy[order]),
@@ -214,30 +210,6 @@ def _rows_of_table(message: Any, names: Mapping[int, str]) -> Rows:
     label = [names.get(number, str(number)) for number in rows["class_id"][0].tolist()]
     image_hw = (int(rows["image_height"][0, 0]), int(rows["image_width"][0, 0])) if rows.size else None
     return columns(rows, *corners)[0], rows["score"][0].astype(np.float32), label, image_hw
-
-
-def _rows_of_array(message: Any, names: Mapping[int, str]) -> Rows:
-    seen = [d for d in message.detections if len(d.results)]
-    best = [max(d.results, key=_score) for d in seen]
-    score = np.array([_score(result) for result in best], np.float32)
-    xyxy = np.array([_corners(d.bbox) for d in seen], np.float32).reshape(-1, 4)
-    return xyxy, score, [_class_name(result, names) for result in best], None
-
-
-def _score(result: Any) -> float:
-    return float(getattr(result, "hypothesis", result).score)
-
-
-def _class_name(result: Any, names: Mapping[int, str]) -> str:
-    hypothesis = getattr(result, "hypothesis", result)
-    name = str(getattr(hypothesis, "class_id", None) or getattr(hypothesis, "id", ""))
-    return names.get(int(name), name) if name.isdigit() else name
-
-
-def _corners(bbox: Any) -> tuple[float, float, float, float]:
-    centre = getattr(bbox.center, "position", bbox.center)  # vision_msgs 4 and before
-    half_w, half_h = bbox.size_x / 2, bbox.size_y / 2
-    return centre.x - half_w, centre.y - half_h, centre.x + half_w, centre.y + half_h
 
 
 def objects(message: Any, names: Mapping[int, str]) -> tuple[tuple[ObjectCloud, ...], ObjectCloud | None]:

@@ -65,11 +65,6 @@ class Ledger:
         with self._lock:
             self._lost[topic] += count
 
-    def waits(self, stamp_ns: int) -> bool:
-        """Whether a frame of this stamp is neither published nor dropped yet."""
-        with self._lock:
-            return stamp_ns in self._arrived
-
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
         """Measure a stage."""

@@ -143,7 +143,6 @@ class Synchroniser:
         self.queues = {stream.name: Queue(stream, on_drop) for stream in streams}
         self._reference = self.queues[streams[0].name]
         self._others = [queue for queue in self.queues.values() if queue is not self._reference]
-        self.time_jumps = 0
 
     def add(self, name: str, stamp_ns: int, payload: Any) -> list[Match]:
         """Take one item of a stream; KeyError for a stream that was not named."""
@@ -153,7 +152,6 @@ class Synchroniser:
             queue.latched, queue.matched = payload, queue.matched + 1
             return self._matches()
         if queue.last_ns is not None and stamp_ns < queue.last_ns:
-            self.time_jumps += 1
             self._forget_after(stamp_ns)
         queue.drop_after(stamp_ns)  # another stream's jump may have left what lies in the future of this one's
         queue.last_ns = stamp_ns

@@ -28,16 +28,12 @@ CLIPS = (1.0, 1.5, 1.5, 2.5, 3.0, 3.0)  # the first of the tolerance, the others
 class Plane:
     """Points p with ``normal · p + offset = 0``; ``normal (3,)`` points up, so the left side is the height above it.
 
-    ``spread`` is the standard deviation of its points in units of `tolerance`.
+    ``spread`` is the standard deviation of its points in tolerances, FLOOR + GROWTH z² at depth z.
     """
 
     normal: Array
     offset: float
     spread: float
-
-    def height(self, points: Array) -> Array:
-        """Metres of points (..., 3) above the plane."""
-        return points @ self.normal.astype(points.dtype) + np.float32(self.offset)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,13 +60,9 @@ class Ground:
     coarse: Surface
 
 
+# Metres that a point of a plane may lie off it, FLOOR + GROWTH z²: structured-light noise grows with squared depth
+# (Khoshelham and Elberink, "Accuracy and resolution of Kinect depth data", 2012).
 FLOOR, GROWTH = np.float32(0.008), np.float32(0.006)
-
-
-def tolerance(depth: Array) -> Array:
-    """Metres that a point of a plane may lie off it: structured-light noise grows with squared depth (Khoshelham and
-    Elberink, "Accuracy and resolution of Kinect depth data", 2012)."""
-    return FLOOR + GROWTH * depth * depth
 
 
 def find_supports(

@@ -44,13 +44,6 @@ class Surface:
         """(h, w, 3) points, 0 0 0 where there is none."""
         return np.stack([self.x[None, :] * self.depth, self.y[:, None] * self.depth, self.depth], axis=-1)
 
-    def areas(self, camera: Intrinsics) -> Array:
-        """(h, w) m² of surface in each cell, z² / (fx fy |n·ray|); 0 where the normal is unknown."""
-        n_x, n_y, n_z = self.normals
-        cosine = np.abs(n_x * self.x[None, :] + n_y * self.y[:, None] + n_z)
-        square = self.depth**2 * np.float32(self.step**2 / (camera.fx * camera.fy))
-        return np.where(cosine > 0, square / np.maximum(cosine, MIN_COSINE), np.float32(0))
-
     def crop(self, window: Window) -> Surface:
         """A copy of the cells of ``window``, which must lie inside."""
         left, top, right, bottom = window

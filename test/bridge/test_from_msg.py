@@ -222,25 +222,6 @@ def test_an_empty_table_is_no_detection_of_the_size_at_hand() -> None:
     assert len(found) == 0 and found.image_hw == (48, 64)
 
 
-@pytest.mark.parametrize("version", [2, 4])
-def test_vision_msgs_are_read_in_their_new_and_their_old_form(version: int) -> None:
-    scored = (("7", 0.2), ("3", 0.9))
-    if version == 4:
-        results = [
-            SimpleNamespace(hypothesis=SimpleNamespace(class_id=c, score=s)) for c, s in (("7", 0.2), ("3", 0.9))
-        ]
-        centre = SimpleNamespace(position=SimpleNamespace(x=20.0, y=30.0), theta=0.0)
-    else:
-        results = [SimpleNamespace(id=int(c), score=s) for c, s in scored]
-        centre = SimpleNamespace(x=20.0, y=30.0, theta=0.0)
-    box = SimpleNamespace(center=centre, size_x=10.0, size_y=20.0)
-    seen = [SimpleNamespace(bbox=box, results=results), SimpleNamespace(bbox=box, results=[])]
-    array = SimpleNamespace(header=messages.header(), detections=seen)
-    found = from_msg.detections(array, {3: "cup"}, image_hw=(48, 64))
-    assert found.label == ("cup",) and found.xyxy.tolist() == [[15, 20, 25, 40]]
-    assert found.score[0] == pytest.approx(0.9)
-
-
 def object_rows() -> np.ndarray:
     rows = np.zeros(5, OBJECTS)
     rows["instance"] = [2, 0, 1, 2, 1]

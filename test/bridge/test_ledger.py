@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from collections import Counter
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -12,14 +14,17 @@ STEPS = st.lists(st.tuples(st.sampled_from(("receive", "publish", "overtaken", "
 
 @given(STEPS)
 def test_the_books_balance_after_every_step(steps: list[tuple[str, int]]) -> None:
-    ledger = Ledger()
+    ledger, waiting = Ledger(), Counter[int]()
     for what, stamp_ns in steps:
         if what == "receive":
             ledger.receive(stamp_ns)
-        elif ledger.waits(stamp_ns):
+            waiting[stamp_ns] += 1
+        elif waiting[stamp_ns]:
+            waiting[stamp_ns] -= 1
             ledger.publish(stamp_ns) if what == "publish" else ledger.drop(stamp_ns, what)
         books = ledger.balance()
         assert books.received == books.published + books.waiting + sum(books.dropped.values())
+        assert books.waiting == waiting.total()
     assert books.received == sum(what == "receive" for what, _ in steps) if steps else True
 
 
@@ -37,7 +42,9 @@ def test_two_frames_of_one_stamp_are_two_frames() -> None:
     ledger.receive(0)
     ledger.receive(0)
     ledger.publish(0)
-    assert ledger.waits(0) and ledger.balance().waiting == 1
+    assert ledger.balance().waiting == 1
+    ledger.publish(0)
+    assert ledger.balance().published == 2
 
 
 def test_drops_are_counted_by_reason_and_losses_apart() -> None:

@@ -119,7 +119,7 @@ def test_what_a_match_lacks_is_told() -> None:
 def test_a_looped_recording_matches_as_well_the_second_time() -> None:
     sync = Synchroniser(EXACT)
     passes = [sum(len(sync.add(name, t, t)) for t in range(50) for name in ("image", "depth")) for _ in range(3)]
-    assert passes == [50, 50, 50] and sync.time_jumps == 2 and accounts_hold(sync)
+    assert passes == [50, 50, 50] and accounts_hold(sync)
 
 
 def test_a_jump_back_drops_what_waits_in_the_future() -> None:
