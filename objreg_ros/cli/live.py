@@ -88,7 +88,7 @@ def _listening(environment: Mapping[str, str]) -> Iterator[Collector]:
     from objreg_ros.bridge.collector import Collector
 
     context = Context()
-    context.init()
+    context.init(args=[])  # not the command line: its --remap is not for ROS
     collector = Collector(context)
     try:
         yield collector
