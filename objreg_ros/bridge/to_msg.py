@@ -19,7 +19,7 @@ from nav_msgs.msg import Odometry as OdometryMsg
 from nav_msgs.msg import Path
 from numpy.typing import NDArray
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2, PointField
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
 from std_msgs.msg import Header, String
 
 from objreg_ros.bridge.layout import DETECTIONS, LANDMARKS, OBJECTS, SUPPORT_ID, VIEW, fields_of
@@ -80,13 +80,6 @@ def finished(node: str, stamp_ns: int, reason: str = "") -> Header:
 def image(picture: ColourImage) -> Image:
     """A colour image as rgb8."""
     return _raster(picture.rgb, "rgb8", picture.stamp_ns, picture.frame_id)
-
-
-def compressed_image(encoded: bytes, kind: str, stamp_ns: int, frame_id: str) -> CompressedImage:
-    """An encoded picture; ``kind`` is jpeg or png."""
-    return CompressedImage(
-        header=header(stamp_ns, frame_id), format=kind, data=_bytes(np.frombuffer(encoded, np.uint8))
-    )
 
 
 def depth_image(picture: DepthImage, millimetres: bool = False) -> Image:
