@@ -9,7 +9,7 @@ A failure is None, a `Rejected` or an exception. It is never a pose.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from enum import Enum, IntFlag
 from typing import Any, TypeVar, dataclass_transform
 
@@ -395,8 +395,3 @@ class Rejected:
     to_ns: int
     detail: str
     T_from_to: Array | None = None
-
-
-def as_dict(value: Any) -> dict[str, Any]:
-    """The fields of a word by name, not recursive."""
-    return {f.name: getattr(value, f.name) for f in fields(value)}
