@@ -23,6 +23,9 @@ from objreg_ros.registrar.params import RegistrarParams
 
 Refusal = tuple[Reason, str]
 
+SAME_EVIDENCE = {"centroids": "objects"}
+"""Chains that are one where they agree: the objects' poses are looked for from those that their middles propose too."""
+
 
 def judge(candidates: Sequence[Candidate], params: RegistrarParams, prior: Prior | None = None) -> Candidate | Refusal:
     """The first candidate that nothing speaks against, or the refusal of the best one.
@@ -126,7 +129,8 @@ def _score(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 def _doubtful(candidate: Candidate, params: RegistrarParams) -> bool:
     """Whether a push is hardly worse than a pose under which something floats, or one chain found a lone object's."""
     drop, floating = candidate.resistance, candidate.verification.violations > params.max_violations_doubtful
-    alone = len(candidate.explained) < 2 and len(candidate.agreeing_chains) < params.min_chains
+    independent = {SAME_EVIDENCE.get(chain, chain) for chain in candidate.agreeing_chains}
+    alone = len(candidate.explained) < 2 and len(independent) < params.min_chains
     return alone or (floating and drop is not None and drop < params.firm_margin)
 
 

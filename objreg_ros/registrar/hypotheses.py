@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a pose may come from: the chains, each independent of the others, and what they propose."""
+"""Where a pose may come from: the chains and what they propose.
+
+Each is independent of the others but for the middles of objects, from which their shapes are looked for too: where
+these two agree the gate counts one.
+"""
 
 from __future__ import annotations
 

@@ -102,8 +102,9 @@ def test_a_lone_object_that_views_like_little_need_not_resist_a_push_where_next_
 
 def test_a_lone_object_that_views_like_little_needs_two_chains() -> None:
     little = {"score": 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful), "margin": 1.0, "explained": (CUP,)}
-    refusal = refuse(candidate(agreeing_chains=("objects",), **little), PARAMS)
-    assert refusal is not None and refusal[0] is Reason.LOW_OVERLAP
+    for chains in (("objects",), ("centroids", "objects")):  # the objects' poses are looked for from their middles too
+        refusal = refuse(candidate(agreeing_chains=chains, **little), PARAMS)
+        assert refusal is not None and refusal[0] is Reason.LOW_OVERLAP
     assert refuse(candidate(agreeing_chains=("features", "objects"), **little), PARAMS) is None
 
 
