@@ -8,9 +8,9 @@ the verb                `registrar`: `track` for every frame, `search` for every
 frames to keyframes     `keyframes` (when one ends), `tracking` (motion without odometry), `fusion`, `odometry`
 what is remembered      `keyframe`, `sighting`, `landmarks`; in `store` through `codec`; seen by `survey`, `export`
 which to try            `retrieve`, by `likest` objects: `descriptor` and `labels`
-poses from chains       `engine` asks `hypotheses`, fed by `prepared`: `features` and `consensus` on the context,
-                        `scene_search` (`shape`, `silhouette`, `shape_search`, `shape_hull`, `shape_icp`,
-                        `shape_score`, `worth`, `scrutiny`) on objects
+poses from chains       `engine` finishes the `shortlist` of the `hypotheses`, fed by `prepared`: `features` and
+                        `consensus` on the context, `scene_search` (`shape`, `silhouette`, `shape_search`, `shape_hull`,
+                        `shape_icp`, `shape_score`, `worth`, `scrutiny`) on objects
 refinement              `icp` brings many to their basin; `refine` ends a few, with `direct` where there is grey
                         and `contradiction` to say how well the surfaces hold the pose; `liking` compares
                         poses near each other

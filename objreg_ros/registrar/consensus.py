@@ -65,6 +65,13 @@ def distinct(T: Array, worth: Array, middle: Array, limit: int, angle: float, di
     return [int(k) for k in _distinct(T, centres, order, limit, np.cos(angle), distance)]
 
 
+def near(T: Array, T_known: Array, middle: Array, angle: float, distance: float) -> Array:
+    """Which of the poses (N, 4, 4) differ from one by less than ``angle`` rad and ``distance`` m at ``middle (3,)``."""
+    cosine = 0.5 * (np.einsum("kij,ij->k", T[:, :3, :3], T_known[:3, :3]) - 1.0)
+    moved = np.linalg.norm((T[:, :3, :3] - T_known[:3, :3]) @ middle + T[:, :3, 3] - T_known[:3, 3], axis=-1)
+    return np.asarray((cosine > np.cos(angle)) & (moved < distance))
+
+
 @numba.njit(cache=True, nogil=True)
 def _distinct(T, centres, order, limit, cosine, distance):  # type: ignore[no-untyped-def]
     chosen = np.empty(limit, np.int64)

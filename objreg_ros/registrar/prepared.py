@@ -50,6 +50,14 @@ class Prepared:
     middle: Array
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Pair:
+    """Two keyframes made ready to be registered."""
+
+    source: Prepared
+    target: Prepared
+
+
 def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
     """Everything about one keyframe that does not depend on its partner.
 
