@@ -117,21 +117,27 @@ def _texture(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
 def _score(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
     """The views must like the pose; more, or its objects do, where it is doubtful."""
-    score = candidate.verification.score
+    score, least = candidate.verification.score, _least_liked(candidate, params)
     if score < params.min_score:
         return Reason.LOW_OVERLAP, f"score {score:.2f} < {params.min_score:.2f}"
     liked = score + params.likeness_weight * max(0.0, candidate.likeness or 0.0)
-    if liked >= params.min_score_doubtful or not _doubtful(candidate, params):
+    if liked >= least:
         return None
-    return Reason.LOW_OVERLAP, f"score with likeness {liked:.2f} < {params.min_score_doubtful:.2f}"
+    return Reason.LOW_OVERLAP, f"score with likeness {liked:.2f} < {least:.2f}"
 
 
-def _doubtful(candidate: Candidate, params: RegistrarParams) -> bool:
-    """Whether a push is hardly worse than a pose under which something floats, or one chain found a lone object's."""
+def _least_liked(candidate: Candidate, params: RegistrarParams) -> float:
+    """What views and objects must like of a pose: more if one chain found a lone object's, or if something floats.
+
+    For what floats makes up by how much worse a push is: a pose that the views hold firmly is not doubtful.
+    """
     drop, floating = candidate.resistance, candidate.verification.violations > params.max_violations_doubtful
     independent = {SAME_EVIDENCE.get(chain, chain) for chain in candidate.agreeing_chains}
-    alone = len(candidate.explained) < 2 and len(independent) < params.min_chains
-    return alone or (floating and drop is not None and drop < params.firm_margin)
+    if len(candidate.explained) < 2 and len(independent) < params.min_chains:
+        return params.min_score_doubtful
+    if not floating or drop is None:
+        return params.min_score
+    return min(params.min_score_doubtful, params.min_score + max(0.0, params.firm_margin - drop))
 
 
 def _agreement(candidate: Candidate, params: RegistrarParams, rivals: Sequence[Candidate]) -> Refusal | None:

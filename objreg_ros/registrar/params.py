@@ -238,14 +238,16 @@ class RegistrarParams(Params):
     min_score_doubtful: float = param(
         0.40,
         "least V, with what likeness adds, of a doubtful pose: a single object's that fewer than min_chains proposed, "
-        "or one where V falls by less than firm_margin over a push, with more than max_violations_doubtful floating",
+        "or one with more than max_violations_doubtful floating, less what V falls by over a push",
         ge=-3.0,
         le=2.0,
     )
     max_violations_doubtful: float = param(
         0.02, "share of tested pixels in seen free space up to which no pose is doubtful", ge=0.0, le=1.0
     )
-    firm_margin: float = param(0.4, "fall of V over a push that tells that the views hold a pose firmly", ge=0.0)
+    firm_margin: float = param(
+        0.4, "fall of V over a push from which on the views hold a pose firmly, and it is not doubtful", ge=0.0
+    )
     rival_margin: float = param(0.1, "a candidate this much below the best in V is not considered", ge=0.0)
     min_chains: int = param(2, "chains that must agree on a lone object's pose for it not to be doubtful", ge=1)
     min_objects: int = param(2, "explained objects that need no more evidence than the views; a lone one does", ge=1)

@@ -81,14 +81,15 @@ def test_several_objects_that_look_otherwise_may_not_float_either() -> None:
     assert refusal is not None and refusal[0] is Reason.FREE_SPACE
 
 
-def test_a_pose_that_views_like_little_and_under_which_something_floats_must_resist_a_push() -> None:
+def test_what_views_like_too_little_where_something_floats_a_push_must_make_worse_by() -> None:
     floating = 1.5 * PARAMS.max_violations_doubtful
     little = {"score": 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful), "margin": 1.0, "violations": floating}
+    lacking = PARAMS.firm_margin - (little["score"] - PARAMS.min_score)
     for explained, resistance, accepted in (
-        ((CUP,), 0.9 * PARAMS.firm_margin, False),
-        ((CUP,), 1.1 * PARAMS.firm_margin, True),
+        ((CUP,), 0.9 * lacking, False),
+        ((CUP,), 1.1 * lacking, True),
         ((CUP,), None, True),
-        ((CUP, ObjectPair(1, 1, "book")), 0.9 * PARAMS.firm_margin, False),
+        ((CUP, ObjectPair(1, 1, "book")), 0.9 * lacking, False),
     ):
         refusal = refuse(candidate(explained=explained, resistance=resistance, **little), PARAMS)
         assert (refusal is None) is accepted, (explained, resistance, refusal)
@@ -110,7 +111,7 @@ def test_a_lone_object_that_views_like_little_needs_two_chains() -> None:
 
 def test_an_object_that_looks_alike_makes_up_for_views_that_like_little() -> None:
     little = {"score": 0.2, "violations": 1.5 * PARAMS.max_violations_doubtful, "yaw_known": True, "margin": 1.0}
-    little["resistance"] = 0.5 * PARAMS.firm_margin
+    little["resistance"] = 0.3 * PARAMS.firm_margin
     alike, otherwise = (candidate(explained=(CUP,), likeness=likeness, **little) for likeness in (1.0, 0.2))
     assert refuse(alike, PARAMS) is None
     refusal = refuse(otherwise, PARAMS)
