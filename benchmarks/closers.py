@@ -128,7 +128,7 @@ def candidate_pairs(keyframes: Sequence[Frame], most: int) -> list[tuple[int, in
 def judged(result: Result, source: Source, found: Sequence[Revisit]) -> dict[str, Any]:
     """A method's result against the truth."""
     truth = source.truth
-    errors = [error for closure in result.closures if (error := truth.error(closure)) is not None]
+    errors = truth.errors(result.closures)
     recall = recall_by_view_change(found, result.closures, truth, TOLERANCE_NS)
     before, after, pruned = trajectory_errors(source.frames, result.closures, truth)
     return {

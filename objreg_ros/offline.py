@@ -36,7 +36,7 @@ from objreg_ros.recording.record import Record
 from objreg_ros.registrar.export import constraint
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.segmenter.params import SegmenterParams
-from objreg_ros.truth import Error, Truth, summarise
+from objreg_ros.truth import Truth, summarise
 
 Word = TypeVar("Word")
 
@@ -132,24 +132,29 @@ class Run:
     complaints: dict[str, str] = field(default_factory=dict)  # the first of each kind
     stage_s: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
 
-    def errors(self, truth: Truth) -> list[Error]:
-        """The true error of every closure that the truth tells of."""
-        return [error for closure in self.closures if (error := truth.error(closure)) is not None]
-
     def summary(self, truth: Truth) -> dict[str, Any]:
         """The run as JSON; the keys are stable."""
         return {
             "frames": self.frames,
             "detections": self.detections,
             "objects": self.objects,
-            "constraints": [constraint(closure) for closure in self.closures],
+            "constraints": [judged(closure, truth) for closure in self.closures],
             "rejected": dict(sorted(self.rejected.items())),
             "dropped": dict(sorted(self.dropped.items())),
             "stage_ms": {stage: percentiles_ms(seconds) for stage, seconds in self.stage_s.items()},
-            "truth": summarise(self.errors(truth)),
+            "truth": summarise(truth.errors(self.closures)),
             "refusals": [refusal(rejected) for rejected in self.refusals],
             "glimpses": self.glimpses,
         }
+
+
+def judged(closure: LoopClosure, truth: Truth) -> dict[str, Any]:
+    """A closure as JSON, with its true ``error``: None where the truth does not tell."""
+    error = truth.error(closure)
+    return {
+        **constraint(closure),
+        "error": None if error is None else dict(zip(("rotation_deg", "translation_cm"), error, strict=True)),
+    }
 
 
 def refusal(rejected: Rejected) -> dict[str, Any]:

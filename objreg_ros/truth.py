@@ -72,6 +72,10 @@ class Truth:
         T_from_to = self.between(closure.from_ns, closure.to_ns)
         return None if T_from_to is None else pose_error(closure.T_from_to, T_from_to)
 
+    def errors(self, closures: Iterable[LoopClosure]) -> list[Error]:
+        """The error of every closure that the truth tells of."""
+        return [error for closure in closures if (error := self.error(closure)) is not None]
+
 
 def within(error: Error, bound: Error) -> bool:
     """Whether both parts of an error are within a bound."""

@@ -37,6 +37,11 @@ def test_a_closure_the_other_way_round_is_wrong() -> None:
     assert error is not None and error[1] == pytest.approx(200)
 
 
+def test_errors_are_of_the_closures_that_the_truth_tells_of() -> None:
+    truth = Truth([(0, at(0)), (100 * MS, at(1))])
+    assert truth.errors([closure(at(1)), closure(at(1), to_ns=900 * MS)]) == [pytest.approx((0, 0), abs=1e-6)]
+
+
 def test_between_two_poses_the_truth_is_interpolated() -> None:
     truth = Truth([(0, at(0, 0)), (100 * MS, at(1, 0.4))])
     T = truth.at(25 * MS)

@@ -20,10 +20,9 @@ from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
 from objreg_ros.cli.played import as_rosbag2, simulated_room
 from objreg_ros.cli.settings import read_settings
 from objreg_ros.data import ColourImage
-from objreg_ros.offline import refusal
+from objreg_ros.offline import judged, refusal
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
-from objreg_ros.registrar.export import constraint
 from objreg_ros.registrar.params import RegistrarNodeParams
 from objreg_ros.report.live_pictures import draw_sight, draw_way
 from objreg_ros.report.write import write_report
@@ -83,7 +82,7 @@ def run(asked: Asked) -> None:
         sent = _sent(source, inputs, asked.seconds, live)
     write_report(asked.out / "report.html", [asked.out / "demo.json"])
     _say(f"wrote {asked.out / 'report.html'}")
-    click.echo("\n".join(live_table.lines(live, sent, _errors(live, truth))))
+    click.echo("\n".join(live_table.lines(live, sent, summarise(truth.errors(live.closures)))))
     live_table.require_balance(live, sent)
 
 
@@ -137,10 +136,6 @@ def _sent(source: Recording, inputs: Inputs, seconds: float | None, live: Live) 
     }
 
 
-def _errors(live: Live, truth: Truth) -> dict[str, Any]:
-    return summarise([error for closure in live.closures if (error := truth.error(closure)) is not None])
-
-
 def mounting_of(asked: Asked) -> tuple[float, ...]:
     """The registrar's ``T_base_camera``: x y z qx qy qz qw, or nothing."""
     return read_settings(asked.params_file, asked.changes).of("registrar", RegistrarNodeParams).T_base_camera
@@ -151,9 +146,9 @@ def _write(file: Path, told: Mapping[str, Any], live: Live, truth: Truth) -> Non
     summary = {
         **told,
         "nodes": {room: asdict(books) for room, books in live.books.items()},
-        "constraints": [constraint(closure) for closure in live.closures],
+        "constraints": [judged(closure, truth) for closure in live.closures],
         "rejected": dict(live.rejected),
-        "truth": _errors(live, truth),
+        "truth": summarise(truth.errors(live.closures)),
         "refusals": [refusal(rejected) for rejected in live.refusals],
         "glimpses": live.glimpses,
     }
