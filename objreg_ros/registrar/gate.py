@@ -132,12 +132,28 @@ def _least_liked(candidate: Candidate, params: RegistrarParams) -> float:
     For what floats makes up by how much worse a push is: a pose that the views hold firmly is not doubtful.
     """
     drop, floating = candidate.resistance, candidate.verification.violations > params.max_violations_doubtful
-    independent = {SAME_EVIDENCE.get(chain, chain) for chain in candidate.agreeing_chains}
-    if len(candidate.explained) < 2 and len(independent) < params.min_chains:
+    if _is_alone(candidate, params):
         return params.min_score_doubtful
     if not floating or drop is None:
         return params.min_score
     return min(params.min_score_doubtful, params.min_score + max(0.0, params.firm_margin - drop))
+
+
+def _is_alone(candidate: Candidate, params: RegistrarParams) -> bool:
+    """Whether at most one object lies upon itself under the pose, and no second chain came to it."""
+    independent = {SAME_EVIDENCE.get(chain, chain) for chain in candidate.agreeing_chains}
+    return len(candidate.explained) < 2 and len(independent) < params.min_chains
+
+
+def _firm(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
+    """A lone object's pose that no second chain came to must be liked by the views, and every push of it less."""
+    score, drop = candidate.verification.score, candidate.resistance
+    if drop is None or score + drop >= params.min_score_alone or not _is_alone(candidate, params):
+        return None
+    return Reason.CHAINS_DISAGREE, (
+        f"a lone object and one chain, score {score:.2f} and its fall over a push {drop:.2f} "
+        f"make less than {params.min_score_alone:.2f}"
+    )
 
 
 def _agreement(candidate: Candidate, params: RegistrarParams, rivals: Sequence[Candidate]) -> Refusal | None:
@@ -221,5 +237,6 @@ CHECKS: tuple[Check, ...] = (  # of a candidate alone, before what others and od
     _free_space,
     _texture,
     _score,
+    _firm,
     _stationary,
 )

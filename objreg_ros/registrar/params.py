@@ -242,6 +242,13 @@ class RegistrarParams(Params):
         ge=-3.0,
         le=2.0,
     )
+    min_score_alone: float = param(
+        1.0,
+        "least V, together with what it falls by over a push, of a lone object's pose that fewer than min_chains "
+        "proposed",
+        ge=-3.0,
+        le=5.0,
+    )
     max_violations_doubtful: float = param(
         0.02, "share of tested pixels in seen free space up to which no pose is doubtful", ge=0.0, le=1.0
     )

@@ -109,6 +109,21 @@ def test_a_lone_object_that_views_like_little_needs_two_chains() -> None:
     assert refuse(candidate(agreeing_chains=("features", "objects"), **little), PARAMS) is None
 
 
+def test_a_lone_object_of_one_chain_needs_views_that_like_it_and_every_push_of_it_less() -> None:
+    liked = {"score": 1.2 * PARAMS.min_score_doubtful, "margin": 1.0, "explained": (CUP,), "likeness": 0.9}
+    lacking = PARAMS.min_score_alone - liked["score"]
+    for chains, resistance, accepted in (
+        (("objects",), 0.9 * lacking, False),
+        (("centroids", "objects"), 0.9 * lacking, False),
+        (("objects",), 1.1 * lacking, True),
+        (("objects",), None, True),
+        (("features", "objects"), 0.9 * lacking, True),
+    ):
+        refusal = refuse(candidate(agreeing_chains=chains, resistance=resistance, **liked), PARAMS)
+        assert (refusal is None) is accepted, (chains, resistance, refusal)
+        assert refusal is None or refusal[0] is Reason.CHAINS_DISAGREE
+
+
 def test_an_object_that_looks_alike_makes_up_for_views_that_like_little() -> None:
     little = {"score": 0.2, "violations": 1.5 * PARAMS.max_violations_doubtful, "yaw_known": True, "margin": 1.0}
     little["resistance"] = 0.3 * PARAMS.firm_margin
