@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How often an accepted pose is false, where every keyframe is held against many.
+
+Online a keyframe tries the four likeliest places and is content with two. Here it tries ten and is content with none,
+nearly all of its closures count, and so one recording gives the gate some hundreds of poses to judge. What is accepted
+is judged by truth, by how many objects speak for it; of what is refused it is said how much was loosely right, were it
+for the best pose that there was.
+
+    python benchmarks/false_closures.py --simulate look-alikes:82 --simulate moved:103:kinect:stress --json OUT
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import re
+import tempfile
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import click
+from sources import detector_of, read_source
+
+from objreg_ros.cli.simulate import camera_of, sensors_of
+from objreg_ros.data import LoopClosure, Rejected
+from objreg_ros.geometry import pose_error
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.registrar import Registrar
+from objreg_ros.registrar.warm import warm
+from objreg_ros.simulation.camera import CAMERAS
+from objreg_ros.simulation.scenarios import SCENARIOS
+from objreg_ros.simulation.write import simulate
+from objreg_ros.truth import FALSE, LOOSE, STRICT, Truth, within
+
+EAGER = {"candidates": 10, "closures": 10, "thin_seconds": 0.2, "threads": 1}
+STORIES = ("look-alikes:82", "moved:103:kinect:stress", "opposite:101:qvga:stress", "loop:111")
+HEAD = f"{'recording':32} {'tried':>6} {'accepted':>9} {'strict':>7} {'loose':>6} {'false':>6}  refused, though right"
+
+
+class Told(NamedTuple):
+    """What is simulated."""
+
+    scenario: str
+    seed: int
+    camera: str
+    stress: bool
+
+
+def told(text: str) -> Told:
+    """``moved:103:qvga:stress``, of which camera and stress may be left out; `click.BadParameter` for anything else."""
+    found = re.fullmatch(r"([\w-]+):(\d+)(?::(\w+))??(:stress)?", text)
+    scenario, seed, camera, stress = found.groups() if found else ("", 0, "", None)
+    story = Told(scenario, int(seed), camera or "kinect", stress is not None)
+    if story.scenario not in SCENARIOS or story.camera not in CAMERAS:
+        expected = f"SCENARIO:SEED[:CAMERA][:stress] of {', '.join(SCENARIOS)} and {', '.join(CAMERAS)}"
+        raise click.BadParameter(f"expected {expected}, got {text!r}", param_hint="--simulate")
+    return story
+
+
+def measure(story: Told, frames: int) -> dict[str, Any]:
+    """The figures of one recording, which is gone afterwards."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "recording"
+        sensors = sensors_of(camera_of(story.camera, None), story.stress, ())
+        simulate(path, story.scenario, story.seed, frames, sensors=sensors, jpeg=True, threads=1)
+        with read_source(path, detector_of(), story.seed) as source:
+            registrar = Registrar(RegistrarParams().replaced(**EAGER))
+            outcomes = [*(registrar.process(frame) for frame in source.frames), registrar.finish()]
+            registrar.close()
+            closures = [closure for outcome in outcomes for closure in outcome.closures]
+            refused = [rejected for outcome in outcomes for rejected in outcome.rejected]
+            return figures(closures, refused, source.truth)
+
+
+def figures(closures: Sequence[LoopClosure], refused: Sequence[Rejected], truth: Truth) -> dict[str, Any]:
+    """What was accepted, in all and by what speaks for it, and what was refused, judged by truth."""
+    lone = [closure for closure in closures if closure.evidence["explained"] < 2]
+    several = [closure for closure in closures if closure.evidence["explained"] >= 2]
+    right = Counter(rejected.reason.value for rejected in refused if is_right(rejected, truth))
+    return {
+        "tried": len(closures) + sum(rejected.T_from_to is not None for rejected in refused),
+        "all": counts(closures, truth),
+        "one object": counts(lone, truth),
+        "several objects": counts(several, truth),
+        "refused_though_right": dict(right.most_common()),
+    }
+
+
+def counts(closures: Iterable[LoopClosure], truth: Truth) -> dict[str, int]:
+    """How many closures the truth tells of, and of them how many are strict, loose and false."""
+    errors = truth.errors(closures)
+    found = {name: sum(within(e, bound) for e in errors) for name, bound in (("strict", STRICT), ("loose", LOOSE))}
+    return {"accepted": len(errors), **found, "false": sum(not within(error, FALSE) for error in errors)}
+
+
+def is_right(rejected: Rejected, truth: Truth) -> bool:
+    """Whether the pose that was refused is loosely right."""
+    T_from_to, found = truth.between(rejected.from_ns, rejected.to_ns), rejected.T_from_to
+    return T_from_to is not None and found is not None and within(pose_error(found, T_from_to), LOOSE)
+
+
+def added(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """The figures of several recordings together."""
+    groups = ("all", "one object", "several objects")
+    right: Counter[str] = Counter()
+    for row in rows:
+        right.update(row["refused_though_right"])
+    summed = {group: {name: sum(row[group][name] for row in rows) for name in rows[0][group]} for group in groups}
+    return {"tried": sum(row["tried"] for row in rows), **summed, "refused_though_right": dict(right.most_common())}
+
+
+def line(name: str, row: dict[str, Any], group: str = "all") -> str:
+    """A line of the table."""
+    of = row[group]
+    right = ", ".join(f"{reason} {n}" for reason, n in row["refused_though_right"].items()) if group == "all" else ""
+    tried = row["tried"] if group == "all" else ""
+    return f"{name:32} {tried:>6} {of['accepted']:>9} {of['strict']:>7} {of['loose']:>6} {of['false']:>6}  {right}"
+
+
+@click.command()
+@click.option(
+    "--simulate",
+    "stories",
+    multiple=True,
+    default=STORIES,
+    show_default=True,
+    metavar="SCENARIO:SEED[:CAMERA][:stress]",
+    callback=lambda _context, _option, texts: [told(text) for text in texts],
+    help="Simulate this, as often as you like.",
+)
+@click.option("--frames", default=400, show_default=True, help="Frames of a recording.")
+@click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
+@click.option("--processes", default=2, show_default=True, help="Recordings at once.")
+def main(stories: list[Told], frames: int, json_file: Path | None, processes: int) -> None:
+    """Hold every keyframe of simulated recordings against ten others, and count what is falsely accepted."""
+    warm(RegistrarParams())
+    rows: dict[str, dict[str, Any]] = {}
+    click.echo(HEAD)
+    with ProcessPoolExecutor(processes, multiprocessing.get_context("fork")) as pool:
+        for story, row in zip(stories, pool.map(measure, stories, [frames] * len(stories)), strict=True):
+            name = f"{story.scenario} {story.seed}, {story.camera}{', stress' * story.stress}"
+            rows[name] = row
+            click.echo(line(name, row))
+    total = added(list(rows.values()))
+    click.echo(line("all of them", total))
+    for group in ("one object", "several objects"):
+        click.echo(line(f"  {group}", total, group))
+    if json_file is not None:
+        json_file.write_text(json.dumps({"frames": frames, "recordings": rows, "total": total}, indent=1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the hunt for false closures counts."""
+
+from __future__ import annotations
+
+import click
+import numpy as np
+import pytest
+from false_closures import Told, added, figures, told
+
+from objreg_ros.data import LoopClosure, Reason, Rejected
+from objreg_ros.geometry import pose
+from objreg_ros.truth import Truth
+
+STILL = Truth([(0, np.eye(4)), (10**8, np.eye(4))])
+
+
+def beside(metres: float) -> np.ndarray:
+    return pose(np.eye(3), np.array([metres, 0.0, 0.0]))
+
+
+def closure(metres: float, objects: int) -> LoopClosure:
+    evidence = {"explained": float(objects)}
+    T = beside(metres)
+    return LoopClosure(from_ns=0, to_ns=10**8, T_from_to=T, covariance=np.eye(6), labels=(), evidence=evidence)
+
+
+def refused(metres: float | None, reason: Reason) -> Rejected:
+    T = None if metres is None else beside(metres)
+    return Rejected(reason=reason, from_ns=0, to_ns=10**8, detail="", T_from_to=T)
+
+
+@pytest.mark.parametrize(
+    ("text", "story"),
+    [
+        ("loop:7", Told("loop", 7, "kinect", False)),
+        ("loop:7:stress", Told("loop", 7, "kinect", True)),
+        ("look-alikes:82:qvga", Told("look-alikes", 82, "qvga", False)),
+        ("moved:103:azure_kinect:stress", Told("moved", 103, "azure_kinect", True)),
+    ],
+)
+def test_a_recording_is_named_by_scenario_seed_camera_and_stress(text: str, story: Told) -> None:
+    assert told(text) == story
+
+
+@pytest.mark.parametrize("text", ["loop", "loop:x", "foo:1", "loop:1:eye", "loop:1:qvga:much", "loop:1:qvga:stress:"])
+def test_what_names_no_recording_is_refused(text: str) -> None:
+    with pytest.raises(click.BadParameter, match="expected SCENARIO:SEED"):
+        told(text)
+
+
+def test_closures_are_counted_by_truth_and_by_what_speaks_for_them_and_right_refusals_by_reason() -> None:
+    closures = [closure(0.01, 3), closure(0.07, 2), closure(0.12, 1), closure(0.3, 1)]
+    refusals = [refused(0.02, Reason.SLACK), refused(0.5, Reason.SLACK), refused(None, Reason.NO_CANDIDATE)]
+    row = figures(closures, refusals, STILL)
+    assert row["tried"] == 6
+    assert row["all"] == {"accepted": 4, "strict": 1, "loose": 2, "false": 1}
+    assert row["one object"] == {"accepted": 2, "strict": 0, "loose": 0, "false": 1}
+    assert row["refused_though_right"] == {Reason.SLACK.value: 1}
+    assert added([row, row])["several objects"] == {"accepted": 4, "strict": 2, "loose": 4, "false": 0}
