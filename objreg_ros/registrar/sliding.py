@@ -21,7 +21,7 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.pushing import Stand, pushed
 from objreg_ros.registrar.texture import texture
-from objreg_ros.registrar.verify import rank
+from objreg_ros.registrar.verify import rank, verify
 
 HELD = 1.0 / 3.0  # of a push that is clearly resisted: one sigma of a pose that the views hold
 AROUND = 8  # ways in which a pose is pushed to see whether it is resisted
@@ -40,15 +40,21 @@ def resisted(
     """
     free, held = [], []
     lever = transform(T_target_source, source.middle) - T_target_source[:3, 3]
-    stand = Stand(source, target, T_target_source, params) if len(slack) else None
+    stand = _stand(source, target, T_target_source, params) if len(slack) else None
     for direction in slack:
         unit = direction / _length(direction, lever, extent)
-        reach = _reach(stand, unit, params) if stand is not None and stand.score >= params.min_score else None
+        reach = None if stand is None else _reach(stand, unit, params)
         if reach is None:
             free.append(direction)
         else:
             held.append(HELD * reach * unit)
     return np.reshape(free, (-1, 6)), np.reshape(held, (-1, 6))
+
+
+def _stand(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> Stand | None:
+    """Where a pose stands that the views like as the gate wants it; None for any other."""
+    seen = verify(source.sight, target.sight, T_target_source, params)
+    return Stand(source, target, T_target_source, params) if seen.score >= params.min_score else None
 
 
 def resistance(source: Prepared, target: Prepared, T_target_source: Array, C: Array, params: RegistrarParams) -> float:
