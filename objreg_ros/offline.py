@@ -138,7 +138,7 @@ class Run:
             "frames": self.frames,
             "detections": self.detections,
             "objects": self.objects,
-            "constraints": [judged(closure, truth) for closure in self.closures],
+            "constraints": [constraint_with_error(closure, truth) for closure in self.closures],
             "rejected": dict(sorted(self.rejected.items())),
             "dropped": dict(sorted(self.dropped.items())),
             "stage_ms": {stage: percentiles_ms(seconds) for stage, seconds in self.stage_s.items()},
@@ -148,7 +148,7 @@ class Run:
         }
 
 
-def judged(closure: LoopClosure, truth: Truth) -> dict[str, Any]:
+def constraint_with_error(closure: LoopClosure, truth: Truth) -> dict[str, Any]:
     """A closure as JSON, with its true ``error``: None where the truth does not tell."""
     error = truth.error(closure)
     return {

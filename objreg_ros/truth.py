@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from objreg_ros.bridge import from_msg
-from objreg_ros.data import Array, LoopClosure
+from objreg_ros.data import Array, LoopClosure, Rejected
 from objreg_ros.geometry import interpolate, inverse, pose_error
 from objreg_ros.recording.record import Recording
 
@@ -67,10 +67,10 @@ class Truth:
         T_world_from, T_world_to = self.at(from_ns), self.at(to_ns)
         return None if T_world_from is None or T_world_to is None else inverse(T_world_from) @ T_world_to
 
-    def error(self, closure: LoopClosure) -> Error | None:
-        """(degrees, centimetres) between a closure and the truth; None where the truth does not tell."""
+    def error(self, closure: LoopClosure | Rejected) -> Error | None:
+        """(degrees, centimetres) between a pose and the truth; None where the truth does not tell or there is none."""
         T_from_to = self.between(closure.from_ns, closure.to_ns)
-        return None if T_from_to is None else pose_error(closure.T_from_to, T_from_to)
+        return None if T_from_to is None or closure.T_from_to is None else pose_error(closure.T_from_to, T_from_to)
 
     def errors(self, closures: Iterable[LoopClosure]) -> list[Error]:
         """The error of every closure that the truth tells of."""

@@ -20,7 +20,7 @@ from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
 from objreg_ros.cli.played import as_rosbag2, simulated_room
 from objreg_ros.cli.settings import read_settings
 from objreg_ros.data import ColourImage
-from objreg_ros.offline import judged, refusal
+from objreg_ros.offline import constraint_with_error, refusal
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
 from objreg_ros.registrar.params import RegistrarNodeParams
@@ -146,7 +146,7 @@ def _write(file: Path, told: Mapping[str, Any], live: Live, truth: Truth) -> Non
     summary = {
         **told,
         "nodes": {room: asdict(books) for room, books in live.books.items()},
-        "constraints": [judged(closure, truth) for closure in live.closures],
+        "constraints": [constraint_with_error(closure, truth) for closure in live.closures],
         "rejected": dict(live.rejected),
         "truth": summarise(truth.errors(live.closures)),
         "refusals": [refusal(rejected) for rejected in live.refusals],

@@ -51,7 +51,7 @@ def refuse(
     candidate: Candidate, params: RegistrarParams, prior: Prior | None = None, rivals: Sequence[Candidate] = ()
 ) -> Refusal | None:
     """Why this candidate is no closure, with the numbers; None if it is one. ``rivals`` are the possible others."""
-    checks: list[Check] = [*CHECKS, partial(_agreement, rivals=rivals), _held]
+    checks: list[Check] = [*CHECKS, partial(_agreement, rivals=rivals), _firm, _held]
     if prior is not None:
         checks.append(partial(_odometry, prior=prior))
     refusals = (check(candidate, params) for check in checks)
@@ -131,28 +131,31 @@ def _least_liked(candidate: Candidate, params: RegistrarParams) -> float:
 
     For what floats makes up by how much worse a push is: a pose that the views hold firmly is not doubtful.
     """
-    drop, floating = candidate.resistance, candidate.verification.violations > params.max_violations_doubtful
+    drop, violated = candidate.resistance, candidate.verification.violations > params.max_violations_doubtful
     if _is_alone(candidate, params):
         return params.min_score_doubtful
-    if not floating or drop is None:
+    if not violated or drop is None:
         return params.min_score
     return min(params.min_score_doubtful, params.min_score + max(0.0, params.firm_margin - drop))
 
 
 def _is_alone(candidate: Candidate, params: RegistrarParams) -> bool:
-    """Whether at most one object lies upon itself under the pose, and no second chain came to it."""
+    """Whether at most one object lies upon itself under the pose, and fewer chains than should came to it."""
     independent = {SAME_EVIDENCE.get(chain, chain) for chain in candidate.agreeing_chains}
     return len(candidate.explained) < 2 and len(independent) < params.min_chains
 
 
 def _firm(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
-    """A lone object's pose that no second chain came to must be liked by the views, and every push of it less."""
+    """A lone object's pose that too few chains came to must be liked by the views, and every push of it less.
+
+    One that surfaces hold within ``doubtful_sigma`` was not pushed, as it needs no views to hold it.
+    """
     score, drop = candidate.verification.score, candidate.resistance
-    if drop is None or score + drop >= params.min_score_alone or not _is_alone(candidate, params):
+    if drop is None or score + drop >= params.min_firmness_alone or not _is_alone(candidate, params):
         return None
     return Reason.CHAINS_DISAGREE, (
-        f"a lone object and one chain, score {score:.2f} and its fall over a push {drop:.2f} "
-        f"make less than {params.min_score_alone:.2f}"
+        f"1 object < {params.min_objects} and fewer than {params.min_chains} chains, score {score:.2f} and its fall "
+        f"over a push {drop:.2f} make less than {params.min_firmness_alone:.2f}"
     )
 
 
@@ -237,6 +240,5 @@ CHECKS: tuple[Check, ...] = (  # of a candidate alone, before what others and od
     _free_space,
     _texture,
     _score,
-    _firm,
     _stationary,
 )

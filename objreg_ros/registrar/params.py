@@ -237,23 +237,24 @@ class RegistrarParams(Params):
     min_score: float = param(0.10, "least verification score V", ge=-3.0, le=2.0)
     min_score_doubtful: float = param(
         0.40,
-        "least V, with what likeness adds, of a doubtful pose: a single object's that fewer than min_chains proposed, "
-        "or one with more than max_violations_doubtful floating, less what V falls by over a push",
+        "least V, with what likeness adds, of a lone object's pose that fewer than min_chains proposed; and the most "
+        "that is asked where more than max_violations_doubtful floats (see firm_margin)",
         ge=-3.0,
         le=2.0,
     )
-    min_score_alone: float = param(
+    min_firmness_alone: float = param(
         1.0,
         "least V, together with what it falls by over a push, of a lone object's pose that fewer than min_chains "
-        "proposed",
+        "proposed; one that is known within doubtful_sigma is not pushed, and needs no more than min_score_doubtful",
         ge=-3.0,
-        le=5.0,
     )
     max_violations_doubtful: float = param(
-        0.02, "share of tested pixels in seen free space up to which no pose is doubtful", ge=0.0, le=1.0
+        0.02, "share of tested pixels in seen free space up to which V need not make up for them", ge=0.0, le=1.0
     )
     firm_margin: float = param(
-        0.4, "fall of V over a push from which on the views hold a pose firmly, and it is not doubtful", ge=0.0
+        0.4,
+        "where something floats, the least V is min_score and what the fall of V over a push lacks of this",
+        ge=0.0,
     )
     rival_margin: float = param(0.1, "a candidate this much below the best in V is not considered", ge=0.0)
     min_chains: int = param(2, "chains that must agree on a lone object's pose for it not to be doubtful", ge=1)

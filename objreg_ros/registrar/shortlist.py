@@ -9,7 +9,6 @@ truth. So what was proposed about the best is looked at once more where it was p
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -30,13 +29,17 @@ from objreg_ros.registrar.verify import WORST, looks, rank, rate
 
 APART = (np.radians(4.0), 0.04)  # rad and m: hypotheses are distinct beyond before they are settled
 ALIKE = (np.radians(0.5), 0.01)  # and after
-ABOUT = (np.radians(30.0), 0.5)
-HELD = 2  # hypotheses about each of the best that grey holds
+BASIN = (np.radians(5.0), 0.10)  # and when they have come to their basins
+ABOUT = (np.radians(30.0), 0.5)  # rad and m: how far shape may have drawn the best from where they were proposed
+ANCHORED = 2  # hypotheses about each of the best that grey holds where they were proposed
 TILTED = 1.5  # times the error of gravity that the gate allows: what is not refined
 
 
 class Shortlist(NamedTuple):
-    """What is worth finishing, the ``best`` first, and ``seeds``: all that may agree with it."""
+    """What is worth finishing, the ``best`` first, and ``seeds``: all that may agree with it.
+
+    What grey held where it was proposed agrees as it was proposed: it was chosen for being near, and drawn nearer.
+    """
 
     best: tuple[Hypothesis, ...]
     seeds: tuple[Hypothesis, ...]
@@ -53,8 +56,9 @@ def shortlist(pair: Pair, T_target_source_prior: Array | None, params: Registrar
     if not seeds:
         return Shortlist((), ())
     best = _best(pair, seeds, params)
-    held = _held(pair, best, list(chain(*chains)), params)
-    return Shortlist(tuple(_best(pair, best + held, params)), (*seeds, *held))
+    about = _about(pair, best, [seed for proposed in chains for seed in proposed], params)
+    anchored = _anchored(pair, about, params)
+    return Shortlist(tuple(_best(pair, best + anchored, params)), (*seeds, *about))
 
 
 def _proposed(pair: Pair, prior: Array | None, params: RegistrarParams) -> list[list[Hypothesis]]:
@@ -87,7 +91,7 @@ def _drawn_best(pair: Pair, proposed: list[Hypothesis], params: RegistrarParams)
     T, V = _drawn(pair, _poses(proposed), points, iterations, sample, params)
     close = distinct(T, V, middle, params.near_per_chain, *APART)
     T, V = _drawn(pair, T[close], params.quick_points, params.iterations, params.quick_sample, params)
-    chosen = distinct(T, V, middle, params.refined_per_chain, np.radians(5.0), 0.10)
+    chosen = distinct(T, V, middle, params.refined_per_chain, *BASIN)
     return [replace(proposed[close[k]], T_target_source=T[k]) for k in chosen]
 
 
@@ -115,9 +119,14 @@ def _hopeful(pair: Pair, seeds: list[Hypothesis], firm: Array, params: Registrar
 
     Two views of nothing in common may look alike by chance: V sees what little meets, and that is not refused.
     """
-    errors = [gravity_error_deg(pair.source, pair.target, seed.T_target_source) or 0.0 for seed in seeds]
-    good = firm & (np.array(errors) <= TILTED * params.max_gravity_error)
-    return [seed for seed, hopeful in zip(seeds, good, strict=True) if hopeful] or seeds
+    good = [seed for seed, held in zip(seeds, firm, strict=True) if held and _keeps_gravity(pair, seed, params)]
+    return good or seeds
+
+
+def _keeps_gravity(pair: Pair, seed: Hypothesis, params: RegistrarParams) -> bool:
+    """Whether a hypothesis, once finished, may keep gravity as the gate wants it; True where that is unknown."""
+    error = gravity_error_deg(pair.source, pair.target, seed.T_target_source)
+    return error is None or error <= TILTED * params.max_gravity_error
 
 
 def _rated(pair: Pair, seeds: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
@@ -146,18 +155,26 @@ def _best(pair: Pair, seeds: list[Hypothesis], params: RegistrarParams) -> list[
     return [seeds[k] for k in best if worth[k] >= worth.max() - params.finished_margin]
 
 
-def _held(pair: Pair, best: list[Hypothesis], proposed: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
-    """What was proposed about the best and looks best where it was proposed, finished by grey."""
+def _about(pair: Pair, best: list[Hypothesis], proposed: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
+    """What was proposed about the best and looks best as it was proposed; nothing without grey to hold it there."""
     source, target = pair.source, pair.target
-    if not (source.sight.textured and target.sight.textured):
+    if not proposed or not (source.sight.textured and target.sight.textured):
         return []
-    held, T = [], _poses(proposed)
+    T = _poses(proposed)
+    V = rank(source.sight, target.sight, T, params, params.quick_sample)
+    chosen: dict[int, Hypothesis] = {}
     for found in best:
-        about = np.flatnonzero(near(T, found.T_target_source, source.middle, *ABOUT))
-        V = rank(source.sight, target.sight, T[about], params, params.quick_sample)
-        held += [proposed[about[k]] for k in distinct(T[about], V, source.middle, HELD, *APART)]
-    finished = (finish(source, target, seed.T_target_source, params)[0] for seed in held)
-    return _rated(pair, [replace(seed, T_target_source=T) for seed, T in zip(held, finished, strict=True)], params)
+        close = np.flatnonzero(near(T, found.T_target_source, source.middle, *ABOUT))
+        chosen |= {k: proposed[k] for k in close[distinct(T[close], V[close], source.middle, ANCHORED, *APART)]}
+    return list(chosen.values())
+
+
+def _anchored(pair: Pair, proposed: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
+    """Hypotheses that grey finishes where they were proposed, each with its worth; those that keep gravity."""
+    source, target = pair.source, pair.target
+    finished = (finish(source, target, seed.T_target_source, params)[0] for seed in proposed)
+    anchored = [replace(seed, T_target_source=T) for seed, T in zip(proposed, finished, strict=True)]
+    return _rated(pair, [seed for seed in anchored if _keeps_gravity(pair, seed, params)], params)
 
 
 def _poses(seeds: list[Hypothesis]) -> Array:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector, transform
-from objreg_ros.registrar.consensus import Matches, distinct, poses
+from objreg_ros.registrar.consensus import Matches, distinct, near, poses
 
 UP = np.array([0.0, 0.0, 1.0])
 YAW = pose(rotation_from_vector(np.array([0.0, 0.0, 2.0])), np.array([0.5, -0.4, 0.1]))
@@ -53,3 +53,13 @@ def test_poses_that_are_the_same_come_back_once() -> None:
 def test_the_same_matches_give_the_same_poses() -> None:
     first, second = (poses(matches(YAW, 10, 50), UP, UP, 0.06, 0.3, 5) for _ in range(2))
     assert all(np.array_equal(a[0], b[0]) and a[1] == b[1] for a, b in zip(first, second, strict=True))
+
+
+@pytest.mark.parametrize(("turn", "shift", "is_near"), [(0.09, 0.19, True), (0.11, 0.0, False), (0.0, 0.21, False)])
+def test_what_turns_or_moves_the_middle_too_far_is_not_near(turn: float, shift: float, is_near: bool) -> None:
+    middle = np.array([3.0, 0.0, 0.0])
+    R = rotation_from_vector(np.array([0.0, 0.0, turn]))
+    other = pose(R, middle - R @ middle + [0.0, shift, 0.0])  # it turns about the middle
+    found = near(np.array([YAW @ other, YAW]), YAW, middle, angle=0.1, distance=0.2)
+    assert found.tolist() == [is_near, True]
+    assert near(np.zeros((0, 4, 4)), YAW, middle, angle=0.1, distance=0.2).shape == (0,)

@@ -35,6 +35,7 @@ def test_a_candidate_that_nothing_speaks_against_is_accepted() -> None:
         ({"score": -1.0}, Reason.LOW_OVERLAP),
         ({"agreeing_chains": ("objects",), "explained": (CUP,)}, Reason.CHAINS_DISAGREE),
         ({"agreeing_chains": ("features",), "explained": ()}, Reason.FEW_OBJECTS),
+        ({"agreeing_chains": ("features",), "explained": (), "resistance": 0.1}, Reason.FEW_OBJECTS),
         ({"explained": (), "moved": (CUP,)}, Reason.MOVED),
         ({"information": np.diag([1.0, 1e5, 1e5, 1e5, 1e5, 1e5])}, Reason.SLACK),
         ({"slack": np.eye(6)[:1]}, Reason.SLACK),
@@ -81,7 +82,7 @@ def test_several_objects_that_look_otherwise_may_not_float_either() -> None:
     assert refusal is not None and refusal[0] is Reason.FREE_SPACE
 
 
-def test_what_views_like_too_little_where_something_floats_a_push_must_make_worse_by() -> None:
+def test_where_something_floats_the_fall_over_a_push_makes_up_for_a_low_score() -> None:
     floating = 1.5 * PARAMS.max_violations_doubtful
     little = {"score": 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful), "margin": 1.0, "violations": floating}
     lacking = PARAMS.firm_margin - (little["score"] - PARAMS.min_score)
@@ -93,6 +94,12 @@ def test_what_views_like_too_little_where_something_floats_a_push_must_make_wors
     ):
         refusal = refuse(candidate(explained=explained, resistance=resistance, **little), PARAMS)
         assert (refusal is None) is accepted, (explained, resistance, refusal)
+
+
+def test_a_pose_that_views_like_well_need_not_resist_though_something_floats() -> None:
+    floating = {"violations": 1.5 * PARAMS.max_violations_doubtful, "explained": (CUP, ObjectPair(1, 1, "book"))}
+    liked = candidate(score=1.1 * PARAMS.min_score_doubtful, resistance=1.1 * PARAMS.rival_margin, **floating)
+    assert refuse(liked, PARAMS) is None
 
 
 def test_a_lone_object_that_views_like_little_need_not_resist_a_push_where_next_to_nothing_floats() -> None:
@@ -111,7 +118,7 @@ def test_a_lone_object_that_views_like_little_needs_two_chains() -> None:
 
 def test_a_lone_object_of_one_chain_needs_views_that_like_it_and_every_push_of_it_less() -> None:
     liked = {"score": 1.2 * PARAMS.min_score_doubtful, "margin": 1.0, "explained": (CUP,), "likeness": 0.9}
-    lacking = PARAMS.min_score_alone - liked["score"]
+    lacking = PARAMS.min_firmness_alone - liked["score"]
     for chains, resistance, accepted in (
         (("objects",), 0.9 * lacking, False),
         (("centroids", "objects"), 0.9 * lacking, False),

@@ -58,7 +58,8 @@ def test_what_warped_depth_draws_away_is_held_where_it_was_proposed_by_grey_alon
 def test_the_best_come_first_and_are_distinct_and_few() -> None:
     best, seeds = shortlist(pair_of(keyframe(seen_from(0.0), seed=1), keyframe(seen_from(25.0), seed=2)), None, PARAMS)
     truth = inverse(seen_from(25.0)) @ seen_from(0.0)
-    assert pose_error(best[0].T_target_source, truth) < (1.0, 2.0)
+    rotation, distance = pose_error(best[0].T_target_source, truth)
+    assert rotation < 1.0 and distance < 2.0
     worth = [seed.worth for seed in best]
     assert worth == sorted(worth, reverse=True) and worth[-1] >= worth[0] - PARAMS.finished_margin
     assert len(best) <= PARAMS.finished and len({seed.chain for seed in seeds}) >= 2
