@@ -3,8 +3,8 @@
 
 Online a keyframe tries the four likeliest places and is content with two closures. Here it tries ten and is content
 with none, and closures need not be far from each other, so that the gate judges some hundreds of pairs of keyframes in
-every recording. What it accepts is judged by truth, and apart where one object alone speaks for it; of what it refuses it is
-said how often the best pose that was proposed was loosely right, and why it was refused.
+every recording. What it accepts is judged by truth, and apart where one object alone speaks for it; of what it refuses
+it is said how often the best pose that was proposed was loosely right, and why it was refused.
 
     python benchmarks/false_closures.py --simulate look-alikes:82 --simulate moved:103:kinect:stress --json OUT
 """
