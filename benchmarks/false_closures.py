@@ -6,7 +6,8 @@ with none, and closures need not be far from each other, so that the gate judges
 every recording. What it accepts is judged by truth, and apart where one object alone speaks for it; of what it refuses
 it is said how often the best pose that was proposed was loosely right, and why it was refused.
 
-    python benchmarks/false_closures.py --simulate look-alikes:82 --simulate moved:103:kinect:stress --json OUT
+    python benchmarks/false_closures.py --json OUT
+    python benchmarks/false_closures.py --simulate look-alikes:82 --simulate moved:103:qvga:stress
 """
 
 from __future__ import annotations
@@ -37,7 +38,18 @@ from objreg_ros.simulation.write import simulate
 from objreg_ros.truth import LOOSE, Truth, summarise, within
 
 EAGER = {"candidates": 10, "closures": 10, "thin_seconds": 0.2, "threads": 1}
-STORIES = ("look-alikes:82", "moved:103:kinect:stress", "opposite:101:qvga:stress", "loop:111")
+STORIES = (
+    "look-alikes:82",
+    "moved:103:stress",
+    "opposite:121:stress",
+    "moved:122:qvga:stress",
+    "loop:123:realsense_d435",
+    "look-alikes:124:stress",
+    "moved:125",
+    "opposite:126:azure_kinect",
+    "loop:127:qvga:stress",
+    "moved:128:realsense_d435:stress",
+)
 HEAD = f"{'recording':32} {'tried':>6} {'accepted':>9} {'strict':>7} {'loose':>6} {'false':>6}  refused, though right"
 
 
