@@ -129,14 +129,16 @@ def _score(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 def _least_liked(candidate: Candidate, params: RegistrarParams) -> float:
     """What views and objects must like of a pose: more if one chain found a lone object's, or if something floats.
 
-    For what floats makes up by how much worse a push is: a pose that the views hold firmly is not doubtful.
+    A doubtful pose makes up for it by how much worse a push is: one that the views hold firmly is less so.
     """
     drop, violated = candidate.resistance, candidate.verification.violations > params.max_violations_doubtful
-    if _is_alone(candidate, params):
-        return params.min_score_doubtful
-    if not violated or drop is None:
-        return params.min_score
-    return min(params.min_score_doubtful, params.min_score + max(0.0, params.firm_margin - drop))
+    alone = _is_alone(candidate, params)
+    least = params.min_score_alone if alone else params.min_score
+    if drop is None:
+        return params.min_score_doubtful if alone else least
+    if not (alone or violated):
+        return least
+    return max(least, min(params.min_score_doubtful, params.min_score + max(0.0, params.firm_margin - drop)))
 
 
 def _is_alone(candidate: Candidate, params: RegistrarParams) -> bool:
@@ -148,14 +150,18 @@ def _is_alone(candidate: Candidate, params: RegistrarParams) -> bool:
 def _firm(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
     """A lone object's pose that too few chains came to must be liked by the views, and every push of it less.
 
-    One that surfaces hold within ``doubtful_sigma`` was not pushed, as it needs no views to hold it.
+    An object that tells its yaw speaks for it too. A pose that surfaces hold within ``doubtful_sigma`` was not pushed,
+    as it needs no views to hold it.
     """
     score, drop = candidate.verification.score, candidate.resistance
-    if drop is None or score + drop >= params.min_firmness_alone or not _is_alone(candidate, params):
+    if drop is None or not _is_alone(candidate, params):
+        return None
+    least = params.min_firmness_alone - params.object_bonus * candidate.yaw_known
+    if score + drop >= least:
         return None
     return Reason.CHAINS_DISAGREE, (
         f"1 object < {params.min_objects} and fewer than {params.min_chains} chains, score {score:.2f} and its fall "
-        f"over a push {drop:.2f} make less than {params.min_firmness_alone:.2f}"
+        f"over a push {drop:.2f} make less than {least:.2f}"
     )
 
 

@@ -180,9 +180,9 @@ class RegistrarParams(Params):
     holding_likeness: float = param(
         0.3, "an object that looks so much alike holds what shape lets slide", ge=-1.0, le=1.0
     )
-    symmetry_share: float = param(0.12, "an object whose surface resists a turn less has no yaw", ge=0.0, le=1.0)
+    symmetry_share: float = param(0.14, "an object whose surface resists a turn less has no yaw", ge=0.0, le=1.0)
     symmetry_violations: float = param(
-        0.12,
+        0.14,
         "an object has a yaw after all if so much of it, turned about its axis, is where its camera saw through",
         ge=0.0,
         le=1.0,
@@ -194,7 +194,12 @@ class RegistrarParams(Params):
     detail_sigma: float = param(3.0, "blur that the high pass of grey takes away", "px", ge=0.5)
     agreement_rotation: float = param(5.0, "chains agree within this rotation", "deg", ge=0.0)
     agreement_translation: float = param(0.15, "chains agree within this distance", "m", ge=0.0)
-    object_bonus: float = param(0.25, "what an explained object adds to V when candidates are ranked", ge=0.0)
+    object_bonus: float = param(
+        0.25,
+        "what an explained object adds to V when candidates are ranked, and a lone one that tells its yaw where a pose "
+        "must be firm (see min_firmness_alone)",
+        ge=0.0,
+    )
     likeness_weight: float = param(
         0.5,
         "what the likeness of explained objects adds to V; at most, where poses near each other are compared",
@@ -237,8 +242,15 @@ class RegistrarParams(Params):
     min_score: float = param(0.10, "least verification score V", ge=-3.0, le=2.0)
     min_score_doubtful: float = param(
         0.40,
-        "least V, with what likeness adds, of a lone object's pose that fewer than min_chains proposed; and the most "
-        "that is asked where more than max_violations_doubtful floats (see firm_margin)",
+        "the most that is asked of V, with what likeness adds, where a pose is doubtful: where more than "
+        "max_violations_doubtful floats, or fewer than min_chains proposed a lone object's (see firm_margin)",
+        ge=-3.0,
+        le=2.0,
+    )
+    min_score_alone: float = param(
+        0.20,
+        "the least that is asked of V, with what likeness adds, of a lone object's pose that fewer than min_chains "
+        "proposed, however firm it is",
         ge=-3.0,
         le=2.0,
     )
@@ -253,7 +265,7 @@ class RegistrarParams(Params):
     )
     firm_margin: float = param(
         0.4,
-        "where something floats, the least V is min_score and what the fall of V over a push lacks of this",
+        "where a pose is doubtful, the least V is min_score and what the fall of V over a push lacks of this",
         ge=0.0,
     )
     rival_margin: float = param(0.1, "a candidate this much below the best in V is not considered", ge=0.0)
@@ -286,7 +298,7 @@ class RegistrarParams(Params):
     odometry_sigmas: float = param(4.0, "largest distance from odometry in its standard deviations", ge=0.0)
 
     # How wrong an accepted pose may be; config/covariance.yaml says how these were calibrated.
-    covariance_scale: float = param(0.83, "factor of the covariance of a registration", ge=0.0)
+    covariance_scale: float = param(0.74, "factor of the covariance of a registration", ge=0.0)
     covariance_patch: float = param(0.8, "edge of a patch of surface whose points err together", "m", ge=0.01)
     covariance_calibration: float = param(
         0.035, "error of a motion, as a share of it, by a camera that is not quite as its calibration says", ge=0.0

@@ -116,6 +116,16 @@ def test_a_lone_object_that_views_like_little_needs_two_chains() -> None:
     assert refuse(candidate(agreeing_chains=("features", "objects"), **little), PARAMS) is None
 
 
+def test_a_lone_object_of_one_chain_that_views_like_little_must_resist_a_push_the_more() -> None:
+    for score, accepted in ((1.2, True), (0.8, False)):
+        little = {"score": score * PARAMS.min_score_alone, "margin": 1.0, "explained": (CUP,), "likeness": 0.0}
+        firm = {"resistance": PARAMS.min_firmness_alone, "violations": 0.0, "agreeing_chains": ("objects",)}
+        refusal = refuse(candidate(**little, **firm), PARAMS)
+        assert (refusal is None) is accepted, (score, refusal)
+        soft = refuse(candidate(**little, **firm | {"resistance": 0.5 * PARAMS.firm_margin}), PARAMS)
+        assert soft is not None and soft[0] is Reason.LOW_OVERLAP
+
+
 def test_a_lone_object_of_one_chain_needs_views_that_like_it_and_every_push_of_it_less() -> None:
     liked = {"score": 1.2 * PARAMS.min_score_doubtful, "margin": 1.0, "explained": (CUP,), "likeness": 0.9}
     lacking = PARAMS.min_firmness_alone - liked["score"]
@@ -129,6 +139,18 @@ def test_a_lone_object_of_one_chain_needs_views_that_like_it_and_every_push_of_i
         refusal = refuse(candidate(agreeing_chains=chains, resistance=resistance, **liked), PARAMS)
         assert (refusal is None) is accepted, (chains, resistance, refusal)
         assert refusal is None or refusal[0] is Reason.CHAINS_DISAGREE
+
+
+def test_a_lone_object_that_tells_its_yaw_makes_up_for_a_push_that_is_resisted_less() -> None:
+    liked = {"score": 1.2 * PARAMS.min_score_doubtful, "margin": 1.0, "explained": (CUP,), "likeness": 0.9}
+    lacking = PARAMS.min_firmness_alone - liked["score"]
+    for yaw_known, resistance, accepted in (
+        (True, lacking - 0.9 * PARAMS.object_bonus, True),
+        (True, lacking - 1.1 * PARAMS.object_bonus, False),
+        (False, lacking - 0.9 * PARAMS.object_bonus, False),
+    ):
+        telling = candidate(agreeing_chains=("objects",), resistance=resistance, yaw_known=yaw_known, **liked)
+        assert (refuse(telling, PARAMS) is None) is accepted, (yaw_known, resistance)
 
 
 def test_an_object_that_looks_alike_makes_up_for_views_that_like_little() -> None:
