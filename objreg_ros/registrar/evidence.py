@@ -70,15 +70,18 @@ def lead(candidate: Candidate, rivals: Iterable[Candidate], params: RegistrarPar
     """How much more a candidate is worth than the best of its rivals; than the lowest score where it has none.
 
     What is hidden says nothing of which of two poses is the right one. V counts it against a pose all the same, as
-    wrong ones hide much; but so does the true one where the views see a large thing from either side.
+    wrong ones hide much; but so does the true one where the views see a large thing from either side. Nor does it say
+    anything that an object looks alike: the back of a box may have the print of its front, and the views share no side
+    of it under the true pose. That it looks otherwise does.
     """
-    others = (_unhidden_worth(rival, params) for rival in rivals if rival is not candidate)
-    return _unhidden_worth(candidate, params) - max(others, default=WORST)
+    others = (_told(rival, params) for rival in rivals if rival is not candidate)
+    return _told(candidate, params) - max(others, default=WORST)
 
 
-def _unhidden_worth(candidate: Candidate, params: RegistrarParams) -> float:
-    seen = candidate.verification
-    return worth(candidate, params) - seen.score + unhidden(seen)
+def _told(candidate: Candidate, params: RegistrarParams) -> float:
+    """The worth of a pose by what tells it from others."""
+    otherwise = min(0.0, candidate.likeness or 0.0)
+    return unhidden(candidate.verification) + agreement(candidate.explained, candidate.moved, otherwise, params)
 
 
 def unhidden(seen: Verification) -> float:
