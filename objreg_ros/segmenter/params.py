@@ -31,7 +31,13 @@ class SegmenterParams(Params):
     )
     up_tilt: float = param(75.0, "most tilt of the camera from upright, apart from `roll`", "deg", ge=5.0, le=89.0)
     support_area: float = param(0.02, "least visible area of a support surface", "m²", ge=0.0)
-    view_step: int = param(4, "the view keeps one pixel of so many in each row and column", ge=1, le=32)
+    view_step: int = param(
+        4,
+        "the view keeps one pixel of so many in each row and column; a smaller step is taken where less than 160 "
+        "columns would be left",
+        ge=1,
+        le=32,
+    )
 
     @property
     def limits(self) -> tuple[float, float]:

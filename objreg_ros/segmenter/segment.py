@@ -19,7 +19,7 @@ from objreg_ros.segmenter.isolate import Isolated, isolate, mark
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.support import Ground, find_supports
 from objreg_ros.segmenter.surface import Surface, cell_size, reduce
-from objreg_ros.segmenter.view import reduced_view
+from objreg_ros.segmenter.view import reduced_view, step_for
 
 COARSE = 2  # every so many cells tell gravity and the support surfaces
 WARM_SIZES = ((640, 480), (320, 240))  # two and one pixel a cell: each has a kernel of its own
@@ -66,7 +66,7 @@ class Segmenter:
         """
         params = self.params
         depth = _plain(depth)
-        seen = (depth, params.view_step, params.z_min, params.limits[0])
+        seen = (depth, step_for(depth.depth.shape[1], params.view_step), params.z_min, params.limits[0])
         view = self._beside.submit(reduced_view, *seen)
         ground = self._ground(depth, gravity)
         taken = np.zeros(ground.surface.depth.shape, np.bool_)

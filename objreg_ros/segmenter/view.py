@@ -8,7 +8,13 @@ import numpy as np
 
 from objreg_ros.data import Array, DepthImage, View
 
+LEAST_WIDTH = 160  # px: what a narrower view holds is too coarse to tell where a pose is
 RED, GREEN, BLUE = np.float32(0.299), np.float32(0.587), np.float32(0.114)  # shares of grey, ITU-R BT.601
+
+
+def step_for(width: int, most: int) -> int:
+    """The step of the view of a picture so many pixels wide: ``most``, or what leaves `LEAST_WIDTH` columns."""
+    return max(1, min(most, width // LEAST_WIDTH))
 
 
 def reduced_view(image: DepthImage, step: int, z_min: float, z_max: float) -> View:

@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from objreg_ros.data import DepthImage, Intrinsics
-from objreg_ros.segmenter.view import reduced_view
+from objreg_ros.segmenter.view import LEAST_WIDTH, reduced_view, step_for
 
 
 def image(height: int, width: int) -> DepthImage:
@@ -34,3 +35,9 @@ def test_grey_is_grey_and_odd_sizes_fit() -> None:
 
 def test_depth_out_of_range_is_nan() -> None:
     assert np.isnan(reduced_view(image(48, 64), 4, 0.2, 0.9).xyz).all()
+
+
+@pytest.mark.parametrize(("width", "step"), [(1280, 4), (640, 4), (512, 3), (320, 2), (160, 1), (40, 1)])
+def test_a_narrow_picture_keeps_more_of_its_pixels(width: int, step: int) -> None:
+    assert step_for(width, 4) == step
+    assert width // step_for(width, 4) >= min(width, LEAST_WIDTH)
