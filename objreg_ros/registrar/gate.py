@@ -117,10 +117,11 @@ def _texture(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
 def _score(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
     """The views must like the pose; more, or its objects do, where it is doubtful."""
-    score, least = candidate.verification.score, _least_liked(candidate, params)
-    if score < params.min_score:
-        return Reason.LOW_OVERLAP, f"score {score:.2f} < {params.min_score:.2f}"
-    liked = score + params.likeness_weight * max(0.0, candidate.likeness or 0.0)
+    score, alone = candidate.verification.score, _is_alone(candidate, params)
+    least = params.min_score_alone if alone else params.min_score
+    if score < least:
+        return Reason.LOW_OVERLAP, f"score {score:.2f} < {least:.2f}"
+    liked, least = score + params.likeness_weight * max(0.0, candidate.likeness or 0.0), _least_liked(candidate, params)
     if liked >= least:
         return None
     return Reason.LOW_OVERLAP, f"score with likeness {liked:.2f} < {least:.2f}"
@@ -133,12 +134,11 @@ def _least_liked(candidate: Candidate, params: RegistrarParams) -> float:
     """
     drop, violated = candidate.resistance, candidate.verification.violations > params.max_violations_doubtful
     alone = _is_alone(candidate, params)
-    least = params.min_score_alone if alone else params.min_score
-    if drop is None:
-        return params.min_score_doubtful if alone else least
-    if not (alone or violated):
-        return least
-    return max(least, min(params.min_score_doubtful, params.min_score + max(0.0, params.firm_margin - drop)))
+    if drop is None and alone:
+        return params.min_score_doubtful
+    if drop is None or not (alone or violated):
+        return params.min_score
+    return min(params.min_score_doubtful, params.min_score + max(0.0, params.firm_margin - drop))
 
 
 def _is_alone(candidate: Candidate, params: RegistrarParams) -> bool:

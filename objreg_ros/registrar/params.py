@@ -248,9 +248,8 @@ class RegistrarParams(Params):
         le=2.0,
     )
     min_score_alone: float = param(
-        0.20,
-        "the least that is asked of V, with what likeness adds, of a lone object's pose that fewer than min_chains "
-        "proposed, however firm it is",
+        0.30,
+        "least V of a lone object's pose that fewer than min_chains proposed, however firm it is and alike it looks",
         ge=-3.0,
         le=2.0,
     )

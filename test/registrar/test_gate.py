@@ -116,14 +116,21 @@ def test_a_lone_object_that_views_like_little_needs_two_chains() -> None:
     assert refuse(candidate(agreeing_chains=("features", "objects"), **little), PARAMS) is None
 
 
-def test_a_lone_object_of_one_chain_that_views_like_little_must_resist_a_push_the_more() -> None:
-    for score, accepted in ((1.2, True), (0.8, False)):
-        little = {"score": score * PARAMS.min_score_alone, "margin": 1.0, "explained": (CUP,), "likeness": 0.0}
-        firm = {"resistance": PARAMS.min_firmness_alone, "violations": 0.0, "agreeing_chains": ("objects",)}
-        refusal = refuse(candidate(**little, **firm), PARAMS)
+def test_a_lone_object_of_one_chain_is_refused_where_views_like_too_little_however_alike_it_looks() -> None:
+    firm = {"resistance": PARAMS.min_firmness_alone, "agreeing_chains": ("objects",), "explained": (CUP,)}
+    for score, accepted in ((1.1, True), (0.9, False)):
+        alike = candidate(score=score * PARAMS.min_score_alone, likeness=1.0, margin=1.0, **firm)
+        refusal = refuse(alike, PARAMS)
         assert (refusal is None) is accepted, (score, refusal)
-        soft = refuse(candidate(**little, **firm | {"resistance": 0.5 * PARAMS.firm_margin}), PARAMS)
-        assert soft is not None and soft[0] is Reason.LOW_OVERLAP
+        assert refusal is None or refusal[0] is Reason.LOW_OVERLAP
+
+
+def test_a_lone_object_of_one_chain_that_views_like_little_must_resist_a_push() -> None:
+    score = 0.5 * (PARAMS.min_score_alone + PARAMS.min_score_doubtful)
+    for resistance, accepted in ((PARAMS.min_firmness_alone, True), (0.0, False), (None, False)):
+        little = {"score": score, "likeness": 0.0, "margin": 1.0, "explained": (CUP,), "agreeing_chains": ("objects",)}
+        refusal = refuse(candidate(resistance=resistance, **little), PARAMS)
+        assert (refusal is None) is accepted, (resistance, refusal)
 
 
 def test_a_lone_object_of_one_chain_needs_views_that_like_it_and_every_push_of_it_less() -> None:
