@@ -118,25 +118,25 @@ def _texture(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 def _score(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
     """The views must like the pose; more, or its objects do, where it is doubtful."""
     score, alone = candidate.verification.score, _is_alone(candidate, params)
-    least = params.min_score_alone if alone else params.min_score
-    if score < least:
-        return Reason.LOW_OVERLAP, f"score {score:.2f} < {least:.2f}"
-    liked, least = score + params.likeness_weight * max(0.0, candidate.likeness or 0.0), _least_liked(candidate, params)
-    if liked >= least:
+    seen, liked = params.min_score_alone if alone else params.min_score, _least_liked(candidate, params)
+    if score < seen:
+        return Reason.LOW_OVERLAP, f"score {score:.2f} < {seen:.2f}"
+    with_likeness = score + params.likeness_weight * max(0.0, candidate.likeness or 0.0)
+    if with_likeness >= liked:
         return None
-    return Reason.LOW_OVERLAP, f"score with likeness {liked:.2f} < {least:.2f}"
+    return Reason.LOW_OVERLAP, f"score with likeness {with_likeness:.2f} < {liked:.2f}"
 
 
 def _least_liked(candidate: Candidate, params: RegistrarParams) -> float:
-    """What views and objects must like of a pose: more if one chain found a lone object's, or if something floats.
+    """What views and objects must like of a pose: more where something floats, or a lone object's was not pushed.
 
-    A doubtful pose makes up for it by how much worse a push is: one that the views hold firmly is less so.
+    For what floats makes up by how much worse a push is: a pose that the views hold firmly is not doubtful. So does
+    `_firm` for a lone object's.
     """
     drop, violated = candidate.resistance, candidate.verification.violations > params.max_violations_doubtful
-    alone = _is_alone(candidate, params)
-    if drop is None and alone:
+    if drop is None and _is_alone(candidate, params):
         return params.min_score_doubtful
-    if drop is None or not (alone or violated):
+    if drop is None or not violated:
         return params.min_score
     return min(params.min_score_doubtful, params.min_score + max(0.0, params.firm_margin - drop))
 

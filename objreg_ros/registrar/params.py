@@ -243,7 +243,8 @@ class RegistrarParams(Params):
     min_score_doubtful: float = param(
         0.40,
         "the most that is asked of V, with what likeness adds, where a pose is doubtful: where more than "
-        "max_violations_doubtful floats, or fewer than min_chains proposed a lone object's (see firm_margin)",
+        "max_violations_doubtful floats (see firm_margin), or a lone object's that fewer than min_chains proposed was "
+        "not pushed",
         ge=-3.0,
         le=2.0,
     )
@@ -264,7 +265,7 @@ class RegistrarParams(Params):
     )
     firm_margin: float = param(
         0.4,
-        "where a pose is doubtful, the least V is min_score and what the fall of V over a push lacks of this",
+        "where something floats, the least V is min_score and what the fall of V over a push lacks of this",
         ge=0.0,
     )
     rival_margin: float = param(0.1, "a candidate this much below the best in V is not considered", ge=0.0)
