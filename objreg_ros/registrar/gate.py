@@ -213,11 +213,11 @@ def _held(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
     The covariance is that of the residuals and of a warped depth: two views may share few patches on one side, which
     agree with many poses. A camera that goes sideways and turns to keep looking at one far thing sees next to no
-    difference. V falls with the square of a push, so what it must fall by grows with the variance; what is free to
-    slide is not known by any push.
+    difference. V falls with the square of a push, so what it must fall by grows with the variance, up to where the
+    views hold a pose firmly by themselves: then it is known, however free the surfaces would let it slide.
     """
     sigma, drop = worst_translation(spread_of(candidate.alignment, params) + candidate.warp), candidate.resistance
-    least = params.rival_margin * max(1.0, (sigma / params.max_slack_sigma) ** 2)
+    least = min(params.firm_margin, params.rival_margin * max(1.0, (sigma / params.max_slack_sigma) ** 2))
     if drop is None and sigma > params.max_slack_sigma:
         return Reason.SLACK, f"sigma {sigma:.3f} m > {params.max_slack_sigma:.3f} m, not pushed"
     if drop is None or drop >= least:

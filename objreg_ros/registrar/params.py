@@ -265,7 +265,8 @@ class RegistrarParams(Params):
     )
     firm_margin: float = param(
         0.4,
-        "where something floats, the least V is min_score and what the fall of V over a push lacks of this",
+        "fall of V over a push from which on views hold a pose however badly surfaces do; where something floats, the "
+        "least V is min_score and what the fall lacks of this",
         ge=0.0,
     )
     rival_margin: float = param(0.1, "a candidate this much below the best in V is not considered", ge=0.0)

@@ -285,7 +285,14 @@ def test_a_pose_that_a_warped_depth_would_move_far_is_refused_as_sliding() -> No
 
 
 def test_the_worse_the_surfaces_hold_a_pose_the_more_the_views_must() -> None:
-    loose, least = warped(2.0 * PARAMS.max_slack_sigma), 4.0 * PARAMS.rival_margin
+    loose, least = warped(1.5 * PARAMS.max_slack_sigma), 2.25 * PARAMS.rival_margin
     assert refuse(candidate(**loose, resistance=least + 0.01), PARAMS) is None
     assert refuse(candidate(**loose, resistance=least - 0.01), PARAMS) is not None
     assert refuse(candidate(**loose, resistance=least + 0.01, slack=np.eye(6)[:1]), PARAMS) is not None
+
+
+def test_a_pose_that_the_views_hold_firmly_is_known_however_free_the_surfaces_would_let_it_slide() -> None:
+    free, firm = {"slack": np.eye(6)[:1]}, PARAMS.firm_margin
+    assert refuse(candidate(**free, resistance=firm + 0.01), PARAMS) is None
+    refusal = refuse(candidate(**free, resistance=firm - 0.01), PARAMS)
+    assert refusal is not None and refusal[0] is Reason.SLACK
