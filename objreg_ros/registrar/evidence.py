@@ -31,7 +31,7 @@ def gather(
         verification=verify(source.sight, target.sight, T, params),
         explained=explained,
         moved=moved,
-        likeness=likeness(source, target, explained, T, params),
+        likeness=likeness(source, target, explained, T, params, params.explained_distance),
         yaw_known=any(source.yaw_known[pair.source] and target.yaw_known[pair.target] for pair in explained),
         gravity_error_deg=gravity_error_deg(source, target, T),
         floating=floating(source.sight, target.sight, T, params),

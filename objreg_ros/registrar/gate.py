@@ -213,16 +213,27 @@ def _held(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
     The covariance is that of the residuals and of a warped depth: two views may share few patches on one side, which
     agree with many poses. A camera that goes sideways and turns to keep looking at one far thing sees next to no
-    difference. V falls with the square of a push, so what it must fall by grows with the variance, up to where the
-    views hold a pose firmly by themselves: then it is known, however free the surfaces would let it slide.
+    difference.
     """
     sigma, drop = worst_translation(spread_of(candidate.alignment, params) + candidate.warp), candidate.resistance
-    least = min(params.firm_margin, params.rival_margin * max(1.0, (sigma / params.max_slack_sigma) ** 2))
+    least = _least_fall(candidate, sigma, params)
     if drop is None and sigma > params.max_slack_sigma:
         return Reason.SLACK, f"sigma {sigma:.3f} m > {params.max_slack_sigma:.3f} m, not pushed"
     if drop is None or drop >= least:
         return None
     return Reason.SLACK, f"sigma {sigma:.3f} m, V falls by {drop:.2f} < {least:.2f} over {params.pushes[-1]:.2f} m"
+
+
+def _least_fall(candidate: Candidate, sigma: float, params: RegistrarParams) -> float:
+    """What V must fall by over a push of a position that the surfaces know to ``sigma`` m.
+
+    V falls with the square of a push, so it grows with the variance, up to where the views by themselves hold the pose
+    firmly: then it is known, however far the surfaces would let it slide. Several objects that look otherwise leave
+    more to the views; a lone one has checks of its own.
+    """
+    otherwise = len(candidate.explained) > 1 and (candidate.likeness or 0.0) < 0.0
+    least = params.rival_margin * max(1.0, (sigma / params.max_slack_sigma) ** 2)
+    return min(params.firm_margin, least * (params.otherwise_margin if otherwise else 1.0))
 
 
 def _odometry(candidate: Candidate, params: RegistrarParams, prior: Prior) -> Refusal | None:

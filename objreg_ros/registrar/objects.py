@@ -33,10 +33,15 @@ def explain(source: Prepared, target: Prepared, T_target_source: Array, params: 
     return explained, _assign(source, left, np.inf)
 
 
-def likeness(source: Prepared, target: Prepared, explained: Pairs, T: Array, params: RegistrarParams) -> float | None:
-    """How alike the explained objects look under a pose, their mean from -1 to 1; None where none has a shape."""
+def likeness(
+    source: Prepared, target: Prepared, explained: Pairs, T: Array, params: RegistrarParams, reach: float = 0.0
+) -> float | None:
+    """How alike the explained objects look under a pose, their mean from -1 to 1; None where none has a shape.
+
+    Each stands so far aside as it looks most alike, ``reach`` m at most: what it is, if not where.
+    """
     shapes = [(source.shapes[pair.source], target.shapes[pair.target]) for pair in explained]
-    scores = [alike(a, b, upright_motion(a, b, T), params) for a, b in shapes if a is not None and b is not None]
+    scores = [alike(a, b, upright_motion(a, b, T), params, reach) for a, b in shapes if a is not None and b is not None]
     return float(np.clip(scores, -1.0, 1.0).mean()) if scores else None
 
 

@@ -263,13 +263,20 @@ class RegistrarParams(Params):
     max_violations_doubtful: float = param(
         0.02, "share of tested pixels in seen free space up to which V need not make up for them", ge=0.0, le=1.0
     )
+    otherwise_margin: float = param(
+        1.5, "how many times as much V must fall over a push where several objects look otherwise (below 0)", ge=1.0
+    )
     firm_margin: float = param(
         0.4,
         "fall of V over a push from which on views hold a pose however badly surfaces do; where something floats, the "
         "least V is min_score and what the fall lacks of this",
         ge=0.0,
     )
-    rival_margin: float = param(0.1, "a candidate this much below the best in V is not considered", ge=0.0)
+    rival_margin: float = param(
+        0.1,
+        "a candidate this much below the best in V is not considered, and over a push V must fall by as much at least",
+        ge=0.0,
+    )
     min_chains: int = param(2, "chains that must agree on a lone object's pose for it not to be doubtful", ge=1)
     min_objects: int = param(2, "explained objects that need no more evidence than the views; a lone one does", ge=1)
     min_objects_plain: int = param(

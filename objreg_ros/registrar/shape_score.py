@@ -25,6 +25,7 @@ LEAST_SHADED = 20
 FLOOR = 0.0106  # m: 7 mm beside three deviations of a structured-light camera at 0.4 m
 GROWTH = 0.0057  # 1/m: three deviations more for each squared metre beyond
 KNEE = 0.4  # m
+STEPS = 8  # that lead from a motion to the farthest that counts as it
 
 
 def weights_of(params: RegistrarParams) -> Array:
@@ -41,10 +42,14 @@ def weights_of(params: RegistrarParams) -> Array:
     )
 
 
-def alike(source: Shape, target: Shape, motion: Array, params: RegistrarParams) -> float:
-    """The score of a motion (yaw, x, y, rise): near 1 and more if right, below 0 if the cameras saw otherwise."""
-    extent = 0.5 * (source.extent + target.extent)
-    return float(two_way(source.sight, target.sight, motion, extent, weights_of(params), source.most + target.most))
+def alike(source: Shape, target: Shape, motion: Array, params: RegistrarParams, reach: float = 0.0) -> float:
+    """The score of a motion (yaw, x, y, rise): near 1 and more if right, below 0 if the cameras saw otherwise.
+
+    The best that is found within ``reach`` m to any side of it, turned as much.
+    """
+    extent, most = 0.5 * (source.extent + target.extent), source.most + target.most
+    steps = np.array([0.0, reach, reach, reach]) / STEPS
+    return float(climb(source.sight, target.sight, motion.copy(), extent, weights_of(params), most, steps, STEPS))
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
@@ -142,25 +147,28 @@ def two_way(source, target, motion, extent, weights, most):  # type: ignore[no-u
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)
-def climb(source, target, motion, extent, weights, most, angle, shift, rounds):  # type: ignore[no-untyped-def]
-    """Improve ``motion`` in place by single steps that raise the score; the steps halve where none does.
+def climb(source, target, motion, extent, weights, most, steps, rounds):  # type: ignore[no-untyped-def]
+    """Improve ``motion`` in place by single ``steps (4,)`` that raise the score; they halve where none does.
 
     Returns the score there.
     """
     best = two_way(source, target, motion, extent, weights, most)
     trial = np.empty(4)
-    first = angle
+    size = 1.0
     for _ in range(rounds):
         improved = False
-        for k in range(6):
+        for k in range(8):
+            step = size * steps[k // 2]
+            if step == 0.0:
+                continue
             trial[:] = motion
-            trial[k // 2] += (angle if k < 2 else shift) * (1.0 if k % 2 == 0 else -1.0)
+            trial[k // 2] += step if k % 2 == 0 else -step
             found = two_way(source, target, trial, extent, weights, most)
             if found > best + 0.002:
                 best, improved = found, True
                 motion[:] = trial
         if not improved:
-            angle, shift = 0.5 * angle, 0.5 * shift
-            if angle < 0.12 * first:
+            size *= 0.5
+            if size < 0.12:
                 break
     return best

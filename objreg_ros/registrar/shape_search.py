@@ -19,7 +19,7 @@ from objreg_ros.registrar.shape_score import climb, two_way, weights_of
 SAME_TURN = 0.12  # rad within which two motions are one
 SAME_SHIFT = 0.015  # m
 ALIKE_TURN, CROWD = 0.5, 2  # rad within which motions turn alike, and how many of them are refined
-CLIMB = (0.05, 0.012)  # rad and m: the first steps of a climb
+CLIMB = (0.05, 0.012, 0.012, 0.0)  # rad and m: the first steps of a climb; a shape keeps its height
 WIDEST_REACH = 0.07  # m within which a point finds a partner at first
 CLEARED, CLEARED_AT_A_GLANCE, CLEARED_AT_LAST = (100, 6), (50, 4), (200, 5)  # points a side and steps out of free space
 
@@ -145,7 +145,7 @@ def _finish(  # type: ignore[no-untyped-def]
     for k in order[: min(n, climbed)]:
         if worth[k] < top - margin:
             break
-        worth[k] = climb(source, target, best[k], extent, weights, every, CLIMB[0], CLIMB[1], rounds)
+        worth[k] = climb(source, target, best[k], extent, weights, every, np.array(CLIMB), rounds)
         trial[:] = best[k]
         settle(P, N, every, grid, trial, max(1.5 * cell, 0.010), max(1.2 * cell, 0.006), 8)
         worth[k] = _better(source, target, trial, best[k], worth[k], extent, weights, every)

@@ -291,6 +291,15 @@ def test_the_worse_the_surfaces_hold_a_pose_the_more_the_views_must() -> None:
     assert refuse(candidate(**loose, resistance=least + 0.01, slack=np.eye(6)[:1]), PARAMS) is not None
 
 
+def test_several_objects_that_look_otherwise_leave_more_to_the_views() -> None:
+    least = PARAMS.rival_margin
+    several = {"explained": (ObjectPair(0, 0, "cup"), ObjectPair(1, 1, "book")), "resistance": 1.2 * least}
+    assert refuse(candidate(**several, likeness=0.1), PARAMS) is None
+    refusal = refuse(candidate(**several, likeness=-0.1), PARAMS)
+    assert refusal is not None and refusal[0] is Reason.SLACK
+    assert refuse(candidate(**{**several, "resistance": 2.0 * least}, likeness=-0.1), PARAMS) is None
+
+
 def test_a_pose_that_the_views_hold_firmly_is_known_however_free_the_surfaces_would_let_it_slide() -> None:
     free, firm = {"slack": np.eye(6)[:1]}, PARAMS.firm_margin
     assert refuse(candidate(**free, resistance=firm + 0.01), PARAMS) is None

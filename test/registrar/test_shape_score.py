@@ -34,6 +34,16 @@ def test_a_shift_into_free_space_costs_more_than_it_can_gain() -> None:
     assert scores[0] > 0.7 and scores[0] > scores[1] > scores[2] and scores[2] < 0.0
 
 
+def test_what_lies_a_little_aside_looks_alike_within_reach_and_what_is_turned_does_not() -> None:
+    source, target = shape_of(ELL, 30.0, 1), shape_of(ELL, 0.0, 2)
+    motion = upright_motion(source, target, truth(30.0))
+    aside, turned = np.add(motion, (0, 0.03, -0.03, 0.01)), np.add(motion, (np.pi / 2, 0, 0, 0))
+    assert alike(source, target, aside, PARAMS) < 0.0
+    assert alike(source, target, aside, PARAMS, reach=0.06) > 0.9 * alike(source, target, motion, PARAMS)
+    assert alike(source, target, turned, PARAMS, reach=0.06) < 0.0
+    assert alike(source, target, np.add(motion, (0, 0.2, 0, 0)), PARAMS, reach=0.06) < 0.0
+
+
 def test_both_ways_say_the_same() -> None:
     source, target = shape_of(ELL, 40.0, 1), shape_of(ELL, 0.0, 2)
     forward = alike(source, target, upright_motion(source, target, truth(40.0)), PARAMS)
@@ -46,6 +56,7 @@ def test_a_climb_never_ends_lower() -> None:
     start = np.add(upright_motion(source, target, truth(30.0)), (0.06, 0.01, -0.01, 0.0))
     motion = start.copy()
     extent = 0.5 * (source.extent + target.extent)
-    reached = climb(source.sight, target.sight, motion, extent, weights_of(PARAMS), 400, 0.05, 0.012, 8)
+    steps = np.array([0.05, 0.012, 0.012, 0.0])
+    reached = climb(source.sight, target.sight, motion, extent, weights_of(PARAMS), 400, steps, 8)
     assert reached > alike(source, target, start, PARAMS) + 0.1
     assert abs(reached - alike(source, target, motion, PARAMS)) < 1e-9
