@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numba
 import numpy as np
 
@@ -48,9 +49,15 @@ def _back_project(depth, x, y, z_min, z_max, xyz):  # type: ignore[no-untyped-de
 
 
 def _grey(rgb: Array, step: int, height: int, width: int) -> Array:
-    grey = np.empty((height, width), np.uint8)
+    """The mean of each block, brought on to the pixel of its depth: from an even block's middle that is half a pixel.
+
+    Half a pixel of two opposite views moves a pose by half a centimetre along a table a metre away.
+    """
+    grey = np.empty((height, width), np.float32)
     _mean(rgb.reshape(rgb.shape[0], -1), step, grey)
-    return grey
+    onward = (step // 2 - (step - 1) / 2) / step
+    share = np.array([0.0, 1.0 - onward, onward])
+    return np.rint(cv2.sepFilter2D(grey, -1, share, share, borderType=cv2.BORDER_REPLICATE)).astype(np.uint8)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -80,4 +87,4 @@ def _mean(values, step, grey):  # type: ignore[no-untyped-def]
             u = 3 * j * step
             count = min(step, (width - u) // 3) * (last - first)
             total = RED * np.float32(block[u]) + GREEN * np.float32(block[u + 1]) + BLUE * np.float32(block[u + 2])
-            grey[i, j] = int(total / np.float32(count) + np.float32(0.5))
+            grey[i, j] = total / np.float32(count)

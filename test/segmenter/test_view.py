@@ -33,6 +33,17 @@ def test_grey_is_grey_and_odd_sizes_fit() -> None:
         assert (view.grey == 90).all()
 
 
+@pytest.mark.parametrize("step", [1, 2, 3, 4])
+def test_grey_is_that_of_the_pixel_whose_depth_it_goes_with(step: int) -> None:
+    full = image(48, 64)
+    v, u = np.mgrid[:48, :64]
+    rgb = np.repeat((2 * u + v)[..., None], 3, axis=-1).astype(np.uint8)
+    view = reduced_view(DepthImage(depth=full.depth, rgb=rgb, intrinsics=full.intrinsics, stamp_ns=0), step, 0.2, 4.0)
+    assert view.grey is not None
+    there = rgb[step // 2 :: step, step // 2 :: step, 0].astype(float)
+    assert abs(view.grey[:-1, :-1] - there[:-1, :-1]).mean() < 0.35
+
+
 def test_depth_out_of_range_is_nan() -> None:
     assert np.isnan(reduced_view(image(48, 64), 4, 0.2, 0.9).xyz).all()
 
