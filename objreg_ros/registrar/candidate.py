@@ -44,7 +44,8 @@ class Candidate:
     ``chain`` proposed it, ``agreeing_chains`` (``chain`` among them) came to the same pose independently;
     ``explained`` are the object pairs that lie upon each other under it, ``moved`` those of the same kind that should
     and do not although both views look there; ``gravity_error_deg`` is the angle between the two gravities under it,
-    None where one is unknown; ``likeness`` is how alike the explained objects look, -1..1, None where that is unknown;
+    None where one is unknown; ``likeness`` is how alike the explained objects look, -1..1, None where that is unknown,
+    and ``likeness_nearby`` where each stands aside as it looks most alike: what it is, wherever exactly it is;
     ``yaw_known`` says that the shape of one of them tells its yaw; ``margin`` is how much more the candidate is worth
     than any other. ``resistance`` is how much less the views like the pose pushed to where it would be false,
     along the directions in which it is known least; None where it is known well enough without. ``warp (6, 6)`` is the
@@ -60,6 +61,7 @@ class Candidate:
     moved: tuple[ObjectPair, ...] = ()
     gravity_error_deg: float | None = None
     likeness: float | None = None
+    likeness_nearby: float | None = None
     yaw_known: bool = False
     margin: float = 0.0
     resistance: float | None = None

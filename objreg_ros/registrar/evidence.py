@@ -31,7 +31,8 @@ def gather(
         verification=verify(source.sight, target.sight, T, params),
         explained=explained,
         moved=moved,
-        likeness=likeness(source, target, explained, T, params, params.explained_distance),
+        likeness=likeness(source, target, explained, T, params),
+        likeness_nearby=likeness(source, target, explained, T, params, params.likeness_reach),
         yaw_known=any(source.yaw_known[pair.source] and target.yaw_known[pair.target] for pair in explained),
         gravity_error_deg=gravity_error_deg(source, target, T),
         floating=floating(source.sight, target.sight, T, params),
@@ -80,7 +81,7 @@ def lead(candidate: Candidate, rivals: Iterable[Candidate], params: RegistrarPar
 
 def _told(candidate: Candidate, params: RegistrarParams) -> float:
     """The worth of a pose by what tells it from others."""
-    otherwise = min(0.0, candidate.likeness or 0.0)
+    otherwise = min(0.0, candidate.likeness_nearby or 0.0)
     return unhidden(candidate.verification) + agreement(candidate.explained, candidate.moved, otherwise, params)
 
 

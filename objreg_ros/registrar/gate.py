@@ -98,10 +98,10 @@ def _free_space(candidate: Candidate, params: RegistrarParams) -> Refusal | None
     And for several that look otherwise: they stand where others stood.
     """
     violations, floating = candidate.verification.violations, candidate.floating
-    otherwise = candidate.likeness is not None and candidate.likeness < params.min_likeness_unrivalled
     if violations > params.max_violations:
         return Reason.FREE_SPACE, f"violations {violations:.3f} > {params.max_violations:.3f}"
-    if (len(candidate.explained) < 2 or otherwise) and floating > params.max_floating_alone:
+    doubtful = len(candidate.explained) < 2 or _several_otherwise(candidate, params)
+    if doubtful and floating > params.max_floating_alone:
         return Reason.FREE_SPACE, f"{floating:.3f} float > {params.max_floating_alone:.3f}"
     return None
 
@@ -182,13 +182,14 @@ def _agreement(candidate: Candidate, params: RegistrarParams, rivals: Sequence[C
         return None
     return Reason.CHAINS_DISAGREE, (
         f"{explained} objects < {params.min_objects}, {chains} chains, "
-        f"likeness {candidate.likeness or 0.0:.2f}, margin {margin:.2f}"
+        f"likeness {candidate.likeness_nearby or 0.0:.2f}, margin {margin:.2f}"
     )
 
 
 def _not_otherwise(candidate: Candidate, params: RegistrarParams) -> bool:
     """Whether the object does not look otherwise, and tells the yaw, or the grey of the views does."""
-    likeness, plain = candidate.likeness, candidate.verification.texture is None
+    plain = candidate.verification.texture is None
+    likeness = candidate.likeness if plain else candidate.likeness_nearby
     least = params.min_likeness_alone if plain else params.min_likeness_unrivalled
     return likeness is not None and likeness >= least and (candidate.yaw_known or not plain)
 
@@ -231,9 +232,15 @@ def _least_fall(candidate: Candidate, sigma: float, params: RegistrarParams) -> 
     firmly: then it is known, however far the surfaces would let it slide. Several objects that look otherwise leave
     more to the views; a lone one has checks of its own.
     """
-    otherwise = len(candidate.explained) > 1 and (candidate.likeness or 0.0) < 0.0
     least = params.rival_margin * max(1.0, (sigma / params.max_slack_sigma) ** 2)
-    return min(params.firm_margin, least * (params.otherwise_margin if otherwise else 1.0))
+    least = max(params.rival_margin, min(params.firm_margin, least))
+    return least * (params.otherwise_factor if _several_otherwise(candidate, params) else 1.0)
+
+
+def _several_otherwise(candidate: Candidate, params: RegistrarParams) -> bool:
+    """Whether several objects look otherwise: they stand where others stood."""
+    likeness = candidate.likeness_nearby
+    return len(candidate.explained) > 1 and likeness is not None and likeness < params.min_likeness_several
 
 
 def _odometry(candidate: Candidate, params: RegistrarParams, prior: Prior) -> Refusal | None:

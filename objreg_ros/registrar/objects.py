@@ -38,7 +38,7 @@ def likeness(
 ) -> float | None:
     """How alike the explained objects look under a pose, their mean from -1 to 1; None where none has a shape.
 
-    Each stands so far aside as it looks most alike, ``reach`` m at most: what it is, if not where.
+    With a ``reach`` in m each stands so far aside along each axis as it looks most alike: what it is, if not where.
     """
     shapes = [(source.shapes[pair.source], target.shapes[pair.target]) for pair in explained]
     scores = [alike(a, b, upright_motion(a, b, T), params, reach) for a, b in shapes if a is not None and b is not None]

@@ -205,6 +205,9 @@ class RegistrarParams(Params):
         "what the likeness of explained objects adds to V; at most, where poses near each other are compared",
         ge=0.0,
     )
+    likeness_reach: float = param(
+        0.06, "how far along each axis an object may stand where it looks most alike, to tell what it is", "m", ge=0.0
+    )
     telling_grey: float = param(
         1000.0,
         "n r / (1 - r^2), of n points (2 grey_points at most) whose grey correlates by r, beyond which objects have "
@@ -263,8 +266,11 @@ class RegistrarParams(Params):
     max_violations_doubtful: float = param(
         0.02, "share of tested pixels in seen free space up to which V need not make up for them", ge=0.0, le=1.0
     )
-    otherwise_margin: float = param(
-        1.5, "how many times as much V must fall over a push where several objects look otherwise (below 0)", ge=1.0
+    otherwise_factor: float = param(
+        1.5,
+        "how many times as much V must fall over a push where several objects look otherwise (see "
+        "min_likeness_several)",
+        ge=1.0,
     )
     firm_margin: float = param(
         0.4,
@@ -288,9 +294,12 @@ class RegistrarParams(Params):
     )
     min_likeness_unrivalled: float = param(
         -0.2,
-        "least likeness of a lone object that grey alone confirms, and below which several look otherwise",
+        "least likeness of a lone object that grey alone confirms",
         ge=-1.0,
         le=1.0,
+    )
+    min_likeness_several: float = param(
+        0.0, "least likeness of several objects, below which they look otherwise", ge=-1.0, le=1.0
     )
     min_texture_painted: float = param(
         0.5, "least correlation of grey that confirms a pose where the lone object does not", ge=-1.0, le=1.0

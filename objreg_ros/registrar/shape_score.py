@@ -25,7 +25,7 @@ LEAST_SHADED = 20
 FLOOR = 0.0106  # m: 7 mm beside three deviations of a structured-light camera at 0.4 m
 GROWTH = 0.0057  # 1/m: three deviations more for each squared metre beyond
 KNEE = 0.4  # m
-STEPS = 8  # that lead from a motion to the farthest that counts as it
+STEPS = 8  # rounds of a climb to what is nearby, each a step of that share of its reach at most
 
 
 def weights_of(params: RegistrarParams) -> Array:
@@ -45,7 +45,7 @@ def weights_of(params: RegistrarParams) -> Array:
 def alike(source: Shape, target: Shape, motion: Array, params: RegistrarParams, reach: float = 0.0) -> float:
     """The score of a motion (yaw, x, y, rise): near 1 and more if right, below 0 if the cameras saw otherwise.
 
-    The best that is found within ``reach`` m to any side of it, turned as much.
+    The best that a climb finds within ``reach`` m along each axis, height too, turned as much.
     """
     extent, most = 0.5 * (source.extent + target.extent), source.most + target.most
     steps = np.array([0.0, reach, reach, reach]) / STEPS

@@ -21,7 +21,7 @@ def step_for(width: int, most: int) -> int:
 def reduced_view(image: DepthImage, step: int, z_min: float, z_max: float) -> View:
     """Every ``step``-th pixel from pixel ``step // 2`` on; points outside z_min … z_max metres are NaN.
 
-    Colour becomes the mean grey (ITU-R BT.601) of the step × step block around the pixel; without colour grey is None.
+    Colour becomes the mean grey (ITU-R BT.601) of step × step pixels about that one; without colour grey is None.
     Where the image is smaller than ``step`` pixels, every pixel is kept.
     """
     step = step if min(image.depth.shape) > step // 2 else 1
@@ -49,13 +49,13 @@ def _back_project(depth, x, y, z_min, z_max, xyz):  # type: ignore[no-untyped-de
 
 
 def _grey(rgb: Array, step: int, height: int, width: int) -> Array:
-    """The mean of each block, brought on to the pixel of its depth: from an even block's middle that is half a pixel.
+    """The mean of each block, brought on to the pixel of its depth: half a pixel of the picture where step is even.
 
-    Half a pixel of two opposite views moves a pose by half a centimetre along a table a metre away.
+    Left out, it moves a pose between opposite views by millimetres along a table that is a metre away.
     """
     grey = np.empty((height, width), np.float32)
     _mean(rgb.reshape(rgb.shape[0], -1), step, grey)
-    onward = (step // 2 - (step - 1) / 2) / step
+    onward = (step // 2 - (step - 1) / 2) / step  # from the middle of the block to the pixel of its depth
     share = np.array([0.0, 1.0 - onward, onward])
     return np.rint(cv2.sepFilter2D(grey, -1, share, share, borderType=cv2.BORDER_REPLICATE)).astype(np.uint8)
 

@@ -119,6 +119,7 @@ def candidate(T: Array | None = None, **evidence: object) -> Candidate:
         "explained": (ObjectPair(0, 0, "cup"), ObjectPair(1, 1, "book")),
         "gravity_error_deg": 0.5,
         "floating": 0.0,
+        "likeness_nearby": evidence.get("likeness"),
     }
     rest.update(evidence)
     return Candidate(alignment=alignment, verification=Verification(**seen), **rest)

@@ -41,7 +41,7 @@ def test_grey_is_that_of_the_pixel_whose_depth_it_goes_with(step: int) -> None:
     view = reduced_view(DepthImage(depth=full.depth, rgb=rgb, intrinsics=full.intrinsics, stamp_ns=0), step, 0.2, 4.0)
     assert view.grey is not None
     there = rgb[step // 2 :: step, step // 2 :: step, 0].astype(float)
-    assert abs(view.grey[:-1, :-1] - there[:-1, :-1]).mean() < 0.35
+    assert abs(view.grey[:-1, :-1] - there[:-1, :-1]).max() < 0.01  # but for the last, beyond which nothing is
 
 
 def test_depth_out_of_range_is_nan() -> None:
