@@ -23,8 +23,9 @@ from objreg_ros.registrar.params import RegistrarParams
 
 Refusal = tuple[Reason, str]
 
-SAME_EVIDENCE = {"centroids": "objects"}
-"""Chains that are one where they agree: the objects' poses are looked for from those that their middles propose too."""
+SAME_EVIDENCE = {"centroids": "objects", "odometry": "objects"}
+"""Chains that are one where they agree: poses of objects are looked for from those that their middles propose too, and
+what drifting odometry expects is refined to whatever the objects fit nearby, right or wrong."""
 
 
 def judge(candidates: Sequence[Candidate], params: RegistrarParams, prior: Prior | None = None) -> Candidate | Refusal:

@@ -139,6 +139,7 @@ def test_a_lone_object_of_one_chain_needs_views_that_like_it_and_every_push_of_i
     for chains, resistance, accepted in (
         (("objects",), 0.9 * lacking, False),
         (("centroids", "objects"), 0.9 * lacking, False),
+        (("objects", "odometry"), 0.9 * lacking, False),
         (("objects",), 1.1 * lacking, True),
         (("objects",), None, True),
         (("features", "objects"), 0.9 * lacking, True),
