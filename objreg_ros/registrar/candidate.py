@@ -45,7 +45,7 @@ class Candidate:
     ``explained`` are the object pairs that lie upon each other under it, ``moved`` those of the same kind that should
     and do not although both views look there; ``gravity_error_deg`` is the angle between the two gravities under it,
     None where one is unknown; ``likeness`` is how alike the explained objects look, -1..1, None where that is unknown,
-    and ``likeness_nearby`` where each stands aside as it looks most alike: what it is, wherever exactly it is;
+    and ``likeness_nearby`` that of each a little aside, where it looks most alike: what it is, if not where;
     ``yaw_known`` says that the shape of one of them tells its yaw; ``margin`` is how much more the candidate is worth
     than any other. ``resistance`` is how much less the views like the pose pushed to where it would be false,
     along the directions in which it is known least; None where it is known well enough without. ``warp (6, 6)`` is the

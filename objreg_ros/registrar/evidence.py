@@ -81,7 +81,7 @@ def lead(candidate: Candidate, rivals: Iterable[Candidate], params: RegistrarPar
 
 def _told(candidate: Candidate, params: RegistrarParams) -> float:
     """The worth of a pose by what tells it from others."""
-    otherwise = min(0.0, candidate.likeness_nearby or 0.0)
+    otherwise = min(0.0, candidate.likeness or 0.0)
     return unhidden(candidate.verification) + agreement(candidate.explained, candidate.moved, otherwise, params)
 
 

@@ -183,14 +183,13 @@ def _agreement(candidate: Candidate, params: RegistrarParams, rivals: Sequence[C
         return None
     return Reason.CHAINS_DISAGREE, (
         f"{explained} objects < {params.min_objects}, {chains} chains, "
-        f"likeness {candidate.likeness_nearby or 0.0:.2f}, margin {margin:.2f}"
+        f"likeness {candidate.likeness or 0.0:.2f}, margin {margin:.2f}"
     )
 
 
 def _not_otherwise(candidate: Candidate, params: RegistrarParams) -> bool:
     """Whether the object does not look otherwise, and tells the yaw, or the grey of the views does."""
-    plain = candidate.verification.texture is None
-    likeness = candidate.likeness if plain else candidate.likeness_nearby
+    likeness, plain = candidate.likeness, candidate.verification.texture is None
     least = params.min_likeness_alone if plain else params.min_likeness_unrivalled
     return likeness is not None and likeness >= least and (candidate.yaw_known or not plain)
 
@@ -239,7 +238,10 @@ def _least_fall(candidate: Candidate, sigma: float, params: RegistrarParams) -> 
 
 
 def _several_otherwise(candidate: Candidate, params: RegistrarParams) -> bool:
-    """Whether several objects look otherwise: they stand where others stood."""
+    """Whether several objects look otherwise, even a little aside: they stand where others stood.
+
+    A lone one is not given that much: aside, a small thing meets nothing and looks neither alike nor otherwise.
+    """
     likeness = candidate.likeness_nearby
     return len(candidate.explained) > 1 and likeness is not None and likeness < params.min_likeness_several
 

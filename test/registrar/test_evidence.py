@@ -34,12 +34,6 @@ def test_that_an_object_looks_alike_is_no_lead_and_that_it_looks_otherwise_is_no
     assert worth(alike, PARAMS) - worth(unseen, PARAMS) == pytest.approx(PARAMS.likeness_weight)
 
 
-def test_that_an_object_looks_otherwise_where_it_stands_but_not_beside_it_leaves_the_lead() -> None:
-    one = candidate(score=0.5, explained=BOX, likeness=-1.0, likeness_nearby=0.2)
-    assert lead(one, [candidate(score=0.4, explained=BOX, likeness=0.0)], PARAMS) == pytest.approx(0.1)
-    assert worth(one, PARAMS) == pytest.approx(0.5 + PARAMS.object_bonus - PARAMS.likeness_weight)
-
-
 def test_objects_that_stand_add_to_what_views_say_and_those_that_moved_take_away() -> None:
     assert agreement(BOX, (), None, PARAMS) == pytest.approx(PARAMS.object_bonus)
     assert agreement(BOX, BOX, 0.0, PARAMS) == pytest.approx(0.0)

@@ -301,11 +301,11 @@ def test_several_objects_that_look_otherwise_leave_more_to_the_views() -> None:
     assert refuse(candidate(**{**several, "resistance": 2.0 * least}, likeness=-0.1), PARAMS) is None
 
 
-def test_of_what_an_object_is_the_pose_may_be_a_little_beside_it() -> None:
+def test_several_objects_may_be_what_they_are_a_little_aside_and_a_lone_one_may_not() -> None:
     aside = {"likeness": -1.0, "resistance": 1.2 * PARAMS.rival_margin}
     assert refuse(candidate(**aside, likeness_nearby=0.1), PARAMS) is None
-    assert refuse(lone(likeness=-1.0, likeness_nearby=0.1), PARAMS) is None
-    assert refuse(lone(likeness=-1.0), PARAMS) is not None
+    assert refuse(candidate(**aside), PARAMS) is not None
+    assert refuse(lone(likeness=-1.0, likeness_nearby=0.1), PARAMS) is not None
 
 
 def test_a_pose_that_the_views_hold_firmly_is_known_however_free_the_surfaces_would_let_it_slide() -> None:
