@@ -97,6 +97,8 @@ def _refine(level, up):  # type: ignore[no-untyped-def]
             y += n_y[n] if near else 0.0
             z += n_z[n] if near else 0.0
         length = np.sqrt(x * x + y * y + z * z)
+        if length == 0.0:  # a cone that no normal is in: the cluster is a ring
+            break
         up[0], up[1], up[2] = x / length, y / length, z / length
 
 

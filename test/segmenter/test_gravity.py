@@ -54,3 +54,11 @@ def test_unknown_normals_are_left_out() -> None:
     normals = np.zeros((3, 6, 8), np.float32)
     normals[2, ::2, 1:] = -1
     assert known_normals(normals, 1).shape == (21, 3)
+
+
+def test_a_ring_of_normals_with_none_in_its_middle_tells_its_middle() -> None:
+    angle, tilt = np.linspace(0.0, 2.0 * np.pi, 400, endpoint=False), np.radians(7.0)
+    ring = np.stack([np.sin(tilt) * np.cos(angle), np.full(400, -np.cos(tilt)), np.sin(tilt) * np.sin(angle)], axis=1)
+    up, _ = estimate_up(ring.astype(np.float32), camera_up(0.0), 65.0)
+    assert up is not None
+    assert up @ [0.0, -1.0, 0.0] > np.cos(np.radians(0.5))
