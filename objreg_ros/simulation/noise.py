@@ -170,7 +170,7 @@ def _sense(  # type: ignore[no-untyped-def]
             if uniform(mixed_bits(seed + 5, at)) < lost:
                 continue
             if loss[f] > 0:  # in blotches: the logistic curve makes normal numbers nearly uniform
-                level = _at(blotch, x, BLOTCH_PX) + np.float32(0.4) * normal(bits)
+                level = _at(blotch, x, BLOTCH_PX) + np.float32(0.4) * normal(mixed_bits(seed + 8, at))
                 if one / (one + np.exp(np.float32(-1.6) * level)) < loss[f]:
                     continue
             z = one / nearest

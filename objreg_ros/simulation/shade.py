@@ -16,6 +16,7 @@ from objreg_ros.simulation.raster import Projection
 from objreg_ros.simulation.surfaces import LEVELS, Surfaces
 
 LIGHT_SCALE = 16383.0
+FARTHEST = np.float32(1e-3)  # 1/m
 
 ONE = np.uintp(1)
 """Unsigned indices spare numba the question whether they count from the end."""
@@ -207,11 +208,13 @@ def _shade(  # type: ignore[no-untyped-def]
             ox, oy = np.float32(x - bounds[f, 0]), np.float32(y - bounds[f, 1])
             at = j if keeps or shared else own
             if not shared:
-                dx = (np.float32(x) - cx) / fx
+                beside = np.float32(0.5) if keeps else np.float32(0.0)  # px: the light of a block is that of its middle
+                lit_z = one / max(nearness[y, x] + beside * _slope(edges[f]), FARTHEST)
+                dx, lit_dy = (np.float32(x) + beside - cx) / fx, dy + beside / fy
                 _enlighten(
-                    f, m, at, z, dx, dy, ox, oy, fx, R, eye, edges, faces, normals, detail, open_surface, texture_size,
-                    response, lamp_position, lamp_colour, ambient, moments, rotation, position, pinhole, reference,
-                    normal, lights, levels,
+                    f, m, at, lit_z, dx, lit_dy, ox + beside, oy + beside, fx, R, eye, edges, faces, normals,
+                    detail, open_surface, texture_size, response, lamp_position, lamp_colour, ambient,
+                    moments, rotation, position, pinhole, reference, normal, lights, levels,
                 )  # fmt: skip
             start = level_start[m, levels[at, 0]]
             tu, tv = _value(picture[0], ox, oy, z), _value(picture[1], ox, oy, z)
@@ -219,6 +222,15 @@ def _shade(  # type: ignore[no-untyped-def]
             for c in range(3):
                 value = albedo[c] * (lights[at, c] + response[m, 2]) + lights[at, 3 + c]
                 out[y, x, c] = np.uint16(min(np.float32(65535.0), np.sqrt(value) * np.float32(LIGHT_SCALE)))
+
+
+@nb.njit(cache=True, nogil=True, inline="always")
+def _slope(edges):  # type: ignore[no-untyped-def]
+    """How much nearness grows one pixel to the right and one down, on the face of ``edges (3, 3)``."""
+    total = np.float32(0.0)
+    for k in range(3):
+        total += edges[k, 1] + edges[k, 2]
+    return total
 
 
 def shade(
