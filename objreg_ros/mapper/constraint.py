@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from objreg_ros.data import Array, LoopClosure
-from objreg_ros.geometry import inverse, pose, skew
+from objreg_ros.geometry import inverse, pose, rotation_angle, skew
 from objreg_ros.mapper.trajectory import Trajectory
 
 # Between the error [t r] of ROS, RTAB-Map, g2o and the error [r t] of Open3D and GTSAM.
@@ -26,23 +26,48 @@ class Constraint(NamedTuple):
     covariance: Array
 
 
+EXACT = (0.0, 0.0)
+
+
 def between_keyframes(
-    closure: LoopClosure, odometry: Trajectory, k1_ns: int, k2_ns: int, T_body_camera: Array
+    closure: LoopClosure,
+    odometry: Trajectory,
+    k1_ns: int,
+    k2_ns: int,
+    T_body_camera: Array,
+    sigmas: tuple[float, float] = EXACT,
 ) -> Constraint:
     """The closure as a constraint between the bodies at a consumer's own keyframes, near *from* and near *to*.
 
     ``T_k1_k2 = O(k1)^-1 O(from) T_from_to O(to)^-1 O(k2)`` with O the odometry of the camera at the closure's moments
-    and of the body at the keyframes. ValueError for a moment that odometry does not cover.
+    and of the body at the keyframes. ``sigmas`` m and rad are how that wanders over one metre or one radian: a closure
+    is known less well where it was not measured. ValueError for a moment that odometry does not cover.
     """
-    T_k1_from = inverse(odometry.at(k1_ns)) @ odometry.at(closure.from_ns) @ T_body_camera
-    T_k2_to = inverse(odometry.at(k2_ns)) @ odometry.at(closure.to_ns) @ T_body_camera
-    return compensated(Constraint(closure.T_from_to, closure.covariance), T_k1_from, inverse(T_k2_to))
+    O_k1, O_from, O_to, O_k2 = (odometry.at(stamp) for stamp in (k1_ns, closure.from_ns, closure.to_ns, k2_ns))
+    T_k1_from, T_k2_to = inverse(O_k1) @ O_from @ T_body_camera, inverse(O_k2) @ O_to @ T_body_camera
+    moved = compensated(Constraint(closure.T_from_to, closure.covariance), T_k1_from, inverse(T_k2_to))
+    turned = _turning(moved.T_from_to[:3, 3] - T_k1_from[:3, 3])
+    there, back = wandering(inverse(O_k1) @ O_from, sigmas), wandering(inverse(O_k2) @ O_to, sigmas)
+    return moved._replace(covariance=moved.covariance + turned @ there @ turned.T + back)
+
+
+def wandering(T_motion: Array, sigmas: tuple[float, float]) -> Array:
+    """The covariance (6, 6) of a motion by odometry whose errors, in m and rad, grow with the root of the way."""
+    way = float(np.linalg.norm(T_motion[:3, 3])) + rotation_angle(T_motion[:3, :3])
+    return np.diag(way * np.repeat(np.square(sigmas) / 3, 3))
+
+
+def _turning(lever: Array) -> Array:
+    """What an error [t r] of a pose makes of one that follows it at ``lever (3,)`` m."""
+    J = np.eye(6)
+    J[:3, 3:] = -skew(lever)
+    return J
 
 
 def compensated(constraint: Constraint, T_k1_from: Array, T_to_k2: Array) -> Constraint:
     """``T_k1_k2 = T_k1_from T_from_to T_to_k2`` and its covariance, to first order.
 
-    The two outer poses count as exact, so the keyframes have to be near.
+    The two outer poses count as exact.
     """
     R_k1_from = T_k1_from[:3, :3]
     lever = constraint.T_from_to[:3, :3] @ T_to_k2[:3, 3]

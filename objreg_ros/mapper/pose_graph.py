@@ -11,7 +11,7 @@ import numpy as np
 
 from objreg_ros.data import Array, LoopClosure, Odometry
 from objreg_ros.geometry import inverse, rotation_angle
-from objreg_ros.mapper.constraint import Constraint, between_keyframes, open3d_information
+from objreg_ros.mapper.constraint import Constraint, between_keyframes, open3d_information, wandering
 from objreg_ros.mapper.optimisation import Edge, Solution, optimise, squared_residual
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.steady import Steady, estimate, step
@@ -124,7 +124,8 @@ class PoseGraph:
         k1, k2 = (self.keyframes.nearest(stamp) for stamp in (closure.from_ns, closure.to_ns))
         if k1 != k2:
             k1_ns, k2_ns = self.keyframes.stamps_ns[k1], self.keyframes.stamps_ns[k2]
-            constraint = between_keyframes(closure, self.odometry, k1_ns, k2_ns, self.T_body_camera)
+            near = k1_ns, k2_ns, self.T_body_camera, self.params.odometry_sigmas
+            constraint = between_keyframes(closure, self.odometry, *near)
             self.ties.append(Tie(k1, k2, constraint, closure))
         return True
 
@@ -176,24 +177,17 @@ class PoseGraph:
     def _moved_on(self, T_odom_body: Array) -> bool:
         if not self.keyframes.poses:
             return True
-        distance, angle = _motion(inverse(self.keyframes.poses[-1]) @ T_odom_body)
-        too_far = distance >= self.params.keyframe_translation
-        return too_far or bool(angle >= np.radians(self.params.keyframe_rotation))
+        T_last_body = inverse(self.keyframes.poses[-1]) @ T_odom_body
+        turned = np.degrees(rotation_angle(T_last_body[:3, :3])) >= self.params.keyframe_rotation
+        return bool(turned or np.linalg.norm(T_last_body[:3, 3]) >= self.params.keyframe_translation)
 
     def _step(self) -> Tie:
         """What odometry says between the two newest keyframes."""
         k1, k2 = len(self.keyframes) - 2, len(self.keyframes) - 1
         T_k1_k2 = inverse(self.keyframes.poses[k1]) @ self.keyframes.poses[k2]
-        each_axis = np.square(self.params.odometry_sigmas) / 3
-        variance = sum(_motion(T_k1_k2)) * np.repeat(each_axis, 3)
-        return Tie(k1, k2, Constraint(T_k1_k2, np.diag(variance)))
+        return Tie(k1, k2, Constraint(T_k1_k2, wandering(T_k1_k2, self.params.odometry_sigmas)))
 
 
 def _edge(tie: Tie) -> Edge:
     information = open3d_information(tie.constraint)
     return Edge(tie.k1, tie.k2, tie.constraint.T_from_to, information, uncertain=tie.closure is not None)
-
-
-def _motion(T: Array) -> tuple[float, float]:
-    """How far (m) and by how much (rad) a pose moves."""
-    return float(np.linalg.norm(T[:3, 3])), rotation_angle(T[:3, :3])

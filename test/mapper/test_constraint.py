@@ -15,6 +15,7 @@ from objreg_ros.mapper.constraint import (
     inverted,
     local_information,
     open3d_information,
+    wandering,
 )
 from objreg_ros.mapper.trajectory import Trajectory
 
@@ -95,6 +96,23 @@ def test_a_closure_between_cameras_becomes_one_between_the_bodies_of_the_keyfram
     closure = LoopClosure(from_ns=0, to_ns=20, T_from_to=T_from_to, covariance=np.eye(6), labels=())
     constraint = between_keyframes(closure, odometry, 10, 30, T_body_camera)
     np.testing.assert_allclose(constraint.T_from_to, inverse(T_world_body[10]) @ T_world_body[30], atol=1e-9)
+
+
+def test_a_closure_moved_by_odometry_is_known_less_well_by_what_that_wanders() -> None:
+    sigmas, T = (0.02, 0.03), {stamp: pose(np.eye(3), [0.1 * stamp, 0.0, 0.0]) for stamp in (0, 1, 20, 22)}
+    closure = LoopClosure(from_ns=0, to_ns=20, T_from_to=inverse(T[0]) @ T[20], covariance=1e-10 * np.eye(6), labels=())
+    errors = []
+    for _ in range(4000):
+        odometry = Trajectory()
+        for k1, k2 in ((0, 1), (20, 22)):
+            step = inverse(T[k1]) @ T[k2]
+            each = np.sqrt(np.diag(wandering(step, sigmas)))
+            odometry.append(k1, T[k1])
+            odometry.append(k2, T[k1] @ disturbed(step, each * RNG.standard_normal(6)))
+        moved = between_keyframes(closure, odometry, 1, 22, np.eye(4), sigmas)
+        errors.append(difference(moved.T_from_to, inverse(T[1]) @ T[22]))
+    seen, said = np.cov(np.array(errors).T), moved.covariance
+    np.testing.assert_allclose(np.sqrt(np.diag(seen)), np.sqrt(np.diag(said)), rtol=0.15)
 
 
 def test_a_closure_outside_odometry_is_refused_with_the_span() -> None:
