@@ -44,6 +44,19 @@ def test_grey_is_that_of_the_pixel_whose_depth_it_goes_with(step: int) -> None:
     assert abs(view.grey[:-1, :-1] - there[:-1, :-1]).max() < 0.01  # but for the last, beyond which nothing is
 
 
+@pytest.mark.parametrize("wavelength", [10.0, 12.0, 16.0, 32.0])
+@pytest.mark.parametrize("step", [2, 3, 4])
+def test_grey_of_fine_prints_lies_where_its_depth_does(step: int, wavelength: float) -> None:
+    full = image(240, 320)
+    wave = 2.0 * np.pi / wavelength * np.arange(320)
+    rgb = np.broadcast_to(np.rint(128.0 + 90.0 * np.sin(wave))[None, :, None], (240, 320, 3)).astype(np.uint8)
+    view = reduced_view(DepthImage(depth=full.depth, rgb=rgb, intrinsics=full.intrinsics, stamp_ns=0), step, 0.2, 4.0)
+    assert view.grey is not None
+    at, seen = wave[step // 2 :: step], view.grey[20].astype(float) - 128.0
+    beside = np.linalg.lstsq(np.stack([np.sin(at), np.cos(at)], axis=1), seen, rcond=None)[0]
+    assert abs(np.arctan2(beside[1], beside[0])) * wavelength / (2.0 * np.pi) < 0.05  # px of the picture
+
+
 def test_depth_out_of_range_is_nan() -> None:
     assert np.isnan(reduced_view(image(48, 64), 4, 0.2, 0.9).xyz).all()
 
