@@ -27,7 +27,6 @@ HELD = 1.0 / 3.0  # of a push that is clearly resisted: one sigma of a pose that
 AROUND = 8  # ways in which a pose is pushed to see whether it is resisted
 CLEARLY = 0.02  # gain for which a pose is left for another
 HOPE = 0.3  # of V, what grey may add to a pose by finishing it
-DIRECTIONS = 4  # in which a pose is pushed to hold it, one after the other
 
 
 def resisted(
@@ -137,10 +136,10 @@ def steadied(source: Prepared, target: Prepared, T_target_source: Array, C: Arra
         return added
     if texture(source.sight, target.sight, T_target_source, params) < params.steadying_texture:
         return added
-    stand = Stand(source, target, T_target_source, params)
-    for _ in range(DIRECTIONS):
+    stand, left = Stand(source, target, T_target_source, params), np.eye(3)
+    for _ in range(3):  # every way once: the views say the same of it again
         spread = np.linalg.inv(known + added)
-        values, vectors = np.linalg.eigh(spread[:3, :3])
+        values, vectors = np.linalg.eigh(left @ spread[:3, :3] @ left)
         if values[-1] <= params.doubtful_sigma**2:
             break
         across = vectors[:, -1]
@@ -148,6 +147,7 @@ def steadied(source: Prepared, target: Prepared, T_target_source: Array, C: Arra
         if reach is None or reach > params.steadying_push:
             break
         added[:3, :3] += np.outer(across, across) / (HELD * reach) ** 2
+        left -= np.outer(across, across)
     return added
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector, transform
 from objreg_ros.registrar.params import RegistrarParams
@@ -60,6 +61,14 @@ def test_a_position_that_views_with_grey_hold_is_known_better_and_one_without_is
     added = steadied(*grey, TRUTH, C, PARAMS)
     assert np.linalg.inv(np.linalg.inv(C) + added)[0, 0] <= (HELD * PARAMS.pushes[0]) ** 2
     assert not steadied(*views(TABLE, 0.0, 20.0), TRUTH, C, PARAMS).any()
+
+
+def test_what_views_say_of_a_direction_counts_once() -> None:
+    C = np.diag([0.2**2, 1e-6, 1e-6, 1e-8, 1e-8, 1e-8])
+    grey = [prepare(keyframe(seen_from(a), TABLE, seed=k), PARAMS) for k, a in enumerate((0.0, 20.0))]
+    sure = PARAMS.replaced(doubtful_sigma=1e-3)  # they are asked on and on
+    once = steadied(*grey, TRUTH, C, PARAMS.replaced(doubtful_sigma=0.1))[0, 0]
+    assert steadied(*grey, TRUTH, C, sure)[0, 0] == pytest.approx(once, rel=0.05)
 
 
 def test_a_pose_that_came_to_rest_beside_the_truth_is_left_for_it() -> None:
