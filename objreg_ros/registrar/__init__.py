@@ -5,7 +5,8 @@ The way of a frame, file by file:
 
 ======================  ==========================================================================================
 the verb                `registrar`: `track` for every frame, `search` for every keyframe, `process` for both
-frames to keyframes     `keyframes` (when one ends), `tracking` (motion without odometry), `fusion`, `odometry`
+frames to keyframes     `keyframes` (when one ends), `tracking` (motion without odometry), `fusion`, `odometry`,
+                        `plumb` (gravity as all of them tell it)
 what is remembered      `keyframe`, `sighting`, `landmarks`; in `store` through `codec`; seen by `survey`, `export`
 which to try            `retrieve`, by `likest` objects: `descriptor` and `labels`
 poses from chains       `engine` finishes the `shortlist` of the `hypotheses`, fed by `prepared`: `features` and
@@ -13,7 +14,7 @@ poses from chains       `engine` finishes the `shortlist` of the `hypotheses`, f
                         `shape_icp`, `shape_score`, `worth`, `scrutiny`) on objects
 refinement              `icp` brings many to their basin; `refine` ends a few, with `direct` where there is grey
                         and `contradiction` to say how well the surfaces hold the pose; `liking` compares
-                        poses near each other
+                        poses near each other; `levelling` ends with what gravity tells
 evidence                `evidence`, of `verify`, `visibility` and `texture` (views, through `projection`), `objects`
                         (explained or moved), `symmetry`, `sliding` and `pushing`
 yes or no               `gate`, on a `candidate` with its evidence; then `covariance` and `thinning`

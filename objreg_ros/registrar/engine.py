@@ -14,10 +14,11 @@ import numpy as np
 from objreg_ros.data import Alignment, Array
 from objreg_ros.registrar.candidate import Candidate
 from objreg_ros.registrar.consensus import near
-from objreg_ros.registrar.covariance import spread_of, worst_translation
+from objreg_ros.registrar.covariance import covariance_of, spread_of, worst_translation
 from objreg_ros.registrar.evidence import gather, lead, resistance_of, unhidden, worth
 from objreg_ros.registrar.hypotheses import Hypothesis
 from objreg_ros.registrar.keyframe import Keyframe
+from objreg_ros.registrar.levelling import levelling
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Pair, Pantry
 from objreg_ros.registrar.refine import refine, warp
@@ -59,7 +60,8 @@ class Engine:
         ]
         if rivals:
             candidates = merged([*candidates, *rivals], pair.source.middle, self._params)
-        return tuple(self._pushed(pair, one) if self._promises(one, candidates[0]) else one for one in candidates)
+        pushed = (self._pushed(pair, one) if self._promises(one, candidates[0]) else one for one in candidates)
+        return tuple(self._levelled(pair, one) for one in pushed)
 
     def _judge(self, pair: Pair, seed: Hypothesis, seeds: Sequence[Hypothesis]) -> Candidate:
         """Finish a hypothesis and gather the evidence; ``seeds`` are all that may agree with it."""
@@ -96,6 +98,12 @@ class Engine:
         drop = resistance_of(candidate, pair.source, pair.target, self._params)
         return self._steadied(pair, replace(candidate, resistance=drop))
 
+    def _levelled(self, pair: Pair, candidate: Candidate) -> Candidate:
+        """The candidate moved within its covariance to where gravity is kept; its evidence stays that of the views."""
+        C = covariance_of(candidate.alignment, self._params) + candidate.warp
+        step = levelling(pair.source, pair.target, candidate.T_target_source, C, self._params)
+        return candidate if step is None else self._informed(moved(candidate, step.T), step.information)
+
     def _refined(self, pair: Pair, T_target_source: Array) -> Alignment:
         """The refined pose; where that is known badly, the one that the views like best of all that it could be."""
         params, source, target = self._params, pair.source, pair.target
@@ -112,15 +120,25 @@ class Engine:
         if candidate.resistance is None or len(alignment.slack) > 0:
             return candidate
         added = steadied(pair.source, pair.target, alignment.T_target_source, C + candidate.warp, self._params)
-        steady = replace(alignment, information=alignment.information + added)
+        return self._informed(candidate, added)
+
+    def _informed(self, candidate: Candidate, added: Array) -> Candidate:
+        """The candidate with information (6, 6) that neither the residuals nor a warped depth know of."""
+        alignment, C = candidate.alignment, spread_of(candidate.alignment, self._params)
+        informed = replace(alignment, information=alignment.information + added)
         whole = np.linalg.inv(np.linalg.inv(C + candidate.warp) + added)
-        return replace(candidate, alignment=steady, warp=whole - np.linalg.inv(np.linalg.inv(C) + added))
+        return replace(candidate, alignment=informed, warp=whole - np.linalg.inv(np.linalg.inv(C) + added))
 
 
 def is_held(candidate: Candidate, params: RegistrarParams) -> bool:
     """Whether what the surfaces let slide is held by the outline and the print of an object."""
     alike = candidate.likeness
     return candidate.yaw_known and alike is not None and alike >= params.holding_likeness
+
+
+def moved(candidate: Candidate, T_target_source: Array) -> Candidate:
+    """The candidate at another pose nearby, with the evidence that it has."""
+    return replace(candidate, alignment=replace(candidate.alignment, T_target_source=T_target_source))
 
 
 def held(alignment: Alignment) -> Alignment:

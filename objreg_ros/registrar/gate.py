@@ -94,17 +94,24 @@ def _overlap(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
 
 def _free_space(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
-    """Stricter for a lone object: a half turn about it is seen in free space alone, by what floats beyond doubt.
+    """Little may float beyond doubt, unless three objects stand as they should, past which another may have moved.
 
-    And for several that look otherwise: they stand where others stood.
+    Stricter for a lone object: a half turn about it is seen in free space alone. And for several that look otherwise:
+    they stand where others stood.
     """
     violations, floating = candidate.verification.violations, candidate.floating
     if violations > params.max_violations:
         return Reason.FREE_SPACE, f"violations {violations:.3f} > {params.max_violations:.3f}"
-    doubtful = len(candidate.explained) < 2 or _several_otherwise(candidate, params)
-    if doubtful and floating > params.max_floating_alone:
-        return Reason.FREE_SPACE, f"{floating:.3f} float > {params.max_floating_alone:.3f}"
+    most = _most_floating(candidate, params)
+    if floating > most:
+        return Reason.FREE_SPACE, f"{floating:.3f} float > {most:.3f}"
     return None
+
+
+def _most_floating(candidate: Candidate, params: RegistrarParams) -> float:
+    if len(candidate.explained) < 2 or _several_otherwise(candidate, params):
+        return params.max_floating_alone
+    return params.max_floating if len(candidate.explained) < params.min_objects_plain else np.inf
 
 
 def _texture(candidate: Candidate, params: RegistrarParams) -> Refusal | None:

@@ -63,8 +63,9 @@ class Keyframe:
     """A moment with its objects, context and view, all in the camera frame of the reference frame at ``stamp_ns``.
 
     ``keyframe_id`` is unique in a store and grows with time, ``session`` counts the runs that wrote into it;
-    ``gravity (3,)`` is of length 1 or None; ``T_odom_camera`` is the pose of the reference frame in the
-    frame of its session, and says something about another keyframe of the same session only: the odometry's where
+    ``gravity (3,)`` is of length 1 or None, and ``gravity_confidence`` 0..1 how much was seen that tells it: next to
+    nothing for one view, 1 for many from around. ``T_odom_camera`` is the pose of the reference frame in the frame of
+    its session, and says something about another keyframe of the same session only: the odometry's where
     ``by_odometry``, else that of our own tracking, which may slip unnoticed. Until then the camera had gone
     ``travelled`` m and turned ``turned`` degrees in the session.
     """

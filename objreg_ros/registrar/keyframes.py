@@ -9,7 +9,7 @@ that rests makes one keyframe, not one a second.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from objreg_ros.data import Array, Frame
 from objreg_ros.geometry import inverse, rotation_angle
 from objreg_ros.registrar.odometry import Way
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.plumb import PlumbLine
 from objreg_ros.registrar.tracking import Surface, surface_of, view_motion
 
 
@@ -45,6 +46,7 @@ class _Session:
     number: int
     in_odometry: bool
     way: Way
+    plumb: PlumbLine
     first: Frame  # of the last stretch
     last_ns: int  # of the last frame that was followed
 
@@ -93,6 +95,7 @@ class Keyframer:
         if T_session_frame is None:
             return None if self._may_come_back(session, frame) else self._start(frame)
         session.last_ns = frame.stamp_ns
+        frame = self._levelled(session, frame)
         if stretch is None:
             self._begin(session, frame, T_session_frame)
             return None
@@ -119,11 +122,12 @@ class Keyframer:
             number=self.next_session,
             in_odometry=frame.T_odom_camera is not None,
             way=Way(T_session_frame),
+            plumb=self._plumb_line(),
             first=frame,
             last_ns=frame.stamp_ns,
         )
         self.next_session += 1
-        self._begin(self._session, frame, T_session_frame)
+        self._begin(self._session, self._levelled(self._session, frame), T_session_frame)
         return ended
 
     def _begin(self, session: _Session, frame: Frame, T_session_frame: Array) -> None:
@@ -152,6 +156,19 @@ class Keyframer:
             travelled=stretch.session.way.travelled,
             turned=stretch.session.way.turned,
         )
+
+    def _plumb_line(self) -> PlumbLine:
+        return PlumbLine(self._params.gravity_metres, self._params.gravity_degrees)
+
+    def _levelled(self, session: _Session, frame: Frame) -> Frame:
+        """The frame with gravity as all views of the session tell it, or its own where odometry does not carry that.
+
+        Our own tracking slips unnoticed, and what it carries then is wrong.
+        """
+        line = session.plumb if frame.T_odom_camera is not None else self._plumb_line()
+        T_session_frame = np.eye(4) if frame.T_odom_camera is None else frame.T_odom_camera
+        gravity, weight = line.feel(T_session_frame, frame.gravity, frame.gravity_confidence)
+        return replace(frame, gravity=gravity, gravity_confidence=weight)
 
     def _follow(self, frame: Frame) -> Array | None:
         """The pose of a frame in its session, in a gap of the odometry by the views; None if the track is lost."""

@@ -34,6 +34,13 @@ class RegistrarParams(Params):
     object_points: int = param(2000, "most points of an object that are kept", ge=100)
     context_radius: float = param(1.0, "how far around an object the context reaches", "m", ge=0.1)
     context_voxel: float = param(0.03, "edge of a voxel of the context", "m", ge=0.005, le=0.2)
+    gravity_metres: float = param(
+        2.0, "way over which odometry carries what earlier views told of gravity", "m", ge=0.01
+    )
+    gravity_degrees: float = param(120.0, "turn over which odometry carries it", "deg", ge=0.1)
+    gravity_noise: float = param(
+        0.5, "standard deviation of gravity that was felt all along such a way", "deg", ge=0.01
+    )
     context_range: float = param(4.0, "context farther from the camera is left out", "m", ge=0.5)
 
     # Which stored keyframes a new one is compared with.
@@ -234,6 +241,12 @@ class RegistrarParams(Params):
     min_tested: int = param(600, "least number of pixels that both views must see", ge=1)
     min_inliers: float = param(0.35, "least share of tested pixels whose depth agrees", ge=0.0, le=1.0)
     max_violations: float = param(0.07, "largest share of tested pixels in seen free space", ge=0.0, le=1.0)
+    max_floating: float = param(
+        0.015,
+        "largest share of tested pixels far in seen free space, where fewer than min_objects_plain are explained",
+        ge=0.0,
+        le=1.0,
+    )
     max_floating_alone: float = param(
         0.008,
         "largest share of tested pixels far in seen free space, where a single object is explained or several look "
@@ -286,7 +299,9 @@ class RegistrarParams(Params):
     min_chains: int = param(2, "chains that must agree on a lone object's pose for it not to be doubtful", ge=1)
     min_objects: int = param(2, "explained objects that need no more evidence than the views; a lone one does", ge=1)
     min_objects_plain: int = param(
-        3, "explained objects that make up for grey that does not correlate, as on a plain table", ge=1
+        3,
+        "explained objects that make up for grey that does not correlate, as on a plain table, and for what floats",
+        ge=1,
     )
     min_likeness_alone: float = param(0.1, "least likeness of a lone object where grey is missing", ge=-1.0, le=1.0)
     min_margin_alone: float = param(

@@ -27,10 +27,11 @@ from objreg_ros.registrar.visibility import Sight, halved, prepare_sight
 class Prepared:
     """All that was seen, thinned: ``sight`` and, at half its size, ``coarse`` to look with.
 
-    ``surface`` to be aligned to, ``xyz`` and ``normals (M, 3)`` to align with; ``up (3,)`` is against gravity, or None;
-    ``groups`` the confusable group of each object, ``centroids (K, 3)`` their middles and ``extents (K,)`` m,
-    ``shapes`` what is laid upon others and ``yaw_known`` whether that tells a turn; ``scene`` is all of them as one
-    shape; ``middle (3,)`` that of everything: where poses are compared.
+    ``surface`` to be aligned to, ``xyz`` and ``normals (M, 3)`` to align with; ``up (3,)`` is against gravity, or None,
+    and ``up_weight`` 0..1 how much was seen that tells it; ``groups`` the confusable group of each object,
+    ``centroids (K, 3)`` their middles and ``extents (K,)`` m, ``shapes`` what is laid upon others and ``yaw_known``
+    whether that tells a turn; ``scene`` is all of them as one shape; ``middle (3,)`` that of everything: where poses
+    are compared.
     """
 
     keyframe: Keyframe
@@ -41,6 +42,7 @@ class Prepared:
     xyz: Array
     normals: Array
     up: Array | None
+    up_weight: float
     groups: tuple[str, ...]
     yaw_known: tuple[bool, ...]
     shapes: tuple[Shape | None, ...]
@@ -81,6 +83,7 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
             coarse=prepare_sight(halved(keyframe.view), *seeing),
             **_shuffled(*joined(coarse, sampled(things, params.thing_points, params.seed)), params.seed),
             up=up,
+            up_weight=keyframe.gravity_confidence,
             groups=tuple(groups.of(label) for label in keyframe.labels),
             yaw_known=tuple(
                 tells_yaw(item.cloud, up, shape, params) for item, shape in zip(keyframe.objects, shapes, strict=True)

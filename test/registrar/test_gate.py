@@ -69,17 +69,24 @@ def test_one_object_closes_a_loop_when_grey_holds_the_pose_and_no_other_comes_ne
 
 
 def test_a_lone_object_must_respect_free_space_more_than_several() -> None:
-    far = {"floating": 2.0 * PARAMS.max_floating_alone}
+    far = {"floating": 0.5 * (PARAMS.max_floating_alone + PARAMS.max_floating)}
     refusal = refuse(candidate(explained=(CUP,), margin=1.0, **far), PARAMS)
     assert refusal is not None and refusal[0] is Reason.FREE_SPACE
     assert refuse(candidate(**far), PARAMS) is None
 
 
 def test_several_objects_that_look_otherwise_may_not_float_either() -> None:
-    far = {"floating": 2.0 * PARAMS.max_floating_alone}
+    far = {"floating": 0.5 * (PARAMS.max_floating_alone + PARAMS.max_floating)}
     assert refuse(candidate(**far, likeness=0.0), PARAMS) is None
     refusal = refuse(candidate(**far, likeness=PARAMS.min_likeness_unrivalled - 0.1), PARAMS)
     assert refusal is not None and refusal[0] is Reason.FREE_SPACE
+
+
+def test_two_objects_may_both_have_moved_but_three_stand_where_they_stood() -> None:
+    far, three = {"floating": 1.1 * PARAMS.max_floating}, tuple(ObjectPair(k, k, "cup") for k in range(3))
+    refusal = refuse(candidate(**far), PARAMS)
+    assert refusal is not None and refusal[0] is Reason.FREE_SPACE
+    assert refuse(candidate(**far, explained=three), PARAMS) is None
 
 
 def test_where_something_floats_the_fall_over_a_push_makes_up_for_a_low_score() -> None:

@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from objreg_ros.data import Frame, View
+from objreg_ros.geometry import inverse, pose, rotation_from_vector
 from objreg_ros.registrar.keyframes import Keyframer, Stretch
 from objreg_ros.registrar.params import RegistrarParams
 
@@ -107,3 +110,25 @@ def test_the_way_counts_where_nothing_is_seen_too() -> None:
     frames = [frame(0.1 * i, (), moved(x)) for i, x in enumerate((there + back)[1:-1], start=1)]
     stretches = _run(Keyframer(PARAMS), [frame(0.0, CUP, np.eye(4)), *frames, frame(1.8, (*CUP, book), np.eye(4))])
     assert [round(s.travelled, 3) for s in stretches] == [0.0, 8.0]
+
+
+def test_odometry_carries_what_earlier_views_told_of_gravity_and_our_own_tracking_does_not() -> None:
+    tilt = rotation_from_vector(np.radians([0.0, 0.0, 4.0]))
+    known = [frame(0.1 * i, CUP, moved(0.03 * i)) for i in range(29)]
+    tracked = [frame(0.1 * i, CUP, None, scene_view(moved(0.03 * i))) for i in range(5)]
+    for frames, carried in ((known, True), (tracked, False)):
+        warped = replace(frames[-1], gravity=tilt @ frames[-1].gravity)
+        last = _run(Keyframer(PARAMS), [*frames[:-1], warped])[-1].frames[0]
+        error = np.degrees(np.arccos(last.gravity @ frames[0].gravity))
+        assert error < 1.0 if carried else error == pytest.approx(4.0)
+        assert last.gravity_confidence > 0.2 if carried else last.gravity_confidence < 0.1
+
+
+def test_gravity_turns_with_the_camera() -> None:
+    turns = [pose(rotation_from_vector(np.radians([5.0 * i, 0.0, 0.0])), np.zeros(3)) for i in range(8)]
+    frames = [replace(frame(0.1 * i, CUP, T), gravity=T[:3, :3].T @ [0.0, 1.0, 0.0]) for i, T in enumerate(turns)]
+    for stretch in _run(Keyframer(PARAMS), frames):
+        for item, T_first_frame in zip(stretch.frames, stretch.T_first_frame, strict=True):
+            T = stretch.T_session_first @ T_first_frame
+            assert item.gravity is not None
+            np.testing.assert_allclose(item.gravity, inverse(T)[:3, :3] @ [0.0, 1.0, 0.0], atol=1e-9)
