@@ -80,16 +80,19 @@ class Intrinsics:
         _require(self, self.fx > 0 and self.fy > 0, "focal lengths above 0 px", numbers[:2])
         _require(self, self.width > 0 and self.height > 0, "a size above 0 px", (self.width, self.height))
 
-    def scaled(self, step: int) -> Intrinsics:
-        """The camera that sees every ``step``-th pixel of each row and column, starting at pixel ``step // 2``."""
-        first = step // 2
+    def scaled(self, step: int, first: tuple[int, int] | None = None) -> Intrinsics:
+        """The camera that sees every ``step``-th pixel of each row and column.
+
+        It starts at pixel ``first``, column and row, or at ``step // 2``.
+        """
+        left, top = first or (step // 2, step // 2)
         return Intrinsics(
             fx=self.fx / step,
             fy=self.fy / step,
-            cx=(self.cx - first) / step,
-            cy=(self.cy - first) / step,
-            width=len(range(first, self.width, step)),
-            height=len(range(first, self.height, step)),
+            cx=(self.cx - left) / step,
+            cy=(self.cy - top) / step,
+            width=len(range(left, self.width, step)),
+            height=len(range(top, self.height, step)),
         )
 
 

@@ -12,6 +12,7 @@ MIN_FIT = 30  # points that a fit of the intrinsics needs
 STEPS = (1, 2, 3, 4, 6, 8)  # pixels in each row and column that become one for a thinned cloud
 SAMPLE, NEAREST = 20000, 0.3  # points, and which share of them, that tell whether a cloud fills an image
 FILLED = 0.75  # share of these that have a point right of them, and below
+BEGUN = 0.9  # share of the points in every step-th column, and row, of a cloud that was thinned to these
 FIT_ERROR_PX = 1.5  # the median distance that a pixel may have from where the fitted camera sees its point
 
 
@@ -103,7 +104,7 @@ def _project(points: Array, rgb: Array | None, camera: Intrinsics) -> tuple[Arra
     That is the one with the most pixels of ``camera`` and its reductions that the points fill, ``camera`` if they fill
     none; of one pixel the nearest point wins.
     """
-    for grid in (*(camera.scaled(step) for step in STEPS), camera):
+    for grid in (*(camera.scaled(step, _first(points, camera, step)) for step in STEPS), camera):
         inside, index = _pixels(points, grid)
         if len(index) == 0:
             raise ValueError(
@@ -121,6 +122,15 @@ def _project(points: Array, rgb: Array | None, camera: Intrinsics) -> tuple[Arra
     colour = np.zeros((grid.height * grid.width, 3), np.uint8)
     colour[index[far_first]] = rgb[inside][far_first]
     return depth.reshape(grid.height, grid.width), colour.reshape(grid.height, grid.width, 3), grid
+
+
+def _first(points: Array, camera: Intrinsics, step: int) -> tuple[int, int] | None:
+    """The column and row with which a thinning to every ``step``-th pixel began; None if it was none of that kind."""
+    _, index = _pixels(points[:: max(1, len(points) // SAMPLE)], camera)
+    counts = [np.bincount(pixel % step, minlength=step) for pixel in (index % camera.width, index // camera.width)]
+    if any(count.max() < BEGUN * len(index) for count in counts):
+        return None
+    return int(counts[0].argmax()), int(counts[1].argmax())
 
 
 def _pixels(points: Array, camera: Intrinsics) -> tuple[Array, Array]:

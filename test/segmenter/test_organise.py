@@ -85,6 +85,19 @@ def test_a_thinned_cloud_gives_the_smaller_image_that_its_points_fill() -> None:
     assert whole.depth.shape == image.depth.shape
 
 
+@pytest.mark.parametrize(("step", "first"), [(2, 0), (2, 1), (3, 0), (4, 0), (4, 3)])
+def test_a_cloud_thinned_from_any_pixel_on_keeps_its_points_on_their_rays(step: int, first: int) -> None:
+    v, u = (grid[first::step, first::step].ravel() for grid in np.mgrid[:480, :640])
+    x, y = (u - CAMERA_VGA.cx) / CAMERA_VGA.fx, (v - CAMERA_VGA.cy) / CAMERA_VGA.fy
+    z = 1.0 / (1.0 - 0.3 * x)  # on the plane z = 1 + 0.3 x
+    xyz = np.stack([x * z, y * z, z], axis=-1).astype(np.float32)
+    image = organise(PointCloud(xyz=xyz[None], rgb=None, stamp_ns=0), CAMERA_VGA)
+    assert (image.depth > 0).sum() == len(u)
+    camera = image.intrinsics
+    seen = back_project(image.depth, camera.fx, camera.fy, camera.cx, camera.cy)[image.depth > 0]
+    np.testing.assert_allclose(seen[:, 2], 1.0 + 0.3 * seen[:, 0], atol=1e-5)
+
+
 @pytest.mark.parametrize(
     ("xyz", "camera", "said"),
     [
