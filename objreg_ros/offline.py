@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -192,7 +192,7 @@ class Line:
         self._camera_info: Any = None
         self._labels: dict[int, tuple[str, ...]] = {}  # what was detected in the frames that are under way
         self._views = Synchroniser(self._streams(), self._unmatched)
-        odom = Stream("odom", Need.OPTIONAL, timing.odom_slop_ns, ODOM_DEPTH)
+        odom = Stream("odom", Need.OPTIONAL, timing.odom_slop_ns, ODOM_DEPTH, enclosing=True)
         self._frames = Synchroniser([Stream("frame"), odom], self._unmatched)
 
     def _streams(self) -> list[Stream]:
@@ -329,11 +329,11 @@ def run_offline(
     return line.finish()
 
 
-def with_odometry(frame: Frame, odom: Any, T_base_camera: Array | None) -> Frame:
-    """The frame with the pose that an odometry message (or None) gives its camera; ValueError if it gives none."""
-    if odom is None:
+def with_odometry(frame: Frame, odom: Sequence[Any] | None, T_base_camera: Array | None) -> Frame:
+    """The frame with the pose that the odometry messages around it give its camera; ValueError if they give none."""
+    if not odom:
         return frame
-    T_odom_body = from_msg.odometry(odom).T_odom_body
+    T_odom_body = from_msg.pose_at(frame.stamp_ns, odom)
     return replace(frame, T_odom_camera=T_odom_body if T_base_camera is None else T_odom_body @ T_base_camera)
 
 

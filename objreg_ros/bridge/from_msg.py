@@ -8,7 +8,7 @@ in `layout`. A message that breaks its contract raises ValueError with what was 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,7 @@ from objreg_ros.data import (
     PointCloud,
     View,
 )
-from objreg_ros.geometry import pose, rotation_from_quaternion
+from objreg_ros.geometry import interpolate, pose, rotation_from_quaternion
 
 Array = NDArray[Any]
 
@@ -126,6 +126,15 @@ def odometry(message: Any) -> Odometry:
         frame_id=message.header.frame_id,
         child_frame_id=getattr(message, "child_frame_id", ""),
     )
+
+
+def pose_at(moment_ns: int, messages: Sequence[Any]) -> Array:
+    """``T_odom_body (4, 4)`` at a moment, between the two odometry messages that enclose it; of one message its own."""
+    first, last = odometry(messages[0]), odometry(messages[-1])
+    if first.stamp_ns == last.stamp_ns:
+        return first.T_odom_body
+    share = (moment_ns - first.stamp_ns) / (last.stamp_ns - first.stamp_ns)
+    return interpolate(first.T_odom_body, last.T_odom_body, min(1.0, max(0.0, share)))
 
 
 def level_gravity(message: Any, T_body_camera: Array | None = None) -> Array | None:
@@ -268,10 +277,10 @@ def frame(
     view_info: Any,
     gravity_message: Any,
     names: Mapping[int, str],
-    odometry_message: Any = None,
+    odometry_messages: Sequence[Any] | None = None,
     T_body_camera: Array | None = None,
 ) -> Frame:
-    """One moment from the segmenter's four messages, which must carry one stamp, and the odometry that goes with it.
+    """One moment from the segmenter's four messages, which must carry one stamp, and the odometry around it, if any.
 
     ``T_body_camera`` is where the camera sits on the body that the odometry speaks of; the same place if None.
     """
@@ -280,7 +289,7 @@ def frame(
         raise ValueError(f"frame: expected objects, view, camera_info and gravity of one stamp, got {stamps} ns")
     clouds, support = objects(objects_message, names)
     falls, confidence = gravity(gravity_message)
-    T_odom_camera = None if odometry_message is None else odometry(odometry_message).T_odom_body
+    T_odom_camera = pose_at(stamps[0], odometry_messages) if odometry_messages else None
     if T_odom_camera is not None and T_body_camera is not None:
         T_odom_camera = T_odom_camera @ T_body_camera
     return Frame(

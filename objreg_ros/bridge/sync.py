@@ -25,6 +25,9 @@ class Need(Enum):
 SILENCE_NS = 1_000_000_000  # an optional stream that is so far behind has stopped: nothing waits for it
 
 
+ENCLOSING = 5  # times the slop: 0.1 s for one of 20 ms, so that 10 Hz are enough
+
+
 class Drop(Enum):
     """Why an item met no match. The value is what diagnostics show."""
 
@@ -44,17 +47,22 @@ class Item:
 
 @dataclass(frozen=True, slots=True)
 class Stream:
-    """How one input is treated: ``slop_ns`` is the largest distance in time to the reference, 0 for exact."""
+    """How one input is treated: ``slop_ns`` is the largest distance in time to the reference, 0 for exact.
+
+    Of an ``enclosing`` one a match gets a tuple: the item of its very time, or those before and after it where they are
+    at most `ENCLOSING` times the slop apart, or the nearest.
+    """
 
     name: str
     need: Need = Need.REQUIRED
     slop_ns: int = 0
     depth: int = 10
+    enclosing: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """One payload a stream, by name; None where an optional stream had nothing near."""
+    """One payload a stream, a tuple of an enclosing one, by name; None where an optional one had nothing near."""
 
     stamp_ns: int
     payloads: Mapping[str, Any]
@@ -86,11 +94,22 @@ class Queue:
         near = min(self.items, key=lambda item: abs(item.stamp_ns - stamp_ns), default=None)
         return near if near is not None and abs(near.stamp_ns - stamp_ns) <= self.stream.slop_ns else None
 
+    def partners(self, stamp_ns: int) -> tuple[Item, ...]:
+        """What goes with a time, the earlier first; one item at most, or two that enclose it. Empty for none."""
+        near = self.nearest(stamp_ns)
+        if self.stream.enclosing and (near is None or near.stamp_ns != stamp_ns):
+            before = next((item for item in reversed(self.items) if item.stamp_ns < stamp_ns), None)
+            after = next((item for item in self.items if item.stamp_ns > stamp_ns), None)
+            most = ENCLOSING * self.stream.slop_ns
+            if before is not None and after is not None and after.stamp_ns - before.stamp_ns <= most:
+                return before, after
+        return () if near is None else (near,)
+
     def lacks(self, stamp_ns: int) -> bool:
         """Whether there can be no match at a time for want of an item of this stream."""
         if self.stream.need is Need.LATCHED:
             return self.latched is None
-        return self.stream.need is Need.REQUIRED and self.nearest(stamp_ns) is None
+        return self.stream.need is Need.REQUIRED and not self.partners(stamp_ns)
 
     def settled(self, stamp_ns: int) -> bool:
         """Whether no item that may still come can be nearer to a time than those that are here."""
@@ -205,26 +224,26 @@ class Synchroniser:
 
     def _resolve(self, item: Item, why: Drop = Drop.UNMATCHED) -> list[Match]:
         """Take the first reference item out: a match, or a drop."""
-        partners = {queue.stream.name: queue.nearest(item.stamp_ns) for queue in self._others if not _latched(queue)}
+        partners = {queue.stream.name: queue.partners(item.stamp_ns) for queue in self._others if not _latched(queue)}
         if self.lacking(item.stamp_ns):
             self._reference.drop_oldest(why)
             return []
         self._reference.use(item)
         self._reference.items.popleft()
         payloads = {queue.stream.name: queue.latched for queue in self._others if _latched(queue)}
-        for name, partner in partners.items():
-            payloads[name] = None if partner is None else partner.payload
-            self._spend(self.queues[name], partner)
+        for name, found in partners.items():
+            payloads[name] = _payload(self.queues[name].stream, found)
+            self._spend(self.queues[name], found)
         return [Match(item.stamp_ns, {self._reference.stream.name: item.payload, **payloads})]
 
     @staticmethod
-    def _spend(queue: Queue, partner: Item | None) -> None:
-        if partner is None:
-            return
-        queue.use(partner)
-        queue.drop_before(partner.stamp_ns)
-        if queue.stream.need is Need.REQUIRED:
-            queue.items.popleft()
+    def _spend(queue: Queue, partners: Sequence[Item]) -> None:
+        for partner in partners:
+            queue.use(partner)
+        if partners:
+            queue.drop_before(partners[0].stamp_ns)
+            if queue.stream.need is Need.REQUIRED:
+                queue.items.popleft()
 
     def _make_room(self, queue: Queue) -> list[Match]:
         """Keep a queue within its depth: the oldest reference item goes as it is, the oldest of others is dropped."""
@@ -239,3 +258,9 @@ class Synchroniser:
 
 def _latched(queue: Queue) -> bool:
     return queue.stream.need is Need.LATCHED
+
+
+def _payload(stream: Stream, partners: Sequence[Item]) -> Any:
+    if not partners:
+        return None
+    return tuple(item.payload for item in partners) if stream.enclosing else partners[0].payload

@@ -77,7 +77,8 @@ class RegistrarNode(MatchingDoor):
             self.listen(kind, topic, self._hear(topic), qos.room(), watched=topic)
         self.expect("objects", "objects")
         exact = [Stream(topic) for topic in room]
-        self.begin([*exact, Stream("labels", Need.LATCHED), Stream("odom", Need.OPTIONAL, odom_slop_ns, depth=1000)])
+        odom = Stream("odom", Need.OPTIONAL, odom_slop_ns, depth=1000, enclosing=True)
+        self.begin([*exact, Stream("labels", Need.LATCHED), odom])
 
     # Hear
 
@@ -106,8 +107,8 @@ class RegistrarNode(MatchingDoor):
 
     def _frame(self, match: Match) -> Frame:
         odom = match["odom"]
-        if odom is not None:
-            self._odom_frame = odom.header.frame_id
+        if odom:
+            self._odom_frame = odom[0].header.frame_id
         topics = ("objects", "view", "view/camera_info", "gravity", "labels", "odom")
         return self.read("frame", from_msg.frame, *(match[topic] for topic in topics), self._T_base_camera)
 

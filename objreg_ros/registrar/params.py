@@ -345,7 +345,12 @@ class RegistrarParams(Params):
 class RegistrarNodeParams(Params):
     """How the registrar's node brings its inputs together."""
 
-    odom_slop: float = param(0.02, "largest distance in time between a frame and its odometry", "s", ge=0.0)
+    odom_slop: float = param(
+        0.02,
+        "largest distance in time between a frame and its odometry, unless two within five times it enclose the frame",
+        "s",
+        ge=0.0,
+    )
     T_base_camera: tuple[float, ...] = param(
         (), "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: the odometry is the camera's"
     )

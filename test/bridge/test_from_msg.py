@@ -270,7 +270,7 @@ def test_a_frame_is_made_of_its_four_messages() -> None:
         info,
         gravity_message(0, 0.5, 0),
         {3: "cup"},
-        messages.odometry(at=(1, 0, 0)),
+        [messages.odometry(at=(1, 0, 0))],
     )
     assert [cloud.label for cloud in frame.objects] == ["4", "cup"]
     assert frame.view.grey is not None and frame.view.grey[0, 0] == 0x40
@@ -283,9 +283,16 @@ def test_the_camera_sits_where_the_body_carries_it() -> None:
     T_body_camera = np.eye(4)
     T_body_camera[1, 3] = 2
     parts = (messages.own_table(object_rows()), view, info, gravity_message(0, 0, 0), {})
-    frame = from_msg.frame(*parts, messages.odometry(at=(1, 0, 0)), T_body_camera)
+    frame = from_msg.frame(*parts, [messages.odometry(at=(1, 0, 0))], T_body_camera)
     assert frame.T_odom_camera is not None and frame.T_odom_camera[:3, 3].tolist() == [1, 2, 0]
     assert frame.gravity is None and frame.gravity_confidence == 0
+
+
+def test_a_pose_between_two_messages_is_between_theirs() -> None:
+    around = [messages.odometry(at=(1, 0, 0), stamp_ns=100), messages.odometry(at=(2, 0, 0), stamp_ns=140)]
+    np.testing.assert_allclose(from_msg.pose_at(110, around)[:3, 3], (1.25, 0, 0))
+    assert from_msg.pose_at(110, around[:1])[0, 3] == 1
+    assert from_msg.pose_at(500, around)[0, 3] == 2
 
 
 def test_messages_of_two_moments_are_no_frame() -> None:

@@ -80,6 +80,18 @@ def test_an_optional_stream_that_has_spoken_is_waited_for_and_reused() -> None:
     assert sync.queues["odom"].matched == 1 and accounts_hold(sync)
 
 
+def test_an_enclosing_stream_gives_what_is_on_either_side_of_a_time() -> None:
+    sync = Synchroniser((Stream("image"), Stream("odom", Need.OPTIONAL, slop_ns=10, enclosing=True)))
+    found = []
+    for stamp in (0, 30, 60, 200, 215):
+        found += sync.add("odom", stamp, f"o{stamp}")
+        for image in {30: (30, 45), 60: (70,), 200: (130, 205)}.get(stamp, ()):
+            found += sync.add("image", image, image)
+    expected = [(30, ("o30",)), (45, ("o30", "o60")), (70, ("o60",)), (130, None), (205, ("o200", "o215"))]
+    assert pairs(found, "image", "odom") == expected  # o60 and o200 are too far apart to enclose 70 or 130
+    assert accounts_hold(sync)
+
+
 def test_an_optional_stream_that_died_is_given_up_when_the_queue_is_full() -> None:
     sync = Synchroniser((Stream("image", depth=2), Stream("odom", Need.OPTIONAL, slop_ns=10)))
     sync.add("odom", 0, "o")
