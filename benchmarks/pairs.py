@@ -42,7 +42,7 @@ QUICK = {"wanted": 15, "names": ("paper", "orb_pnp")}
 
 def single(frame: Frame, params: RegistrarParams) -> Keyframe:
     """A keyframe of one frame."""
-    return fuse(Stretch(frames=(frame,), T_first_frame=(np.eye(4),), T_session_first=np.eye(4), session=0), params)
+    return fuse(Stretch.of(frame), params)
 
 
 def fused(frames: Sequence[Frame], params: RegistrarParams) -> list[Keyframe]:

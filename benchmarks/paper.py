@@ -142,7 +142,7 @@ def shoot(stage: Stage, T_world_camera: Array, seed: int, preset: str) -> Frame:
 
 def keyframe(frame: Frame, params: RegistrarParams) -> Keyframe:
     """A keyframe of a single frame."""
-    return fuse(Stretch(frames=(frame,), T_first_frame=(np.eye(4),), T_session_first=np.eye(4), session=0), params)
+    return fuse(Stretch.of(frame), params)
 
 
 def closest(source: Array, target: Array, T_target_source: Array) -> float:

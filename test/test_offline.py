@@ -9,6 +9,7 @@ import pytest
 from recording.folders import CAMERA, records
 from simple_rooms import simple_rooms
 
+from objreg_ros.bridge import from_msg
 from objreg_ros.data import DepthImage
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.offline import Timing, as_sent, run_offline
@@ -70,6 +71,21 @@ def test_a_frame_whose_odometry_was_lost_goes_through_without() -> None:
     rooms, chain = simple_rooms()
     run_offline(without("/odom", 1100 * MS), rooms, INPUTS)
     assert [frame.T_odom_camera is None for frame in chain.frames] == [False, True, False, False]
+
+
+def test_a_frame_between_two_odometry_messages_has_a_pose_between_theirs() -> None:
+    rooms, chain = simple_rooms()
+    wanted = {1000 * MS: 970, 1100 * MS: 1070, 1200 * MS: 1170, 1300 * MS: 1270}  # each 30 ms before its frame
+    shifted = []
+    for record in records(4):
+        if record.topic == "/odom":
+            early = wanted[record.stamp_ns] * MS
+            message = messages.odometry(from_msg.odometry(record.message).T_odom_body, np.eye(6), early, "odom", "base")
+            record = Record.of("/odom", message, early)
+        shifted.append(record)
+    run_offline(sorted(shifted, key=lambda record: record.stamp_ns), rooms, INPUTS)
+    assert [frame.T_odom_camera[0, 3] for frame in chain.frames[:3]] == pytest.approx([0.03, 0.13, 0.23])
+    assert chain.frames[3].T_odom_camera is None  # nothing came after it, and the last is more than 20 ms away
 
 
 def test_the_mounting_of_the_camera_is_applied() -> None:

@@ -129,10 +129,15 @@ def odometry(message: Any) -> Odometry:
 
 
 def pose_at(moment_ns: int, messages: Sequence[Any]) -> Array:
-    """``T_odom_body (4, 4)`` at a moment, between the two odometry messages that enclose it; of one message its own."""
+    """``T_odom_body (4, 4)`` at a moment, between the two odometry messages that enclose it; of one message its own.
+
+    The nearer one's where they speak of different frames.
+    """
     first, last = odometry(messages[0]), odometry(messages[-1])
     if first.stamp_ns == last.stamp_ns:
         return first.T_odom_body
+    if first.frame_id != last.frame_id:
+        return (first if moment_ns - first.stamp_ns <= last.stamp_ns - moment_ns else last).T_odom_body
     share = (moment_ns - first.stamp_ns) / (last.stamp_ns - first.stamp_ns)
     return interpolate(first.T_odom_body, last.T_odom_body, min(1.0, max(0.0, share)))
 

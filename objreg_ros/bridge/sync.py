@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Streams of stamped things brought together by time; knows neither ROS nor what the things are.
 
-The first stream is the reference: every match is one of its items with the nearest item of each other stream. Nothing
-is lost in silence: for every stream ``received = matched + waiting + dropped by reason``.
+The first stream is the reference: every match is one of its items with the nearest item of each other stream, or with
+those before and after it. Nothing is lost in silence: for every stream
+``received = matched + waiting + dropped by reason``.
 """
 
 from __future__ import annotations
@@ -23,9 +24,7 @@ class Need(Enum):
 
 
 SILENCE_NS = 1_000_000_000  # an optional stream that is so far behind has stopped: nothing waits for it
-
-
-ENCLOSING = 5  # times the slop: 0.1 s for one of 20 ms, so that 10 Hz are enough
+ENCLOSING = 7  # times the slop: 0.14 s for one of 20 ms, so that 10 Hz are enough
 
 
 class Drop(Enum):
@@ -58,6 +57,12 @@ class Stream:
     slop_ns: int = 0
     depth: int = 10
     enclosing: bool = False
+
+    def __post_init__(self) -> None:
+        if self.enclosing and self.need is not Need.OPTIONAL:
+            raise ValueError(
+                f"{self.name}: expected an enclosing stream to be optional, as its items serve many matches"
+            )
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,10 +44,11 @@ def between_keyframes(
     is known less well where it was not measured. ValueError for a moment that odometry does not cover.
     """
     O_k1, O_from, O_to, O_k2 = (odometry.at(stamp) for stamp in (k1_ns, closure.from_ns, closure.to_ns, k2_ns))
-    T_k1_from, T_k2_to = inverse(O_k1) @ O_from @ T_body_camera, inverse(O_k2) @ O_to @ T_body_camera
-    moved = compensated(Constraint(closure.T_from_to, closure.covariance), T_k1_from, inverse(T_k2_to))
-    turned = _turning(moved.T_from_to[:3, 3] - T_k1_from[:3, 3])
-    there, back = wandering(inverse(O_k1) @ O_from, sigmas), wandering(inverse(O_k2) @ O_to, sigmas)
+    T_k1_body, T_k2_body = inverse(O_k1) @ O_from, inverse(O_k2) @ O_to  # at the closure's moments
+    measured = Constraint(closure.T_from_to, closure.covariance)
+    moved = compensated(measured, T_k1_body @ T_body_camera, inverse(T_k2_body @ T_body_camera))
+    turned = _turning(moved.T_from_to[:3, 3] - T_k1_body[:3, 3])
+    there, back = wandering(T_k1_body, sigmas), wandering(T_k2_body, sigmas)
     return moved._replace(covariance=moved.covariance + turned @ there @ turned.T + back)
 
 

@@ -124,8 +124,8 @@ class PoseGraph:
         k1, k2 = (self.keyframes.nearest(stamp) for stamp in (closure.from_ns, closure.to_ns))
         if k1 != k2:
             k1_ns, k2_ns = self.keyframes.stamps_ns[k1], self.keyframes.stamps_ns[k2]
-            near = k1_ns, k2_ns, self.T_body_camera, self.params.odometry_sigmas
-            constraint = between_keyframes(closure, self.odometry, *near)
+            moments, sigmas = (k1_ns, k2_ns), self.params.odometry_sigmas
+            constraint = between_keyframes(closure, self.odometry, *moments, self.T_body_camera, sigmas)
             self.ties.append(Tie(k1, k2, constraint, closure))
         return True
 

@@ -99,10 +99,13 @@ class Engine:
         return self._steadied(pair, replace(candidate, resistance=drop))
 
     def _levelled(self, pair: Pair, candidate: Candidate) -> Candidate:
-        """The candidate moved within its covariance to where gravity is kept; its evidence stays that of the views."""
+        """The candidate brought within its covariance to where gravity is kept, and known better by it.
+
+        Its evidence stays that of the pose that the views like.
+        """
         C = covariance_of(candidate.alignment, self._params) + candidate.warp
         step = levelling(pair.source, pair.target, candidate.T_target_source, C, self._params)
-        return candidate if step is None else self._informed(moved(candidate, step.T), step.information)
+        return candidate if step is None else self._informed(brought(candidate, step.T), step.information)
 
     def _refined(self, pair: Pair, T_target_source: Array) -> Alignment:
         """The refined pose; where that is known badly, the one that the views like best of all that it could be."""
@@ -136,7 +139,7 @@ def is_held(candidate: Candidate, params: RegistrarParams) -> bool:
     return candidate.yaw_known and alike is not None and alike >= params.holding_likeness
 
 
-def moved(candidate: Candidate, T_target_source: Array) -> Candidate:
+def brought(candidate: Candidate, T_target_source: Array) -> Candidate:
     """The candidate at another pose nearby, with the evidence that it has."""
     return replace(candidate, alignment=replace(candidate.alignment, T_target_source=T_target_source))
 

@@ -94,24 +94,25 @@ def _overlap(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
 
 def _free_space(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
-    """Little may float beyond doubt, unless three objects stand as they should, past which another may have moved.
+    """Stricter for a lone object: a half turn about it is seen in free space alone, by what floats beyond doubt.
 
-    Stricter for a lone object: a half turn about it is seen in free space alone. And for several that look otherwise:
-    they stand where others stood.
+    And for several that look otherwise: they stand where others stood.
     """
     violations, floating = candidate.verification.violations, candidate.floating
     if violations > params.max_violations:
         return Reason.FREE_SPACE, f"violations {violations:.3f} > {params.max_violations:.3f}"
-    most = _most_floating(candidate, params)
-    if floating > most:
-        return Reason.FREE_SPACE, f"{floating:.3f} float > {most:.3f}"
+    doubtful = len(candidate.explained) < 2 or _several_otherwise(candidate, params)
+    if doubtful and floating > params.max_floating_alone:
+        return Reason.FREE_SPACE, f"{floating:.3f} float > {params.max_floating_alone:.3f}"
     return None
 
 
-def _most_floating(candidate: Candidate, params: RegistrarParams) -> float:
-    if len(candidate.explained) < 2 or _several_otherwise(candidate, params):
-        return params.max_floating_alone
-    return params.max_floating if len(candidate.explained) < params.min_objects_plain else np.inf
+def _unmoved(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
+    """Two objects may have moved together, and be most of what is seen: then what stayed floats. Three stayed."""
+    few, floating = len(candidate.explained) < params.min_objects_plain, candidate.floating
+    if few and floating > params.max_floating:
+        return Reason.FREE_SPACE, f"{floating:.3f} float > {params.max_floating:.3f}"
+    return None
 
 
 def _texture(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
@@ -219,9 +220,9 @@ def _stationary(candidate: Candidate, params: RegistrarParams) -> Refusal | None
 def _held(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
     """Whether the pose is known: the worse by its covariance, the more the views must like a push less.
 
-    The covariance is that of the residuals and of a warped depth: two views may share few patches on one side, which
-    agree with many poses. A camera that goes sideways and turns to keep looking at one far thing sees next to no
-    difference.
+    The covariance is that of the residuals and of a warped depth, less what views and gravity tell: two views may share
+    few patches on one side, which agree with many poses. A camera that goes sideways and turns to keep looking at one
+    far thing sees next to no difference.
     """
     sigma, drop = worst_translation(spread_of(candidate.alignment, params) + candidate.warp), candidate.resistance
     least = _least_fall(candidate, sigma, params)
@@ -272,6 +273,7 @@ CHECKS: tuple[Check, ...] = (  # of a candidate alone, before what others and od
     _gravity,
     _overlap,
     _free_space,
+    _unmoved,
     _texture,
     _score,
     _stationary,

@@ -38,6 +38,22 @@ class Stretch:
     travelled: float = 0.0
     turned: float = 0.0
 
+    @classmethod
+    def of(cls, frame: Frame) -> Stretch:
+        """One frame by itself."""
+        still = np.eye(4)
+        return cls(frames=(alone(frame),), T_first_frame=(still,), T_session_first=still, session=0)
+
+
+def alone(frame: Frame) -> Frame:
+    """The frame with the weight that gravity has which no other view confirms."""
+    return _felt(PlumbLine(1.0, 1.0), np.eye(4), frame)
+
+
+def _felt(line: PlumbLine, T_session_frame: Array, frame: Frame) -> Frame:
+    gravity, weight = line.feel(T_session_frame, frame.gravity, frame.gravity_confidence)
+    return replace(frame, gravity=gravity, gravity_confidence=weight)
+
 
 @dataclass(slots=True, eq=False)
 class _Session:
@@ -54,6 +70,14 @@ class _Session:
         """Whether a frame may belong to it: later, of the same camera, and with odometry only if the session has it."""
         later, same = frame.stamp_ns > self.first.stamp_ns, frame.frame_id == self.first.frame_id
         return later and same and (self.in_odometry or frame.T_odom_camera is None)
+
+
+def _levelled(session: _Session, frame: Frame) -> Frame:
+    """The frame with gravity as all views of the session tell it, or its own where odometry does not carry that.
+
+    Our own tracking slips unnoticed, and what it carries then is wrong.
+    """
+    return alone(frame) if frame.T_odom_camera is None else _felt(session.plumb, frame.T_odom_camera, frame)
 
 
 @dataclass(slots=True, eq=False)
@@ -95,7 +119,7 @@ class Keyframer:
         if T_session_frame is None:
             return None if self._may_come_back(session, frame) else self._start(frame)
         session.last_ns = frame.stamp_ns
-        frame = self._levelled(session, frame)
+        frame = _levelled(session, frame)
         if stretch is None:
             self._begin(session, frame, T_session_frame)
             return None
@@ -122,12 +146,12 @@ class Keyframer:
             number=self.next_session,
             in_odometry=frame.T_odom_camera is not None,
             way=Way(T_session_frame),
-            plumb=self._plumb_line(),
+            plumb=PlumbLine(self._params.gravity_metres, self._params.gravity_degrees),
             first=frame,
             last_ns=frame.stamp_ns,
         )
         self.next_session += 1
-        self._begin(self._session, self._levelled(self._session, frame), T_session_frame)
+        self._begin(self._session, _levelled(self._session, frame), T_session_frame)
         return ended
 
     def _begin(self, session: _Session, frame: Frame, T_session_frame: Array) -> None:
@@ -156,19 +180,6 @@ class Keyframer:
             travelled=stretch.session.way.travelled,
             turned=stretch.session.way.turned,
         )
-
-    def _plumb_line(self) -> PlumbLine:
-        return PlumbLine(self._params.gravity_metres, self._params.gravity_degrees)
-
-    def _levelled(self, session: _Session, frame: Frame) -> Frame:
-        """The frame with gravity as all views of the session tell it, or its own where odometry does not carry that.
-
-        Our own tracking slips unnoticed, and what it carries then is wrong.
-        """
-        line = session.plumb if frame.T_odom_camera is not None else self._plumb_line()
-        T_session_frame = np.eye(4) if frame.T_odom_camera is None else frame.T_odom_camera
-        gravity, weight = line.feel(T_session_frame, frame.gravity, frame.gravity_confidence)
-        return replace(frame, gravity=gravity, gravity_confidence=weight)
 
     def _follow(self, frame: Frame) -> Array | None:
         """The pose of a frame in its session, in a gap of the odometry by the views; None if the track is lost."""

@@ -347,7 +347,7 @@ class RegistrarNodeParams(Params):
 
     odom_slop: float = param(
         0.02,
-        "largest distance in time between a frame and its odometry, unless two within five times it enclose the frame",
+        "largest distance in time between a frame and its odometry, unless two within seven times it enclose the frame",
         "s",
         ge=0.0,
     )

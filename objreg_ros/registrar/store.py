@@ -27,7 +27,7 @@ from objreg_ros.registrar.sighting import Sighting
 
 MAGIC = b"SQLite format 3\0"
 APPLICATION_ID = 0x4F424A52  # "OBJR" at byte 68 of the file
-SCHEMA_VERSION = 2  # at byte 60
+SCHEMA_VERSION = 3  # at byte 60
 CACHED = 64  # decoded keyframes in memory, about 1 MB each
 SCHEMA = """
 CREATE TABLE keyframe (
@@ -53,6 +53,9 @@ ALTER TABLE closure RENAME COLUMN frame_id TO to_frame_id;
 ALTER TABLE closure ADD COLUMN from_frame_id TEXT NOT NULL DEFAULT '';
 UPDATE closure SET from_frame_id = to_frame_id;
 """,
+    2: """
+UPDATE keyframe SET gravity_confidence = 0.05 * gravity_confidence * gravity_confidence * gravity_confidence;
+""",  # it was that of one view: see `plumb`
 }
 SIGHTINGS = (
     "SELECT object.keyframe, session, stamp_ns, instance, label, score, extent, descriptor, position,"

@@ -295,6 +295,12 @@ def test_a_pose_between_two_messages_is_between_theirs() -> None:
     assert from_msg.pose_at(500, around)[0, 3] == 2
 
 
+def test_there_is_nothing_between_poses_in_two_frames() -> None:
+    around = [messages.odometry(at=(x, 0, 0), stamp_ns=100 * x) for x in (1, 2)]
+    around[1].header.frame_id = "another"
+    assert [from_msg.pose_at(moment, around)[0, 3] for moment in (120, 180)] == [1, 2]
+
+
 def test_messages_of_two_moments_are_no_frame() -> None:
     view, info = view_messages()
     later = messages.own_table(object_rows(), stamp_ns=5)

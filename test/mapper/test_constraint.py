@@ -100,7 +100,9 @@ def test_a_closure_between_cameras_becomes_one_between_the_bodies_of_the_keyfram
 
 def test_a_closure_moved_by_odometry_is_known_less_well_by_what_that_wanders() -> None:
     sigmas, T = (0.02, 0.03), {stamp: pose(np.eye(3), [0.1 * stamp, 0.0, 0.0]) for stamp in (0, 1, 20, 22)}
-    closure = LoopClosure(from_ns=0, to_ns=20, T_from_to=inverse(T[0]) @ T[20], covariance=1e-10 * np.eye(6), labels=())
+    T_body_camera = pose(rotation_from_vector(np.array([0.2, -0.5, 0.1])), np.array([0.3, 0.1, 0.15]))
+    T_from_to = inverse(T[0] @ T_body_camera) @ T[20] @ T_body_camera
+    closure = LoopClosure(from_ns=0, to_ns=20, T_from_to=T_from_to, covariance=1e-10 * np.eye(6), labels=())
     errors = []
     for _ in range(4000):
         odometry = Trajectory()
@@ -109,7 +111,7 @@ def test_a_closure_moved_by_odometry_is_known_less_well_by_what_that_wanders() -
             each = np.sqrt(np.diag(wandering(step, sigmas)))
             odometry.append(k1, T[k1])
             odometry.append(k2, T[k1] @ disturbed(step, each * RNG.standard_normal(6)))
-        moved = between_keyframes(closure, odometry, 1, 22, np.eye(4), sigmas)
+        moved = between_keyframes(closure, odometry, 1, 22, T_body_camera, sigmas)
         errors.append(difference(moved.T_from_to, inverse(T[1]) @ T[22]))
     seen, said = np.cov(np.array(errors).T), moved.covariance
     np.testing.assert_allclose(np.sqrt(np.diag(seen)), np.sqrt(np.diag(said)), rtol=0.15)

@@ -108,6 +108,17 @@ def test_the_place_of_the_camera_on_the_body_is_honoured() -> None:
     assert distances(corrected(of_camera), TRUE).max() < 0.3 * distances(BENT, TRUE).max()
 
 
+def test_a_closure_far_from_its_keyframes_is_known_less_well() -> None:
+    graph = mapped([])
+    stamps = graph.keyframes.stamps_ns
+    steps = [stamp * 10 // SECOND for stamp in (stamps[5], stamps[-5])]
+    spreads = []
+    for away in (0, 1):
+        assert graph.add_closure(closure(TRUE, steps[0] + away, steps[1] + away))
+        spreads.append(np.sqrt(np.diag(graph.ties[-1].constraint.covariance)))
+    assert (spreads[1] > spreads[0]).all()
+
+
 def test_keyframes_are_apart_by_the_parameters() -> None:
     near, far = (mapped([], MapperParams(keyframe_translation=d, keyframe_rotation=180.0)) for d in (0.2, 0.8))
     assert len(near.keyframes) > 2.5 * len(far.keyframes)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import View
-from objreg_ros.geometry import inverse, pose_error
+from objreg_ros.geometry import inverse, pose_error, rotation_from_vector
 from objreg_ros.registrar.engine import Engine
-from objreg_ros.registrar.keyframe import Context
+from objreg_ros.registrar.keyframe import Context, Keyframe
 from objreg_ros.registrar.params import RegistrarParams
 
 from .rooms import ROOM, keyframe, seen_from
@@ -39,6 +39,24 @@ def test_the_other_way_round_is_the_inverse(engine: Engine) -> None:
     best = engine.propose(target, source)[0]
     rotation, distance = pose_error(best.T_target_source, inverse(seen_from(0.0)) @ seen_from(20.0))
     assert rotation < 1.0 and distance < 2.0
+
+
+def test_a_pose_is_brought_to_where_gravity_is_kept_as_far_as_that_is_known() -> None:
+    source, target = keyframe(seen_from(0.0), seed=1), keyframe(seen_from(20.0), seed=2)
+    tilt = rotation_from_vector(np.radians([1.0, 0.0, 0.0]))
+    tilted = replace(source, gravity=tilt @ source.gravity, gravity_confidence=1.0)
+    errors, spreads = [], []
+    for noise in (0.01, 10.0):
+        best = Engine(PARAMS.replaced(gravity_noise=noise)).propose(tilted, replace(target, gravity_confidence=1.0))[0]
+        errors.append(gravity_error(best.T_target_source, tilted, target))
+        spreads.append(np.linalg.inv(best.alignment.information)[3:, 3:].trace())
+    assert errors[0] < 0.1 and errors[1] > 0.8
+    assert spreads[0] < spreads[1]
+
+
+def gravity_error(T_target_source: np.ndarray, source: Keyframe, target: Keyframe) -> float:
+    assert source.gravity is not None and target.gravity is not None
+    return float(np.degrees(np.arccos(np.clip(T_target_source[:3, :3] @ source.gravity @ target.gravity, -1.0, 1.0))))
 
 
 def test_objects_that_stand_still_are_explained(engine: Engine) -> None:

@@ -18,6 +18,7 @@ import pytest
 
 from objreg_ros.data import LoopClosure
 from objreg_ros.registrar import store as store_module
+from objreg_ros.registrar.plumb import DOUBT, ONE_VIEW
 from objreg_ros.registrar.sighting import sightings_of
 from objreg_ros.registrar.store import Store, StoreError
 
@@ -132,7 +133,19 @@ def test_a_store_of_the_first_version_is_read_as_it_is_and_renewed_when_it_is_wr
         assert (back.from_frame_id, back.to_frame_id, opened.keyframe(1).labels) == ("camera", "camera", ("cup",))
         opened.close()
     with sqlite3.connect(path) as connection:
-        assert connection.execute("PRAGMA user_version").fetchone() == (2,)
+        assert connection.execute("PRAGMA user_version").fetchone() == (3,)
+
+
+def test_gravity_of_the_second_version_is_that_of_one_view(tmp_path: Path) -> None:
+    path, written = tmp_path / "place.db", keyframe(1)
+    store = Store(path)
+    store.add(written, sightings_of(written))
+    store._connection.executescript("PRAGMA user_version = 2;")
+    store.close()
+    for _ in range(2):  # once and for all
+        opened = Store(path)
+        assert opened.keyframe(1).gravity_confidence == pytest.approx(ONE_VIEW * written.gravity_confidence**DOUBT)
+        opened.close()
 
 
 def test_a_place_where_no_store_can_be_made_is_a_store_error(tmp_path: Path) -> None:
@@ -224,7 +237,7 @@ def test_a_newer_file_is_refused_and_left_untouched(tmp_path: Path) -> None:
         connection.execute("PRAGMA user_version = 99")
     connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     connection.close()
-    _refused(path, "version 2 or older, got 99")
+    _refused(path, "version 3 or older, got 99")
 
 
 def test_a_file_of_another_kind_is_refused_and_left_untouched(tmp_path: Path) -> None:
