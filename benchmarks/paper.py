@@ -25,6 +25,7 @@ import numpy as np
 from command_line import quick_values
 from pose_figures import SUCCESS
 from scipy.spatial import cKDTree
+from sources import SIMULATED
 
 from objreg_ros.data import Array, DepthImage, Detections, Frame
 from objreg_ros.geometry import inverse, pose, rotation_from_vector, transform
@@ -196,7 +197,7 @@ class Bench:
     """Registers cells of the tables; every cell is the median over its seeds."""
 
     def __init__(self, seeds: Sequence[int]) -> None:
-        self.params = RegistrarParams()
+        self.params = RegistrarParams().replaced(**SIMULATED)
         self.engine = Engine(self.params)
         self._seeds = seeds
         self._stages = {(label, seed): Stage.of(label, seed, ASIDE) for label in TABLE_1 for seed in seeds}

@@ -39,6 +39,7 @@ from command_line import given
 from looks import Setting, Shot, Shots, around, four
 from paper import TABLE_1, Stage, keyframe
 from pose_figures import SUCCESS, error_at, grouped, judged, mean, median, nees, percentiles
+from sources import SIMULATED
 
 from objreg_ros.data import DepthImage, Detections
 from objreg_ros.geometry import inverse, pose_error, transform
@@ -74,7 +75,7 @@ class Bench:
     """One condition: pairs that must be registered, pairs that must be refused, piece by piece."""
 
     def __init__(self, condition: str, seed: int, cache: Path | None = None) -> None:
-        self.params = RegistrarParams()
+        self.params = RegistrarParams().replaced(**SIMULATED)
         self.calibrated = self.params.replaced(covariance_calibration=0.0)
         self.engine = Engine(self.params)
         self.seed = seed
@@ -303,7 +304,7 @@ def compile_half(half: int) -> None:
     else:
         stage = Stage.of("soda_can", 99, ASIDE)
         render(stage.scene, stage.camera((0.0, 0.0, 0.0), np.random.default_rng(0)), seed=0)
-        params = RegistrarParams()
+        params = RegistrarParams().replaced(**SIMULATED)
         Engine(params).propose(keyframe(drawn(0), params), keyframe(drawn(1), params))
 
 

@@ -196,10 +196,11 @@ def _agreement(candidate: Candidate, params: RegistrarParams, rivals: Sequence[C
 
 
 def _not_otherwise(candidate: Candidate, params: RegistrarParams) -> bool:
-    """Whether the object does not look otherwise, and tells the yaw, or the grey of the views does."""
-    likeness, plain = candidate.likeness, candidate.verification.texture is None
-    least = params.min_likeness_alone if plain else params.min_likeness_unrivalled
-    return likeness is not None and likeness >= least and (candidate.yaw_known or not plain)
+    """Whether the object does not look otherwise, and tells the yaw, or the grey of the views does beyond doubt."""
+    likeness, texture = candidate.likeness, candidate.verification.texture
+    least = params.min_likeness_alone if texture is None else params.min_likeness_unrivalled
+    told = candidate.yaw_known or (texture is not None and texture >= params.min_texture_painted)
+    return likeness is not None and likeness >= least and told
 
 
 def _painted(candidate: Candidate, params: RegistrarParams) -> bool:

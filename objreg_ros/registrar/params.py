@@ -317,7 +317,10 @@ class RegistrarParams(Params):
         0.0, "least likeness of several objects, below which they look otherwise", ge=-1.0, le=1.0
     )
     min_texture_painted: float = param(
-        0.5, "least correlation of grey that confirms a pose where the lone object does not", ge=-1.0, le=1.0
+        0.5,
+        "least correlation of grey that confirms a pose where the lone object does not, or tells no yaw",
+        ge=-1.0,
+        le=1.0,
     )
     min_margin_painted: float = param(
         0.45, "least worth above that of any other pose where grey, but not the lone object, confirms it", ge=0.0

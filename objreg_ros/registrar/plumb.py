@@ -14,7 +14,7 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.geometry import inverse, rotation_angle
 
-ONE_VIEW = 0.05  # weight of what a single view tells, beside 1 of many from around
+ONE_VIEW = 0.02  # weight of what a single view tells, beside 1 of many from around
 DOUBT = 3  # power of a view's own confidence: 0.96 err by 0.7 degrees, below 0.9 by 2.4
 
 

@@ -54,7 +54,7 @@ ALTER TABLE closure ADD COLUMN from_frame_id TEXT NOT NULL DEFAULT '';
 UPDATE closure SET from_frame_id = to_frame_id;
 """,
     2: """
-UPDATE keyframe SET gravity_confidence = 0.05 * gravity_confidence * gravity_confidence * gravity_confidence;
+UPDATE keyframe SET gravity_confidence = 0.02 * gravity_confidence * gravity_confidence * gravity_confidence;
 """,  # it was that of one view: see `plumb`
 }
 SIGHTINGS = (

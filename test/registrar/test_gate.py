@@ -68,6 +68,13 @@ def test_one_object_closes_a_loop_when_grey_holds_the_pose_and_no_other_comes_ne
         assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
 
 
+def test_a_lone_object_without_a_yaw_needs_grey_that_tells_it() -> None:
+    alone = {"explained": (CUP,), "margin": 1.0, "likeness": 0.5}
+    for yaw_known, beyond, accepted in ((True, -0.1, True), (False, -0.1, False), (False, 0.01, True)):
+        told = {"yaw_known": yaw_known, "texture": PARAMS.min_texture_painted + beyond}
+        assert (refuse(candidate(**alone, **told), PARAMS) is None) is accepted
+
+
 def test_a_lone_object_must_respect_free_space_more_than_several() -> None:
     far = {"floating": 0.5 * (PARAMS.max_floating_alone + PARAMS.max_floating)}
     refusal = refuse(candidate(explained=(CUP,), margin=1.0, **far), PARAMS)
