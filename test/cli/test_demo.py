@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from recording.folders import tum_folder
 
-from objreg_ros.cli.demo import Asked, mounting_of, run, setup_of
+from objreg_ros.cli.demo import Asked, calibrated, mounting_of, run, setup_of
 from objreg_ros.recording.inputs import Inputs, parse_remaps
 
 ASKED = Asked(
@@ -15,6 +15,12 @@ ASKED = Asked(
     lossless=False, out=Path("out"),
 )  # fmt: skip
 INPUTS = Inputs(image="/a", depth="/d", camera_info="/i", odom="/o")
+
+
+def test_a_simulated_camera_is_as_its_calibration_says_unless_something_else_is_asked_for() -> None:
+    assert calibrated(ASKED).changes == ("registrar.covariance_calibration=0.01",)
+    asked = replace(ASKED, changes=("registrar.covariance_calibration=0.02",))
+    assert calibrated(asked) == asked
 
 
 def test_without_options_the_nodes_run_with_their_own_defaults_at_the_recordings_pace() -> None:
