@@ -40,11 +40,6 @@ from objreg_ros.registrar.verify import verify
 QUICK = {"wanted": 15, "names": ("paper", "orb_pnp")}
 
 
-def single(frame: Frame, params: RegistrarParams) -> Keyframe:
-    """A keyframe of one frame."""
-    return fuse(Stretch.of(frame), params)
-
-
 def fused(frames: Sequence[Frame], params: RegistrarParams) -> list[Keyframe]:
     """The keyframes that the registrar would make of a recording."""
     keyframer = Keyframer(params)
@@ -170,7 +165,7 @@ def methods_of(
 def compare(source: Source, params: RegistrarParams, options: dict[str, Any]) -> dict[str, Any]:
     """All methods over the same pairs of one recording."""
     frames = [frame for frame in source.frames if source.truth.at(frame.stamp_ns) is not None]
-    makes = fused(frames, params) if options["keyframes"] else [single(frame, params) for frame in frames]
+    makes = fused(frames, params) if options["keyframes"] else [fuse(Stretch.of(frame), params) for frame in frames]
     keyframes = [keyframe for keyframe in makes if keyframe.objects]
     poses = [source.truth.at(keyframe.stamp_ns) for keyframe in keyframes]
     truths = Truths(keyframes, [T for T in poses if T is not None], params)

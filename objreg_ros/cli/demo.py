@@ -91,7 +91,7 @@ def run(asked: Asked) -> None:
 
 def calibrated(asked: Asked) -> Asked:
     """What is asked of a simulated room: its camera is as its calibration says, unless something else is asked for."""
-    if any(change.startswith(CALIBRATION) for change in asked.changes):
+    if asked.params_file is not None or any(change.startswith(CALIBRATION) for change in asked.changes):
         return asked
     return replace(asked, changes=(f"{CALIBRATION}=0.01", *asked.changes))
 

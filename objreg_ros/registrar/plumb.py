@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.geometry import inverse, rotation_angle
+from objreg_ros.registrar.odometry import Way
 
 ONE_VIEW = 0.02  # weight of what a single view tells, beside 1 of many from around
 DOUBT = 3  # power of a view's own confidence: 0.96 err by 0.7 degrees, below 0.9 by 2.4
@@ -29,7 +29,7 @@ class PlumbLine:
     metres: float
     degrees: float
     _falls: Array = field(default_factory=lambda: np.zeros(3))  # in the session's frame, times its weight
-    _T_session_last: Array | None = None
+    _way: Way | None = None
 
     def feel(self, T_session_camera: Array, gravity: Array | None, confidence: float) -> tuple[Array | None, float]:
         """Go to a pose and take in what its view tells, None for nothing.
@@ -47,9 +47,7 @@ class PlumbLine:
 
     def _go(self, T_session_camera: Array) -> float:
         """What is kept of all that was told, after going on to a pose."""
-        last, self._T_session_last = self._T_session_last, T_session_camera
-        if last is None:
-            return 1.0
-        motion = inverse(last) @ T_session_camera
-        turned = float(np.degrees(rotation_angle(motion[:3, :3])))
-        return float(np.exp(-float(np.linalg.norm(motion[:3, 3])) / self.metres - turned / self.degrees))
+        way = self._way = self._way or Way(T_session_camera)
+        travelled, turned = way.travelled, way.turned
+        way.go(T_session_camera)
+        return float(np.exp((travelled - way.travelled) / self.metres + (turned - way.turned) / self.degrees))

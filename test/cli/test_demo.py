@@ -19,8 +19,9 @@ INPUTS = Inputs(image="/a", depth="/d", camera_info="/i", odom="/o")
 
 def test_a_simulated_camera_is_as_its_calibration_says_unless_something_else_is_asked_for() -> None:
     assert calibrated(ASKED).changes == ("registrar.covariance_calibration=0.01",)
-    asked = replace(ASKED, changes=("registrar.covariance_calibration=0.02",))
-    assert calibrated(asked) == asked
+    others = {"changes": ("registrar.covariance_calibration=0.02",)}, {"params_file": Path("own.yaml")}
+    for asked in (replace(ASKED, **other) for other in others):
+        assert calibrated(asked) == asked
 
 
 def test_without_options_the_nodes_run_with_their_own_defaults_at_the_recordings_pace() -> None:

@@ -16,6 +16,15 @@ def line() -> PlumbLine:
     return PlumbLine(metres=2.0, degrees=120.0)
 
 
+def taught(turns: int) -> PlumbLine:
+    """One that views around have told of gravity, each turned by 10 degrees more."""
+    plumb = line()
+    for k in range(turns):
+        T = camera(10.0 * k)
+        plumb.feel(T, T[:3, :3].T @ DOWN, 1.0)
+    return plumb
+
+
 def camera(yaw_deg: float, x: float = 0.0) -> np.ndarray:
     return pose(rotation_from_vector(np.radians([-100.0, 0.0, 0.0])) @ turn(yaw_deg), np.array([x, 0.0, 1.0]))
 
@@ -55,11 +64,7 @@ def test_a_camera_that_rests_learns_nothing() -> None:
 
 
 def test_a_view_that_tells_nothing_is_told_by_those_before_it() -> None:
-    plumb = line()
-    for k in range(10):
-        T = camera(10.0 * k)
-        plumb.feel(T, T[:3, :3].T @ DOWN, 1.0)
-    T = camera(110.0)
+    plumb, T = taught(10), camera(110.0)
     found, weight = plumb.feel(T, None, 0.0)
     assert found is not None and error_deg(found, T) < 1e-6
     assert 0.0 < weight < 1.0
@@ -70,11 +75,7 @@ def test_nothing_is_known_before_a_view_told_it() -> None:
 
 
 def test_a_doubtful_view_hardly_counts() -> None:
-    plumb = line()
-    for k in range(20):
-        T = camera(10.0 * k)
-        plumb.feel(T, T[:3, :3].T @ DOWN, 1.0)
-    T = camera(210.0)
+    plumb, T = taught(20), camera(210.0)
     found, _ = plumb.feel(T, rotation_from_vector(np.radians([5.0, 0.0, 0.0])) @ T[:3, :3].T @ DOWN, 0.4)
     assert found is not None and error_deg(found, T) < 0.1
 
