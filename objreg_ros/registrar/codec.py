@@ -125,6 +125,7 @@ def sighting_from_row(row: Mapping[str, Any]) -> Sighting:
         position=np.frombuffer(row["position"], float),
         camera=np.frombuffer(row["camera"], float),
         travelled=row["travelled"],
+        by_odometry=bool(row["by_odometry"]),
         landmark=row["landmark"],
         R_landmark_session=np.frombuffer(row["R_landmark_session"], float).reshape(3, 3),
     )

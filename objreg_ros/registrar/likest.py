@@ -20,16 +20,18 @@ from objreg_ros.registrar.sighting import Sighting
 
 LANES = 64
 NOWHERE = np.float32(np.inf)  # half the squared length of a row that is free
+NO_SESSION = -1  # of what our own tracking says where it is: nothing is left out for it
 
 
 class Block:
     """The rows of one label group, which double when they are full; rows that are given up are used again.
 
-    ``where (n, 4)`` float64 are x, y, z and travelled, ``when (n, 3)`` int64 stamp_ns, session and keyframe_id.
+    ``where (n, 4)`` float64 are x, y, z and travelled, ``when (n, 4)`` int64 stamp_ns, session, keyframe_id and whether
+    odometry told the pose.
     """
 
     def __init__(self) -> None:
-        self.where, self.when = np.zeros((LANES, 4)), np.zeros((LANES, 3), np.int64)
+        self.where, self.when = np.zeros((LANES, 4)), np.zeros((LANES, 4), np.int64)
         self._descriptors = np.zeros((1, SIZE, LANES), np.float32)
         self._half_norms = np.full((1, LANES), NOWHERE)
         self._used = 0  # rows below which all others are
@@ -48,7 +50,7 @@ class Block:
         self._descriptors[tile, :, lane] = sighting.descriptor
         self._half_norms[tile, lane] = 0.5 * float(sighting.descriptor @ sighting.descriptor)
         self.where[i] = *sighting.position, sighting.travelled
-        self.when[i] = sighting.stamp_ns, sighting.session, sighting.keyframe_id
+        self.when[i] = sighting.stamp_ns, sighting.session, sighting.keyframe_id, sighting.by_odometry
         return i
 
     def remove(self, i: int) -> None:
@@ -64,9 +66,10 @@ class Block:
         """
         tiles = -(-self._used // LANES)
         descriptor = np.asarray(sighting.descriptor, np.float32)
+        session = sighting.session if sighting.by_odometry else NO_SESSION
         found, likeness = _likest(  # type: ignore[call-arg]
             self._descriptors[:tiles], self._half_norms[:tiles], self.where, self.when, descriptor,
-            np.asarray(sighting.position, float), sighting.travelled, sighting.stamp_ns, sighting.session,
+            np.asarray(sighting.position, float), sighting.travelled, sighting.stamp_ns, session,
             round(1e9 * params.min_gap), params.odometry_radius, params.odometry_drift, most, margin,
         )  # fmt: skip
         return found, np.maximum(0.5 * float(descriptor @ descriptor) - likeness, 0.0)
@@ -116,7 +119,7 @@ def _best(  # type: ignore[no-untyped-def]
             row, like = tile * LANES + lane, likeness[tile, lane]
             if like < least or like == -NOWHERE or abs(when[row, 0] - stamp_ns) < gap_ns:
                 continue
-            if when[row, 1] == session:
+            if when[row, 1] == session and when[row, 3]:
                 reach = radius + drift * abs(way - where[row, 3])
                 x, y, z = where[row, 0] - position[0], where[row, 1] - position[1], where[row, 2] - position[2]
                 if x * x + y * y + z * z > reach * reach:

@@ -49,7 +49,9 @@ class RegistrarParams(Params):
         "labels that detectors confuse: one group an item, spaces between (an underscore for a space in a name)",
     )
     min_gap: float = param(2.0, "least time between the two moments of a constraint", "s", ge=0.0)
-    odometry_radius: float = param(1.0, "stored objects of the session farther than this are not tried", "m", ge=0.0)
+    odometry_radius: float = param(
+        1.0, "stored objects of the session that odometry puts farther away are not tried", "m", ge=0.0
+    )
     odometry_translation_noise: float = param(
         0.03, "standard deviation of odometry's position over no distance", "m", ge=0.0
     )

@@ -3,7 +3,8 @@
 
 The index holds one row an object, in one block a label group, so a query touches only objects that could be the same.
 Objects vote for their keyframes: the nearer the descriptors and the rarer the label, the more. Odometry takes out what
-cannot be there: stored objects of the same session farther away than its uncertainty has grown.
+cannot be there: stored objects of the same session farther away than its uncertainty has grown. Our own tracking does
+not: it may have slipped unnoticed.
 """
 
 from __future__ import annotations
@@ -78,7 +79,7 @@ class Index:
         taken = order[np.concatenate([np.flatnonzero(~here)[:most], np.flatnonzero(here)[:most]])]
         taken = taken[self._spread(where[taken], when[taken])]
         chosen = zip(when[taken].tolist(), votes[taken].tolist(), strict=True)
-        return [Place(number, stamp_ns, session, vote) for (stamp_ns, session, number), vote in chosen]
+        return [Place(number, stamp_ns, session, vote) for (stamp_ns, session, number, _), vote in chosen]
 
     def _ballot(self, sighting: Sighting, stored: int) -> tuple[Array, Array, Array]:
         """Where and when the objects were seen that look most like this one, the likest first, and their votes."""

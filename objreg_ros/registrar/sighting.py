@@ -18,7 +18,8 @@ class Sighting:
     """Object ``instance`` of a keyframe, in the frame of its session.
 
     ``extent`` m of the object, ``position (3,)`` of its middle and ``camera (3,)`` of the camera, m; ``travelled`` m
-    of the camera's path in the session until then; ``landmark`` the id that the object has wherever it is seen, 0
+    of the camera's path in the session until then; ``by_odometry`` whether odometry told the pose, or our own tracking,
+    which may have slipped unnoticed; ``landmark`` the id that the object has wherever it is seen, 0
     before it has one; ``R_landmark_session (3, 3)`` turns this session's axes into those of the session that saw the
     landmark first.
     """
@@ -34,6 +35,7 @@ class Sighting:
     position: Array
     camera: Array
     travelled: float = 0.0
+    by_odometry: bool = False
     landmark: int = 0
     R_landmark_session: Array = field(default_factory=lambda: np.eye(3))
 
@@ -63,6 +65,7 @@ def sightings_of(keyframe: Keyframe) -> tuple[Sighting, ...]:
             position=transform(T_session_camera, item.centroid),
             camera=np.array(T_session_camera[:3, 3]),
             travelled=keyframe.travelled,
+            by_odometry=keyframe.by_odometry,
         )
         for item in keyframe.objects
     )

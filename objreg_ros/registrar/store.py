@@ -59,7 +59,7 @@ UPDATE keyframe SET gravity_confidence = 0.02 * gravity_confidence * gravity_con
 }
 SIGHTINGS = (
     "SELECT object.keyframe, session, stamp_ns, instance, label, score, extent, descriptor, position,"
-    " object.camera, travelled, landmark, R_landmark_session"
+    " object.camera, travelled, by_odometry, landmark, R_landmark_session"
     " FROM object JOIN keyframe ON keyframe.id = object.keyframe"
 )
 
@@ -264,17 +264,21 @@ def _check(path: Path) -> None:
         header = file.read(100)
     if len(header) < 100 or not header.startswith(MAGIC):
         raise StoreError(f"{path}: expected a store of objreg_ros, got a file of another kind; it was left as it is")
-    version = int.from_bytes(header[60:64], "big")
     if not is_store(path):
         raise StoreError(f"{path}: expected a store of objreg_ros, got another SQLite database; it was left as it is")
+    _refuse_newer(path, int.from_bytes(header[60:64], "big"))
+    version, found = _look_through(path)
+    _refuse_newer(path, version)
+    if found:
+        raise StoreError(f"{path}: expected an intact store, got: {found}; it was left as it is. Use another path")
+
+
+def _refuse_newer(path: Path, version: int) -> None:
     if version > SCHEMA_VERSION:
         raise StoreError(
             f"{path}: expected schema version {SCHEMA_VERSION} or older, got {version}; it was left as it is. "
             "Use the newer objreg_ros that wrote it, or another path"
         )
-    found = _damage(path)
-    if found:
-        raise StoreError(f"{path}: expected an intact store, got: {found}; it was left as it is. Use another path")
 
 
 def _read_only_uri(path: Path) -> str:
@@ -283,14 +287,18 @@ def _read_only_uri(path: Path) -> str:
     return f"{path.resolve().as_uri()}?{mode}"
 
 
-def _damage(path: Path) -> str:
-    """What is wrong with the pages of a database, empty if nothing. Opens it for reading only."""
+def _look_through(path: Path) -> tuple[int, str]:
+    """The version of a database, and what is wrong with its pages, empty if nothing. Opens it for reading only.
+
+    With what a log beside it says: the program that wrote it may have been killed before that came into the file.
+    """
     try:
         with closing(sqlite3.connect(_read_only_uri(path), uri=True)) as connection:
+            version = int(connection.execute("PRAGMA user_version").fetchone()[0])
             found = str(connection.execute("PRAGMA quick_check(1)").fetchone()[0])
     except sqlite3.DatabaseError as error:
-        return str(error)
-    return "" if found == "ok" else found
+        return 0, str(error)
+    return version, "" if found == "ok" else found
 
 
 def _insert(transaction: sqlite3.Connection, table: str, row: Mapping[str, Any]) -> int:

@@ -31,6 +31,7 @@ def _sighting(number: int, draw: Generator, spread: float = 1.0) -> Sighting:
         position=draw.uniform(-2, 2, 3),
         camera=np.zeros(3),
         travelled=float(draw.uniform(0, 20)),
+        by_odometry=bool(draw.random() < 0.7),
     )
 
 
@@ -41,7 +42,8 @@ def _brute_force(stored: list[Sighting], row: Sighting) -> list[int]:
         if abs(other.stamp_ns - row.stamp_ns) < 1e9 * PARAMS.min_gap:
             continue
         reach = PARAMS.odometry_radius + PARAMS.odometry_drift * abs(row.travelled - other.travelled)
-        if other.session == row.session and np.linalg.norm(other.position - row.position) > reach:
+        bound = other.session == row.session and other.by_odometry and row.by_odometry
+        if bound and np.linalg.norm(other.position - row.position) > reach:
             continue
         halves[other.keyframe_id] = 0.5 * float(np.sum((other.descriptor.astype(float) - row.descriptor) ** 2))
     ranked = sorted(halves, key=lambda number: (halves[number], number))[:MOST]

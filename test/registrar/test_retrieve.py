@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from objreg_ros.data import ObjectCloud
 from objreg_ros.registrar.params import RegistrarParams
@@ -17,8 +18,11 @@ from .samples import box, keyframe, moved
 PARAMS = RegistrarParams(min_gap=2.0, candidates=3, thin_seconds=1.0)
 
 
-def _seen(number: int, seconds: float, *objects: ObjectCloud, session: int = 0, x: float = 0.0) -> list[Sighting]:
-    return list(sightings_of(replace(keyframe(number, seconds, objects, session, moved(x)), travelled=seconds)))
+def _seen(
+    number: int, seconds: float, *objects: ObjectCloud, session: int = 0, x: float = 0.0, by_odometry: bool = True
+) -> list[Sighting]:
+    shown = keyframe(number, seconds, objects, session, moved(x))
+    return list(sightings_of(replace(shown, travelled=seconds, by_odometry=by_odometry)))
 
 
 def _index(*keyframes: list[Sighting], params: RegistrarParams = PARAMS) -> Index:
@@ -58,6 +62,13 @@ def test_odometry_takes_out_what_cannot_be_there_in_the_same_session_only() -> N
     assert [place.keyframe_id for place in index.query(_seen(9, 30, CUP))] == [2]
     wide = _index(_seen(1, 0, CUP, x=8.0), params=params.replaced(odometry_drift=1.0))
     assert [place.keyframe_id for place in wide.query(_seen(9, 30, CUP))] == [1]
+
+
+@pytest.mark.parametrize("told", [(False, False), (True, False), (False, True)])
+def test_our_own_tracking_takes_out_nothing(told: tuple[bool, bool]) -> None:
+    params = PARAMS.replaced(odometry_radius=1.0, odometry_drift=0.1)
+    index = _index(_seen(1, 0, CUP, x=8.0, by_odometry=told[0]), params=params)
+    assert [place.keyframe_id for place in index.query(_seen(9, 30, CUP, by_odometry=told[1]))] == [1]
 
 
 def test_an_object_of_another_size_or_colour_gets_a_lower_vote() -> None:

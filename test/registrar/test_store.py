@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import random
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -238,6 +239,23 @@ def test_a_newer_file_is_refused_and_left_untouched(tmp_path: Path) -> None:
     connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     connection.close()
     _refused(path, "version 3 or older, got 99")
+
+
+def test_a_store_is_newer_where_only_the_log_beside_it_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "place.db"
+    Store(path).close()
+    with sqlite3.connect(path) as connection:
+        connection.execute("PRAGMA user_version = 99")
+    killed = tmp_path / "killed"
+    killed.mkdir()
+    for name in (path.name, f"{path.name}-wal"):
+        shutil.copy(tmp_path / name, killed / name)
+    connection.close()
+    assert (killed / path.name).read_bytes()[60:64] == (3).to_bytes(4, "big")
+    before = [(killed / name).read_bytes() for name in (path.name, f"{path.name}-wal")]
+    with pytest.raises(StoreError, match="version 3 or older, got 99"):
+        Store(killed / path.name)
+    assert [(killed / name).read_bytes() for name in (path.name, f"{path.name}-wal")] == before
 
 
 def test_a_file_of_another_kind_is_refused_and_left_untouched(tmp_path: Path) -> None:
