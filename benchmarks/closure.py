@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -146,6 +147,13 @@ def stories(texts: Sequence[str]) -> list[tuple[str, int]]:
     return found
 
 
+def _require_own_names(names: Sequence[str]) -> None:
+    """Figures are kept and told by the name of the recording; `click.UsageError` where two have one."""
+    twice = sorted(name for name, count in Counter(names).items() if count > 1)
+    if twice:
+        raise click.UsageError(f"expected recordings of different names, got more than one {', '.join(twice)}")
+
+
 @click.command()
 @click.argument("recordings", nargs=-1, type=click.Path(exists=True, path_type=Path))
 @click.option("--simulate", "scenarios", multiple=True, metavar="SCENARIO:SEED,SEED…", help="Make and use a recording.")
@@ -183,6 +191,7 @@ def main(
     asked = Asked(detector, options["names"], options["candidates"], options["seed"], options["drift"])
     paths = [partial(Path, path) for path in recordings]
     paths += [partial(simulated, keep, *story, options["frames"]) for story in told]
+    _require_own_names([*(path.name for path in recordings), *(f"{name}_{seed}" for name, seed in told)])
     rows: dict[str, dict[str, Any]] = {}
     for make in paths:
         path = make()

@@ -29,6 +29,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -66,7 +67,7 @@ NOTHING = (180.0, 1e3)  # the error where there is no pose
 ASIDE = 0.18  # m from the middle of the table
 STORED = (0.0, 60.0, 120.0, 180.0)  # sides that an object is known from
 QUICK_SECONDS, LEAST = 40.0, 3  # after which a quick run begins no piece beyond the least
-ROOMS = 4  # strangers of each kind that are shown to each other
+ROOMS = 5  # strangers of each kind that are shown to each other
 SYMMETRIC = ("soda_can", "bowl")
 TELLING = ("cereal_box", "chair", "monitor", "flashlight", "book", "keyboard")  # a cap tells next to nothing
 
@@ -147,8 +148,11 @@ class Bench:
         return [judged(row) for row in rows]
 
     def refuse(self, labels: Sequence[str], part: int, count: int) -> None:
-        """Pairs of looks at different rooms, half of them at the same kind of object: whatever is accepted is a lie."""
-        name = f"refuse_{len(labels)}_{part}_{count}"
+        """Pairs of looks at different rooms, half of them at the same kind of object: whatever is accepted is a lie.
+
+        No pair is tried twice.
+        """
+        name = f"refused_{len(labels)}_{part}_{count}"
         self.negatives += self._piece(name, lambda: self._refuse(labels, part, count))
 
     def _refuse(self, labels: Sequence[str], part: int, count: int) -> list[dict[str, Any]]:
@@ -156,12 +160,9 @@ class Bench:
         rooms = range(ROOMS * part, ROOMS * (part + 1))
         shots = {(label, n): self._stranger(label, n) for label in labels for n in rooms}
         rows = []
-        for k in range(count):
-            first = labels[int(rng.integers(len(labels)))]
-            second = first if k % 2 == 0 else labels[int(rng.integers(len(labels)))]
-            i, j = rng.choice(rooms, 2, replace=False)
-            verdict = judge(self.engine.propose(shots[first, i].key, shots[second, j].key), self.params)
-            rows.append({"labels": [first, second], "accepted": isinstance(verdict, Candidate)})
+        for first, second in strangers(list(shots), count, rng):
+            verdict = judge(self.engine.propose(shots[first].key, shots[second].key), self.params)
+            rows.append({"labels": [first[0], second[0]], "accepted": isinstance(verdict, Candidate)})
         return rows
 
     def _stranger(self, label: str, number: int) -> Shot:
@@ -308,7 +309,17 @@ def compile_half(half: int) -> None:
         Engine(params).propose(keyframe(drawn(0), params), keyframe(drawn(1), params))
 
 
+Look = tuple[str, int]  # the kind of object, and the room
 Piece = tuple[str, Callable[[Bench], None]]
+
+
+def strangers(looks: Sequence[Look], count: int, rng: np.random.Generator) -> list[tuple[Look, Look]]:
+    """Up to ``count`` different pairs of looks at different rooms, half of them at the same kind where there are."""
+    pairs = [(a, b) for a, b in combinations(looks, 2) if a[1] != b[1]]
+    mixed = [pairs[k] for k in rng.permutation(len(pairs))]
+    alike, other = ([pair for pair in mixed if (pair[0][0] == pair[1][0]) is same] for same in (True, False))
+    half = max(count // 2, count - len(other))
+    return (alike[:half] + other)[:count]
 
 
 def whole(reps: int, negatives: int, every: int) -> list[Piece]:

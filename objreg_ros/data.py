@@ -9,6 +9,7 @@ A failure is None, a `Rejected` or an exception. It is never a pose.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from enum import Enum, IntFlag
 from typing import Any, TypeVar, dataclass_transform
@@ -17,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
+
+MOVED = re.compile(r"moved (?P<label>.+) \[m\]")  # evidence: how far an object of the label went
 Word = TypeVar("Word")
 
 
@@ -363,6 +366,12 @@ class LoopClosure:
         symmetric = bool(np.isfinite(C).all()) and bool(np.abs(C - C.T).max() <= 1e-6 * max(1e-12, np.abs(C).max()))
         _require(self, symmetric, "a finite, symmetric covariance", C.tolist())
         _require(self, bool(np.linalg.eigvalsh((C + C.T) / 2).min() > 0), "a positive definite covariance", C.tolist())
+
+    @property
+    def moved(self) -> dict[str, float]:
+        """How far objects went that stood elsewhere before, m by label, as the evidence tells (see `MOVED`)."""
+        found = ((MOVED.fullmatch(name), metres) for name, metres in self.evidence.items())
+        return {name["label"]: metres for name, metres in found if name}
 
 
 class Reason(Enum):

@@ -79,7 +79,7 @@ def run(asked: Asked) -> None:
     with open_recording(bag) as source:
         live = run_live(bag, setup_of(asked, inputs), asked.out / "logs", _say)
         truth = Truth.of(source, inputs.ground_truth)
-        told = {"recording": str(bag), "name": recording.resolve().name, "inputs": inputs.outright}
+        told = {"recording": str(bag.resolve()), "name": recording.resolve().name, "inputs": inputs.outright}
         _write(asked.out / "demo.json", {**told, "T_base_camera": T_base_camera}, live, truth)
         _draw(asked.out, live, truth, source, inputs)
         sent = _sent(source, inputs, asked.seconds, live)

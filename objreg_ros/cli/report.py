@@ -35,5 +35,6 @@ def command(context: click.Context, runs: tuple[Path, ...], out: Path, model: st
             if file is not run:
                 context.invoke(offline.command, recording=run, model=model, odometry=odometry, json_file=file)
             files.append(file)
-        write_report(out, files)
+        for lacking in write_report(out, files):
+            click.echo(f"! {lacking}", err=True)
     click.echo(f"wrote {out}")

@@ -24,7 +24,7 @@ NODES: dict[str, tuple[type[Params], ...]] = {
     "registrar": (RegistrarParams, RegistrarNodeParams, DoorParams),
     "mapper": (MapperParams, MapperNodeParams, DoorParams),
 }
-KEY = "ros__parameters"
+KEY, ALL = "ros__parameters", "/**"
 EVERYWHERE = ("use_sim_time",)  # what rclpy itself declares
 
 
@@ -34,7 +34,7 @@ class Settings:
     def __init__(self, values: Mapping[str, Mapping[str, Any]]) -> None:
         self._values = {node: dict(values.get(node, {})) for node in NODES}
         for node, kinds in NODES.items():
-            known = {name for kind in kinds for name in names_of(kind)}
+            known = _known(node)
             unknown = sorted(set(self._values[node]) - known)
             if unknown:
                 raise ValueError(f"{node}: no parameter {', '.join(unknown)}; there are {', '.join(sorted(known))}")
@@ -53,21 +53,44 @@ def names_of(kind: type[Params]) -> list[str]:
 
 
 def read_settings(file: Path | None, changes: Iterable[str]) -> Settings:
-    """Defaults, then a ROS 2 parameter file, then changes like ``registrar.method=paper``; ValueError if refused."""
-    values = {node: {} if file is None else _values_of(file, node) for node in NODES}
+    """Defaults, then a ROS 2 parameter file, then changes like ``registrar.method=paper``; ValueError if refused.
+
+    What the file says under ``/**`` goes to the nodes that have such a parameter.
+    """
+    sections = {} if file is None else _sections(file)
+    values = {node: _values_of(sections, node) for node in NODES}
     for change in changes:
         node, name, value = _parse(change)
         values[node][name] = value
     return Settings(values)
 
 
-def _values_of(file: Path, node: str) -> dict[str, Any]:
+def _sections(file: Path) -> dict[str, dict[str, Any]]:
+    """The parameters under each of the names of our nodes."""
+    names = (ALL, *(name for node in NODES for name in _names_of_node(node)))
     try:
         content = dict(yaml.safe_load(file.read_text()) or {})
-        sections = [content[name] for name in ("/**", f"/**/{node}", node, f"/{node}") if name in content]
-        return {name: value for section in sections for name, value in section[KEY].items() if name not in EVERYWHERE}
+        sections = {name: dict(content[name][KEY]) for name in names if name in content}
     except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
         raise ValueError(f"{file}: expected a ROS 2 parameter file (node: {KEY}: name: value), got: {error}") from error
+    unknown = sorted(set(sections.get(ALL, ())) - set(EVERYWHERE).union(*map(_known, NODES)))
+    if unknown:
+        raise ValueError(f"{file}: no node has a parameter {', '.join(unknown)}")
+    return sections
+
+
+def _values_of(sections: Mapping[str, Mapping[str, Any]], node: str) -> dict[str, Any]:
+    shared = {name: value for name, value in sections.get(ALL, {}).items() if name in _known(node)}
+    own = [sections.get(name, {}) for name in _names_of_node(node)]
+    return shared | {name: value for section in own for name, value in section.items() if name not in EVERYWHERE}
+
+
+def _names_of_node(node: str) -> tuple[str, ...]:
+    return f"/**/{node}", node, f"/{node}"
+
+
+def _known(node: str) -> set[str]:
+    return {name for kind in NODES[node] for name in names_of(kind)}
 
 
 def _parse(change: str) -> tuple[str, str, Any]:

@@ -13,6 +13,8 @@ import numpy as np
 from objreg_ros.data import Array, LoopClosure
 from objreg_ros.geometry import rotate, transform
 from objreg_ros.registrar.keyframe import Keyframe, KeyObject
+from objreg_ros.registrar.landmarks import Landmark, Landmarks
+from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.sighting import Sighting
 from objreg_ros.registrar.store import Store
 
@@ -21,8 +23,8 @@ def export(path: str | Path, folder: str | Path) -> Iterator[Path]:
     """Write the store at ``path`` into ``folder`` and yield each file as it is written. The store is not changed.
 
     ``objects/<landmark>_<label>/keyframe_<id>.ply`` is one view of an object and ``contexts/keyframe_<id>.ply`` what
-    was around it, both in m in the frame of the session; ``map.json`` holds keyframes, objects and closures. StoreError
-    (an OSError) if it is no store or damaged.
+    was around it, both in m in the frame of the session; ``map.json`` holds keyframes with their objects, the landmarks
+    that those are of, and closures. StoreError (an OSError) if it is no store or damaged.
     """
     store = Store(path, read_only=True)
     try:
@@ -32,8 +34,10 @@ def export(path: str | Path, folder: str | Path) -> Iterator[Path]:
             keyframe, sightings = store.keyframe(keyframe_id), list(store.sightings(keyframe_id))
             yield from _write_clouds(folder, keyframe, sightings)
             keyframes.append(_keyframe_json(keyframe, sightings))
-        closures = [constraint(closure) for closure in store.closures()]
-        yield _write_json(folder / "map.json", {"keyframes": keyframes, "closures": closures})
+        landmarks = [_landmark_json(known) for known in Landmarks(RegistrarParams(), store.sightings()).known()]
+        closures = [_closure_json(closure) for closure in store.closures()]
+        content = {"keyframes": keyframes, "landmarks": landmarks, "closures": closures}
+        yield _write_json(folder / "map.json", content)
     finally:
         store.close()
 
@@ -89,6 +93,24 @@ def _keyframe_json(keyframe: Keyframe, sightings: list[Sighting]) -> dict[str, A
             for item, sighting in zip(keyframe.objects, sightings, strict=True)
         ],
     }
+
+
+def _landmark_json(known: Landmark) -> dict[str, Any]:
+    """``position`` is in the frame of the ``session`` that saw the landmark last, at ``stamp_ns``."""
+    return {
+        "landmark": known.landmark,
+        "label": known.label,
+        "session": known.session,
+        "stamp_ns": known.stamp_ns,
+        "position": known.position.tolist(),
+        "sightings": known.sightings,
+    }
+
+
+def _closure_json(closure: LoopClosure) -> dict[str, Any]:
+    """A closure as it is stored: without the poses of single objects, with its cameras."""
+    told = {name: value for name, value in constraint(closure).items() if name != "objects"}
+    return {**told, "from_frame_id": closure.from_frame_id, "to_frame_id": closure.to_frame_id}
 
 
 def constraint(closure: LoopClosure) -> dict[str, Any]:

@@ -51,6 +51,7 @@ class RegistrarNode(MatchingDoor):
         self._counts = dict(self._registrar.counts())
         self._accepted, self._unsearched, self._refused = 0, 0, Counter[str]()
         self._last_refusals: dict[str, str] = {}  # by reason
+        self._last_moved: dict[str, float] = {}  # m by label, of the last closure that found any
         self._names: Mapping[int, str] = {}
         self._scene, self._odom_frame = Scene(), "odom"
         self.searcher: Backlog[tuple[int, Stretch]] = Backlog(self._search, self._keep, self.fail, GIVING_WAY)
@@ -135,6 +136,7 @@ class RegistrarNode(MatchingDoor):
             self._constraints.publish(to_msg.constraint(closure))
             for transform in to_msg.transforms(closure):
                 self._transforms.publish(transform)
+            self._last_moved = closure.moved or self._last_moved
         self._accepted += len(outcome.closures)
         self._refused.update(refusal.reason.value for refusal in outcome.rejected)
         self._last_refusals.update((refusal.reason.value, refusal.detail) for refusal in outcome.rejected)
@@ -153,12 +155,13 @@ class RegistrarNode(MatchingDoor):
         self._markers.publish(self._scene.markers(objects, stamp_ns, self._odom_frame))
 
     def extra_diagnostics(self) -> Mapping[str, object]:
-        """What is stored, what was accepted, what was refused by reason, and of each the last with its numbers."""
+        """What is stored, accepted and refused by reason, the last refusal of each, and what moved last."""
         stored = {f"stored {what}": count for what, count in self._counts.items()}
         refused = {f"{REJECTED}{reason}": count for reason, count in sorted(self._refused.items())}
         counts = {"constraints": self._accepted, "stored unsearched": self._unsearched}
         last = {f"last rejected: {reason}": detail for reason, detail in sorted(self._last_refusals.items())}
-        return {**super().extra_diagnostics(), **stored, **counts, **refused, **last}
+        moved = {f"last moved: {label}": f"{metres:.2f} m" for label, metres in sorted(self._last_moved.items())}
+        return {**super().extra_diagnostics(), **stored, **counts, **refused, **last, **moved}
 
     # Services
 

@@ -318,12 +318,13 @@ def _evidence(candidate: Candidate) -> dict[str, float]:
         "moved": len(candidate.moved),
         "gravity_error_deg": candidate.gravity_error_deg,
         "resistance": candidate.resistance,
+        "yaw_known": candidate.yaw_known,
     }
     return {name: float(number) for name, number in numbers.items() if number is not None}
 
 
 def _moved(keyframe: Keyframe, item: _Accepted) -> dict[str, float]:
-    """How far the objects went that stand elsewhere now, by label; the farthest of several of one."""
+    """How far the objects went that stand elsewhere now, under `MOVED`'s names; the farthest of several of one."""
     found: dict[str, float] = {}
     for pair in item.candidate.moved:
         here = transform(item.candidate.T_target_source, keyframe.objects[pair.source].centroid)

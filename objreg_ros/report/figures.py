@@ -153,7 +153,8 @@ def closure_words(story: Story, closure: LoopClosure) -> str:
     times = f"{story.seconds(closure.from_ns):.1f} s ↔ {story.seconds(closure.to_ns):.1f} s"
     error = story.error(closure)
     truth = [] if error is None else [f"off by {error[0]:.1f}° and {error[1]:.1f} cm"]
-    return ", ".join([times, *closure.labels, *truth])
+    moved = [f"{label} moved by {metres:.2f} m" for label, metres in closure.moved.items()]
+    return ", ".join([times, *closure.labels, *moved, *truth])
 
 
 def _index(tracks: Tracks, stamp_ns: int) -> int:

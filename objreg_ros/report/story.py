@@ -176,6 +176,7 @@ def _closure(row: Mapping[str, Any]) -> LoopClosure:
         T_from_to=np.array(row["T_from_to"], float),
         covariance=np.array(row["covariance"], float),
         labels=tuple(map(_spaced, row["labels"])),
+        evidence={_spaced(name): number for name, number in row.get("evidence", {}).items()},
     )
 
 

@@ -25,16 +25,18 @@ from objreg_ros.truth import Truth
 ODOMETRY_SLOP_NS = 20_000_000  # as the registrar's default
 
 
-def write_report(out: Path, runs: Sequence[Path]) -> None:
+def write_report(out: Path, runs: Sequence[Path]) -> list[str]:
     """Write one page about runs from the files of `objreg offline --json`, or of `objreg demo`.
 
-    The recording that a run names gives truth and pictures; where it is gone the page does without. ValueError for a
-    file that is no run.
+    The recording that a run names gives truth and pictures; where it is gone the page does without, and what comes back
+    says so, a line a run. ValueError for a file that is no run.
     """
     with ExitStack() as stack:
         chapters = [_chapter(file, stack) for file in runs]
         text = page(chapters)
     out.write_text(text, encoding="utf-8")
+    lacking = [file for file, (_, album) in zip(runs, chapters, strict=True) if album is None]
+    return [f"{file} names no recording that is there: the page shows neither truth nor pictures" for file in lacking]
 
 
 def _chapter(file: Path, stack: ExitStack) -> tuple[Story, Album | None]:

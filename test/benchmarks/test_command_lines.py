@@ -81,6 +81,14 @@ def test_a_scenario_without_seeds_is_that_of_seed_0(benchmark: Benchmark) -> Non
     assert benchmark("closure").stories(["loop", "moved:1,2"]) == [("loop", 0), ("moved", 1), ("moved", 2)]
 
 
+def test_recordings_of_one_name_are_refused(benchmark: Benchmark, tmp_path: Path) -> None:
+    same = [tmp_path / folder / "walk" for folder in ("a", "b")]
+    for folder in same:
+        folder.mkdir(parents=True)
+    said = refusal(benchmark("closure").main, *map(str, same), "--keep", str(tmp_path / "out"))
+    assert "expected recordings of different names, got more than one walk" in said
+
+
 def test_parts_of_the_store_that_there_are_not_are_refused(benchmark: Benchmark) -> None:
     said = refusal(benchmark("store").main, "--parts", "sizes,nonsense")
     assert "expected some of sizes,frames,kills, got 'sizes,nonsense'" in said

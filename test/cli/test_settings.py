@@ -7,7 +7,7 @@ import pytest
 
 from objreg_ros.cli.settings import NODES, Settings, names_of, read_settings
 from objreg_ros.detector.params import DetectorParams
-from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 
 
@@ -20,7 +20,7 @@ def test_without_anything_the_defaults_hold() -> None:
 def test_a_parameter_file_is_read_as_ros_reads_it(tmp_path: Path) -> None:
     file = tmp_path / "p.yaml"
     file.write_text(
-        "/**:\n  ros__parameters: {use_sim_time: true}\n"
+        "/**:\n  ros__parameters: {use_sim_time: true, T_base_camera: [0, 0, 1, 0, 0, 0, 1]}\n"
         "segmenter:\n  ros__parameters: {z_max: 3, slop: 0.5}\n"
         "/detector:\n  ros__parameters: {threshold: 0.25}\n"
     )
@@ -28,6 +28,15 @@ def test_a_parameter_file_is_read_as_ros_reads_it(tmp_path: Path) -> None:
     assert settings.of("segmenter", SegmenterParams).z_max == 3.0
     assert settings.of("segmenter", SegmenterNodeParams).slop == 0.5
     assert settings.of("detector", DetectorParams).threshold == 0.25
+    for node, kind in (("segmenter", SegmenterNodeParams), ("registrar", RegistrarNodeParams)):
+        assert settings.of(node, kind).T_base_camera == (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def test_a_parameter_that_no_node_has_is_refused_even_for_all(tmp_path: Path) -> None:
+    file = tmp_path / "p.yaml"
+    file.write_text("/**:\n  ros__parameters: {treshold: 0.25}\n")
+    with pytest.raises(ValueError, match="no node has a parameter treshold"):
+        read_settings(file, ())
 
 
 def test_a_change_wins_over_the_file(tmp_path: Path) -> None:

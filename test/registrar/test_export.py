@@ -46,4 +46,10 @@ def test_a_store_becomes_clouds_in_the_frame_of_the_session_and_a_map(tmp_path: 
     ]
     assert abs(float(_read_ply(files[0])["x"].mean()) - 5.0) < 0.05
     content = json.loads(files[2].read_text())
-    assert content["keyframes"][0]["objects"][0]["landmark"] == 7 and content["closures"][0]["to_ns"] == 2
+    assert content["keyframes"][0]["objects"][0]["landmark"] == 7
+    assert [(known["landmark"], known["label"], known["sightings"]) for known in content["landmarks"]] == [
+        (7, "cell phone", 1)
+    ]
+    assert np.allclose(content["landmarks"][0]["position"], [5.0, 0.0, 1.0], atol=0.05)
+    (told,) = content["closures"]
+    assert told["to_ns"] == 2 and told["from_frame_id"] == "camera" and "objects" not in told

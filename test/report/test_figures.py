@@ -10,7 +10,7 @@ import numpy as np
 from objreg_ros.report import figures
 from objreg_ros.report.story import Story
 
-from .runs import TRUTH, summary
+from .runs import TRUTH, closure, summary
 
 STORY = Story.of("walk", summary(false=True), TRUTH)
 
@@ -23,6 +23,14 @@ def test_the_way_shows_three_lines_and_a_link_a_closure() -> None:
     svg = figures.way(STORY, STORY.tracks())
     assert [count(svg, style) for style in ("true", "odometry", "corrected", "link", "false")] == [1, 1, 1, 5, 1]
     assert "off by 0.0° and 50.0 cm" in svg
+
+
+def test_a_closure_tells_what_had_moved() -> None:
+    told = {**closure(0, 60), "evidence": {"score": 0.8, "moved soda_can [m]": 0.412}}
+    story = Story.of("walk", {**summary(), "constraints": [told]}, TRUTH)
+    assert figures.closure_words(story, story.closures[0]).endswith(
+        "cup, book, soda can moved by 0.41 m, off by 0.0° and 0.0 cm"
+    )
 
 
 def test_the_error_has_two_lines_with_truth() -> None:

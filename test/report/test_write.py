@@ -21,14 +21,15 @@ from .runs import summary
 
 def test_a_report_is_written_from_json_alone(tmp_path: Path) -> None:
     (tmp_path / "run.json").write_text(json.dumps(summary()))
-    write_report(tmp_path / "out.html", [tmp_path / "run.json"] * 2)
+    lacking = write_report(tmp_path / "out.html", [tmp_path / "run.json"] * 2)
+    assert len(lacking) == 2 and "names no recording that is there" in lacking[0]
     assert (tmp_path / "out.html").read_text().count("<article>") == 2
 
 
 def test_the_recording_of_a_run_gives_truth_and_pictures(tmp_path: Path, shared: Path) -> None:
     place = shared / "data" / "redkitchen_a"
     (tmp_path / "run.json").write_text(json.dumps({**summary(), "recording": str(place)}))
-    write_report(tmp_path / "out.html", [tmp_path / "run.json"])
+    assert write_report(tmp_path / "out.html", [tmp_path / "run.json"]) == []
     text = (tmp_path / "out.html").read_text()
     assert "<h1>redkitchen_a</h1>" in text and text.count("data:image/jpeg") >= 12
 
