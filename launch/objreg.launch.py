@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The three nodes: ``ros2 launch objreg_ros objreg.launch.py image:=/kinect/rgb points:=/kinect/points``.
+"""The nodes: ``ros2 launch objreg_ros objreg.launch.py image:=/kinect/rgb points:=/kinect/points``.
 
-Every argument is optional. No parameter's default is repeated here; what is not said is as in the code.
+Every argument is optional; ``mapper:=true`` starts the reference mapper beside the three rooms. No parameter's default
+is repeated here; what is not said is as in the code.
 """
 
 import sys
@@ -39,6 +40,7 @@ OPTIONS = {
     "source": "where the segmenter takes depth from: auto, points or depth",
     "use_sim_time": "true to follow /clock",
     "reliable": "true to ask cameras for reliable delivery",
+    "mapper": "true to start the reference mapper too, which publishes path and correction",
 }
 
 
@@ -61,8 +63,12 @@ def _nodes(context: LaunchContext) -> list[Node]:
             remappings=_remappings(said),
             output="screen",
         )
-        for room in ROOMS
+        for room in _rooms(said)
     ]
+
+
+def _rooms(said: dict[str, str]) -> tuple[str, ...]:
+    return (*ROOMS, "mapper") if said["mapper"].lower() == "true" else ROOMS
 
 
 def _parameters(room: str, said: dict[str, str]) -> list:

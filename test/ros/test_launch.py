@@ -60,6 +60,12 @@ def test_without_arguments_no_parameter_is_set_and_nothing_is_remapped(repositor
     assert file["_remappings"](said) == [] and all(file["_parameters"](room, said) == [] for room in file["ROOMS"])
 
 
+def test_the_mapper_comes_along_when_it_is_asked_for(repository: Path, said: dict[str, Any]) -> None:
+    rooms = launch_file(repository)["_rooms"]
+    assert rooms(said) == ("detector", "segmenter", "registrar")
+    assert rooms({**said, "mapper": "True"}) == ("detector", "segmenter", "registrar", "mapper")
+
+
 def test_an_image_is_remapped_with_its_compressed_form(repository: Path, said: dict[str, Any]) -> None:
     rules = launch_file(repository)["_remappings"]({**said, "image": "/kinect/rgb", "depth": "/kinect/z"})
     assert rules == [
@@ -116,17 +122,17 @@ def test_the_nodes_of_a_launch_live_in_its_namespace_and_end_with_it(
     command = [sys.executable, "-c", PROGRAM, str(repository / "launch" / "objreg.launch.py")]
     with (tmp_path / "log").open("w") as log:
         launched = subprocess.Popen(
-            [*command, "namespace:=robot", f"model:={tiny_model}", "use_sim_time:=false"],
+            [*command, "namespace:=robot", f"model:={tiny_model}", "use_sim_time:=false", "mapper:=true"],
             env={**graph.environment(), "ROS_LOG_DIR": str(tmp_path)}, cwd=repository, stdout=log, stderr=log,
         )  # fmt: skip
     try:
-        names = {f"/robot/{room}" for room in ("detector", "segmenter", "registrar")}
+        names = {f"/robot/{room}" for room in ("detector", "segmenter", "registrar", "mapper")}
         graph.wait_for(lambda: names <= set(graph.books), START_S, f"diagnostics of {names}")
     finally:
         launched.send_signal(signal.SIGINT)
         launched.wait(START_S)
     said = (tmp_path / "log").read_text()
-    assert said.count("process has finished cleanly") == 3, said
+    assert said.count("process has finished cleanly") == 4, said
 
 
 def test_a_replay_brings_every_frame_through_the_nodes_and_ends_the_launch(
