@@ -126,10 +126,9 @@ def _texture(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
 def _score(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
     """The views must like the pose; more, or its objects do, where it is doubtful."""
-    score, alone = candidate.verification.score, _is_alone(candidate, params)
-    seen, liked = params.min_score_alone if alone else params.min_score, _least_liked(candidate, params)
-    if score < seen:
-        return Reason.LOW_OVERLAP, f"score {score:.2f} < {seen:.2f}"
+    score, liked = candidate.verification.score, _least_liked(candidate, params)
+    if score < params.min_score:
+        return Reason.LOW_OVERLAP, f"score {score:.2f} < {params.min_score:.2f}"
     with_likeness = score + params.likeness_weight * max(0.0, candidate.likeness or 0.0)
     if with_likeness >= liked:
         return None

@@ -250,7 +250,7 @@ class RegistrarParams(Params):
         le=1.0,
     )
     max_floating_alone: float = param(
-        0.008,
+        0.012,
         "largest share of tested pixels far in seen free space, where a single object is explained or several look "
         "otherwise",
         ge=0.0,
@@ -263,12 +263,6 @@ class RegistrarParams(Params):
         "the most that is asked of V, with what likeness adds, where a pose is doubtful: where more than "
         "max_violations_doubtful floats (see firm_margin), or a lone object's that fewer than min_chains proposed was "
         "not pushed",
-        ge=-3.0,
-        le=2.0,
-    )
-    min_score_alone: float = param(
-        0.30,
-        "least V of a lone object's pose that fewer than min_chains proposed, however firm it is and alike it looks",
         ge=-3.0,
         le=2.0,
     )

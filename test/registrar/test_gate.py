@@ -133,14 +133,14 @@ def test_a_lone_object_that_views_like_little_needs_two_chains() -> None:
 def test_a_lone_object_of_one_chain_is_refused_where_views_like_too_little_however_alike_it_looks() -> None:
     firm = {"resistance": PARAMS.min_firmness_alone, "agreeing_chains": ("objects",), "explained": (CUP,)}
     for score, accepted in ((1.1, True), (0.9, False)):
-        alike = candidate(score=score * PARAMS.min_score_alone, likeness=1.0, margin=1.0, **firm)
+        alike = candidate(score=score * PARAMS.min_score, likeness=1.0, margin=1.0, **firm)
         refusal = refuse(alike, PARAMS)
         assert (refusal is None) is accepted, (score, refusal)
         assert refusal is None or refusal[0] is Reason.LOW_OVERLAP
 
 
 def test_a_lone_object_of_one_chain_that_views_like_little_must_resist_a_push() -> None:
-    score = 0.5 * (PARAMS.min_score_alone + PARAMS.min_score_doubtful)
+    score = 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful)
     for resistance, accepted in ((PARAMS.min_firmness_alone, True), (0.0, False), (None, False)):
         little = {"score": score, "likeness": 0.0, "margin": 1.0, "explained": (CUP,), "agreeing_chains": ("objects",)}
         refusal = refuse(candidate(resistance=resistance, **little), PARAMS)
