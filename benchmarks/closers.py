@@ -19,6 +19,7 @@ from objreg_ros.mapper.pose_graph import PoseGraph
 from objreg_ros.registrar.export import constraint
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Outcome, Registrar
+from objreg_ros.registrar.warm import warm
 from objreg_ros.report.revisits import Revisit, Seen, recall_by_view_change, revisits
 from objreg_ros.report.trajectory_error import absolute_trajectory_error
 from objreg_ros.truth import FALSE, LOOSE, Truth, within
@@ -45,7 +46,9 @@ class Result:
 
 def ours(source: Source, seed: int) -> Result:
     """The registrar, frame by frame."""
-    registrar = Registrar(RegistrarParams(seed=seed).replaced(**source.camera))
+    params = RegistrarParams(seed=seed).replaced(**source.camera)
+    warm(params)
+    registrar = Registrar(params)
     result = Result([], 0, 0.0)
     start = time.process_time()
     for frame in source.frames:

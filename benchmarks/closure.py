@@ -11,12 +11,13 @@ simulation our constraints know that the camera is calibrated well (covariance_c
     python benchmarks/closure.py --simulate loop:0,1,2,3,4 --simulate moved:0,1,2,3,4 --json OUT --figure closure.png
     python benchmarks/closure.py REC --model MODEL
 
-Simulated recordings and the figures of every method are kept in a folder, so that another run goes on where one ended;
-``--again objreg`` measures a method anew.
+Simulated recordings are kept in a folder, and so are the figures of every method, so that another run of the same code
+goes on where one ended; ``--again objreg`` measures a method anew.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from collections import Counter
@@ -33,6 +34,7 @@ from command_line import quick_values
 from peers import PEERS, named
 from sources import Source, detector_of, read_source
 
+import objreg_ros
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.simulation.scenarios import SCENARIOS
 from objreg_ros.simulation.write import simulate
@@ -61,10 +63,18 @@ class Asked:
         """What the figures depend on, as a part of a file's name."""
         usual = DetectorParams()
         model = "default" if self.detector.model == usual.model else Path(self.detector.model).stem
-        parts = [model, f"{self.candidates}", f"{self.seed}"]
+        parts = [code(), model, f"{self.candidates}", f"{self.seed}"]
         parts += [f"{self.detector.threshold:g}"] if self.detector.threshold != usual.threshold else []
         parts += [f"x{self.drift:g}"] if self.drift != 1.0 else []
         return "_".join(parts)
+
+
+def code() -> str:
+    """Eight digits that change with the package and the benchmarks."""
+    files = [
+        file for folder in (Path(objreg_ros.__file__).parent, Path(__file__).parent) for file in folder.rglob("*.py")
+    ]
+    return hashlib.sha1(b"".join(file.read_bytes() for file in sorted(files))).hexdigest()[:8]
 
 
 class Kept:
