@@ -13,7 +13,7 @@ import numpy as np
 from peers import Peer
 from sources import Source
 
-from objreg_ros.data import Array, Frame, LoopClosure, Odometry, Reason
+from objreg_ros.data import UNTRIED, Array, Frame, LoopClosure, Odometry
 from objreg_ros.geometry import inverse, rotation_angle
 from objreg_ros.mapper.pose_graph import PoseGraph
 from objreg_ros.registrar.export import constraint
@@ -30,7 +30,6 @@ KEYFRAME_MOTION = (0.15, 8.0)  # m, degrees: as often as the registrar by defaul
 AHEAD = np.array([0.0, 0.0, 1.2, 1.0])  # what a camera looks at, about
 PEER_COVARIANCE = np.diag([0.05**2] * 3 + [np.radians(2.0) ** 2] * 3)
 ORACLE_COVARIANCE = np.diag([0.005**2] * 3 + [np.radians(0.2) ** 2] * 3)
-UNTRIED = (Reason.NO_CANDIDATE, Reason.REDUNDANT, Reason.OVER_BUDGET)
 
 
 @dataclass

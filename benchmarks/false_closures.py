@@ -24,11 +24,10 @@ from typing import Any, NamedTuple
 
 import click
 import cv2
-from closers import UNTRIED
 from sources import detector_of, read_source
 
 from objreg_ros.cli.simulate import camera_of, sensors_of
-from objreg_ros.data import LoopClosure, Rejected
+from objreg_ros.data import UNTRIED, LoopClosure, Rejected
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm

@@ -393,6 +393,11 @@ class Reason(Enum):
     REDUNDANT = "redundant"
     OVER_BUDGET = "over_budget"
     UNREADABLE = "unreadable"
+    CLOCK = "clock_began_anew"
+
+
+UNTRIED = frozenset({Reason.NO_CANDIDATE, Reason.REDUNDANT, Reason.OVER_BUDGET, Reason.UNREADABLE, Reason.CLOCK})
+"""Reasons for which nothing was registered."""
 
 
 @word

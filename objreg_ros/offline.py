@@ -27,6 +27,7 @@ from objreg_ros.data import (
     Frame,
     LoopClosure,
     ObjectCloud,
+    Odometry,
     PointCloud,
     Rejected,
 )
@@ -220,8 +221,10 @@ class Line:
         elif name in ("depth", "points"):
             self._feed("depth", stamp_ns, message)
         elif name == "odom":
-            self._feed(name, stamp_ns, message)
-            self._track(self._frames.add("odom", stamp_ns, message))
+            odometry = self._kept(name, partial(from_msg.odometry, message))
+            if odometry is not None:
+                self._feed(name, stamp_ns, odometry)
+                self._track(self._frames.add(name, stamp_ns, odometry))
 
     def finish(self) -> Run:
         """Let out what waits."""
@@ -273,11 +276,7 @@ class Line:
             if self.full:
                 return
             labels = self._labels.pop(match.stamp_ns, ())
-            frame = self._kept(
-                "frame", partial(with_odometry, match["frame"], match["odom"], self._timing.T_base_camera)
-            )
-            if frame is None:
-                continue
+            frame = with_odometry(match["frame"], match["odom"], self._timing.T_base_camera)
             self.run.frames += 1
             self.run.glimpses.append(glimpse(frame, labels))
             with self._timed("register"):
@@ -329,8 +328,8 @@ def run_offline(
     return line.finish()
 
 
-def with_odometry(frame: Frame, odom: Sequence[Any] | None, T_base_camera: Array | None) -> Frame:
-    """The frame with the pose that the odometry messages around it give its camera; ValueError if they give none."""
+def with_odometry(frame: Frame, odom: Sequence[Odometry] | None, T_base_camera: Array | None) -> Frame:
+    """The frame with the pose that the odometry around it gives its camera."""
     if not odom:
         return frame
     T_odom_body = from_msg.pose_at(frame.stamp_ns, odom)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -53,6 +54,7 @@ class Door(Node):
         self.ledger = Ledger()
         self.connected: dict[str, int] = {}  # full topic name → publishers that DDS has connected us to
         self._opened: dict[str, dict[str, Subscription]] = {}  # input of `listen_to_first` → its open topics
+        self._ignored: Counter[str] = Counter()  # messages that are no frame by themselves, by what is wrong with them
         self.failure: Future = Future()
         self.throttled = ThrottledLog(self.get_logger().warning)
         self.watch = Watch(self.count_publishers, self.settings.of(DoorParams).silence)
@@ -156,10 +158,11 @@ class Door(Node):
             raise DroppedError(f"malformed_{topic}", str(error)) from error
 
     def read_aside(self, topic: str, decode: Callable[..., Any], message: Any) -> Any:
-        """The word of a message that is no frame by itself; None, logged throttled, if it breaks its contract."""
+        """The word of a message that is no frame by itself; None, counted and logged, if it breaks its contract."""
         try:
             return decode(message)
         except ValueError as error:
+            self._ignored[f"malformed {topic}"] += 1
             self.throttled.warn(f"malformed_{topic}", f"{topic} ignored: {error}")
             return None
 
@@ -195,7 +198,7 @@ class Door(Node):
         stamp = self.get_clock().now().to_msg()
         name = self.get_fully_qualified_name()
         connected = {f"{CONNECTED}{topic}": count for topic, count in sorted(self.connected.items())}
-        extra = {**connected, **self.extra_diagnostics()}
+        extra = {**connected, **self._ignored, **self.extra_diagnostics()}
         self._diagnostics.publish(diagnostic(name, stamp, balance, rate, silent, extra))
 
     def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> SetParametersResult:

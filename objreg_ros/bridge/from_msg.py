@@ -128,12 +128,12 @@ def odometry(message: Any) -> Odometry:
     )
 
 
-def pose_at(moment_ns: int, messages: Sequence[Any]) -> Array:
-    """``T_odom_body (4, 4)`` at a moment, between the two odometry messages that enclose it; of one message its own.
+def pose_at(moment_ns: int, words: Sequence[Odometry]) -> Array:
+    """``T_odom_body (4, 4)`` at a moment, between the two words of odometry that enclose it; of one word its own.
 
     The nearer one's where they speak of different frames.
     """
-    first, last = odometry(messages[0]), odometry(messages[-1])
+    first, last = words[0], words[-1]
     if first.stamp_ns == last.stamp_ns:
         return first.T_odom_body
     if first.frame_id != last.frame_id:
@@ -142,15 +142,14 @@ def pose_at(moment_ns: int, messages: Sequence[Any]) -> Array:
     return interpolate(first.T_odom_body, last.T_odom_body, min(1.0, max(0.0, share)))
 
 
-def level_gravity(message: Any, T_body_camera: Array | None = None) -> Array | None:
+def level_gravity(word: Odometry | None, T_body_camera: Array | None = None) -> Array | None:
     """The way things fall (3,) in the camera frame by an odometry whose frame is level with z up; None without one.
 
     ``T_body_camera`` is where the camera sits on the body that the odometry speaks of; the same place if None.
     """
-    if message is None:
+    if word is None:
         return None
-    T_level_body = odometry(message).T_odom_body
-    T_level_camera = T_level_body if T_body_camera is None else T_level_body @ T_body_camera
+    T_level_camera = word.T_odom_body if T_body_camera is None else word.T_odom_body @ T_body_camera
     return -T_level_camera[2, :3]
 
 
@@ -282,7 +281,7 @@ def frame(
     view_info: Any,
     gravity_message: Any,
     names: Mapping[int, str],
-    odometry_messages: Sequence[Any] | None = None,
+    odometry_words: Sequence[Odometry] | None = None,
     T_body_camera: Array | None = None,
 ) -> Frame:
     """One moment from the segmenter's four messages, which must carry one stamp, and the odometry around it, if any.
@@ -294,7 +293,7 @@ def frame(
         raise ValueError(f"frame: expected objects, view, camera_info and gravity of one stamp, got {stamps} ns")
     clouds, support = objects(objects_message, names)
     falls, confidence = gravity(gravity_message)
-    T_odom_camera = pose_at(stamps[0], odometry_messages) if odometry_messages else None
+    T_odom_camera = pose_at(stamps[0], odometry_words) if odometry_words else None
     if T_odom_camera is not None and T_body_camera is not None:
         T_odom_camera = T_odom_camera @ T_body_camera
     return Frame(

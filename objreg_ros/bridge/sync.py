@@ -24,6 +24,9 @@ class Need(Enum):
 
 
 SILENCE_NS = 1_000_000_000  # an optional stream that is so far behind has stopped: nothing waits for it
+JUMP_NS = 1_000_000_000  # time that goes back so far has begun anew; by less, one item came late
+PATIENCE_NS = 2_000_000_000  # what waits longer, and is not among the last ``depth``, makes room
+MOST_BYTES = 200_000_000  # so does what is over this size, whatever its time
 ENCLOSING = 7  # times the slop: 0.14 s for one of 20 ms, so that 10 Hz are enough
 
 
@@ -33,6 +36,7 @@ class Drop(Enum):
     UNMATCHED = "unmatched"  # its time has passed and no partner came
     QUEUE_FULL = "queue_full"  # it waited for a partner until the queue was full
     TIME_JUMP = "time_jump"  # time jumped back and left it in the future
+    LATE = "late"  # one of its stream with a later stamp was there before it
 
 
 @dataclass(slots=True)
@@ -48,8 +52,10 @@ class Item:
 class Stream:
     """How one input is treated: ``slop_ns`` is the largest distance in time to the reference, 0 for exact.
 
-    Of an ``enclosing`` one a match gets a tuple: the item of its very time, or those before and after it where they are
-    at most `ENCLOSING` times the slop apart, or the nearest.
+    The last ``depth`` items wait as long as it takes, more of them for `PATIENCE_NS` if they are not too large: a slow
+    detector's word comes when its depth image is many images old. Of an ``enclosing`` one a match gets a tuple: the
+    item of its very time, or those before and after it where they are at most `ENCLOSING` times the slop apart, or the
+    nearest.
     """
 
     name: str
@@ -90,6 +96,14 @@ class Queue:
     dropped: Counter[str] = field(default_factory=Counter)
 
     @property
+    def crowded(self) -> bool:
+        """Whether the oldest item must make room."""
+        if len(self.items) <= self.stream.depth:
+            return False
+        waited_ns = self.items[-1].stamp_ns - self.items[0].stamp_ns
+        return waited_ns > PATIENCE_NS or sum(_size(item.payload) for item in self.items) > MOST_BYTES
+
+    @property
     def waiting(self) -> int:
         """Items that no match has used yet."""
         return sum(not item.used for item in self.items)
@@ -121,6 +135,14 @@ class Queue:
         if self.last_ns is None:
             return self.stream.need is Need.OPTIONAL
         return self.last_ns > stamp_ns or any(item.stamp_ns == stamp_ns for item in self.items)
+
+    def is_late(self, stamp_ns: int) -> bool:
+        """Whether an item came after a later one of its stream, and time has not begun anew."""
+        return self.last_ns is not None and 0 < self.last_ns - stamp_ns < JUMP_NS
+
+    def refuse(self, stamp_ns: int) -> None:
+        """Count an item that came late."""
+        self._let_go(Item(stamp_ns, None), Drop.LATE)
 
     def use(self, item: Item) -> None:
         """Count an item as matched, once."""
@@ -154,9 +176,9 @@ class Queue:
 class Synchroniser:
     """Matches the items of several streams. `add` returns the matches that an item completes, in order of time.
 
-    A stream whose stamps go back has jumped in time (a looped bag): what waits with a later stamp is dropped as
-    ``time_jump``, in every stream, and matching starts afresh. ``on_drop`` hears of every item that met no match: the
-    stream's name, the stamp and the reason.
+    A stream whose stamps go back by `JUMP_NS` has jumped in time (a looped bag): what waits with a later stamp is
+    dropped as ``time_jump``, in every stream, and matching starts afresh. ``on_drop`` hears of every item that met no
+    match: the stream's name, the stamp and the reason.
     """
 
     def __init__(
@@ -175,6 +197,9 @@ class Synchroniser:
         if queue.stream.need is Need.LATCHED:
             queue.latched, queue.matched = payload, queue.matched + 1
             return self._matches()
+        if queue.is_late(stamp_ns):
+            queue.refuse(stamp_ns)
+            return []
         if queue.last_ns is not None and stamp_ns < queue.last_ns:
             self._forget_after(stamp_ns)
         queue.drop_after(stamp_ns)  # another stream's jump may have left what lies in the future of this one's
@@ -251,9 +276,9 @@ class Synchroniser:
                 queue.items.popleft()
 
     def _make_room(self, queue: Queue) -> list[Match]:
-        """Keep a queue within its depth: the oldest reference item goes as it is, the oldest of others is dropped."""
+        """Keep a queue within bounds: the oldest reference item goes as it is, the oldest of others is dropped."""
         found: list[Match] = []
-        while len(queue.items) > queue.stream.depth:
+        while queue.crowded:
             if queue is self._reference:
                 found += self._resolve(queue.items[0], Drop.QUEUE_FULL)
             else:
@@ -263,6 +288,11 @@ class Synchroniser:
 
 def _latched(queue: Queue) -> bool:
     return queue.stream.need is Need.LATCHED
+
+
+def _size(payload: Any) -> int:
+    """The bytes of a message's data, 0 of what has none."""
+    return len(getattr(payload, "data", ()))
 
 
 def _payload(stream: Stream, partners: Sequence[Item]) -> Any:

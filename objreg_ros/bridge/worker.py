@@ -85,31 +85,28 @@ class Backlog(Worker[Job]):
         failed: Callable[[BaseException], None],
         nice: int = 0,
     ) -> None:
-        self._aside: deque[Job] = deque()
+        self._waiting: deque[Job] = deque()
         self._newest, self._settle = work, settle
-        super().__init__(self._in_order, self._aside.append, failed, nice)
+        super().__init__(self._by_age, settle, failed, nice)
 
     def put(self, job: Job) -> None:
         """Hand over a job; never waits."""
-        with self._ready:  # the overtaken one is aside before the new one can be taken
-            if self._next is not None:
-                self._aside.append(self._next)
-            self._next = job
+        with self._ready:
+            self._waiting.append(job)
             self._ready.notify()
 
     def rest(self) -> list[Job]:
         """Take back every job that has not begun, the oldest first."""
         with self._ready:
-            waiting = [*self._aside, *([] if self._next is None else [self._next])]
-            self._aside.clear()
-            self._next = None
+            waiting = list(self._waiting)
+            self._waiting.clear()
         return waiting
 
-    def _in_order(self, job: Job) -> None:
-        while (older := self._oldest()) is not None:
-            self._settle(older)
-        self._newest(job)
+    def _take(self) -> Job | None:
+        """The oldest job; with those behind it still in the queue, so that none is lost whatever this one raises."""
+        with self._ready:
+            self._ready.wait_for(lambda: self._waiting or not self._open)
+            return self._waiting.popleft() if self._open else None
 
-    def _oldest(self) -> Job | None:
-        with self._ready:  # `rest` may empty it between a look and a grasp
-            return self._aside.popleft() if self._aside else None
+    def _by_age(self, job: Job) -> None:
+        (self._settle if self._waiting else self._newest)(job)

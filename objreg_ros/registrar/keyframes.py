@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,20 +21,34 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.plumb import PlumbLine
 from objreg_ros.registrar.tracking import Surface, surface_of, view_motion
 
+JUMP_NS = 1_000_000_000  # time that goes back so far has begun anew; by less, one frame came late
+
+
+class Clock(NamedTuple):
+    """A run of the clock: time has only grown since ``began_ns``, and ``session`` was the first in it.
+
+    It ends where time goes back: a looped bag, a simulation that begins anew, another start of the node.
+    """
+
+    began_ns: int
+    session: int
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stretch:
     """Frames of one moment: ``T_first_frame`` maps the camera of each frame into that of the first.
 
     ``T_session_first`` is the pose of the first camera in the frame of its session: the odometry's, or our own
-    tracking's where odometry had a gap or there is none; ``by_odometry`` says which. ``session`` counts and
-    changes where the track was lost. By then the camera had gone ``travelled`` m in it and turned ``turned`` degrees.
+    tracking's where odometry had a gap or there is none; ``by_odometry`` says which. ``session`` counts and changes
+    where the track was lost; ``clock`` is the run of the clock that it is in. By then the camera had gone ``travelled``
+    m in it and turned ``turned`` degrees.
     """
 
     frames: tuple[Frame, ...]
     T_first_frame: tuple[Array, ...]
     T_session_first: Array
     session: int
+    clock: Clock = Clock(0, 0)
     by_odometry: bool = False
     travelled: float = 0.0
     turned: float = 0.0
@@ -60,6 +75,7 @@ class _Session:
     """A run of frames whose poses are known in one frame: the odometry's, or that of our own tracking."""
 
     number: int
+    clock: Clock
     in_odometry: bool
     way: Way
     plumb: PlumbLine
@@ -67,9 +83,8 @@ class _Session:
     last_ns: int  # of the last frame that was followed
 
     def goes_on(self, frame: Frame) -> bool:
-        """Whether a frame may belong to it: later, of the same camera, and with odometry only if the session has it."""
-        later, same = frame.stamp_ns > self.first.stamp_ns, frame.frame_id == self.first.frame_id
-        return later and same and (self.in_odometry or frame.T_odom_camera is None)
+        """Whether a later frame may belong to it: of the same camera, and with odometry only if the session has it."""
+        return frame.frame_id == self.first.frame_id and (self.in_odometry or frame.T_odom_camera is None)
 
 
 def _levelled(session: _Session, frame: Frame) -> Frame:
@@ -106,13 +121,24 @@ class Keyframer:
     def __init__(self, params: RegistrarParams, next_session: int = 0) -> None:
         self._params = params
         self.next_session = next_session
+        self._clock = Clock(0, next_session)
+        self._last_ns: int | None = None  # of the last frame
         self._open: _Open | None = None
         self._session: _Session | None = None
         self._last: tuple[int, Array, Counter[str]] | None = None  # session, pose and labels of the last stretch
 
     def add(self, frame: Frame) -> Stretch | None:
-        """Track the frame and collect it. A lost track or a jump back in time begins a new session."""
-        session, stretch = self._session, self._open
+        """Track the frame and collect it. A lost track or a jump back in time begins a new session.
+
+        One that is not later than the last, but by no jump, is passed over.
+        """
+        last_ns, session, stretch = self._last_ns, self._session, self._open
+        if last_ns is not None and 0 <= last_ns - frame.stamp_ns < JUMP_NS:
+            return None
+        self._last_ns = frame.stamp_ns
+        if last_ns is None or frame.stamp_ns < last_ns:
+            self._clock = Clock(frame.stamp_ns, self.next_session)
+            return self._start(frame)
         if session is None or not session.goes_on(frame):
             return self._start(frame)
         T_session_frame = self._follow(frame)
@@ -144,6 +170,7 @@ class Keyframer:
         T_session_frame = np.eye(4) if frame.T_odom_camera is None else frame.T_odom_camera
         self._session = _Session(
             number=self.next_session,
+            clock=self._clock,
             in_odometry=frame.T_odom_camera is not None,
             way=Way(T_session_frame),
             plumb=PlumbLine(self._params.gravity_metres, self._params.gravity_degrees),
@@ -176,6 +203,7 @@ class Keyframer:
             T_first_frame=tuple(stretch.motions),
             T_session_first=stretch.T_session_first,
             session=stretch.session.number,
+            clock=stretch.session.clock,
             by_odometry=stretch.by_odometry,
             travelled=stretch.session.way.travelled,
             turned=stretch.session.way.turned,

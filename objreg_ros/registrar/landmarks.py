@@ -61,16 +61,16 @@ class _Known:
 class Landmarks:
     """All known objects. Deterministic: the same sightings in the same order give the same ids.
 
-    What a keyframe costs here does not grow with the number of landmarks.
+    ``first`` is the id of the first new one. What a keyframe costs here does not grow with the number of landmarks.
     """
 
-    def __init__(self, params: RegistrarParams, sightings: Iterable[Sighting] = ()) -> None:
+    def __init__(self, params: RegistrarParams, sightings: Iterable[Sighting] = (), first: int = 1) -> None:
         self._params = params
         self._groups = LabelGroups(params.label_groups)
         self._known: dict[int, _Known] = {}  # the one seen last comes last
         self._there: defaultdict[Cell, set[int]] = defaultdict(set)
         self._shown: defaultdict[int, set[int]] = defaultdict(set)  # the landmarks of each keyframe
-        self._next = 1
+        self._next = first
         self.add(sightings)
 
     def __len__(self) -> int:

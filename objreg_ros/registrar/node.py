@@ -50,6 +50,7 @@ class RegistrarNode(MatchingDoor):
         self._enabled = True
         self._counts = dict(self._registrar.counts())
         self._accepted, self._unsearched, self._refused = 0, 0, Counter[str]()
+        self._without_odometry = 0  # frames
         self._last_refusals: dict[str, str] = {}  # by reason
         self._last_moved: dict[str, float] = {}  # m by label, of the last closure that found any
         self._names: Mapping[int, str] = {}
@@ -73,7 +74,7 @@ class RegistrarNode(MatchingDoor):
     def _listen(self, odom_slop_ns: int) -> None:
         room = {"objects": PointCloud2, "view": PointCloud2, "view/camera_info": CameraInfo, "gravity": Vector3Stamped}
         self.listen(String, "labels", self._hear_labels, qos.latched())
-        self.listen(Odometry, "odom", self._hear("odom"), self.sensor())
+        self.listen(Odometry, "odom", self._hear_odom, self.sensor())
         for topic, kind in room.items():
             self.listen(kind, topic, self._hear(topic), qos.room(), watched=topic)
         self.expect("objects", "objects")
@@ -88,6 +89,11 @@ class RegistrarNode(MatchingDoor):
         if names is not None:
             self._names = names
             self.feed("labels", 0, names)
+
+    def _hear_odom(self, message: Any) -> None:
+        odometry = self.read_aside("odom", from_msg.odometry, message)
+        if odometry is not None:
+            self.feed("odom", odometry.stamp_ns, odometry)
 
     def _hear(self, topic: str) -> Callable[[Any], None]:
         return lambda message: self.feed(topic, from_msg.stamp_ns(message), message)
@@ -108,8 +114,9 @@ class RegistrarNode(MatchingDoor):
 
     def _frame(self, match: Match) -> Frame:
         odom = match["odom"]
+        self._without_odometry += odom is None
         if odom:
-            self._odom_frame = odom[0].header.frame_id
+            self._odom_frame = odom[0].frame_id
         topics = ("objects", "view", "view/camera_info", "gravity", "labels", "odom")
         return self.read("frame", from_msg.frame, *(match[topic] for topic in topics), self._T_base_camera)
 
@@ -158,7 +165,11 @@ class RegistrarNode(MatchingDoor):
         """What is stored, accepted and refused by reason, the last refusal of each, and what moved last."""
         stored = {f"stored {what}": count for what, count in self._counts.items()}
         refused = {f"{REJECTED}{reason}": count for reason, count in sorted(self._refused.items())}
-        counts = {"constraints": self._accepted, "stored unsearched": self._unsearched}
+        counts = {
+            "constraints": self._accepted,
+            "stored unsearched": self._unsearched,
+            "frames without odometry": self._without_odometry,
+        }
         last = {f"last rejected: {reason}": detail for reason, detail in sorted(self._last_refusals.items())}
         moved = {f"last moved: {label}": f"{metres:.2f} m" for label, metres in sorted(self._last_moved.items())}
         return {**super().extra_diagnostics(), **stored, **counts, **refused, **last, **moved}

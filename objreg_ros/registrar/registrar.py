@@ -12,6 +12,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +25,7 @@ from objreg_ros.registrar.engine import Engine
 from objreg_ros.registrar.fusion import fuse
 from objreg_ros.registrar.gate import Refusal, judge
 from objreg_ros.registrar.keyframe import Keyframe
-from objreg_ros.registrar.keyframes import Keyframer, Stretch
+from objreg_ros.registrar.keyframes import Clock, Keyframer, Stretch
 from objreg_ros.registrar.landmarks import Landmark, Landmarks, Link
 from objreg_ros.registrar.odometry import expect
 from objreg_ros.registrar.paper import PaperEngine
@@ -77,8 +78,9 @@ class Registrar:
         self._keyframer, self._first_session = Keyframer(self.params, session), session
         self._index = Index(self.params)
         self._index.add(self._store.sightings())
-        self._landmarks = Landmarks(self.params, self._store.sightings())
-        self._thinning = Thinning(self.params.thin_seconds, ((c.from_ns, c.to_ns) for c in self._store.closures()))
+        self._landmarks = Landmarks(self.params, self._store.sightings(), self._store.next_landmark())
+        self._clock: Clock | None = None  # the run of the clock that goes on
+        self._thinning = Thinning(self.params.thin_seconds)  # of what was accepted in it
         self._session: int | None = None  # the one that goes on, None before the first keyframe
 
     @property
@@ -129,8 +131,10 @@ class Registrar:
                 return Outcome()
             keyframe = fuse(stretch, self.params).numbered(self._store.next_keyframe())
             self._session = keyframe.session
+            if stretch.clock != self._clock:
+                self._clock, self._thinning = stretch.clock, Thinning(self.params.thin_seconds)
             sightings = sightings_of(keyframe)
-            accepted, rejected = self._try_places(keyframe, sightings, deadline)
+            accepted, rejected = self._try_places(keyframe, sightings, stretch.clock, deadline)
             try:
                 closures, named = self._remember(keyframe, sightings, accepted)
             except StoreError:
@@ -164,15 +168,17 @@ class Registrar:
             self._store.close()
 
     def _try_places(
-        self, keyframe: Keyframe, sightings: Sequence[Sighting], deadline: float
+        self, keyframe: Keyframe, sightings: Sequence[Sighting], clock: Clock, deadline: float
     ) -> tuple[list[_Accepted], tuple[Rejected, ...]]:
         """Try the stored keyframes that may show the same place, the likeliest first."""
         accepted: list[_Accepted] = []
         rejected: list[Rejected] = []
-        places = deque(self._index.query(sightings))
-        if not places:
+        found = self._index.query(sightings)
+        if not found:
             refusal = Reason.NO_CANDIDATE, f"none of {len(self._index)} stored objects is alike and may be here"
             rejected.append(_rejected(keyframe.stamp_ns, keyframe, refusal))
+        rejected += [_rejected(place.stamp_ns, keyframe, _twice(clock)) for place in found if _is_twice(place, clock)]
+        places = deque(place for place in found if not _is_twice(place, clock))
         tries, trying = self.params.candidates, deque[_Try]()
         while len(accepted) < self.params.closures:
             self._begin(keyframe, places, trying, tries, self.params.closures - len(accepted), deadline)
@@ -247,13 +253,17 @@ class Registrar:
         self._store.add(keyframe, named, closures, merged)
         self._landmarks.add(named, merged)
         self._index.add(named)
+        with suppress(StoreError):  # the keyframe is stored: what is left now goes another time
+            self._forget_surplus(named)
+        return closures, named
+
+    def _forget_surplus(self, named: Sequence[Sighting]) -> None:
         spare = self._landmarks.surplus(sighting.landmark for sighting in named)
         spare += [k for k in self._store.beyond(self.params.max_keyframes) if k not in spare]
         if spare:
             self._store.remove(spare)
             self._index.remove(spare)
             self._landmarks.forget(spare)
-        return closures, named
 
     def _links(self, keyframe: Keyframe, item: _Accepted) -> list[Link]:
         stored = {sighting.instance: sighting for sighting in self._store.sightings(item.target.keyframe_id)}
@@ -264,6 +274,15 @@ class Registrar:
             )
             for pair in item.candidate.explained
         ]
+
+
+def _is_twice(place: Place, clock: Clock) -> bool:
+    """Whether a place's stamp would name a moment of this run of the clock, which it is not of."""
+    return place.session < clock.session and place.stamp_ns >= clock.began_ns
+
+
+def _twice(clock: Clock) -> Refusal:
+    return Reason.CLOCK, f"it is of an earlier run of the clock, which began anew at {1e-9 * clock.began_ns:.3f} s"
 
 
 def closure_of(

@@ -27,7 +27,7 @@ from objreg_ros.registrar.sighting import Sighting
 
 MAGIC = b"SQLite format 3\0"
 APPLICATION_ID = 0x4F424A52  # "OBJR" at byte 68 of the file
-SCHEMA_VERSION = 3  # at byte 60
+SCHEMA_VERSION = 4  # at byte 60
 CACHED = 64  # decoded keyframes in memory, about 1 MB each
 SCHEMA = """
 CREATE TABLE keyframe (
@@ -46,6 +46,8 @@ CREATE TABLE closure (
   id INTEGER PRIMARY KEY, from_ns INTEGER NOT NULL, to_ns INTEGER NOT NULL,
   from_frame_id TEXT NOT NULL, to_frame_id TEXT NOT NULL,
   T_from_to BLOB NOT NULL, covariance BLOB NOT NULL, labels TEXT NOT NULL, evidence TEXT NOT NULL);
+CREATE TABLE highest (landmark INTEGER NOT NULL);
+INSERT INTO highest VALUES (0);
 """
 RENEWALS = {  # what makes of a version the next one
     1: """
@@ -56,6 +58,10 @@ UPDATE closure SET from_frame_id = to_frame_id;
     2: """
 UPDATE keyframe SET gravity_confidence = 0.02 * gravity_confidence * gravity_confidence * gravity_confidence;
 """,  # it was that of one view: see `plumb`
+    3: """
+CREATE TABLE highest (landmark INTEGER NOT NULL);
+INSERT INTO highest SELECT COALESCE(MAX(landmark), 0) FROM object;
+""",
 }
 SIGHTINGS = (
     "SELECT object.keyframe, session, stamp_ns, instance, label, score, extent, descriptor, position,"
@@ -109,6 +115,8 @@ class Store:
             _insert(transaction, "keyframe", keyframe_row(keyframe))
             for item, sighting in zip(keyframe.objects, sightings, strict=True):
                 _insert(transaction, "object", object_row(item, sighting))
+            newest = max((sighting.landmark for sighting in sightings), default=0)
+            transaction.execute("UPDATE highest SET landmark = MAX(landmark, ?)", (newest,))
             for closure in closures:
                 _insert(transaction, "closure", _closure_row(closure))
             for old, new in (merged or {}).items():
@@ -168,6 +176,10 @@ class Store:
     def next_keyframe(self) -> int:
         """An id that no keyframe ever had here."""
         return 1 + self._one("SELECT COALESCE(MAX(seq), 0) FROM sqlite_sequence WHERE name = 'keyframe'")
+
+    def next_landmark(self) -> int:
+        """An id that no landmark ever had here, whatever has been forgotten since."""
+        return 1 + self._one("SELECT landmark FROM highest")
 
     def next_session(self) -> int:
         """The number of a session that nothing is stored of yet."""

@@ -4,17 +4,14 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable
 
 
 class Thinning:
-    """Knows the accepted closures, and says whether a new pair of moments adds to them."""
+    """Knows the accepted closures of a run of the clock, and says whether a new pair of moments adds to them."""
 
-    def __init__(self, seconds: float, pairs: Iterable[tuple[int, int]] = ()) -> None:
+    def __init__(self, seconds: float) -> None:
         self._span_ns = max(round(1e9 * seconds), 1)
         self._pairs: defaultdict[int, list[tuple[int, int]]] = defaultdict(list)  # by the span that the later one is in
-        for pair in pairs:
-            self.accept(*pair)
 
     def redundant(self, from_ns: int, to_ns: int) -> bool:
         """Whether an accepted closure joins moments that are both nearer than the span to these."""

@@ -8,7 +8,7 @@ from html import escape
 
 import numpy as np
 
-from objreg_ros.data import Array, LoopClosure, Rejected
+from objreg_ros.data import UNTRIED, Array, LoopClosure, Reason, Rejected
 from objreg_ros.geometry import pose_error, rotation_angle
 from objreg_ros.report import figures
 from objreg_ros.report.drawing import legend
@@ -33,9 +33,8 @@ MEANINGS = {
     "redundant": "a closure of this revisit was accepted already",
     "over_budget": "time ran out before this place was tried",
     "unreadable": "what the store holds of this place is damaged",
+    "clock_began_anew": "stamps repeat: that moment's would name one of this run",
 }
-
-UNTRIED = ("no_candidate", "redundant", "over_budget", "unreadable")
 
 
 def page(chapters: Sequence[tuple[Story, Album | None]]) -> str:
@@ -97,7 +96,7 @@ def _tile(value: str, name: str, note: str, tone: str = "") -> str:
 def _refused_count(story: Story) -> int:
     """How many candidates were tried in vain."""
     counts = story.summary.get("rejected", {})
-    return sum(count for reason, count in counts.items() if reason not in UNTRIED)
+    return sum(count for reason, count in counts.items() if Reason(reason) not in UNTRIED)
 
 
 def _count_note(story: Story) -> str:

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from objreg_ros.bridge import from_msg
-from objreg_ros.data import Array, DepthImage, LoopClosure, Reason, Rejected
+from objreg_ros.data import UNTRIED, Array, DepthImage, LoopClosure, Rejected
 from objreg_ros.geometry import back_project, transform
 from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.record import Record, Recording
@@ -21,7 +21,6 @@ from objreg_ros.segmenter.organise import organise
 WINDOW_NS = 150_000_000  # how far from a moment its pictures may have been recorded
 WIDTH = 320  # px of one picture
 QUALITY = 82
-UNTRIED = (Reason.NO_CANDIDATE, Reason.REDUNDANT, Reason.OVER_BUDGET, Reason.UNREADABLE)  # nothing was registered
 
 
 class Album:

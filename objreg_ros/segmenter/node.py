@@ -74,7 +74,9 @@ class SegmenterNode(MatchingDoor):
         self.feed("image", from_msg.stamp_ns(message), message)
 
     def _hear_odom(self, message: Any) -> None:
-        self.feed("odom", from_msg.stamp_ns(message), message)
+        odometry = self.read_aside("odom", from_msg.odometry, message)
+        if odometry is not None:
+            self.feed("odom", odometry.stamp_ns, odometry)
 
     def _hear_depth(self, topic: str, message: Any) -> None:
         if not self.begun:
@@ -107,7 +109,7 @@ class SegmenterNode(MatchingDoor):
         names = payload["labels"]
         shape = depth.depth.shape
         detections = self.read("detections", from_msg.detections, payload["detections"], names, shape)
-        gravity = self.read("odom", from_msg.level_gravity, payload.payloads.get("odom"), self._inputs.mounting)
+        gravity = from_msg.level_gravity(payload.payloads.get("odom"), self._inputs.mounting)
         with self.ledger.timed("segment"):
             frame = self._segmenter.segment(detections, depth, gravity)
         self._publish(frame, names)

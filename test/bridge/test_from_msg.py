@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -159,9 +160,11 @@ def test_odometry_is_a_pose() -> None:
 
 def test_gravity_is_down_in_the_frame_of_a_level_odometry() -> None:
     half = np.sqrt(0.5)
-    on_its_side = messages.odometry((half, 0, 0, half), (1, 2, 3))  # a quarter turn about x: the body's y is up
+    on_its_side = from_msg.odometry(
+        messages.odometry((half, 0, 0, half), (1, 2, 3))
+    )  # a quarter turn about x: the body's y is up
     assert from_msg.level_gravity(None) is None
-    assert np.allclose(from_msg.level_gravity(messages.odometry()), (0, 0, -1))
+    assert np.allclose(from_msg.level_gravity(from_msg.odometry(messages.odometry())), (0, 0, -1))
     assert np.allclose(from_msg.level_gravity(on_its_side), (0, -1, 0))
     T_body_camera = pose(rotation_from_vector(np.array([0, 0, np.pi / 2])), np.ones(3))  # the body's y is its x
     assert np.allclose(from_msg.level_gravity(on_its_side, T_body_camera), (-1, 0, 0))
@@ -270,7 +273,7 @@ def test_a_frame_is_made_of_its_four_messages() -> None:
         info,
         gravity_message(0, 0.5, 0),
         {3: "cup"},
-        [messages.odometry(at=(1, 0, 0))],
+        [from_msg.odometry(messages.odometry(at=(1, 0, 0)))],
     )
     assert [cloud.label for cloud in frame.objects] == ["4", "cup"]
     assert frame.view.grey is not None and frame.view.grey[0, 0] == 0x40
@@ -283,21 +286,21 @@ def test_the_camera_sits_where_the_body_carries_it() -> None:
     T_body_camera = np.eye(4)
     T_body_camera[1, 3] = 2
     parts = (messages.own_table(object_rows()), view, info, gravity_message(0, 0, 0), {})
-    frame = from_msg.frame(*parts, [messages.odometry(at=(1, 0, 0))], T_body_camera)
+    frame = from_msg.frame(*parts, [from_msg.odometry(messages.odometry(at=(1, 0, 0)))], T_body_camera)
     assert frame.T_odom_camera is not None and frame.T_odom_camera[:3, 3].tolist() == [1, 2, 0]
     assert frame.gravity is None and frame.gravity_confidence == 0
 
 
 def test_a_pose_between_two_messages_is_between_theirs() -> None:
-    around = [messages.odometry(at=(1, 0, 0), stamp_ns=100), messages.odometry(at=(2, 0, 0), stamp_ns=140)]
+    around = [from_msg.odometry(messages.odometry(at=(x, 0, 0), stamp_ns=60 + 40 * x)) for x in (1, 2)]
     np.testing.assert_allclose(from_msg.pose_at(110, around)[:3, 3], (1.25, 0, 0))
     assert from_msg.pose_at(110, around[:1])[0, 3] == 1
     assert from_msg.pose_at(500, around)[0, 3] == 2
 
 
 def test_there_is_nothing_between_poses_in_two_frames() -> None:
-    around = [messages.odometry(at=(x, 0, 0), stamp_ns=100 * x) for x in (1, 2)]
-    around[1].header.frame_id = "another"
+    around = [from_msg.odometry(messages.odometry(at=(x, 0, 0), stamp_ns=100 * x)) for x in (1, 2)]
+    around[1] = replace(around[1], frame_id="another")
     assert [from_msg.pose_at(moment, around)[0, 3] for moment in (120, 180)] == [1, 2]
 
 

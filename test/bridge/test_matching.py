@@ -14,7 +14,7 @@ import rclpy
 from objreg_ros.bridge.door import DroppedError
 from objreg_ros.bridge.log import ThrottledLog
 from objreg_ros.bridge.matching import MatchingDoor
-from objreg_ros.bridge.sync import Match, Need, Stream
+from objreg_ros.bridge.sync import JUMP_NS, PATIENCE_NS, Match, Need, Stream
 
 PATIENCE = 20.0  # seconds; a test that gets there has failed
 
@@ -109,16 +109,23 @@ def test_the_log_says_what_a_frame_without_a_partner_lacked(door: Pairs, said: l
 def test_the_log_names_all_that_a_frame_waited_for_until_the_queue_was_full(door: Pairs, said: list[str]) -> None:
     door.begin([Stream("a", depth=1), Stream("b"), Stream("names", Need.LATCHED)])
     door.feed("a", 5, "a5")
-    door.feed("a", 6, "a6")
+    door.feed("a", 6 + PATIENCE_NS, "a6")
     assert len(said) == 1
     assert said[0].startswith("frame dropped, queue full: expected b of its very stamp and names before it, got none")
 
 
 def test_the_log_says_that_time_went_back(door: Pairs, said: list[str]) -> None:
     door.begin([Stream("a"), Stream("b")])
-    door.feed("a", 5, "a5")
+    door.feed("a", 5 + JUMP_NS, "a5")
     door.feed("a", 3, "a3")
     assert said == ["frame dropped, time jump: time went back to before it while it waited"]
+
+
+def test_the_log_says_that_a_frame_came_late(door: Pairs, said: list[str]) -> None:
+    door.begin([Stream("a"), Stream("b")])
+    door.feed("a", 5, "a5")
+    door.feed("a", 3, "a3")
+    assert said == ["frame dropped, late: one with a later stamp came before it"]
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from objreg_ros.bridge.sync import SILENCE_NS, Match, Need, Stream, Synchroniser
+from objreg_ros.bridge.sync import JUMP_NS, MOST_BYTES, PATIENCE_NS, SILENCE_NS, Match, Need, Stream, Synchroniser
 
 EXACT = (Stream("image"), Stream("depth"))
 
@@ -95,8 +97,10 @@ def test_an_enclosing_stream_gives_what_is_on_either_side_of_a_time() -> None:
 def test_an_optional_stream_that_died_is_given_up_when_the_queue_is_full() -> None:
     sync = Synchroniser((Stream("image", depth=2), Stream("odom", Need.OPTIONAL, slop_ns=10)))
     sync.add("odom", 0, "o")
-    found = [match for t in (100, 200, 300, 400) for match in sync.add("image", t, t)]
-    assert pairs(found, "image", "odom") == [(100, None), (200, None)] and accounts_hold(sync)
+    image = SimpleNamespace(data=range(MOST_BYTES // 2))
+    found = [match for t in (100, 200, 300, 400) for match in sync.add("image", t, image)]
+    assert [match.stamp_ns for match in found] == [100, 200] and accounts_hold(sync)
+    assert pairs(found, "odom") == [(None,), (None,)]
 
 
 def test_an_optional_stream_that_has_been_silent_for_long_is_not_waited_for() -> None:
@@ -110,13 +114,44 @@ def test_an_optional_stream_that_has_been_silent_for_long_is_not_waited_for() ->
 
 def test_a_full_queue_drops_its_oldest_with_a_reason() -> None:
     sync = Synchroniser((Stream("image", depth=2), Stream("depth", depth=3)))
-    for t in range(5):
+    for t in range(0, 5 * PATIENCE_NS, PATIENCE_NS):
         sync.add("image", t, t)
     assert sync.queues["image"].dropped == {"queue_full": 3} and sync.queues["image"].waiting == 2
     other = Synchroniser((Stream("image", depth=2), Stream("depth", depth=3)))
-    for t in range(5):
+    for t in range(0, 5 * PATIENCE_NS, PATIENCE_NS):
         other.add("depth", t, t)
     assert other.queues["depth"].dropped == {"queue_full": 2} and accounts_hold(sync) and accounts_hold(other)
+
+
+def test_what_comes_fast_waits_long_enough_for_a_slow_partner() -> None:
+    sync = Synchroniser((Stream("depth"), Stream("detections", slop_ns=10)))
+    step_ns, slow_ns = PATIENCE_NS // 60, PATIENCE_NS // 3
+    found = []
+    for t in range(0, 10 * slow_ns, step_ns):
+        found += sync.add("depth", t, t)
+        if t % slow_ns < step_ns and t >= slow_ns:  # about a picture seen one slow look before
+            seen = (t - slow_ns) // step_ns * step_ns
+            found += sync.add("detections", seen, seen)
+    assert len(found) >= 8 and accounts_hold(sync)
+    assert sync.queues["depth"].waiting * step_ns <= PATIENCE_NS + step_ns
+
+
+def test_large_things_make_room_however_short_they_have_waited() -> None:
+    sync = Synchroniser((Stream("cloud", depth=3), Stream("detections")))
+    for t in range(20):
+        sync.add("cloud", t, SimpleNamespace(data=range(MOST_BYTES // 5)))
+    assert sync.queues["cloud"].waiting == 5 and sync.queues["cloud"].dropped == {"queue_full": 15}
+
+
+def test_one_that_comes_late_is_passed_over_and_nothing_that_waits_is_lost() -> None:
+    sync = Synchroniser((Stream("image"), Stream("depth"), Stream("odom", Need.OPTIONAL, slop_ns=10)))
+    sync.add("odom", JUMP_NS, "o")
+    sync.add("image", JUMP_NS + 5, "i")
+    sync.add("odom", JUMP_NS - 3, "late")
+    sync.add("image", JUMP_NS + 1, "late")
+    sync.add("depth", JUMP_NS + 5, "d")
+    assert pairs(sync.add("odom", JUMP_NS + 20, "p"), "image", "depth", "odom") == [("i", "d", "o")]
+    assert sync.queues["odom"].dropped == sync.queues["image"].dropped == {"late": 1} and accounts_hold(sync)
 
 
 def test_what_a_match_lacks_is_told() -> None:
@@ -130,13 +165,14 @@ def test_what_a_match_lacks_is_told() -> None:
 
 def test_a_looped_recording_matches_as_well_the_second_time() -> None:
     sync = Synchroniser(EXACT)
-    passes = [sum(len(sync.add(name, t, t)) for t in range(50) for name in ("image", "depth")) for _ in range(3)]
+    stamps = range(0, 50 * JUMP_NS, JUMP_NS)
+    passes = [sum(len(sync.add(name, t, t)) for t in stamps for name in ("image", "depth")) for _ in range(3)]
     assert passes == [50, 50, 50] and accounts_hold(sync)
 
 
 def test_a_jump_back_drops_what_waits_in_the_future() -> None:
     sync = Synchroniser(EXACT)
-    sync.add("image", 100, "old")
+    sync.add("image", 10 + JUMP_NS, "old")
     sync.add("image", 10, "new")
     assert sync.queues["image"].dropped == {"time_jump": 1}
     assert pairs(sync.add("depth", 10, "d"), "image") == [("new",)] and accounts_hold(sync)
@@ -144,7 +180,7 @@ def test_a_jump_back_drops_what_waits_in_the_future() -> None:
 
 def test_a_stream_that_follows_anothers_jump_back_loses_nothing_in_silence() -> None:
     sync = Synchroniser((Stream("image"), Stream("depth"), Stream("odom", Need.OPTIONAL)))
-    for name, stamp in (("depth", 1), ("odom", 2), ("odom", 1), ("image", 0)):
+    for name, stamp in (("depth", 1), ("odom", 1 + JUMP_NS), ("odom", 1), ("image", 0)):
         assert sync.add(name, stamp, stamp) == []
     assert pairs(sync.add("depth", 0, "d0"), "depth") == [("d0",)]
     assert sync.queues["depth"].dropped == {"time_jump": 1} and accounts_hold(sync)
@@ -181,6 +217,7 @@ def test_a_reference_that_is_not_required_is_refused() -> None:
 
 NAMES = ("image", "depth", "odom", "info")
 ARRIVALS = st.lists(st.tuples(st.sampled_from(NAMES), st.integers(0, 30)), max_size=80)
+STEP_NS = JUMP_NS // 3  # some that go back are late, some have begun anew
 
 
 @given(ARRIVALS, st.integers(0, 5), st.integers(1, 4))
@@ -188,15 +225,16 @@ def test_nothing_is_lost_in_silence_whatever_comes(arrivals: list[tuple[str, int
     sync = Synchroniser(
         (
             Stream("image", depth=depth),
-            Stream("depth", slop_ns=slop, depth=depth),
-            Stream("odom", Need.OPTIONAL, slop_ns=slop, depth=depth),
+            Stream("depth", slop_ns=slop * STEP_NS, depth=depth),
+            Stream("odom", Need.OPTIONAL, slop_ns=slop * STEP_NS, depth=depth),
             Stream("info", Need.LATCHED),
         )
     )
-    found = []
+    found, queues = [], sync.queues.values()
     for name, stamp in arrivals:
-        found += sync.add(name, stamp, stamp)
-        assert accounts_hold(sync) and all(q.waiting <= depth for q in sync.queues.values())
+        found += sync.add(name, stamp * STEP_NS, stamp)
+        assert accounts_hold(sync)
+        assert all(q.waiting <= depth or q.items[-1].stamp_ns - q.items[0].stamp_ns <= PATIENCE_NS for q in queues)
     found += sync.flush()
     assert accounts_hold(sync)
     assert all(abs(match["depth"] - match["image"]) <= slop for match in found)
@@ -206,10 +244,7 @@ def test_nothing_is_lost_in_silence_whatever_comes(arrivals: list[tuple[str, int
 def test_every_drop_is_told_with_its_stream_stamp_and_reason() -> None:
     told: list[tuple[str, int, str]] = []
     sync = Synchroniser(EXACT, on_drop=lambda name, stamp_ns, why: told.append((name, stamp_ns, why)))
-    sync.add("image", 10, "i10")
-    sync.add("image", 20, "i20")
-    sync.add("depth", 20, "d20")
-    sync.add("depth", 30, "d30")
-    sync.add("image", 5, "i5")
-    assert told == [("image", 10, "unmatched"), ("depth", 30, "time_jump")]
+    for name, stamp in (("image", 10), ("image", JUMP_NS), ("depth", JUMP_NS), ("depth", JUMP_NS + 30), ("image", 0)):
+        sync.add(name, stamp, stamp)
+    assert told == [("image", 10, "unmatched"), ("depth", JUMP_NS + 30, "time_jump")]
     assert sum(q.dropped.total() for q in sync.queues.values()) == len(told)

@@ -154,3 +154,24 @@ def test_a_nice_worker_and_the_threads_that_it_starts_give_way() -> None:
     worker.close()
     assert seen == [19, 19]
     assert os.getpriority(os.PRIO_PROCESS, threading.get_native_id()) < 19
+
+
+def test_a_backlog_that_breaks_off_gives_back_all_that_it_did_not_begin() -> None:
+    begun, go, broken = threading.Event(), threading.Event(), threading.Event()
+
+    def work(job: int) -> None:
+        begun.set()
+        assert go.wait(PATIENCE)
+
+    def settle(job: int) -> None:
+        raise RuntimeError("ROS is down")
+
+    backlog: Backlog[int] = Backlog(work, settle, lambda error: broken.set())
+    backlog.put(1)
+    assert begun.wait(PATIENCE)
+    for job in (2, 3, 4):
+        backlog.put(job)
+    go.set()
+    assert broken.wait(PATIENCE)
+    backlog.close()
+    assert backlog.rest() == [3, 4]

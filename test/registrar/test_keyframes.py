@@ -10,10 +10,10 @@ import pytest
 
 from objreg_ros.data import Frame, View
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
-from objreg_ros.registrar.keyframes import Keyframer, Stretch
+from objreg_ros.registrar.keyframes import Clock, Keyframer, Stretch
 from objreg_ros.registrar.params import RegistrarParams
 
-from .samples import CAMERA, box, frame, moved, scene_view
+from .samples import CAMERA, SECOND, box, frame, moved, scene_view
 
 PARAMS = RegistrarParams(keyframe_translation=0.1, keyframe_rotation=10.0, keyframe_seconds=1.0, keyframe_frames=4)
 CUP = (box("cup", (0, 0, 1)),)
@@ -61,6 +61,23 @@ def test_a_lost_track_and_a_jump_back_in_time_begin_a_new_session() -> None:
     assert sessions == [0, 1]
     looped = [frame(5.0, CUP, np.eye(4)), frame(1.0, CUP, np.eye(4)), frame(1.1, CUP, np.eye(4))]
     assert [s.session for s in _run(Keyframer(PARAMS), looped)] == [0, 1]
+
+
+def test_a_frame_that_comes_late_or_twice_is_passed_over() -> None:
+    frames = [frame(t, CUP, moved(0.03 * k)) for k, t in enumerate((5.0, 5.1, 5.0, 4.2, 5.1, 5.2, 5.3, 5.4, 5.5))]
+    stretches = _run(Keyframer(PARAMS), frames)
+    assert {s.session for s in stretches} == {0}
+    stamps = [f.stamp_ns for s in stretches for f in s.frames]
+    assert stamps == sorted(set(stamps)) and min(stamps) == 5 * SECOND
+
+
+def test_a_clock_runs_until_time_goes_back() -> None:
+    frames = [frame(t, CUP, moved(t)) for t in (5.0, 6.0)] + [frame(7.0, CUP, None, scene_view(moved(9.0)))]
+    frames += [frame(t, CUP, moved(t)) for t in (1.0, 2.0)]
+    clocks = [s.clock for s in _run(Keyframer(PARAMS, 4), frames)]
+    assert clocks[0] == Clock(5 * SECOND, 4) and clocks[-1].began_ns == SECOND
+    assert clocks == sorted(clocks, key=lambda clock: clock.session)
+    assert len(set(clocks)) == 2 and clocks[-1].session > 4
 
 
 def test_odometry_that_appears_begins_its_own_session() -> None:

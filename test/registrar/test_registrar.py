@@ -17,6 +17,7 @@ from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.store import StoreError
 
 from . import rooms
+from .samples import SECOND
 
 PARAMS = RegistrarParams()
 HERE = rooms.look_at((0.2, 0.0, 1.3), (1.8, 0.0, 0.75))
@@ -221,4 +222,32 @@ def test_a_keyframe_of_before_a_reset_is_not_stored_after_it() -> None:
     registrar.reset()
     assert stretch is not None and registrar.search(stretch).keyframe_ns is None
     _run(registrar, _frame(10, HERE, True))
+    assert registrar.counts()["keyframes"] == 1
+
+
+def test_a_place_whose_stamp_would_name_a_moment_of_this_run_of_the_clock_closes_nothing() -> None:
+    frames = [_frame(10.0, HERE), _frame(20.0, AWAY)]
+    begun_anew = [_frame(5.0, AWAY), _frame(40.0, BESIDE)]  # in this run the camera was elsewhere at 10 s
+    closures, rejected = _run(Registrar(PARAMS), *frames, *begun_anew)
+    told = [r for r in rejected if r.reason is Reason.CLOCK]
+    assert {r.from_ns for r in told} == {10 * SECOND, 20 * SECOND} and "began anew at 5.000 s" in told[0].detail
+    assert {closure.from_ns for closure in closures if closure.to_ns in (5 * SECOND, 40 * SECOND)} <= {5 * SECOND}
+
+
+def test_a_place_of_before_a_run_of_the_clock_still_closes_a_loop() -> None:
+    frames = [_frame(50.0, AWAY), _frame(2.0, HERE), _frame(3.5, AWAY), _frame(1.0, AWAY), _frame(40.0, AWAY)]
+    closures, _ = _run(Registrar(PARAMS), _frame(0.5, HERE), *frames, _frame(70.0, BESIDE))
+    assert 0.5 * SECOND in {closure.from_ns for closure in closures if closure.to_ns == 70 * SECOND}
+
+
+def test_a_surplus_that_cannot_be_forgotten_now_takes_nothing_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise StoreError("the disk is full")
+
+    registrar = Registrar(replace(PARAMS, max_keyframes=1))
+    monkeypatch.setattr(registrar._store, "remove", refuse)
+    closures, _ = _run(registrar, _frame(0, HERE), _frame(30, BESIDE))
+    assert len(closures) == 1 and registrar.counts()["keyframes"] == 2
+    monkeypatch.undo()
+    _run(registrar, _frame(60, AWAY))
     assert registrar.counts()["keyframes"] == 1

@@ -21,7 +21,7 @@ from objreg_ros.data import LoopClosure
 from objreg_ros.registrar import store as store_module
 from objreg_ros.registrar.plumb import DOUBT, ONE_VIEW
 from objreg_ros.registrar.sighting import sightings_of
-from objreg_ros.registrar.store import Store, StoreError
+from objreg_ros.registrar.store import SCHEMA_VERSION, Store, StoreError
 
 from .samples import box, keyframe, moved
 
@@ -125,7 +125,7 @@ def test_a_store_of_the_first_version_is_read_as_it_is_and_renewed_when_it_is_wr
     store.add(written, sightings_of(written), [closure])
     store._connection.executescript(
         "ALTER TABLE closure DROP COLUMN from_frame_id;"
-        "ALTER TABLE closure RENAME COLUMN to_frame_id TO frame_id; PRAGMA user_version = 1;"
+        "ALTER TABLE closure RENAME COLUMN to_frame_id TO frame_id; DROP TABLE highest; PRAGMA user_version = 1;"
     )
     store.close()
     for read_only in (True, False, True):
@@ -134,19 +134,40 @@ def test_a_store_of_the_first_version_is_read_as_it_is_and_renewed_when_it_is_wr
         assert (back.from_frame_id, back.to_frame_id, opened.keyframe(1).labels) == ("camera", "camera", ("cup",))
         opened.close()
     with sqlite3.connect(path) as connection:
-        assert connection.execute("PRAGMA user_version").fetchone() == (3,)
+        assert connection.execute("PRAGMA user_version").fetchone() == (SCHEMA_VERSION,)
 
 
 def test_gravity_of_the_second_version_is_that_of_one_view(tmp_path: Path) -> None:
     path, written = tmp_path / "place.db", keyframe(1)
     store = Store(path)
     store.add(written, sightings_of(written))
-    store._connection.executescript("PRAGMA user_version = 2;")
+    store._connection.executescript("DROP TABLE highest; PRAGMA user_version = 2;")
     store.close()
     for _ in range(2):  # once and for all
         opened = Store(path)
         assert opened.keyframe(1).gravity_confidence == pytest.approx(ONE_VIEW * written.gravity_confidence**DOUBT)
         opened.close()
+
+
+def test_landmarks_of_the_third_version_keep_their_ids(tmp_path: Path) -> None:
+    path, written = tmp_path / "place.db", keyframe(1)
+    store = Store(path)
+    store.add(written, [sightings_of(written)[0].of_landmark(7, np.eye(3))])
+    store._connection.executescript("DROP TABLE highest; PRAGMA user_version = 3;")
+    store.close()
+    assert Store(path).next_landmark() == 8
+
+
+def test_the_id_of_a_landmark_is_never_used_again(tmp_path: Path) -> None:
+    path, written = tmp_path / "place.db", keyframe(1)
+    store = Store(path)
+    assert store.next_landmark() == 1
+    store.add(written, [sightings_of(written)[0].of_landmark(7, np.eye(3))])
+    store.remove([1])
+    store.close()
+    opened = Store(path)
+    opened.clear()
+    assert opened.next_landmark() == 8
 
 
 def test_a_place_where_no_store_can_be_made_is_a_store_error(tmp_path: Path) -> None:
@@ -238,7 +259,7 @@ def test_a_newer_file_is_refused_and_left_untouched(tmp_path: Path) -> None:
         connection.execute("PRAGMA user_version = 99")
     connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     connection.close()
-    _refused(path, "version 3 or older, got 99")
+    _refused(path, f"version {SCHEMA_VERSION} or older, got 99")
 
 
 def test_a_store_is_newer_where_only_the_log_beside_it_says_so(tmp_path: Path) -> None:
@@ -251,9 +272,9 @@ def test_a_store_is_newer_where_only_the_log_beside_it_says_so(tmp_path: Path) -
     for name in (path.name, f"{path.name}-wal"):
         shutil.copy(tmp_path / name, killed / name)
     connection.close()
-    assert (killed / path.name).read_bytes()[60:64] == (3).to_bytes(4, "big")
+    assert (killed / path.name).read_bytes()[60:64] == SCHEMA_VERSION.to_bytes(4, "big")
     before = [(killed / name).read_bytes() for name in (path.name, f"{path.name}-wal")]
-    with pytest.raises(StoreError, match="version 3 or older, got 99"):
+    with pytest.raises(StoreError, match=f"version {SCHEMA_VERSION} or older, got 99"):
         Store(killed / path.name)
     assert [(killed / name).read_bytes() for name in (path.name, f"{path.name}-wal")] == before
 

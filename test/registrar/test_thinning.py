@@ -21,7 +21,3 @@ def test_what_came_to_nothing_is_not_in_the_way() -> None:
     thinning.accept(0, 60 * SECOND)
     thinning.withdraw(0, 60 * SECOND)
     assert not thinning.redundant(0, 60 * SECOND)
-
-
-def test_what_was_accepted_before_a_restart_still_counts() -> None:
-    assert Thinning(1.0, [(0, 60 * SECOND)]).redundant(0, 60 * SECOND)
