@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -11,6 +12,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
@@ -55,6 +57,7 @@ class Door(Node):
         self.connected: dict[str, int] = {}  # full topic name → publishers that DDS has connected us to
         self._opened: dict[str, dict[str, Subscription]] = {}  # input of `listen_to_first` → its open topics
         self._ignored: Counter[str] = Counter()  # messages that are no frame by themselves, by what is wrong with them
+        self.apart = ReentrantCallbackGroup()  # of services that wait for work that is done `aside`
         self.failure: Future = Future()
         self.throttled = ThrottledLog(self.get_logger().warning)
         self.watch = Watch(self.count_publishers, self.settings.of(DoorParams).silence)
@@ -184,6 +187,27 @@ class Door(Node):
 
     def _overtaken(self, job: tuple[int, Any]) -> None:
         self.drop(job[0], "overtaken")  # by a newer frame: usual where the camera is faster than the room
+
+    # Services
+
+    def aside(self, work: Callable[[], Any]) -> Future:
+        """What ``work`` gives, done by a thread of its own; for a service to await, so that no subscription waits.
+
+        The service has to be in the group ``apart``: a group does nothing else while one of its callbacks waits.
+        """
+        executor = self.executor
+        future = Future(executor=executor)
+
+        def run() -> None:
+            try:
+                future.set_result(work())
+            except BaseException as error:
+                future.set_exception(error)
+            if executor is not None:
+                executor.wake()
+
+        threading.Thread(target=run, name="aside", daemon=True).start()
+        return future
 
     # Diagnostics, parameters, the end
 

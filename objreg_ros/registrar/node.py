@@ -68,7 +68,7 @@ class RegistrarNode(MatchingDoor):
 
     def _serve(self) -> None:
         self.create_service(Trigger, "~/reset", self._reset)
-        self.create_service(Trigger, "~/save", self._save)
+        self.create_service(Trigger, "~/save", self._save, callback_group=self.apart)
         self.create_service(SetBool, "~/enable", self._enable)
 
     def _listen(self, odom_slop_ns: int) -> None:
@@ -186,20 +186,24 @@ class RegistrarNode(MatchingDoor):
         response.success, response.message = True, "forgot every keyframe"
         return response
 
-    def _save(self, _: Any, response: Any) -> Any:
+    async def _save(self, _: Any, response: Any) -> Any:
         """Also ends the keyframe in hand: what the last frames closed is published before the answer.
 
         With odometry the session goes on; without, our own tracking begins another.
         """
+        response.success, response.message = await self.aside(self._settle_and_save)
+        return response
+
+    def _settle_and_save(self) -> tuple[bool, str]:
+        """Whether it could be, and where it is or what was in the way."""
         try:
             with self._tracking:
                 stretch = self._registrar.end()
             if stretch is not None:
                 self._publish(self._registrar.search(stretch, self._seconds))
-            response.success, response.message = True, self._registrar.save()
+            return True, self._registrar.save()
         except (ValueError, OSError) as error:
-            response.success, response.message = False, str(error)
-        return response
+            return False, str(error)
 
     def _enable(self, request: Any, response: Any) -> Any:
         self._enabled = request.data

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from typing import Any
 
@@ -10,6 +11,7 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
 import rclpy
 from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
 from objreg_ros.bridge import qos
 from objreg_ros.bridge.door import Door, DroppedError
@@ -79,3 +81,30 @@ def test_an_input_that_is_hung_up_has_no_subscriptions_and_hears_nothing_more(do
     door.hang_up("words")
     door.hang_up("never opened")
     assert door.count_subscribers("/quiet") == door.count_subscribers("/loud") == 0
+
+
+def test_while_a_service_waits_for_work_aside_the_node_hears_on(door: Door) -> None:
+    heard: list[str] = []
+    go = threading.Event()
+
+    async def answer(_: Any, response: Any) -> Any:
+        response.success = await door.aside(lambda: go.wait(20.0))
+        return response
+
+    def hear(message: Any) -> None:
+        heard.append(message.data)
+        go.set()
+
+    door.create_service(Trigger, "save", answer, callback_group=door.apart)
+    door.listen(String, "word", hear, qos.room())
+    client, word = door.create_client(Trigger, "save"), door.create_publisher(String, "word", qos.room())
+    spin_until(door, [] if word.get_subscription_count() == 0 else [1], 1)
+    asked = client.call_async(Trigger.Request())
+    for _ in range(5):
+        rclpy.spin_once(door, timeout_sec=0.05)
+    assert not asked.done()
+    word.publish(String(data="one"))
+    for _ in range(400):
+        if not asked.done():
+            rclpy.spin_once(door, timeout_sec=0.05)
+    assert heard == ["one"] and asked.result().success
