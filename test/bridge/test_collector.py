@@ -147,9 +147,7 @@ def test_the_sight_is_the_latest_of_the_frames_with_most_objects_with_the_detect
     assert [item.label for item in sight.objects] == ["tv", "cup"]
 
 
-def test_no_more_detections_wait_for_their_objects_than_are_recent(
-    collector: Collector, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_more_detections_wait_for_their_objects_than_are_recent(collector: Collector) -> None:
     for stamp_ns in range(collector_module.RECENT + 1):
         hear(collector, "/detections_table", detections(stamp_ns, "tv"))
     hear(collector, "/objects", objects(0, "tv"))
