@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Furniture, rooms and distractors: what stands on what, and closed walls."""
+"""Furniture and rooms: what stands on what, and closed walls."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import Intrinsics
-from objreg_ros.simulation import distractors, furniture
+from objreg_ros.simulation import furniture
 from objreg_ros.simulation.light import looking
 from objreg_ros.simulation.mesh import merge
 from objreg_ros.simulation.raster import rasterise
@@ -41,18 +41,3 @@ def test_a_room_is_closed_on_all_sides() -> None:
             view = looking(np.array([0.0, 0.0, 1.3]), np.array(target, float), np.array([0.0, 0.3, 1.0]))
             depth, _ = rasterise(mesh.vertices, mesh.faces, mesh.open_surface, view, WIDE)
             assert (depth > 0).all() and depth.max() < 4.0
-
-
-@pytest.mark.parametrize("kind", distractors.FAMILIES)
-def test_distractors_stand_on_the_ground_and_differ(kind: str) -> None:
-    first, again, other = (distractors.make_distractor(kind, seed) for seed in (1, 1, 2))
-    assert np.array_equal(first.mesh.vertices, again.mesh.vertices)
-    assert first.label == kind and not np.array_equal(first.size, other.size)
-    for model in (first, other):
-        assert model.mesh.bounds[0, 2] == pytest.approx(0.0, abs=5e-3) and 0.02 < model.size.max() < 0.6
-        assert np.isfinite(model.mesh.normals).all()
-
-
-def test_an_unknown_distractor_is_refused_with_those_there_are() -> None:
-    with pytest.raises(ValueError, match="expected one of mug"):
-        distractors.make_distractor("teapot", 0)

@@ -10,13 +10,10 @@ from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.simulation.mesh import Material, box
 from objreg_ros.simulation.model import ObjectModel, Symmetry, half_turns, revolution, turn
 
+from .motions import about
+
 T_TRUE = pose(rotation_from_vector(np.array([0.3, -0.2, 0.9])), np.array([0.1, 0.2, 0.8]))
 CENTRE = np.array([0.0, 0.0, 0.06])
-
-
-def about(axis: str, degrees: float, centre: np.ndarray) -> np.ndarray:
-    shift = pose(np.eye(3), centre)
-    return shift @ turn(axis, degrees) @ np.linalg.inv(shift)
 
 
 @pytest.mark.parametrize("degrees", [1.0, 77.0, 180.0, 300.0])

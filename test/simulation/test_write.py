@@ -94,8 +94,3 @@ def test_a_folder_that_exists_is_refused_and_kept(recorded: Path) -> None:
     with pytest.raises(FileExistsError, match="expected a new folder"):
         simulate(recorded, "loop", frames=2, sensors=SMALL)
     assert read_truth(recorded).frames
-
-
-def test_a_recording_without_truth_says_where_it_comes_from(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError, match="objreg simulate"):
-        read_truth(tmp_path)

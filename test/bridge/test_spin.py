@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From `main` to a running node and to its end: the exit status, what is said, and what is left behind."""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from typing import NoReturn
+
+import pytest
+
+pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+
+import rclpy
+
+from objreg_ros.bridge.door import Door
+from objreg_ros.bridge.spin import run
+
+
+@pytest.fixture(autouse=True)
+def on_its_own(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A graph that ends at this machine; the transport and the frozen garbage of a node are not for other tests."""
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    monkeypatch.setattr("objreg_ros.bridge.profile.apply", lambda: "the transport")
+    yield
+    gc.unfreeze()
+    rclpy.try_shutdown()
+
+
+class Short(Door):
+    """A node that soon meets its end, and remembers that it was closed."""
+
+    made: Short | None = None
+
+    def __init__(self, error: BaseException | None = None) -> None:
+        super().__init__("short")
+        Short.made, self.closed, self.error = self, False, error
+        self.soon = self.create_timer(0.01, self.end)
+
+    def end(self) -> None:
+        if self.error is not None:
+            self.fail(self.error)
+        else:
+            rclpy.shutdown()
+
+    def close(self) -> None:
+        self.closed = True
+        super().close()
+
+
+def ended_well() -> bool:
+    return Short.made is not None and Short.made.closed and not rclpy.ok()
+
+
+def test_a_node_that_is_told_to_end_is_closed_with_status_0() -> None:
+    class Terminated(Short):
+        def end(self) -> None:
+            os.kill(os.getpid(), signal.SIGTERM)
+            while rclpy.ok():  # it is heard in another thread
+                time.sleep(0.001)
+
+    assert run(Terminated, []) == 0 and ended_well()
+
+
+def test_a_node_that_is_interrupted_is_closed_with_status_0() -> None:
+    class Interrupted(Short):
+        def end(self) -> None:
+            raise KeyboardInterrupt
+
+    assert run(Interrupted, []) == 0 and ended_well()
+
+
+def test_a_node_whose_ros_is_shut_down_ends_with_status_0() -> None:
+    assert run(Short, []) == 0 and ended_well()
+
+
+def test_a_node_whose_ros_is_shut_down_while_it_waits_ends_with_status_0() -> None:
+    class Waiting(Short):
+        def end(self) -> None:
+            self.destroy_timer(self.soon)
+            threading.Timer(0.05, rclpy.shutdown).start()
+
+    assert run(Waiting, []) == 0 and ended_well()
+
+
+def test_what_breaks_a_worker_propagates_and_the_node_is_closed() -> None:
+    with pytest.raises(RuntimeError, match="a bug"):
+        run(lambda: Short(RuntimeError("a bug")), [])
+    assert ended_well()
+
+
+@pytest.mark.parametrize("error", [ValueError, FileNotFoundError])
+def test_what_a_node_refuses_at_start_is_one_line_and_status_1(
+    error: type[Exception], capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refuse() -> NoReturn:
+        raise error("expected a model,\n    got  none")
+
+    assert run(refuse, []) == 1
+    assert capsys.readouterr().err == "expected a model, got none\n" and not rclpy.ok()
+
+
+def test_a_bug_at_start_propagates_and_leaves_no_ros_behind() -> None:
+    with pytest.raises(ZeroDivisionError):
+        run(lambda: 1 / 0, [])  # type: ignore[arg-type, return-value]
+    assert not rclpy.ok()
+
+
+def test_the_arguments_reach_ros() -> None:
+    names: list[str] = []
+
+    def make() -> Door:
+        door = Short()
+        names.append(door.get_fully_qualified_name())
+        return door
+
+    run(make, ["--ros-args", "-r", "__ns:=/robot", "-r", "__node:=cell"])
+    assert names == ["/robot/cell"]
+
+
+def test_what_was_made_at_the_start_is_not_looked_through_again() -> None:
+    frozen: list[int] = []
+
+    class Counting(Short):
+        def end(self) -> None:
+            frozen.append(gc.get_freeze_count())
+            super().end()
+
+    assert gc.get_freeze_count() == 0
+    run(Counting, [])
+    assert frozen[0] > 10_000
