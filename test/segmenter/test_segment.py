@@ -12,14 +12,9 @@ from objreg_ros.data import DepthImage, Detections, Intrinsics, PointFlag
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 
-from .scenes import SMALL, Scene
+from .scenes import SMALL, Scene, two_boxes
 
 NOISE = 0.0015
-
-
-def two_boxes() -> Scene:
-    """A table (1), a tall box (2) to the left and a low one (3) to the right."""
-    return Scene().plane().box((-0.25, -0.05, 0), (-0.15, 0.05, 0.2)).box((0.1, -0.1, 0), (0.3, 0.1, 0.06))
 
 
 def test_two_boxes_on_a_table_are_found_whole_and_without_the_table() -> None:
