@@ -6,12 +6,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.data import Intrinsics
-from objreg_ros.segmenter.extract import NO_COLOUR
+from objreg_ros.data import DepthImage, Intrinsics
+from objreg_ros.segmenter.extract import colours
 from objreg_ros.segmenter.parts import RIM, Parts, measure
 from objreg_ros.segmenter.surface import Window, reduce
 
 JUMP = (0.012, 0.008)
+LIMITS = (0.2, 9.0, 99.0)
 FOCAL = 100.0  # px: at 1 m two cells are 1 cm apart
 
 
@@ -19,16 +20,17 @@ def measured(
     labels: np.ndarray,
     depth: np.ndarray | None = None,
     window: Window | None = None,
-    rgb: np.ndarray = NO_COLOUR,
+    rgb: np.ndarray | None = None,
     limit: int = 9,
 ) -> Parts:
     """The parts of ``labels``, all 1 m away and all in the box if nothing else is said."""
     h, w = labels.shape
     camera = Intrinsics(fx=FOCAL, fy=FOCAL, cx=w / 2, cy=h / 2, width=w, height=h)
-    metres = np.ones((h, w)) if depth is None else depth
-    surface = reduce(metres.astype(np.float32), camera, 1, (0.2, 9.0, 99.0), JUMP)
-    count = int(labels.max())
-    return measure(labels.astype(np.int32), count, window or (0, 0, w, h), surface, rgb, JUMP, limit)
+    metres = np.ascontiguousarray(np.ones((h, w)) if depth is None else depth, np.float32)
+    image = DepthImage(depth=metres, rgb=rgb, intrinsics=camera, stamp_ns=0)
+    surface = reduce(image.depth, camera, 1, LIMITS, JUMP)
+    numbers = np.ascontiguousarray(labels, np.int32)
+    return measure(numbers, int(labels.max()), window or (0, 0, w, h), surface, colours(image), JUMP, limit)
 
 
 def halves(height: int = 4, between: int = 0) -> np.ndarray:
@@ -71,9 +73,9 @@ def test_where_nothing_is_there_are_no_parts() -> None:
 
 def test_a_cell_in_the_middle_of_the_box_weighs_more_than_one_at_its_rim_and_one_outside_nothing() -> None:
     labels = np.zeros((7, 7), int)
-    labels[3, 3], labels[1, 1], labels[3, 5:] = 1, 2, 3
+    labels[3, 3], labels[1, 3], labels[3, 5:] = 1, 2, 3
     parts = measured(labels, window=(1, 1, 6, 6))
-    rim = 1 - RIM * 4 / 5  # the middle of a corner cell is four fifths of the way to the corner
+    rim = 1 - RIM * 4 / 5  # a cell at the rim is four fifths of the way to it
     np.testing.assert_allclose(parts.weight, (1, rim, rim))
     assert parts.inside.tolist() == [1, 1, 1]
     assert parts.total.tolist() == [1, 1, 2]
@@ -152,7 +154,8 @@ def test_the_colour_of_a_cell_is_taken_where_it_lies_in_the_whole_picture() -> N
     rgb[8:16:2, 10:16:2] = (200, 40, 40)  # only the first pixel of each cell is looked at
     rgb[8:16:2, 16:22:2] = (40, 40, 200)
     camera = Intrinsics(fx=FOCAL, fy=FOCAL, cx=15, cy=10, width=30, height=20)
-    surface = reduce(np.ones((20, 30), np.float32), camera, 2, (0.2, 9.0, 99.0), JUMP).crop((5, 4, 11, 8))
-    for labels, alike in ((halves(), False), (np.tile([1, 2, 3], (4, 2)) % 3 + 1, True)):
-        parts = measure(labels.astype(np.int32), int(labels.max()), (0, 0, 6, 4), surface, rgb, JUMP, 9)
+    image = DepthImage(depth=np.ones((20, 30), np.float32), rgb=rgb, intrinsics=camera, stamp_ns=0)
+    surface = reduce(image.depth, camera, 2, LIMITS, JUMP).crop((5, 4, 11, 8))
+    for labels, alike in ((halves(), False), (np.tile([[1], [2]], (2, 6)), True)):
+        parts = measure(labels.astype(np.int32), 2, (0, 0, 6, 4), surface, image.rgb, JUMP, 9)
         assert parts.alike[0, 1] == alike
