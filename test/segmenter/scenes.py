@@ -41,9 +41,11 @@ class Scene:
 
     def box(self, low: tuple[float, float, float], high: tuple[float, float, float]) -> Scene:
         """An upright box between two corners (slab test of each ray)."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            a, b = (np.array(low) - self.eye) / self.rays, (np.array(high) - self.eye) / self.rays
-        near, far = np.fmin(a, b).max(axis=-1), np.fmax(a, b).min(axis=-1)
+        near, far = np.full(self.depth.shape, -np.inf), np.full(self.depth.shape, np.inf)
+        for k in range(3):  # axis by axis: to reduce an axis of three takes five times as long
+            with np.errstate(divide="ignore", invalid="ignore"):
+                a, b = (low[k] - self.eye[k]) / self.rays[..., k], (high[k] - self.eye[k]) / self.rays[..., k]
+            near, far = np.maximum(near, np.fmin(a, b)), np.minimum(far, np.fmax(a, b))
         self.count += 1
         seen = (near < far) & (near > 0) & (near < self.depth)
         self.depth[seen], self.owner[seen] = near[seen], self.count
