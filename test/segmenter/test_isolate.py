@@ -19,6 +19,11 @@ NOISE = 0.0015
 PARAMS = SegmenterParams()
 
 
+@pytest.fixture(scope="module")
+def boxes() -> Scene:
+    return two_boxes()
+
+
 def isolated(scene: Scene, box: Box, image: DepthImage | None = None) -> Isolated:
     seen = scene.image(NOISE) if image is None else image
     return isolate(seen, box, scene.ground(seen), PARAMS)
@@ -29,32 +34,29 @@ def pixel_box(scene: Scene, owner: int) -> Box:
 
 
 @pytest.mark.parametrize("owner", [2, 3])
-def test_a_box_on_a_table_is_found_whole_and_nothing_is_wrong_with_it(owner: int) -> None:
-    scene = two_boxes()
-    found = isolated(scene, pixel_box(scene, owner))
-    assert scene.iou(found.pixels.xyz, owner) > 0.95
+def test_a_box_on_a_table_is_found_whole_and_nothing_is_wrong_with_it(boxes: Scene, owner: int) -> None:
+    found = isolated(boxes, pixel_box(boxes, owner))
+    assert boxes.iou(found.pixels.xyz, owner) > 0.95
     assert found.flags == PointFlag(0)
 
 
-def test_its_cells_are_those_that_its_pixels_are_in() -> None:
-    scene = two_boxes()
-    found = isolated(scene, pixel_box(scene, 2))
+def test_its_cells_are_those_that_its_pixels_are_in(boxes: Scene) -> None:
+    found = isolated(boxes, pixel_box(boxes, 2))
     assert found.cells is not None
     assert found.cells.step == 2
     left, top, right, bottom = found.cells.window
     assert found.cells.chosen.shape == (bottom - top, right - left)
     cells = np.zeros((240, 320), bool)
     cells[top:bottom, left:right] = found.cells.chosen
-    seen = scene.pixels(found.pixels.xyz).reshape(240, 2, 320, 2).any(axis=(1, 3))
+    seen = boxes.pixels(found.pixels.xyz).reshape(240, 2, 320, 2).any(axis=(1, 3))
     assert (cells & seen).sum() > 0.97 * max(cells.sum(), seen.sum())
 
 
-def test_no_pixel_outside_the_box_is_taken() -> None:
-    scene = two_boxes()
-    x0, y0, x1, y1 = pixel_box(scene, 2)
+def test_no_pixel_outside_the_box_is_taken(boxes: Scene) -> None:
+    x0, y0, x1, y1 = pixel_box(boxes, 2)
     half = (x0, y0, (x0 + x1) // 2, (y0 + y1) // 2)
-    found = isolated(scene, half)
-    rows, columns = np.nonzero(scene.pixels(found.pixels.xyz))
+    found = isolated(boxes, half)
+    rows, columns = np.nonzero(boxes.pixels(found.pixels.xyz))
     assert len(rows) > 500
     assert columns.min() >= half[0] and columns.max() < half[2]
     assert rows.min() >= half[1] and rows.max() < half[3]
@@ -68,18 +70,17 @@ def test_a_thing_without_support_is_still_segmented_and_says_so() -> None:
     assert PointFlag.UNSUPPORTED in found.flags
 
 
-def test_a_box_around_bare_table_shows_no_object() -> None:
-    found = isolated(two_boxes(), (280, 300, 360, 360))
+def test_a_box_around_bare_table_shows_no_object(boxes: Scene) -> None:
+    found = isolated(boxes, (280, 300, 360, 360))
     assert len(found.pixels) == 0
     assert found.cells is not None
     assert not found.cells.chosen.any()
     assert found.flags == PointFlag(0)
 
 
-def test_where_nothing_was_measured_there_is_no_object_and_no_support() -> None:
-    scene = two_boxes()
-    image = replace(scene.image(), depth=np.zeros((480, 640), np.float32))
-    found = isolated(scene, pixel_box(scene, 2), image)
+def test_where_nothing_was_measured_there_is_no_object_and_no_support(boxes: Scene) -> None:
+    image = replace(boxes.image(), depth=np.zeros((480, 640), np.float32))
+    found = isolated(boxes, pixel_box(boxes, 2), image)
     assert len(found.pixels) == 0
     assert found.flags == PointFlag.UNSUPPORTED
 
@@ -87,8 +88,8 @@ def test_where_nothing_was_measured_there_is_no_object_and_no_support() -> None:
 @pytest.mark.parametrize(
     "box", [(0, 0, 1, 1), (639, 0, 640, 1), (0, 479, 1, 480), (639, 479, 640, 480), (320, 5, 321, 475)]
 )
-def test_the_smallest_boxes_are_looked_at_without_harm(box: Box) -> None:
-    found = isolated(two_boxes(), box)
+def test_the_smallest_boxes_are_looked_at_without_harm(boxes: Scene, box: Box) -> None:
+    found = isolated(boxes, box)
     assert found.cells is not None
     left, top, right, bottom = found.cells.window
     assert 0 <= left < right <= 320 and 0 <= top < bottom <= 240
@@ -113,11 +114,10 @@ def test_the_largest_object_is_found_whole_on_the_coarse_grid_too() -> None:
     assert scene.iou(found.pixels.xyz, 2) > 0.95
 
 
-def test_without_colour_the_object_is_the_same_but_for_it() -> None:
-    scene = two_boxes()
-    plain = isolated(scene, pixel_box(scene, 2), replace(scene.image(NOISE), rgb=None))
+def test_without_colour_the_object_is_the_same_but_for_it(boxes: Scene) -> None:
+    plain = isolated(boxes, pixel_box(boxes, 2), replace(boxes.image(NOISE), rgb=None))
     assert plain.pixels.rgb is None
-    np.testing.assert_array_equal(plain.pixels.xyz, isolated(scene, pixel_box(scene, 2)).pixels.xyz)
+    np.testing.assert_array_equal(plain.pixels.xyz, isolated(boxes, pixel_box(boxes, 2)).pixels.xyz)
 
 
 @pytest.mark.parametrize("step", [2, 4])
