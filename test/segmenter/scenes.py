@@ -6,6 +6,9 @@ from __future__ import annotations
 import numpy as np
 
 from objreg_ros.data import DepthImage, Detections, Intrinsics
+from objreg_ros.segmenter.params import SegmenterParams
+from objreg_ros.segmenter.support import Ground, find_supports
+from objreg_ros.segmenter.surface import cell_size, reduce
 
 CAMERA = Intrinsics(fx=525.0, fy=525.0, cx=319.5, cy=239.5, width=640, height=480)
 SMALL = Intrinsics(fx=262.5, fy=262.5, cx=159.5, cy=119.5, width=320, height=240)
@@ -38,9 +41,11 @@ class Scene:
 
     def box(self, low: tuple[float, float, float], high: tuple[float, float, float]) -> Scene:
         """An upright box between two corners (slab test of each ray)."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            a, b = (np.array(low) - self.eye) / self.rays, (np.array(high) - self.eye) / self.rays
-        near, far = np.fmin(a, b).max(axis=-1), np.fmax(a, b).min(axis=-1)
+        near, far = np.full(self.depth.shape, -np.inf), np.full(self.depth.shape, np.inf)
+        for k in range(3):  # axis by axis: to reduce an axis of three takes five times as long
+            with np.errstate(divide="ignore", invalid="ignore"):
+                a, b = (low[k] - self.eye[k]) / self.rays[..., k], (high[k] - self.eye[k]) / self.rays[..., k]
+            near, far = np.maximum(near, np.fmin(a, b)), np.minimum(far, np.fmax(a, b))
         self.count += 1
         seen = (near < far) & (near > 0) & (near < self.depth)
         self.depth[seen], self.owner[seen] = near[seen], self.count
@@ -54,6 +59,15 @@ class Scene:
         speckle = np.random.default_rng(seed).integers(0, 30, (*depth.shape, 3))
         rgb = (palette[np.minimum(self.owner, 4)] + speckle).astype(np.uint8)
         return DepthImage(depth=depth.astype(np.float32), rgb=rgb, intrinsics=self.camera, stamp_ns=7, frame_id="eye")
+
+    def ground(self, image: DepthImage) -> Ground:
+        """What the segmenter knows of a whole image of the scene where it is told the way up."""
+        params = SegmenterParams()
+        limits, jump = (params.z_min, *params.limits), (params.jump, params.jump_z2)
+        surface = reduce(image.depth, self.camera, cell_size(*image.depth.shape), limits, jump)
+        coarse = surface.every(2)
+        supports = find_supports(coarse, self.camera, self.up, params.support_area, jump)
+        return Ground(self.up, 1.0, supports, surface, coarse)
 
     def box_of(self, *owners: int, pad: float = 0.08) -> tuple[float, float, float, float]:
         """The padded image box (x0, y0, x1, y1) of the things with these numbers."""
@@ -90,3 +104,8 @@ class Scene:
         """Intersection over union of points (N, 3) and the pixels that show ``owner``."""
         mask, truth = self.pixels(xyz), self.owner == owner
         return float((mask & truth).sum() / (mask | truth).sum())
+
+
+def two_boxes() -> Scene:
+    """A table (1), a tall box (2) to the left and a low one (3) to the right."""
+    return Scene().plane().box((-0.25, -0.05, 0), (-0.15, 0.05, 0.2)).box((0.1, -0.1, 0), (0.3, 0.1, 0.06))

@@ -12,14 +12,9 @@ from objreg_ros.data import DepthImage, Detections, Intrinsics, PointFlag
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 
-from .scenes import SMALL, Scene
+from .scenes import SMALL, Scene, two_boxes
 
 NOISE = 0.0015
-
-
-def two_boxes() -> Scene:
-    """A table (1), a tall box (2) to the left and a low one (3) to the right."""
-    return Scene().plane().box((-0.25, -0.05, 0), (-0.15, 0.05, 0.2)).box((0.1, -0.1, 0), (0.3, 0.1, 0.06))
 
 
 def test_two_boxes_on_a_table_are_found_whole_and_without_the_table() -> None:
@@ -120,29 +115,6 @@ def test_density_is_points_per_square_metre() -> None:
     front = shown & (np.abs((scene.eye + scene.rays * scene.depth[..., None])[..., 2] - 0.05) > 1e-6)
     area = 0.04 + 0.008 * min(1.0, front.sum() / 1)  # the top and the front side, both fully seen
     assert thing.density == pytest.approx(shown.sum() / area, rel=0.1)
-
-
-def test_an_object_cut_by_the_image_says_so() -> None:
-    scene = Scene().plane().box((-0.7, -0.1, 0), (-0.45, 0.1, 0.2)).box((0.0, -0.05, 0), (0.1, 0.05, 0.1))
-    frame = Segmenter().segment(scene.detections(scene.box_of(2), scene.box_of(3)), scene.image(NOISE))
-    assert frame.objects[0].has(PointFlag.CUT_BY_IMAGE)
-    assert not frame.objects[1].has(PointFlag.CUT_BY_IMAGE)
-
-
-def test_an_object_cut_by_its_box_says_so_and_keeps_to_the_box() -> None:
-    scene = two_boxes()
-    x0, y0, x1, y1 = scene.box_of(2, pad=0.0)
-    frame = Segmenter().segment(scene.detections((x0, y0, x1, y0 + 0.6 * (y1 - y0))), scene.image(NOISE))
-    rows, _ = np.nonzero(scene.pixels(frame.objects[0].xyz))
-    assert frame.objects[0].has(PointFlag.CUT_BY_BOX)
-    assert rows.max() < y0 + 0.6 * (y1 - y0)
-
-
-def test_points_at_a_silhouette_carry_the_edge_flag() -> None:
-    scene = two_boxes()
-    thing = Segmenter().segment(scene.detections(scene.box_of(2)), scene.image(NOISE)).objects[0]
-    edge = (thing.flags & PointFlag.EDGE) > 0
-    assert 0.01 < edge.mean() < 0.3
 
 
 def test_the_support_surface_is_instance_0_and_lies_on_the_table() -> None:

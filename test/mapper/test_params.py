@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the mapper makes of its parameters."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from objreg_ros.mapper.params import MapperNodeParams, MapperParams
+from objreg_ros.mapper.steady import Steady
+
+
+def test_the_errors_of_odometry_are_in_metres_and_radians() -> None:
+    params = MapperParams(odometry_translation_error=0.05, odometry_rotation_error=18.0)
+    assert params.odometry_sigmas == pytest.approx((0.05, np.pi / 10))
+
+
+def test_what_is_steadily_wrong_is_a_turn_in_radians_and_as_much_along_the_way_as_across() -> None:
+    assert MapperParams(steady_heading=18.0, steady_distance=0.03).steady == pytest.approx((np.pi / 10, 0.03, 0.03))
+    assert MapperParams(steady_heading=0.0, steady_distance=0.0).steady == Steady()
+
+
+def test_where_the_camera_is_mounted_is_a_pose_and_nothing_is_where_the_body_is() -> None:
+    T = MapperNodeParams(T_base_camera=(0.1, 0.2, 0.3, 0.0, 0.0, 1.0, 0.0)).mounting
+    assert np.allclose(T, [[-1, 0, 0, 0.1], [0, -1, 0, 0.2], [0, 0, 1, 0.3], [0, 0, 0, 1]])
+    assert np.array_equal(MapperNodeParams().mounting, np.eye(4))
+
+
+@pytest.mark.parametrize(
+    ("numbers", "said"), [((1.0, 2.0, 3.0), "expected x y z qx qy qz qw or nothing"), ((0.0,) * 7, "non-zero length")]
+)
+def test_a_mounting_that_cannot_be_is_refused_when_it_is_set(numbers: tuple, said: str) -> None:
+    with pytest.raises(ValueError, match=f"{said}.*got"):
+        MapperNodeParams(T_base_camera=numbers)
+
+
+def test_the_node_s_other_values_are_checked_too() -> None:
+    with pytest.raises(ValueError, match="map_frame: expected str, got 3"):
+        MapperNodeParams(map_frame=3)  # type: ignore[arg-type]

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the registrar makes of its parameters."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from objreg_ros.registrar.params import RegistrarNodeParams
+
+
+def test_a_search_may_take_as_long_as_is_set_and_without_a_limit_for_ever() -> None:
+    assert RegistrarNodeParams(search_seconds=0.4).limit == 0.4
+    assert RegistrarNodeParams().limit == math.inf
+
+
+def test_where_the_camera_is_mounted_is_a_pose_and_nothing_is_none() -> None:
+    T = RegistrarNodeParams(T_base_camera=(0.1, 0.2, 0.3, 0.0, 0.0, 1.0, 0.0)).mounting
+    assert T is not None
+    assert np.allclose(T, [[-1, 0, 0, 0.1], [0, -1, 0, 0.2], [0, 0, 1, 0.3], [0, 0, 0, 1]])
+    assert RegistrarNodeParams().mounting is None
+
+
+@pytest.mark.parametrize(
+    ("numbers", "said"), [((1.0, 2.0, 3.0), "expected x y z qx qy qz qw or nothing"), ((0.0,) * 7, "non-zero length")]
+)
+def test_a_mounting_that_cannot_be_is_refused_when_it_is_set(numbers: tuple, said: str) -> None:
+    with pytest.raises(ValueError, match=f"{said}.*got"):
+        RegistrarNodeParams(T_base_camera=numbers)
+
+
+def test_the_node_s_other_values_are_checked_too() -> None:
+    with pytest.raises(ValueError, match="odom_slop: expected at least 0, got -1"):
+        RegistrarNodeParams(odom_slop=-1.0)
