@@ -92,7 +92,7 @@ def rosbag1(tmp_path: Path) -> Path:
         D=np.zeros(5),
         K=np.array([50.0, 0, 31.5, 0, 50, 23.5, 0, 0, 1]),
         R=np.eye(3).ravel(),
-        P=np.zeros(12),
+        P=np.array([49.0, 0, 30.5, 0, 0, 49, 22.5, 0, 0, 0, 1, 0]),
         binning_x=0,
         binning_y=0,
         roi=roi,
@@ -109,9 +109,9 @@ def test_a_compressed_rosbag1_is_read_and_brought_up_to_date(rosbag1: Path) -> N
     with open_recording(rosbag1) as recording:
         record = next(recording.records())
         assert recording.kind == "rosbag1" and record.stamp_ns == 9 * 10**9
-        assert from_msg.intrinsics(record.message).cx == 31.5
+        assert from_msg.intrinsics(record.message).cx == 30.5
         modern = standard_types().deserialize_cdr(record.cdr, record.msgtype)
-        assert from_msg.stamp_ns(modern) == 5_000_000_006 and from_msg.intrinsics(modern).cx == 31.5
+        assert from_msg.stamp_ns(modern) == 5_000_000_006 and from_msg.intrinsics(modern).cx == 30.5
 
 
 def test_a_real_rosbag1_gives_its_cloud(shared: Path) -> None:
