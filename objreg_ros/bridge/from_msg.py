@@ -94,6 +94,21 @@ def intrinsics(message: Any) -> Intrinsics:
     )
 
 
+def is_calibrated(message: Any) -> bool:
+    """Whether a CameraInfo says anything of its camera: drivers leave K and P at zeros until somebody calibrated it."""
+    return any(_camera_matrix(message, name).flat[0] != 0 for name in "pk")
+
+
+def camera_of_cloud(camera_info: Any, cloud: PointCloud) -> Intrinsics | None:
+    """The camera that a cloud is organised or projected with; None without a ``camera_info``.
+
+    None too for one that is not calibrated where the cloud is organised, since that needs none; else ValueError.
+    """
+    if camera_info is None or (cloud.organised and not is_calibrated(camera_info)):
+        return None
+    return intrinsics(camera_info)
+
+
 def _calibrated(message: Any) -> Array:
     """P (3, 4) or, where it says nothing, K (3, 3), in pixels of the whole picture; ValueError if neither is usable."""
     P, K = _camera_matrix(message, "p"), _camera_matrix(message, "k")

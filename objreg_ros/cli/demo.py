@@ -19,7 +19,7 @@ from objreg_ros.cli import live_table, options
 from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
 from objreg_ros.cli.played import as_rosbag2, simulated_room
 from objreg_ros.cli.settings import read_settings
-from objreg_ros.data import ColourImage
+from objreg_ros.data import ColourImage, Intrinsics
 from objreg_ros.offline import constraint_with_error, refusal
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
@@ -170,10 +170,16 @@ def _draw(out: Path, live: Live, truth: Truth, source: Recording, inputs: Inputs
         draw_way(out / "way.png", truth, live.closures)
         _say(f"drew {out / 'way.png'}")
     image = None if live.sight is None else _image(source, inputs, live.sight.detections.stamp_ns)
-    if live.sight is not None and image is not None and inputs.camera_info is not None:
-        camera = from_msg.intrinsics(next(iter(source.records([inputs.camera_info]))).message)
+    camera = camera_of(source, inputs)
+    if live.sight is not None and image is not None and camera is not None:
         draw_sight(out / "sight.png", image.rgb, camera, live.sight.detections, live.sight.objects)
         _say(f"drew {out / 'sight.png'}")
+
+
+def camera_of(source: Recording, inputs: Inputs) -> Intrinsics | None:
+    """The camera of a recording by its camera_info; None where it has none, or one that is not calibrated."""
+    info = None if inputs.camera_info is None else next(iter(source.records([inputs.camera_info]))).message
+    return from_msg.intrinsics(info) if info is not None and from_msg.is_calibrated(info) else None
 
 
 def _image(source: Recording, inputs: Inputs, stamp_ns: int) -> ColourImage | None:

@@ -5,9 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from recording.folders import tum_folder
+from recording.folders import CAMERA, records, tum_folder, uncalibrated
 
-from objreg_ros.cli.demo import Asked, calibrated, mounting_of, run, setup_of
+from objreg_ros.cli.demo import Asked, calibrated, camera_of, mounting_of, run, setup_of
+from objreg_ros.recording import open_recording, write_rosbag2
 from objreg_ros.recording.inputs import Inputs, parse_remaps
 
 ASKED = Asked(
@@ -64,6 +65,15 @@ def test_a_demo_plays_the_depth_that_its_segmenter_takes(tmp_path: Path) -> None
     with pytest.raises(ValueError, match=r"expected points or a depth image for segmenter\.source=points, got /"):
         run(replace(asked, out=tmp_path / "out"))
     assert not (tmp_path / "out").exists()
+
+
+def test_a_camera_that_is_not_calibrated_is_no_camera_to_draw_with(tmp_path: Path) -> None:
+    inputs = Inputs(image="/image", points="/points", camera_info="/camera_info")
+    for name, info, fx in (("known", next(records()), CAMERA.fx), ("unknown", uncalibrated(5), None)):
+        write_rosbag2(tmp_path / name, [info])
+        with open_recording(tmp_path / name) as source:
+            assert getattr(camera_of(source, inputs), "fx", None) == fx
+            assert camera_of(source, replace(inputs, camera_info=None)) is None
 
 
 def test_a_recording_that_the_graph_cannot_use_is_refused_before_anything_is_written(tmp_path: Path) -> None:

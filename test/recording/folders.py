@@ -58,6 +58,13 @@ def records(frames: int = 3) -> Iterator[Record]:
         yield Record.of("/depth/image", messages.image(depth, "16UC1", stamp_ns, "camera"), stamp_ns)
 
 
+def uncalibrated(stamp_ns: int) -> Record:
+    """A camera_info as drivers send it until somebody has calibrated the camera."""
+    info = messages.camera_info(CAMERA, stamp_ns, "camera")
+    info.k[:], info.p[:] = 0, 0
+    return Record.of("/camera_info", info, stamp_ns)
+
+
 def noetic_bag(path: Path, frames: int = 3) -> Path:
     """A rosbag1 with `records`, and with what any robot of ROS 1 says besides: /tf, /rosout and /markers."""
     types = get_typestore(Stores.ROS1_NOETIC)
