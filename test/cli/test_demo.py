@@ -33,7 +33,7 @@ def test_without_options_the_nodes_run_with_their_own_defaults_at_the_recordings
 def test_options_reach_the_node_that_they_are_for() -> None:
     asked = replace(ASKED, model="my.onnx", changes=("registrar.seed=4",), params_file=Path("p.yaml"))
     args = setup_of(asked, INPUTS).node_args
-    assert args["detector"] == ["--params-file", "p.yaml", "-p", "model:=my.onnx"]
+    assert args["detector"] == ["--params-file", "p.yaml", "-p", 'model:="my.onnx"']
     assert args["registrar"] == ["--params-file", "p.yaml", "-p", "seed:=4"]
     assert args["segmenter"] == ["--params-file", "p.yaml"]
 
@@ -49,9 +49,28 @@ def test_the_player_plays_just_the_inputs_that_were_chosen() -> None:
     assert set(words[::2]) == {"--remap"} and parse_remaps(words[1::2]) == INPUTS.outright
 
 
-def test_a_change_of_no_node_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"expected NODE\.NAME=VALUE"):
-        setup_of(replace(ASKED, changes=("seed=4",)), INPUTS)
+def test_a_change_reaches_its_node_in_its_type() -> None:
+    changes = ("registrar.T_base_camera=0,0,0.1,0,0,0,1", "registrar.label_groups=cup mouse,tv", "registrar.store=123")
+    assert setup_of(replace(ASKED, changes=changes), INPUTS).node_args["registrar"][1::2] == [
+        "T_base_camera:=[0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0]",
+        'label_groups:=["cup mouse", "tv"]',
+        'store:="123"',
+    ]
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        (
+            "seed=4",
+            r"expected node\.parameter=value with a node of detector, segmenter, registrar, mapper, got 'seed=4'",
+        ),
+        ("mapper.map_frame=m", r"expected a node of the demo \(detector, segmenter, registrar\), got mapper"),
+    ],
+)
+def test_a_change_of_no_node_of_the_demo_is_refused(change: str, complaint: str) -> None:
+    with pytest.raises(ValueError, match=f"--set: {complaint}"):
+        setup_of(replace(ASKED, changes=(change,)), INPUTS)
 
 
 def test_the_report_learns_where_the_camera_is_on_the_body_of_the_odometry() -> None:
