@@ -268,8 +268,8 @@ class Line:
     def _depth(self, match: Match) -> DepthImage:
         if not self._from_points:
             return from_msg.depth_image(match["depth"], match["camera_info"], match.payloads.get("image"))
-        camera = None if self._camera_info is None else from_msg.intrinsics(self._camera_info)
-        return self._rooms.organise(from_msg.point_cloud(match["depth"]), camera)
+        cloud = from_msg.point_cloud(match["depth"])
+        return self._rooms.organise(cloud, from_msg.camera_of_cloud(self._camera_info, cloud))
 
     def _track(self, matches: Iterable[Match]) -> None:
         for match in matches:

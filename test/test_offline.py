@@ -6,15 +6,16 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from recording.folders import CAMERA, records
+from recording.folders import CAMERA, records, uncalibrated
 from simple_rooms import simple_rooms
 
 from objreg_ros.bridge import from_msg
 from objreg_ros.data import DepthImage
-from objreg_ros.geometry import pose, rotation_from_vector
+from objreg_ros.geometry import back_project, pose, rotation_from_vector
 from objreg_ros.offline import Timing, as_sent, run_offline
 from objreg_ros.recording import Record, messages
 from objreg_ros.recording.inputs import Inputs
+from objreg_ros.segmenter.organise import organise
 from objreg_ros.truth import Truth
 
 INPUTS = Inputs(image="/image", depth="/depth/image", camera_info="/camera_info", odom="/odom")
@@ -214,6 +215,24 @@ def test_points_go_through_the_organiser() -> None:
         clouds.append(Record.of("/points", messages.point_cloud(rows, stamp_ns, "camera"), stamp_ns))
     run = run_offline(clouds, rooms, Inputs(image="/image", points="/points", camera_info="/camera_info"))
     assert run.frames == 2 and seen[0].fx == CAMERA.fx
+
+
+@pytest.mark.parametrize(("height", "frames"), [(48, 2), (1, 0)])
+def test_a_camera_that_is_not_calibrated_stops_only_clouds_that_need_one(height: int, frames: int) -> None:
+    rooms, _ = simple_rooms()
+    object.__setattr__(rooms, "organise", organise)
+    xyz = back_project(1.5 + np.random.default_rng(1).random((48, 64)), 50.0, 50.0, 31.5, 23.5)
+    rows = np.zeros((48, 64), [("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
+    for axis, name in enumerate("xyz"):
+        rows[name] = xyz[..., axis]
+    said = [r for r in records(2) if r.topic == "/image"]
+    for stamp_ns in (10**9, 11 * 10**8):
+        cloud = messages.point_cloud(rows.reshape(height, -1), stamp_ns, "camera")
+        said.append(uncalibrated(stamp_ns))
+        said.append(Record.of("/points", cloud, stamp_ns))
+    run = run_offline(said, rooms, Inputs(image="/image", points="/points", camera_info="/camera_info"))
+    assert run.frames == frames and run.dropped == ({} if frames else {"malformed_depth": 2})
+    assert frames or "expected a calibrated K" in run.complaints["malformed_depth"]
 
 
 def test_the_json_tells_of_every_frame_and_every_refusal() -> None:

@@ -77,21 +77,51 @@ def depth_image(depth_message: Any, camera_info: Any, colour: Any = None) -> Dep
 def intrinsics(message: Any) -> Intrinsics:
     """The pinhole camera of a CameraInfo, with its binning and region of interest applied.
 
-    ValueError for a camera that is not calibrated (ROS drivers say so with zeros in K).
+    It is the projection matrix P, by which rectified and registered pictures are made (image_geometry's
+    PinholeCameraModel), and K where P is left at zeros. ValueError for a camera that is not calibrated (ROS drivers
+    say so with zeros in both).
     """
-    K = np.asarray(message.k if hasattr(message, "k") else message.K, np.float64)  # K: the name in ROS 1
-    if K.shape != (9,) or not np.isfinite(K).all() or K[0] <= 0 or K[4] <= 0:
-        raise ValueError(f"camera_info: expected a calibrated K with focal lengths above 0, got {K.tolist()}")
+    matrix = _calibrated(message)
     roi, (bin_x, bin_y) = message.roi, (max(1, int(b)) for b in (message.binning_x, message.binning_y))
     width, height = int(roi.width) or int(message.width), int(roi.height) or int(message.height)
     return Intrinsics(
-        fx=float(K[0]) / bin_x,
-        fy=float(K[4]) / bin_y,
-        cx=(float(K[2]) - int(roi.x_offset)) / bin_x,
-        cy=(float(K[5]) - int(roi.y_offset)) / bin_y,
+        fx=float(matrix[0, 0]) / bin_x,
+        fy=float(matrix[1, 1]) / bin_y,
+        cx=(float(matrix[0, 2]) - int(roi.x_offset)) / bin_x,
+        cy=(float(matrix[1, 2]) - int(roi.y_offset)) / bin_y,
         width=width // bin_x,
         height=height // bin_y,
     )
+
+
+def is_calibrated(message: Any) -> bool:
+    """Whether a CameraInfo says anything of its camera: drivers leave K and P at zeros until somebody calibrated it."""
+    return any(_camera_matrix(message, name).flat[0] != 0 for name in "pk")
+
+
+def camera_of_cloud(camera_info: Any, cloud: PointCloud) -> Intrinsics | None:
+    """The camera that a cloud is organised or projected with; None without a ``camera_info``.
+
+    None too for one that is not calibrated where the cloud is organised, since that needs none; else ValueError.
+    """
+    if camera_info is None or (cloud.organised and not is_calibrated(camera_info)):
+        return None
+    return intrinsics(camera_info)
+
+
+def _calibrated(message: Any) -> Array:
+    """P (3, 4) or, where it says nothing, K (3, 3), in pixels of the whole picture; ValueError if neither is usable."""
+    P, K = _camera_matrix(message, "p"), _camera_matrix(message, "k")
+    name, matrix = ("P", P) if P.flat[0] != 0 else ("K", K)
+    if not np.isfinite(matrix).all() or matrix[0, 0] <= 0 or matrix[1, 1] <= 0:
+        got = matrix.ravel().tolist()
+        raise ValueError(f"camera_info: expected a calibrated {name} with focal lengths above 0, got {got}")
+    return matrix
+
+
+def _camera_matrix(message: Any, name: str) -> Array:
+    values = getattr(message, name) if hasattr(message, name) else getattr(message, name.upper())  # as in ROS 1
+    return np.asarray(values, np.float64).reshape(3, -1)
 
 
 def point_cloud(message: Any) -> PointCloud:

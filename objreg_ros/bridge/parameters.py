@@ -73,11 +73,14 @@ def _part(kind: type[Params], values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _declare(node: Node, declaration: Declaration) -> Any:
-    """Declare without type and range, let `Params` judge what the user set, then fix the descriptor."""
+    """Declare without type and range, let `Params` judge what the user set, then fix the descriptor.
+
+    An empty list has no type to ROS, so it arrives as no value at all.
+    """
     declared = declaration.check(declaration.default)
     loose = ParameterDescriptor(dynamic_typing=True)
     given = node.declare_parameter(declaration.name, list(declared) if declaration.many else declared, loose).value
-    value = declared if given is None else declaration.check(given)
+    value = declaration.check(given) if given is not None else () if declaration.many else declared
     Node.set_parameters(node, [_parameter(declaration, value)])  # rclpy's own: a Door's asks what we are making here
     node.set_descriptor(declaration.name, descriptor(declaration))
     return value

@@ -191,6 +191,15 @@ class Player(Node):
         self.destroy_node()
 
 
+def is_installed(kind: str) -> bool:
+    """Whether `message_type` has the class of a type."""
+    try:
+        message_type(kind)
+    except ValueError:
+        return False
+    return True
+
+
 def message_type(kind: str) -> Any:
     """The class of a type like ``sensor_msgs/msg/Image``; ValueError if its package is not installed."""
     package, _, name = kind.replace("/msg/", "/").partition("/")

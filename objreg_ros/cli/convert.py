@@ -21,13 +21,15 @@ from objreg_ros.recording.writer import STORAGES
 def command(recording: Path, out: Path, storage: str) -> None:
     """Write RECORDING (rosbag1, rosbag2 or a TUM RGB-D folder) as the rosbag2 folder OUT.
 
-    Topics of a type that ROS 2 does not ship, or not with the same fields, are left out, and named.
+    The topics keep the QoS of their publishers; what ROS 1 latched becomes transient local. Topics of a type that ROS 2
+    does not ship, or not with the same fields, are left out, and named.
     """
     with open_recording(recording) as source:
         obstacles = source.obstacles()
         for name, reason in obstacles.items():
             click.echo(f"left out: {name} ({reason})", err=True)
-        count = write_rosbag2(out, _with_progress(source, set(source.topics) - set(obstacles)), storage)
+        kept = _with_progress(source, set(source.topics) - set(obstacles))
+        count = write_rosbag2(out, kept, storage, source.offered_qos())
     click.echo(f"{out}: {count} records")
 
 

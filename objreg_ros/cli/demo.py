@@ -18,8 +18,8 @@ from objreg_ros.bridge import from_msg
 from objreg_ros.cli import live_table, options
 from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
 from objreg_ros.cli.played import as_rosbag2, simulated_room
-from objreg_ros.cli.settings import read_settings
-from objreg_ros.data import ColourImage
+from objreg_ros.cli.settings import parse_change, read_settings, ros_argument
+from objreg_ros.data import ColourImage, Intrinsics
 from objreg_ros.offline import constraint_with_error, refusal
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
@@ -117,21 +117,14 @@ def setup_of(asked: Asked, inputs: Inputs) -> Setup:
     node_args = {room: list(everywhere) for room in ROOMS}
     named = {"model": asked.model, "labels": asked.labels}
     changes = [*(f"detector.{name}={value}" for name, value in named.items() if value), *asked.changes]
-    for change in changes:
-        room, name, value = _parse(change)
-        node_args[room] += ["-p", f"{name}:={value}"]
+    for room, name, value in map(parse_change, changes):
+        if room not in ROOMS:
+            raise ValueError(f"--set: expected a node of the demo ({', '.join(ROOMS)}), got {room}; leave it out")
+        node_args[room] += ["-p", ros_argument(name, value)]
     replay = ["--lossless"] if asked.lossless else ["--rate", str(asked.rate)]
     replay += [] if asked.seconds is None else ["--end", str(asked.seconds)]
     remaps = [f"{name}:={topic}" for name, topic in inputs.outright.items()]
     return Setup(node_args, [*replay, *(word for remap in remaps for word in ("--remap", remap))])
-
-
-def _parse(change: str) -> tuple[str, str, str]:
-    path, _, value = change.partition("=")
-    room, _, name = path.partition(".")
-    if room not in ROOMS or not name or not value:
-        raise ValueError(f"--set: expected NODE.NAME=VALUE with a node of {', '.join(ROOMS)}, got {change!r}")
-    return room, name, value
 
 
 def _sent(source: Recording, inputs: Inputs, seconds: float | None, live: Live) -> dict[str, int]:
@@ -170,10 +163,16 @@ def _draw(out: Path, live: Live, truth: Truth, source: Recording, inputs: Inputs
         draw_way(out / "way.png", truth, live.closures)
         _say(f"drew {out / 'way.png'}")
     image = None if live.sight is None else _image(source, inputs, live.sight.detections.stamp_ns)
-    if live.sight is not None and image is not None and inputs.camera_info is not None:
-        camera = from_msg.intrinsics(next(iter(source.records([inputs.camera_info]))).message)
+    camera = camera_of(source, inputs)
+    if live.sight is not None and image is not None and camera is not None:
         draw_sight(out / "sight.png", image.rgb, camera, live.sight.detections, live.sight.objects)
         _say(f"drew {out / 'sight.png'}")
+
+
+def camera_of(source: Recording, inputs: Inputs) -> Intrinsics | None:
+    """The camera of a recording by its camera_info; None where it has none, or one that is not calibrated."""
+    info = None if inputs.camera_info is None else next(iter(source.records([inputs.camera_info]))).message
+    return from_msg.intrinsics(info) if info is not None and from_msg.is_calibrated(info) else None
 
 
 def _image(source: Recording, inputs: Inputs, stamp_ns: int) -> ColourImage | None:

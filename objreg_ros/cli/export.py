@@ -17,7 +17,8 @@ from objreg_ros.registrar.export import export
 def command(store: Path, folder: Path) -> None:
     """Write the objects, contexts and closures of STORE into FOLDER, as PLY clouds and one map.json.
 
-    Clouds are in metres, in the frame of the session (of its odometry, or of its first camera). STORE is not changed.
+    Clouds are in metres as doubles, in the frame of the session (of its odometry, or of its first camera). STORE is not
+    changed.
     """
     written = 0
     for _ in tqdm(export(store, folder), desc="write", unit=" files", disable=None):

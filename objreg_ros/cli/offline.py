@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import click
 from tqdm import tqdm
 
 from objreg_ros.cli import FIRST_TIME, options
+from objreg_ros.cli.options import require_writable
 from objreg_ros.cli.settings import Settings, read_settings
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.offline import Run, Timing, build_rooms, run_offline
@@ -56,7 +56,7 @@ def command(
     true error of every constraint.
     """
     if json_file is not None:
-        _require_writable(json_file)
+        require_writable("--json", json_file)
     settings = read_settings(params_file, [*changes, *_model_changes(model, labels)])
     with open_recording(recording) as source:
         inputs = _inputs(source, remaps, odometry, settings.of("segmenter", SegmenterNodeParams).source)
@@ -67,14 +67,6 @@ def command(
     if json_file is not None:
         told = {"recording": str(recording.resolve()), "inputs": inputs.outright, "odometry": inputs.odom}
         json_file.write_text(json.dumps({**told, **summary}, indent=1))
-
-
-def _require_writable(file: Path) -> None:
-    """OSError before the run rather than after it, where its outcome could not be kept."""
-    if not file.parent.is_dir():
-        raise OSError(f"--json: expected {file.parent} to be a folder, and it is not; create it or choose another")
-    if not os.access(file if file.exists() else file.parent, os.W_OK):
-        raise OSError(f"--json: expected to be allowed to write {file}, and am not; choose another place")
 
 
 def _model_changes(model: str | None, labels: str | None) -> list[str]:

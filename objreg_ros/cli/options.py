@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import click
@@ -18,3 +19,11 @@ params = click.option(
 change = click.option("--set", "changes", multiple=True, metavar="NODE.NAME=VALUE", help="Change one parameter.")
 model = click.option("--model", help="ONNX model: a path or the name of an installed one.")
 labels = click.option("--labels", help="Text file of labels, one a line.")
+
+
+def require_writable(option: str, file: Path) -> None:
+    """OSError before the work rather than after it, where the ``file`` of an option could not be written."""
+    if not file.parent.is_dir():
+        raise OSError(f"{option}: expected {file.parent} to be a folder, and it is not; create it or choose another")
+    if not os.access(file if file.exists() else file.parent, os.W_OK):
+        raise OSError(f"{option}: expected to be allowed to write {file}, and am not; choose another place")

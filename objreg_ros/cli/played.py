@@ -47,7 +47,7 @@ def as_rosbag2(recording: Path, inputs: Inputs, out: Path, seconds: float | None
         click.echo(f"writing {recording} as {bag}", err=True)
         end_ns = None if seconds is None else source.start_ns + round(seconds * 1e9)
         with _whole(bag) as unfinished:
-            write_rosbag2(unfinished, source.records(topics, end_ns=end_ns))
+            write_rosbag2(unfinished, source.records(topics, end_ns=end_ns), offered_qos=source.offered_qos())
     return bag
 
 

@@ -56,7 +56,8 @@ def command(
 ) -> None:
     """Publish RECORDING under the names that the nodes listen to.
 
-    Arguments behind -- go to ROS, like -- --ros-args -r __ns:=/robot.
+    With --all, topics of a type that is not installed here, or that ROS 2 has with other fields, are left out, and
+    named. Arguments behind -- go to ROS, like -- --ros-args -r __ns:=/robot.
     """
     import rclpy
 
@@ -65,7 +66,7 @@ def command(
 
     with open_recording(recording) as source:
         inputs = choose_inputs(source.topics, parse_remaps(remaps), depth_source)
-        names = recorded_names(source) if everything else graph_names(source, inputs)
+        names = playable_names(source, inputs) if everything else graph_names(source, inputs)
         if not names:
             raise ValueError(f"{recording}: expected topics that the graph can use, got {', '.join(source.topics)}")
         selection = Selection(names, start, end)
@@ -84,6 +85,32 @@ def command(
             player.close()
             rclpy.try_shutdown()
         _say(player, receipts)
+
+
+def playable_names(source: Recording, inputs: Inputs) -> dict[str, str]:
+    """Every topic that can be published, under its own name; the others are named to the user.
+
+    ValueError where one of those is an input of the graph.
+    """
+    obstacles = _obstacles(source)
+    needed = sorted(obstacles.keys() & set(inputs.chosen().values()))
+    if needed:
+        reasons = ", ".join(f"{name} ({obstacles[name]})" for name in needed)
+        raise ValueError(
+            f"expected inputs that can be published, got {reasons}; choose others with --remap input:=/topic"
+        )
+    for name, reason in obstacles.items():
+        click.echo(f"left out: {name} ({reason})", err=True)
+    return {topic: name for topic, name in recorded_names(source).items() if topic not in obstacles}
+
+
+def _obstacles(source: Recording) -> dict[str, str]:
+    """The topics that cannot be published here, each with the reason. The bytes of a rosbag2 go out as they are."""
+    from objreg_ros.bridge.player import is_installed
+
+    reasons = source.obstacles() if source.kind == "rosbag1" else {}
+    absent = {t.name: f"{t.msgtype} is not installed" for t in source.topics.values() if not is_installed(t.msgtype)}
+    return {**absent, **reasons}
 
 
 def _prepare(player: Player, inputs: Inputs, names: dict[str, str], wait: float) -> None:

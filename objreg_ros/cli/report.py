@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from objreg_ros.cli import offline
+from objreg_ros.cli.options import require_writable
 from objreg_ros.report.write import write_report
 
 
@@ -24,6 +25,7 @@ def command(context: click.Context, runs: tuple[Path, ...], out: Path, model: st
     It opens offline and holds the trajectory against the truth, a timeline of closures and refusals, pictures of
     registrations, the object map and the times.
     """
+    require_writable("--out", out)
     for missing in [run for run in runs if not run.expanduser().exists()]:
         raise FileNotFoundError(
             f"expected the JSON of `objreg offline --json` or a recording, got nothing at {missing}"

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -60,9 +61,18 @@ def read_settings(file: Path | None, changes: Iterable[str]) -> Settings:
     sections = {} if file is None else _sections(file)
     values = {node: _values_of(sections, node) for node in NODES}
     for change in changes:
-        node, name, value = _parse(change)
+        node, name, value = parse_change(change)
         values[node][name] = value
     return Settings(values)
+
+
+def ros_argument(name: str, value: Any) -> str:
+    """``name:=value`` as ROS 2 reads it behind ``-p``, in the type of the value that `parse_change` gave.
+
+    A list is of one type to ROS and text that looks like a number is a number, unless it is in quotes: so has JSON it,
+    which is YAML too.
+    """
+    return f"{name}:={json.dumps(value, ensure_ascii=False)}"
 
 
 def _sections(file: Path) -> dict[str, dict[str, Any]]:
@@ -93,22 +103,35 @@ def _known(node: str) -> set[str]:
     return {name for kind in NODES[node] for name in names_of(kind)}
 
 
-def _parse(change: str) -> tuple[str, str, Any]:
+def parse_change(change: str) -> tuple[str, str, Any]:
+    """Node, name and value of a change like ``registrar.seed=7``, the value in its declared type.
+
+    ValueError for another form and for a value that is refused; a name that no node has keeps its text.
+    """
     path, sign, text = change.partition("=")
     node, dot, name = path.partition(".")
     if not sign or not dot or node not in NODES:
         raise ValueError(f"--set: expected node.parameter=value with a node of {', '.join(NODES)}, got {change!r}")
     declaration = next((d for kind in NODES[node] for d in kind.declarations() if d.name == name), None)
-    return node, name, text if declaration is None else _value(declaration, text)
+    return node, name, text if declaration is None else declaration.check(_value(declaration, text))
 
 
 def _value(declaration: Declaration, text: str) -> Any:
-    """The text as YAML, but a text parameter takes it as it stands, and a list may do without brackets."""
-    if declaration.many:
-        inner = text.strip().removeprefix("[").removesuffix("]")
-        return [_value_one(declaration, part.strip()) for part in inner.split(",") if part.strip()]
-    return _value_one(declaration, text)
+    """The text as YAML, but a text parameter takes it as it stands, and a list may do without brackets and quotes."""
+    if not declaration.many:
+        return _value_one(declaration, text)
+    try:
+        items = yaml.load(text if text.strip().startswith("[") else f"[{text}]", Loader=yaml.BaseLoader)
+    except yaml.YAMLError:
+        return text
+    return [_value_one(declaration, item) for item in items]
 
 
-def _value_one(declaration: Declaration, text: str) -> Any:
-    return text if declaration.kind is str else yaml.safe_load(text)
+def _value_one(declaration: Declaration, text: Any) -> Any:
+    """What cannot be read as the declared type stays as it is, and is refused as that."""
+    if declaration.kind is str or not isinstance(text, str):
+        return text
+    try:
+        return float(text) if declaration.kind is float else yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError):
+        return text

@@ -4,12 +4,24 @@
 from __future__ import annotations
 
 import struct
+from collections import Counter
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.interfaces import (
+    Connection,
+    ConnectionExtRosbag1,
+    ConnectionExtRosbag2,
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
 from rosbags.rosbag1 import ReaderError as Rosbag1Error
 from rosbags.rosbag2 import ReaderError as Rosbag2Error
 from rosbags.serde import SerdeError
@@ -62,6 +74,16 @@ class BagRecording(Recording):
             for connection, stamp_ns, raw in self._reader.messages(wanted, start_ns, end_ns):
                 yield self._record(connection, stamp_ns, raw)
 
+    def offered_qos(self) -> dict[str, list[Qos]]:
+        """See `Recording.offered_qos`. What was latched in ROS 1 is transient local, as deep as it had publishers."""
+        offers: dict[str, list[Qos]] = {}
+        for connection in self._reader.connections:
+            if isinstance(connection.ext, ConnectionExtRosbag2):
+                offers.setdefault(connection.topic, []).extend(connection.ext.offered_qos_profiles)
+        latched = Counter(c.topic for c in self._reader.connections if _is_latched(c))
+        offers.update({topic: [latched_qos(count)] for topic, count in latched.items()})
+        return {topic: profiles for topic, profiles in offers.items() if profiles}
+
     def _types(self) -> Typestore:
         return standard_types() if self._reader.is2 else self._reader.typestore
 
@@ -78,6 +100,26 @@ class BagRecording(Recording):
             return bytes(raw) if self._reader.is2 else serialise(decode())
 
         return Record(connection.topic, connection.msgtype, stamp_ns, decode, encode)
+
+
+def latched_qos(depth: int) -> Qos:
+    """The last ``depth`` messages are kept for who comes late, as ROS 1 does with what is latched."""
+    default = QosTime(0, 0)
+    return Qos(
+        history=QosHistory.KEEP_LAST,
+        depth=depth,
+        reliability=QosReliability.RELIABLE,
+        durability=QosDurability.TRANSIENT_LOCAL,
+        deadline=default,
+        lifespan=default,
+        liveliness=QosLiveliness.AUTOMATIC,
+        liveliness_lease_duration=default,
+        avoid_ros_namespace_conventions=False,
+    )
+
+
+def _is_latched(connection: Connection) -> bool:
+    return isinstance(connection.ext, ConnectionExtRosbag1) and bool(connection.ext.latching)
 
 
 def _topics(reader: AnyReader) -> dict[str, Topic]:

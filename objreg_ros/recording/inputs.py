@@ -27,19 +27,26 @@ TRUTH = r"ground_?truth|(^|/)gt(/|$|_)|vicon|mocap|vrpn|optitrack"
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """What an input may be: its types, names that it never has, and names by preference (regular expressions)."""
+    """What an input may be: its types, names that it never has, and names by preference (regular expressions).
+
+    A topic that fits no preference comes last; where there is ``proof``, it comes only if its name has that.
+    """
 
     types: tuple[str, ...]
     never: str
     prefer: tuple[str, ...]
+    proof: str = ""
 
+
+DEPTH_ENCODING = r"/compressedDepth$"  # a transport that takes nothing but depth
+STEREO = r"stereo/image_(raw|rect)(/|$)"  # OAK-D: the depth of its two grey cameras
 
 # The first of two pictures that fit equally is the one of the shorter name: raw before compressed.
 RULES = {
     "image": Rule(
         PICTURES,
         r"(?<!rgb_to_)depth|(^|/)ir(/|_|$)|infra|disparity|mask|label|(^|/)theora"
-        r"|objects|view|left|right",
+        rf"|objects|view|left|right|{STEREO}|{DEPTH_ENCODING}",
         (
             r"rgb_to_depth/image",  # Azure Kinect: colour in the geometry of its native depth
             r"^/?image$",
@@ -74,13 +81,15 @@ RULES = {
             r"depth/image_rect",
             r"depth/image",
             r"depth",
+            STEREO,
         ),
+        DEPTH_ENCODING,
     ),
     "odom": Rule(("nav_msgs/msg/Odometry",), TRUTH, (r"^/?odom$", r"odom", r".")),
     "ground_truth": Rule(POSES, r"(?!.*(" + TRUTH + r"))^", (TRUTH,)),
 }
-RULES["depth_native"] = Rule(PICTURES, RULES["depth"].never + "|depth_to_rgb", (r"depth/image",))
 NATIVE = "rgb_to_depth"  # colour in the geometry of the native depth
+NATIVE_DEPTH = Rule(PICTURES, RULES["depth"].never + "|depth_to_rgb", (r"depth/image",), DEPTH_ENCODING)
 REGISTERED = RULES["depth"].prefer.index(r"depth/image_rect")  # the names before it say that they are registered
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 SOURCES = ("auto", "points", "depth")  # as the segmenter's parameter of this name
@@ -142,7 +151,8 @@ def choose_inputs(topics: Mapping[str, Topic], remaps: Mapping[str, str] | None 
     """The best topic for each input. ``remaps`` say it outright: input → topic, or input → "" for none. ``source`` is
     the segmenter's: of the two kinds of depth only ``points``, only ``depth``, or the better one.
 
-    What the nodes publish is never taken unasked: a recording may hold it too. A depth image with its camera_info goes
+    What the nodes publish is never taken unasked: a recording may hold it too. A picture is taken for depth only where
+    its name says so: a topic that fits nothing is more likely a second camera. A depth image with its camera_info goes
     before points: it is the same measurement in a thirteenth of the bytes. Points go before a depth image whose name
     does not say that it is registered to colour. ValueError for a remap that names no input, no topic of the recording,
     a topic of another type, a topic that another remap names or the kind of depth that ``source`` leaves out.
@@ -151,10 +161,7 @@ def choose_inputs(topics: Mapping[str, Topic], remaps: Mapping[str, str] | None 
     _require_known(asked, topics)
     _require_types(asked, topics)
     _require_different(asked)
-    free = [topic for topic in topics.values() if topic.name not in asked.values() and not OWN.search(topic.name)]
-    found = {name: asked[name] if name in asked else _best(rule, free) for name, rule in RULES.items()}
-    if "depth" not in asked and NATIVE in (found["image"] or ""):
-        found["depth"] = _best(RULES["depth_native"], free)
+    found = _find(topics, asked)
     found["camera_info"] = asked.get("camera_info", _camera_info_of((found["depth"], found["image"]), topics))
     if _depth_wins(found, asked):
         found["points"] = None
@@ -162,6 +169,17 @@ def choose_inputs(topics: Mapping[str, Topic], remaps: Mapping[str, str] | None 
         found["depth"] = None
         found["camera_info"] = asked.get("camera_info", _camera_info_of((found["image"], found["points"]), topics))
     return Inputs(**{field.name: found[field.name] or None for field in fields(Inputs)})
+
+
+def _find(topics: Mapping[str, Topic], asked: Mapping[str, str]) -> dict[str, str | None]:
+    """What is asked for, and the best topic for each other input, in the order of the rules; no topic serves two."""
+    free = [topic for topic in topics.values() if topic.name not in asked.values() and not OWN.search(topic.name)]
+    found: dict[str, str | None] = {}
+    for name, rule in RULES.items():
+        native = name == "depth" and NATIVE in (found["image"] or "")
+        found[name] = asked[name] if name in asked else _best(NATIVE_DEPTH if native else rule, free)
+        free = [topic for topic in free if topic.name != found[name]]
+    return found
 
 
 def _only(source: str, asked: Mapping[str, str]) -> dict[str, str]:
@@ -225,9 +243,17 @@ def _require_different(asked: Mapping[str, str]) -> None:
 
 
 def _best(rule: Rule, topics: Iterable[Topic]) -> str | None:
-    fitting = [t.name for t in topics if t.msgtype in rule.types and t.count and not re.search(rule.never, t.name)]
-    ranked = [(_rank(rule, name), len(name), name) for name in fitting]
-    return min(ranked)[2] if ranked else None
+    fitting = [t.name for t in topics if t.msgtype in rule.types and t.count and _may_be(rule, t.name)]
+    best = min(fitting, key=lambda name: (_rank(rule, name), len(name), name), default=None)
+    lossless = f"{best}Depth"  # beside depth as /compressed, which is JPEG unless its driver was told otherwise
+    return lossless if lossless in fitting else best
+
+
+def _may_be(rule: Rule, name: str) -> bool:
+    """Whether a name is not ruled out, and fits a preference or has the proof that the others need."""
+    if re.search(rule.never, name):
+        return False
+    return _rank(rule, name) < len(rule.prefer) or re.search(rule.proof, name) is not None
 
 
 def _rank(rule: Rule, name: str) -> int:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
+from rosbags.interfaces import Qos
 from rosbags.typesys.store import Typestore
 
 from objreg_ros.recording.messages import obstacle, serialise, standard_types
@@ -74,6 +75,10 @@ class Recording(ABC):
         """The topics whose records ROS 2 cannot have (`Record.cdr` refuses them), each with the reason."""
         reasons = {topic.name: obstacle(topic.msgtype, self._types()) for topic in self.topics.values()}
         return {name: reason for name, reason in reasons.items() if reason}
+
+    def offered_qos(self) -> dict[str, list[Qos]]:
+        """The QoS of the publishers of each topic; without the topics of which nothing is known."""
+        return {}
 
     def _types(self) -> Typestore:
         """The message types as the recording knows them."""

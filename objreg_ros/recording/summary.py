@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from typing import Any
 
@@ -113,7 +114,8 @@ def _first_messages(recording: Recording, inputs: Inputs) -> list[str]:
     colour = _try(found, "image", recording, inputs.image, lambda m: from_msg.image(m).rgb.shape[:2])
     depth = _try(found, "depth", recording, inputs.depth, lambda m: from_msg.depth(m).shape)
     cloud = _try(found, "points", recording, inputs.points, from_msg.point_cloud)
-    camera: Intrinsics | None = _try(found, "camera_info", recording, inputs.camera_info, from_msg.intrinsics)
+    read = from_msg.intrinsics if cloud is None else partial(from_msg.camera_of_cloud, cloud=cloud)
+    camera: Intrinsics | None = _try(found, "camera_info", recording, inputs.camera_info, read)
     if camera and depth and depth != (camera.height, camera.width):
         found.append(f"depth has {_size(depth)} pixels and its camera_info {camera.width} × {camera.height}")
     if colour and depth and colour != depth:

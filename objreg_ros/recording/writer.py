@@ -4,11 +4,13 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Literal
 
+from rosbags.interfaces import Qos
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from objreg_ros.recording.messages import standard_types
@@ -18,8 +20,13 @@ STORAGES = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}
 METADATA_VERSION: Literal[9] = 9  # Jazzy's
 
 
-def write_rosbag2(path: Path | str, records: Iterable[Record], storage: str = "mcap") -> int:
-    """Write records in order to a new folder; their number comes back.
+def write_rosbag2(
+    path: Path | str,
+    records: Iterable[Record],
+    storage: str = "mcap",
+    offered_qos: Mapping[str, Sequence[Qos]] = MappingProxyType({}),
+) -> int:
+    """Write records in order to a new folder; their number comes back. ``offered_qos`` is as `Recording.offered_qos`.
 
     ValueError for a storage that there is not or a type that ROS 2 does not ship, FileExistsError for a folder that is
     already there, OSError for one that cannot be made. What fails leaves no folder.
@@ -38,7 +45,7 @@ def write_rosbag2(path: Path | str, records: Iterable[Record], storage: str = "m
         for record in records:
             key = (record.topic, record.msgtype)
             if key not in connections:
-                connections[key] = _connect(writer, record)
+                connections[key] = _connect(writer, record, offered_qos.get(record.topic, ()))
             writer.write(connections[key], record.stamp_ns, record.cdr)
             count += 1
     return count
@@ -61,7 +68,8 @@ def _make_parents(path: Path) -> None:
         raise OSError(f"{path}: expected a place that can be written to, got: {error.strerror}") from error
 
 
-def _connect(writer: Writer, record: Record) -> Any:
+def _connect(writer: Writer, record: Record, offered: Sequence[Qos]) -> Any:
     if record.msgtype not in standard_types().types:
         raise ValueError(f"{record.topic}: expected a type that ROS 2 ships, got {record.msgtype}")
-    return writer.add_connection(record.topic, record.msgtype, typestore=standard_types())
+    types = standard_types()
+    return writer.add_connection(record.topic, record.msgtype, typestore=types, offered_qos_profiles=offered)

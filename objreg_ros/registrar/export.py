@@ -12,7 +12,7 @@ import numpy as np
 
 from objreg_ros.data import Array, LoopClosure
 from objreg_ros.geometry import rotate, transform
-from objreg_ros.registrar.keyframe import Keyframe, KeyObject
+from objreg_ros.registrar.keyframe import Keyframe
 from objreg_ros.registrar.landmarks import Landmark, Landmarks
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.sighting import Sighting
@@ -23,8 +23,9 @@ def export(path: str | Path, folder: str | Path) -> Iterator[Path]:
     """Write the store at ``path`` into ``folder`` and yield each file as it is written. The store is not changed.
 
     ``objects/<landmark>_<label>/keyframe_<id>.ply`` is one view of an object and ``contexts/keyframe_<id>.ply`` what
-    was around it, both in m in the frame of the session; ``map.json`` holds keyframes with their objects, the landmarks
-    that those are of, and closures. StoreError (an OSError) if it is no store or damaged.
+    was around it, both in m in the frame of the session. Their points are doubles, since that frame may be UTM's, where
+    a float steps by half a metre. ``map.json`` holds keyframes with their objects, the landmarks that those are of, and
+    closures. StoreError (an OSError) if it is no store or damaged.
     """
     store = Store(path, read_only=True)
     try:
@@ -43,15 +44,15 @@ def export(path: str | Path, folder: str | Path) -> Iterator[Path]:
 
 
 def write_ply(path: Path, xyz: Array, normals: Array, rgb: Array | None) -> Path:
-    """Write points as binary little-endian PLY with normals and, if there are any, colours."""
-    fields = [(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz")]
+    """Write points as binary little-endian PLY: x y z as doubles, normals as floats and, if there are any, colours."""
+    fields = [(name, "<f8") for name in ("x", "y", "z")] + [(name, "<f4") for name in ("nx", "ny", "nz")]
     fields += [(name, "u1") for name in ("red", "green", "blue")] if rgb is not None else []
     table = np.zeros(len(xyz), fields)
     for k, name in enumerate(("x", "y", "z")):
         table[name], table["n" + name] = xyz[:, k], normals[:, k]
     for k, name in enumerate(("red", "green", "blue") if rgb is not None else ()):
         table[name] = rgb[:, k]  # type: ignore[index]
-    kinds = {"<f4": "float", "u1": "uchar"}
+    kinds = {"<f8": "double", "<f4": "float", "u1": "uchar"}
     header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(xyz)}"]
     header += [f"property {kinds[kind]} {name}" for name, kind in fields] + ["end_header", ""]
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -64,13 +65,14 @@ def _write_clouds(folder: Path, keyframe: Keyframe, sightings: list[Sighting]) -
     name = f"keyframe_{keyframe.keyframe_id:06d}.ply"
     for item, sighting in zip(keyframe.objects, sightings, strict=True):
         place = folder / "objects" / f"{sighting.landmark:05d}_{_file_name(item.label)}"
-        yield _write_object(place / name, T, item)
+        yield _write_cloud(place / name, T, item.cloud.xyz, item.cloud.normals, item.cloud.rgb)
     context = keyframe.context
-    yield write_ply(folder / "contexts" / name, transform(T, context.xyz), rotate(T, context.normals), None)
+    yield _write_cloud(folder / "contexts" / name, T, context.xyz, context.normals)
 
 
-def _write_object(path: Path, T: Array, item: KeyObject) -> Path:
-    return write_ply(path, transform(T, item.cloud.xyz), rotate(T, item.cloud.normals), item.cloud.rgb)
+def _write_cloud(path: Path, T_session_camera: Array, xyz: Array, normals: Array, rgb: Array | None = None) -> Path:
+    """Points and normals of the camera, written in the session's frame."""
+    return write_ply(path, transform(T_session_camera, xyz.astype(float)), rotate(T_session_camera, normals), rgb)
 
 
 def _keyframe_json(keyframe: Keyframe, sightings: list[Sighting]) -> dict[str, Any]:

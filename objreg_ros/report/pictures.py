@@ -51,8 +51,8 @@ class Album:
 
     def _depth_image(self, depth: Any, colour: Any) -> DepthImage:
         if self._inputs.depth is None:
-            camera = None if self._camera_info is None else from_msg.intrinsics(self._camera_info)
-            return organise(from_msg.point_cloud(depth), camera)
+            cloud = from_msg.point_cloud(depth)
+            return organise(cloud, from_msg.camera_of_cloud(self._camera_info, cloud))
         return from_msg.depth_image(depth, self._camera_info, colour)
 
 

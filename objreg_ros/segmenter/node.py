@@ -119,7 +119,7 @@ class SegmenterNode(MatchingDoor):
         if "camera_info" in match.payloads:
             return self.read("depth", from_msg.depth_image, match["depth"], match["camera_info"], match["image"])
         cloud = self.read("points", from_msg.point_cloud, match["depth"])
-        camera = None if self._camera_info is None else from_msg.intrinsics(self._camera_info)
+        camera = self.read("camera_info", from_msg.camera_of_cloud, self._camera_info, cloud)
         with self.ledger.timed("organise"):
             return organise(cloud, camera)
 

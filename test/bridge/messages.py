@@ -36,10 +36,12 @@ def compressed(data: bytes, kind: str) -> SimpleNamespace:
     return SimpleNamespace(header=header(), format=kind, data=data)
 
 
-def camera_info(K: list[float], width: int, height: int, **where: Any) -> SimpleNamespace:
+def camera_info(
+    K: list[float], width: int, height: int, P: tuple[float, ...] = (0.0,) * 12, **where: Any
+) -> SimpleNamespace:
     roi = SimpleNamespace(x_offset=0, y_offset=0, width=0, height=0, do_rectify=False)
     return SimpleNamespace(
-        header=header(**where), width=width, height=height, k=K, d=[], binning_x=0, binning_y=0, roi=roi
+        header=header(**where), width=width, height=height, k=K, p=P, d=[], binning_x=0, binning_y=0, roi=roi
     )
 
 

@@ -15,6 +15,8 @@ from objreg_ros.geometry import pose, rotation_from_vector
 from . import messages
 
 K = [500.0, 0, 31.5, 0, 510.0, 23.5, 0, 0, 1]
+P = (400.0, 0, 30.5, -12.0, 0, 410.0, 22.5, 0, 0, 0, 1, 0)
+UNCALIBRATED = messages.camera_info([0.0] * 9, 4, 3)
 PACKED = np.dtype({"names": ["x", "y", "z", "rgb"], "formats": ["<f4"] * 4, "offsets": [0, 4, 8, 16], "itemsize": 32})
 
 
@@ -49,7 +51,7 @@ def test_colour_of_another_size_is_not_taken_for_registered() -> None:
 
 def test_an_uncalibrated_camera_is_refused() -> None:
     with pytest.raises(ValueError, match="calibrated K"):
-        from_msg.intrinsics(messages.camera_info([0.0] * 9, 64, 48))
+        from_msg.intrinsics(UNCALIBRATED)
 
 
 def test_binning_and_region_of_interest_move_the_camera() -> None:
@@ -63,9 +65,52 @@ def test_binning_and_region_of_interest_move_the_camera() -> None:
 
 def test_intrinsics_of_ros_1_are_read_too() -> None:
     info = messages.camera_info(K, 64, 48)
-    info.K = info.k
-    del info.k
+    info.K, info.P = info.k, info.p
+    del info.k, info.p
     assert from_msg.intrinsics(info).fy == 510.0
+    info.P = P
+    assert from_msg.intrinsics(info).fy == 410.0
+
+
+def test_the_camera_of_a_rectified_picture_is_that_of_the_projection_matrix() -> None:
+    info = messages.camera_info(K, 64, 48, P)
+    camera = from_msg.intrinsics(info)
+    assert (camera.fx, camera.fy, camera.cx, camera.cy) == (400.0, 410.0, 30.5, 22.5)
+    info.binning_x = info.binning_y = 2
+    info.roi.x_offset, info.roi.y_offset, info.roi.width, info.roi.height = 10, 4, 40, 30
+    camera = from_msg.intrinsics(info)
+    assert (camera.fx, camera.cx, camera.cy) == (200.0, 10.25, 9.25)
+
+
+@pytest.mark.parametrize("fx", [-400.0, float("nan")])
+def test_a_projection_matrix_that_cannot_be_is_refused_though_K_could(fx: float) -> None:
+    with pytest.raises(ValueError, match=r"expected a calibrated P with focal lengths above 0, got .(-400|nan)"):
+        from_msg.intrinsics(messages.camera_info(K, 64, 48, (fx, *P[1:])))
+
+
+def test_the_view_is_of_the_camera_of_its_projection_matrix() -> None:
+    word = from_msg.view(messages.cloud(packed_cloud()), messages.camera_info(K, 4, 3, P))
+    assert (word.intrinsics.fx, word.intrinsics.cx) == (400.0, 30.5)
+
+
+def test_an_organised_cloud_needs_no_camera_and_so_no_calibration() -> None:
+    cloud = from_msg.point_cloud(messages.cloud(packed_cloud()))
+    assert from_msg.camera_of_cloud(None, cloud) is None
+    assert from_msg.camera_of_cloud(UNCALIBRATED, cloud) is None
+    for calibrated, fx in ((messages.camera_info(K, 4, 3), 500.0), (messages.camera_info([0.0] * 9, 4, 3, P), 400.0)):
+        camera = from_msg.camera_of_cloud(calibrated, cloud)
+        assert camera is not None and camera.fx == fx
+    with pytest.raises(ValueError, match=r"expected a calibrated K with focal lengths above 0, got .-1"):
+        from_msg.camera_of_cloud(messages.camera_info([-1.0, *K[1:]], 4, 3), cloud)
+
+
+def test_an_uncalibrated_camera_projects_no_cloud_and_no_depth() -> None:
+    cloud = from_msg.point_cloud(messages.cloud(packed_cloud(height=1)))
+    assert from_msg.camera_of_cloud(None, cloud) is None
+    with pytest.raises(ValueError, match=r"expected a calibrated K with focal lengths above 0, got .0"):
+        from_msg.camera_of_cloud(UNCALIBRATED, cloud)
+    with pytest.raises(ValueError, match=r"expected a calibrated K with focal lengths above 0, got .0"):
+        from_msg.depth_image(messages.image(np.full((3, 4), 1500, np.uint16), "16UC1"), UNCALIBRATED)
 
 
 @pytest.mark.parametrize("pad", [0, 5])

@@ -25,6 +25,7 @@ class PotParams(Params):
     method: str = param("fast", "how", choices=("fast", "paper"), live=True)
     names: tuple[str, ...] = param((), "which", live=True)
     offsets: tuple[float, ...] = param((), "where", live=True)
+    fruits: tuple[str, ...] = param(("apple",), "which are eaten")
     on: bool = param(True, "whether")
 
 
@@ -68,6 +69,12 @@ def test_an_empty_list_keeps_its_declared_type(made: Made) -> None:
     names, offsets = made().describe_parameters(["names", "offsets"])
     assert names.type == ParameterType.PARAMETER_STRING_ARRAY
     assert offsets.type == ParameterType.PARAMETER_DOUBLE_ARRAY
+
+
+def test_a_list_can_be_emptied_at_the_start(made: Made) -> None:
+    door = made("fruits:=[]", "names:=[]")
+    assert (door.settings.of(PotParams).fruits, door.settings.of(PotParams).names) == ((), ())
+    assert door.describe_parameter("fruits").type == ParameterType.PARAMETER_STRING_ARRAY
 
 
 def test_start_values_are_taken_and_a_float_accepts_1(made: Made) -> None:

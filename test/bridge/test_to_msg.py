@@ -107,8 +107,10 @@ def test_depth_comes_back_exactly_in_metres_and_to_half_a_millimetre_in_16_bits(
 
 
 def test_a_camera_comes_back_as_it_was() -> None:
-    back = from_msg.intrinsics(to_msg.camera_info(CAMERA, STAMP, "kinect"))
+    info = to_msg.camera_info(CAMERA, STAMP, "kinect")
+    back = from_msg.intrinsics(info)
     assert (back.fx, back.fy, back.cx, back.cy, back.width, back.height) == (525.0, 524.5, 3.25, 2.5, 8, 6)
+    assert np.array_equal(info.p.reshape(3, 4)[:, :3], info.k.reshape(3, 3)) and not info.p.reshape(3, 4)[:, 3].any()
 
 
 @pytest.mark.parametrize("coloured", [True, False])

@@ -5,11 +5,12 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from recording.folders import noetic_bag, tum_folder
+from recording.folders import noetic_bag, records, tum_folder
 
 from objreg_ros.bridge import from_msg
 from objreg_ros.cli.convert import command
-from objreg_ros.recording import open_recording
+from objreg_ros.recording import open_recording, write_rosbag2
+from objreg_ros.recording.bags import latched_qos
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
@@ -39,6 +40,15 @@ def test_topics_that_ros_2_does_not_have_are_left_out_by_name(tmp_path: Path) ->
     assert "left out: /markers (visualization_msgs/msg/Marker has no texture_resource, which" in result.output
     with open_recording(tmp_path / "bag") as bag:
         assert set(bag.topics) == {"/image", "/depth/image", "/camera_info", "/odom"}
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_a_latched_topic_stays_latched(storage: str, tmp_path: Path) -> None:
+    write_rosbag2(tmp_path / "tf", records(), offered_qos={"/odom": [latched_qos(1)]})
+    words = [str(tmp_path / "tf"), str(tmp_path / "bag"), "--storage", storage]
+    assert CliRunner().invoke(command, words).exit_code == 0
+    with open_recording(tmp_path / "bag") as bag:
+        assert bag.offered_qos() == {"/odom": [latched_qos(1)]}
 
 
 def test_what_is_there_is_not_overwritten(tmp_path: Path) -> None:

@@ -5,9 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from recording.folders import tum_folder
+from recording.folders import CAMERA, records, tum_folder, uncalibrated
 
-from objreg_ros.cli.demo import Asked, calibrated, mounting_of, run, setup_of
+from objreg_ros.cli.demo import Asked, calibrated, camera_of, mounting_of, run, setup_of
+from objreg_ros.recording import open_recording, write_rosbag2
 from objreg_ros.recording.inputs import Inputs, parse_remaps
 
 ASKED = Asked(
@@ -32,7 +33,7 @@ def test_without_options_the_nodes_run_with_their_own_defaults_at_the_recordings
 def test_options_reach_the_node_that_they_are_for() -> None:
     asked = replace(ASKED, model="my.onnx", changes=("registrar.seed=4",), params_file=Path("p.yaml"))
     args = setup_of(asked, INPUTS).node_args
-    assert args["detector"] == ["--params-file", "p.yaml", "-p", "model:=my.onnx"]
+    assert args["detector"] == ["--params-file", "p.yaml", "-p", 'model:="my.onnx"']
     assert args["registrar"] == ["--params-file", "p.yaml", "-p", "seed:=4"]
     assert args["segmenter"] == ["--params-file", "p.yaml"]
 
@@ -48,9 +49,28 @@ def test_the_player_plays_just_the_inputs_that_were_chosen() -> None:
     assert set(words[::2]) == {"--remap"} and parse_remaps(words[1::2]) == INPUTS.outright
 
 
-def test_a_change_of_no_node_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"expected NODE\.NAME=VALUE"):
-        setup_of(replace(ASKED, changes=("seed=4",)), INPUTS)
+def test_a_change_reaches_its_node_in_its_type() -> None:
+    changes = ("registrar.T_base_camera=0,0,0.1,0,0,0,1", "registrar.label_groups=cup mouse,tv", "registrar.store=123")
+    assert setup_of(replace(ASKED, changes=changes), INPUTS).node_args["registrar"][1::2] == [
+        "T_base_camera:=[0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0]",
+        'label_groups:=["cup mouse", "tv"]',
+        'store:="123"',
+    ]
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        (
+            "seed=4",
+            r"expected node\.parameter=value with a node of detector, segmenter, registrar, mapper, got 'seed=4'",
+        ),
+        ("mapper.map_frame=m", r"expected a node of the demo \(detector, segmenter, registrar\), got mapper"),
+    ],
+)
+def test_a_change_of_no_node_of_the_demo_is_refused(change: str, complaint: str) -> None:
+    with pytest.raises(ValueError, match=f"--set: {complaint}"):
+        setup_of(replace(ASKED, changes=(change,)), INPUTS)
 
 
 def test_the_report_learns_where_the_camera_is_on_the_body_of_the_odometry() -> None:
@@ -64,6 +84,15 @@ def test_a_demo_plays_the_depth_that_its_segmenter_takes(tmp_path: Path) -> None
     with pytest.raises(ValueError, match=r"expected points or a depth image for segmenter\.source=points, got /"):
         run(replace(asked, out=tmp_path / "out"))
     assert not (tmp_path / "out").exists()
+
+
+def test_a_camera_that_is_not_calibrated_is_no_camera_to_draw_with(tmp_path: Path) -> None:
+    inputs = Inputs(image="/image", points="/points", camera_info="/camera_info")
+    for name, info, fx in (("known", next(records()), CAMERA.fx), ("unknown", uncalibrated(5), None)):
+        write_rosbag2(tmp_path / name, [info])
+        with open_recording(tmp_path / name) as source:
+            assert getattr(camera_of(source, inputs), "fx", None) == fx
+            assert camera_of(source, replace(inputs, camera_info=None)) is None
 
 
 def test_a_recording_that_the_graph_cannot_use_is_refused_before_anything_is_written(tmp_path: Path) -> None:

@@ -12,14 +12,17 @@ import pytest
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
 from click.testing import CliRunner, Result
-from recording.folders import STEP_NS, tum_folder
+from recording.folders import STEP_NS, noetic_bag, robot_bag, tum_folder
 
 from objreg_ros.bridge.player import Item
 from objreg_ros.bridge.receipts import DEPTH, IMAGE, ORDER, Receipts
-from objreg_ros.cli.replay import command
+from objreg_ros.cli.replay import command, playable_names
+from objreg_ros.recording import open_recording
+from objreg_ros.recording.inputs import Inputs, choose_inputs
 
 KIND = "sensor_msgs/msg/Image"
 PLAYED = ("image", "depth/image", "camera_info", "ground_truth")
+ROBOT = {"/camera_info", "/depth/image", "/image", "/odom"}
 
 
 class Stage:
@@ -193,3 +196,31 @@ def test_the_player_is_closed_and_ros_shut_down_when_a_play_fails(
     with pytest.raises(ValueError, match="registrar has ended"):
         replay(folder)
     assert stage.closed and stage.shut_down
+
+
+def test_a_topic_of_a_type_that_is_not_installed_is_left_out_by_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with open_recording(robot_bag(tmp_path / "bag")) as source:
+        assert playable_names(source, choose_inputs(source.topics)) == {topic: topic for topic in ROBOT}
+    assert capsys.readouterr().err == "left out: /meta (acme_msgs/msg/Meta is not installed)\n"
+
+
+def test_what_ros_1_has_with_other_fields_is_left_out_by_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with open_recording(noetic_bag(tmp_path / "one.bag")) as source:
+        assert set(playable_names(source, choose_inputs(source.topics))) == ROBOT
+    said = capsys.readouterr().err
+    assert "left out: /tf (ROS 2 does not ship tf/msg/tfMessage)" in said
+    assert "left out: /markers (visualization_msgs/msg/Marker has no texture_resource" in said
+
+
+def test_an_input_that_cannot_be_played_is_refused(tmp_path: Path) -> None:
+    with (
+        open_recording(robot_bag(tmp_path / "bag")) as source,
+        pytest.raises(
+            ValueError, match=r"expected inputs that can be published, got /meta \(acme_msgs/msg/Meta is not"
+        ),
+    ):
+        playable_names(source, Inputs(image="/image", points="/meta"))

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from recording.folders import tum_folder
 
 from objreg_ros.cli.report import command
 
@@ -15,3 +16,13 @@ def test_what_is_not_there_is_refused_before_anything_runs(tmp_path: Path, name:
     with pytest.raises(FileNotFoundError, match=r"expected the JSON of .* or a recording, got nothing at .*nothere"):
         CliRunner().invoke(command, [*runs, "--out", str(tmp_path / "out.html")], catch_exceptions=False)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_page_that_cannot_be_written_is_refused_before_anything_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording = tum_folder(tmp_path / "tum")
+    monkeypatch.setattr("objreg_ros.cli.offline.run_offline", lambda *_: pytest.fail("a recording was run"))
+    with pytest.raises(OSError, match=r"--out: expected .*nowhere to be a folder, and it is not; create it"):
+        CliRunner().invoke(command, [str(recording), "--out", str(tmp_path / "nowhere/x.html")], catch_exceptions=False)
+    assert not (tmp_path / "nowhere").exists()

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from objreg_ros.cli.settings import NODES, Settings, names_of, read_settings
+from objreg_ros.cli.settings import NODES, Settings, names_of, parse_change, read_settings, ros_argument
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.registrar.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
@@ -53,6 +53,47 @@ def test_text_stays_text_and_lists_are_lists() -> None:
     assert read_settings(None, ["detector.ignore=[]"]).of("detector", DetectorParams).ignore == ()
 
 
+def test_a_list_may_have_quotes_and_a_number_an_exponent() -> None:
+    changes = ['registrar.label_groups=["cup mouse", "tv, big"]', "registrar.T_base_camera=[0, 0, 1e-1, 0, 0, 0, 1]"]
+    settings = read_settings(None, changes)
+    assert settings.of("registrar", RegistrarParams).label_groups == ("cup mouse", "tv, big")
+    assert settings.of("registrar", RegistrarNodeParams).T_base_camera == (0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0)
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize(
+    "change",
+    [
+        "registrar.T_base_camera=0,0,0.1,0,0,0,1",
+        "registrar.label_groups=cup mouse,tv laptop",
+        "registrar.label_groups=",
+        "registrar.store=123",
+        "registrar.store=",
+        'registrar.store=a "b" /\\ ü: [c]',
+        "registrar.min_gap=1",
+        "registrar.min_gap=1e-05",
+        "registrar.seed=7",
+        "segmenter.colour=false",
+    ],
+)
+def test_a_node_takes_a_change_as_an_offline_run_does(change: str) -> None:
+    pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+    from rclpy.context import Context
+    from rclpy.node import Node
+
+    from objreg_ros.bridge.parameters import Parameters
+
+    room, name, value = parse_change(change)
+    context = Context()
+    context.init(args=["--ros-args", "-p", ros_argument(name, value)])
+    node = Node(room, context=context, start_parameter_services=False)
+    parameters, settings = Parameters(node, *NODES[room]), read_settings(None, [change])
+    for kind in NODES[room]:
+        assert parameters.of(kind) == settings.of(room, kind)
+    node.destroy_node()
+    context.try_shutdown()
+
+
 @pytest.mark.parametrize("change", ["method=paper", "registrar.method", "lidar.range=3", "registrar=1"])
 def test_a_change_of_another_form_is_refused(change: str) -> None:
     with pytest.raises(ValueError, match=r"--set: expected node\.parameter=value"):
@@ -66,6 +107,9 @@ def test_a_change_of_another_form_is_refused(change: str) -> None:
         ("registrar.method=magic", "expected one of objreg, paper, got 'magic'"),
         ("detector.threshold=2", "expected 0 … 1, got 2.0"),
         ("detector.threads=many", "expected int, got 'many'"),
+        ("detector.threshold=[", "expected float, got '\\['"),
+        ("registrar.T_base_camera=[0, 1", "expected a list of float, got '\\[0, 1'"),
+        ("registrar.T_base_camera=[a: 1]", "expected float, got {'a': '1'}"),
     ],
 )
 def test_a_value_that_cannot_be_is_refused(change: str, complaint: str) -> None:

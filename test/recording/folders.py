@@ -10,6 +10,8 @@ from typing import Any
 import cv2
 import numpy as np
 from rosbags.rosbag1 import Writer as Rosbag1Writer
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Rosbag2Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
@@ -58,6 +60,13 @@ def records(frames: int = 3) -> Iterator[Record]:
         yield Record.of("/depth/image", messages.image(depth, "16UC1", stamp_ns, "camera"), stamp_ns)
 
 
+def uncalibrated(stamp_ns: int) -> Record:
+    """A camera_info as drivers send it until somebody has calibrated the camera."""
+    info = messages.camera_info(CAMERA, stamp_ns, "camera")
+    info.k[:], info.p[:] = 0, 0
+    return Record.of("/camera_info", info, stamp_ns)
+
+
 def noetic_bag(path: Path, frames: int = 3) -> Path:
     """A rosbag1 with `records`, and with what any robot of ROS 1 says besides: /tf, /rosout and /markers."""
     types = get_typestore(Stores.ROS1_NOETIC)
@@ -78,6 +87,22 @@ def noetic_bag(path: Path, frames: int = 3) -> Path:
             if topic not in open_topics:
                 open_topics[topic] = writer.add_connection(topic, kind, typestore=types)
             writer.write(open_topics[topic], stamp_ns, types.serialize_ros1(message, kind))
+    return path
+
+
+def robot_bag(path: Path, frames: int = 3) -> Path:
+    """A rosbag2 with `records`, and with a topic /meta of a type that nobody has installed."""
+    types = get_typestore(Stores.ROS2_JAZZY)
+    types.register(get_types_from_msg("float64 exposure", "acme_msgs/msg/Meta"))
+    meta = types.types["acme_msgs/msg/Meta"](exposure=1.0)
+    with Rosbag2Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection("/meta", "acme_msgs/msg/Meta", typestore=types)
+        writer.write(connection, 10**9, types.serialize_cdr(meta, "acme_msgs/msg/Meta"))
+        open_topics: dict[str, Any] = {}
+        for record in records(frames):
+            if record.topic not in open_topics:
+                open_topics[record.topic] = writer.add_connection(record.topic, record.msgtype, typestore=types)
+            writer.write(open_topics[record.topic], record.stamp_ns, record.cdr)
     return path
 
 

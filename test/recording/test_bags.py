@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rosbags.interfaces import QosDurability
 from rosbags.rosbag1 import Writer as Rosbag1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
@@ -92,7 +93,7 @@ def rosbag1(tmp_path: Path) -> Path:
         D=np.zeros(5),
         K=np.array([50.0, 0, 31.5, 0, 50, 23.5, 0, 0, 1]),
         R=np.eye(3).ravel(),
-        P=np.zeros(12),
+        P=np.array([49.0, 0, 30.5, 0, 0, 49, 22.5, 0, 0, 0, 1, 0]),
         binning_x=0,
         binning_y=0,
         roi=roi,
@@ -109,9 +110,23 @@ def test_a_compressed_rosbag1_is_read_and_brought_up_to_date(rosbag1: Path) -> N
     with open_recording(rosbag1) as recording:
         record = next(recording.records())
         assert recording.kind == "rosbag1" and record.stamp_ns == 9 * 10**9
-        assert from_msg.intrinsics(record.message).cx == 31.5
+        assert from_msg.intrinsics(record.message).cx == 30.5
         modern = standard_types().deserialize_cdr(record.cdr, record.msgtype)
-        assert from_msg.stamp_ns(modern) == 5_000_000_006 and from_msg.intrinsics(modern).cx == 31.5
+        assert from_msg.stamp_ns(modern) == 5_000_000_006 and from_msg.intrinsics(modern).cx == 30.5
+
+
+def test_what_ros_1_latched_is_kept_for_who_comes_late(tmp_path: Path) -> None:
+    types = get_typestore(Stores.ROS1_NOETIC)
+    kind = "std_msgs/msg/String"
+    raw = types.serialize_ros1(types.types[kind](data="a"), kind)
+    publishers = (("/map", "/a", 1), ("/map", "/b", 1), ("/map", "/c", 0), ("/chatter", "/a", 0), ("/log", "/a", None))
+    with Rosbag1Writer(tmp_path / "one.bag") as writer:
+        for topic, caller, latching in publishers:
+            connection = writer.add_connection(topic, kind, typestore=types, callerid=caller, latching=latching)
+            writer.write(connection, 10**9, raw)
+    with open_recording(tmp_path / "one.bag") as recording:
+        ((topic, (profile,)),) = recording.offered_qos().items()
+    assert (topic, profile.durability, profile.depth) == ("/map", QosDurability.TRANSIENT_LOCAL, 2)
 
 
 def test_a_real_rosbag1_gives_its_cloud(shared: Path) -> None:

@@ -68,6 +68,27 @@ DRIVERS = {
         "/camera/rgb/image_raw/compressed:jpeg /camera/depth_registered/points:points",
         "image=/camera/rgb/image_raw/compressed points=/camera/depth_registered/points",
     ),
+    "OAK-D": (
+        "/oak/rgb/image_raw /oak/rgb/camera_info:info /oak/stereo/image_raw /oak/stereo/image_raw/compressed:jpeg "
+        "/oak/stereo/camera_info:info /oak/left/image_raw /oak/right/image_raw",
+        "image=/oak/rgb/image_raw depth=/oak/stereo/image_raw camera_info=/oak/stereo/camera_info",
+    ),
+    "OAK-D with a cloud": (
+        "/oak/rgb/image_raw /oak/rgb/camera_info:info /oak/stereo/image_raw /oak/stereo/camera_info:info "
+        "/oak/points:points",
+        "image=/oak/rgb/image_raw points=/oak/points camera_info=/oak/rgb/camera_info",
+    ),
+    "only compressed, by every transport": (
+        "/camera/color/image_raw/compressed:jpeg /camera/color/camera_info:info "
+        "/camera/aligned_depth_to_color/image_raw/compressed:jpeg "
+        "/camera/aligned_depth_to_color/image_raw/compressedDepth:jpeg",
+        "image=/camera/color/image_raw/compressed camera_info=/camera/color/camera_info "
+        "depth=/camera/aligned_depth_to_color/image_raw/compressedDepth",
+    ),
+    "depth that only its transport gives away": (
+        "/cam0/image_raw /cam1/image_raw /cam2/frame/compressedDepth:jpeg /camera_info:info",
+        "image=/cam0/image_raw depth=/cam2/frame/compressedDepth camera_info=/camera_info",
+    ),
     "truth as odometry": (
         "/odometry/filtered:odom /vicon/camera:odom",
         "odom=/odometry/filtered ground_truth=/vicon/camera",
@@ -145,6 +166,28 @@ def test_the_sources_are_those_of_the_segmenter() -> None:
 def test_an_input_can_be_left_out() -> None:
     inputs = choose_inputs(topics("/image /depth/image /camera_info:info /odom:odom"), {"odom": ""})
     assert inputs.odom is None and inputs.complete
+
+
+@pytest.mark.parametrize(
+    "there",
+    [
+        "/camera/image_raw /camera/camera_info:info",
+        "/camera/color/image_raw /camera/color/camera_info:info /usb_cam/image_raw /usb_cam/image_raw/compressed:jpeg",
+        "/stereo/left/image_raw /stereo/right/image_raw /cam0/image_raw /camera_info:info",
+        "/rgb_to_depth/image_raw /rgb/image_raw /rgb/camera_info:info",
+        "/feed /camera_info:info",
+    ],
+)
+def test_a_picture_that_nothing_says_to_be_depth_is_none(there: str) -> None:
+    inputs = choose_inputs(topics(there))
+    assert inputs.image is not None and inputs.depth is None
+    assert inputs.missing == "points or a depth image"
+
+
+def test_a_lone_depth_image_is_not_taken_for_colour() -> None:
+    for depth in ("/oak/stereo/image_raw", "/oak/stereo/image_raw/compressedDepth", "/cam2/image_raw/compressedDepth"):
+        inputs = choose_inputs(topics(f"{depth} /camera_info:info"))
+        assert (inputs.image, inputs.depth) == (None, depth)
 
 
 def test_an_empty_topic_is_no_input() -> None:

@@ -30,8 +30,10 @@ def test_colour_and_depth_pass_through_their_bytes() -> None:
 
 
 def test_a_camera_passes_through_its_bytes() -> None:
-    camera = from_msg.intrinsics(through_cdr(messages.camera_info(CAMERA, 5, "c")))
+    info = through_cdr(messages.camera_info(CAMERA, 5, "c"))
+    camera = from_msg.intrinsics(info)
     assert (camera.fx, camera.cy, camera.width) == (CAMERA.fx, CAMERA.cy, CAMERA.width)
+    assert np.array_equal(info.p.reshape(3, 4)[:, :3], info.k.reshape(3, 3)) and not info.p.reshape(3, 4)[:, 3].any()
 
 
 @pytest.mark.parametrize("layout", [VIEW, OBJECTS])

@@ -12,7 +12,7 @@ from objreg_ros.recording import Record, Recording, messages, open_recording, wr
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.summary import describe_topics, warnings
 
-from .folders import CAMERA, records, tum_folder
+from .folders import CAMERA, records, tum_folder, uncalibrated
 
 
 def bag(path: Path, items: Iterator[Record] | list[Record]) -> Recording:
@@ -86,6 +86,17 @@ def test_stamps_that_go_back_are_said(tmp_path: Path) -> None:
     rgb = np.zeros((4, 4, 3), np.uint8)
     pictures = [Record.of("/image", messages.image(rgb, "rgb8", t, "c"), 9 + i) for i, t in enumerate((7, 8, 5))]
     assert "the stamps of colour go back in time" in said(bag(tmp_path / "bag", pictures))
+
+
+@pytest.mark.parametrize(("height", "complaints"), [(48, 0), (1, 2)])
+def test_an_uncalibrated_camera_is_said_only_where_a_cloud_needs_one(
+    height: int, complaints: int, tmp_path: Path
+) -> None:
+    rows = np.ones((height, 64), [("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
+    cloud = Record.of("/points", messages.point_cloud(rows, 5, "c"), 5)
+    _, image, _ = depth_and_colour(METRE, "16UC1")
+    told = said(bag(tmp_path / "bag", [uncalibrated(5), image, cloud]))
+    assert told.count("expected a calibrated K") + told.count("not organised") == complaints
 
 
 def test_what_the_reader_assumed_is_passed_on(tmp_path: Path) -> None:

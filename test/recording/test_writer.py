@@ -5,8 +5,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from rosbags.interfaces import QosDurability, QosReliability
 
 from objreg_ros.recording import Record, open_recording, write_rosbag2
+from objreg_ros.recording.bags import latched_qos
+from objreg_ros.recording.writer import STORAGES
 
 from .folders import records, tum_folder
 
@@ -17,6 +20,15 @@ def test_a_folder_becomes_a_rosbag2_with_the_same_messages(tmp_path: Path) -> No
     with open_recording(tmp_path / "bag") as bag:
         pairs = list(zip(recording.records(), bag.records(), strict=True))
         assert all(a.cdr == b.cdr and (a.topic, a.stamp_ns) == (b.topic, b.stamp_ns) for a, b in pairs)
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+def test_topics_keep_the_qos_of_their_publishers(storage: str, tmp_path: Path) -> None:
+    often = latched_qos(7)._replace(reliability=QosReliability.BEST_EFFORT, durability=QosDurability.VOLATILE)
+    offered = {"/odom": [latched_qos(1)], "/image": [often, often]}
+    write_rosbag2(tmp_path / "bag", records(), storage, offered)
+    with open_recording(tmp_path / "bag") as bag:
+        assert bag.offered_qos() == offered
 
 
 def test_nothing_is_overwritten(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from .samples import box, keyframe, moved
 
 def _read_ply(path: Path) -> np.ndarray:
     header, body = path.read_bytes().split(b"end_header\n", 1)
-    kinds = {b"float": "<f4", b"uchar": "u1"}
+    kinds = {b"double": "<f8", b"float": "<f4", b"uchar": "u1"}
     fields = [(line.split()[2].decode(), kinds[line.split()[1]]) for line in header.split(b"\n") if b"property" in line]
     return np.frombuffer(body, fields)
 
@@ -29,6 +29,24 @@ def test_points_normals_and_colours_are_written(tmp_path: Path) -> None:
     assert np.array_equal(np.stack([table["x"], table["y"], table["z"]], axis=1), item.xyz)
     assert np.array_equal(table["nz"], item.normals[:, 2]) and np.array_equal(table["red"], item.rgb[:, 0])
     assert "red" not in (_read_ply(write_ply(tmp_path / "b.ply", item.xyz, item.normals, None)).dtype.names or ())
+
+
+def test_points_far_from_the_origin_of_the_odometry_keep_their_places(tmp_path: Path) -> None:
+    item = box("cup", (0, 0, 1))
+    T_utm_camera = moved(450_000.0)
+    T_utm_camera[1, 3] = 5_400_000.0
+    taken = keyframe(1, 2.0, (item,), T_odom_camera=T_utm_camera)
+    store = Store(tmp_path / "place.db")
+    store.add(taken, sightings_of(taken), [])
+    store.close()
+    *files, told = export(tmp_path / "place.db", tmp_path / "out")
+    kept = Store(tmp_path / "place.db", read_only=True).keyframe(1)
+    for file, xyz in zip(files, (kept.objects[0].cloud.xyz, kept.context.xyz), strict=True):
+        table = _read_ply(file)
+        offset_m = np.stack([table["x"], table["y"], table["z"]], axis=1) - T_utm_camera[:3, 3]
+        np.testing.assert_allclose(offset_m, xyz, atol=1e-6)
+    (landmark,) = json.loads(told.read_text())["landmarks"]
+    np.testing.assert_allclose(landmark["position"] - T_utm_camera[:3, 3], kept.objects[0].centroid, atol=1e-6)
 
 
 def test_a_store_becomes_clouds_in_the_frame_of_the_session_and_a_map(tmp_path: Path) -> None:

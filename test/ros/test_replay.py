@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from nav_msgs.msg import Odometry
-from recording.folders import tum_folder
+from recording.folders import robot_bag, tum_folder
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Image
 from std_srvs.srv import Trigger
@@ -81,6 +81,13 @@ def test_a_paced_replay_keeps_its_pace_and_tells_the_time(fresh: Graph, tmp_path
     assert "9 image" in output and "9 depth/image" in output
     times = [from_msg.stamp_ns(m.clock) for m in fresh.heard["/clock"]]
     assert times == sorted(times) and times[-1] == 10**9
+
+
+def test_everything_is_played_but_for_types_that_are_not_installed(fresh: Graph, tmp_path: Path) -> None:
+    bag = robot_bag(tmp_path / "bag")
+    fresh.hear(Odometry, "/odom")
+    output = objreg(fresh, "replay", str(bag), "--all", "--wait", "0")
+    assert "3 /odom\n" in output and "/meta" not in output
 
 
 def test_a_lossless_replay_without_nodes_says_so(fresh: Graph, tmp_path: Path) -> None:
