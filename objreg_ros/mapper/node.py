@@ -119,20 +119,27 @@ class MapperNode(Door):
         """Odometry and constraints come in any order: a constraint waits until odometry covers both its moments."""
         waiting, self._waiting = self._waiting, []
         for closure in waiting:
-            with self._graph_lock:
-                tied = self._graph.add_closure(closure)
-            if tied:
-                self.worker.put((closure.to_ns, None))
-            elif self._came_too_early(closure):
-                self.drop(closure.to_ns, "before_odometry", "odometry begins after the first moment of the constraint")
-            else:
-                self._waiting.append(closure)
+            try:
+                self._tie(closure)
+            except ValueError as error:
+                self.drop(closure.to_ns, "two_clocks", str(error))
         while len(self._waiting) > MOST_WAITING:
             self.drop(self._waiting.pop(0).to_ns, "queue_full", "no odometry covers the moments of the constraint")
 
+    def _tie(self, closure: LoopClosure) -> None:
+        """Into the graph, or back to what waits; ValueError if it cannot be of one run of the clock."""
+        with self._graph_lock:
+            tied = self._graph.add_closure(closure)
+        if tied:
+            self.worker.put((closure.to_ns, None))
+        elif self._came_too_early(closure):
+            self.drop(closure.to_ns, "before_odometry", "odometry begins after the first moment of the constraint")
+        else:
+            self._waiting.append(closure)
+
     def _came_too_early(self, closure: LoopClosure) -> bool:
         known = self._graph.odometry.stamps_ns
-        return bool(known) and min(closure.from_ns, closure.to_ns) < known[0]
+        return bool(known) and closure.from_ns < known[0]
 
     def _overtaken(self, job: tuple[int, Any]) -> None:
         self.conclude(job[0], lambda: True)  # the newer job solves the graph with this constraint in it

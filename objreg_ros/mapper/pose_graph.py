@@ -118,7 +118,16 @@ class PoseGraph:
         return True
 
     def add_closure(self, closure: LoopClosure) -> bool:
-        """Tie the two keyframes nearest to the closure's moments; False if odometry does not cover both (yet)."""
+        """Tie the two keyframes nearest to the closure's moments; False if odometry does not cover both (yet).
+
+        ValueError for a closure whose *from* is not before its *to*: the registrar looks back, so its moments are of
+        two runs of the clock, and this odometry knows at most one of them.
+        """
+        if closure.from_ns >= closure.to_ns:
+            raise ValueError(
+                f"expected a constraint from before its to at {closure.to_ns} ns, got one from {closure.from_ns} ns: "
+                "it ties two runs of the clock; give each run a store of its own"
+            )
         if not (self.odometry.covers(closure.from_ns) and self.odometry.covers(closure.to_ns)):
             return False
         k1, k2 = (self.keyframes.nearest(stamp) for stamp in (closure.from_ns, closure.to_ns))

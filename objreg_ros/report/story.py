@@ -133,13 +133,18 @@ def advancing(glimpses: Sequence[Glimpse]) -> list[Glimpse]:
     return later
 
 
+def of_one_clock(closures: Sequence[LoopClosure]) -> list[LoopClosure]:
+    """The closures from an earlier to a later moment: the others tie two runs of the clock; a map is of one."""
+    return [closure for closure in closures if closure.from_ns < closure.to_ns]
+
+
 def mapped(glimpses: Sequence[Glimpse], closures: Sequence[LoopClosure]) -> PoseGraph:
-    """The pose graph of the frames that have odometry and at which time advances, with every closure between them."""
+    """The pose graph of the frames with odometry at which time advances, with every closure of one clock."""
     graph = PoseGraph()
     for glimpse in advancing(glimpses):
         if glimpse.T_odom_camera is not None:
             graph.add_odometry(Odometry(T_odom_body=glimpse.T_odom_camera, stamp_ns=glimpse.stamp_ns))
-    for closure in closures:
+    for closure in of_one_clock(closures):
         graph.add_closure(closure)
     return graph
 

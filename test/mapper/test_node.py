@@ -124,8 +124,10 @@ def test_what_cannot_be_used_is_dropped_by_reason(outside: Outside) -> None:
     outside.constraints.publish(malformed)
     outside.drive(BENT[:20])
     outside.send([closure(TRUE, -30, 10)])
-    outside.wait(lambda: outside.door.ledger.balance().received == 2 and outside.settled())
-    assert outside.door.ledger.balance().dropped == {"malformed_constraints": 1, "before_odometry": 1}
+    outside.send([closure(TRUE, 10, 5)])
+    outside.wait(lambda: outside.door.ledger.balance().received == 3 and outside.settled())
+    dropped = outside.door.ledger.balance().dropped
+    assert dropped == {"malformed_constraints": 1, "before_odometry": 1, "two_clocks": 1}
 
 
 def test_a_jump_back_in_time_starts_a_new_map(outside: Outside) -> None:

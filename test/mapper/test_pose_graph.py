@@ -91,6 +91,14 @@ def test_a_closure_waits_for_its_odometry() -> None:
     assert graph.add_closure(RIGHT[0])
 
 
+@pytest.mark.parametrize("to", [29, 30])
+def test_a_closure_of_two_runs_of_the_clock_is_refused(to: int) -> None:
+    graph, ties = mapped([]), len(mapped([]).ties)
+    with pytest.raises(ValueError, match=rf"expected a constraint from before its to at {to}00000000 ns, got .* 30000"):
+        graph.add_closure(closure(TRUE, 30, to))
+    assert len(graph.ties) == ties
+
+
 def test_the_place_of_the_camera_on_the_body_is_honoured() -> None:
     """Closures between cameras that look sideways give the same map as closures between bodies."""
     T_body_camera = pose(rotation_from_vector(np.array([-1.2, 1.2, -1.2])), np.array([0.1, 0.0, 0.4]))
