@@ -159,14 +159,14 @@ def trajectory_errors(
     frames: Sequence[Frame], closures: Sequence[LoopClosure], truth: Truth
 ) -> tuple[float, float, int]:
     """The trajectory error in m by odometry and in the map, and how many closures the map pruned."""
+    posed = [(frame.stamp_ns, T) for frame in frames if (T := frame.T_odom_camera) is not None]
     graph = PoseGraph()
-    for frame in frames:
-        if frame.T_odom_camera is not None:
-            graph.add_odometry(Odometry(T_odom_body=frame.T_odom_camera, stamp_ns=frame.stamp_ns))
+    for stamp_ns, T_odom_camera in posed:
+        graph.add_odometry(Odometry(T_odom_body=T_odom_camera, stamp_ns=stamp_ns))
     for closure in closures:
         graph.add_closure(closure)
     pruned = len(graph.optimise().pruned)
-    known = [(stamp, T, there) for stamp, T in graph.odometry if (there := truth.at(stamp)) is not None]
+    known = [(stamp, T, there) for stamp, T in posed if (there := truth.at(stamp)) is not None]
     true = [row[2] for row in known]
     before = absolute_trajectory_error([row[1] for row in known], true)
     after = absolute_trajectory_error(graph.corrected(row[0] for row in known), true)

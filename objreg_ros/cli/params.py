@@ -17,6 +17,7 @@ from objreg_ros.params import Declaration, Params
 
 YAML_FILE, TABLE_FILE = "config/objreg.yaml", "docs/parameters.md"
 WIDTH = 120
+IN_ANY_NAMESPACE = "/**/"  # before a node's name, which alone is to rcl that of the node in no namespace
 
 
 @click.command()
@@ -49,9 +50,12 @@ def page_text() -> str:
 
 def yaml_text() -> str:
     """A ROS 2 parameter file with every node's defaults, each with what it means."""
-    lines = ["# Made by `objreg params --write` from the code: change defaults there, and copies of this file here."]
+    lines = [
+        "# Made by `objreg params --write` from the code: change defaults there, and copies of this file here.",
+        "# /**/ before a node's name stands for any namespace, and for none.",
+    ]
     for node, kinds in NODES.items():
-        lines += ["", f"{node}:", f"  {KEY}:"]
+        lines += ["", f"{IN_ANY_NAMESPACE}{node}:", f"  {KEY}:"]
         lines += [line for kind in kinds for declaration in kind.declarations() for line in _yaml_lines(declaration)]
     return "\n".join(lines) + "\n"
 

@@ -27,6 +27,7 @@ try:
 except ImportError:  # optional: the topic carries the same
     TransformBroadcaster = None
 
+LATE_NS = 1_000_000_000  # odometry that goes back by less came out of order; by more, the clock was set back
 MOST_WAITING = qos.KEPT_CONSTRAINTS  # constraints without odometry yet; the oldest go when there are more
 
 
@@ -41,7 +42,8 @@ class MapperNode(Door):
         self._inputs = self.settings.of(MapperNodeParams)
         self._graph_lock = threading.Lock()
         self._waiting: list[LoopClosure] = []
-        self._enabled, self._odometry_count, self._odom_frame = True, 0, "odom"
+        self._enabled, self._odom_frame = True, "odom"
+        self._odometry_count = self._passed_over_count = 0
         self._begin()
         self._path = self.create_publisher(PathMsg, "path", qos.latched())
         self._correction = self.create_publisher(TransformStamped, "correction", qos.latched())
@@ -84,12 +86,20 @@ class MapperNode(Door):
         self._tie_what_waits()
 
     def _advances(self, odometry: Odometry) -> bool:
-        """Whether time goes on; a jump back (a looped bag) starts a new map, a repeated stamp is passed over."""
+        """Whether time goes on; a jump back of the clock (a looped bag, a simulation begun anew) starts a new map.
+
+        An odometry that comes again, or late, is passed over and counted: the map has the later one already.
+        """
         known = self._graph.odometry.stamps_ns
-        if known and odometry.stamp_ns < known[-1]:
-            self.get_logger().warning(f"time jumped back by {(known[-1] - odometry.stamp_ns) / 1e9:.3f} s: a new map")
-            self._start_anew("time_jump")
-        return not known or odometry.stamp_ns != known[-1]
+        if not known or odometry.stamp_ns > known[-1]:
+            return True
+        back_ns = known[-1] - odometry.stamp_ns
+        if back_ns < LATE_NS:
+            self._passed_over_count += 1
+            return False
+        self.get_logger().warning(f"time jumped back by {back_ns / 1e9:.3f} s: a new map")
+        self._start_anew("time_jump")
+        return True
 
     # Constraints
 
@@ -109,20 +119,27 @@ class MapperNode(Door):
         """Odometry and constraints come in any order: a constraint waits until odometry covers both its moments."""
         waiting, self._waiting = self._waiting, []
         for closure in waiting:
-            with self._graph_lock:
-                tied = self._graph.add_closure(closure)
-            if tied:
-                self.worker.put((closure.to_ns, None))
-            elif self._came_too_early(closure):
-                self.drop(closure.to_ns, "before_odometry", "odometry begins after the first moment of the constraint")
-            else:
-                self._waiting.append(closure)
+            try:
+                self._tie(closure)
+            except ValueError as error:
+                self.drop(closure.to_ns, "two_clocks", str(error))
         while len(self._waiting) > MOST_WAITING:
             self.drop(self._waiting.pop(0).to_ns, "queue_full", "no odometry covers the moments of the constraint")
 
+    def _tie(self, closure: LoopClosure) -> None:
+        """Into the graph, or back to what waits; ValueError if it cannot be of one run of the clock."""
+        with self._graph_lock:
+            tied = self._graph.add_closure(closure)
+        if tied:
+            self.worker.put((closure.to_ns, None))
+        elif self._came_too_early(closure):
+            self.drop(closure.to_ns, "before_odometry", "odometry begins after the first moment of the constraint")
+        else:
+            self._waiting.append(closure)
+
     def _came_too_early(self, closure: LoopClosure) -> bool:
         known = self._graph.odometry.stamps_ns
-        return bool(known) and min(closure.from_ns, closure.to_ns) < known[0]
+        return bool(known) and closure.from_ns < known[0]
 
     def _overtaken(self, job: tuple[int, Any]) -> None:
         self.conclude(job[0], lambda: True)  # the newer job solves the graph with this constraint in it
@@ -163,6 +180,7 @@ class MapperNode(Door):
         """What the last solution believed."""
         return {
             "odometry": self._odometry_count,
+            "odometry passed over": self._passed_over_count,
             "keyframes": len(self._graph.keyframes),
             "constraints kept": len(self._summary.kept),
             "constraints pruned": len(self._summary.pruned),

@@ -14,6 +14,7 @@ from objreg_ros.geometry import inverse, rotation_angle
 from objreg_ros.mapper.constraint import Constraint, between_keyframes, open3d_information, wandering
 from objreg_ros.mapper.optimisation import Edge, Solution, optimise, squared_residual
 from objreg_ros.mapper.params import MapperParams
+from objreg_ros.mapper.sparse import SparseTrajectory
 from objreg_ros.mapper.steady import Steady, estimate, step
 from objreg_ros.mapper.trajectory import Trajectory
 
@@ -96,13 +97,14 @@ class Summary:
 class PoseGraph:
     """Keyframes, the odometry between them and the closures; `optimise` makes them agree.
 
-    ``T_body_camera`` is where the camera of the closures sits on the body of the odometry.
+    ``T_body_camera`` is where the camera of the closures sits on the body of the odometry. ``odometry`` gives back what
+    was added to within 1 mm and 0.05°, and the poses of keyframes exactly.
     """
 
     def __init__(self, params: MapperParams | None = None, T_body_camera: Array | None = None) -> None:
         self.params = params or MapperParams()
         self.T_body_camera = np.eye(4) if T_body_camera is None else T_body_camera
-        self.odometry = Trajectory()
+        self.odometry = SparseTrajectory()
         self.keyframes = Trajectory()  # T_odom_body
         self.ties: list[Tie] = []
         self._solved: tuple[Array, ...] = ()  # T_map_body of the first keyframes; the others follow the last of them
@@ -112,13 +114,23 @@ class PoseGraph:
         self.odometry.append(odometry.stamp_ns, odometry.T_odom_body)
         if not self._moved_on(odometry.T_odom_body):
             return False
+        self.odometry.pin()
         self.keyframes.append(odometry.stamp_ns, odometry.T_odom_body)
         if len(self.keyframes) > 1:
             self.ties.append(self._step())
         return True
 
     def add_closure(self, closure: LoopClosure) -> bool:
-        """Tie the two keyframes nearest to the closure's moments; False if odometry does not cover both (yet)."""
+        """Tie the two keyframes nearest to the closure's moments; False if odometry does not cover both (yet).
+
+        ValueError for a closure whose *from* is not before its *to*: the registrar looks back, so its moments are of
+        two runs of the clock, and this odometry knows at most one of them.
+        """
+        if closure.from_ns >= closure.to_ns:
+            raise ValueError(
+                f"expected a constraint from before its to at {closure.to_ns} ns, got one from {closure.from_ns} ns: "
+                "it ties two runs of the clock; give each run a store of its own"
+            )
         if not (self.odometry.covers(closure.from_ns) and self.odometry.covers(closure.to_ns)):
             return False
         k1, k2 = (self.keyframes.nearest(stamp) for stamp in (closure.from_ns, closure.to_ns))

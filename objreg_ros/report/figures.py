@@ -97,9 +97,9 @@ def object_map(story: Story, corrected: bool) -> str:
     tracks = story.tracks()
     if tracks is None or not seen:
         return ""
-    poses = story.graph.corrected(story.graph.odometry.stamps_ns)
+    _, odometry, poses = story.poses_before_and_after()
     ground = Ground(np.array([T[:3, 3] for T in poses]))
-    line = poses if corrected else story.graph.odometry.poses
+    line = poses if corrected else odometry
     xy = ground.flat(np.array([row[2 if corrected else 1] for row in seen]))
     both = np.concatenate([ground.flat(np.array(places)), ground.flat(np.array([row[1] for row in seen]))])
     plot = Plot.equal(np.concatenate([both, ground.flat(np.array([T[:3, 3] for T in poses]))]), width=510, most=440)

@@ -13,7 +13,7 @@ from objreg_ros.geometry import pose_error, rotation_angle
 from objreg_ros.report import figures
 from objreg_ros.report.drawing import legend
 from objreg_ros.report.pictures import Album, chosen_closures, chosen_refusals, data_uri, overlay
-from objreg_ros.report.story import Story, Tracks
+from objreg_ros.report.story import Story, Tracks, of_one_clock
 from objreg_ros.report.style import CSS
 
 MEANINGS = {
@@ -130,6 +130,9 @@ def _way(story: Story, tracks: Tracks | None) -> str:
         words += f" The mapper pruned {len(story.pruned)} of {len(story.closures)} closures."
     if story.left_out:
         words += f" {story.left_out} frames are left out: their time is not later than that of the frames before them."
+    across = len(story.closures) - len(of_one_clock(story.closures))
+    if across:
+        words += f" {across} closures are left out: they tie two runs of the clock, and the map is of one."
     drawing = f"<figure class=card>{legend(entries)}{figures.way(story, tracks)}</figure>"
     error = figures.error_over_time(story, tracks)
     if error:

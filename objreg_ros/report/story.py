@@ -88,12 +88,18 @@ class Story:
     @property
     def left_out(self) -> int:
         """How many frames with odometry are not on the map because time does not advance at them."""
-        posed = sum(glimpse.T_odom_camera is not None for glimpse in self.glimpses)
-        return posed - len(advancing(self.glimpses))
+        told = sum(glimpse.T_odom_camera is not None for glimpse in self.glimpses)
+        return told - len(advancing(self.glimpses))
+
+    def poses_before_and_after(self) -> tuple[list[int], list[Array], list[Array]]:
+        """The stamps of the frames on the map, and ``T_odom_camera`` and ``T_map_camera`` (4, 4) at each."""
+        frames = posed(self.glimpses)
+        stamps = [stamp for stamp, _ in frames]
+        return stamps, [T for _, T in frames], self.graph.corrected(stamps)
 
     def tracks(self) -> Tracks | None:
         """Odometry, corrected and true way, over each other; None without odometry."""
-        stamps, odometry, corrected = poses_before_and_after(self.graph)
+        stamps, odometry, corrected = self.poses_before_and_after()
         if not stamps:
             return None
         true = [self.truth.at(stamp) for stamp in stamps]
@@ -133,21 +139,24 @@ def advancing(glimpses: Sequence[Glimpse]) -> list[Glimpse]:
     return later
 
 
+def posed(glimpses: Sequence[Glimpse]) -> list[tuple[int, Array]]:
+    """Stamp and ``T_odom_camera`` of the `advancing` frames."""
+    return [(glimpse.stamp_ns, T) for glimpse in advancing(glimpses) if (T := glimpse.T_odom_camera) is not None]
+
+
+def of_one_clock(closures: Sequence[LoopClosure]) -> list[LoopClosure]:
+    """The closures from an earlier to a later moment: the others tie two runs of the clock; a map is of one."""
+    return [closure for closure in closures if closure.from_ns < closure.to_ns]
+
+
 def mapped(glimpses: Sequence[Glimpse], closures: Sequence[LoopClosure]) -> PoseGraph:
-    """The pose graph of the frames that have odometry and at which time advances, with every closure between them."""
+    """The pose graph of the frames with odometry at which time advances, with every closure of one clock."""
     graph = PoseGraph()
-    for glimpse in advancing(glimpses):
-        if glimpse.T_odom_camera is not None:
-            graph.add_odometry(Odometry(T_odom_body=glimpse.T_odom_camera, stamp_ns=glimpse.stamp_ns))
-    for closure in closures:
+    for stamp_ns, T_odom_camera in posed(glimpses):
+        graph.add_odometry(Odometry(T_odom_body=T_odom_camera, stamp_ns=stamp_ns))
+    for closure in of_one_clock(closures):
         graph.add_closure(closure)
     return graph
-
-
-def poses_before_and_after(graph: PoseGraph) -> tuple[list[int], list[Array], list[Array]]:
-    """Stamps, and the poses at them by odometry and in the map."""
-    stamps = list(graph.odometry.stamps_ns)
-    return stamps, list(graph.odometry.poses), graph.corrected(stamps)
 
 
 def positions(poses: Sequence[Array]) -> Array:

@@ -19,6 +19,7 @@ from objreg_ros.cli.params import (
     yaml_value,
 )
 from objreg_ros.cli.settings import KEY, NODES, read_settings
+from objreg_ros.mapper.params import MapperParams
 
 STALE = "made from the parameters and stale; `objreg params --write` makes it again"
 
@@ -48,9 +49,9 @@ def test_every_node_has_every_parameter_in_the_file_with_its_default() -> None:
     for node, kinds in NODES.items():
         for declaration in (d for kind in kinds for d in kind.declarations()):
             if declaration.default == ():
-                assert declaration.name not in content[node][KEY]
+                assert declaration.name not in content[f"/**/{node}"][KEY]
             else:
-                assert declaration.check(content[node][KEY][declaration.name]) == declaration.default
+                assert declaration.check(content[f"/**/{node}"][KEY][declaration.name]) == declaration.default
 
 
 def test_the_file_says_what_the_defaults_say(tmp_path: Path) -> None:
@@ -58,6 +59,17 @@ def test_the_file_says_what_the_defaults_say(tmp_path: Path) -> None:
     settings, defaults = read_settings(tmp_path / "p.yaml", ()), read_settings(None, ())
     for node, kinds in NODES.items():
         assert [settings.of(node, kind) for kind in kinds] == [defaults.of(node, kind) for kind in kinds]
+
+
+def test_what_is_changed_in_a_copy_of_the_file_is_read_by_its_node(tmp_path: Path) -> None:
+    (tmp_path / "p.yaml").write_text(yaml_text().replace("keyframe_translation: 0.25", "keyframe_translation: 0.5"))
+    assert read_settings(tmp_path / "p.yaml", ()).of("mapper", MapperParams).keyframe_translation == 0.5
+
+
+@pytest.mark.parametrize("file", [YAML_FILE, "config/covariance.yaml"])
+def test_every_section_of_a_file_to_be_passed_to_nodes_holds_in_any_namespace(repository: Path, file: str) -> None:
+    sections = list(yaml.safe_load((repository / file).read_text()))
+    assert sections and set(sections) <= {f"/**/{node}" for node in NODES}
 
 
 @pytest.mark.parametrize("value", [1.0, 1e-7, 1e22, 0.1, -3.0, 5, True, "", "a: #b", "1", ("x y", "z"), (1.0, 2.5)])

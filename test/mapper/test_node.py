@@ -124,8 +124,10 @@ def test_what_cannot_be_used_is_dropped_by_reason(outside: Outside) -> None:
     outside.constraints.publish(malformed)
     outside.drive(BENT[:20])
     outside.send([closure(TRUE, -30, 10)])
-    outside.wait(lambda: outside.door.ledger.balance().received == 2 and outside.settled())
-    assert outside.door.ledger.balance().dropped == {"malformed_constraints": 1, "before_odometry": 1}
+    outside.send([closure(TRUE, 10, 5)])
+    outside.wait(lambda: outside.door.ledger.balance().received == 3 and outside.settled())
+    dropped = outside.door.ledger.balance().dropped
+    assert dropped == {"malformed_constraints": 1, "before_odometry": 1, "two_clocks": 1}
 
 
 def test_a_jump_back_in_time_starts_a_new_map(outside: Outside) -> None:
@@ -134,6 +136,21 @@ def test_a_jump_back_in_time_starts_a_new_map(outside: Outside) -> None:
     outside.odom.publish(to_msg.odometry(odometry(BENT)[0]))
     outside.wait(lambda: outside.door.extra_diagnostics()["keyframes"] == 1)
     assert keyframes > 3
+
+
+def test_odometry_that_comes_late_is_passed_over_and_counted_and_leaves_the_map(outside: Outside) -> None:
+    door = outside.door
+    outside.drive(BENT)
+    outside.send(ROUND_TRIP)
+    outside.wait(lambda: door.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP))
+    keyframes, correction = door.extra_diagnostics()["keyframes"], door._graph.T_map_odom
+    for steps_back in (2, 10):  # 0.1 s and 0.9 s before the last
+        outside.odom.publish(to_msg.odometry(odometry(BENT)[-steps_back]))
+    outside.wait(lambda: door.extra_diagnostics()["odometry passed over"] == 2)
+    assert (door.extra_diagnostics()["keyframes"], door.extra_diagnostics()["odometry"]) == (keyframes, len(BENT))
+    np.testing.assert_array_equal(door._graph.T_map_odom, correction)
+    outside.odom.publish(to_msg.odometry(odometry(BENT)[-11]))  # a whole second: the clock was set back
+    outside.wait(lambda: door.extra_diagnostics()["keyframes"] == 1)
 
 
 def test_constraints_that_wait_do_not_outlive_a_jump_back_in_time_or_a_reset(outside: Outside) -> None:
@@ -176,4 +193,5 @@ def test_a_stamp_that_repeats_is_passed_over(outside: Outside) -> None:
     outside.odom.publish(to_msg.odometry(odometry(BENT)[4]))
     outside.odom.publish(to_msg.odometry(odometry(BENT)[5]))
     outside.wait(lambda: outside.door.extra_diagnostics()["odometry"] == 6)
+    assert outside.door.extra_diagnostics()["odometry passed over"] == 1
     assert outside.door._graph.odometry.stamps_ns[-1] == SECOND // 2

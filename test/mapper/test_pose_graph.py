@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import Array, LoopClosure, Odometry
-from objreg_ros.geometry import inverse, pose, rotation_from_vector
+from objreg_ros.geometry import interpolate, inverse, pose, pose_error, rotation_from_vector
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.pose_graph import PoseGraph
+from objreg_ros.mapper.sparse import TOLERANCE_DEG, TOLERANCE_M
+from objreg_ros.mapper.trajectory import Trajectory
 
 from .bent import SECOND, bent, closure, distances, odometry, square
 
@@ -56,7 +58,57 @@ def test_without_closures_the_map_is_odometry() -> None:
     graph = mapped([])
     assert graph.optimise().kept == ()
     np.testing.assert_allclose(graph.T_map_odom, np.eye(4), atol=1e-12)
-    assert distances(corrected(graph), BENT).max() < 1e-9
+    assert distances(corrected(graph), BENT).max() < TOLERANCE_M
+    for stamp, T_odom_body in graph.keyframes:
+        np.testing.assert_allclose(graph.corrected([stamp])[0], T_odom_body, atol=1e-12)
+
+
+def test_a_robot_at_rest_adds_nothing_however_often_its_odometry_comes() -> None:
+    graph = PoseGraph()
+    for k in range(12_000):  # a minute at 200 Hz
+        graph.add_odometry(Odometry(T_odom_body=TRUE[0], stamp_ns=k * SECOND // 200))
+    assert (len(graph.odometry), len(graph.keyframes)) == (2, 1)
+    assert graph.odometry.covers(11_999 * SECOND // 200)
+    graph.add_odometry(Odometry(T_odom_body=TRUE[5], stamp_ns=60 * SECOND))
+    np.testing.assert_array_equal(graph.odometry.at(11_999 * SECOND // 200), TRUE[0])
+
+
+class EveryPose(Trajectory):
+    """An odometry that leaves nothing out."""
+
+    def pin(self) -> None:
+        """Everything stays."""
+
+
+def often(poses: list[Array]) -> list[Odometry]:
+    """The walk of `odometry` at 200 Hz, trembling by a third of a millimetre."""
+    rng = np.random.default_rng(4)
+    return [
+        Odometry(T_odom_body=T @ pose(np.eye(3), 1e-4 * rng.standard_normal(3)), stamp_ns=(20 * k + i) * SECOND // 200)
+        for k, (a, b) in enumerate(pairwise(poses))
+        for i, T in ((i, interpolate(a, b, i / 20)) for i in range(20))
+    ]
+
+
+def test_leaving_poses_out_changes_no_answer_by_more_than_millimetres() -> None:
+    sparse, whole = PoseGraph(), PoseGraph()
+    whole.odometry = EveryPose()  # type: ignore[assignment]
+    walk = often(BENT)
+    for graph in (sparse, whole):
+        for pose_in_time in walk:
+            graph.add_odometry(pose_in_time)
+        for constraint in RIGHT[:-1]:
+            assert graph.add_closure(constraint)
+    for ours, theirs in zip(sparse.ties, whole.ties, strict=True):
+        degrees, centimetres = pose_error(ours.constraint.T_from_to, theirs.constraint.T_from_to)
+        assert degrees < 2 * TOLERANCE_DEG and centimetres < 100 * 3 * TOLERANCE_M
+    sparse.optimise()
+    whole.optimise()
+    stamps = [o.stamp_ns for o in walk[::7]]
+    assert distances(sparse.corrected(stamps), whole.corrected(stamps)).max() < 3 * TOLERANCE_M
+    assert distances([T for _, T in sparse.path()], [T for _, T in whole.path()]).max() < 3 * TOLERANCE_M
+    assert pose_error(sparse.T_map_odom, whole.T_map_odom)[1] < 100 * 3 * TOLERANCE_M
+    assert len(sparse.odometry) < len(whole.odometry) / 3
 
 
 def test_the_correction_belongs_to_the_newest_keyframe() -> None:
@@ -89,6 +141,14 @@ def test_a_closure_waits_for_its_odometry() -> None:
     for pose_in_time in odometry(BENT):
         graph.add_odometry(pose_in_time)
     assert graph.add_closure(RIGHT[0])
+
+
+@pytest.mark.parametrize("to", [29, 30])
+def test_a_closure_of_two_runs_of_the_clock_is_refused(to: int) -> None:
+    graph, ties = mapped([]), len(mapped([]).ties)
+    with pytest.raises(ValueError, match=rf"expected a constraint from before its to at {to}00000000 ns, got .* 30000"):
+        graph.add_closure(closure(TRUE, 30, to))
+    assert len(graph.ties) == ties
 
 
 def test_the_place_of_the_camera_on_the_body_is_honoured() -> None:

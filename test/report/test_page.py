@@ -11,7 +11,7 @@ from objreg_ros.report.page import MEANINGS, page
 from objreg_ros.report.story import Story
 from objreg_ros.truth import Truth
 
-from .runs import TRUTH, summary
+from .runs import TRUTH, closure, summary
 
 VOID = {"meta", "img", "br"}
 
@@ -60,6 +60,14 @@ def test_frames_that_are_left_out_are_counted() -> None:
     assert "left out" not in page([(Story.of("walk", told, TRUTH), None)])
     told["glimpses"] += told["glimpses"][-2:]
     assert " 2 frames are left out: their time is not later" in page([(Story.of("walk", told, TRUTH), None)])
+
+
+def test_closures_of_two_runs_of_the_clock_are_left_out_of_the_map_and_counted() -> None:
+    told = summary()
+    told["constraints"] += [closure(90, 30), closure(95, 35)]
+    text = page([(Story.of("walk", told, TRUTH), None)])
+    assert "6 loops closed" in text and " 2 closures are left out: they tie two runs of the clock" in text
+    assert "two runs of the clock" not in page([(Story.of("walk", summary(), TRUTH), None)])
 
 
 def test_names_are_escaped() -> None:

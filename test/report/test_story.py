@@ -9,7 +9,7 @@ import pytest
 from objreg_ros.report.story import Story
 from objreg_ros.truth import Truth
 
-from .runs import TRUTH, summary
+from .runs import COUNT, TRUE, TRUTH, summary
 
 
 def test_closures_bend_the_way_back_to_the_truth() -> None:
@@ -23,6 +23,15 @@ def test_a_false_closure_is_known_by_the_truth_and_pruned_by_the_map() -> None:
     story = Story.of("walk", summary(false=True), TRUTH)
     assert [story.is_false(closure) for closure in story.closures] == [False] * 4 + [True]
     assert story.pruned == story.closures[-1:]
+
+
+def test_every_frame_is_on_the_way_of_a_camera_at_rest_too() -> None:
+    told = summary()
+    for row in told["glimpses"]:
+        row["T_odom_camera"] = TRUE[0].tolist()
+    tracks = Story.of("rest", told, TRUTH).tracks()
+    assert list(tracks.stamps_ns) == TRUTH.stamps_ns
+    assert tracks.odometry.shape == tracks.corrected.shape == (COUNT, 3)
 
 
 def test_without_truth_nothing_is_false_and_there_are_no_errors() -> None:

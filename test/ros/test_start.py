@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from .graph import START_S, Graph
+from .graph import REPOSITORY, START_S, Graph
 
 pytestmark = pytest.mark.ros
 
@@ -37,6 +37,24 @@ def test_a_wrong_model_file_ends_the_detector_with_one_clear_line(
 def test_a_parameter_out_of_range_ends_a_node_in_the_words_of_params(graph: Graph) -> None:
     ended = start(graph, "segmenter", "-p slop:=-1.0")
     assert (ended.returncode, ended.stderr.strip()) == (1, "slop: expected at least 0, got -1.0")
+
+
+@pytest.mark.parametrize("namespace", ["/", "/robot"])
+@pytest.mark.parametrize(
+    ("room", "file", "setting", "wrong"),
+    [
+        ("mapper", "config/objreg.yaml", "keyframe_translation: 0.25", "keyframe_translation: -5.0"),
+        ("registrar", "config/covariance.yaml", "covariance_scale: 0.68", "covariance_scale: -5.0"),
+    ],
+)
+def test_a_copy_of_our_parameter_files_is_read_in_any_namespace(
+    graph: Graph, tmp_path: Path, room: str, file: str, setting: str, wrong: str, namespace: str
+) -> None:
+    text = (REPOSITORY / file).read_text()
+    assert setting in text
+    (tmp_path / "own.yaml").write_text(text.replace(setting, wrong))
+    ended = start(graph, room, f"--params-file {tmp_path}/own.yaml", f"-r __ns:={namespace}")
+    assert ended.returncode == 1 and wrong.split(":")[0] in ended.stderr and "got -5.0" in ended.stderr
 
 
 def test_a_node_says_which_topic_is_missing_and_how_to_remap_it_and_keeps_running(

@@ -17,7 +17,10 @@ from objreg_ros.mapper.constraint import Constraint, local_information
 
 
 def graph_text(poses: Sequence[Array], edges: Iterable[tuple[int, int, Constraint]]) -> str:
-    """The file: vertices 0, 1, … at ``T_map_body (4, 4)`` and edges ``(from, to, constraint)``; vertex 0 is fixed."""
+    """The file: vertices 0, 1, … at ``T_map_body (4, 4)`` and edges ``(from, to, constraint)``; vertex 0 is fixed.
+
+    A constraint is between the bodies at its two vertices, as `between_keyframes` makes it: not between cameras.
+    """
     lines = [f"VERTEX_SE3:QUAT {i} {_pose_text(T)}" for i, T in enumerate(poses)]
     lines += ["FIX 0"] if lines else []
     lines += [edge_text(*edge) for edge in edges]
@@ -25,7 +28,7 @@ def graph_text(poses: Sequence[Array], edges: Iterable[tuple[int, int, Constrain
 
 
 def edge_text(from_id: int, to_id: int, constraint: Constraint) -> str:
-    """One edge: ids, ``T_from_to``, and the upper triangle of the information row by row."""
+    """One edge: ids, ``T_from_to`` of the vertices, and the upper triangle of the information row by row."""
     upper = local_information(constraint)[np.triu_indices(6)]
     numbers = " ".join(f"{value:.9g}" for value in upper)
     return f"EDGE_SE3:QUAT {from_id} {to_id} {_pose_text(constraint.T_from_to)} {numbers}"

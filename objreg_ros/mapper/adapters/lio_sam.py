@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """LIO-SAM: topic ``lio_loop/loop_closure_detection``, std_msgs/Float64MultiArray.
 
-It takes no pose: it is told two moments, looks up its own keyframes for them and runs its own ICP between them.
+It takes no pose, so where the camera sits does not matter: it is told two moments, looks up its own keyframes for them
+and runs its own ICP between them.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 """RTAB-Map: the service ``add_link`` (rtabmap_msgs/AddLink) and the topic ``landmark_detections``.
 
 Links tie the base frames of two of its own nodes: ``mapData`` has their ids and stamps, `between_keyframes` the
-constraint. A landmark is a point: its rotation is left open.
+constraint. A landmark is a point in the camera, whose optical frame the detection's header must name, for RTAB-Map
+looks up in TF where that is on the base frame; its rotation is left open.
 """
 
 from __future__ import annotations
@@ -20,7 +21,10 @@ USER_CLOSURE, NO_ROTATION = 4, 9999.0  # type 0 or 99 aborts RTAB-Map; a varianc
 
 
 def fill_link(link: Any, constraint: Constraint, from_id: int, to_id: int) -> Any:
-    """The Link with ``T_from_to`` and its information, translation first. ValueError for what RTAB-Map aborts on."""
+    """The Link of a ``constraint`` between the base frames of two nodes, with its information, translation first.
+
+    ValueError for what RTAB-Map aborts on.
+    """
     information = local_information(constraint)
     if from_id == to_id or not np.all(np.diag(information) > 0):  # also refuses NaN
         raise ValueError(f"expected two nodes and a positive diagonal, got {from_id}, {to_id}, {np.diag(information)}")
@@ -31,7 +35,10 @@ def fill_link(link: Any, constraint: Constraint, from_id: int, to_id: int) -> An
 
 
 def fill_landmark(detection: Any, object_id: int, xyz: Array, sigma: float) -> Any:
-    """The LandmarkDetection of ``xyz (3,)`` m in the camera, ``sigma`` m certain. ValueError for an id below 1."""
+    """The LandmarkDetection of ``xyz (3,)`` m in the frame of its header, ``sigma`` m certain.
+
+    ValueError for an id below 1.
+    """
     if object_id < 1:
         raise ValueError(f"expected a landmark's id of at least 1, got {object_id}")
     detection.id = object_id

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Poses over time without those that interpolation gives back: a robot at rest would fill the memory with one pose."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.geometry import vector_from_rotation
+from objreg_ros.mapper.trajectory import Trajectory
+
+TOLERANCE_M, TOLERANCE_DEG = 1e-3, 0.05
+EACH_AXIS = np.repeat([TOLERANCE_M, np.radians(TOLERANCE_DEG)], 3) / np.sqrt(3)  # so that three of them keep within it
+SECOND_NS = 1_000_000_000
+
+
+class SparseTrajectory(Trajectory):
+    """A `Trajectory` whose `at` is within 1 mm and 0.05° of every pose that was appended, of however few it keeps.
+
+    The first, the newest and every pinned pose are kept as they are. A pose between the last one that stays and the
+    newest is left out while the straight way between the two passes it and all that were left out before near enough:
+    each of them bounds the velocity of that way, so what was left out need not be known any more (Bristol, "Swinging
+    Door Trending", 1990). Turns are compared as rotation vectors: these are never nearer than the rotations are.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._least, self._most = _nothing()
+
+    def append(self, stamp_ns: int, T_world_body: Array) -> None:
+        """Add the newest pose; the one before it goes if it can. ValueError if time does not advance."""
+        super().append(stamp_ns, T_world_body)
+        if np.all(self._least <= self._most):  # the newest but one is not to stay yet
+            velocity, slack = self._velocity_from(-3)
+            if np.all((self._least <= velocity) & (velocity <= self._most)):
+                del self.stamps_ns[-2], self.poses[-2]
+                self._least = np.maximum(self._least, velocity - slack)
+                self._most = np.minimum(self._most, velocity + slack)
+                return
+        if len(self) > 1:
+            velocity, slack = self._velocity_from(-2)
+            self._least, self._most = velocity - slack, velocity + slack
+
+    def pin(self) -> None:
+        """The newest pose is to stay, as it is."""
+        self._least, self._most = _nothing()
+
+    def _velocity_from(self, before: int) -> tuple[Array, Array]:
+        """The velocity (6,) from a kept pose to the newest, m/s in the world and rad/s in the body, and its slack."""
+        T_start, T_end = self.poses[before], self.poses[-1]
+        seconds = (self.stamps_ns[-1] - self.stamps_ns[before]) / SECOND_NS
+        turn = vector_from_rotation(T_start[:3, :3].T @ T_end[:3, :3])
+        return np.concatenate([T_end[:3, 3] - T_start[:3, 3], turn]) / seconds, EACH_AXIS / seconds
+
+
+def _nothing() -> tuple[Array, Array]:
+    """Bounds of a velocity that none is within."""
+    return np.full(6, np.inf), np.full(6, -np.inf)
