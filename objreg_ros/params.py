@@ -33,6 +33,7 @@ class Declaration:
     le: float | None = None
     choices: tuple[str, ...] = ()
     live: bool = False
+    counts: tuple[int, ...] = ()  # how long a list may be; empty: as long as it likes
 
     def check(self, value: Any) -> Any:
         """The value in its declared type; ValueError with expected and got if it is not that or out of range."""
@@ -40,6 +41,9 @@ class Declaration:
             items = value.tolist() if hasattr(value, "tolist") else value
             if not isinstance(items, list | tuple):
                 raise ValueError(f"{self.name}: expected a list of {self.kind.__name__}, got {value!r}")
+            if self.counts and len(items) not in self.counts:
+                expected = " or ".join(map(str, self.counts))
+                raise ValueError(f"{self.name}: expected {expected} values, got {len(items)}: {items!r}")
             return tuple(self._check_one(item) for item in items)
         return self._check_one(value)
 
@@ -76,9 +80,10 @@ def param(
     le: float | None = None,
     choices: tuple[str, ...] = (),
     live: bool = False,
+    counts: tuple[int, ...] = (),
 ) -> Any:
     """Declare one parameter. ``live`` ones may be changed while a node runs; the others are read-only there."""
-    metadata = {"doc": doc, "unit": unit, "ge": ge, "le": le, "choices": choices, "live": live}
+    metadata = {"doc": doc, "unit": unit, "ge": ge, "le": le, "choices": choices, "live": live, "counts": counts}
     return dataclasses.field(default=default, metadata=metadata)
 
 

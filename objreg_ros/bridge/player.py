@@ -205,5 +205,7 @@ def message_type(kind: str) -> Any:
     package, _, name = kind.replace("/msg/", "/").partition("/")
     try:
         return getattr(import_module(f"{package}.msg"), name)
-    except (ImportError, AttributeError) as error:
-        raise ValueError(f"{kind}: expected an installed message type, got none; leave its topic out") from error
+    except (ImportError, AttributeError, TypeError) as error:
+        raise ValueError(
+            f"{kind or 'no type'}: expected an installed message type, got none; leave its topic out"
+        ) from error

@@ -5,10 +5,12 @@ from __future__ import annotations
 
 import gc
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 
 from objreg_ros.bridge import profile
 from objreg_ros.bridge.door import Door
@@ -36,6 +38,16 @@ def _settle() -> None:
     gc.freeze()
 
 
+@contextmanager
+def _unless_shut_down() -> Iterator[None]:
+    """What ROS says because a signal ended it between two of its own steps is no error."""
+    try:
+        yield
+    except rclpy_implementation.RCLError:
+        if rclpy.ok():
+            raise
+
+
 def _serve(make: Callable[[], Door], transport: str) -> int:
     try:
         door = make()
@@ -47,7 +59,8 @@ def _serve(make: Callable[[], Door], transport: str) -> int:
     executor = SingleThreadedExecutor()
     executor.add_node(door)
     try:
-        executor.spin_until_future_complete(door.failure)
+        with _unless_shut_down():
+            executor.spin_until_future_complete(door.failure)
         if rclpy.ok() and door.failure.done():
             door.failure.result()  # raises what ended the worker
         return 0

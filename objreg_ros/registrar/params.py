@@ -140,12 +140,16 @@ class RegistrarParams(Params):
     grid_reach: float = param(0.20, "how far from a surface its grid reaches", "m", ge=0.02)
     refined_per_chain: int = param(5, "hypotheses of each chain that are refined to the end", ge=1)
     finished: int = param(3, "hypotheses of all chains that grey finishes and the gate sees", ge=1)
-    first_look: tuple[int, ...] = param((150, 5, 150), "points, iterations and views' points a side of a first look")
+    first_look: tuple[int, ...] = param(
+        (150, 5, 150), "points, iterations and views' points a side of a first look", ge=1, counts=(3,)
+    )
     near_per_chain: int = param(24, "hypotheses of each chain that are looked at again", ge=1)
     finished_margin: float = param(0.5, "worth below the best at which a hypothesis is not finished", ge=0.0)
     quick_sample: int = param(500, "points a side that rank the hypotheses", ge=50)
     quick_points: int = param(500, "points that bring a hypothesis to its basin", ge=50)
-    reaches: tuple[float, ...] = param((0.2, 0.1, 0.06), "distance of a pair at first, in the basin, at the end", "m")
+    reaches: tuple[float, ...] = param(
+        (0.2, 0.1, 0.06), "distance of a pair at first, in the basin, at the end", "m", ge=0.001, counts=(3,)
+    )
     iterations: int = param(15, "most iterations of one round of refinement", ge=1)
     min_points: int = param(60, "fewer paired points hold no pose", ge=6)
     grey_points: int = param(2500, "points a side whose grey ends a refinement", ge=100)
@@ -161,6 +165,8 @@ class RegistrarParams(Params):
         (0.05, 0.1, 0.15),
         "how far a pose is pushed along a free direction; what the views like less is held there",
         "m",
+        ge=0.001,
+        counts=(1, 2, 3, 4, 5),
     )
     depth_warp: float = param(
         0.005, "error of depth that a patch of surface shares, as a share of its distance", ge=0.0, le=0.1

@@ -39,6 +39,11 @@ class SegmenterParams(Params):
         le=32,
     )
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.z_min >= self.z_max:
+            raise ValueError(f"z_max: expected more than z_min ({self.z_min:g}), got {self.z_max:g}")
+
     @property
     def limits(self) -> tuple[float, float]:
         """The passthrough limits (z_max, y_max) in metres that hold for the preset."""

@@ -71,8 +71,9 @@ def _measure(labels, count, window, depth, x, y, pixels, rgb, bounds, limit):  #
         for q in range(k):
             gap[p, q] = np.inf
     _compare(renamed, depth, x, y, bounds, touching, front, gap)
-    cell = x[1] - x[0] if len(x) > 1 else np.float32(0)
-    longer = max(window[2] - window[0], window[3] - window[1]) * cell
+    wide = x[1] - x[0] if len(x) > 1 else np.float32(0)
+    high = y[1] - y[0] if len(y) > 1 else np.float32(0)
+    longer = max((window[2] - window[0]) * wide, (window[3] - window[1]) * high)
     total, inside, weight, size, pure, figure = _describe(sums, front, longer)
     alike = _alike(sums, len(rgb) > 0)
     return renamed, total, inside, weight, extent[1:], size, pure, figure, alike, touching[1:], gap[1:], front[1:]

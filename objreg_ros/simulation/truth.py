@@ -113,8 +113,9 @@ def read_truth(recording: Path | str) -> Truth:
         raise FileNotFoundError(f"{path}: expected the truth of a simulated recording; `objreg simulate` writes it")
     lines = path.read_text(encoding="utf-8").splitlines()
     head = json.loads(lines[0]) if lines else {}
-    if head.get("format") != FORMAT:
-        raise ValueError(f"{path}: expected format {FORMAT}, got {head.get('format')!r}; simulate the recording again")
+    found = head.get("format") if isinstance(head, dict) else head
+    if found != FORMAT:
+        raise ValueError(f"{path}: expected format {FORMAT}, got {found!r}; simulate the recording again")
     objects = tuple({o["instance"]: _object(o) for o in scene["objects"]} for scene in head["scenes"])
     frames = tuple(_frame(json.loads(line), objects) for line in lines[1:])
     camera = Intrinsics(**head["camera"])

@@ -217,6 +217,11 @@ def test_a_type_is_found_by_its_name() -> None:
     assert message_type(PICTURE) is Image and message_type("sensor_msgs/Image") is Image
 
 
+def test_no_type_at_all_is_refused() -> None:
+    with pytest.raises(ValueError, match="no type: expected an installed message type"):
+        message_type("")
+
+
 @pytest.mark.parametrize("kind", ["nowhere_msgs/msg/Image", "sensor_msgs/msg/Picture", "Image"])
 def test_a_type_that_is_not_installed_is_refused_by_its_name(kind: str) -> None:
     with pytest.raises(ValueError, match=f"{kind}: expected an installed message type, got none; leave its topic out"):

@@ -16,6 +16,8 @@ import pytest
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
 import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 
 from objreg_ros.bridge.door import Door
 from objreg_ros.bridge.spin import run
@@ -108,6 +110,21 @@ def test_a_bug_at_start_propagates_and_leaves_no_ros_behind() -> None:
     with pytest.raises(ZeroDivisionError):
         run(lambda: 1 / 0, [])  # type: ignore[arg-type, return-value]
     assert not rclpy.ok()
+
+
+@pytest.mark.parametrize("is_down", [True, False])
+def test_what_ros_says_because_it_was_just_shut_down_is_no_bug(is_down: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    def break_off(*_: object) -> NoReturn:
+        if is_down:
+            rclpy.shutdown()
+        raise rclpy_implementation.RCLError("failed to initialize wait set: the given context is not valid")
+
+    monkeypatch.setattr(SingleThreadedExecutor, "spin_until_future_complete", break_off)
+    if is_down:
+        assert run(Short, []) == 0 and ended_well()
+    else:
+        with pytest.raises(rclpy_implementation.RCLError):
+            run(Short, [])
 
 
 def test_the_arguments_reach_ros() -> None:

@@ -34,3 +34,10 @@ def test_a_mounting_that_cannot_be_is_refused_when_it_is_set(numbers: tuple, sai
 def test_the_node_s_other_values_are_checked_too() -> None:
     with pytest.raises(ValueError, match="slop: expected at least 0, got -1"):
         SegmenterNodeParams(slop=-1.0)
+
+
+def test_limits_that_no_depth_can_keep_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"z_max: expected more than z_min \(3\), got 1"):
+        SegmenterParams(z_min=3.0, z_max=1.0)
+    with pytest.raises(ValueError, match="z_max: expected more than z_min"):
+        SegmenterParams(z_min=2.0).replaced(z_max=1.5)

@@ -22,10 +22,11 @@ def measured(
     window: Window | None = None,
     rgb: np.ndarray | None = None,
     limit: int = 9,
+    fy: float = FOCAL,
 ) -> Parts:
     """The parts of ``labels``, all 1 m away and all in the box if nothing else is said."""
     h, w = labels.shape
-    camera = Intrinsics(fx=FOCAL, fy=FOCAL, cx=w / 2, cy=h / 2, width=w, height=h)
+    camera = Intrinsics(fx=FOCAL, fy=fy, cx=w / 2, cy=h / 2, width=w, height=h)
     metres = np.ascontiguousarray(np.ones((h, w)) if depth is None else depth, np.float32)
     image = DepthImage(depth=metres, rgb=rgb, intrinsics=camera, stamp_ns=0)
     surface = reduce(image.depth, camera, 1, LIMITS, JUMP)
@@ -85,6 +86,7 @@ def test_the_size_of_the_box_is_in_metres_at_the_depth_of_a_part() -> None:
     depth = np.where(halves() == 1, 1.0, 2.0)
     np.testing.assert_allclose(measured(halves(), depth).size, (0.06, 0.12), rtol=1e-6)
     np.testing.assert_allclose(measured(halves(12)).size, (0.12, 0.12), rtol=1e-6)  # the longer side counts
+    np.testing.assert_allclose(measured(halves(9), fy=2 * FOCAL).size, (0.06, 0.06), rtol=1e-6)  # 9 rows, 0.045 m
 
 
 def test_neighbours_without_a_depth_jump_touch() -> None:

@@ -146,7 +146,8 @@ def test_a_recording_without_truth_says_where_it_comes_from(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
-    ("text", "got"), [("", "None"), ("{}\n", "None"), ('{"format": "objreg-truth/9"}', "objreg-truth/9")]
+    ("text", "got"),
+    [("", "None"), ("{}\n", "None"), ('{"format": "objreg-truth/9"}', "objreg-truth/9"), ("[]", r"\[\]")],
 )
 def test_another_format_is_refused_with_what_was_expected(text: str, got: str, tmp_path: Path) -> None:
     (tmp_path / FOLDER).mkdir()
