@@ -104,12 +104,15 @@ class Graph:
         self.node.create_subscription(kind, topic, self.heard[topic].append, profile or qos.room(depth=1000))
 
     def publish(self, topic: str, message: Any, listeners: int = 1) -> None:
-        """Publish once the nodes listen."""
+        """Publish once the nodes listen: each end of a connection has to know of the other."""
         if topic not in self.publishers:
             reliable = qos.latched() if topic.endswith("labels") else qos.room()
-            self.publishers[topic] = self.node.create_publisher(type(message), topic, reliable)
-            full = self.publishers[topic].topic_name
-            there = lambda: sum(known.get(full, 0) for known in self.connected.values()) >= listeners  # noqa: E731
+            publisher = self.publishers[topic] = self.node.create_publisher(type(message), topic, reliable)
+
+            def there() -> bool:
+                heard_by = sum(known.get(publisher.topic_name, 0) for known in self.connected.values())
+                return min(heard_by, publisher.get_subscription_count()) >= listeners
+
             self.wait_for(there, START_S, f"{listeners} nodes that are connected to {topic}")
         self.publishers[topic].publish(message)
 
