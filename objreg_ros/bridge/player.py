@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
@@ -13,6 +13,7 @@ from typing import Any
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 
@@ -20,6 +21,7 @@ from objreg_ros.bridge import from_msg, qos, to_msg
 from objreg_ros.bridge.receipts import DEPTH, IMAGE, ORDER, Receipts
 
 QUEUE = 20  # messages of a topic that wait in DDS for a slow reader
+LATCHED = 100  # messages of a latched topic that are kept: a recording has those of all its publishers in one
 ASK_AGAIN_S = 2.0  # how often a play that waits looks whether the nodes are still there
 START_S = 300.0  # how long the start of a node may take
 INPUTS = {  # what a node hears of the nodes before it
@@ -48,11 +50,17 @@ class Item:
 
 
 class Player(Node):
-    """A node that plays items on ``topics`` (topic → type like ``sensor_msgs/msg/Image``)."""
+    """A node that plays items on ``topics`` (topic → type like ``sensor_msgs/msg/Image``).
 
-    def __init__(self, topics: Mapping[str, str], clock: bool = False) -> None:
+    Who subscribes late still gets what was played last on the ``latched`` ones.
+    """
+
+    def __init__(self, topics: Mapping[str, str], clock: bool = False, latched: Collection[str] = ()) -> None:
         super().__init__("player")
-        self._publishers_of = {topic: self._advertise(topic, kind) for topic, kind in topics.items()}
+        self._publishers_of = {
+            topic: self._advertise(topic, kind, qos.latched(LATCHED) if topic in latched else qos.room(QUEUE))
+            for topic, kind in topics.items()
+        }
         self._ticks = self.create_publisher(Clock, "/clock", qos.room()) if clock else None
         self._receipts: Receipts | None = None
         self._executor = SingleThreadedExecutor()
@@ -61,8 +69,8 @@ class Player(Node):
         self.published: Counter[str] = Counter()
         self.lost: list[int] = []
 
-    def _advertise(self, topic: str, kind: str) -> Publisher:
-        return self.create_publisher(message_type(kind), topic, qos.room(depth=QUEUE))
+    def _advertise(self, topic: str, kind: str, profile: QoSProfile) -> Publisher:
+        return self.create_publisher(message_type(kind), topic, profile)
 
     # Who listens
 

@@ -73,7 +73,8 @@ def command(
         selection.require_some(source)
         click.echo(profile.apply(), err=True)
         rclpy.init(args=list(ros_args))
-        player = Player({out: source.topics[topic].msgtype for topic, out in names.items()}, clock)
+        latched = {names[topic] for topic in source.latched & names.keys()}
+        player = Player({out: source.topics[topic].msgtype for topic, out in names.items()}, clock, latched)
         try:
             _prepare(player, inputs, names, wait)
             receipts = player.listen_to_receipts(wait) if lossless else None

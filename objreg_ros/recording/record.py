@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
-from rosbags.interfaces import Qos
+from rosbags.interfaces import Qos, QosDurability
 from rosbags.typesys.store import Typestore
 
 from objreg_ros.recording.messages import obstacle, serialise, standard_types
@@ -79,6 +79,13 @@ class Recording(ABC):
     def offered_qos(self) -> dict[str, list[Qos]]:
         """The QoS of the publishers of each topic; without the topics of which nothing is known."""
         return {}
+
+    @property
+    def latched(self) -> frozenset[str]:
+        """The topics whose last messages a late subscriber still got, like /tf_static."""
+        offers = self.offered_qos().items()
+        kept = QosDurability.TRANSIENT_LOCAL
+        return frozenset(topic for topic, profiles in offers if any(offer.durability is kept for offer in profiles))
 
     def _types(self) -> Typestore:
         """The message types as the recording knows them."""

@@ -213,6 +213,23 @@ def test_a_lossless_play_without_receipts_is_refused(player: Player) -> None:
         player.play_lossless([], 1.0, print)
 
 
+def test_who_comes_late_still_gets_what_was_latched(graph: Graph) -> None:
+    player = Player({"words": STRING, "static": STRING}, latched={"static"})
+    try:
+        for topic in ("words", "static"):
+            player.play([Item(topic, 0, serialize_message(String(data=topic)))], None, print)
+        heard: list[str] = []
+        for topic in ("words", "static"):
+            player.create_subscription(String, topic, lambda m: heard.append(m.data), qos.latched(5))
+            player.create_subscription(String, topic, lambda m: heard.append(m.data), qos.room())
+        deadline = time.monotonic() + 5.0
+        while not heard and time.monotonic() < deadline:
+            rclpy.spin_once(player, timeout_sec=0.05)
+        assert heard == ["static"]
+    finally:
+        player.close()
+
+
 def test_a_type_is_found_by_its_name() -> None:
     assert message_type(PICTURE) is Image and message_type("sensor_msgs/Image") is Image
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 
 import pytest
@@ -12,12 +12,13 @@ import pytest
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
 from click.testing import CliRunner, Result
-from recording.folders import STEP_NS, noetic_bag, robot_bag, tum_folder
+from recording.folders import STEP_NS, noetic_bag, records, robot_bag, tum_folder
 
 from objreg_ros.bridge.player import Item
 from objreg_ros.bridge.receipts import DEPTH, IMAGE, ORDER, Receipts
 from objreg_ros.cli.replay import command, playable_names
-from objreg_ros.recording import open_recording
+from objreg_ros.recording import open_recording, write_rosbag2
+from objreg_ros.recording.bags import latched_qos
 from objreg_ros.recording.inputs import Inputs, choose_inputs
 
 KIND = "sensor_msgs/msg/Image"
@@ -31,6 +32,7 @@ class Stage:
     def __init__(self) -> None:
         self.ros_args: list[str] | None = None
         self.topics: dict[str, str] = {}
+        self.latched: set[str] = set()
         self.clock = self.closed = self.shut_down = False
         self.asked: list[tuple[list[str], float]] = []
         self.deaf: list[str] = []
@@ -39,8 +41,8 @@ class Stage:
         self.published: Counter[str] = Counter()
         self.lost: list[int] = []
 
-    def __call__(self, topics: dict[str, str], clock: bool) -> Stage:
-        self.topics, self.clock = topics, clock
+    def __call__(self, topics: dict[str, str], clock: bool, latched: Collection[str]) -> Stage:
+        self.topics, self.clock, self.latched = topics, clock, set(latched)
         return self
 
     def init(self, args: list[str]) -> None:
@@ -151,6 +153,14 @@ def test_it_waits_for_those_who_hear_colour_and_depth_and_names_what_nobody_hear
 def test_everything_goes_out_under_its_own_name(stage: Stage, folder: Path) -> None:
     replay(folder, "--all", "--remap", "ground_truth:=")
     assert set(stage.topics) == {f"/{topic}" for topic in PLAYED} and stage.asked[0][0] == ["/image", "/depth/image"]
+
+
+def test_what_was_latched_goes_out_latched(stage: Stage, tmp_path: Path) -> None:
+    write_rosbag2(tmp_path / "bag", records(), offered_qos={"/odom": [latched_qos(1)]})
+    replay(tmp_path / "bag", "--all")
+    assert stage.latched == {"/odom"} and "/image" in stage.topics
+    replay(tmp_path / "bag")
+    assert stage.latched == {"odom"}
 
 
 def test_an_input_that_is_mapped_away_stays_home(stage: Stage, folder: Path) -> None:
