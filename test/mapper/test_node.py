@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -195,3 +196,22 @@ def test_a_stamp_that_repeats_is_passed_over(outside: Outside) -> None:
     outside.wait(lambda: outside.door.extra_diagnostics()["odometry"] == 6)
     assert outside.door.extra_diagnostics()["odometry passed over"] == 1
     assert outside.door._graph.odometry.stamps_ns[-1] == SECOND // 2
+
+
+class Broadcaster:
+    """Stands in for tf2_ros' and keeps what it was given."""
+
+    def __init__(self, node: Any) -> None:
+        self.sent: list[Any] = []
+
+    def sendTransform(self, transform: Any) -> None:  # noqa: N802  the name in tf2_ros
+        self.sent.append(transform)
+
+
+def test_every_odometry_that_is_not_late_brings_the_correction_to_tf(outside: Outside) -> None:
+    broadcaster = outside.door._broadcaster = Broadcaster(outside.door)
+    for word in odometry(BENT[:3]):
+        outside.door._hear_odometry(to_msg.odometry(word))
+        outside.door._hear_odometry(to_msg.odometry(replace(word, stamp_ns=word.stamp_ns - 1000)))
+    assert [from_msg.stamp_ns(message) for message in broadcaster.sent] == [w.stamp_ns for w in odometry(BENT[:3])]
+    assert {(m.header.frame_id, m.child_frame_id) for m in broadcaster.sent} == {("map", "odom")}
