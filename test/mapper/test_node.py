@@ -204,7 +204,7 @@ class Broadcaster:
     def __init__(self, node: Any) -> None:
         self.sent: list[Any] = []
 
-    def sendTransform(self, transform: Any) -> None:  # noqa: N802  the name in tf2_ros
+    def sendTransform(self, transform: Any) -> None:
         self.sent.append(transform)
 
 
