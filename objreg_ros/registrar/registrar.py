@@ -177,8 +177,9 @@ class Registrar:
         if not found:
             refusal = Reason.NO_CANDIDATE, f"none of {len(self._index)} stored objects is alike and may be here"
             rejected.append(_rejected(keyframe.stamp_ns, keyframe, refusal))
-        rejected += [_rejected(place.stamp_ns, keyframe, _twice(clock)) for place in found if _is_twice(place, clock)]
-        places = deque(place for place in found if not _is_twice(place, clock))
+        twice = [place for place in found if _is_twice(place, clock)]
+        rejected += _told_of(twice, keyframe, clock)
+        places = deque(place for place in found if place not in twice)
         tries, trying = self.params.candidates, deque[_Try]()
         while len(accepted) < self.params.closures:
             self._begin(keyframe, places, trying, tries, self.params.closures - len(accepted), deadline)
@@ -281,8 +282,12 @@ def _is_twice(place: Place, clock: Clock) -> bool:
     return place.session < clock.session and place.stamp_ns >= clock.began_ns
 
 
-def _twice(clock: Clock) -> Refusal:
-    return Reason.CLOCK, f"it is of an earlier run of the clock, which began anew at {1e-9 * clock.began_ns:.3f} s"
+def _told_of(twice: Sequence[Place], keyframe: Keyframe, clock: Clock) -> list[Rejected]:
+    """One refusal for all of them, at most."""
+    detail = (
+        f"{len(twice)} places are of an earlier run of the clock, which began anew at {1e-9 * clock.began_ns:.3f} s"
+    )
+    return [_rejected(place.stamp_ns, keyframe, (Reason.CLOCK, detail)) for place in twice[:1]]
 
 
 def closure_of(

@@ -230,7 +230,8 @@ def test_a_place_whose_stamp_would_name_a_moment_of_this_run_of_the_clock_closes
     begun_anew = [_frame(5.0, AWAY), _frame(40.0, BESIDE)]  # in this run the camera was elsewhere at 10 s
     closures, rejected = _run(Registrar(PARAMS), *frames, *begun_anew)
     told = [r for r in rejected if r.reason is Reason.CLOCK]
-    assert {r.from_ns for r in told} == {10 * SECOND, 20 * SECOND} and "began anew at 5.000 s" in told[0].detail
+    assert {r.from_ns for r in told} <= {10 * SECOND, 20 * SECOND} and len(told) == 2  # one a keyframe
+    assert told[1].detail == "2 places are of an earlier run of the clock, which began anew at 5.000 s"
     assert {closure.from_ns for closure in closures if closure.to_ns in (5 * SECOND, 40 * SECOND)} <= {5 * SECOND}
 
 
