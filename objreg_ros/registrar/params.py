@@ -195,7 +195,7 @@ class RegistrarParams(Params):
     holding_likeness: float = param(
         0.3, "an object that looks so much alike holds what shape lets slide", ge=-1.0, le=1.0
     )
-    symmetry_share: float = param(0.14, "an object whose surface resists a turn less has no yaw", ge=0.0, le=1.0)
+    symmetry_share: float = param(0.16, "an object whose surface resists a turn less has no yaw", ge=0.0, le=1.0)
     symmetry_violations: float = param(
         0.14,
         "an object has a yaw after all if so much of it, turned about its axis, is where its camera saw through",
