@@ -58,6 +58,7 @@ class Door(Node):
         self._opened: dict[str, dict[str, Subscription]] = {}  # input of `listen_to_first` → its open topics
         self._ignored: Counter[str] = Counter()  # messages that are no frame by themselves, by what is wrong with them
         self.apart = ReentrantCallbackGroup()  # of services that wait for work that is done `aside`
+        self._aside: list[threading.Thread] = []
         self.failure: Future = Future()
         self.throttled = ThrottledLog(self.get_logger().warning)
         self.watch = Watch(self.count_publishers, self.settings.of(DoorParams).silence)
@@ -202,12 +203,20 @@ class Door(Node):
             try:
                 future.set_result(work())
             except BaseException as error:
-                future.set_exception(error)
+                if self.context.ok():  # else nobody waits for it any more
+                    future.set_exception(error)
             if executor is not None:
                 executor.wake()
 
-        threading.Thread(target=run, name="aside", daemon=True).start()
+        thread = threading.Thread(target=run, name="aside", daemon=True)
+        self._aside = [*(other for other in self._aside if other.is_alive()), thread]
+        thread.start()
         return future
+
+    def end_aside(self) -> None:
+        """Wait for what is done `aside`."""
+        for thread in self._aside:
+            thread.join()
 
     # Diagnostics, parameters, the end
 
@@ -243,5 +252,6 @@ class Door(Node):
 
     def close(self) -> None:
         """End the worker and the node."""
+        self.end_aside()
         self.worker.close()
         self.destroy_node()

@@ -76,11 +76,11 @@ def ros_argument(name: str, value: Any) -> str:
 
 
 def _sections(file: Path) -> dict[str, dict[str, Any]]:
-    """The parameters under each of the names of our nodes."""
-    names = (ALL, *(name for node in NODES for name in _names_of_node(node)))
+    """The parameters under each of the names of our nodes, in the order of the file: the last word holds, as in ROS."""
+    names = {ALL, *(name for node in NODES for name in _names_of_node(node))}
     try:
         content = dict(yaml.safe_load(file.read_text()) or {})
-        sections = {name: dict(content[name][KEY]) for name in names if name in content}
+        sections = {name: dict(section[KEY]) for name, section in content.items() if name in names}
     except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
         raise ValueError(f"{file}: expected a ROS 2 parameter file (node: {KEY}: name: value), got: {error}") from error
     unknown = sorted(set(sections.get(ALL, ())) - set(EVERYWHERE).union(*map(_known, NODES)))
@@ -90,9 +90,13 @@ def _sections(file: Path) -> dict[str, dict[str, Any]]:
 
 
 def _values_of(sections: Mapping[str, Mapping[str, Any]], node: str) -> dict[str, Any]:
-    shared = {name: value for name, value in sections.get(ALL, {}).items() if name in _known(node)}
-    own = [sections.get(name, {}) for name in _names_of_node(node)]
-    return shared | {name: value for section in own for name, value in section.items() if name not in EVERYWHERE}
+    values: dict[str, Any] = {}
+    for title, section in sections.items():
+        if title == ALL:
+            values |= {name: value for name, value in section.items() if name in _known(node)}
+        elif title in _names_of_node(node):
+            values |= {name: value for name, value in section.items() if name not in EVERYWHERE}
+    return values
 
 
 def _names_of_node(node: str) -> tuple[str, ...]:

@@ -246,7 +246,7 @@ def _best(rule: Rule, topics: Iterable[Topic]) -> str | None:
     fitting = [t.name for t in topics if t.msgtype in rule.types and t.count and _may_be(rule, t.name)]
     best = min(fitting, key=lambda name: (_rank(rule, name), len(name), name), default=None)
     lossless = f"{best}Depth"  # beside depth as /compressed, which is JPEG unless its driver was told otherwise
-    return lossless if lossless in fitting else best
+    return lossless if lossless.endswith("/compressedDepth") and lossless in fitting else best
 
 
 def _may_be(rule: Rule, name: str) -> bool:

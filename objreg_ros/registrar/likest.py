@@ -58,11 +58,14 @@ class Block:
         self._half_norms[i // LANES, i % LANES] = NOWHERE
         self._free.append(i)
 
-    def likest(self, sighting: Sighting, params: RegistrarParams, most: int, margin: float) -> tuple[Array, Array]:
+    def likest(
+        self, sighting: Sighting, params: RegistrarParams, most: int, margin: float, since: int = 0
+    ) -> tuple[Array, Array]:
         """The rows (at most ``most``) that look most like this one, and half their squared distances, (K,) each.
 
         Left out are those farther away in half the squared distance than the likest by ``margin``, nearer in time than
-        the least gap, and where odometry says that they cannot be here. Among equals the older keyframe comes first.
+        the least gap, of sessions before ``since``, and where odometry says that they cannot be here. Among equals the
+        older keyframe comes first.
         """
         tiles = -(-self._used // LANES)
         descriptor = np.asarray(sighting.descriptor, np.float32)
@@ -70,7 +73,7 @@ class Block:
         found, likeness = _likest(  # type: ignore[call-arg]
             self._descriptors[:tiles], self._half_norms[:tiles], self.where, self.when, descriptor,
             np.asarray(sighting.position, float), sighting.travelled, sighting.stamp_ns, session,
-            round(1e9 * params.min_gap), params.odometry_radius, params.odometry_drift, most, margin,
+            round(1e9 * params.min_gap), params.odometry_radius, params.odometry_drift, since, most, margin,
         )  # fmt: skip
         return found, np.maximum(0.5 * float(descriptor @ descriptor) - likeness, 0.0)
 
@@ -83,8 +86,8 @@ class Block:
 
 @numba.njit(cache=True, nogil=True)
 def _likest(  # type: ignore[no-untyped-def]
-    descriptors, half_norms, where, when, descriptor, position, way, stamp_ns, session, gap_ns, radius, drift, most,
-    margin,
+    descriptors, half_norms, where, when, descriptor, position, way, stamp_ns, session, gap_ns, radius, drift, since,
+    most, margin,
 ):  # fmt: skip
     """The rows, the likest first, and their likeness: half the squared distance below half a length.
 
@@ -94,7 +97,7 @@ def _likest(  # type: ignore[no-untyped-def]
     for tile in range(len(tops)):
         tops[tile] = _compare(descriptors[tile], half_norms[tile], descriptor, likeness[tile])
     floor = np.partition(tops, len(tops) - most)[len(tops) - most] if len(tops) > most else -NOWHERE
-    seen = (likeness, tops, where, when, position, way, stamp_ns, session, gap_ns, radius, drift, margin)
+    seen = (likeness, tops, where, when, position, way, stamp_ns, session, gap_ns, radius, drift, since, margin)
     best = _best(most, floor, *seen)
     if best[-1][0] == -NOWHERE and floor > -NOWHERE:
         best = _best(most, -NOWHERE, *seen)
@@ -106,7 +109,7 @@ def _likest(  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _best(  # type: ignore[no-untyped-def]
-    most, floor, likeness, tops, where, when, position, way, stamp_ns, session, gap_ns, radius, drift, margin
+    most, floor, likeness, tops, where, when, position, way, stamp_ns, session, gap_ns, radius, drift, since, margin
 ):
     """The best that are at least as like as the floor, in falling order: likeness, how old, row; none is -inf."""
     best = [(-NOWHERE, 0, 0) for _ in range(most)]  # as a heap: the least is the first
@@ -117,7 +120,7 @@ def _best(  # type: ignore[no-untyped-def]
             continue
         for lane in range(LANES):
             row, like = tile * LANES + lane, likeness[tile, lane]
-            if like < least or like == -NOWHERE or abs(when[row, 0] - stamp_ns) < gap_ns:
+            if like < least or like == -NOWHERE or when[row, 1] < since or abs(when[row, 0] - stamp_ns) < gap_ns:
                 continue
             if when[row, 1] == session and when[row, 3]:
                 reach = radius + drift * abs(way - where[row, 3])

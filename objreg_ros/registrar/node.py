@@ -212,6 +212,7 @@ class RegistrarNode(MatchingDoor):
 
     def close(self) -> None:
         """End both workers, store what they had not come to, let go of the store."""
+        self.end_aside()
         self.worker.close()
         self.searcher.close()
         for stretch in (*(job[1] for job in self.searcher.rest()), self._registrar.end()):

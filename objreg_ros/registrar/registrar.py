@@ -81,6 +81,7 @@ class Registrar:
         self._landmarks = Landmarks(self.params, self._store.sightings(), self._store.next_landmark())
         self._clock: Clock | None = None  # the run of the clock that goes on
         self._thinning = Thinning(self.params.thin_seconds)  # of what was accepted in it
+        self._since = 0  # the first session whose stamps are not of this run too
         self._session: int | None = None  # the one that goes on, None before the first keyframe
 
     @property
@@ -131,10 +132,9 @@ class Registrar:
                 return Outcome()
             keyframe = fuse(stretch, self.params).numbered(self._store.next_keyframe())
             self._session = keyframe.session
-            if stretch.clock != self._clock:
-                self._clock, self._thinning = stretch.clock, Thinning(self.params.thin_seconds)
+            unnamed = self._follow(stretch.clock, keyframe)
             sightings = sightings_of(keyframe)
-            accepted, rejected = self._try_places(keyframe, sightings, stretch.clock, deadline)
+            accepted, rejected = self._try_places(keyframe, sightings, deadline)
             try:
                 closures, named = self._remember(keyframe, sightings, accepted)
             except StoreError:
@@ -144,7 +144,7 @@ class Registrar:
             seen = observations(keyframe, named)
             return Outcome(
                 closures=closures,
-                rejected=rejected,
+                rejected=(*unnamed, *rejected),
                 keyframe_ns=keyframe.stamp_ns,
                 observations=seen,
                 frame_id=keyframe.frame_id,
@@ -167,19 +167,29 @@ class Registrar:
             self._pool.shutdown()
             self._store.close()
 
+    def _follow(self, clock: Clock, keyframe: Keyframe) -> tuple[Rejected, ...]:
+        """Where the clock began anew, leave out what an earlier run of it saw unless that was over by then.
+
+        A stamp of it would name a moment of this run, and the session does not travel with a constraint.
+        """
+        if clock == self._clock:
+            return ()
+        last = self._store.last_session_beyond(clock.session, clock.began_ns)
+        self._clock, self._thinning, self._since = clock, Thinning(self.params.thin_seconds), last + 1
+        began = f"{1e-9 * clock.began_ns:.3f} s"
+        refusal = Reason.CLOCK, f"the clock began anew at {began}; places of sessions to {last} saw that time before"
+        return () if last < 0 else (_rejected(keyframe.stamp_ns, keyframe, refusal),)
+
     def _try_places(
-        self, keyframe: Keyframe, sightings: Sequence[Sighting], clock: Clock, deadline: float
+        self, keyframe: Keyframe, sightings: Sequence[Sighting], deadline: float
     ) -> tuple[list[_Accepted], tuple[Rejected, ...]]:
         """Try the stored keyframes that may show the same place, the likeliest first."""
         accepted: list[_Accepted] = []
         rejected: list[Rejected] = []
-        found = self._index.query(sightings)
-        if not found:
+        places = deque(self._index.query(sightings, self._since))
+        if not places:
             refusal = Reason.NO_CANDIDATE, f"none of {len(self._index)} stored objects is alike and may be here"
             rejected.append(_rejected(keyframe.stamp_ns, keyframe, refusal))
-        twice = [place for place in found if _is_twice(place, clock)]
-        rejected += _told_of(twice, keyframe, clock)
-        places = deque(place for place in found if place not in twice)
         tries, trying = self.params.candidates, deque[_Try]()
         while len(accepted) < self.params.closures:
             self._begin(keyframe, places, trying, tries, self.params.closures - len(accepted), deadline)
@@ -275,19 +285,6 @@ class Registrar:
             )
             for pair in item.candidate.explained
         ]
-
-
-def _is_twice(place: Place, clock: Clock) -> bool:
-    """Whether a place's stamp would name a moment of this run of the clock, which it is not of."""
-    return place.session < clock.session and place.stamp_ns >= clock.began_ns
-
-
-def _told_of(twice: Sequence[Place], keyframe: Keyframe, clock: Clock) -> list[Rejected]:
-    """One refusal for all of them, at most."""
-    detail = (
-        f"{len(twice)} places are of an earlier run of the clock, which began anew at {1e-9 * clock.began_ns:.3f} s"
-    )
-    return [_rejected(place.stamp_ns, keyframe, (Reason.CLOCK, detail)) for place in twice[:1]]
 
 
 def closure_of(

@@ -63,12 +63,12 @@ class Index:
         for block, row in chain.from_iterable(self._rows.pop(number, ()) for number in keyframe_ids):
             block.remove(row)
 
-    def query(self, sightings: Sequence[Sighting]) -> list[Place]:
-        """Places for the objects of a new keyframe, the most promising first; may be empty.
+    def query(self, sightings: Sequence[Sighting], since: int = 0) -> list[Place]:
+        """Places of the sessions from ``since`` on for the objects of a new keyframe, the most promising first.
 
-        There are more than ``candidates``, so that those which turn out to be redundant have successors.
+        May be empty. There are more than ``candidates``, so that those which turn out to be redundant have successors.
         """
-        ballots = [self._ballot(sighting, len(self)) for sighting in sightings]
+        ballots = [self._ballot(sighting, len(self), since) for sighting in sightings]
         where, when, votes = (np.concatenate(column) for column in zip(*ballots, strict=True))
         ballot = np.repeat(np.arange(len(ballots)), [len(ballot[-1]) for ballot in ballots])
         first, votes = _tally(when[:, 2], ballot, votes)
@@ -81,10 +81,10 @@ class Index:
         chosen = zip(when[taken].tolist(), votes[taken].tolist(), strict=True)
         return [Place(number, stamp_ns, session, vote) for (stamp_ns, session, number, _), vote in chosen]
 
-    def _ballot(self, sighting: Sighting, stored: int) -> tuple[Array, Array, Array]:
+    def _ballot(self, sighting: Sighting, stored: int, since: int) -> tuple[Array, Array, Array]:
         """Where and when the objects were seen that look most like this one, the likest first, and their votes."""
         block = self._blocks.get(self._groups.of(sighting.label), EMPTY)
-        rows, halves = block.likest(sighting, self._params, SHORTLIST, WORTH_A_VOTE)
+        rows, halves = block.likest(sighting, self._params, SHORTLIST, WORTH_A_VOTE, since)
         rarity = math.log(2.0 + stored / max(len(block), 1))
         return block.where[rows], block.when[rows], rarity * np.exp(-halves / LIKENESS**2)
 

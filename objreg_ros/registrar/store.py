@@ -185,6 +185,12 @@ class Store:
         """The number of a session that nothing is stored of yet."""
         return max(self._sessions.values(), default=-1) + 1
 
+    def last_session_beyond(self, session: int, stamp_ns: int) -> int:
+        """The last of the sessions before ``session`` that has a keyframe of ``stamp_ns`` or later; -1 if none has."""
+        wanted = "SELECT COALESCE(MAX(session), -1) FROM keyframe WHERE session < ? AND stamp_ns >= ?"
+        with self._told("read the sessions"):
+            return int(self._connection.execute(wanted, (session, stamp_ns)).fetchone()[0])
+
     def counts(self) -> dict[str, int]:
         """How many keyframes, objects, landmarks, sessions and closures there are."""
         return {

@@ -8,7 +8,7 @@ from html import escape
 
 import numpy as np
 
-from objreg_ros.data import UNTRIED, Array, LoopClosure, Reason, Rejected
+from objreg_ros.data import UNTRIED, Array, LoopClosure, Rejected
 from objreg_ros.geometry import pose_error, rotation_angle
 from objreg_ros.report import figures
 from objreg_ros.report.drawing import legend
@@ -33,7 +33,7 @@ MEANINGS = {
     "redundant": "a closure of this revisit was accepted already",
     "over_budget": "time ran out before this place was tried",
     "unreadable": "what the store holds of this place is damaged",
-    "clock_began_anew": "stamps repeat: that moment's would name one of this run",
+    "clock_began_anew": "what was seen before then has stamps of now, and is left out",
 }
 
 
@@ -96,7 +96,8 @@ def _tile(value: str, name: str, note: str, tone: str = "") -> str:
 def _refused_count(story: Story) -> int:
     """How many candidates were tried in vain."""
     counts = story.summary.get("rejected", {})
-    return sum(count for reason, count in counts.items() if Reason(reason) not in UNTRIED)
+    untried = {reason.value for reason in UNTRIED}
+    return sum(count for reason, count in counts.items() if reason not in untried)
 
 
 def _count_note(story: Story) -> str:

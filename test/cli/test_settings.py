@@ -32,6 +32,14 @@ def test_a_parameter_file_is_read_as_ros_reads_it(tmp_path: Path) -> None:
         assert settings.of(node, kind).T_base_camera == (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
+@pytest.mark.parametrize("titles", [("registrar", "/**"), ("/**", "/**/registrar"), ("/registrar", "registrar")])
+def test_of_two_sections_the_last_in_the_file_holds_as_in_ros(titles: tuple[str, str], tmp_path: Path) -> None:
+    file = tmp_path / "p.yaml"
+    for first, last in (titles, titles[::-1]):
+        file.write_text(f"{first}:\n  ros__parameters: {{seed: 1}}\n{last}:\n  ros__parameters: {{seed: 2}}\n")
+        assert read_settings(file, ()).of("registrar", RegistrarParams).seed == 2
+
+
 def test_a_parameter_that_no_node_has_is_refused_even_for_all(tmp_path: Path) -> None:
     file = tmp_path / "p.yaml"
     file.write_text("/**:\n  ros__parameters: {treshold: 0.25}\n")

@@ -184,6 +184,10 @@ def test_a_picture_that_nothing_says_to_be_depth_is_none(there: str) -> None:
     assert inputs.missing == "points or a depth image"
 
 
+def test_colour_is_not_left_for_a_topic_whose_name_is_longer_by_depth() -> None:
+    assert choose_inputs(topics("/image /imageDepth /camera_info:info")).image == "/image"
+
+
 def test_a_lone_depth_image_is_not_taken_for_colour() -> None:
     for depth in ("/oak/stereo/image_raw", "/oak/stereo/image_raw/compressedDepth", "/cam2/image_raw/compressedDepth"):
         inputs = choose_inputs(topics(f"{depth} /camera_info:info"))
