@@ -109,3 +109,12 @@ def test_while_a_service_waits_for_work_aside_the_node_hears_on(door: Door) -> N
     while not asked.done() and time.monotonic() < deadline:
         rclpy.spin_once(door, timeout_sec=0.05)
     assert heard == ["one"] and asked.result().success
+
+
+def test_what_is_done_aside_is_over_before_a_node_ends(door: Door) -> None:
+    done: list[str] = []
+    go = threading.Event()
+    door.aside(lambda: (go.wait(20.0), done.append("stored")))
+    threading.Timer(0.1, go.set).start()
+    door.end_aside()
+    assert done == ["stored"]
