@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from objreg_ros.simulation.params import StressParams
 from objreg_ros.simulation.render import render
 from objreg_ros.simulation.scene import furnished, number, place_on
 
+Look = tuple[str, int]  # the kind of object, and the room
 FOUR = ("cereal_box", "book", "keyboard", "bowl", "cap", "flashlight", "soda_can")
 
 
@@ -121,3 +123,12 @@ class Shots:
         hand = np.random.default_rng([self._setting.seed, self._name, round(angle), time])
         T = self._camera(angle, hand)
         return look(self._stage, T, int(hand.integers(2**31)), self._setting)
+
+
+def strangers(looks: Sequence[Look], count: int, rng: np.random.Generator) -> list[tuple[Look, Look]]:
+    """Up to ``count`` different pairs of looks at different rooms, half of them at the same kind where there are."""
+    pairs = [(a, b) for a, b in combinations(looks, 2) if a[1] != b[1]]
+    mixed = [pairs[k] for k in rng.permutation(len(pairs))]
+    alike, other = ([pair for pair in mixed if (pair[0][0] == pair[1][0]) is same] for same in (True, False))
+    half = max(count // 2, count - len(other))
+    return (alike[:half] + other)[:count]

@@ -29,7 +29,6 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +36,7 @@ import click
 import numpy as np
 from cloud_peers import Peer, cloud_peers
 from command_line import given
-from looks import Setting, Shot, Shots, around, four
+from looks import Setting, Shot, Shots, around, four, strangers
 from paper import TABLE_1, Stage, keyframe
 from pose_figures import SUCCESS, error_at, grouped, judged, mean, median, nees, percentiles
 from sources import SIMULATED
@@ -309,17 +308,7 @@ def compile_half(half: int) -> None:
         Engine(params).propose(keyframe(drawn(0), params), keyframe(drawn(1), params))
 
 
-Look = tuple[str, int]  # the kind of object, and the room
 Piece = tuple[str, Callable[[Bench], None]]
-
-
-def strangers(looks: Sequence[Look], count: int, rng: np.random.Generator) -> list[tuple[Look, Look]]:
-    """Up to ``count`` different pairs of looks at different rooms, half of them at the same kind where there are."""
-    pairs = [(a, b) for a, b in combinations(looks, 2) if a[1] != b[1]]
-    mixed = [pairs[k] for k in rng.permutation(len(pairs))]
-    alike, other = ([pair for pair in mixed if (pair[0][0] == pair[1][0]) is same] for same in (True, False))
-    half = max(count // 2, count - len(other))
-    return (alike[:half] + other)[:count]
 
 
 def whole(reps: int, negatives: int, every: int) -> list[Piece]:

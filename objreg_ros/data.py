@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 
+JUMP_NS = 1_000_000_000  # stamps that go back so far are of a clock that began anew; by less, one message came late
 MOVED = re.compile(r"moved (?P<label>.+) \[m\]")  # evidence: how far an object of the label went
 Word = TypeVar("Word")
 

@@ -65,5 +65,7 @@ def _serve(make: Callable[[], Door], transport: str) -> int:
             door.failure.result()  # raises what ended the worker
         return 0
     finally:
-        executor.shutdown()
-        door.close()
+        try:
+            door.close()
+        finally:
+            executor.shutdown()  # last: the thread that heard the signal may still ring the bell that this takes down

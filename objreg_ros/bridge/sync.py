@@ -14,6 +14,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
+from objreg_ros.data import JUMP_NS
+
 
 class Need(Enum):
     """What a match does without an item of a stream."""
@@ -24,7 +26,6 @@ class Need(Enum):
 
 
 SILENCE_NS = 1_000_000_000  # an optional stream that is so far behind has stopped: nothing waits for it
-JUMP_NS = 1_000_000_000  # time that goes back so far has begun anew; by less, one item came late
 PATIENCE_NS = 2_000_000_000  # what waits longer, and is not among the last ``depth``, makes room
 MOST_BYTES = 200_000_000  # so does what is over this size, whatever its time
 ENCLOSING = 7  # times the slop: 0.14 s for one of 20 ms, so that 10 Hz are enough

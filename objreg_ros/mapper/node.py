@@ -17,7 +17,7 @@ from std_srvs.srv import SetBool, Trigger
 from objreg_ros.bridge import from_msg, qos, to_msg
 from objreg_ros.bridge.door import Door
 from objreg_ros.bridge.spin import run
-from objreg_ros.data import LoopClosure, Odometry
+from objreg_ros.data import JUMP_NS, LoopClosure, Odometry
 from objreg_ros.mapper.adapters.g2o import graph_text
 from objreg_ros.mapper.params import MapperNodeParams, MapperParams
 from objreg_ros.mapper.pose_graph import PoseGraph, Summary
@@ -27,7 +27,6 @@ try:
 except ImportError:  # optional: the topic carries the same
     TransformBroadcaster = None
 
-LATE_NS = 1_000_000_000  # odometry that goes back by less came out of order; by more, the clock was set back
 MOST_WAITING = qos.KEPT_CONSTRAINTS  # constraints without odometry yet; the oldest go when there are more
 
 
@@ -94,7 +93,7 @@ class MapperNode(Door):
         if not known or odometry.stamp_ns > known[-1]:
             return True
         back_ns = known[-1] - odometry.stamp_ns
-        if back_ns < LATE_NS:
+        if back_ns < JUMP_NS:
             self._passed_over_count += 1
             return False
         self.get_logger().warning(f"time jumped back by {back_ns / 1e9:.3f} s: a new map")

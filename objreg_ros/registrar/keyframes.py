@@ -14,14 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from objreg_ros.data import Array, Frame
+from objreg_ros.data import JUMP_NS, Array, Frame
 from objreg_ros.geometry import inverse, rotation_angle
 from objreg_ros.registrar.odometry import Way
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.plumb import PlumbLine
 from objreg_ros.registrar.tracking import Surface, surface_of, view_motion
-
-JUMP_NS = 1_000_000_000  # time that goes back so far has begun anew; by less, one frame came late
 
 
 class Clock(NamedTuple):

@@ -4,6 +4,7 @@ from __future__ import annotations
 import os
 import sys
 import threading
+from collections.abc import Callable
 
 import pytest
 
@@ -93,44 +94,56 @@ def test_a_job_that_has_not_begun_can_be_taken_back() -> None:
     assert bench.done == ["first"] and not bench.replaced
 
 
+class Overtaken:
+    """A backlog that holds its first job until ``go``, while 2, 3 and 4 overtake each other behind it."""
+
+    def __init__(self, settle: Callable[[int], object] | None = None) -> None:
+        self.go, self.over = threading.Event(), threading.Event()
+        self.done: list[tuple[str, int]] = []
+        begun = threading.Event()
+
+        def work(job: int) -> None:
+            begun.set()
+            assert self.go.wait(PATIENCE)
+            self.done.append(("work", job))
+            if job == 4:
+                self.over.set()
+
+        noted: Callable[[int], object] = lambda job: self.done.append(("settle", job))  # noqa: E731
+        self.backlog: Backlog[int] = Backlog(work, settle or noted, lambda error: self.over.set())
+        self.backlog.put(1)
+        assert begun.wait(PATIENCE)
+        for job in (2, 3, 4):
+            self.backlog.put(job)
+
+    def go_on(self) -> None:
+        """Let it go until it has done the last job, or broken off."""
+        self.go.set()
+        assert self.over.wait(PATIENCE)
+        self.backlog.close()
+
+
 def test_a_backlog_settles_what_was_overtaken_before_it_works_on_the_newest() -> None:
-    begun, go, over = threading.Event(), threading.Event(), threading.Event()
-    done: list[tuple[str, int]] = []
-
-    def work(job: int) -> None:
-        begun.set()
-        assert go.wait(PATIENCE)
-        done.append(("work", job))
-        if job == 4:
-            over.set()
-
-    backlog: Backlog[int] = Backlog(work, lambda job: done.append(("settle", job)), print)
-    backlog.put(1)
-    assert begun.wait(PATIENCE)
-    for job in (2, 3, 4):
-        backlog.put(job)
-    go.set()
-    assert over.wait(PATIENCE)
-    backlog.close()
-    assert done == [("work", 1), ("settle", 2), ("settle", 3), ("work", 4)] and backlog.rest() == []
+    held = Overtaken()
+    held.go_on()
+    assert held.done == [("work", 1), ("settle", 2), ("settle", 3), ("work", 4)] and held.backlog.rest() == []
 
 
 def test_a_closed_backlog_gives_back_what_it_did_not_begin() -> None:
-    begun, go = threading.Event(), threading.Event()
+    held = Overtaken()
+    rest = held.backlog.rest()
+    held.go.set()
+    held.backlog.close()
+    assert rest == [2, 3, 4] and held.done == [("work", 1)]
 
-    def work(_: int) -> None:
-        begun.set()
-        assert go.wait(PATIENCE)
 
-    backlog: Backlog[int] = Backlog(work, lambda _: None, print)
-    backlog.put(1)
-    assert begun.wait(PATIENCE)
-    for job in (2, 3):
-        backlog.put(job)
-    rest = backlog.rest()
-    go.set()
-    backlog.close()
-    assert rest == [2, 3]
+def test_a_backlog_that_breaks_off_gives_back_all_that_it_did_not_begin() -> None:
+    def settle(job: int) -> None:
+        raise RuntimeError("ROS is down")
+
+    held = Overtaken(settle)
+    held.go_on()
+    assert held.backlog.rest() == [3, 4]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="threads have no niceness of their own")
@@ -154,24 +167,3 @@ def test_a_nice_worker_and_the_threads_that_it_starts_give_way() -> None:
     worker.close()
     assert seen == [19, 19]
     assert os.getpriority(os.PRIO_PROCESS, threading.get_native_id()) < 19
-
-
-def test_a_backlog_that_breaks_off_gives_back_all_that_it_did_not_begin() -> None:
-    begun, go, broken = threading.Event(), threading.Event(), threading.Event()
-
-    def work(job: int) -> None:
-        begun.set()
-        assert go.wait(PATIENCE)
-
-    def settle(job: int) -> None:
-        raise RuntimeError("ROS is down")
-
-    backlog: Backlog[int] = Backlog(work, settle, lambda error: broken.set())
-    backlog.put(1)
-    assert begun.wait(PATIENCE)
-    for job in (2, 3, 4):
-        backlog.put(job)
-    go.set()
-    assert broken.wait(PATIENCE)
-    backlog.close()
-    assert backlog.rest() == [3, 4]

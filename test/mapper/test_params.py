@@ -26,12 +26,9 @@ def test_where_the_camera_is_mounted_is_a_pose_and_nothing_is_where_the_body_is(
     assert np.array_equal(MapperNodeParams().mounting, np.eye(4))
 
 
-@pytest.mark.parametrize(
-    ("numbers", "said"), [((1.0, 2.0, 3.0), "expected x y z qx qy qz qw or nothing"), ((0.0,) * 7, "non-zero length")]
-)
-def test_a_mounting_that_cannot_be_is_refused_when_it_is_set(numbers: tuple, said: str) -> None:
-    with pytest.raises(ValueError, match=f"{said}.*got"):
-        MapperNodeParams(T_base_camera=numbers)
+def test_a_mounting_that_cannot_be_is_refused_when_it_is_set() -> None:
+    with pytest.raises(ValueError, match="expected x y z qx qy qz qw or nothing, got"):
+        MapperNodeParams(T_base_camera=(1.0, 2.0, 3.0))
 
 
 def test_the_node_s_other_values_are_checked_too() -> None:

@@ -10,6 +10,8 @@ import pytest
 
 from objreg_ros.simulation import texture
 
+from .pictures import require_square_and_seeded
+
 PICTURES: list[Callable[[np.random.Generator], np.ndarray]] = [
     texture.wood, texture.tiles, texture.fabric, texture.marble, texture.brushed, texture.patches, texture.stripes,
     texture.any_surface,
@@ -18,11 +20,7 @@ PICTURES: list[Callable[[np.random.Generator], np.ndarray]] = [
 
 @pytest.mark.parametrize("draw", PICTURES, ids=lambda draw: draw.__name__)
 def test_a_picture_is_square_of_a_power_of_two_and_follows_from_its_seed(draw: Callable[..., np.ndarray]) -> None:
-    first, again, other = (draw(np.random.default_rng(seed)) for seed in (3, 3, 4))
-    size = first.shape[0]
-    assert first.shape == (size, size, 3) and first.dtype == np.uint8 and size & (size - 1) == 0
-    assert np.array_equal(first, again)
-    assert first.shape != other.shape or not np.array_equal(first, other)
+    require_square_and_seeded(draw)
 
 
 @pytest.mark.parametrize(

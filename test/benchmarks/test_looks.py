@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of what the registration benchmark shows to the gate."""
+"""Tests of which simulated looks are shown to each other."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 def test_strangers_are_pairs_of_different_rooms_and_no_pair_comes_twice(
     labels: tuple[str, ...], rooms: int, count: int
 ) -> None:
-    from registration import strangers
+    from looks import strangers
 
     looks = [(label, room) for label in labels for room in range(rooms)]
     pairs = strangers(looks, count, np.random.default_rng(3))
@@ -22,6 +22,6 @@ def test_strangers_are_pairs_of_different_rooms_and_no_pair_comes_twice(
 
 
 def test_of_few_strangers_all_pairs_are_shown() -> None:
-    from registration import strangers
+    from looks import strangers
 
     assert len(strangers([("box", 0), ("can", 1), ("can", 2)], 500, np.random.default_rng(0))) == 3
