@@ -20,7 +20,7 @@ from objreg_ros.data import JUMP_NS
 class Need(Enum):
     """What a match does without an item of a stream."""
 
-    REQUIRED = "required"  # there is no match; an item serves one match
+    REQUIRED = "required"  # there is no match; an item serves one match, of the reference's nearest
     OPTIONAL = "optional"  # it goes without; waited for while the stream speaks; an item may serve many matches
     LATCHED = "latched"  # the last value serves whatever its stamp; there is no match before the first
 
@@ -91,6 +91,7 @@ class Queue:
     on_drop: Callable[[str, int, str], None]
     items: deque[Item] = field(default_factory=deque)
     last_ns: int | None = None
+    period_ns: int | None = None  # between its last two
     latched: Any = None
     received: int = 0
     matched: int = 0
@@ -137,6 +138,16 @@ class Queue:
         if self.last_ns is None:
             return self.stream.need is Need.OPTIONAL
         return self.last_ns > stamp_ns or any(item.stamp_ns == stamp_ns for item in self.items)
+
+    def takes(self, stamp_ns: int, item: Item) -> bool:
+        """Whether an item of the reference at a time would have this one for its match, and no other may."""
+        return self.stream.need is Need.REQUIRED and self.nearest(stamp_ns) is item
+
+    def hear(self, item: Item) -> None:
+        """Take an item in."""
+        self.period_ns = None if self.last_ns is None else item.stamp_ns - self.last_ns
+        self.last_ns = item.stamp_ns
+        self.items.append(item)
 
     def is_late(self, stamp_ns: int) -> bool:
         """Whether an item came after a later one of its stream, and time has not begun anew."""
@@ -205,8 +216,7 @@ class Synchroniser:
         if queue.last_ns is not None and stamp_ns < queue.last_ns:
             self._forget_after(stamp_ns)
         queue.drop_after(stamp_ns)  # another stream's jump may have left what lies in the future of this one's
-        queue.last_ns = stamp_ns
-        queue.items.append(Item(stamp_ns, payload))
+        queue.hear(Item(stamp_ns, payload))
         return [*self._matches(), *self._make_room(queue)]
 
     def flush(self) -> list[Match]:
@@ -246,7 +256,30 @@ class Synchroniser:
                     return False
             elif not queue.settled(item.stamp_ns) and not self._silent(queue):
                 return False
-        return True
+        return not self._may_give_way(item)
+
+    def _may_give_way(self, item: Item) -> bool:
+        """Whether the next reference item, which is due and not here yet, would be nearer to a partner of this one."""
+        reference = self._reference
+        if len(reference.items) > 1 or not reference.period_ns:
+            return False
+        due_ns = item.stamp_ns + reference.period_ns
+        return any(_is_nearer(due_ns, item, partner) for _, partner in self._sole_partners(item))
+
+    def _gives_way(self, item: Item) -> bool:
+        """Whether the next reference item is nearer to a partner that serves one match, and will have it."""
+        if len(self._reference.items) < 2:
+            return False
+        next_ns = self._reference.items[1].stamp_ns
+        return any(
+            _is_nearer(next_ns, item, partner) and queue.takes(next_ns, partner)
+            for queue, partner in self._sole_partners(item)
+        )
+
+    def _sole_partners(self, item: Item) -> list[tuple[Queue, Item]]:
+        """What the streams whose items serve one match have for a reference item."""
+        queues = [queue for queue in self._others if queue.stream.need is Need.REQUIRED]
+        return [(queue, partner) for queue in queues for partner in queue.partners(item.stamp_ns)]
 
     def _silent(self, queue: Queue) -> bool:
         """Whether an optional stream has stopped, by the time of the reference."""
@@ -257,7 +290,7 @@ class Synchroniser:
     def _resolve(self, item: Item, why: Drop = Drop.UNMATCHED) -> list[Match]:
         """Take the first reference item out: a match, or a drop."""
         partners = {queue.stream.name: queue.partners(item.stamp_ns) for queue in self._others if not _latched(queue)}
-        if self.lacking(item.stamp_ns):
+        if self.lacking(item.stamp_ns) or self._gives_way(item):
             self._reference.drop_oldest(why)
             return []
         self._reference.use(item)
@@ -290,6 +323,11 @@ class Synchroniser:
 
 def _latched(queue: Queue) -> bool:
     return queue.stream.need is Need.LATCHED
+
+
+def _is_nearer(stamp_ns: int, item: Item, partner: Item) -> bool:
+    """Whether a time is nearer to a partner than an item is."""
+    return abs(stamp_ns - partner.stamp_ns) < abs(item.stamp_ns - partner.stamp_ns)
 
 
 def _size(payload: Any) -> int:

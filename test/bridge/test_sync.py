@@ -53,12 +53,37 @@ def test_nothing_within_the_slop_is_no_match() -> None:
     assert sync.queues["image"].dropped == {"unmatched": 1} and accounts_hold(sync)
 
 
-def test_a_required_item_serves_one_match() -> None:
+def test_a_required_item_serves_the_one_match_of_its_nearest() -> None:
     sync = Synchroniser((Stream("image"), Stream("depth", slop_ns=10)))
     sync.add("image", 100, "i")
     sync.add("image", 104, "j")
-    assert pairs(sync.add("depth", 104, "d"), "image") == [("i",)]
+    assert pairs(sync.add("depth", 104, "d"), "image") == [("j",)]
+    assert sync.queues["image"].dropped == {"unmatched": 1}
     assert sync.flush() == [] and accounts_hold(sync)
+
+
+def test_one_that_has_a_nearer_partner_leaves_the_other_to_whom_it_suits() -> None:
+    sync = Synchroniser((Stream("image"), Stream("depth", slop_ns=10)))
+    sync.add("image", 100, "i")
+    sync.add("image", 112, "j")
+    sync.add("depth", 107, "d")  # nearer to j, which has a nearer one still
+    assert pairs(sync.add("depth", 114, "e"), "image", "depth") == [("i", "d")]
+    assert pairs(sync.flush(), "image", "depth") == [("j", "e")] and accounts_hold(sync)
+
+
+@pytest.mark.parametrize(
+    ("reference_ms", "partner_ms", "offset_ms", "expected_ms"),
+    [(1000 / 60, 1000 / 30, 18.0, 1.4), (1000 / 30, 1000 / 15, 20.0, 13.4), (1000 / 30, 1000 / 30, 5.0, 5.1)],
+)
+def test_every_partner_meets_its_nearest_whichever_stream_is_faster(
+    reference_ms: float, partner_ms: float, offset_ms: float, expected_ms: float
+) -> None:
+    sync = Synchroniser((Stream("depth"), Stream("image", slop_ns=20_000_000)))
+    stamps = [(round(k * reference_ms * 1e6), "depth") for k in range(60)]
+    stamps += [(round((k * partner_ms + offset_ms) * 1e6), "image") for k in range(20)]
+    matches = [match for stamp_ns, name in sorted(stamps) for match in sync.add(name, stamp_ns, stamp_ns)]
+    assert len(matches) >= 19
+    assert max(abs(match["depth"] - match["image"]) for match in matches) < expected_ms * 1e6
 
 
 def test_a_latched_value_serves_every_match_and_is_waited_for() -> None:
