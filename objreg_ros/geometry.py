@@ -62,6 +62,11 @@ def is_rigid(T: Array, tolerance: float = 1e-5) -> bool:
     return bool(np.abs(R @ R.T - np.eye(3)).max() < tolerance and np.linalg.det(R) > 0)
 
 
+def rigid(T: Array) -> Array:
+    """A pose (4, 4) with its rotation made orthonormal again: each product leaves it a little less so."""
+    return pose(rotation_from_vector(vector_from_rotation(T[:3, :3])), T[:3, 3])
+
+
 def skew(v: Array) -> Array:
     """The cross-product matrices (..., 3, 3) of vectors (..., 3): ``skew(v) @ w == cross(v, w)``."""
     K = np.zeros((*np.shape(v), 3))

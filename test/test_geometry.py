@@ -152,6 +152,12 @@ def test_a_mounting_is_seven_numbers_or_none_at_all() -> None:
         g.mounting((0.0,) * 7)
 
 
+def test_a_pose_after_many_products_is_made_rigid_again() -> None:
+    T = g.pose(QUARTER_TURN + 1e-4 * np.arange(9.0).reshape(3, 3), np.ones(3))
+    assert not g.is_rigid(T) and g.is_rigid(g.rigid(T), 1e-12)
+    np.testing.assert_allclose(g.rigid(T), T, atol=1e-3)
+
+
 def test_the_rigid_fit_finds_the_motion_and_never_a_mirror() -> None:
     T = g.pose(g.rotation_from_vector(np.array([0.3, -2.0, 1.1])), np.array([4.0, -1.0, 2.0]))
     xyz = np.random.default_rng(3).normal(size=(30, 3)) * [1.0, 1.0, 0.01]

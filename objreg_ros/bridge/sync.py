@@ -259,11 +259,15 @@ class Synchroniser:
         return not self._may_give_way(item)
 
     def _may_give_way(self, item: Item) -> bool:
-        """Whether the next reference item, which is due and not here yet, would be nearer to a partner of this one."""
-        reference = self._reference
-        if len(reference.items) > 1 or not reference.period_ns:
-            return False
-        due_ns = item.stamp_ns + reference.period_ns
+        """Whether the next reference item is nearer to a partner, and is only due or may meet a nearer one yet."""
+        items, period_ns = self._reference.items, self._reference.period_ns
+        if len(items) > 1:
+            next_ns = items[1].stamp_ns
+            return any(
+                _is_nearer(next_ns, item, partner) and not queue.settled(next_ns)
+                for queue, partner in self._sole_partners(item)
+            )
+        due_ns = item.stamp_ns + (period_ns or 0)
         return any(_is_nearer(due_ns, item, partner) for _, partner in self._sole_partners(item))
 
     def _gives_way(self, item: Item) -> bool:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from objreg_ros.data import Array, Frame, ObjectCloud, PointFlag
-from objreg_ros.geometry import inverse, pose, rotate, rotation_from_vector, transform, vector_from_rotation
+from objreg_ros.geometry import inverse, rigid, rotate, transform
 from objreg_ros.registrar.keyframe import Context, Keyframe, KeyObject, bounding_box
 from objreg_ros.registrar.keyframes import Stretch
 from objreg_ros.registrar.labels import LabelGroups
@@ -39,7 +39,7 @@ def fuse(stretch: Stretch, params: RegistrarParams) -> Keyframe:
         view=reference.view,
         gravity=reference.gravity,
         gravity_confidence=reference.gravity_confidence,
-        T_odom_camera=_rigid(stretch.T_session_first @ stretch.T_first_frame[chosen]),
+        T_odom_camera=rigid(stretch.T_session_first @ stretch.T_first_frame[chosen]),
         by_odometry=stretch.by_odometry,
         travelled=stretch.travelled,
         turned=stretch.turned,
@@ -190,8 +190,3 @@ def _sharpness(grey: Array | None) -> float:
         return 0.0
     pixels = grey.astype(np.float32)
     return float(np.square(np.diff(pixels, axis=0)).mean() + np.square(np.diff(pixels, axis=1)).mean())
-
-
-def _rigid(T: Array) -> Array:
-    """The pose with its rotation made orthonormal again after many products."""
-    return pose(rotation_from_vector(vector_from_rotation(T[:3, :3])), T[:3, 3])

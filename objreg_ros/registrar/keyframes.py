@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from objreg_ros.data import JUMP_NS, Array, Frame
-from objreg_ros.geometry import inverse, rotation_angle
+from objreg_ros.geometry import inverse, rigid, rotation_angle
 from objreg_ros.registrar.odometry import Way
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.plumb import PlumbLine
@@ -212,7 +212,7 @@ class Keyframer:
         if frame.T_odom_camera is not None or self._open is None:
             return frame.T_odom_camera
         T_first_frame = view_motion(frame.view, self._open.surface, self._open.T_first_last)
-        return None if T_first_frame is None else self._open.T_session_first @ T_first_frame
+        return None if T_first_frame is None else rigid(self._open.T_session_first @ T_first_frame)
 
     def _may_come_back(self, session: _Session, frame: Frame) -> bool:
         """Whether odometry is only a moment late: such a frame is passed over."""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import Frame, View
-from objreg_ros.geometry import inverse, pose, rotation_from_vector
+from objreg_ros.geometry import inverse, is_rigid, pose, rotation_from_vector
 from objreg_ros.registrar.keyframes import Clock, Keyframer, Stretch
 from objreg_ros.registrar.params import RegistrarParams
 
@@ -54,6 +54,13 @@ def test_without_odometry_the_views_give_the_motion() -> None:
     stretches = _run(Keyframer(PARAMS), frames)
     assert len(stretches) == 2 and {s.session for s in stretches} == {0}
     assert np.allclose(stretches[1].T_session_first, moved(0.12), atol=0.005)
+
+
+def test_our_own_tracking_stays_rigid_however_long_it_is() -> None:
+    keyframer, sway = Keyframer(PARAMS), 0.1 * np.sin(0.2 * np.arange(150))
+    stretches = _run(keyframer, [frame(0.1 * i, CUP, None, scene_view(moved(x))) for i, x in enumerate(sway)])
+    assert {s.session for s in stretches} == {0} and len(stretches) > 10
+    assert all(is_rigid(s.T_session_first, 1e-12) for s in stretches)
 
 
 def test_a_lost_track_and_a_jump_back_in_time_begin_a_new_session() -> None:
