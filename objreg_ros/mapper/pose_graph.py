@@ -87,9 +87,8 @@ class Problem(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What an optimisation came to: how many keyframes, and the closures that it kept and pruned."""
+    """What an optimisation came to: the closures that it kept and those that it pruned."""
 
-    keyframes: int
     kept: tuple[LoopClosure, ...]
     pruned: tuple[LoopClosure, ...]
 
@@ -156,7 +155,7 @@ class PoseGraph:
         verdicts = [(tie.closure, kept) for tie, kept in zip(problem.ties, solution.kept, strict=True)]
         kept = tuple(closure for closure, keep in verdicts if closure is not None and keep)
         pruned = tuple(closure for closure, keep in verdicts if closure is not None and not keep)
-        return Summary(len(problem.poses), kept, pruned)
+        return Summary(kept, pruned)
 
     @property
     def T_map_odom(self) -> Array:

@@ -47,7 +47,6 @@ def refine(source: Prepared, target: Prepared, T_target_source: Array, params: R
         inliers=found.inliers,
         overlap=found.inliers / max(1, len(source.xyz)),
         rmse=found.rmse,
-        iterations=params.iterations,
         converged=found.inliers >= params.min_points,
         slack=free,
         held=held,
