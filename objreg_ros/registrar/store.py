@@ -319,11 +319,9 @@ def _look_through(path: Path) -> tuple[int, str]:
     return version, "" if found == "ok" else found
 
 
-def _insert(transaction: sqlite3.Connection, table: str, row: Mapping[str, Any]) -> int:
+def _insert(transaction: sqlite3.Connection, table: str, row: Mapping[str, Any]) -> None:
     names, marks = ", ".join(row), ", ".join("?" * len(row))
-    return int(
-        transaction.execute(f"INSERT INTO {table} ({names}) VALUES ({marks})", tuple(row.values())).lastrowid or 0
-    )
+    transaction.execute(f"INSERT INTO {table} ({names}) VALUES ({marks})", tuple(row.values()))
 
 
 def _closure_row(closure: LoopClosure) -> dict[str, Any]:
