@@ -64,7 +64,7 @@ def command(
         )
     click.echo(f"{out}: {scenario}, seed {seed}, {frames} frames at {story.rate:.1f} Hz, truth in {out / 'truth'}")
     if story.rate < rate - 1e-6:
-        click.echo(f"note: {frames} frames are few for this way, so they are {story.rate:.1f} Hz apart, not {rate:g}")
+        click.echo(f"note: {frames} frames are few for this path, so they come at {story.rate:.1f} Hz, not {rate:g}")
 
 
 def camera_of(name: str, size: str | None) -> Intrinsics:

@@ -127,8 +127,8 @@ class PoseGraph:
         """
         if closure.from_ns >= closure.to_ns:
             raise ValueError(
-                f"expected a constraint from before its to at {closure.to_ns} ns, got one from {closure.from_ns} ns: "
-                "it ties two runs of the clock; give each run a store of its own"
+                f"expected a constraint whose *from* is before its *to* at {closure.to_ns} ns, got "
+                f"{closure.from_ns} ns: it ties two runs of the clock; give each run a store of its own"
             )
         if not (self.odometry.covers(closure.from_ns) and self.odometry.covers(closure.to_ns)):
             return False

@@ -172,7 +172,7 @@ def test_the_id_of_a_landmark_is_never_used_again(tmp_path: Path) -> None:
 
 def test_a_place_where_no_store_can_be_made_is_a_store_error(tmp_path: Path) -> None:
     for path in (tmp_path / "nowhere" / "place.db", tmp_path):
-        with pytest.raises(StoreError, match="expected a file in a folder"):
+        with pytest.raises(StoreError, match="expected a file in an existing folder"):
             Store(path)
     assert not list(tmp_path.iterdir())
 
