@@ -194,9 +194,9 @@ def furnished(rng: Random, pieces: Sequence[tuple[Furniture, Array]], room: Room
     return Scene((), (room.mesh, *meshes), lamps, ambient, (), (room.ceiling,), reach)
 
 
-def number(laid: Sequence[tuple[ObjectModel, Array]], first: int = 1) -> tuple[Placed, ...]:
-    """Placed objects from models and their poses in the world, numbered from ``first``."""
-    return tuple(Placed(first + k, model, T) for k, (model, T) in enumerate(laid))
+def number(laid: Sequence[tuple[ObjectModel, Array]]) -> tuple[Placed, ...]:
+    """Placed objects from models and their poses in the world, numbered from 1."""
+    return tuple(Placed(k, model, T) for k, (model, T) in enumerate(laid, 1))
 
 
 def random_scene(seed: int, labels: Sequence[str] = LABELS, distractor_share: float = 0.4) -> Scene:
