@@ -95,7 +95,7 @@ def test_an_unknown_keyframe_is_a_key_error() -> None:
         Store().keyframe(5)
 
 
-def test_merged_landmarks_are_written(tmp_path: Path) -> None:
+def test_merged_landmarks_are_written() -> None:
     store = Store()
     written = keyframe(1)
     store.add(written, [sightings_of(written)[0].of_landmark(9, np.eye(3))])
