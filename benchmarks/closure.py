@@ -166,7 +166,13 @@ def _require_own_names(names: Sequence[str]) -> None:
 
 @click.command()
 @click.argument("recordings", nargs=-1, type=click.Path(exists=True, path_type=Path))
-@click.option("--simulate", "scenarios", multiple=True, metavar="SCENARIO:SEED,SEED…", help="Make and use a recording.")
+@click.option(
+    "--simulate",
+    "scenarios",
+    multiple=True,
+    metavar="SCENARIO:SEED,SEED…",
+    help="Simulate these recordings and use them.",
+)
 @click.option("--frames", default=600, show_default=True, help="Frames of a simulated recording.")
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
 @click.option("--figure", type=click.Path(dir_okay=False, path_type=Path), help="Draw them here (svg, png).")
@@ -176,7 +182,7 @@ def _require_own_names(names: Sequence[str]) -> None:
     "--peers", "names", default="orb_pnp,fpfh_icp,paper", show_default=True, callback=named, help="Compared with these."
 )
 @click.option("--candidates", default=1, show_default=True, help="Pairs that a peer may try for each keyframe.")
-@click.option("--seed", default=1, show_default=True, help="Of the synthetic drift and of the registrar.")
+@click.option("--seed", default=1, show_default=True, help="Seed of the synthetic drift and of the registrar.")
 @click.option("--drift", default=1.0, show_default=True, help="Synthetic odometry drifts so many times 2 % and 1°/m.")
 @click.option(
     "--keep", type=click.Path(file_okay=False, path_type=Path), default=Path("out/closure"), show_default=True

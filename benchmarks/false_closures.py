@@ -143,7 +143,7 @@ def line(name: str, row: dict[str, Any], group: str = "all") -> str:
     show_default=True,
     metavar="SCENARIO:SEED[:CAMERA][:stress]",
     callback=lambda _context, _option, texts: [told(text) for text in texts],
-    help="Simulate this, as often as you like.",
+    help="Simulate this; may be repeated.",
 )
 @click.option("--frames", type=click.IntRange(min=2), default=400, show_default=True, help="Frames of a recording.")
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")

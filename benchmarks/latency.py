@@ -217,7 +217,7 @@ def line_of(row: Mapping[str, Any]) -> str:
 @click.command()
 @click.option("--objects", default="1,4,8", show_default=True, help="Objects in view, one run each.")
 @click.option("--frames", default=300, show_default=True, help="Frames of a run, at 30 a second.")
-@click.option("--seed", default=0, show_default=True, help="Of the simulated recordings.")
+@click.option("--seed", default=0, show_default=True, help="Seed of the simulated recordings.")
 @click.option("--model", default="", help="ONNX model of the detector, if not the default.")
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
 def main(objects: str, frames: int, seed: int, model: str, json_file: Path | None) -> None:

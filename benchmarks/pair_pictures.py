@@ -15,6 +15,8 @@ from objreg_ros.data import Array, DepthImage
 from objreg_ros.geometry import back_project, transform
 from objreg_ros.truth import LOOSE
 
+MOST_FAILURES = 12  # that are drawn of one run
+
 
 def picture(images: tuple[DepthImage, DepthImage], T_target_source: Array, text: str) -> Array:
     """Source, target, and the source's points painted into the target's picture, side by side, as BGR."""
@@ -35,7 +37,7 @@ def picture(images: tuple[DepthImage, DepthImage], T_target_source: Array, text:
 
 
 def draw_failures(
-    folder: Path, pairs: Sequence[Pair], rows: Sequence[Row], image: Callable[[int], DepthImage | None], most: int = 12
+    folder: Path, pairs: Sequence[Pair], rows: Sequence[Row], image: Callable[[int], DepthImage | None]
 ) -> None:
     """The worst of a method as pictures: what was accepted and wrong first, then the largest errors."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -44,7 +46,7 @@ def draw_failures(
         for k, (p, r) in enumerate(zip(pairs, rows, strict=True))
         if r.error is not None and r.T is not None
     ]
-    for wrong, failed, _, k in sorted(worth, reverse=True)[:most]:
+    for wrong, failed, _, k in sorted(worth, reverse=True)[:MOST_FAILURES]:
         pair, row = pairs[k], rows[k]
         first, second = image(pair.source), image(pair.target)
         if not (wrong or failed) or row.T is None or row.error is None or first is None or second is None:

@@ -38,6 +38,7 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.verify import verify
 
 QUICK = {"wanted": 15, "names": ("paper", "orb_pnp")}
+GICP_VOXEL = 0.03  # m, of the whole frames that finish a peer's pose
 
 
 def fused(frames: Sequence[Frame], params: RegistrarParams) -> list[Keyframe]:
@@ -91,8 +92,8 @@ class Theirs:
 class Finished:
     """A peer whose pose is finished by GICP on the whole frames, at the same acceptance."""
 
-    def __init__(self, peer: Peer, voxel: float = 0.03) -> None:
-        self.name, self._peer, self._voxel = f"{peer.name}+gicp", peer, voxel
+    def __init__(self, peer: Peer) -> None:
+        self.name, self._peer = f"{peer.name}+gicp", peer
 
     def prepare(self, shot: Shot) -> Any:
         """What the peer prepares, and a cloud for GICP."""
@@ -100,7 +101,7 @@ class Finished:
 
         camera, depth = shot.image.intrinsics, shot.image.depth
         xyz = back_project(depth, camera.fx, camera.fy, camera.cx, camera.cy)[(depth > 0) & (depth < 4.0)]
-        return self._peer.prepare(shot), small_gicp.preprocess_points(xyz.astype(np.float64), self._voxel, 12, 1)
+        return self._peer.prepare(shot), small_gicp.preprocess_points(xyz.astype(np.float64), GICP_VOXEL, 12, 1)
 
     def register(self, first: Any, second: Any) -> Answer | None:
         """The peer's pose after two rounds of GICP."""

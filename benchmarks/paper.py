@@ -332,7 +332,7 @@ def show(cell: dict[str, Any]) -> str:
 
 @click.command()
 @click.option("--seeds", default=3, show_default=True, help="Instances of every object.")
-@click.option("--seed", default=0, show_default=True, help="The first of them.")
+@click.option("--seed", default=0, show_default=True, help="The first seed.")
 @click.option("--step", type=click.Choice(["10", "30"]), default="30", show_default=True, help="Degrees of the sweep.")
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
 @click.option("--figure", type=click.Path(dir_okay=False, path_type=Path), help="Draw the line graph here (svg, png).")

@@ -18,9 +18,11 @@ import numpy as np
 from objreg_ros.data import Array, DepthImage, ObjectCloud
 from objreg_ros.geometry import back_project, pose, rotation_from_vector
 
+FEATURES = 1000  # of an image, at most
 MIN_FEATURES = 20  # inliers of PnP, as RTAB-Map's Vis/MinInliers
 MIN_FITNESS = 0.4  # of whole-frame ICP
 PAPER_ERROR = 0.005  # m, what the founding document calls good
+PAPER_ITERATIONS = 100  # of its ICP, at most
 VOXEL = 0.05  # m, of whole-frame features
 FAR = 4.0  # m, a Kinect's depth beyond is not used
 
@@ -55,10 +57,10 @@ class Peer(Protocol):
 class FeaturesPnP:
     """ORB or SIFT features, mutual nearest neighbours, PnP with RANSAC: what feature-based SLAM does."""
 
-    def __init__(self, name: str = "orb_pnp", features: int = 1000) -> None:
+    def __init__(self, name: str) -> None:
         self.name = name
         sift = name.startswith("sift")
-        self._detector = cv2.SIFT_create(features) if sift else cv2.ORB_create(features)
+        self._detector = cv2.SIFT_create(FEATURES) if sift else cv2.ORB_create(FEATURES)
         self._matcher = cv2.BFMatcher(cv2.NORM_L2 if sift else cv2.NORM_HAMMING, crossCheck=True)
 
     def prepare(self, shot: Shot) -> tuple[Array, Array, Any, Array]:
@@ -148,9 +150,6 @@ class Founding:
 
     name = "paper"
 
-    def __init__(self, max_error: float = PAPER_ERROR, iterations: int = 100) -> None:
-        self._max_error, self._iterations = max_error, iterations
-
     def prepare(self, shot: Shot) -> list[tuple[str, Any]]:
         """The objects as clouds, with their labels."""
         import open3d as o3d
@@ -167,7 +166,7 @@ class Founding:
         if not fits:
             return None
         error, T_from_to = min(fits, key=lambda item: item[0])
-        return Answer(T_from_to, error < self._max_error)
+        return Answer(T_from_to, error < PAPER_ERROR)
 
     def fit(self, target: Any, source: Any) -> tuple[float, Array]:
         """(mean distance to the closest point in m, ``T_target_source``): the document's error and answer."""
@@ -180,7 +179,7 @@ class Founding:
             1.0,
             np.eye(4),
             registration.TransformationEstimationPointToPoint(False),
-            registration.ICPConvergenceCriteria(1e-7, 1e-7, self._iterations),
+            registration.ICPConvergenceCriteria(1e-7, 1e-7, PAPER_ITERATIONS),
         )
         T = np.array(result.transformation)
         moved = o3d.geometry.PointCloud(source).transform(T)

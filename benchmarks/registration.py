@@ -363,8 +363,8 @@ def run(
 @click.option("--cache", type=click.Path(file_okay=False, path_type=Path), help="Keep finished pieces here.")
 @click.option("--negatives", default=500, show_default=True, help="Pairs of different rooms, for each condition.")
 @click.option("--reps", default=2, show_default=True, help="Instances of each object.")
-@click.option("--every", default=2, show_default=True, help="The peers see every so many angles of one instance.")
-@click.option("--processes", default=2, show_default=True, help="1 where the times count: one condition at a time.")
+@click.option("--every", default=2, show_default=True, help="The peers are asked at every n-th angle of one instance.")
+@click.option("--processes", default=2, show_default=True, help="Conditions run at once; 1 where the times matter.")
 @click.pass_context
 def main(
     context: click.Context,

@@ -90,7 +90,7 @@ def table(name: str, row: dict[str, Any]) -> str:
 @click.option("--threads", default=2, show_default=True, help="Stored keyframes that are tried at once.")
 @click.option("--model", default="", help="ONNX model; `truth` takes the true boxes of a simulated recording.")
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
-@click.option("--seed", default=1, show_default=True, help="Of the synthetic drift.")
+@click.option("--seed", default=1, show_default=True, help="Seed of the synthetic drift.")
 def main(recordings: tuple[Path, ...], threads: int, model: str, json_file: Path | None, seed: int) -> None:
     """Measure the stages of the registrar on RECORDINGS that have ground truth."""
     params = RegistrarParams(threads=threads)

@@ -305,7 +305,6 @@ class Alignment:
     inliers: int
     overlap: float
     rmse: float
-    iterations: int
     converged: bool
     slack: Array = field(default_factory=lambda: np.zeros((0, 6)))
     held: Array = field(default_factory=lambda: np.zeros((0, 6)))

@@ -53,7 +53,7 @@ def closure(**changes: Any) -> data.LoopClosure:
 
 def alignment(**changes: Any) -> data.Alignment:
     values = {"T_target_source": np.eye(4), "information": np.eye(6), "inliers": 3, "overlap": 0.5, "rmse": 0.1,
-              "iterations": 2, "converged": True, **changes}  # fmt: skip
+              "converged": True, **changes}  # fmt: skip
     return data.Alignment(**values)
 
 

@@ -33,7 +33,6 @@ class Sight:
 
     detections: Detections
     objects: tuple[ObjectCloud, ...]
-    stamp_ns: int
 
 
 class Collector(Node):
@@ -111,7 +110,7 @@ class Collector(Node):
             return
         if self.sight is None or len(objects) >= len(self.sight.objects):
             seen = min(self._recent, key=lambda detections: abs(detections.stamp_ns - stamp_ns))
-            self.sight = Sight(seen, objects, stamp_ns)
+            self.sight = Sight(seen, objects)
 
     def _glimpse(self, stamp_ns: int) -> dict[str, Any]:
         return self.glimpses.setdefault(stamp_ns, {"stamp_ns": stamp_ns, "labels": [], "objects": []})

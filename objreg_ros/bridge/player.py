@@ -94,7 +94,7 @@ class Player(Node):
         if not nodes:
             raise ValueError("lossless: expected the nodes to publish `finished`, got none; are they running here?")
         if not self._spin_until(lambda: not self._deaf(nodes), START_S):
-            raise ValueError(f"lossless: expected nodes that listen, got none on {', '.join(self._deaf(nodes))}")
+            raise ValueError(f"lossless: expected listening nodes, got none on {', '.join(self._deaf(nodes))}")
         self._wait_until(time.monotonic() + SETTLE_S)
         self._receipts = Receipts(nodes)
         return self._receipts

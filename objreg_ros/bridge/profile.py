@@ -17,7 +17,7 @@ def apply(environment: MutableMapping[str, str] = os.environ) -> str:
     """Name our profile in ``environment`` before DDS reads it; a line for the log that says what is in force."""
     rmw = environment.get("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp")
     if "fastrtps" not in rmw:
-        return f"{rmw}: check by yourself that it passes messages of 10 MB"
+        return f"{rmw}: check yourself that it carries messages of 10 MB"
     chosen = next((name for name in (*VARIABLES, TRANSPORTS) if environment.get(name)), None)
     if chosen and environment[chosen] != str(find(PROFILE)):
         return f"Fast DDS: your own {chosen}={environment[chosen]}"

@@ -229,10 +229,6 @@ class Synchroniser:
                 queue.drop_oldest(Drop.UNMATCHED)
         return found
 
-    def clear(self) -> None:
-        """Drop everything that waits, counted like a jump in time; latched values stay."""
-        self._forget_after(-(2**63))
-
     def lacking(self, stamp_ns: int) -> list[Stream]:
         """The streams that a match at a time needs and that have nothing for it now."""
         return [queue.stream for queue in self._others if queue.lacks(stamp_ns)]

@@ -42,12 +42,6 @@ class Worker(Generic[Job]):
         if overtaken is not None:
             self._replaced(overtaken)
 
-    def clear(self) -> Job | None:
-        """Take back the job that has not begun, if there is one."""
-        with self._ready:
-            waiting, self._next = self._next, None
-        return waiting
-
     def close(self) -> None:
         """Finish the job in hand, leave the one that waits, end the thread."""
         with self._ready:

@@ -16,7 +16,7 @@ import click
 # What `objreg --help` says without importing a command. A name without its file is not shown.
 SUMMARIES = {
     "demo": "Run a recording through the live graph and show what came out.",
-    "inspect": "Say what is in a recording and what the graph would use.",
+    "inspect": "Say what is in a recording and what the graph would use of it, or what a store remembers.",
     "offline": "Run a recording through the three rooms without ROS.",
     "replay": "Publish a recording into the live graph.",
     "convert": "Write any recording as rosbag2.",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`objreg inspect`: what is in a recording and what the graph would use."""
+"""`objreg inspect`: what is in a recording and what the graph would use of it, or what a store remembers."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ DRIFT = "drift:"
 @options.model
 @options.labels
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the outcome here.")
-@click.option("--max-frames", type=click.IntRange(min=1), help="Stop after so many frames.")
+@click.option("--max-frames", type=click.IntRange(min=1), help="Stop after this many frames.")
 @click.option(
     "--odometry",
     metavar="TOPIC|none|drift:SEED",

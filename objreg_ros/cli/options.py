@@ -24,6 +24,6 @@ labels = click.option("--labels", help="Text file of labels, one a line.")
 def require_writable(option: str, file: Path) -> None:
     """OSError before the work rather than after it, where the ``file`` of an option could not be written."""
     if not file.parent.is_dir():
-        raise OSError(f"{option}: expected {file.parent} to be a folder, and it is not; create it or choose another")
+        raise OSError(f"{option}: expected an existing folder {file.parent}, got none; create it or choose another")
     if not os.access(file if file.exists() else file.parent, os.W_OK):
-        raise OSError(f"{option}: expected to be allowed to write {file}, and am not; choose another place")
+        raise OSError(f"{option}: expected permission to write {file}, got none; choose another place")

@@ -42,7 +42,7 @@ def as_rosbag2(recording: Path, inputs: Inputs, out: Path, seconds: float | None
         part = "" if seconds is None else f"_{seconds:g}s"
         bag = out / f"{source.path.resolve().name.removesuffix('.bag')}{part}_{_mark(source.path, topics, out)}"
         if bag.exists():
-            click.echo(f"playing {bag}, which was written of {recording} before", err=True)
+            click.echo(f"playing {bag}, which an earlier run wrote of {recording}", err=True)
             return bag
         click.echo(f"writing {recording} as {bag}", err=True)
         end_ns = None if seconds is None else source.start_ns + round(seconds * 1e9)

@@ -18,7 +18,7 @@ class Processes:
 
     def __init__(self, folder: Path, environment: Mapping[str, str]) -> None:
         self._folder = folder
-        self._environment = {**environment, "PYTHONUNBUFFERED": "1"}  # last words come last
+        self._environment = {**environment, "PYTHONUNBUFFERED": "1"}  # so that its last line is the last
         self._running: dict[str, subprocess.Popen[bytes]] = {}
 
     def __enter__(self) -> Self:
@@ -48,8 +48,8 @@ class Processes:
         return self._folder / f"{name}.log"
 
     def require_alive(self) -> None:
-        """ValueError with the last words of a process that has failed."""
+        """ValueError with the last line of a process that has failed."""
         for name, process in self._running.items():
             if process.poll():
                 words = self.log(name).read_text(errors="replace").strip().splitlines() or ["nothing"]
-                raise ValueError(f"{name} ended with status {process.returncode}; its last words: {words[-1]}")
+                raise ValueError(f"{name} ended with status {process.returncode}; its last line: {words[-1]}")

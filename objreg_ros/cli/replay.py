@@ -24,15 +24,19 @@ if TYPE_CHECKING:
 @click.command()
 @options.recording
 @click.option("--rate", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True, help="Speed.")
-@click.option("--loop", is_flag=True, help="Begin again at the end, with the same stamps.")
+@click.option("--loop", is_flag=True, help="Start over at the end, with the same stamps.")
 @click.option("--clock", is_flag=True, help="Publish /clock (for nodes with use_sim_time).")
-@click.option("--start", type=click.FloatRange(min=0), default=0.0, help="Seconds from the start to begin at.")
-@click.option("--end", type=click.FloatRange(min=0), help="Seconds from the start to end at.")
-@click.option("--lossless", is_flag=True, help="As fast as the nodes take every frame, and none is lost.")
+@click.option("--start", type=click.FloatRange(min=0), default=0.0, help="Seconds of the recording to skip.")
+@click.option("--end", type=click.FloatRange(min=0), help="Seconds of the recording at which to end.")
+@click.option("--lossless", is_flag=True, help="Wait for the nodes at every frame, so that none is lost.")
 @click.option("--all", "everything", is_flag=True, help="Every topic under its own name, not only the graph's inputs.")
 @click.option("--wait", type=click.FloatRange(min=0), default=10.0, show_default=True, help="Seconds for subscribers.")
 @click.option(
-    "--patience", type=click.FloatRange(min=0), default=300.0, show_default=True, help="Seconds for a frame, lossless."
+    "--patience",
+    type=click.FloatRange(min=0),
+    default=300.0,
+    show_default=True,
+    help="Seconds for one frame if lossless.",
 )
 @options.remap
 @click.option(

@@ -32,16 +32,22 @@ def _list(context: click.Context, _: click.Parameter, wanted: bool) -> None:
 
 @click.command()
 @click.argument("out", type=click.Path(path_type=Path))
-@click.option("--scenario", type=click.Choice(list(SCENARIOS)), default="loop", show_default=True, help="What happens.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Fixes everything.")
+@click.option(
+    "--scenario", type=click.Choice(list(SCENARIOS)), default="loop", show_default=True, help="The path of the camera."
+)
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Decides all that is random.")
 @click.option("--frames", type=click.IntRange(2), default=600, show_default=True, help="Number of image pairs.")
 @click.option("--rate", type=click.FloatRange(1.0, 240.0), default=30.0, show_default=True, help="Frames per second.")
 @click.option("--intrinsics", default="kinect", show_default=True, help=f"{', '.join(CAMERAS)}, or fx,fy,cx,cy.")
 @click.option("--size", help="WIDTHxHEIGHT in pixels; a named camera is scaled to it.")
 @click.option("--points", is_flag=True, help="Also write an organised PointCloud2 (9.8 MB a frame at 640x480).")
 @click.option("--jpeg", is_flag=True, help="Write image/compressed (jpeg) instead of image.")
-@click.option("--stress", is_flag=True, help="Bias, warp and rag the depth, blur the colour, crowd the tables.")
-@click.option("--set", "settings", multiple=True, metavar="SECTION.NAME=VALUE", help="See --list.")
+@click.option(
+    "--stress", is_flag=True, help="Bias and warp the depth, fray its edges, blur the colour, crowd the tables."
+)
+@click.option(
+    "--set", "settings", multiple=True, metavar="SECTION.NAME=VALUE", help="Change one parameter; see --list."
+)
 @click.option("--list", is_flag=True, is_eager=True, expose_value=False, callback=_list, help="List the parameters.")
 def command(
     out: Path,
@@ -64,7 +70,7 @@ def command(
         )
     click.echo(f"{out}: {scenario}, seed {seed}, {frames} frames at {story.rate:.1f} Hz, truth in {out / 'truth'}")
     if story.rate < rate - 1e-6:
-        click.echo(f"note: {frames} frames are few for this way, so they are {story.rate:.1f} Hz apart, not {rate:g}")
+        click.echo(f"note: {frames} frames are few for this path, so they come at {story.rate:.1f} Hz, not {rate:g}")
 
 
 def camera_of(name: str, size: str | None) -> Intrinsics:

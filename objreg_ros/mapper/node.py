@@ -59,7 +59,7 @@ class MapperNode(Door):
 
     def _begin(self) -> None:
         self._graph = PoseGraph(self.settings.of(MapperParams), self._inputs.mounting)
-        self._summary = Summary(0, (), ())
+        self._summary = Summary((), ())
 
     def _start_anew(self, reason: str) -> None:
         """An empty map; the constraints that wait are about moments of the old one, and are dropped."""

@@ -87,9 +87,8 @@ class Problem(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What an optimisation came to: how many keyframes, and the closures that it kept and pruned."""
+    """What an optimisation came to: the closures that it kept and those that it pruned."""
 
-    keyframes: int
     kept: tuple[LoopClosure, ...]
     pruned: tuple[LoopClosure, ...]
 
@@ -128,8 +127,8 @@ class PoseGraph:
         """
         if closure.from_ns >= closure.to_ns:
             raise ValueError(
-                f"expected a constraint from before its to at {closure.to_ns} ns, got one from {closure.from_ns} ns: "
-                "it ties two runs of the clock; give each run a store of its own"
+                f"expected a constraint whose *from* is before its *to* at {closure.to_ns} ns, got "
+                f"{closure.from_ns} ns: it ties two runs of the clock; give each run a store of its own"
             )
         if not (self.odometry.covers(closure.from_ns) and self.odometry.covers(closure.to_ns)):
             return False
@@ -156,7 +155,7 @@ class PoseGraph:
         verdicts = [(tie.closure, kept) for tie, kept in zip(problem.ties, solution.kept, strict=True)]
         kept = tuple(closure for closure, keep in verdicts if closure is not None and keep)
         pruned = tuple(closure for closure, keep in verdicts if closure is not None and not keep)
-        return Summary(len(problem.poses), kept, pruned)
+        return Summary(kept, pruned)
 
     @property
     def T_map_odom(self) -> Array:

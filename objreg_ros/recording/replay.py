@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a replay publishes: which topics of a recording under which names, from when to when, how often."""
+"""What a replay publishes: which topics of a recording under which names, and from when to when."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def _make_parents(path: Path) -> None:
     try:
         path.absolute().parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise OSError(f"{path}: expected a place that can be written to, got: {error.strerror}") from error
+        raise OSError(f"{path}: expected a path that can be written, got: {error.strerror}") from error
 
 
 def _connect(writer: Writer, record: Record, offered: Sequence[Qos]) -> Any:

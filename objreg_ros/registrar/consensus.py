@@ -3,7 +3,7 @@
 
 Two matches fix a pose when a direction is known beside their baseline: gravity where both frames know it, the sum of
 their normals otherwise. Every pair of matches that keeps its length, its tilt and its normals gives one pose, and
-the pose is worth the weight of all matches that it brings together. This replaces RANSAC over triples.
+the pose is worth the weight of all matches that it brings together.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ import numba
 import numpy as np
 
 from objreg_ros.data import Array
+
+MOST_PAIRS = 6000  # of matches that agree, each of which gives a pose to weigh
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,7 +39,6 @@ def poses(
     tolerance: float,
     shortest: float,
     limit: int,
-    most_pairs: int = 6000,
 ) -> tuple[tuple[Array, float], ...]:
     """The best distinct poses T_target_source with their support, best first, at most ``limit``.
 
@@ -47,7 +48,7 @@ def poses(
     upright = up_source is not None and up_target is not None
     ups = (up_source, up_target) if upright else (np.zeros(3), np.zeros(3))
     arrays = (matches.source, matches.target, matches.source_normals, matches.target_normals)
-    pairs = _consistent_pairs(*arrays, *ups, upright, tolerance, shortest, most_pairs)  # type: ignore[call-arg]
+    pairs = _consistent_pairs(*arrays, *ups, upright, tolerance, shortest, MOST_PAIRS)  # type: ignore[call-arg]
     if len(pairs) == 0:
         return ()
     T = _poses(*arrays, *ups, upright, pairs)  # type: ignore[call-arg]

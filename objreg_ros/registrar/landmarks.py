@@ -127,8 +127,8 @@ class Landmarks:
     def surplus(self, landmarks: Iterable[int]) -> list[int]:
         """Keyframes of these landmarks that show each of their objects from where better spread keyframes do too."""
         spare = {number: self._spare(self._known[number]) for number in set(landmarks) if number in self._known}
-        tired = set().union(*spare.values()) if spare else set()
-        return sorted(k for k in tired if all(k in spare.get(number, ()) for number in self._shown[k]))
+        spared = set().union(*spare.values()) if spare else set()
+        return sorted(k for k in spared if all(k in spare.get(number, ()) for number in self._shown[k]))
 
     def forget(self, keyframe_ids: Iterable[int]) -> None:
         """Forget from where these keyframes saw their objects; the landmarks stay known."""

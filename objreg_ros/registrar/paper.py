@@ -83,7 +83,6 @@ def register(source: Array, target: Array, T_target_source: Array, params: Regis
         inliers=len(pairs.source),
         overlap=len(pairs.source) / len(source),
         rmse=float(np.sqrt(np.mean(np.square(pairs.distance)))),
-        iterations=iterations,
         converged=converged,
         middle=transform(T, source.astype(float)).mean(axis=0),
     )

@@ -35,12 +35,12 @@ class RegistrarParams(Params):
     context_radius: float = param(1.0, "how far around an object the context reaches", "m", ge=0.1)
     context_voxel: float = param(0.03, "edge of a voxel of the context", "m", ge=0.005, le=0.2)
     gravity_metres: float = param(
-        2.0, "way over which odometry carries what earlier views told of gravity", "m", ge=0.01
+        2.0, "path over which odometry carries what earlier views told of gravity", "m", ge=0.01
     )
-    gravity_degrees: float = param(120.0, "turn over which odometry carries it", "deg", ge=0.1)
-    gravity_noise: float = param(
-        0.5, "standard deviation of gravity that was felt all along such a way", "deg", ge=0.01
+    gravity_degrees: float = param(
+        120.0, "turn over which odometry carries what earlier views told of gravity", "deg", ge=0.1
     )
+    gravity_noise: float = param(0.5, "standard deviation of gravity carried over such a way or turn", "deg", ge=0.01)
     context_range: float = param(4.0, "context farther from the camera is left out", "m", ge=0.5)
 
     # Which stored keyframes a new one is compared with.
@@ -64,9 +64,9 @@ class RegistrarParams(Params):
     odometry_rotation_drift: float = param(
         0.05, "growth of the deviation of odometry's rotation with each degree turned", "deg/deg", ge=0.0
     )
-    prior_translation: float = param(0.20, "odometry less certain than this proposes no pose", "m", ge=0.0)
-    prior_rotation: float = param(6.0, "odometry less certain than this proposes no pose", "deg", ge=0.0)
-    thin_seconds: float = param(1.0, "closures whose both ends are nearer than this are one closure", "s", ge=0.0)
+    prior_translation: float = param(0.20, "odometry whose position is less certain proposes no pose", "m", ge=0.0)
+    prior_rotation: float = param(6.0, "odometry whose rotation is less certain proposes no pose", "deg", ge=0.0)
+    thin_seconds: float = param(1.0, "two closures are one if both their ends are nearer than this", "s", ge=0.0)
     closures: int = param(2, "accepted closures of one keyframe that end its search", ge=1)
     threads: int = param(2, "stored keyframes that are tried at once", ge=1, le=16)
     candidates: int = param(4, "stored keyframes that are tried for each new one, best first", ge=1, le=100)
@@ -94,15 +94,15 @@ class RegistrarParams(Params):
         100, "points a side by which poses of objects are ranked before the best are refined", ge=20
     )
     shape_kept: int = param(4, "poses of objects that are refined", ge=1)
-    shape_climbed: int = param(2, "poses of objects whose score is climbed to its top", ge=1)
+    shape_climbed: int = param(2, "best poses of objects, from which the score is climbed to its maximum", ge=1)
     shape_margin: float = param(
         0.5, "score or worth below the best at which a pose of objects is neither climbed nor drawn to the room", ge=0.0
     )
     shape_rounds: int = param(8, "most rounds of the climb of an object's pose", ge=0)
     scene_seeds: int = param(8, "poses that the middles of the objects propose for all together", ge=0)
     drawn: int = param(2, "best upright poses that are drawn to where the room fits", ge=0)
-    drawing_points: int = param(300, "points of all that was seen that draw a pose to where the room fits", ge=20)
-    drawing_rounds: int = param(10, "iterations that draw a pose to where the room fits", ge=0)
+    drawing_points: int = param(300, "points of everything seen by which a pose is drawn to where the room fits", ge=20)
+    drawing_rounds: int = param(10, "most iterations in which a pose is drawn to where the room fits", ge=0)
     drawing_reach: float = param(
         0.06, "a pose stays as it was if drawing it to the room moves the objects farther", "m", ge=0.0
     )
@@ -151,7 +151,7 @@ class RegistrarParams(Params):
         (0.2, 0.1, 0.06), "distance of a pair at first, in the basin, at the end", "m", ge=0.001, counts=(3,)
     )
     iterations: int = param(15, "most iterations of one round of refinement", ge=1)
-    min_points: int = param(60, "fewer paired points hold no pose", ge=6)
+    min_points: int = param(60, "least number of paired points that hold a pose", ge=6)
     grey_points: int = param(2500, "points a side whose grey ends a refinement", ge=100)
     grey_sigma: float = param(0.7, "difference of the high-passed grey that counts little, in its deviations", ge=0.01)
     grey_rounds: int = param(3, "most times that grey finishes a pose, coarse to fine", ge=1)
@@ -160,7 +160,9 @@ class RegistrarParams(Params):
     depth_noise_growth: float = param(
         0.0019, "growth of the deviation of depth with the square of the depth beyond 0.4 m", "1/m", ge=0.0
     )
-    slack_share: float = param(0.01, "a direction that less of the surface resists is free to slide", ge=0.0, le=0.3)
+    slack_share: float = param(
+        0.01, "a direction that a smaller share of the surface resists is free to slide", ge=0.0, le=0.3
+    )
     pushes: tuple[float, ...] = param(
         (0.05, 0.1, 0.15),
         "how far a pose is pushed along a free direction; what the views like less is held there",
@@ -186,16 +188,20 @@ class RegistrarParams(Params):
     )
     searched: int = param(2, "best places of the search about a doubtful position that grey finishes", ge=1)
     steadying_texture: float = param(
-        0.5, "grey that correlates so well holds a position as far as pushes are resisted", ge=0.0, le=1.0
+        0.5, "correlation of grey from which on a position is held as far as pushes are resisted", ge=0.0, le=1.0
     )
     steadying_push: float = param(
         0.06, "longest push until the views like a pose less at which grey still steadies a position", "m", ge=0.0
     )
-    holding_texture: float = param(0.45, "grey that correlates so well holds what shape lets slide", ge=0.0, le=1.0)
-    holding_likeness: float = param(
-        0.3, "an object that looks so much alike holds what shape lets slide", ge=-1.0, le=1.0
+    holding_texture: float = param(
+        0.45, "correlation of grey from which on it holds what shape lets slide", ge=0.0, le=1.0
     )
-    symmetry_share: float = param(0.16, "an object whose surface resists a turn less has no yaw", ge=0.0, le=1.0)
+    holding_likeness: float = param(
+        0.3, "likeness of an object from which on it holds what shape lets slide", ge=-1.0, le=1.0
+    )
+    symmetry_share: float = param(
+        0.16, "an object has no yaw if a smaller share of its surface resists a turn", ge=0.0, le=1.0
+    )
     symmetry_violations: float = param(
         0.14,
         "an object has a yaw after all if so much of it, turned about its axis, is where its camera saw through",
@@ -229,7 +235,7 @@ class RegistrarParams(Params):
         "less say in where exactly a pose is",
         ge=0.0,
     )
-    explained_distance: float = param(0.06, "an object is explained when the middles are this close", "m", ge=0.0)
+    explained_distance: float = param(0.06, "an object is explained when its two middles are this close", "m", ge=0.0)
     explained_share: float = param(
         0.28,
         "share of its extent that an object's middle may be farther, since a large thing is never seen whole",
@@ -279,7 +285,7 @@ class RegistrarParams(Params):
         ge=-3.0,
     )
     max_violations_doubtful: float = param(
-        0.02, "share of tested pixels in seen free space up to which V need not make up for them", ge=0.0, le=1.0
+        0.02, "share of tested pixels in seen free space for which V need not make up", ge=0.0, le=1.0
     )
     otherwise_factor: float = param(
         1.5,

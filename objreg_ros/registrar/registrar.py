@@ -177,7 +177,7 @@ class Registrar:
         last = self._store.last_session_beyond(clock.session, clock.began_ns)
         self._clock, self._thinning, self._since = clock, Thinning(self.params.thin_seconds), last + 1
         began = f"{1e-9 * clock.began_ns:.3f} s"
-        refusal = Reason.CLOCK, f"the clock began anew at {began}; places of sessions to {last} saw that time before"
+        refusal = Reason.CLOCK, f"the clock began anew at {began}; sessions up to {last} had seen that time before"
         return () if last < 0 else (_rejected(keyframe.stamp_ns, keyframe, refusal),)
 
     def _try_places(

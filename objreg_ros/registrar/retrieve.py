@@ -36,7 +36,6 @@ class Place(NamedTuple):
 
     keyframe_id: int
     stamp_ns: int
-    session: int
     votes: float
 
 
@@ -79,7 +78,7 @@ class Index:
         taken = order[np.concatenate([np.flatnonzero(~here)[:most], np.flatnonzero(here)[:most]])]
         taken = taken[self._spread(where[taken], when[taken])]
         chosen = zip(when[taken].tolist(), votes[taken].tolist(), strict=True)
-        return [Place(number, stamp_ns, session, vote) for (stamp_ns, session, number, _), vote in chosen]
+        return [Place(number, stamp_ns, vote) for (stamp_ns, _, number, _), vote in chosen]
 
     def _ballot(self, sighting: Sighting, stored: int, since: int) -> tuple[Array, Array, Array]:
         """Where and when the objects were seen that look most like this one, the likest first, and their votes."""

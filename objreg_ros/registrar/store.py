@@ -255,9 +255,7 @@ def _create(path: Path, read_only: bool) -> None:
     if read_only:
         raise StoreError(f"{path}: expected a store of objreg_ros, got no file")
     if path.exists() or not path.parent.is_dir():
-        raise StoreError(
-            f"{path}: expected a file in a folder that is there, got none; make the folder, or use another"
-        )
+        raise StoreError(f"{path}: expected a file in an existing folder, got none; create the folder or use another")
     beside = path.with_name(f"{path.name}.new{os.getpid()}")
     beside.unlink(missing_ok=True)
     with closing(sqlite3.connect(beside)) as connection:
@@ -319,11 +317,9 @@ def _look_through(path: Path) -> tuple[int, str]:
     return version, "" if found == "ok" else found
 
 
-def _insert(transaction: sqlite3.Connection, table: str, row: Mapping[str, Any]) -> int:
+def _insert(transaction: sqlite3.Connection, table: str, row: Mapping[str, Any]) -> None:
     names, marks = ", ".join(row), ", ".join("?" * len(row))
-    return int(
-        transaction.execute(f"INSERT INTO {table} ({names}) VALUES ({marks})", tuple(row.values())).lastrowid or 0
-    )
+    transaction.execute(f"INSERT INTO {table} ({names}) VALUES ({marks})", tuple(row.values()))
 
 
 def _closure_row(closure: LoopClosure) -> dict[str, Any]:

@@ -52,12 +52,12 @@ class Survey:
         ]
 
 
-def survey(path: str | Path, params: RegistrarParams | None = None) -> Survey:
+def survey(path: str | Path) -> Survey:
     """Look through the store at ``path`` without changing it; StoreError (an OSError) if it is none or damaged."""
     store = Store(path, read_only=True)
     try:
         sightings = tuple(store.sightings())
-        landmarks = Landmarks(params or RegistrarParams(), sightings)
+        landmarks = Landmarks(RegistrarParams(), sightings)
         return Survey(
             path=str(path),
             bytes=Path(path).stat().st_size,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether an object itself tells its yaw: a can or a bowl looks the same however it is turned.
+"""Whether an object's shape tells its yaw: a can or a bowl looks the same however it is turned.
 
 Its surface tells it, or its outline: the round back of a chair lets it turn about the axis of the back, but then it
 would stand where its camera saw through.

@@ -13,6 +13,8 @@ import numpy as np
 from objreg_ros.data import Array, Detections
 from objreg_ros.detector.boxes import area, iou
 
+LEAST_IOU = 0.5  # of a detection and the box that it finds
+
 
 @dataclass(frozen=True)
 class TrueBoxes:
@@ -27,15 +29,15 @@ class TrueBoxes:
 
 
 def average_precision(
-    seen: Sequence[Detections], truth: Sequence[TrueBoxes], label: str, least_iou: float = 0.5, least_area: float = 0.0
+    seen: Sequence[Detections], truth: Sequence[TrueBoxes], label: str, least_area: float = 0.0
 ) -> float | None:
     """The average precision 0..1 of one label over a set of images; None when no image has the label to be found.
 
-    Every box of ``truth`` is found at most once, by the best scored detection that overlaps it by ``least_iou``.
+    Every box of ``truth`` is found at most once, by the best scored detection that overlaps it by `LEAST_IOU`.
     A detection that finds nothing is no error where it is smaller than ``least_area`` px^2, as COCO counts it when only
     larger objects are asked for.
     """
-    rows = [_judge(one, known, label, least_iou, least_area) for one, known in zip(seen, truth, strict=True)]
+    rows = [_judge(one, known, label, least_area) for one, known in zip(seen, truth, strict=True)]
     score, verdict = (np.concatenate(part) if rows else np.zeros(0) for part in zip(*rows, strict=True))
     wanted = sum(_wanted(known, label) for known in truth)
     if wanted == 0:
@@ -51,7 +53,7 @@ def _wanted(known: TrueBoxes, label: str) -> int:
     return int((of_label & ~known.difficult).sum())
 
 
-def _judge(seen: Detections, known: TrueBoxes, label: str, least_iou: float, least_area: float) -> tuple[Array, Array]:
+def _judge(seen: Detections, known: TrueBoxes, label: str, least_area: float) -> tuple[Array, Array]:
     """Scores and verdicts (1 right, 0 wrong, -1 not counted) of the detections of ``label`` in one image."""
     mine = np.flatnonzero([name == label for name in seen.label])
     true = np.flatnonzero([name == label for name in known.label])
@@ -60,11 +62,11 @@ def _judge(seen: Detections, known: TrueBoxes, label: str, least_iou: float, lea
     free, small = ~difficult, area(seen.xyxy[mine]) < least_area
     verdict = np.zeros(len(mine), int)
     for row in np.argsort(-seen.score[mine], kind="stable"):
-        candidates = np.where(free & (overlap[row] >= least_iou), overlap[row], -1)
+        candidates = np.where(free & (overlap[row] >= LEAST_IOU), overlap[row], -1)
         if candidates.max(initial=-1) >= 0:
             free[candidates.argmax()] = False
             verdict[row] = 1
-        elif (overlap[row][difficult] >= least_iou).any() or small[row]:
+        elif (overlap[row][difficult] >= LEAST_IOU).any() or small[row]:
             verdict[row] = -1
     return seen.score[mine].astype(float), verdict
 

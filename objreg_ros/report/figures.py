@@ -16,6 +16,8 @@ LANE = 18  # px of one row of the timeline
 MOST_LABELS = 9  # rows of detections; the rarer labels share one more
 LINE, LETTER = 13.0, 7.0  # px of a line of text and of a letter
 SERIES = 8  # colours of labels on the page
+HEAP_RADIUS = 0.5  # m around a place that is named on the map
+HEAP_SIGHTINGS = 4  # of one label there, at least
 
 
 class Ground:
@@ -115,18 +117,18 @@ def object_map(story: Story, corrected: bool) -> str:
     return plot.svg("objects from above" + (", corrected" if corrected else ", by odometry"))
 
 
-def heaps(labels: Sequence[str], xy: Array, radius: float = 0.5, least: int = 4) -> list[tuple[str, Array]]:
-    """(label, middle) of the places where one label was seen at least so often, for the names on the map."""
+def heaps(labels: Sequence[str], xy: Array) -> list[tuple[str, Array]]:
+    """(label, middle) of the places where one label was seen `HEAP_SIGHTINGS` times or more, for names on the map."""
     found: list[tuple[str, Array]] = []
     for label in dict.fromkeys(labels):
         rest = xy[[name == label for name in labels]]
-        while len(rest) >= least:
+        while len(rest) >= HEAP_SIGHTINGS:
             distances = np.linalg.norm(rest[:, None] - rest[None], axis=2)
-            near = distances[(distances < radius).sum(axis=1).argmax()] < radius
-            if near.sum() < least:
+            near = distances[(distances < HEAP_RADIUS).sum(axis=1).argmax()] < HEAP_RADIUS
+            if near.sum() < HEAP_SIGHTINGS:
                 break
             found.append((label, rest[near].mean(axis=0)))
-            rest = rest[np.linalg.norm(rest - rest[near].mean(axis=0), axis=1) > radius]
+            rest = rest[np.linalg.norm(rest - rest[near].mean(axis=0), axis=1) > HEAP_RADIUS]
     return found
 
 

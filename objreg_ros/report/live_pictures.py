@@ -34,9 +34,9 @@ def write_picture(file: Path, rgb: Array) -> None:
     try:
         written = cv2.imwrite(str(file), np.ascontiguousarray(rgb[..., ::-1]))
     except cv2.error as error:  # no format of this name
-        raise OSError(f"{file}: expected a name like picture.png, got one of no known format; rename it") from error
+        raise OSError(f"{file}: expected a name like picture.png, got one of an unknown format; rename it") from error
     if not written:
-        raise OSError(f"{file}: expected a place that can be written to; create its folder or choose another")
+        raise OSError(f"{file}: expected a path that can be written; create its folder or choose another")
 
 
 def _colour(instance: int) -> tuple[int, int, int]:
@@ -70,7 +70,7 @@ def draw_way(file: Path, truth: Truth, closures: Sequence[LoopClosure]) -> None:
     The plane is that of the two directions in which the way extends most. ValueError where the truth has no poses.
     """
     if not truth.poses:
-        raise ValueError("expected a recording with ground truth to draw its way")
+        raise ValueError("expected a recording with ground truth to draw its path")
     from matplotlib.figure import Figure
 
     positions = np.array([T[:3, 3] for T in truth.poses])

@@ -36,7 +36,9 @@ def write_report(out: Path, runs: Sequence[Path]) -> list[str]:
         text = page(chapters)
     out.write_text(text, encoding="utf-8")
     lacking = [file for file, (_, album) in zip(runs, chapters, strict=True) if album is None]
-    return [f"{file} names no recording that is there: the page shows neither truth nor pictures" for file in lacking]
+    return [
+        f"{file} names a recording that is not there: the page shows neither truth nor pictures" for file in lacking
+    ]
 
 
 def _chapter(file: Path, stack: ExitStack) -> tuple[Story, Album | None]:

@@ -100,7 +100,8 @@ def split(
 ) -> tuple[Array, int]:
     """The parts of the cells with depth that are not ``level (h, w) bool``, parted at ``seams (h, w) bool``.
 
-    Parts of fewer than ``least`` cells are dissolved; the others grow over those cells and over seams as in `grow`.
+    Parts of fewer than ``least`` cells are dissolved; the others grow over those cells and over seams, one ring of
+    cells in each of ``rounds``.
     Labels (h, w) int32, 0 for none, and their number.
     """
     labels = np.empty(depth.shape, np.int32)
@@ -121,17 +122,13 @@ def _split(depth, level, seams, a, b, least, rounds, labels):  # type: ignore[no
     return count
 
 
-def grow(labels: Array, depth: Array, keep: Array, jump: tuple[float, float], rounds: int) -> None:
-    """Let the parts grow in place into the cells of ``keep`` that have no label, one ring of cells a round.
-
-    A cell takes the label of the neighbour nearest in depth, within ``jump``; where two parts grow towards each other
-    they meet half way.
-    """
-    _grow(labels, depth, keep, np.float32(jump[0]), np.float32(jump[1]), rounds)
-
-
 @numba.njit(cache=True, nogil=True, fastmath=EXACT)
 def _grow(labels, depth, keep, a, b, rounds):  # type: ignore[no-untyped-def]
+    """Let the parts grow in place into the cells of ``keep`` that have no label, one ring of cells a round.
+
+    A cell takes the label of the neighbour nearest in depth; where two parts grow towards each other they meet half
+    way.
+    """
     h, w = depth.shape
     bare = np.empty((h * w, 3), np.int64)  # rows and columns of the cells without a label, and the label found
     n = 0

@@ -19,15 +19,21 @@ class SegmenterParams(Params):
     preset: str = param("default", "the method; paper is the founding filter of each box", choices=("default", "paper"))
     z_min: float = param(0.2, "nearest depth that is believed", "m", ge=0.0)
     z_max: float = param(4.0, "farthest depth that is believed (1.75 in preset paper)", "m", ge=0.1, live=True)
-    y_max: float = param(100.0, "farthest below or above the camera's axis (0.75 in preset paper)", "m", ge=0.0)
+    y_max: float = param(100.0, "farthest point below or above the camera's axis (0.75 in preset paper)", "m", ge=0.0)
     min_points: int = param(80, "an object of fewer points is not published", ge=1, live=True)
     margin: float = param(0.15, "how far around a box is looked at, of the box's size", ge=0.0, le=1.0)
     jump: float = param(0.012, "depth step that ends an object, at the camera", "m", ge=0.001)
     jump_z2: float = param(0.012, "how the depth step grows with squared depth", "1/m", ge=0.0)
-    crease: float = param(20.0, "a valley that bends more than this parts two things", "deg", ge=5.0, le=90.0)
-    height: float = param(0.0005, "a point this far above the support belongs to it, without noise", "m", ge=0.0)
+    crease: float = param(20.0, "a concave bend sharper than this separates two things", "deg", ge=5.0, le=90.0)
+    height: float = param(
+        0.0005, "a point this far above the support still belongs to it, if there were no noise", "m", ge=0.0
+    )
     roll: float = param(
-        0.0, "how far clockwise, as it looks, the camera is mounted; 180: upside down", "deg", ge=-360.0, le=360.0
+        0.0,
+        "how far clockwise, along its line of sight, the camera is turned; 180: upside down",
+        "deg",
+        ge=-360.0,
+        le=360.0,
     )
     up_tilt: float = param(75.0, "most tilt of the camera from upright, apart from `roll`", "deg", ge=5.0, le=89.0)
     support_area: float = param(0.02, "least visible area of a support surface", "m²", ge=0.0)
@@ -55,7 +61,7 @@ class SegmenterNodeParams(Params):
     """How the segmenter's node brings its inputs together."""
 
     source: str = param(
-        "auto", "where depth comes from; auto takes what speaks first", choices=("auto", "points", "depth")
+        "auto", "where depth comes from; auto takes whichever publishes first", choices=("auto", "points", "depth")
     )
     slop: float = param(0.02, "largest distance in time between depth and what goes with it", "s", ge=0.0)
     colour: bool = param(True, "take the colour of the points from `image` when depth comes as an image")

@@ -20,10 +20,10 @@ RIM = 0.7  # how much less a cell at the rim of the box counts than one in its m
 class Parts(NamedTuple):
     """K connected parts of a surface, the largest in the box first, numbered from 1 in ``labels (h, w) int32``.
 
-    Of each part: ``total`` and ``inside (K,)`` its cells and those in the box, ``weight (K,)`` those in the box where
-    the middle counts more than the rim, ``extent (K, 4)`` left, top, right, bottom in cells, half open, ``size (K,)``
-    the length in metres of the box's longer side at the part's depth, ``pure (K,)`` which share of it lies in the box,
-    ``figure (K,)`` which share of its depth jumps is its own silhouette, 1 where it has none.
+    Of each part: ``total (K,)`` its cells, ``weight (K,)`` those in the box where the middle counts more than the rim,
+    ``extent (K, 4)`` left, top, right, bottom in cells, half open, ``size (K,)`` the length in metres of the box's
+    longer side at the part's depth, ``pure (K,)`` which share of it lies in the box, ``figure (K,)`` which share of its
+    depth jumps is its own silhouette, 1 where it has none.
 
     Of each pair: ``alike (K, K)`` whether they have one colour in whatever light, False without colour, ``touching
     (K, 1 + K)`` the cells in which they are neighbours without a depth jump, ``gap (K, 1 + K)`` m² the square of the
@@ -33,7 +33,6 @@ class Parts(NamedTuple):
 
     labels: Array
     total: Array
-    inside: Array
     weight: Array
     extent: Array
     size: Array
@@ -74,27 +73,27 @@ def _measure(labels, count, window, depth, x, y, pixels, rgb, bounds, limit):  #
     wide = x[1] - x[0] if len(x) > 1 else np.float32(0)
     high = y[1] - y[0] if len(y) > 1 else np.float32(0)
     longer = max((window[2] - window[0]) * wide, (window[3] - window[1]) * high)
-    total, inside, weight, size, pure, figure = _describe(sums, front, longer)
+    total, weight, size, pure, figure = _describe(sums, front, longer)
     alike = _alike(sums, len(rgb) > 0)
-    return renamed, total, inside, weight, extent[1:], size, pure, figure, alike, touching[1:], gap[1:], front[1:]
+    return renamed, total, weight, extent[1:], size, pure, figure, alike, touching[1:], gap[1:], front[1:]
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _describe(sums, front, longer):  # type: ignore[no-untyped-def]
-    """Of each part, from 1 on: total, inside, weight, size, pure and figure, each (K,)."""
+    """Of each part, from 1 on: total, weight, size, pure and figure, each (K,)."""
     count = len(sums) - 1
-    total, inside, weight = np.empty(count), np.empty(count), np.empty(count)
+    total, weight = np.empty(count), np.empty(count)
     size, pure, figure = np.empty(count), np.empty(count), np.empty(count)
     for p in range(count):
         k = p + 1
-        total[p], inside[p], weight[p] = sums[k, 0], sums[k, 1], sums[k, 2]
+        total[p], weight[p] = sums[k, 0], sums[k, 2]
         size[p], pure[p] = longer * sums[k, 3] / sums[k, 0], sums[k, 1] / sums[k, 0]
         shown, hidden = 0, 0
         for o in range(count + 1):
             shown += front[k, o]
             hidden += front[o, k] if o > 0 else 0
         figure[p] = (shown + 1) / (shown + hidden + 1)
-    return total, inside, weight, size, pure, figure
+    return total, weight, size, pure, figure
 
 
 @numba.njit(cache=True, nogil=True)

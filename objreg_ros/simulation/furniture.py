@@ -9,7 +9,7 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.simulation import print_design, texture
-from objreg_ros.simulation.mesh import Material, Mesh, box, cushion, merge, revolve, sheet
+from objreg_ros.simulation.mesh import Material, Mesh, box, cushion, merge, revolve
 from objreg_ros.simulation.model import turn
 
 Random = np.random.Generator
@@ -207,10 +207,3 @@ def _window(rng: Random, x: float, width: float) -> list[Mesh]:
         parts.append(box((0.05, 0.05, 1.2), bars).moved(x + place * width, -0.01, 0.93))
     parts += [box((width, 0.05, 0.05), bars).moved(x + width / 2, -0.01, z) for z in (0.92, 2.08)]
     return parts
-
-
-def panel(width: float, height: float, material: Material) -> Mesh:
-    """An upright sheet that is seen from both sides, standing on z = 0: something in front of the camera."""
-    x = width / 2
-    corners = np.array([[(-x, 0, height), (x, 0, height)], [(-x, 0, 0), (x, 0, 0)]])
-    return sheet(corners, material).two_sided()

@@ -289,13 +289,14 @@ def _signed_power(values: Array, power: float) -> Array:
     return np.sign(values) * np.abs(values) ** power
 
 
-def disc(radius: float, material: Material, z: float = 0.0, up: bool = True, segments: int = 32) -> Mesh:
-    """A flat round plate at height ``z``, facing up or down, with the texture's centre in its middle."""
+def disc(radius: float, material: Material, z: float = 0.0) -> Mesh:
+    """A flat round plate at height ``z``, facing up, with the texture's centre in its middle."""
+    segments = 32
     angle = np.linspace(0, 2 * np.pi, segments, endpoint=False)
     rim = np.stack([np.cos(angle), np.sin(angle)], -1)
     points = np.concatenate([[[0.0, 0.0]], rim])
     vertices = np.concatenate([points * radius, np.full((len(points), 1), z)], axis=1)
     near, far = np.arange(segments) + 1, (np.arange(segments) + 1) % segments + 1
-    faces = np.stack([np.zeros_like(near), near, far] if up else [np.zeros_like(near), far, near], -1)
-    normals = np.tile([0.0, 0.0, 1.0 if up else -1.0], (len(points), 1))
+    faces = np.stack([np.zeros_like(near), near, far], -1)
+    normals = np.tile([0.0, 0.0, 1.0], (len(points), 1))
     return _of_one_material(vertices, normals, points * [0.5, -0.5] + 0.5, faces, material)

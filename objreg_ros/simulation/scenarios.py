@@ -278,19 +278,17 @@ SCENARIOS: dict[str, Callable[[Random, int], Plot]] = {
 }
 
 
-def make_story(
-    scenario: str, seed: int, frames: int = 600, rate: float = 30.0, occluders: int = 0, hand: Hand | None = None
-) -> Story:
+def make_story(scenario: str, seed: int, frames: int = 600, rate: float = 30.0, occluders: int = 0) -> Story:
     """The story of a scenario; everything follows from its arguments. ValueError if there is no such scenario.
 
-    ``occluders`` are things added to every table. ``rate`` in Hz comes down
-    where so few frames would make the camera faster than a hand moves it.
+    ``occluders`` are things added to every table. ``rate`` in Hz comes down where so few frames would make the
+    camera faster than a hand moves it.
     """
     if scenario not in SCENARIOS:
         raise ValueError(f"expected one of {', '.join(SCENARIOS)}, got {scenario!r}")
     rng = np.random.default_rng([seed, 31, list(SCENARIOS).index(scenario)])
     scenes, waypoints, change = SCENARIOS[scenario](rng, occluders)
-    poses, rate = carried(waypoints, frames, rate, rng, hand or Hand())
+    poses, rate = carried(waypoints, frames, rate, rng, Hand())
     scene_of = np.zeros(frames, int)
     if change is not None:
         scene_of[_first_passing(poses, change) :] = 1

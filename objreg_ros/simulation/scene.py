@@ -45,7 +45,7 @@ class Placed:
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Somewhere worth looking at: ``centre (3,)`` m in the world, among the objects, and their ``reach`` around it."""
+    """Where objects stand: ``centre (3,)`` m in the world, among them, and their ``reach`` around it."""
 
     centre: Array
     reach: float
@@ -55,8 +55,8 @@ class Place:
 class Scene:
     """``objects`` in front of a ``backdrop`` under ``lamps``; ``ambient (3,)`` linear light from everywhere.
 
-    ``ceiling`` is what throws no shadow; ``places`` where the objects are; ``reach`` metres around the first place, or
-    the world's origin where there is none, have soft shadows.
+    ``ceiling`` is what throws no shadow; ``places`` are where the objects stand; shadows are soft within ``reach``
+    metres of ``middle (3,)``.
     """
 
     objects: tuple[Placed, ...]
@@ -194,15 +194,15 @@ def furnished(rng: Random, pieces: Sequence[tuple[Furniture, Array]], room: Room
     return Scene((), (room.mesh, *meshes), lamps, ambient, (), (room.ceiling,), reach)
 
 
-def number(laid: Sequence[tuple[ObjectModel, Array]], first: int = 1) -> tuple[Placed, ...]:
-    """Placed objects from models and their poses in the world, numbered from ``first``."""
-    return tuple(Placed(first + k, model, T) for k, (model, T) in enumerate(laid))
+def number(laid: Sequence[tuple[ObjectModel, Array]]) -> tuple[Placed, ...]:
+    """Placed objects from models and their poses in the world, numbered from 1."""
+    return tuple(Placed(k, model, T) for k, (model, T) in enumerate(laid, 1))
 
 
 def random_scene(seed: int, labels: Sequence[str] = LABELS, distractor_share: float = 0.4) -> Scene:
     """A corner of a room made at random: furniture, walls, lamps, clutter, objects of the nine classes and others.
 
-    Everything follows from ``seed``. Its places are where `random_view` looks.
+    Everything follows from ``seed``.
     """
     rng = np.random.default_rng([seed, 1])
     half = (rng.uniform(1.8, 3.5), rng.uniform(1.8, 3.5))

@@ -144,11 +144,11 @@ def marble(rng: np.random.Generator, size: int = 256) -> Array:
     return mixed(muted(rng), grey(rng), 0.15 + 0.7 * veins**3)
 
 
-def brushed(rng: np.random.Generator, colour: Colour | None = None, size: int = 128) -> Array:
+def brushed(rng: np.random.Generator, size: int = 128) -> Array:
     """Metal with fine parallel scratches along the rows."""
     lines = cv2.resize(rng.uniform(-1, 1, (size, 4)).astype(np.float32), (size, size))
     shade = 1 + 0.12 * lines[..., None] + 0.08 * noise(rng, size, 3)[..., None]
-    return np.clip(filled(colour or grey(rng, 0.4, 0.85), size) * shade, 0, 255).astype(np.uint8)
+    return np.clip(filled(grey(rng, 0.4, 0.85), size) * shade, 0, 255).astype(np.uint8)
 
 
 def patches(rng: np.random.Generator, size: int = 128) -> Array:

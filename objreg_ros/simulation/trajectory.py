@@ -141,9 +141,3 @@ def _shaken(poses: Array, rate: float, rng: Random, hand: Hand) -> Array:
         out[k, :3, :3] = T[:3, :3] @ rotation_from_vector(np.radians(hand.shake) * n[3:])
         out[k, :3, 3] = T[:3, 3] + hand.tremor * n[:3]
     return out
-
-
-def speeds(poses: Array, rate: float) -> tuple[Array, Array]:
-    """Speed in m/s and turning in deg/s between consecutive poses (N, 4, 4) at ``rate`` Hz."""
-    moved = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1) * rate
-    return moved, np.degrees(_turned(poses)) * rate

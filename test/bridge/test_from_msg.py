@@ -20,11 +20,11 @@ UNCALIBRATED = messages.camera_info([0.0] * 9, 4, 3)
 PACKED = np.dtype({"names": ["x", "y", "z", "rgb"], "formats": ["<f4"] * 4, "offsets": [0, 4, 8, 16], "itemsize": 32})
 
 
-def packed_cloud(height: int = 3, width: int = 4, dtype: np.dtype = PACKED) -> np.ndarray:
-    records = np.zeros((height, width), dtype)
+def packed_cloud(height: int = 3, width: int = 4) -> np.ndarray:
+    records = np.zeros((height, width), PACKED)
     for i, name in enumerate("xyz"):
         records[name] = np.arange(height * width).reshape(height, width) + 100 * i
-    records["rgb"] = np.full((height, width), 0x00102030, "u4").view("f4").astype(dtype["rgb"])
+    records["rgb"] = np.full((height, width), 0x00102030, "u4").view("f4").astype(PACKED["rgb"])
     return records
 
 

@@ -15,8 +15,8 @@ from . import messages
 RED = (200, 30, 10)
 
 
-def flat(*channels: int, dtype: str = "u1") -> np.ndarray:
-    return np.tile(np.array(channels, dtype), (4, 6, 1))
+def flat(*channels: int) -> np.ndarray:
+    return np.tile(np.array(channels, "u1"), (4, 6, 1))
 
 
 @pytest.mark.parametrize("pad", [0, 3])

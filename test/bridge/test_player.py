@@ -209,7 +209,7 @@ def test_a_node_that_does_not_hear_its_inputs_is_told(
     graph.node("segmenter").create_publisher(Header, "finished", qos.room())
     graph.node("segmenter").create_subscription(String, "labels", print, qos.room())
     until(lambda: player.count_publishers("finished") == player.count_subscribers("labels") == 1)
-    with pytest.raises(ValueError, match=r"expected nodes that listen, got none on detections_table$"):
+    with pytest.raises(ValueError, match=r"expected listening nodes, got none on detections_table$"):
         player.listen_to_receipts(0.0)
 
 

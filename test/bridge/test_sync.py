@@ -225,16 +225,6 @@ def test_flush_gives_what_is_still_possible() -> None:
     assert sync.queues["image"].dropped == {"unmatched": 1} and accounts_hold(sync)
 
 
-def test_a_cleared_synchroniser_waits_for_nothing_and_keeps_what_is_latched() -> None:
-    sync = Synchroniser((Stream("image"), Stream("depth"), Stream("info", Need.LATCHED)))
-    sync.add("info", 0, "K")
-    sync.add("image", 5, "i")
-    sync.clear()
-    assert sync.queues["image"].waiting == 0 and accounts_hold(sync)
-    sync.add("image", 1, "i")
-    assert pairs(sync.add("depth", 1, "d"), "info") == [("K",)]
-
-
 def test_a_reference_that_is_not_required_is_refused() -> None:
     with pytest.raises(ValueError, match="required stream first"):
         Synchroniser((Stream("info", Need.LATCHED),))

@@ -83,17 +83,6 @@ def test_closing_leaves_the_job_that_waits_undone() -> None:
     assert bench.done == ["first"]
 
 
-def test_a_job_that_has_not_begun_can_be_taken_back() -> None:
-    bench = Bench()
-    bench.worker.put("first")
-    assert bench.begun.wait(PATIENCE)
-    bench.worker.put("second")
-    assert bench.worker.clear() == "second" and bench.worker.clear() is None
-    bench.go.set()
-    bench.worker.close()
-    assert bench.done == ["first"] and not bench.replaced
-
-
 class Overtaken:
     """A backlog that holds its first job until ``go``, while 2, 3 and 4 overtake each other behind it."""
 

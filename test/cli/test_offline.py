@@ -48,13 +48,13 @@ def test_a_run_stops_early(model: Path, tmp_path: Path) -> None:
 
 
 def test_json_for_a_folder_that_is_not_there_is_refused_before_the_run(tmp_path: Path) -> None:
-    with pytest.raises(OSError, match=r"--json: expected .*nowhere to be a folder, and it is not"):
+    with pytest.raises(OSError, match=r"--json: expected an existing folder .*nowhere, got none"):
         offline(tmp_path / "no_recording", "--json", tmp_path / "nowhere" / "out.json")
 
 
 def test_json_that_cannot_be_written_is_refused_before_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("os.access", lambda path, mode: path != tmp_path)  # root may write everywhere
-    with pytest.raises(OSError, match=r"--json: expected to be allowed to write .*out\.json"):
+    with pytest.raises(OSError, match=r"--json: expected permission to write .*out\.json"):
         offline(tmp_path / "no_recording", "--json", tmp_path / "out.json")
 
 

@@ -77,7 +77,7 @@ def test_a_file_that_can_be_written_is_not_touched(tmp_path: Path) -> None:
 def test_a_file_in_no_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a_file").touch()
     for place in (tmp_path / "nowhere/x", tmp_path / "a_file/x"):
-        with pytest.raises(OSError, match=r"^--out: expected .* to be a folder, and it is not; create it or choose"):
+        with pytest.raises(OSError, match=r"^--out: expected an existing folder .*, got none; create it or choose"):
             require_writable("--out", place)
 
 
@@ -85,5 +85,5 @@ def test_a_file_that_may_not_be_written_is_refused(tmp_path: Path, monkeypatch: 
     (tmp_path / "old").touch()
     for forbidden, file in ((tmp_path, tmp_path / "new"), (tmp_path / "old", tmp_path / "old")):
         monkeypatch.setattr("os.access", lambda path, mode, forbidden=forbidden: path != forbidden)  # as root may
-        with pytest.raises(OSError, match=r"^--out: expected to be allowed to write .*, and am not; choose another"):
+        with pytest.raises(OSError, match=r"^--out: expected permission to write .*, got none; choose another"):
             require_writable("--out", file)

@@ -35,7 +35,7 @@ def test_a_copy_that_is_played_again_is_named(tmp_path: Path, capsys: pytest.Cap
     bag = copied(tum_folder(tmp_path / "run"), tmp_path / "out")
     assert f"writing {tmp_path / 'run'} as {bag}" in capsys.readouterr().err
     copied(tmp_path / "run", tmp_path / "out")
-    assert f"playing {bag}, which was written of {tmp_path / 'run'} before" in capsys.readouterr().err
+    assert f"playing {bag}, which an earlier run wrote of {tmp_path / 'run'}" in capsys.readouterr().err
 
 
 def test_recordings_of_one_name_have_copies_of_their_own(tmp_path: Path) -> None:

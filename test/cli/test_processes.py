@@ -32,7 +32,7 @@ def test_a_failed_process_is_told_with_its_last_words(tmp_path: Path, modules: d
     with Processes(tmp_path / "logs", modules) as processes:
         processes.start("good", "sleeper", ())
         processes.start("bad", "failure", ()).wait(20)
-        with pytest.raises(ValueError, match="bad ended with status 1; its last words: this went wrong"):
+        with pytest.raises(ValueError, match="bad ended with status 1; its last line: this went wrong"):
             processes.require_alive()
 
 

@@ -18,16 +18,16 @@ PRIORS = np.array([[0.5, 0.5, 0.2, 0.2], [0.25, 0.25, 0.1, 0.3]], np.float32)
 HEADS = {"loc": np.zeros((1, 2, 4)), "logits": np.array([[[0, 5, 0], [9, 0, 0]]], float)}
 
 
-def tf(outputs: Mapping[str, np.ndarray], input_name: str = "x", offset: str = "auto", labels: int = 5) -> TfDetection:
+def tf(outputs: Mapping[str, np.ndarray], input_name: str = "x", offset: str = "auto") -> TfDetection:
     inputs = (Port(input_name, "uint8", (1, 30, 40, 3)),)
     ports = tuple(Port(name, "float", (None,)) for name in outputs)
-    contract = recognise(inputs, ports, {}, outputs, labels, offset)
+    contract = recognise(inputs, ports, {}, outputs, 5, offset)
     assert isinstance(contract, TfDetection)
     return contract
 
 
-def classes_of(contract: TfDetection, outputs: Mapping[str, np.ndarray], threshold: float = 0.5) -> list[int]:
-    return contract.read([outputs[name] for name in contract.names], threshold).index.tolist()
+def classes_of(contract: TfDetection, outputs: Mapping[str, np.ndarray]) -> list[int]:
+    return contract.read([outputs[name] for name in contract.names], 0.5).index.tolist()
 
 
 def test_a_converted_model_counts_classes_from_zero_and_boxes_become_xyxy() -> None:

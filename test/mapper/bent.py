@@ -27,13 +27,13 @@ def square(side: float = 2.0, per_side: int = 20, laps: int = 1) -> list[Array]:
     return poses
 
 
-def bent(true: list[Array], scale: float = 1.02, yaw_per_step: float = np.radians(0.15)) -> list[Array]:
+def bent(true: list[Array]) -> list[Array]:
     """The same walk as odometry tells it: a little too long, and turning."""
     poses = [true[0]]
     for before, after in pairwise(true):
         motion = inverse(before) @ after
-        motion[:3, 3] *= scale
-        poses.append(poses[-1] @ motion @ step(yaw=yaw_per_step))
+        motion[:3, 3] *= 1.02
+        poses.append(poses[-1] @ motion @ step(yaw=np.radians(0.15)))
     return poses
 
 

@@ -108,7 +108,6 @@ def candidate(T: Array | None = None, **evidence: object) -> Candidate:
         inliers=900,
         overlap=0.7,
         rmse=0.01,
-        iterations=9,
         converged=bool(evidence.pop("converged", True)),
         slack=evidence.pop("slack", np.zeros((0, 6))),
         held=evidence.pop("held", np.zeros((0, 6))),

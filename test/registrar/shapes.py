@@ -20,11 +20,10 @@ ELL: tuple[Box, ...] = (((-0.12, -0.05, 0.0), (0.12, 0.03, 0.10)), ((-0.12, 0.03
 CAN = 0.05  # m, a radius; it is 0.15 m high
 
 
-def from_side(angle_deg: float, distance: float = 0.9, aside: tuple[float, float] = (0.0, 0.0)) -> Array:
-    """A camera that looks down at what stands ``aside`` from the middle."""
+def from_side(angle_deg: float, distance: float = 0.9) -> Array:
+    """A camera that looks down at what stands in the middle."""
     a = np.radians(angle_deg)
-    at = (aside[0], aside[1], 0.08)
-    return look_at((at[0] + distance * np.cos(a), at[1] + distance * np.sin(a), 0.65), at)
+    return look_at((distance * np.cos(a), distance * np.sin(a), 0.65), (0.0, 0.0, 0.08))
 
 
 def cast_boxes(eye: Array, rays: Array, boxes: tuple[Box, ...]) -> tuple[Array, Array]:

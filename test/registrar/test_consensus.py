@@ -14,8 +14,8 @@ YAW = pose(rotation_from_vector(np.array([0.0, 0.0, 2.0])), np.array([0.5, -0.4,
 TUMBLE = pose(rotation_from_vector(np.array([1.0, -0.5, 2.0])), np.array([0.5, -0.4, 0.1]))
 
 
-def matches(T, good: int, bad: int, seed: int = 0) -> Matches:
-    rng = np.random.default_rng(seed)
+def matches(T, good: int, bad: int) -> Matches:
+    rng = np.random.default_rng(0)
     source, target = rng.uniform(-1, 1, (good + bad, 3)), rng.uniform(-1, 1, (good + bad, 3))
     normals, others = (x / np.linalg.norm(x, axis=1, keepdims=True) for x in rng.normal(size=(2, good + bad, 3)))
     target[:good] = transform(T, source[:good]) + rng.normal(0, 0.01, (good, 3))

@@ -230,7 +230,7 @@ def test_a_place_of_an_earlier_run_of_the_clock_that_reached_this_one_closes_not
     begun_anew = [_frame(12.0, AWAY), _frame(40.0, BESIDE)]  # in this run the camera was elsewhere at 10 s
     closures, rejected = _run(Registrar(PARAMS), *frames, *begun_anew)
     (told,) = [r for r in rejected if r.reason is Reason.CLOCK]
-    assert told.detail == "the clock began anew at 12.000 s; places of sessions to 1 saw that time before"
+    assert told.detail == "the clock began anew at 12.000 s; sessions up to 1 had seen that time before"
     assert {closure.from_ns for closure in closures if closure.to_ns in (12 * SECOND, 40 * SECOND)} <= {12 * SECOND}
 
 

@@ -95,7 +95,7 @@ def test_an_unknown_keyframe_is_a_key_error() -> None:
         Store().keyframe(5)
 
 
-def test_merged_landmarks_are_written(tmp_path: Path) -> None:
+def test_merged_landmarks_are_written() -> None:
     store = Store()
     written = keyframe(1)
     store.add(written, [sightings_of(written)[0].of_landmark(9, np.eye(3))])
@@ -172,7 +172,7 @@ def test_the_id_of_a_landmark_is_never_used_again(tmp_path: Path) -> None:
 
 def test_a_place_where_no_store_can_be_made_is_a_store_error(tmp_path: Path) -> None:
     for path in (tmp_path / "nowhere" / "place.db", tmp_path):
-        with pytest.raises(StoreError, match="expected a file in a folder"):
+        with pytest.raises(StoreError, match="expected a file in an existing folder"):
             Store(path)
     assert not list(tmp_path.iterdir())
 

@@ -24,9 +24,9 @@ def seen(*boxes: tuple[Sequence[float], float], label: str = "cap") -> Detection
     )
 
 
-def known(*boxes: Sequence[float], difficult: Sequence[bool] | None = None, label: str = "cap") -> TrueBoxes:
+def known(*boxes: Sequence[float], difficult: Sequence[bool] | None = None) -> TrueBoxes:
     hard = np.array(difficult if difficult is not None else [False] * len(boxes), bool)
-    return TrueBoxes(np.array(boxes, np.float32).reshape(-1, 4), (label,) * len(boxes), hard)
+    return TrueBoxes(np.array(boxes, np.float32).reshape(-1, 4), ("cap",) * len(boxes), hard)
 
 
 def test_everything_found_and_nothing_else_is_one() -> None:

@@ -22,7 +22,7 @@ from .runs import summary
 def test_a_report_is_written_from_json_alone(tmp_path: Path) -> None:
     (tmp_path / "run.json").write_text(json.dumps(summary()))
     lacking = write_report(tmp_path / "out.html", [tmp_path / "run.json"] * 2)
-    assert len(lacking) == 2 and "names no recording that is there" in lacking[0]
+    assert len(lacking) == 2 and "names a recording that is not there" in lacking[0]
     assert (tmp_path / "out.html").read_text().count("<article>") == 2
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.segmenter.components import connect, grow
+from objreg_ros.segmenter.components import connect, split
 
 JUMP = (0.012, 0.008)
 
@@ -28,8 +28,8 @@ def test_a_missing_cell_is_bridged_and_a_seam_is_not() -> None:
 
 
 def test_parts_that_grow_towards_each_other_meet_half_way() -> None:
-    depth, keep = np.ones((3, 10), np.float32), np.ones((3, 10), bool)
-    labels = np.zeros((3, 10), np.int32)
-    labels[:, :2], labels[:, 8:] = 1, 2
-    grow(labels, depth, keep, JUMP, 9)
-    assert labels[1].tolist() == [1] * 5 + [2] * 5
+    depth, level = np.ones((3, 10), np.float32), np.zeros((3, 10), bool)
+    seams = np.zeros((3, 10), bool)
+    seams[:, 2:8] = True
+    labels, count = split(depth, level, seams, JUMP, 1, 9)
+    assert count == 2 and labels[1].tolist() == [1] * 5 + [2] * 5

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Turns about a point, and how far they take a shape from itself."""
+"""Motions: turns about a point, how far they take a shape from itself, and how fast a camera is carried."""
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
-from objreg_ros.geometry import pose, transform
+from objreg_ros.geometry import pose, rotation_angle, transform
 from objreg_ros.simulation.mesh import Mesh
 from objreg_ros.simulation.model import turn
 
@@ -25,3 +27,10 @@ def gap(mesh: Mesh, motion: np.ndarray) -> float:
     distance = np.linalg.norm(moved[:, None] - points[None], axis=2).min(axis=1)
     order = np.argsort(distance)
     return float(distance[order][np.searchsorted(np.cumsum(area[order]), 0.97 * area.sum())])
+
+
+def speeds(poses: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
+    """Speed in m/s and turning in deg/s between consecutive poses (N, 4, 4) at ``rate`` Hz."""
+    moved = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1) * rate
+    turned = [rotation_angle(a[:3, :3].T @ b[:3, :3]) for a, b in pairwise(poses)]
+    return moved, np.degrees(turned) * rate

@@ -14,10 +14,10 @@ from objreg_ros.simulation.trajectory import Hand, Waypoint, carried
 NONE = OdometryParams(distance_drift=0.0, turn_drift=0.0, tilt_error=0.0)
 
 
-def straight(metres: float, frames: int = 40) -> np.ndarray:
+def straight(metres: float) -> np.ndarray:
     ends = [np.array([0.0, 0.0, 1.2]), np.array([metres, 0.0, 1.2])]
     way = [Waypoint(eye, eye + np.array([1.0, 0.0, -0.2])) for eye in ends]
-    return carried(way, frames, 30.0, np.random.default_rng(0), Hand(tremor=0.0, shake=0.0))[0]
+    return carried(way, 40, 30.0, np.random.default_rng(0), Hand(tremor=0.0, shake=0.0))[0]
 
 
 def test_without_drift_odometry_is_the_true_motion_in_a_frame_with_z_up() -> None:

@@ -32,8 +32,8 @@ def scene_of(*centres: tuple[float, float, float], edge: float = 0.2) -> Scene:
     return Scene(tuple(placed), (floor,), (lamp,), np.full(3, 0.4))
 
 
-def level_view(distance: float = 1.0) -> np.ndarray:
-    return looking(np.array([0.0, -distance, 0.1]), np.array([0.0, 0.0, 0.1]), np.array([0.0, 0.0, 1.0]))
+def level_view() -> np.ndarray:
+    return looking(np.array([0.0, -1.0, 0.1]), np.array([0.0, 0.0, 0.1]), np.array([0.0, 0.0, 1.0]))
 
 
 def test_a_cube_seen_from_in_front_has_the_depth_and_the_box_that_the_pinhole_gives() -> None:

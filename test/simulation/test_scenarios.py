@@ -14,7 +14,8 @@ from objreg_ros.simulation import scenarios
 from objreg_ros.simulation.render import render
 from objreg_ros.simulation.scenarios import SCENARIOS, Story
 from objreg_ros.simulation.scene import Scene
-from objreg_ros.simulation.trajectory import speeds
+
+from .motions import speeds
 
 make_story = cache(scenarios.make_story)  # making a room takes half a second
 SMALL = Intrinsics(fx=131.25, fy=131.25, cx=79.5, cy=59.5, width=160, height=120)

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import is_rigid
-from objreg_ros.simulation.trajectory import Hand, Waypoint, around, carried, speeds
+from objreg_ros.simulation.trajectory import Hand, Waypoint, around, carried
+
+from .motions import speeds
 
 STEADY = Hand(tremor=0.0, shake=0.0)
 

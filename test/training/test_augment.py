@@ -14,10 +14,10 @@ from training.samples import Sample
 RED = (255, 0, 0)
 
 
-def one_red_box(x0: int = 100, y0: int = 60, x1: int = 180, y1: int = 120) -> Sample:
+def one_red_box() -> Sample:
     rgb = np.zeros((240, 320, 3), np.uint8)
-    rgb[y0:y1, x0:x1] = RED
-    return Sample(rgb, np.array([[x0, y0, x1, y1]], np.float32), np.array([3]), np.array([False]))
+    rgb[60:120, 100:180] = RED
+    return Sample(rgb, np.array([[100, 60, 180, 120]], np.float32), np.array([3]), np.array([False]))
 
 
 def red_extent(rgb: np.ndarray) -> np.ndarray:
