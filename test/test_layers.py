@@ -11,7 +11,7 @@ import pytest
 PACKAGE = Path(__file__).resolve().parents[1] / "objreg_ros"
 ROOMS = ("detector", "segmenter", "registrar", "mapper")
 ROS = {"rclpy", "launch", "launch_ros", "tf2_ros", "ament_index_python", "rosgraph_msgs"}
-FREE_BRIDGE = ("bridge.from_msg", "bridge.sync", "bridge.layout", "bridge.pictures")
+FREE_BRIDGE = ("bridge.from_msg", "bridge.course", "bridge.sync", "bridge.layout", "bridge.pictures")
 CORE = ("data", "geometry", "params", "share")
 HOUSE = ("offline", "truth", "report")
 

@@ -62,6 +62,8 @@ class MatchingDoor(Door):
         """What a frame that found no partner waited for, in words."""
         if why == Drop.LATE.value:
             return "one with a later stamp came before it"
+        if why == Drop.ODD_STAMP.value:
+            return "its stamp is far from those before and after it"
         if self._sync is None or why == Drop.TIME_JUMP.value:
             return "time went back to before it while it waited"
         wanted = " and ".join(map(_partner, self._sync.lacking(stamp_ns)))

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
+from objreg_ros.bridge.course import Course
 from objreg_ros.data import JUMP_NS
 
 
@@ -38,6 +39,7 @@ class Drop(Enum):
     QUEUE_FULL = "queue_full"  # it waited for a partner until the queue was full
     TIME_JUMP = "time_jump"  # time jumped back and left it in the future
     LATE = "late"  # one of its stream with a later stamp was there before it
+    ODD_STAMP = "odd_stamp"  # its stamp leapt far away, and the next one's did not
 
 
 @dataclass(slots=True)
@@ -96,6 +98,10 @@ class Queue:
     received: int = 0
     matched: int = 0
     dropped: Counter[str] = field(default_factory=Counter)
+    course: Course[Any] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.course = Course(lambda stamp_ns, payload: self._let_go(Item(stamp_ns, payload), Drop.ODD_STAMP))
 
     @property
     def crowded(self) -> bool:
@@ -109,7 +115,7 @@ class Queue:
     @property
     def waiting(self) -> int:
         """Items that no match has used yet."""
-        return sum(not item.used for item in self.items)
+        return sum(not item.used for item in self.items) + self.course.holding
 
     def nearest(self, stamp_ns: int) -> Item | None:
         """The item nearest to a time within the slop; None if there is none. The earlier of two that are as near."""
@@ -189,8 +195,8 @@ class Queue:
 class Synchroniser:
     """Matches the items of several streams. `add` returns the matches that an item completes, in order of time.
 
-    A stream whose stamps go back by `JUMP_NS` has jumped in time (a looped bag): what waits with a later stamp is
-    dropped as ``time_jump``, in every stream, and matching starts afresh. ``on_drop`` hears of every item that met no
+    A stream whose stamps go back by `JUMP_NS`, two of them, has jumped in time (a looped bag): what waits with a later
+    stamp is dropped as ``time_jump``, in every stream, and matching starts afresh. One alone is an ``odd_stamp``. ``on_drop`` hears of every item that met no
     match: the stream's name, the stamp and the reason.
     """
 
@@ -210,6 +216,10 @@ class Synchroniser:
         if queue.stream.need is Need.LATCHED:
             queue.latched, queue.matched = payload, queue.matched + 1
             return self._matches()
+        admitted = queue.course.admit(stamp_ns, payload)
+        return [match for item in admitted for match in self._take(queue, *item)]
+
+    def _take(self, queue: Queue, stamp_ns: int, payload: Any) -> list[Match]:
         if queue.is_late(stamp_ns):
             queue.refuse(stamp_ns)
             return []
@@ -222,6 +232,8 @@ class Synchroniser:
     def flush(self) -> list[Match]:
         """The matches that are still possible when nothing more will come; the rest is dropped as unmatched."""
         found = []
+        for queue in self.queues.values():
+            queue.course.end()
         while self._reference.items:
             found += self._resolve(self._reference.items[0])
         for queue in self._others:

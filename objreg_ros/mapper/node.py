@@ -15,6 +15,7 @@ from nav_msgs.msg import Path as PathMsg
 from std_srvs.srv import SetBool, Trigger
 
 from objreg_ros.bridge import from_msg, qos, to_msg
+from objreg_ros.bridge.course import Course
 from objreg_ros.bridge.door import Door
 from objreg_ros.bridge.spin import run
 from objreg_ros.data import JUMP_NS, LoopClosure, Odometry
@@ -43,6 +44,7 @@ class MapperNode(Door):
         self._waiting: list[LoopClosure] = []
         self._enabled, self._odom_frame = True, "odom"
         self._odometry_count = self._passed_over_count = 0
+        self._course: Course[Odometry] = Course(self._pass_over)
         self._begin()
         self._path = self.create_publisher(PathMsg, "path", qos.latched())
         self._correction = self.create_publisher(TransformStamped, "correction", qos.latched())
@@ -73,8 +75,16 @@ class MapperNode(Door):
 
     def _hear_odometry(self, message: Any) -> None:
         odometry = self.read_aside("odom", from_msg.odometry, message)
-        if odometry is None or not self._advances(odometry):
+        if odometry is None:
             return
+        for _, admitted in self._course.admit(odometry.stamp_ns, odometry):
+            if self._advances(admitted):
+                self._follow(admitted)
+
+    def _pass_over(self, stamp_ns: int, odometry: Odometry) -> None:
+        self._passed_over_count += 1
+
+    def _follow(self, odometry: Odometry) -> None:
         self._odometry_count += 1
         self._odom_frame = odometry.frame_id
         with self._graph_lock:
@@ -87,7 +97,8 @@ class MapperNode(Door):
     def _advances(self, odometry: Odometry) -> bool:
         """Whether time goes on; a jump back of the clock (a looped bag, a simulation begun anew) starts a new map.
 
-        An odometry that comes again, or late, is passed over and counted: the map has the later one already.
+        An odometry that comes again, or late, is passed over and counted: the map has the later one already. So is one
+        whose stamp is alone in a time of its own.
         """
         known = self._graph.odometry.stamps_ns
         if not known or odometry.stamp_ns > known[-1]:

@@ -118,7 +118,15 @@ def test_the_log_says_that_time_went_back(door: Pairs, said: list[str]) -> None:
     door.begin([Stream("a"), Stream("b")])
     door.feed("a", 5 + JUMP_NS, "a5")
     door.feed("a", 3, "a3")
+    door.feed("a", 4, "a4")
     assert said == ["frame dropped, time jump: time went back to before it while it waited"]
+
+
+def test_the_log_says_that_a_stamp_is_odd(door: Pairs, said: list[str]) -> None:
+    door.begin([Stream("a"), Stream("b")])
+    for stamp in (5 + JUMP_NS, 3, 6 + JUMP_NS):
+        door.feed("a", stamp, "a")
+    assert said == ["frame dropped, odd stamp: its stamp is far from those before and after it"]
 
 
 def test_the_log_says_that_a_frame_came_late(door: Pairs, said: list[str]) -> None:

@@ -197,15 +197,23 @@ def test_a_looped_recording_matches_as_well_the_second_time() -> None:
 
 def test_a_jump_back_drops_what_waits_in_the_future() -> None:
     sync = Synchroniser(EXACT)
-    sync.add("image", 10 + JUMP_NS, "old")
-    sync.add("image", 10, "new")
+    for stamp, what in ((10 + JUMP_NS, "old"), (10, "new"), (20, "newer")):
+        sync.add("image", stamp, what)
     assert sync.queues["image"].dropped == {"time_jump": 1}
     assert pairs(sync.add("depth", 10, "d"), "image") == [("new",)] and accounts_hold(sync)
 
 
+def test_one_stamp_that_is_far_from_its_neighbours_is_left_out_and_nothing_else() -> None:
+    for odd in (0, 3600 * JUMP_NS):
+        sync, stamps = Synchroniser(EXACT), [5 * JUMP_NS, 5 * JUMP_NS + 1, odd, 5 * JUMP_NS + 2, 5 * JUMP_NS + 3]
+        found = [match.stamp_ns for stamp in stamps for name in sync.queues for match in sync.add(name, stamp, stamp)]
+        assert found == [stamp for stamp in stamps if stamp != odd]
+        assert all(q.dropped == {"odd_stamp": 1} for q in sync.queues.values()) and accounts_hold(sync)
+
+
 def test_a_stream_that_follows_anothers_jump_back_loses_nothing_in_silence() -> None:
     sync = Synchroniser((Stream("image"), Stream("depth"), Stream("odom", Need.OPTIONAL)))
-    for name, stamp in (("depth", 1), ("odom", 1 + JUMP_NS), ("odom", 1), ("image", 0)):
+    for name, stamp in (("depth", 1), ("odom", 1 + JUMP_NS), ("odom", 1), ("odom", 1), ("image", 0)):
         assert sync.add(name, stamp, stamp) == []
     assert pairs(sync.add("depth", 0, "d0"), "depth") == [("d0",)]
     assert sync.queues["depth"].dropped == {"time_jump": 1} and accounts_hold(sync)
@@ -249,7 +257,7 @@ def test_nothing_is_lost_in_silence_whatever_comes(arrivals: list[tuple[str, int
     for name, stamp in arrivals:
         found += sync.add(name, stamp * STEP_NS, stamp)
         assert accounts_hold(sync)
-        assert all(q.waiting <= depth or q.items[-1].stamp_ns - q.items[0].stamp_ns <= PATIENCE_NS for q in queues)
+        assert all(len(q.items) <= depth or q.items[-1].stamp_ns - q.items[0].stamp_ns <= PATIENCE_NS for q in queues)
     found += sync.flush()
     assert accounts_hold(sync)
     assert all(abs(match["depth"] - match["image"]) <= slop for match in found)
@@ -259,7 +267,9 @@ def test_nothing_is_lost_in_silence_whatever_comes(arrivals: list[tuple[str, int
 def test_every_drop_is_told_with_its_stream_stamp_and_reason() -> None:
     told: list[tuple[str, int, str]] = []
     sync = Synchroniser(EXACT, on_drop=lambda name, stamp_ns, why: told.append((name, stamp_ns, why)))
-    for name, stamp in (("image", 10), ("image", JUMP_NS), ("depth", JUMP_NS), ("depth", JUMP_NS + 30), ("image", 0)):
+    for name, stamp in (("image", 10), ("image", JUMP_NS), ("depth", JUMP_NS), ("depth", JUMP_NS + 30)):
         sync.add(name, stamp, stamp)
+    for stamp in (0, 1):
+        sync.add("image", stamp, stamp)
     assert told == [("image", 10, "unmatched"), ("depth", JUMP_NS + 30, "time_jump")]
     assert sum(q.dropped.total() for q in sync.queues.values()) == len(told)

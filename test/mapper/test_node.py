@@ -134,7 +134,8 @@ def test_what_cannot_be_used_is_dropped_by_reason(outside: Outside) -> None:
 def test_a_jump_back_in_time_starts_a_new_map(outside: Outside) -> None:
     outside.drive(BENT[:40])
     keyframes = outside.door.extra_diagnostics()["keyframes"]
-    outside.odom.publish(to_msg.odometry(odometry(BENT)[0]))
+    for again in odometry(BENT)[:2]:
+        outside.odom.publish(to_msg.odometry(again))
     outside.wait(lambda: outside.door.extra_diagnostics()["keyframes"] == 1)
     assert keyframes > 3
 
@@ -150,8 +151,20 @@ def test_odometry_that_comes_late_is_passed_over_and_counted_and_leaves_the_map(
     outside.wait(lambda: door.extra_diagnostics()["odometry passed over"] == 2)
     assert (door.extra_diagnostics()["keyframes"], door.extra_diagnostics()["odometry"]) == (keyframes, len(BENT))
     np.testing.assert_array_equal(door._graph.T_map_odom, correction)
-    outside.odom.publish(to_msg.odometry(odometry(BENT)[-11]))  # a whole second: the clock was set back
+    for steps_back in (45, 44):  # seconds: the clock was set back, as the next one follows
+        assert door.extra_diagnostics()["keyframes"] == keyframes
+        outside.odom.publish(to_msg.odometry(odometry(BENT)[-steps_back]))
     outside.wait(lambda: door.extra_diagnostics()["keyframes"] == 1)
+
+
+def test_one_odometry_with_a_wrong_stamp_leaves_the_map(outside: Outside) -> None:
+    door = outside.door
+    outside.drive(BENT[:60])
+    for stamp_ns in (0, odometry(BENT)[60].stamp_ns + 3600 * 10**9):
+        outside.odom.publish(to_msg.odometry(replace(odometry(BENT)[60], stamp_ns=stamp_ns)))
+        outside.odom.publish(to_msg.odometry(odometry(BENT)[60 if stamp_ns == 0 else 61]))
+    outside.wait(lambda: door.extra_diagnostics()["odometry"] == 62)
+    assert door.extra_diagnostics()["odometry passed over"] == 2 and door.extra_diagnostics()["keyframes"] > 1
 
 
 def test_constraints_that_wait_do_not_outlive_a_jump_back_in_time_or_a_reset(outside: Outside) -> None:
@@ -159,7 +172,8 @@ def test_constraints_that_wait_do_not_outlive_a_jump_back_in_time_or_a_reset(out
     outside.drive(BENT[:40])
     outside.send(ahead[:1])
     outside.wait(lambda: door.extra_diagnostics()["constraints without odometry"] == 1)
-    outside.odom.publish(to_msg.odometry(odometry(BENT)[0]))
+    for again in odometry(BENT)[:2]:
+        outside.odom.publish(to_msg.odometry(again))
     outside.wait(lambda: door.ledger.balance().dropped == {"time_jump": 1})
     outside.send(ahead[1:])
     outside.wait(lambda: door.extra_diagnostics()["constraints without odometry"] == 1)

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The course of time in one stream. A stamp that is alone in a time of its own is an error; two are a jump of the clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+from objreg_ros.data import JUMP_NS
+
+AHEAD_NS = 60_000_000_000  # a stamp that leaps so far ahead is believed once the next one follows it
+
+T = TypeVar("T")
+
+
+class Course(Generic[T]):
+    """Holds an item whose stamp leaps until the next one of its stream tells whether time has leapt with it.
+
+    A leap is back by `JUMP_NS` or ahead by `AHEAD_NS`: of a looped bag or a clock that was set, or of one message that
+    was stamped wrongly, which must not part what came before from what comes after. ``on_alone`` is given the stamp and
+    the item of such a one.
+    """
+
+    def __init__(self, on_alone: Callable[[int, T], None]) -> None:
+        self._on_alone = on_alone
+        self._held: tuple[int, T] | None = None
+        self._last_ns: int | None = None
+
+    @property
+    def holding(self) -> bool:
+        """Whether an item waits for the next one."""
+        return self._held is not None
+
+    def admit(self, stamp_ns: int, item: T) -> list[tuple[int, T]]:
+        """The stamps and items that may be taken in now, in order: mostly this one, none or two around a leap."""
+        held, self._held = self._held, None
+        if held is not None and self._follows(stamp_ns, held[0]):
+            self._last_ns = stamp_ns
+            return [held, (stamp_ns, item)]
+        self._let_go(held)
+        if self._leaps(stamp_ns):
+            self._held = stamp_ns, item
+            return []
+        self._last_ns = stamp_ns if self._last_ns is None else max(stamp_ns, self._last_ns)
+        return [(stamp_ns, item)]
+
+    def end(self) -> None:
+        """Let go of what is held: nothing more will come."""
+        held, self._held = self._held, None
+        self._let_go(held)
+
+    def _let_go(self, held: tuple[int, T] | None) -> None:
+        if held is not None:
+            self._on_alone(*held)
+
+    def _follows(self, stamp_ns: int, held_ns: int) -> bool:
+        """Whether a stamp goes on from the one that is held, and not from those before it."""
+        return self._last_ns is not None and 0 <= stamp_ns - held_ns <= abs(stamp_ns - self._last_ns)
+
+    def _leaps(self, stamp_ns: int) -> bool:
+        if self._last_ns is None:
+            return False
+        return stamp_ns <= self._last_ns - JUMP_NS or stamp_ns >= self._last_ns + AHEAD_NS

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import pytest
+
+from objreg_ros.bridge.course import AHEAD_NS, Course
+from objreg_ros.data import JUMP_NS
+
+NOW = 1000 * JUMP_NS
+
+
+def passed(stamps: list[int]) -> tuple[list[int], list[int]]:
+    """The stamps that were admitted, and those that were found alone."""
+    alone: list[int] = []
+    course: Course[str] = Course(lambda stamp_ns, item: alone.append(stamp_ns))
+    admitted = [stamp_ns for stamp in stamps for stamp_ns, _ in course.admit(stamp, "item")]
+    course.end()
+    assert not course.holding
+    return admitted, alone
+
+
+def test_what_is_in_order_or_a_little_late_passes_at_once() -> None:
+    stamps = [NOW, NOW + 5, NOW + 3, NOW + 5, NOW + JUMP_NS // 2, NOW + 4]
+    assert passed(stamps) == (stamps, [])
+
+
+@pytest.mark.parametrize("odd", [0, NOW - JUMP_NS, NOW + AHEAD_NS + 1])
+def test_one_that_leaps_alone_is_kept_out(odd: int) -> None:
+    assert passed([NOW, NOW + 1, odd, NOW + 2, NOW + 3]) == ([NOW, NOW + 1, NOW + 2, NOW + 3], [odd])
+
+
+@pytest.mark.parametrize("leap", [-JUMP_NS, -NOW, AHEAD_NS])
+def test_two_that_leap_are_a_jump_of_the_clock(leap: int) -> None:
+    stamps = [NOW, NOW + leap, NOW + leap + 1, NOW + leap + 2]
+    assert passed(stamps) == (stamps, [])
+
+
+def test_of_two_that_leap_to_different_times_the_last_is_asked_for() -> None:
+    assert passed([NOW, NOW + 2 * AHEAD_NS, 5, 6]) == ([NOW, 5, 6], [NOW + 2 * AHEAD_NS])
+
+
+def test_one_that_leaps_at_the_end_is_let_go() -> None:
+    assert passed([NOW, 0]) == ([NOW], [0])
