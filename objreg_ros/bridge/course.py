@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The course of time in one stream. A stamp that is alone in a time of its own is an error; two are a jump of the clock."""
+"""The course of time in one stream: a stamp alone in a time of its own is an error, two are a jump of the clock."""
 
 from __future__ import annotations
 
