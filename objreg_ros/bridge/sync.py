@@ -196,8 +196,8 @@ class Synchroniser:
     """Matches the items of several streams. `add` returns the matches that an item completes, in order of time.
 
     A stream whose stamps go back by `JUMP_NS`, two of them, has jumped in time (a looped bag): what waits with a later
-    stamp is dropped as ``time_jump``, in every stream, and matching starts afresh. One alone is an ``odd_stamp``. ``on_drop`` hears of every item that met no
-    match: the stream's name, the stamp and the reason.
+    stamp is dropped as ``time_jump``, in every stream, and matching starts afresh. One alone is an ``odd_stamp``.
+    ``on_drop`` hears of every item that met no match: the stream's name, the stamp and the reason.
     """
 
     def __init__(
