@@ -139,6 +139,15 @@ def pose_error(T_estimated: Array, T_true: Array) -> tuple[float, float]:
     return float(rotation), float(100.0 * np.linalg.norm(T_estimated[:3, 3] - T_true[:3, 3]))
 
 
+def leaps(T_before_after: Array, seconds: float, max_speed: float) -> bool:
+    """Whether a body cannot have moved so within a time: faster than ``max_speed`` m/s, or two turns a second.
+
+    With half a metre and 20 degrees to spare, for what a filter puts right at once.
+    """
+    turned = np.degrees(rotation_angle(T_before_after[:3, :3]))
+    return bool(np.linalg.norm(T_before_after[:3, 3]) > 0.5 + max_speed * seconds or turned > 20.0 + 720.0 * seconds)
+
+
 def rotation_between(source: Array, target: Array) -> Array:
     """The shortest (3, 3) rotation that turns the direction ``source`` (3,) into ``target`` (3,)."""
     a, b = source / np.linalg.norm(source), target / np.linalg.norm(target)

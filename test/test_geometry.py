@@ -158,6 +158,13 @@ def test_a_pose_after_many_products_is_made_rigid_again() -> None:
     np.testing.assert_allclose(g.rigid(T), T, atol=1e-3)
 
 
+def test_what_no_body_does_is_a_leap() -> None:
+    half_turn = g.pose(QUARTER_TURN @ QUARTER_TURN, np.zeros(3))
+    ahead = g.pose(np.eye(3), np.array([1.0, 0.0, 0.0]))
+    assert g.leaps(ahead, 0.05, 5.0) and not g.leaps(ahead, 0.2, 5.0) and not g.leaps(ahead, 0.05, 20.0)
+    assert g.leaps(half_turn, 0.1, 5.0) and not g.leaps(half_turn, 0.5, 5.0)
+
+
 def test_the_rigid_fit_finds_the_motion_and_never_a_mirror() -> None:
     T = g.pose(g.rotation_from_vector(np.array([0.3, -2.0, 1.1])), np.array([4.0, -1.0, 2.0]))
     xyz = np.random.default_rng(3).normal(size=(30, 3)) * [1.0, 1.0, 0.01]

@@ -97,11 +97,19 @@ class MapperNode(Door):
     def _advances(self, odometry: Odometry) -> bool:
         """Whether time goes on; a jump back of the clock (a looped bag, a simulation begun anew) starts a new map.
 
-        An odometry that comes again, or late, is passed over and counted: the map has the later one already. So is one
-        whose stamp is alone in a time of its own.
+        So does odometry that begins anew elsewhere, as it does where what makes it is started again: nothing says where
+        that is on the map. An odometry that comes again, or late, is passed over and counted: the map has the later one
+        already. So is one whose stamp is alone in a time of its own.
         """
         known = self._graph.odometry.stamps_ns
-        if not known or odometry.stamp_ns > known[-1]:
+        if not known:
+            return True
+        if odometry.stamp_ns > known[-1]:
+            if self._graph.leaps(odometry):
+                self.get_logger().warning(
+                    "odometry leapt faster than max_speed: a new map; is there more than one publisher on odom?"
+                )
+                self._start_anew("odometry_leap")
             return True
         back_ns = known[-1] - odometry.stamp_ns
         if back_ns < JUMP_NS:
@@ -142,6 +150,8 @@ class MapperNode(Door):
             tied = self._graph.add_closure(closure)
         if tied:
             self.worker.put((closure.to_ns, None))
+        elif self._graph.in_gap(closure):
+            self.drop(closure.to_ns, "odometry_gap", "no odometry came around a moment of the constraint")
         elif self._came_too_early(closure):
             self.drop(closure.to_ns, "before_odometry", "odometry begins after the first moment of the constraint")
         else:

@@ -30,6 +30,7 @@ class MapperParams(Params):
     # And its steady error, which the closures tell; 0 is never any.
     steady_heading: float = param(1.0, "error of heading that every metre adds alike, one sigma", "deg/m", ge=0.0)
     steady_distance: float = param(0.02, "error of position that every metre adds alike, one sigma", "m/m", ge=0.0)
+    max_speed: float = param(5.0, "odometry that leaps faster than this has begun anew: a new map", "m/s", ge=0.1)
     max_residual: float = param(
         5.0, "a constraint farther than this from all the others is pruned", "standard deviations", ge=1.0
     )

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from objreg_ros.data import Array, LoopClosure, Odometry
-from objreg_ros.geometry import inverse, rotation_angle
+from objreg_ros.geometry import inverse, leaps, rotation_angle
 from objreg_ros.mapper.constraint import Constraint, between_keyframes, open3d_information, wandering
 from objreg_ros.mapper.optimisation import Edge, Solution, optimise, squared_residual
 from objreg_ros.mapper.params import MapperParams
@@ -122,8 +122,9 @@ class PoseGraph:
     def add_closure(self, closure: LoopClosure) -> bool:
         """Tie the two keyframes nearest to the closure's moments; False if odometry does not cover both (yet).
 
-        ValueError for a closure whose *from* is not before its *to*: the registrar looks back, so its moments are of
-        two runs of the clock, and this odometry knows at most one of them.
+        In a gap of the odometry it never will (`in_gap`): where the camera was by then nobody knows. ValueError for a
+        closure whose *from* is not before its *to*: the registrar looks back, so its moments are of two runs of the
+        clock, and this odometry knows at most one of them.
         """
         if closure.from_ns >= closure.to_ns:
             raise ValueError(
@@ -139,6 +140,17 @@ class PoseGraph:
             constraint = between_keyframes(closure, self.odometry, *moments, self.T_body_camera, sigmas)
             self.ties.append(Tie(k1, k2, constraint, closure))
         return True
+
+    def in_gap(self, closure: LoopClosure) -> bool:
+        """Whether a moment of the closure lies in a gap of the odometry."""
+        return self.odometry.in_gap(closure.from_ns) or self.odometry.in_gap(closure.to_ns)
+
+    def leaps(self, odometry: Odometry) -> bool:
+        """Whether odometry has begun anew elsewhere: no body moves so from the newest pose to this later one."""
+        if not len(self.odometry):
+            return False
+        seconds = 1e-9 * (odometry.stamp_ns - self.odometry.stamps_ns[-1])
+        return leaps(inverse(self.odometry.poses[-1]) @ odometry.T_odom_body, seconds, self.params.max_speed)
 
     def optimise(self) -> Summary:
         """Solve and adopt in one go."""

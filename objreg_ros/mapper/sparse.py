@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
+
 import numpy as np
 
 from objreg_ros.data import Array
@@ -12,6 +14,9 @@ from objreg_ros.mapper.trajectory import Trajectory
 TOLERANCE_M, TOLERANCE_DEG = 1e-3, 0.05
 EACH_AXIS = np.repeat([TOLERANCE_M, np.radians(TOLERANCE_DEG)], 3) / np.sqrt(3)  # so that three of them keep within it
 SECOND_NS = 1_000_000_000
+GAP_NS = 1_000_000_000  # while nothing comes for longer, and for `MISSED` times as long as usual,
+MISSED = 5.0  # nobody knows what happens
+NEWEST = 0.1  # the weight of the newest time between two poses in what is usual
 
 
 class SparseTrajectory(Trajectory):
@@ -21,15 +26,24 @@ class SparseTrajectory(Trajectory):
     newest is left out while the straight way between the two passes it and all that were left out before near enough:
     each of them bounds the velocity of that way, so what was left out need not be known any more (Bristol, "Swinging
     Door Trending", 1990). Turns are compared as rotation vectors: these are never nearer than the rotations are.
+
+    Moments within a gap of the poses (`GAP_NS`) are not covered.
     """
 
     def __init__(self) -> None:
         super().__init__()
+        self._gaps: list[tuple[int, int]] = []
+        self._usual_ns = np.inf  # the time between two poses
         self._least, self._most = _nothing()
 
     def append(self, stamp_ns: int, T_world_body: Array) -> None:
         """Add the newest pose; the one before it goes if it can. ValueError if time does not advance."""
+        last_ns = self.stamps_ns[-1] if self.stamps_ns else stamp_ns
         super().append(stamp_ns, T_world_body)
+        if len(self) > 1 and self._is_gap(stamp_ns - last_ns):
+            self._gaps.append((last_ns, stamp_ns))
+            self.pin()  # both ends are to stay
+            return
         if np.all(self._least <= self._most):  # the newest but one is not to stay yet
             velocity, slack = self._velocity_from(-3)
             if np.all((self._least <= velocity) & (velocity <= self._most)):
@@ -41,9 +55,25 @@ class SparseTrajectory(Trajectory):
             velocity, slack = self._velocity_from(-2)
             self._least, self._most = velocity - slack, velocity + slack
 
+    def covers(self, stamp_ns: int) -> bool:
+        """Whether the moment lies between the first and the last pose, and in no gap."""
+        return super().covers(stamp_ns) and not self.in_gap(stamp_ns)
+
+    def in_gap(self, stamp_ns: int) -> bool:
+        """Whether nothing came around the moment."""
+        k = bisect_left(self._gaps, stamp_ns, key=lambda gap: gap[1])
+        return k < len(self._gaps) and self._gaps[k][0] < stamp_ns < self._gaps[k][1]
+
     def pin(self) -> None:
         """The newest pose is to stay, as it is."""
         self._least, self._most = _nothing()
+
+    def _is_gap(self, waited_ns: int) -> bool:
+        if waited_ns > max(GAP_NS, MISSED * self._usual_ns):
+            return True
+        known = np.isfinite(self._usual_ns)
+        self._usual_ns = (1.0 - NEWEST) * self._usual_ns + NEWEST * waited_ns if known else float(waited_ns)
+        return False
 
     def _velocity_from(self, before: int) -> tuple[Array, Array]:
         """The velocity (6,) from a kept pose to the newest, m/s in the world and rad/s in the body, and its slack."""

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from objreg_ros.data import JUMP_NS, Array, Frame
-from objreg_ros.geometry import inverse, rigid, rotation_angle
+from objreg_ros.geometry import inverse, leaps, rigid, rotation_angle
 from objreg_ros.registrar.odometry import Way
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.plumb import PlumbLine
@@ -79,6 +79,20 @@ class _Session:
     plumb: PlumbLine
     first: Frame  # of the last stretch
     last_ns: int  # of the last frame that was followed
+    odometry: tuple[int, Array] | None = None  # the last that it had: stamp in ns, T_odom_camera
+
+    def leaps(self, frame: Frame, max_speed: float) -> bool:
+        """Whether odometry has begun anew elsewhere: no camera moves so fast."""
+        if self.odometry is None or frame.T_odom_camera is None:
+            return False
+        last_ns, T_odom_last = self.odometry
+        return leaps(inverse(T_odom_last) @ frame.T_odom_camera, 1e-9 * (frame.stamp_ns - last_ns), max_speed)
+
+    def follow(self, frame: Frame) -> None:
+        """Go on to a frame."""
+        self.last_ns = frame.stamp_ns
+        if frame.T_odom_camera is not None:
+            self.odometry = frame.stamp_ns, frame.T_odom_camera
 
     def goes_on(self, frame: Frame) -> bool:
         """Whether a later frame may belong to it: of the same camera, and with odometry only if the session has it."""
@@ -126,7 +140,7 @@ class Keyframer:
         self._last: tuple[int, Array, Counter[str]] | None = None  # session, pose and labels of the last stretch
 
     def add(self, frame: Frame) -> Stretch | None:
-        """Track the frame and collect it. A lost track or a jump back in time begins a new session.
+        """Track the frame and collect it. A lost track, odometry that leaps or a clock that does begins a new session.
 
         One that is not later than the last, but by no jump, is passed over.
         """
@@ -137,12 +151,12 @@ class Keyframer:
         if last_ns is None or frame.stamp_ns < last_ns:
             self._clock = Clock(frame.stamp_ns, self.next_session)
             return self._start(frame)
-        if session is None or not session.goes_on(frame):
+        if session is None or not session.goes_on(frame) or session.leaps(frame, self._params.max_speed):
             return self._start(frame)
         T_session_frame = self._follow(frame)
         if T_session_frame is None:
             return None if self._may_come_back(session, frame) else self._start(frame)
-        session.last_ns = frame.stamp_ns
+        session.follow(frame)
         frame = _levelled(session, frame)
         if stretch is None:
             self._begin(session, frame, T_session_frame)
@@ -175,6 +189,7 @@ class Keyframer:
             first=frame,
             last_ns=frame.stamp_ns,
         )
+        self._session.follow(frame)
         self.next_session += 1
         self._begin(self._session, _levelled(self._session, frame), T_session_frame)
         return ended

@@ -28,6 +28,7 @@ class RegistrarParams(Params):
     keyframe_translation: float = param(0.15, "motion that ends a keyframe", "m", ge=0.0)
     keyframe_rotation: float = param(8.0, "rotation that ends a keyframe", "deg", ge=0.0, le=180.0)
     keyframe_seconds: float = param(1.0, "longest time that a keyframe spans", "s", ge=0.0)
+    max_speed: float = param(5.0, "odometry that leaps faster than this has begun anew: another session", "m/s", ge=0.1)
     keyframe_min_objects: int = param(1, "least number of objects of a keyframe", ge=1)
     keyframe_frames: int = param(4, "most frames that are fused into one keyframe", ge=1, le=30)
     object_voxel: float = param(0.004, "edge of a voxel when sightings of an object are fused", "m", ge=0.001, le=0.05)

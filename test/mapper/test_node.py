@@ -131,6 +131,24 @@ def test_what_cannot_be_used_is_dropped_by_reason(outside: Outside) -> None:
     assert dropped == {"malformed_constraints": 1, "before_odometry": 1, "two_clocks": 1}
 
 
+def test_odometry_that_begins_anew_elsewhere_starts_a_new_map(outside: Outside) -> None:
+    outside.drive(BENT[:40])
+    keyframes = outside.door.extra_diagnostics()["keyframes"]
+    away = pose(np.eye(3), np.array([3.0, 0.0, 0.0]))
+    outside.odom.publish(to_msg.odometry(replace(odometry(BENT)[40], T_odom_body=away @ BENT[40])))
+    outside.wait(lambda: outside.door.extra_diagnostics()["keyframes"] == 1)
+    assert keyframes > 3
+
+
+def test_a_constraint_within_a_gap_of_the_odometry_is_dropped(outside: Outside) -> None:
+    outside.drive(BENT[:20])
+    for word in odometry(BENT)[60:62]:
+        outside.odom.publish(to_msg.odometry(word))
+    outside.wait(lambda: outside.door.extra_diagnostics()["odometry"] == 22)
+    outside.send([closure(TRUE, 5, 40)])
+    outside.wait(lambda: outside.door.ledger.balance().dropped == {"odometry_gap": 1})
+
+
 def test_a_jump_back_in_time_starts_a_new_map(outside: Outside) -> None:
     outside.drive(BENT[:40])
     keyframes = outside.door.extra_diagnostics()["keyframes"]

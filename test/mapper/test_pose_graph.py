@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -149,6 +150,25 @@ def test_a_closure_of_two_runs_of_the_clock_is_refused(to: int) -> None:
     with pytest.raises(ValueError, match=rf"whose \*from\* is before its \*to\* at {to}00000000 ns, got 30000"):
         graph.add_closure(closure(TRUE, 30, to))
     assert len(graph.ties) == ties
+
+
+def test_a_closure_within_a_gap_of_the_odometry_ties_nothing() -> None:
+    graph, silent = PoseGraph(), range(100, 130)
+    for k, word in enumerate(odometry(TRUE)):
+        if k not in silent:
+            graph.add_odometry(word)
+    inside = closure(TRUE, 10, 110)
+    assert graph.in_gap(inside) and not graph.add_closure(inside)
+    assert not graph.in_gap(RIGHT[0]) and graph.add_closure(RIGHT[0])
+
+
+def test_odometry_that_is_elsewhere_at_once_has_leapt() -> None:
+    graph, (first, second, *_) = PoseGraph(), odometry(TRUE)
+    assert not graph.leaps(first)
+    graph.add_odometry(first)
+    away = replace(second, T_odom_body=second.T_odom_body @ pose(np.eye(3), np.array([3.0, 0.0, 0.0])))
+    assert graph.leaps(away) and not graph.leaps(second)
+    assert not graph.leaps(replace(away, stamp_ns=5 * SECOND))  # it had the time
 
 
 def test_the_place_of_the_camera_on_the_body_is_honoured() -> None:

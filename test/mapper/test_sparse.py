@@ -55,6 +55,25 @@ def test_every_pose_of_a_walk_is_given_back_within_a_millimetre_and_a_twentieth_
     assert len(trajectory) < len(poses) / 4
 
 
+def test_moments_in_a_gap_are_not_covered_and_its_ends_are() -> None:
+    trajectory, silent_ns = SparseTrajectory(), 20 * SECOND
+    for stamp_ns in (*range(0, SECOND, STEP_NS), *range(silent_ns, silent_ns + SECOND, STEP_NS)):
+        trajectory.append(stamp_ns, at([1e-9 * stamp_ns, 0.0, 0.0], [0.0, 0.0, 0.0]))
+    inside, ends = [SECOND, silent_ns - 1], [SECOND - STEP_NS, silent_ns, silent_ns + STEP_NS]
+    assert all(trajectory.in_gap(stamp) and not trajectory.covers(stamp) for stamp in inside)
+    assert all(trajectory.covers(stamp) and not trajectory.in_gap(stamp) for stamp in ends)
+    assert trajectory.at(silent_ns)[0, 3] == pytest.approx(20.0)
+
+
+def test_poses_that_always_come_seldom_have_no_gaps() -> None:
+    trajectory = SparseTrajectory()
+    for k in range(20):
+        trajectory.append(3 * k * SECOND, at([0.1 * k, 0.0, 0.0], [0.0, 0.0, 0.0]))
+    assert trajectory.covers(10 * SECOND)
+    trajectory.append(100 * SECOND, at([2.0, 0.0, 0.0], [0.0, 0.0, 0.0]))
+    assert trajectory.in_gap(80 * SECOND) and not trajectory.in_gap(SECOND)
+
+
 def test_the_first_the_newest_and_what_is_pinned_stay_as_they_are() -> None:
     poses, pins = [at([0.001 * k, 0.0, 0.0], [0.0, 0.0, 0.0]) for k in range(400)], (100, 101, 250)
     trajectory = kept_of(poses, pins)

@@ -70,6 +70,15 @@ def test_a_lost_track_and_a_jump_back_in_time_begin_a_new_session() -> None:
     assert [s.session for s in _run(Keyframer(PARAMS), looped)] == [0, 1]
 
 
+def test_odometry_that_begins_anew_elsewhere_begins_a_new_session() -> None:
+    away = pose(np.eye(3), np.array([0.9, 0.0, 0.0]))
+    steps = [moved(0.03 * i) for i in range(20)]
+    restarted = [frame(0.03 * i, CUP, T if i < 10 else away @ T) for i, T in enumerate(steps)]
+    assert {s.session for s in _run(Keyframer(PARAMS), restarted)} == {0, 1}
+    fast = PARAMS.replaced(max_speed=20.0)
+    assert {s.session for s in _run(Keyframer(fast), restarted)} == {0}
+
+
 def test_a_frame_that_comes_late_or_twice_is_passed_over() -> None:
     frames = [frame(t, CUP, moved(0.03 * k)) for k, t in enumerate((5.0, 5.1, 5.0, 4.2, 5.1, 5.2, 5.3, 5.4, 5.5))]
     stretches = _run(Keyframer(PARAMS), frames)
