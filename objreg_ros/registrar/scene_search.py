@@ -99,12 +99,16 @@ def register_scenes(source: Prepared, target: Prepared, params: RegistrarParams)
     """The best distinct poses of all objects of ``source`` upon those of ``target``, best first; empty without any."""
     if source.scene is None or target.scene is None:
         return []
-    seeds = [hypothesis.T_target_source for hypothesis in from_centroids(source, target, params)[: params.scene_seeds]]
     pairs = shape_pairs(source, target)
+    if not pairs:
+        return []
+    seeds = [hypothesis.T_target_source for hypothesis in from_centroids(source, target, params)[: params.scene_seeds]]
     for a, b in pairs:
         seeds += glance(a, b, EACH, params)
-    levelled = [_levelled(pairs, T, params.centroid_tolerance) for T in seeds]
-    return improve(source.scene, target.scene, levelled, params) if levelled else []
+    feet_a, feet_b = (np.array([shape.foot for shape in shapes]) for shapes in zip(*pairs, strict=True))
+    up = pairs[0][1].R_upright_camera[2]
+    levelled = [_levelled(feet_a, feet_b, up, T, params.centroid_tolerance) for T in seeds]
+    return improve(source.scene, target.scene, levelled, params)
 
 
 def shape_pairs(source: Prepared, target: Prepared) -> list[tuple[Shape, Shape]]:
@@ -113,15 +117,15 @@ def shape_pairs(source: Prepared, target: Prepared) -> list[tuple[Shape, Shape]]
     return [(a, b) for a, b in pairs if a is not None and b is not None]
 
 
-def _levelled(pairs: list[tuple[Shape, Shape]], T_target_source: Array, tolerance: float) -> Array:
+def _levelled(feet_source: Array, feet_target: Array, up: Array, T_target_source: Array, tolerance: float) -> Array:
     """The pose raised or lowered so that the objects that it brings together stand at the same height.
 
-    What an object stands on is known to a millimetre, its middle to centimetres.
+    What an object stands on is known to a millimetre, its middle to centimetres. Feet (P, 3) of P pairs that may be
+    one object, ``up (3,)`` in the target's frame.
     """
-    gaps = np.array([b.foot - transform(T_target_source, a.foot) for a, b in pairs])
+    gaps = feet_target - transform(T_target_source, feet_source)
     near = np.linalg.norm(gaps, axis=1) < 2.0 * tolerance
     T = T_target_source.copy()
     if near.any():
-        up = pairs[0][1].R_upright_camera[2]
         T[:3, 3] += np.median(gaps[near] @ up) * up
     return T
