@@ -193,7 +193,8 @@ class Line:
         self._camera_info: Any = None
         self._labels: dict[int, tuple[str, ...]] = {}  # what was detected in the frames that are under way
         self._views = Synchroniser(self._streams(), self._unmatched)
-        odom = Stream("odom", Need.OPTIONAL, timing.odom_slop_ns, ODOM_DEPTH, enclosing=True)
+        expected = inputs.odom is not None
+        odom = Stream("odom", Need.OPTIONAL, timing.odom_slop_ns, ODOM_DEPTH, enclosing=True, expected=expected)
         self._frames = Synchroniser([Stream("frame"), odom], self._unmatched)
 
     def _streams(self) -> list[Stream]:

@@ -58,7 +58,7 @@ class Stream:
     The last ``depth`` items wait as long as it takes, more of them for `PATIENCE_NS` if they are not too large: a slow
     detector's word comes when its depth image is many images old. Of an ``enclosing`` one a match gets a tuple: the
     item of its very time, or those before and after it where they are at most `ENCLOSING` times the slop apart, or the
-    nearest.
+    nearest. An ``expected`` one is known to speak, and waited for from the start.
     """
 
     name: str
@@ -66,6 +66,7 @@ class Stream:
     slop_ns: int = 0
     depth: int = 10
     enclosing: bool = False
+    expected: bool = False
 
     def __post_init__(self) -> None:
         if self.enclosing and self.need is not Need.OPTIONAL:
@@ -142,7 +143,7 @@ class Queue:
     def settled(self, stamp_ns: int) -> bool:
         """Whether no item that may still come can be nearer to a time than those that are here."""
         if self.last_ns is None:
-            return self.stream.need is Need.OPTIONAL
+            return self.stream.need is Need.OPTIONAL and not self.stream.expected
         return self.last_ns > stamp_ns or any(item.stamp_ns == stamp_ns for item in self.items)
 
     def takes(self, stamp_ns: int, item: Item) -> bool:

@@ -99,6 +99,13 @@ def test_an_optional_stream_that_never_spoke_is_not_waited_for() -> None:
     assert pairs(sync.add("image", 1, "i"), "odom") == [(None,)]
 
 
+def test_an_expected_stream_is_waited_for_from_the_start() -> None:
+    sync = Synchroniser((Stream("image"), Stream("odom", Need.OPTIONAL, slop_ns=10, expected=True)))
+    assert sync.add("image", 100, "i") == []
+    assert pairs(sync.add("odom", 101, "o"), "image", "odom") == [("i", "o")]
+    assert accounts_hold(sync)
+
+
 def test_an_optional_stream_that_has_spoken_is_waited_for_and_reused() -> None:
     sync = Synchroniser((Stream("image"), Stream("odom", Need.OPTIONAL, slop_ns=10)))
     sync.add("odom", 0, "o0")
