@@ -18,7 +18,7 @@ from objreg_ros.data import Frame, LoopClosure, Rejected
 Array = NDArray[Any]
 
 RECENT_FRAMES = 1000  # frames whose position is remembered until it is known which is a keyframe
-RECENT_REFUSALS = 100
+RECENT_CLOSURES, RECENT_REFUSALS = 2000, 100  # edges that are shown
 GREEN, RED, GOLD, WHITE = (0.2, 0.8, 0.3, 1.0), (0.9, 0.2, 0.2, 0.35), (1.0, 0.75, 0.1, 0.9), (1.0, 1.0, 1.0, 1.0)
 
 Edge = tuple[int, int]
@@ -30,7 +30,7 @@ class Scene:
     def __init__(self) -> None:
         self._recent: deque[tuple[int, Array]] = deque(maxlen=RECENT_FRAMES)
         self._places: dict[int, Array] = {}
-        self._accepted: list[Edge] = []
+        self._accepted: deque[Edge] = deque(maxlen=RECENT_CLOSURES)
         self._rejected: deque[Edge] = deque(maxlen=RECENT_REFUSALS)
 
     def see(self, frame: Frame) -> None:

@@ -55,6 +55,15 @@ def test_an_edge_to_a_keyframe_of_unknown_place_is_not_drawn() -> None:
     assert ends(scene, "accepted") == []
 
 
+def test_a_long_run_shows_the_newest_edges(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("objreg_ros.bridge.markers.RECENT_CLOSURES", 2)
+    scene = Scene()
+    for stamp_ns in range(1, 5):
+        scene.see(frame(stamp_ns, x=10.0 * stamp_ns))
+        scene.settle(stamp_ns, [closure(1, stamp_ns)] if stamp_ns > 1 else [], [])
+    assert ends(scene, "accepted") == [10.0, 30.0, 10.0, 40.0]
+
+
 def test_objects_are_shown_with_their_names() -> None:
     markers = Scene().markers([(7, "cup", np.array([1.0, 2.0, 3.0]))], 5, "odom").markers
     (name,) = [marker for marker in markers if marker.type == Marker.TEXT_VIEW_FACING]
