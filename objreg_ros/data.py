@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 
+LEAST_VARIANCE = 1e-30  # m^2, rad^2: the information of less is no number that can be reckoned with
 JUMP_NS = 1_000_000_000  # stamps that go back so far are of a clock that began anew; by less, one message came late
 MOVED = re.compile(r"moved (?P<label>.+) \[m\]")  # evidence: how far an object of the label went
 Word = TypeVar("Word")
@@ -365,7 +366,8 @@ class LoopClosure:
         C = self.covariance
         symmetric = bool(np.isfinite(C).all()) and bool(np.abs(C - C.T).max() <= 1e-6 * max(1e-12, np.abs(C).max()))
         _require(self, symmetric, "a finite, symmetric covariance", C.tolist())
-        _require(self, bool(np.linalg.eigvalsh((C + C.T) / 2).min() > 0), "a positive definite covariance", C.tolist())
+        least = np.linalg.eigvalsh((C + C.T) / 2).min()
+        _require(self, bool(least > LEAST_VARIANCE), "a positive definite covariance", C.tolist())
 
     @property
     def moved(self) -> dict[str, float]:

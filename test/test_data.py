@@ -115,6 +115,7 @@ NOT_SYMMETRIC = np.eye(6) + np.eye(6, k=1)
         (detections, {"image_hw": (0, 64)}, "expected an image size above 0 px"),
         (closure, {"T_from_to": R_SCALED}, "LoopClosure.T_from_to: expected a rigid motion"),
         (closure, {"covariance": NOT_POSITIVE}, "expected a positive definite covariance"),
+        (closure, {"covariance": 1e-300 * np.eye(6)}, "expected a positive definite covariance"),
         (closure, {"covariance": NOT_SYMMETRIC}, "expected a finite, symmetric covariance"),
         (closure, {"covariance": np.full((6, 6), np.nan)}, "expected a finite, symmetric covariance"),
         (closure, {"covariance": np.eye(3)}, "LoopClosure.covariance: expected float64 of shape (6, 6)"),
