@@ -23,6 +23,7 @@ import numpy as np
 from objreg_ros.data import LoopClosure
 from objreg_ros.registrar.codec import keyframe_from_rows, keyframe_row, object_row, sighting_from_row
 from objreg_ros.registrar.keyframe import Keyframe
+from objreg_ros.registrar.landmarks import Merge
 from objreg_ros.registrar.sighting import Sighting
 
 MAGIC = b"SQLite format 3\0"
@@ -104,12 +105,12 @@ class Store:
         keyframe: Keyframe,
         sightings: Sequence[Sighting],
         closures: Iterable[LoopClosure] = (),
-        merged: Mapping[int, int] | None = None,
+        merged: Mapping[int, Merge] | None = None,
     ) -> None:
         """Write a keyframe under its id (see `next_keyframe`), its objects and closures in one transaction.
 
-        ``merged`` says which landmarks became which: known objects that turned out to be the same. StoreError where it
-        cannot be written: then nothing of it is.
+        ``merged`` says which landmarks became which, and in whose axes: known objects that turned out to be the same.
+        StoreError where it cannot be written: then nothing of it is.
         """
         with self._told(f"write keyframe {keyframe.keyframe_id}"), self._connection as transaction:
             _insert(transaction, "keyframe", keyframe_row(keyframe))
@@ -119,8 +120,8 @@ class Store:
             transaction.execute("UPDATE highest SET landmark = MAX(landmark, ?)", (newest,))
             for closure in closures:
                 _insert(transaction, "closure", _closure_row(closure))
-            for old, new in (merged or {}).items():
-                transaction.execute("UPDATE object SET landmark = ? WHERE landmark = ?", (new, old))
+            for old, merge in (merged or {}).items():
+                _rename(transaction, old, merge)
         self._sessions[keyframe.keyframe_id] = keyframe.session
         self._remember(keyframe)
 
@@ -324,6 +325,16 @@ def _insert(transaction: sqlite3.Connection, table: str, row: Mapping[str, Any])
     return int(
         transaction.execute(f"INSERT INTO {table} ({names}) VALUES ({marks})", tuple(row.values())).lastrowid or 0
     )
+
+
+def _rename(transaction: sqlite3.Connection, old: int, merge: Merge) -> None:
+    """Make every sighting of a landmark one of that which stays, in its axes."""
+    rows = transaction.execute("SELECT id, R_landmark_session FROM object WHERE landmark = ?", (old,)).fetchall()
+    turned = [
+        (merge.into, (merge.R_into_old @ np.frombuffer(row["R_landmark_session"]).reshape(3, 3)).tobytes(), row["id"])
+        for row in rows
+    ]
+    transaction.executemany("UPDATE object SET landmark = ?, R_landmark_session = ? WHERE id = ?", turned)
 
 
 def _closure_row(closure: LoopClosure) -> dict[str, Any]:

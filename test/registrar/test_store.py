@@ -18,7 +18,9 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import LoopClosure
+from objreg_ros.geometry import rotation_from_vector
 from objreg_ros.registrar import store as store_module
+from objreg_ros.registrar.landmarks import Merge
 from objreg_ros.registrar.plumb import DOUBT, ONE_VIEW
 from objreg_ros.registrar.sighting import sightings_of
 from objreg_ros.registrar.store import SCHEMA_VERSION, Store, StoreError
@@ -95,13 +97,16 @@ def test_an_unknown_keyframe_is_a_key_error() -> None:
         Store().keyframe(5)
 
 
-def test_merged_landmarks_are_written(tmp_path: Path) -> None:
-    store = Store()
+def test_merged_landmarks_are_written_in_the_axes_of_the_one_that_stays() -> None:
+    store, turn = Store(), rotation_from_vector(np.array([0.0, 0.0, 0.5]))
     written = keyframe(1)
-    store.add(written, [sightings_of(written)[0].of_landmark(9, np.eye(3))])
+    store.add(written, [sightings_of(written)[0].of_landmark(9, turn)])
     later = keyframe(2, 5.0)
-    store.add(later, [sightings_of(later)[0].of_landmark(2, np.eye(3))], merged={9: 2})
-    assert [sighting.landmark for sighting in store.sightings()] == [2, 2]
+    merged = {9: Merge(into=2, R_into_old=turn)}
+    store.add(later, [sightings_of(later)[0].of_landmark(2, np.eye(3))], merged=merged)
+    first, second = store.sightings()
+    assert (first.landmark, second.landmark) == (2, 2)
+    assert np.allclose(first.R_landmark_session, turn @ turn) and np.array_equal(second.R_landmark_session, np.eye(3))
 
 
 def test_a_closure_comes_back_with_its_covariance(tmp_path: Path) -> None:
