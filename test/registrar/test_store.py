@@ -23,7 +23,8 @@ from objreg_ros.registrar import store as store_module
 from objreg_ros.registrar.landmarks import Merge
 from objreg_ros.registrar.plumb import DOUBT, ONE_VIEW
 from objreg_ros.registrar.sighting import sightings_of
-from objreg_ros.registrar.store import SCHEMA_VERSION, Store, StoreError
+from objreg_ros.registrar.store import Store, StoreError
+from objreg_ros.registrar.store_file import SCHEMA_VERSION
 
 from .samples import box, keyframe, moved
 
@@ -241,6 +242,32 @@ def test_a_store_that_is_only_read_is_not_changed(tmp_path: Path) -> None:
         _add(reader)
     reader.close()
     assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["place.db"]
+
+
+def test_a_second_writer_is_refused_while_readers_see_what_is_written(tmp_path: Path) -> None:
+    path = tmp_path / "place.db"
+    store = Store(path)
+    _add(store)
+    with pytest.raises(StoreError, match=r"place\.db: in use by another registrar"):
+        Store(path)
+    reader = Store(path, read_only=True)
+    assert _add(store) == 2 and reader.keyframe(1).labels == ("cup",)
+    reader.close()
+    store.save(tmp_path / "copy.db")
+    Store(tmp_path / "copy.db").close()
+    store.close()
+    again = Store(path)
+    assert again.keyframe_ids() == [1, 2]
+    again.close()
+
+
+def test_a_store_that_was_refused_is_in_nobodys_way(tmp_path: Path) -> None:
+    path = tmp_path / "place.db"
+    path.write_text("nothing like a store\n" * 20)
+    with pytest.raises(StoreError, match="another kind"):
+        Store(path)
+    path.unlink()
+    Store(path).close()
 
 
 def test_a_missing_store_is_not_made_by_reading(tmp_path: Path) -> None:
