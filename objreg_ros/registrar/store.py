@@ -176,14 +176,32 @@ class Store:
         }
 
     def save(self, path: str | Path = "") -> str:
-        """Fold the write-ahead log into the file, or write a copy to ``path``. Returns where it is."""
-        with self._told("save it" if not path else f"copy it to {path}"):
+        """Fold the write-ahead log into the file, or write a whole copy to ``path``. Returns where it is.
+
+        StoreError where that cannot be: a store in memory has no file, and a log that others read stays.
+        """
+        with self._told(f"copy it to {path}" if path else "save it"):
             if path:
-                with closing(sqlite3.connect(path)) as copy:
-                    self._connection.backup(copy)
+                self._copy(Path(path).expanduser())
                 return str(path)
-            self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            if not self.path:
+                raise ValueError("expected a store in a file, got one in memory only; start with a path for it")
+            busy, *_ = self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
+            if busy:
+                name = Path(self.path).name
+                raise ValueError(
+                    f"expected nobody else to read it, got another program that does; all is written, but what is in "
+                    f"{name}-wal is not in {name} yet: end that program and save again"
+                )
             return self.path
+
+    def _copy(self, path: Path) -> None:
+        claim = Claim(path)
+        try:
+            with closing(sqlite3.connect(path)) as copy:
+                self._connection.backup(copy)
+        finally:
+            claim.release()
 
     def close(self) -> None:
         """End it; everything that was added is already written."""

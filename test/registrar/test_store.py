@@ -11,6 +11,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -219,6 +220,38 @@ def test_a_copy_can_be_saved_from_memory(tmp_path: Path) -> None:
     _add(store)
     store.save(tmp_path / "copy.db")
     assert Store(tmp_path / "copy.db").counts()["keyframes"] == 1
+
+
+def test_a_store_in_memory_is_not_saved_without_a_path() -> None:
+    store = Store()
+    _add(store)
+    with pytest.raises(StoreError, match="memory: cannot save it: expected a store in a file, got one in memory only"):
+        store.save()
+
+
+def test_a_store_that_is_read_is_not_said_to_be_folded_but_its_copy_is_whole(tmp_path: Path) -> None:
+    path = tmp_path / "place.db"
+    store = Store(path)
+    _add(store)
+    assert store.save() == str(path)
+    store._connection.execute("PRAGMA busy_timeout = 10")
+    with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True)) as reader:
+        reader.execute("BEGIN")
+        reader.execute("SELECT COUNT(*) FROM keyframe").fetchone()
+        _add(store)
+        with pytest.raises(StoreError, match=r"place\.db-wal is not in place\.db yet: end that program and save again"):
+            store.save()
+        store.save(tmp_path / "copy.db")
+    copy = Store(tmp_path / "copy.db", read_only=True)
+    assert copy.keyframe_ids() == [1, 2] and store.save() == str(path)
+
+
+def test_a_copy_never_goes_where_a_registrar_writes(tmp_path: Path) -> None:
+    store, other = Store(tmp_path / "place.db"), Store(tmp_path / "other.db")
+    for path in (tmp_path / "place.db", tmp_path / "other.db"):
+        with pytest.raises(StoreError, match="in use by another registrar"):
+            store.save(path)
+    other.close()
 
 
 def test_only_the_last_few_keyframes_stay_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:
