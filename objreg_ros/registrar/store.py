@@ -115,7 +115,7 @@ class Store:
     def sightings(self, keyframe_id: int | None = None) -> Iterator[Sighting]:
         """Every stored object without its points, or those of one keyframe, oldest first."""
         only = "" if keyframe_id is None else f" WHERE object.keyframe = {int(keyframe_id)}"
-        with self._told("read the objects"):
+        with self._told("read the objects", "; it was left as it is. Use a copy of it or another path"):
             yield from map(sighting_from_row, self._connection.execute(f"{SIGHTINGS}{only} ORDER BY object.id"))
 
     def closures(self) -> Iterator[LoopClosure]:
@@ -216,12 +216,12 @@ class Store:
             return int(self._connection.execute(query).fetchone()[0])
 
     @contextmanager
-    def _told(self, what: str) -> Iterator[None]:
+    def _told(self, what: str, advice: str = "") -> Iterator[None]:
         """Say of any error of the database or of what it holds which file it is and what could not be done."""
         try:
             yield
         except (sqlite3.Error, ValueError) as error:
-            raise StoreError(f"{self.path or 'memory'}: cannot {what}: {error}") from error
+            raise StoreError(f"{self.path or 'memory'}: cannot {what}: {error}{advice}") from error
 
     def _remember(self, keyframe: Keyframe) -> None:
         self._cache[keyframe.keyframe_id] = keyframe
