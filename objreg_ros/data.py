@@ -22,6 +22,7 @@ Array = NDArray[Any]
 LEAST_VARIANCE = 1e-30  # m^2, rad^2: the information of less is no number that can be reckoned with
 JUMP_NS = 1_000_000_000  # stamps that go back so far are of a clock that began anew; by less, one message came late
 MOVED = re.compile(r"moved (?P<label>.+) \[m\]")  # evidence: how far an object of the label went
+SURROGATE = re.compile("[\ud800-\udfff]")  # halves of a character, as broken JSON has them
 Word = TypeVar("Word")
 
 
@@ -198,7 +199,7 @@ class PointFlag(IntFlag):
 
 @word
 class ObjectCloud:
-    """One segmented object in one frame, in the camera frame.
+    """One segmented object in one frame, in the camera frame, with a ``score`` in 0..1.
 
     ``xyz (M, 3) float32`` m; ``normals (M, 3) float32`` of length 1, towards the camera (0 0 0 where unknown);
     ``rgb (M, 3) uint8`` or None; ``flags (M,) uint16`` of `PointFlag`; ``density`` measured points per square metre of
@@ -222,6 +223,9 @@ class ObjectCloud:
         if self.rgb is not None:
             _hold(self, "rgb", np.uint8, ("M", 3), sizes)
         _require(self, bool(np.isfinite(self.xyz).all()), f"finite points of {self.label!r}", "NaN or infinity")
+        _require(self, 0 <= self.score <= 1, f"a score of {self.label!r} in 0..1", self.score)
+        _require(self, 0 <= self.density < np.inf, f"a finite density of {self.label!r}, 0 or more", self.density)
+        _require(self, not SURROGATE.search(self.label), "a label that UTF-8 can write", ascii(self.label))
 
     def __len__(self) -> int:
         return len(self.xyz)

@@ -102,6 +102,12 @@ NOT_SYMMETRIC = np.eye(6) + np.eye(6, k=1)
         (cloud, {"flags": np.zeros(4, np.int64)}, "ObjectCloud.flags: expected uint16"),
         (cloud, {"rgb": np.zeros((4, 3), np.float32)}, "ObjectCloud.rgb: expected uint8"),
         (cloud, {"xyz": np.full((4, 3), NAN)}, "expected finite points of 'cup'"),
+        (cloud, {"score": NAN}, "ObjectCloud: expected a score of 'cup' in 0..1, got nan"),
+        (cloud, {"score": np.inf}, "expected a score of 'cup' in 0..1, got inf"),
+        (cloud, {"score": -0.1}, "expected a score of 'cup' in 0..1, got -0.1"),
+        (cloud, {"density": NAN}, "expected a finite density of 'cup', 0 or more, got nan"),
+        (cloud, {"density": np.inf}, "expected a finite density of 'cup', 0 or more, got inf"),
+        (cloud, {"label": "\ud800cup"}, r"expected a label that UTF-8 can write, got '\ud800cup'"),
         (view, {"xyz": floats(24, 64, 3)}, "View.xyz: expected float32 of shape (h, w, 3)"),
         (view, {"grey": np.zeros((48, 64, 3), np.uint8)}, "View.grey: expected uint8 of shape (h, w)"),
         (frame, {"gravity": np.array([0, 2.0, 0])}, "expected gravity of length 1, got 2.0"),
@@ -132,7 +138,7 @@ def test_a_broken_word_is_refused_with_expected_and_got(make: Any, changes: dict
 
 
 @pytest.mark.parametrize(
-    "change", [{"fx": 0.0}, {"fy": -1.0}, {"cx": float("nan")}, {"width": 0}, {"height": -3}, {"fx": float("inf")}]
+    "change", [{"fx": 0.0}, {"fy": -1.0}, {"cx": NAN}, {"width": 0}, {"height": -3}, {"fx": np.inf}]
 )
 def test_a_camera_that_cannot_be_is_refused(change: dict) -> None:
     with pytest.raises(ValueError, match="Intrinsics: expected"):

@@ -15,7 +15,7 @@ from objreg_ros.registrar.export import export
 @click.argument("store", type=click.Path(path_type=Path))
 @click.argument("folder", type=click.Path(file_okay=False, path_type=Path))
 def command(store: Path, folder: Path) -> None:
-    """Write the objects, contexts and closures of STORE into FOLDER, as PLY clouds and one map.json.
+    """Write the objects, contexts and closures of STORE into FOLDER, new or empty, as PLY clouds and one map.json.
 
     Clouds are in metres as doubles, in the frame of the session (of its odometry, or of its first camera). STORE is not
     changed.

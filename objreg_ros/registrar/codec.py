@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 
 from objreg_ros.data import Array, Intrinsics, ObjectCloud, View
-from objreg_ros.geometry import back_project
+from objreg_ros.geometry import back_project, is_rigid
+from objreg_ros.registrar.descriptor import SIZE
 from objreg_ros.registrar.keyframe import Context, Keyframe, KeyObject
 from objreg_ros.registrar.sighting import Sighting
 
 Row = dict[str, Any]
+PLACES = {"position": 3, "camera": 3, "R_landmark_session": 9}  # doubles in the columns of a sighting
 
 
 def pack(*arrays: Array | None) -> bytes:
@@ -89,8 +91,8 @@ def object_row(item: KeyObject, sighting: Sighting) -> Row:
 
 
 def keyframe_from_rows(row: Mapping[str, Any], objects: Sequence[Mapping[str, Any]]) -> Keyframe:
-    """A keyframe from its row and the rows of its objects. ValueError if a blob is damaged."""
-    camera = Intrinsics(**json.loads(row["camera"]))
+    """A keyframe from its row and the rows of its objects. ValueError if anything of it is damaged."""
+    camera = _camera(row["camera"])
     depth, grey = unpack(row["view"])
     xyz = back_project(depth, camera.fx, camera.fy, camera.cx, camera.cy)
     context_xyz, context_normals = unpack(row["context"])
@@ -102,9 +104,9 @@ def keyframe_from_rows(row: Mapping[str, Any], objects: Sequence[Mapping[str, An
         objects=tuple(_object(item) for item in objects),
         context=Context(xyz=context_xyz, normals=context_normals),
         view=View(xyz=xyz, grey=grey, intrinsics=camera),
-        gravity=_array(row["gravity"], (3,)),
+        gravity=_gravity(row),
         gravity_confidence=row["gravity_confidence"],
-        T_odom_camera=_array(row["T_odom_camera"], (4, 4)),
+        T_odom_camera=_pose(row),
         by_odometry=bool(row["by_odometry"]),
         travelled=row["travelled"],
         turned=row["turned"],
@@ -112,7 +114,19 @@ def keyframe_from_rows(row: Mapping[str, Any], objects: Sequence[Mapping[str, An
 
 
 def sighting_from_row(row: Mapping[str, Any]) -> Sighting:
-    """A sighting from the row of its object joined with that of its keyframe."""
+    """A sighting from the row of its object joined with that of its keyframe. ValueError if it is damaged."""
+    try:
+        return _sighting(row)
+    except ValueError as error:
+        raise ValueError(f"object {row['instance']} of keyframe {row['keyframe']}: {error}") from error
+
+
+def _sighting(row: Mapping[str, Any]) -> Sighting:
+    if not isinstance(row["label"], str):
+        raise ValueError(f"label: expected text, got {row['label']!r}")
+    places = b"".join(_bytes_of(row, name, 8 * count) for name, count in PLACES.items())  # looked at in one go
+    numbers = _finite(", ".join(PLACES), np.frombuffer(places))
+    descriptor = np.frombuffer(_bytes_of(row, "descriptor", 4 * SIZE), np.float32)
     return Sighting(
         keyframe_id=row["keyframe"],
         session=row["session"],
@@ -121,13 +135,13 @@ def sighting_from_row(row: Mapping[str, Any]) -> Sighting:
         label=row["label"],
         score=row["score"],
         extent=row["extent"],
-        descriptor=np.frombuffer(row["descriptor"], np.float32),
-        position=np.frombuffer(row["position"], float),
-        camera=np.frombuffer(row["camera"], float),
+        descriptor=_finite("descriptor", descriptor),
+        position=numbers[:3],
+        camera=numbers[3:6],
         travelled=row["travelled"],
         by_odometry=bool(row["by_odometry"]),
         landmark=row["landmark"],
-        R_landmark_session=np.frombuffer(row["R_landmark_session"], float).reshape(3, 3),
+        R_landmark_session=numbers[6:].reshape(3, 3),
     )
 
 
@@ -150,5 +164,40 @@ def _bytes(array: Array | None) -> bytes | None:
     return None if array is None else np.ascontiguousarray(array, float).tobytes()
 
 
-def _array(blob: bytes | None, shape: tuple[int, ...]) -> Array | None:
-    return None if blob is None else np.frombuffer(blob, float).reshape(shape)
+def _bytes_of(row: Mapping[str, Any], name: str, size: int) -> bytes:
+    blob = row[name]
+    if not isinstance(blob, bytes) or len(blob) != size:
+        got = f"{len(blob)} bytes" if isinstance(blob, bytes) else repr(blob)
+        raise ValueError(f"{name}: expected {size} bytes, got {got}")
+    return blob
+
+
+def _finite(name: str, numbers: Array) -> Array:
+    if not np.isfinite(numbers).all():
+        raise ValueError(f"{name}: expected finite numbers, got {numbers.tolist()}")
+    return numbers
+
+
+def _camera(text: str) -> Intrinsics:
+    try:
+        return Intrinsics(**json.loads(text))
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"camera: expected fx fy cx cy width height as JSON, got {text!r} ({error})") from error
+
+
+def _gravity(row: Mapping[str, Any]) -> Array | None:
+    if row["gravity"] is None:
+        return None
+    gravity = _finite("gravity", np.frombuffer(_bytes_of(row, "gravity", 24)))
+    if abs(np.linalg.norm(gravity) - 1.0) > 1e-4:
+        raise ValueError(f"gravity: expected a direction of length 1, got {gravity.tolist()}")
+    return gravity
+
+
+def _pose(row: Mapping[str, Any]) -> Array | None:
+    if row["T_odom_camera"] is None:
+        return None
+    T = np.frombuffer(_bytes_of(row, "T_odom_camera", 128)).reshape(4, 4)
+    if not is_rigid(T, 1e-4):
+        raise ValueError(f"T_odom_camera: expected a rigid motion, got {T.tolist()}")
+    return T

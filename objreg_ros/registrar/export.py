@@ -22,14 +22,16 @@ from objreg_ros.registrar.store import Store
 def export(path: str | Path, folder: str | Path) -> Iterator[Path]:
     """Write the store at ``path`` into ``folder`` and yield each file as it is written. The store is not changed.
 
-    ``objects/<landmark>_<label>/keyframe_<id>.ply`` is one view of an object and ``contexts/keyframe_<id>.ply`` what
-    was around it, both in m in the frame of the session. Their points are doubles, since that frame may be UTM's, where
-    a float steps by half a metre. ``map.json`` holds keyframes with their objects, the landmarks that those are of, and
-    closures. StoreError (an OSError) if it is no store or damaged.
+    ``objects/<landmark>_<label>/keyframe_<id>_<instance>.ply`` is one view of an object and
+    ``contexts/keyframe_<id>.ply`` what was around it, both in m in the frame of the session. Their points are doubles,
+    since that frame may be UTM's, where a float steps by half a metre. ``map.json`` holds keyframes with their objects,
+    the landmarks that those are of, and closures. StoreError (an OSError) if it is no store or damaged, OSError if
+    there is anything in the folder already.
     """
+    folder = Path(folder)
+    _refuse_used(folder)
     store = Store(path, read_only=True)
     try:
-        folder = Path(folder)
         keyframes = []
         for keyframe_id in store.keyframe_ids():
             keyframe, sightings = store.keyframe(keyframe_id), list(store.sightings(keyframe_id))
@@ -60,14 +62,24 @@ def write_ply(path: Path, xyz: Array, normals: Array, rgb: Array | None) -> Path
     return path
 
 
+def _refuse_used(folder: Path) -> None:
+    """Files of another store must not come between those of this one."""
+    if folder.is_dir() and any(folder.iterdir()):
+        raise FileExistsError(
+            f"{folder}: expected a new or empty folder, got one that holds something; choose another or empty it"
+        )
+
+
 def _write_clouds(folder: Path, keyframe: Keyframe, sightings: list[Sighting]) -> Iterator[Path]:
     T = np.eye(4) if keyframe.T_odom_camera is None else keyframe.T_odom_camera
-    name = f"keyframe_{keyframe.keyframe_id:06d}.ply"
+    name = f"keyframe_{keyframe.keyframe_id:06d}"
     for item, sighting in zip(keyframe.objects, sightings, strict=True):
         place = folder / "objects" / f"{sighting.landmark:05d}_{_file_name(item.label)}"
-        yield _write_cloud(place / name, T, item.cloud.xyz, item.cloud.normals, item.cloud.rgb)
+        yield _write_cloud(
+            place / f"{name}_{sighting.instance:03d}.ply", T, item.cloud.xyz, item.cloud.normals, item.cloud.rgb
+        )
     context = keyframe.context
-    yield _write_cloud(folder / "contexts" / name, T, context.xyz, context.normals)
+    yield _write_cloud(folder / "contexts" / f"{name}.ply", T, context.xyz, context.normals)
 
 
 def _write_cloud(path: Path, T_session_camera: Array, xyz: Array, normals: Array, rgb: Array | None = None) -> Path:
@@ -87,6 +99,7 @@ def _keyframe_json(keyframe: Keyframe, sightings: list[Sighting]) -> dict[str, A
         "objects": [
             {
                 "landmark": sighting.landmark,
+                "instance": sighting.instance,
                 "label": sighting.label,
                 "score": sighting.score,
                 "position": sighting.position.tolist(),

@@ -55,12 +55,15 @@ def reference_index(frames: Sequence[Frame]) -> int:
 def fuse_objects(
     frames: Sequence[Frame], T_reference_frame: Sequence[Array], params: RegistrarParams
 ) -> tuple[KeyObject, ...]:
-    """Every object once: the same label group at the same place is the same object, seen from several sides."""
+    """Every object once: the same label group at the same place is the same object, seen from several sides.
+
+    One without points is nowhere, and is passed over.
+    """
     groups = LabelGroups(params.label_groups)
     tracks: list[_Track] = []
     for frame, T in zip(frames, T_reference_frame, strict=True):
         free = list(tracks)
-        for item in frame.objects:
+        for item in (item for item in frame.objects if len(item)):
             sighting = _moved(item, T, most=SPARE * params.object_points)
             track = _nearest(sighting, free, groups)
             if track is None:

@@ -2,13 +2,14 @@
 """Objects of the place with ids that stay: the same cup has the same id in every keyframe and session.
 
 Two sightings are the same landmark where they are at the same place in the same session, or where a closure put them
-upon each other. When a closure shows that two landmarks are one, the older id stays.
+upon each other. When a closure shows that two landmarks are one, the older id stays, and its axes. A closure's word
+counts for more than a place, which drifts with the session; and two that one keyframe shows together are never one.
 """
 
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from itertools import islice, product
 
@@ -49,6 +50,17 @@ class Link:
     R_there_here: Array
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Merge:
+    """What became of a landmark that turned out to be ``into``, an older one.
+
+    ``R_into_old (3, 3)`` turns the axes of the one that is gone into those of the one that stays.
+    """
+
+    into: int
+    R_into_old: Array
+
+
 @dataclass(slots=True, eq=False)
 class _Known:
     """What is kept of one landmark: its latest sighting, votes for its label, and from where each keyframe saw it."""
@@ -87,32 +99,30 @@ class Landmarks:
 
     def assign(
         self, sightings: Sequence[Sighting], links: Sequence[Link] = ()
-    ) -> tuple[tuple[Sighting, ...], dict[int, int]]:
+    ) -> tuple[tuple[Sighting, ...], dict[int, Merge]]:
         """The sightings of a new keyframe with their landmarks, and which landmarks turned out to be which older.
 
         A landmark is one object of a keyframe at most: of two that closures put upon it the first has it.
         """
-        merged: dict[int, int] = {}
+        merged: dict[int, Merge] = {}
         named: list[Sighting] = []
         taken: set[int] = set()
         for index, sighting in enumerate(sightings):
-            claims = [link for link in links if link.index == index and _root(merged, link.of.landmark) not in taken]
-            here = self._same_place(sighting, taken)
-            numbers = {_root(merged, link.of.landmark) for link in claims} | ({here} if here else set())
-            if not numbers:
+            axes = self._axes(index, sighting, links, taken)
+            if not axes:
                 named.append(sighting.of_landmark(self._next, np.eye(3)))
                 self._next += 1
                 continue
-            oldest = min(numbers)
-            merged.update({number: oldest for number in numbers if number != oldest})
-            taken |= numbers
-            named.append(sighting.of_landmark(oldest, self._axes(claims, here)))
+            oldest = min(axes)
+            merged |= {n: Merge(into=oldest, R_into_old=axes[oldest] @ R.T) for n, R in axes.items() if n != oldest}
+            taken |= axes.keys()
+            named.append(sighting.of_landmark(oldest, axes[oldest]))
         return tuple(named), merged
 
-    def add(self, sightings: Iterable[Sighting], merged: dict[int, int] | None = None) -> None:
+    def add(self, sightings: Iterable[Sighting], merged: Mapping[int, Merge] | None = None) -> None:
         """Take in sightings that have their landmarks, after merging the landmarks that turned out to be one."""
-        for old, new in (merged or {}).items():
-            self._merge(old, new)
+        for old, merge in (merged or {}).items():
+            self._merge(old, merge)
         for sighting in sightings:
             number = sighting.landmark
             known = self._known[number] = self._known.pop(number, _Known(sighting))
@@ -165,16 +175,38 @@ class Landmarks:
         wander = MIDDLE_WANDERS * min(sighting.extent, last.extent)
         return params.landmark_radius + wander + min(drift, params.landmark_radius)
 
-    def _axes(self, claims: Sequence[Link], here: int) -> Array:
-        if claims:
-            return np.asarray(claims[0].of.R_landmark_session @ claims[0].R_there_here)
-        return self._known[here].last.R_landmark_session
+    def _axes(self, index: int, sighting: Sighting, links: Sequence[Link], taken: Set[int]) -> dict[int, Array]:
+        """The landmarks that an object of a new keyframe is, each with what turns the session's axes into its own.
 
-    def _merge(self, old: int, new: int) -> None:
-        gone = self._known.pop(old, None)
+        Those that closures claim for it come first. The place adds one only if no closure claims that for another
+        object, and of two that some keyframe shows together only the first is believed.
+        """
+        found: dict[int, Array] = {}
+        for link in links:
+            number = link.of.landmark
+            if link.index == index and number not in taken and not self._shown_beside(number, found):
+                found.setdefault(number, link.of.R_landmark_session @ link.R_there_here)
+        claimed = {link.of.landmark for link in links if link.index != index}
+        here = self._same_place(sighting, claimed | taken)
+        if here and here not in found and not self._shown_beside(here, found):
+            found[here] = self._known[here].last.R_landmark_session
+        return found
+
+    def _shown_beside(self, number: int, others: Iterable[int]) -> bool:
+        """Whether some keyframe shows a landmark together with another one of ``others``."""
+        mine = self._known[number].views.keys() if number in self._known else frozenset()
+        return any(
+            other != number and other in self._known and not mine.isdisjoint(self._known[other].views)
+            for other in others
+        )
+
+    def _merge(self, old: int, merge: Merge) -> None:
+        gone, new = self._known.pop(old, None), merge.into
         if gone is None:
             return
         self._there[self._cell(gone.last)].discard(old)
+        gone.last = gone.last.of_landmark(new, merge.R_into_old @ gone.last.R_landmark_session)
+        gone.views = {keyframe_id: merge.R_into_old @ view for keyframe_id, view in gone.views.items()}
         known = self._known.setdefault(new, gone)
         self._there[self._cell(known.last)].add(new)
         for keyframe_id in gone.views:
@@ -201,12 +233,6 @@ class Landmarks:
             distance[chosen] = -1.0
             chosen.append(int(distance.argmax()))
         return set(keys) - {keys[i] for i in chosen}
-
-
-def _root(merged: dict[int, int], number: int) -> int:
-    while number in merged:
-        number = merged[number]
-    return number
 
 
 def _landmark(number: int, known: _Known) -> Landmark:

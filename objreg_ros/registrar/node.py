@@ -8,6 +8,7 @@ import sys
 import threading
 from collections import Counter
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from typing import Any
 
 from geometry_msgs.msg import TransformStamped, Vector3Stamped
@@ -67,7 +68,7 @@ class RegistrarNode(MatchingDoor):
         self._markers = self.create_publisher(MarkerArray, "markers", qos.latched())
 
     def _serve(self) -> None:
-        self.create_service(Trigger, "~/reset", self._reset)
+        self.create_service(Trigger, "~/reset", self._reset, callback_group=self.apart)
         self.create_service(Trigger, "~/save", self._save, callback_group=self.apart)
         self.create_service(SetBool, "~/enable", self._enable)
 
@@ -176,15 +177,27 @@ class RegistrarNode(MatchingDoor):
 
     # Services
 
-    def _reset(self, _: Any, response: Any) -> Any:
-        with self._tracking:
-            for stamp_ns, _ in self.searcher.rest():
-                self.drop(stamp_ns, "reset")
-            self._registrar.reset()
-        self._scene.clear()
-        self._counts = dict(self._registrar.counts())
-        response.success, response.message = True, "forgot every keyframe"
+    async def _reset(self, _: Any, response: Any) -> Any:
+        """Once the search in hand is over; the keyframes that wait for theirs are dropped."""
+        response.success, response.message = await self.aside(self._forget)
         return response
+
+    def _forget(self) -> tuple[bool, str]:
+        """Whether everything is forgotten; if the store does not let it, why, and nothing is."""
+        with self._tracking:
+            waiting = self.searcher.rest()
+            try:
+                self._registrar.reset()
+                self._counts = dict(self._registrar.counts())
+            except OSError as error:
+                for job in waiting:
+                    self.searcher.put(job)
+                return False, str(error)
+        for stamp_ns, _ in waiting:
+            self.drop(stamp_ns, "reset")
+        with self._telling:
+            self._scene.clear()
+        return True, "forgot every keyframe"
 
     async def _save(self, _: Any, response: Any) -> Any:
         """Also ends the keyframe in hand: what the last frames closed is published before the answer.
@@ -215,11 +228,22 @@ class RegistrarNode(MatchingDoor):
         self.end_aside()
         self.worker.close()
         self.searcher.close()
+        with ExitStack() as ends:
+            ends.callback(super().close)
+            ends.callback(self._registrar.close)
+            self._store_the_rest()
+
+    def _store_the_rest(self) -> None:
+        """Store the keyframes that were not searched for; of those that cannot be the log says how many and why."""
+        lost: list[str] = []
         for stretch in (*(job[1] for job in self.searcher.rest()), self._registrar.end()):
             if stretch is not None:
-                self._registrar.search(stretch, 0.0)
-        self._registrar.close()
-        super().close()
+                try:
+                    self._registrar.search(stretch, 0.0)
+                except (ValueError, OSError) as error:
+                    lost.append(str(error))
+        if lost:
+            self.get_logger().error(f"the last keyframes could not be stored, {len(lost)} are lost: {lost[-1]}")
 
 
 def main() -> int:

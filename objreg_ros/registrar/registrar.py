@@ -71,7 +71,11 @@ class Registrar:
         self._store = Store(params.store)
         self._lock = threading.RLock()
         self._pool = ThreadPoolExecutor(params.threads, "register")
-        self._start(self._store.next_session())
+        try:
+            self._start(self._store.next_session())
+        except BaseException:  # a damaged store: others may have it
+            self.close()
+            raise
 
     def _start(self, session: int) -> None:
         """Everything that lives in memory, from what is in the store; ``session`` is the first that is new."""

@@ -9,11 +9,10 @@ Memory is bounded: only the last few keyframes that were used stay decoded.
 from __future__ import annotations
 
 import json
-import os
 import sqlite3
 from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -21,48 +20,14 @@ from typing import Any
 import numpy as np
 
 from objreg_ros.data import LoopClosure
+from objreg_ros.registrar.claim import Claim
 from objreg_ros.registrar.codec import keyframe_from_rows, keyframe_row, object_row, sighting_from_row
 from objreg_ros.registrar.keyframe import Keyframe
+from objreg_ros.registrar.landmarks import Merge
 from objreg_ros.registrar.sighting import Sighting
+from objreg_ros.registrar.store_file import StoreError, birth, check, create, read_only_uri, renew, require_place
 
-MAGIC = b"SQLite format 3\0"
-APPLICATION_ID = 0x4F424A52  # "OBJR" at byte 68 of the file
-SCHEMA_VERSION = 4  # at byte 60
 CACHED = 64  # decoded keyframes in memory, about 1 MB each
-SCHEMA = """
-CREATE TABLE keyframe (
-  id INTEGER PRIMARY KEY AUTOINCREMENT, session INTEGER NOT NULL, stamp_ns INTEGER NOT NULL, frame_id TEXT NOT NULL,
-  travelled REAL NOT NULL, turned REAL NOT NULL, T_odom_camera BLOB, by_odometry INTEGER NOT NULL,
-  gravity BLOB, gravity_confidence REAL NOT NULL,
-  camera TEXT NOT NULL, view BLOB NOT NULL, context BLOB NOT NULL);
-CREATE TABLE object (
-  id INTEGER PRIMARY KEY, keyframe INTEGER NOT NULL REFERENCES keyframe ON DELETE CASCADE,
-  instance INTEGER NOT NULL, landmark INTEGER NOT NULL, label TEXT NOT NULL, score REAL NOT NULL,
-  extent REAL NOT NULL, sightings INTEGER NOT NULL, density REAL NOT NULL, position BLOB NOT NULL, camera BLOB NOT NULL,
-  R_landmark_session BLOB NOT NULL, descriptor BLOB NOT NULL, cloud BLOB NOT NULL);
-CREATE INDEX object_of_keyframe ON object (keyframe);
-CREATE INDEX object_of_landmark ON object (landmark);
-CREATE TABLE closure (
-  id INTEGER PRIMARY KEY, from_ns INTEGER NOT NULL, to_ns INTEGER NOT NULL,
-  from_frame_id TEXT NOT NULL, to_frame_id TEXT NOT NULL,
-  T_from_to BLOB NOT NULL, covariance BLOB NOT NULL, labels TEXT NOT NULL, evidence TEXT NOT NULL);
-CREATE TABLE highest (landmark INTEGER NOT NULL);
-INSERT INTO highest VALUES (0);
-"""
-RENEWALS = {  # what makes of a version the next one
-    1: """
-ALTER TABLE closure RENAME COLUMN frame_id TO to_frame_id;
-ALTER TABLE closure ADD COLUMN from_frame_id TEXT NOT NULL DEFAULT '';
-UPDATE closure SET from_frame_id = to_frame_id;
-""",
-    2: """
-UPDATE keyframe SET gravity_confidence = 0.02 * gravity_confidence * gravity_confidence * gravity_confidence;
-""",  # it was that of one view: see `plumb`
-    3: """
-CREATE TABLE highest (landmark INTEGER NOT NULL);
-INSERT INTO highest SELECT COALESCE(MAX(landmark), 0) FROM object;
-""",
-}
 SIGHTINGS = (
     "SELECT object.keyframe, session, stamp_ns, instance, label, score, extent, descriptor, position,"
     " object.camera, travelled, by_odometry, landmark, R_landmark_session"
@@ -70,46 +35,55 @@ SIGHTINGS = (
 )
 
 
-class StoreError(OSError):
-    """A file that is no store, is damaged or newer (it has not been touched), or that cannot be written."""
-
-
 class Store:
     """The store at ``path``, made if it is not there; in memory only if the path is empty. StoreError if it is bad.
 
-    With ``read_only`` nothing is made or changed, and a path without a store is a StoreError too. Whatever the file
-    refuses later (a full disk, a lock that another process holds) is a StoreError as well.
+    A store that is written is this one's alone until `close` (see `Claim`). With ``read_only`` nothing is made or
+    changed, whoever writes it, and a path without a store is a StoreError too. Whatever the file refuses later (a full
+    disk, a lock that another process holds) is a StoreError as well.
     """
 
     def __init__(self, path: str | Path = "", read_only: bool = False) -> None:
         self.path = str(Path(path).expanduser()) if str(path) else ""
         self._cache: OrderedDict[int, Keyframe] = OrderedDict()
         self._sessions: dict[int, int] = {}  # of the keyframes, the oldest first: to count them is to read the file
+        self._claim: Claim | None = None
         if not self.path and not read_only:
             self._connection = _connect(":memory:")
-            self._connection.executescript(_birth())
+            self._connection.executescript(birth())
             return
-        with self._told("open"):
-            if not Path(self.path).is_file():
-                _create(Path(self.path), read_only)
-            _check(Path(self.path))
-            self._connection = _connect(_read_only_uri(Path(self.path)) if read_only else self.path)
+        with self._told("open"), ExitStack() as undo:
+            require_place(Path(self.path), read_only)
             if not read_only:
-                self._connection.execute("PRAGMA journal_mode = WAL")
-                _renew(self._connection)
+                self._claim = Claim(Path(self.path))
+                undo.callback(self._claim.release)
+            self._connection = self._opened(Path(self.path), read_only)
+            undo.callback(self._connection.close)
             self._sessions.update(self._connection.execute("SELECT id, session FROM keyframe ORDER BY id"))
+            undo.pop_all()
+
+    @staticmethod
+    def _opened(path: Path, read_only: bool) -> sqlite3.Connection:
+        if not path.is_file():
+            create(path)
+        check(path)
+        connection = _connect(read_only_uri(path) if read_only else str(path))
+        if not read_only:
+            connection.execute("PRAGMA journal_mode = WAL")
+            renew(connection)
+        return connection
 
     def add(
         self,
         keyframe: Keyframe,
         sightings: Sequence[Sighting],
         closures: Iterable[LoopClosure] = (),
-        merged: Mapping[int, int] | None = None,
+        merged: Mapping[int, Merge] | None = None,
     ) -> None:
         """Write a keyframe under its id (see `next_keyframe`), its objects and closures in one transaction.
 
-        ``merged`` says which landmarks became which: known objects that turned out to be the same. StoreError where it
-        cannot be written: then nothing of it is.
+        ``merged`` says which landmarks became which, and in whose axes: known objects that turned out to be the same.
+        StoreError where it cannot be written: then nothing of it is.
         """
         with self._told(f"write keyframe {keyframe.keyframe_id}"), self._connection as transaction:
             _insert(transaction, "keyframe", keyframe_row(keyframe))
@@ -119,8 +93,8 @@ class Store:
             transaction.execute("UPDATE highest SET landmark = MAX(landmark, ?)", (newest,))
             for closure in closures:
                 _insert(transaction, "closure", _closure_row(closure))
-            for old, new in (merged or {}).items():
-                transaction.execute("UPDATE object SET landmark = ? WHERE landmark = ?", (new, old))
+            for old, merge in (merged or {}).items():
+                _rename(transaction, old, merge)
         self._sessions[keyframe.keyframe_id] = keyframe.session
         self._remember(keyframe)
 
@@ -141,7 +115,7 @@ class Store:
     def sightings(self, keyframe_id: int | None = None) -> Iterator[Sighting]:
         """Every stored object without its points, or those of one keyframe, oldest first."""
         only = "" if keyframe_id is None else f" WHERE object.keyframe = {int(keyframe_id)}"
-        with self._told("read the objects"):
+        with self._told("read the objects", "; it was left as it is. Use a copy of it or another path"):
             yield from map(sighting_from_row, self._connection.execute(f"{SIGHTINGS}{only} ORDER BY object.id"))
 
     def closures(self) -> Iterator[LoopClosure]:
@@ -202,44 +176,57 @@ class Store:
         }
 
     def save(self, path: str | Path = "") -> str:
-        """Fold the write-ahead log into the file, or write a copy to ``path``. Returns where it is."""
-        with self._told("save it" if not path else f"copy it to {path}"):
+        """Fold the write-ahead log into the file, or write a whole copy to ``path``. Returns where it is.
+
+        StoreError where that cannot be: a store in memory has no file, and a log that others read stays.
+        """
+        with self._told(f"copy it to {path}" if path else "save it"):
             if path:
-                with closing(sqlite3.connect(path)) as copy:
-                    self._connection.backup(copy)
+                self._copy(Path(path).expanduser())
                 return str(path)
-            self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            if not self.path:
+                raise ValueError("expected a store in a file, got one in memory only; start with a path for it")
+            busy, *_ = self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
+            if busy:
+                name = Path(self.path).name
+                raise ValueError(
+                    f"expected nobody else to read it, got another program that does; all is written, but what is in "
+                    f"{name}-wal is not in {name} yet: end that program and save again"
+                )
             return self.path
+
+    def _copy(self, path: Path) -> None:
+        claim = Claim(path)
+        try:
+            with closing(sqlite3.connect(path)) as copy:
+                self._connection.backup(copy)
+        finally:
+            claim.release()
 
     def close(self) -> None:
         """End it; everything that was added is already written."""
-        self._connection.close()
+        try:
+            self._connection.close()
+        finally:
+            if self._claim is not None:
+                self._claim.release()
 
     def _one(self, query: str) -> int:
         with self._told("count"):
             return int(self._connection.execute(query).fetchone()[0])
 
     @contextmanager
-    def _told(self, what: str) -> Iterator[None]:
+    def _told(self, what: str, advice: str = "") -> Iterator[None]:
         """Say of any error of the database or of what it holds which file it is and what could not be done."""
         try:
             yield
         except (sqlite3.Error, ValueError) as error:
-            raise StoreError(f"{self.path or 'memory'}: cannot {what}: {error}") from error
+            raise StoreError(f"{self.path or 'memory'}: cannot {what}: {error}{advice}") from error
 
     def _remember(self, keyframe: Keyframe) -> None:
         self._cache[keyframe.keyframe_id] = keyframe
         while len(self._cache) > CACHED:
             self._cache.popitem(last=False)
-
-
-def is_store(path: str | Path) -> bool:
-    """Whether the file at ``path`` bears the mark of a store, of any version and in any state."""
-    if not Path(path).is_file():
-        return False
-    with Path(path).open("rb") as file:
-        header = file.read(100)
-    return header.startswith(MAGIC) and int.from_bytes(header[68:72], "big") == APPLICATION_ID
 
 
 def _connect(path: str) -> sqlite3.Connection:
@@ -250,76 +237,19 @@ def _connect(path: str) -> sqlite3.Connection:
     return connection
 
 
-def _create(path: Path, read_only: bool) -> None:
-    """An empty store, made beside its place and moved there: a process that is killed here leaves no half of one."""
-    if read_only:
-        raise StoreError(f"{path}: expected a store of objreg_ros, got no file")
-    if path.exists() or not path.parent.is_dir():
-        raise StoreError(f"{path}: expected a file in an existing folder, got none; create the folder or use another")
-    beside = path.with_name(f"{path.name}.new{os.getpid()}")
-    beside.unlink(missing_ok=True)
-    with closing(sqlite3.connect(beside)) as connection:
-        connection.executescript(_birth())
-    os.replace(beside, path)
-
-
-def _birth() -> str:
-    return f"PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {SCHEMA_VERSION}; {SCHEMA}"
-
-
-def _renew(connection: sqlite3.Connection) -> None:
-    """Bring a store of an older version to this one, in one transaction for each version."""
-    (version,) = connection.execute("PRAGMA user_version").fetchone()
-    for old in range(version, SCHEMA_VERSION):
-        connection.executescript(f"BEGIN; {RENEWALS[old]} PRAGMA user_version = {old + 1}; COMMIT;")
-
-
-def _check(path: Path) -> None:
-    """StoreError unless the file is a whole store of a version that is understood. It is only read."""
-    with path.open("rb") as file:
-        header = file.read(100)
-    if len(header) < 100 or not header.startswith(MAGIC):
-        raise StoreError(f"{path}: expected a store of objreg_ros, got a file of another kind; it was left as it is")
-    if not is_store(path):
-        raise StoreError(f"{path}: expected a store of objreg_ros, got another SQLite database; it was left as it is")
-    _refuse_newer(path, int.from_bytes(header[60:64], "big"))
-    version, found = _look_through(path)
-    _refuse_newer(path, version)
-    if found:
-        raise StoreError(f"{path}: expected an intact store, got: {found}; it was left as it is. Use another path")
-
-
-def _refuse_newer(path: Path, version: int) -> None:
-    if version > SCHEMA_VERSION:
-        raise StoreError(
-            f"{path}: expected schema version {SCHEMA_VERSION} or older, got {version}; it was left as it is. "
-            "Use the newer objreg_ros that wrote it, or another path"
-        )
-
-
-def _read_only_uri(path: Path) -> str:
-    """Without a log beside it the file is all there is, and no helper files are made to read it."""
-    mode = "mode=ro" if path.with_name(path.name + "-wal").exists() else "mode=ro&immutable=1"
-    return f"{path.resolve().as_uri()}?{mode}"
-
-
-def _look_through(path: Path) -> tuple[int, str]:
-    """The version of a database, and what is wrong with its pages, empty if nothing. Opens it for reading only.
-
-    With what a log beside it says: the program that wrote it may have been killed before that came into the file.
-    """
-    try:
-        with closing(sqlite3.connect(_read_only_uri(path), uri=True)) as connection:
-            version = int(connection.execute("PRAGMA user_version").fetchone()[0])
-            found = str(connection.execute("PRAGMA quick_check(1)").fetchone()[0])
-    except sqlite3.DatabaseError as error:
-        return 0, str(error)
-    return version, "" if found == "ok" else found
-
-
 def _insert(transaction: sqlite3.Connection, table: str, row: Mapping[str, Any]) -> None:
     names, marks = ", ".join(row), ", ".join("?" * len(row))
     transaction.execute(f"INSERT INTO {table} ({names}) VALUES ({marks})", tuple(row.values()))
+
+
+def _rename(transaction: sqlite3.Connection, old: int, merge: Merge) -> None:
+    """Make every sighting of a landmark one of that which stays, in its axes."""
+    rows = transaction.execute("SELECT id, R_landmark_session FROM object WHERE landmark = ?", (old,)).fetchall()
+    turned = [
+        (merge.into, (merge.R_into_old @ np.frombuffer(row["R_landmark_session"]).reshape(3, 3)).tobytes(), row["id"])
+        for row in rows
+    ]
+    transaction.executemany("UPDATE object SET landmark = ?, R_landmark_session = ? WHERE id = ?", turned)
 
 
 def _closure_row(closure: LoopClosure) -> dict[str, Any]:

@@ -296,6 +296,16 @@ def test_a_point_that_no_camera_sees_is_refused(z: float) -> None:
         from_msg.objects(messages.own_table(rows), {})
 
 
+@pytest.mark.parametrize(
+    ("field", "value"), [("score", np.nan), ("score", np.inf), ("score", 7.0), ("density", np.nan)]
+)
+def test_an_object_whose_numbers_mean_nothing_is_refused(field: str, value: float) -> None:
+    rows = object_rows()
+    rows[field] = value
+    with pytest.raises(ValueError, match=f"expected a .*{field} of .*got {value}"):
+        from_msg.objects(messages.own_table(rows), {})
+
+
 def test_no_objects_are_no_objects() -> None:
     assert from_msg.objects(messages.own_table(np.zeros((1, 0), OBJECTS)), {}) == ((), None)
 

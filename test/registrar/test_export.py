@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from objreg_ros.data import LoopClosure
 from objreg_ros.registrar.export import export, write_ply
@@ -58,7 +59,7 @@ def test_a_store_becomes_clouds_in_the_frame_of_the_session_and_a_map(tmp_path: 
     store.close()
     files = list(export(tmp_path / "place.db", tmp_path / "out"))
     assert [str(f.relative_to(tmp_path / "out")) for f in files] == [
-        "objects/00007_cell_phone/keyframe_000001.ply",
+        "objects/00007_cell_phone/keyframe_000001_001.ply",
         "contexts/keyframe_000001.ply",
         "map.json",
     ]
@@ -71,3 +72,24 @@ def test_a_store_becomes_clouds_in_the_frame_of_the_session_and_a_map(tmp_path: 
     assert np.allclose(content["landmarks"][0]["position"], [5.0, 0.0, 1.0], atol=0.05)
     (told,) = content["closures"]
     assert told["to_ns"] == 2 and told["from_frame_id"] == "camera" and "objects" not in told
+
+
+def test_two_objects_of_a_keyframe_are_two_files_even_where_they_are_one_landmark(tmp_path: Path) -> None:
+    store = Store(tmp_path / "place.db")
+    taken = keyframe(1, 2.0, (box("cup", (0, 0, 1)), box("cup", (0.4, 0, 1), instance=2)))
+    store.add(taken, [sighting.of_landmark(7, np.eye(3)) for sighting in sightings_of(taken)])
+    store.close()
+    first, second, *_ = export(tmp_path / "place.db", tmp_path / "out")
+    middles = [float(_read_ply(file)["x"].mean()) for file in (first, second)]
+    assert np.allclose(middles, (0.0, 0.4), atol=0.02)
+
+
+def test_a_folder_that_holds_something_is_refused_and_left_as_it_is(tmp_path: Path) -> None:
+    Store(tmp_path / "place.db").close()
+    used = tmp_path / "used"
+    used.mkdir()
+    assert [file.name for file in export(tmp_path / "place.db", used)] == ["map.json"]  # an empty one is good
+    before = (used / "map.json").stat().st_mtime_ns
+    with pytest.raises(OSError, match=r"used: expected a new or empty folder, got one that .* choose another"):
+        next(export(tmp_path / "place.db", used))
+    assert [(file.name, file.stat().st_mtime_ns) for file in used.iterdir()] == [("map.json", before)]

@@ -96,3 +96,9 @@ def test_a_large_object_is_thinned_to_the_points_that_are_kept() -> None:
     many = cloud("chair", np.random.default_rng(0).random((5000, 3)))
     (item,) = fuse_objects((frame(0, (many,)),), (np.eye(4),), PARAMS.replaced(object_points=1000))
     assert 800 < len(item.cloud) <= 1000 and np.allclose(item.centroid, 0.5, atol=0.03)
+
+
+def test_an_object_without_points_is_passed_over() -> None:
+    nothing = cloud("cup", np.zeros((0, 3)))
+    seen = (frame(0, (nothing, box("book", (0.4, 0, 1)))), frame(0.1, (nothing,)))
+    assert [item.label for item in fuse_objects(seen, [np.eye(4)] * 2, PARAMS)] == ["book"]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import ObjectCloud
+from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.registrar.landmarks import Landmarks, Link
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.sighting import Sighting, sightings_of
@@ -57,6 +58,64 @@ def test_of_two_objects_that_closures_put_upon_one_the_first_has_it() -> None:
     stored, _ = landmarks.assign(first)
     links = [Link(index=index, of=stored[0], R_there_here=np.eye(3)) for index in (0, 1)]
     assert _take(landmarks, _seen(2, CUP, box("cup", (2, 0, 1)), session=1), links) == [1, 2]
+
+
+def _linked(*sightings: Sighting) -> list[Link]:
+    """A closure that puts each object of the next keyframe upon one of these, in their order."""
+    return [Link(index=index, of=sighting, R_there_here=np.eye(3)) for index, sighting in enumerate(sightings)]
+
+
+@pytest.mark.parametrize(("label", "side", "apart", "drift"), [("cup", 0.1, 0.15, 0.13), ("chair", 0.6, 0.7, 0.5)])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_closure_over_a_drift_onto_the_neighbour_leaves_both_objects_their_ids(
+    label: str, side: float, apart: float, drift: float, way: float
+) -> None:
+    landmarks = Landmarks(PARAMS)
+
+    def pair(shift: float) -> tuple[ObjectCloud, ...]:
+        return box(label, (shift, 0, 1), side), box(label, (shift + apart, 0, 1), side)
+
+    first, _ = landmarks.assign(_seen(1, *pair(0.0)))
+    landmarks.add(first)
+    assert _take(landmarks, _seen(2, *pair(way * drift)), _linked(*first)) == [1, 2]
+    assert _take(landmarks, _seen(3, *pair(way * drift))) == [1, 2]
+    assert [known.sightings for known in landmarks.known()] == [3, 3]
+
+
+def test_a_drifted_object_is_not_joined_with_a_neighbour_that_a_keyframe_shows_beside_it() -> None:
+    landmarks = Landmarks(PARAMS)
+    first, _ = landmarks.assign(_seen(1, CUP, box("cup", (0.15, 0, 1))))
+    landmarks.add(first)
+    assert _take(landmarks, _seen(2, box("cup", (0.14, 0, 1))), _linked(first[0])) == [1]
+    assert [known.landmark for known in landmarks.known()] == [1, 2]
+
+
+def test_closures_that_put_one_object_upon_two_that_a_keyframe_shows_join_nothing() -> None:
+    landmarks = Landmarks(PARAMS)
+    first, _ = landmarks.assign(_seen(1, CUP, box("cup", (0.5, 0, 1))))
+    landmarks.add(first)
+    links = [Link(index=0, of=sighting, R_there_here=np.eye(3)) for sighting in reversed(first)]
+    assert _take(landmarks, _seen(2, CUP, session=1), links) == [2]
+    assert len(landmarks) == 2
+
+
+def test_landmarks_that_turn_out_to_be_one_are_seen_in_the_axes_of_the_older() -> None:
+    turn = rotation_from_vector(np.array([0.0, 1.2, 0.0]))
+    landmarks = Landmarks(PARAMS)
+    first, _ = landmarks.assign(_seen(1, CUP))
+    landmarks.add(first)
+    T_session_camera = pose(turn.T, np.zeros(3))  # this session began with its axes turned
+
+    def again(number: int) -> tuple[Sighting, ...]:
+        return sightings_of(keyframe(number, number, (CUP,), 1, T_session_camera))
+
+    second, _ = landmarks.assign(again(2))
+    landmarks.add(second)
+    named, merged = landmarks.assign(again(3), [Link(index=0, of=first[0], R_there_here=turn)])
+    landmarks.add(named, merged)
+    assert merged.keys() == {2} and np.allclose(merged[2].R_into_old, turn)
+    views = np.array(list(landmarks._known[1].views.values()))
+    assert len(views) == 3 and np.allclose(views, views[0])  # the camera stood at one place all the time
 
 
 def test_another_session_sees_new_objects_until_a_closure_says_otherwise() -> None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import os
 import random
-import shutil
 import signal
 import sqlite3
 import subprocess
 import sys
 import time
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,10 +18,13 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import LoopClosure
+from objreg_ros.geometry import rotation_from_vector
 from objreg_ros.registrar import store as store_module
-from objreg_ros.registrar.plumb import DOUBT, ONE_VIEW
+from objreg_ros.registrar.landmarks import Merge
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.sighting import sightings_of
-from objreg_ros.registrar.store import SCHEMA_VERSION, Store, StoreError
+from objreg_ros.registrar.store import Store, StoreError
 
 from .samples import box, keyframe, moved
 
@@ -95,13 +98,16 @@ def test_an_unknown_keyframe_is_a_key_error() -> None:
         Store().keyframe(5)
 
 
-def test_merged_landmarks_are_written() -> None:
-    store = Store()
+def test_merged_landmarks_are_written_in_the_axes_of_the_one_that_stays() -> None:
+    store, turn = Store(), rotation_from_vector(np.array([0.0, 0.0, 0.5]))
     written = keyframe(1)
-    store.add(written, [sightings_of(written)[0].of_landmark(9, np.eye(3))])
+    store.add(written, [sightings_of(written)[0].of_landmark(9, turn)])
     later = keyframe(2, 5.0)
-    store.add(later, [sightings_of(later)[0].of_landmark(2, np.eye(3))], merged={9: 2})
-    assert [sighting.landmark for sighting in store.sightings()] == [2, 2]
+    merged = {9: Merge(into=2, R_into_old=turn)}
+    store.add(later, [sightings_of(later)[0].of_landmark(2, np.eye(3))], merged=merged)
+    first, second = store.sightings()
+    assert (first.landmark, second.landmark) == (2, 2)
+    assert np.allclose(first.R_landmark_session, turn @ turn) and np.array_equal(second.R_landmark_session, np.eye(3))
 
 
 def test_a_closure_comes_back_with_its_covariance(tmp_path: Path) -> None:
@@ -117,47 +123,6 @@ def test_a_closure_comes_back_with_its_covariance(tmp_path: Path) -> None:
     assert (back.labels, back.evidence) == (("cup",), {"score": 0.5})
 
 
-def test_a_store_of_the_first_version_is_read_as_it_is_and_renewed_when_it_is_written(tmp_path: Path) -> None:
-    path = tmp_path / "place.db"
-    store = Store(path)
-    closure = LoopClosure(from_ns=1, to_ns=2, T_from_to=moved(0.3), covariance=np.eye(6), labels=("cup",))
-    written = keyframe(1)
-    store.add(written, sightings_of(written), [closure])
-    store._connection.executescript(
-        "ALTER TABLE closure DROP COLUMN from_frame_id;"
-        "ALTER TABLE closure RENAME COLUMN to_frame_id TO frame_id; DROP TABLE highest; PRAGMA user_version = 1;"
-    )
-    store.close()
-    for read_only in (True, False, True):
-        opened = Store(path, read_only=read_only)
-        (back,) = opened.closures()
-        assert (back.from_frame_id, back.to_frame_id, opened.keyframe(1).labels) == ("camera", "camera", ("cup",))
-        opened.close()
-    with sqlite3.connect(path) as connection:
-        assert connection.execute("PRAGMA user_version").fetchone() == (SCHEMA_VERSION,)
-
-
-def test_gravity_of_the_second_version_is_that_of_one_view(tmp_path: Path) -> None:
-    path, written = tmp_path / "place.db", keyframe(1)
-    store = Store(path)
-    store.add(written, sightings_of(written))
-    store._connection.executescript("DROP TABLE highest; PRAGMA user_version = 2;")
-    store.close()
-    for _ in range(2):  # once and for all
-        opened = Store(path)
-        assert opened.keyframe(1).gravity_confidence == pytest.approx(ONE_VIEW * written.gravity_confidence**DOUBT)
-        opened.close()
-
-
-def test_landmarks_of_the_third_version_keep_their_ids(tmp_path: Path) -> None:
-    path, written = tmp_path / "place.db", keyframe(1)
-    store = Store(path)
-    store.add(written, [sightings_of(written)[0].of_landmark(7, np.eye(3))])
-    store._connection.executescript("DROP TABLE highest; PRAGMA user_version = 3;")
-    store.close()
-    assert Store(path).next_landmark() == 8
-
-
 def test_the_id_of_a_landmark_is_never_used_again(tmp_path: Path) -> None:
     path, written = tmp_path / "place.db", keyframe(1)
     store = Store(path)
@@ -168,13 +133,6 @@ def test_the_id_of_a_landmark_is_never_used_again(tmp_path: Path) -> None:
     opened = Store(path)
     opened.clear()
     assert opened.next_landmark() == 8
-
-
-def test_a_place_where_no_store_can_be_made_is_a_store_error(tmp_path: Path) -> None:
-    for path in (tmp_path / "nowhere" / "place.db", tmp_path):
-        with pytest.raises(StoreError, match="expected a file in an existing folder"):
-            Store(path)
-    assert not list(tmp_path.iterdir())
 
 
 def test_what_the_database_refuses_later_is_a_store_error_too(tmp_path: Path) -> None:
@@ -215,6 +173,38 @@ def test_a_copy_can_be_saved_from_memory(tmp_path: Path) -> None:
     assert Store(tmp_path / "copy.db").counts()["keyframes"] == 1
 
 
+def test_a_store_in_memory_is_not_saved_without_a_path() -> None:
+    store = Store()
+    _add(store)
+    with pytest.raises(StoreError, match="memory: cannot save it: expected a store in a file, got one in memory only"):
+        store.save()
+
+
+def test_a_store_that_is_read_is_not_said_to_be_folded_but_its_copy_is_whole(tmp_path: Path) -> None:
+    path = tmp_path / "place.db"
+    store = Store(path)
+    _add(store)
+    assert store.save() == str(path)
+    store._connection.execute("PRAGMA busy_timeout = 10")
+    with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True)) as reader:
+        reader.execute("BEGIN")
+        reader.execute("SELECT COUNT(*) FROM keyframe").fetchone()
+        _add(store)
+        with pytest.raises(StoreError, match=r"place\.db-wal is not in place\.db yet: end that program and save again"):
+            store.save()
+        store.save(tmp_path / "copy.db")
+    copy = Store(tmp_path / "copy.db", read_only=True)
+    assert copy.keyframe_ids() == [1, 2] and store.save() == str(path)
+
+
+def test_a_copy_never_goes_where_a_registrar_writes(tmp_path: Path) -> None:
+    store, other = Store(tmp_path / "place.db"), Store(tmp_path / "other.db")
+    for path in (tmp_path / "place.db", tmp_path / "other.db"):
+        with pytest.raises(StoreError, match="in use by another registrar"):
+            store.save(path)
+    other.close()
+
+
 def test_only_the_last_few_keyframes_stay_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(store_module, "CACHED", 3)
     store = Store()
@@ -238,71 +228,36 @@ def test_a_store_that_is_only_read_is_not_changed(tmp_path: Path) -> None:
     assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["place.db"]
 
 
+def test_a_second_writer_is_refused_while_readers_see_what_is_written(tmp_path: Path) -> None:
+    path = tmp_path / "place.db"
+    store = Store(path)
+    _add(store)
+    with pytest.raises(StoreError, match=r"place\.db: in use by another registrar"):
+        Store(path)
+    reader = Store(path, read_only=True)
+    assert _add(store) == 2 and reader.keyframe(1).labels == ("cup",)
+    reader.close()
+    store.save(tmp_path / "copy.db")
+    Store(tmp_path / "copy.db").close()
+    store.close()
+    again = Store(path)
+    assert again.keyframe_ids() == [1, 2]
+    again.close()
+
+
+def test_a_store_that_was_refused_is_in_nobodys_way(tmp_path: Path) -> None:
+    path = tmp_path / "place.db"
+    path.write_text("nothing like a store\n" * 20)
+    with pytest.raises(StoreError, match="another kind"):
+        Store(path)
+    path.unlink()
+    Store(path).close()
+
+
 def test_a_missing_store_is_not_made_by_reading(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="got no file"):
         Store(tmp_path / "nothing.db", read_only=True)
     assert not list(tmp_path.iterdir())
-
-
-def _refused(path: Path, match: str) -> None:
-    before = path.read_bytes()
-    with pytest.raises(StoreError, match=match):
-        Store(path)
-    assert path.read_bytes() == before
-    assert [p.name for p in path.parent.iterdir()] == [path.name]
-
-
-def test_a_newer_file_is_refused_and_left_untouched(tmp_path: Path) -> None:
-    path = tmp_path / "place.db"
-    Store(path).close()
-    with sqlite3.connect(path) as connection:
-        connection.execute("PRAGMA user_version = 99")
-    connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
-    connection.close()
-    _refused(path, f"version {SCHEMA_VERSION} or older, got 99")
-
-
-def test_a_store_is_newer_where_only_the_log_beside_it_says_so(tmp_path: Path) -> None:
-    path = tmp_path / "place.db"
-    Store(path).close()
-    with sqlite3.connect(path) as connection:
-        connection.execute("PRAGMA user_version = 99")
-    killed = tmp_path / "killed"
-    killed.mkdir()
-    for name in (path.name, f"{path.name}-wal"):
-        shutil.copy(tmp_path / name, killed / name)
-    connection.close()
-    assert (killed / path.name).read_bytes()[60:64] == SCHEMA_VERSION.to_bytes(4, "big")
-    before = [(killed / name).read_bytes() for name in (path.name, f"{path.name}-wal")]
-    with pytest.raises(StoreError, match=f"version {SCHEMA_VERSION} or older, got 99"):
-        Store(killed / path.name)
-    assert [(killed / name).read_bytes() for name in (path.name, f"{path.name}-wal")] == before
-
-
-def test_a_file_of_another_kind_is_refused_and_left_untouched(tmp_path: Path) -> None:
-    path = tmp_path / "notes.txt"
-    path.write_text("nothing like a store\n" * 20)
-    _refused(path, "another kind")
-
-
-def test_another_database_is_refused_and_left_untouched(tmp_path: Path) -> None:
-    path = tmp_path / "other.db"
-    connection = sqlite3.connect(path)
-    connection.execute("CREATE TABLE a (b)")
-    connection.close()
-    _refused(path, "another SQLite database")
-
-
-@pytest.mark.parametrize("damage", ["cut", "scribble"])
-def test_a_damaged_file_is_refused_and_left_untouched(tmp_path: Path, damage: str) -> None:
-    path = tmp_path / "place.db"
-    store = Store(path)
-    for i in range(4):
-        _add(store, float(i))
-    store.close()
-    whole = path.read_bytes()
-    path.write_bytes(whole[: len(whole) // 2] if damage == "cut" else whole[:4096] + b"\x77" * 8192 + whole[12288:])
-    _refused(path, "intact store")
 
 
 def test_a_damaged_blob_is_reported_when_it_is_read(tmp_path: Path) -> None:
@@ -313,6 +268,53 @@ def test_a_damaged_blob_is_reported_when_it_is_read(tmp_path: Path) -> None:
     store._cache.clear()
     with pytest.raises(StoreError, match=r"keyframe 1: .*damaged"):
         store.keyframe(number)
+
+
+NAN = np.full(16, np.nan)
+DAMAGED_OBJECTS = {
+    "descriptor": (b"\0" * 40, "descriptor: expected 108 bytes, got 40 bytes"),
+    "position": (NAN[:3].tobytes(), "position, .*: expected finite numbers, got .nan, nan, nan, "),
+    "camera": (b"\0", "camera: expected 24 bytes, got 1 bytes"),
+    "R_landmark_session": (NAN[:9].tobytes(), ".*R_landmark_session: expected finite numbers"),
+    "label": (b"\xff", "label: expected text, got"),
+}
+DAMAGED_KEYFRAMES = {
+    "camera": ('{"f": 1}', "camera: expected fx fy cx cy width height as JSON, got"),
+    "gravity": (NAN[:3].tobytes(), "gravity: expected finite numbers"),
+    "T_odom_camera": (NAN.tobytes(), "T_odom_camera: expected a rigid motion"),
+}
+
+
+def _damaged(path: Path, table: str, column: str, value: object) -> bytes:
+    """A store with two keyframes, the first of which holds ``value``; what the file holds."""
+    store = Store(path)
+    for seconds in (0.0, 5.0):
+        _add(store, seconds)
+    with store._connection as transaction:
+        transaction.execute(f"UPDATE {table} SET {column} = ? WHERE id = 1", (value,))
+    store.close()
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize("column", DAMAGED_OBJECTS)
+def test_a_damaged_object_is_named_with_its_file_and_nothing_is_touched(tmp_path: Path, column: str) -> None:
+    path, (value, expected) = tmp_path / "place.db", DAMAGED_OBJECTS[column]
+    before = _damaged(path, "object", column, value)
+    for _ in range(2):  # the first is in nobody's way
+        with pytest.raises(StoreError, match=rf"place\.db: .*object 1 of keyframe 1: {expected}.* or another path"):
+            Registrar(RegistrarParams(store=str(path)))
+    assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["place.db"]
+
+
+@pytest.mark.parametrize("column", DAMAGED_KEYFRAMES)
+def test_a_damaged_keyframe_is_reported_when_it_is_read_and_the_others_are_not(tmp_path: Path, column: str) -> None:
+    path, (value, expected) = tmp_path / "place.db", DAMAGED_KEYFRAMES[column]
+    _damaged(path, "keyframe", column, value)
+    store = Store(path)
+    with pytest.raises(StoreError, match=rf"place\.db: cannot read keyframe 1: {expected}"):
+        store.keyframe(1)
+    assert store.keyframe(2).labels == ("cup",)
+    store.close()
 
 
 def test_two_processes_killed_at_any_moment_lose_nothing_acknowledged(tmp_path: Path, repository: Path) -> None:

@@ -11,7 +11,8 @@ import pytest
 from objreg_ros.registrar.landmarks import Landmarks
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.sighting import sightings_of
-from objreg_ros.registrar.store import Store, StoreError, is_store
+from objreg_ros.registrar.store import Store, StoreError
+from objreg_ros.registrar.store_file import is_store
 from objreg_ros.registrar.survey import PANEL, describe, draw, survey
 
 from .samples import box, keyframe, moved

@@ -103,8 +103,9 @@ def test_a_disabled_registrar_drops_its_frames_as_disabled_until_it_is_enabled(
         assert running.answer("registrar", moments[3].stamp_ns) == expected
 
 
-def test_the_registrar_saves_and_forgets_on_demand(running: Graph) -> None:
-    assert call(running, Trigger, "registrar/save")[0]
+def test_the_registrar_ends_its_keyframe_to_save_and_forgets_on_demand(running: Graph) -> None:
+    saved, why = call(running, Trigger, "registrar/save")
+    assert not saved and "got one in memory only" in why
     running.wait_for(lambda: bool(running.heard["landmarks"]), what="the objects of the keyframe that was saved")
     assert all((table(message, "object_id")["object_id"] >= 1).all() for message in running.heard["landmarks"])
     assert call(running, Trigger, "registrar/reset") == (True, "forgot every keyframe")
