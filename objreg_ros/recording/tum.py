@@ -20,8 +20,9 @@ import yaml
 from numpy.typing import NDArray
 
 from objreg_ros.data import Intrinsics
-from objreg_ros.geometry import pose, rotation_from_quaternion
+from objreg_ros.geometry import is_rigid, pose, rotation_from_quaternion
 from objreg_ros.recording import messages
+from objreg_ros.recording.poses import passed_over
 from objreg_ros.recording.record import Record, Recording, Topic
 
 Array = NDArray[Any]
@@ -57,7 +58,7 @@ class TumRecording(Recording):
         self.path, self.notes = path, []
         pairs = _pairs(path)
         self._camera, self._depth_scale, self._distortion = self._read_camera(path / pairs[0][1])
-        moments = [m for pair in pairs for m in self._moments(*pair)] + _ground_truth(path)
+        moments = [m for pair in pairs for m in self._moments(*pair)] + self._ground_truth()
         order = list(TYPES)
         self._sequence = sorted(moments, key=lambda m: (m.stamp_ns, order.index(m.topic)))
         counts = {name: sum(m.topic == name for m in moments) for name in TYPES}
@@ -94,6 +95,13 @@ class TumRecording(Recording):
             return camera, float(values["depth_scale"]), distortion
         except (KeyError, TypeError, ValueError) as error:
             raise ValueError(f"{file}: expected numbers fx fy cx cy width height depth_scale, got: {error}") from error
+
+    def _ground_truth(self) -> list[Moment]:
+        file = self.path / "groundtruth.txt"
+        told = [_true_moment(row, file) for row in _rows(file, 8)] if file.exists() else []
+        moments = [moment for moment in told if moment is not None]
+        self.notes += passed_over(len(told) - len(moments), len(told), file.name)
+        return moments
 
 
 def _read_yaml(file: Path) -> dict[str, Any]:
@@ -147,19 +155,25 @@ def _around(stamps: Array, stamp: int) -> list[tuple[int, int]]:
     return [(j, int(stamps[j])) for j in (place - 1, place) if 0 <= j < len(stamps)]
 
 
-def _ground_truth(folder: Path) -> list[Moment]:
-    file = folder / "groundtruth.txt"
-    return [_true_moment(row, file) for row in _rows(file, 8)] if file.exists() else []
-
-
-def _true_moment(row: list[str], file: Path) -> Moment:
+def _true_moment(row: list[str], file: Path) -> Moment | None:
+    """A row of the ground truth; None where its numbers are no pose. ValueError where they are no numbers."""
     try:
         numbers = np.array([float(text) for text in row[1:8]])
-        T_world_camera = pose(rotation_from_quaternion(numbers[3:]), numbers[:3])
     except ValueError as error:
         raise ValueError(f"{file}: expected timestamp tx ty tz qx qy qz qw, got {' '.join(row)}") from error
-    stamp_ns = _stamp(row[0], file)
+    stamp_ns, T_world_camera = _stamp(row[0], file), _true_pose(numbers)
+    if T_world_camera is None:
+        return None
     return Moment(stamp_ns, GROUND_TRUTH, partial(messages.pose_stamped, T_world_camera, stamp_ns, WORLD_FRAME))
+
+
+def _true_pose(numbers: Array) -> Array | None:
+    """``T_world_camera`` of tx ty tz qx qy qz qw; None where they are no pose."""
+    try:
+        T_world_camera = pose(rotation_from_quaternion(numbers[3:]), numbers[:3])
+    except ValueError:
+        return None
+    return T_world_camera if is_rigid(T_world_camera) else None
 
 
 def _rows(file: Path, columns: int) -> list[list[str]]:

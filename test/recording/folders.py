@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +66,16 @@ def uncalibrated(stamp_ns: int) -> Record:
     info = messages.camera_info(CAMERA, stamp_ns, "camera")
     info.k[:], info.p[:] = 0, 0
     return Record.of("/camera_info", info, stamp_ns)
+
+
+def lost(record: Record, value: float = 0.0) -> Record:
+    """The record of a pose as a motion capture says it while it sees nothing: every number is ``value``."""
+    made = deepcopy(record.message)
+    pose = made.pose.pose if hasattr(made.pose, "pose") else made.pose
+    for numbers, names in ((pose.position, "xyz"), (pose.orientation, "xyzw")):
+        for name in names:
+            setattr(numbers, name, value)
+    return Record.of(record.topic, made, record.stamp_ns)
 
 
 def noetic_bag(path: Path, frames: int = 3) -> Path:

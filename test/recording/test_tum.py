@@ -60,6 +60,15 @@ def test_a_folder_without_truth_has_no_truth(tmp_path: Path) -> None:
     assert "/ground_truth" not in open_recording(tmp_path).topics
 
 
+@pytest.mark.parametrize("numbers", ["0 0 0 0 0 0 0", "nan nan nan 0 0 0 1", "0 0 0 nan nan nan nan"])
+def test_a_row_of_the_truth_that_is_no_pose_is_passed_over_and_counted(numbers: str, tmp_path: Path) -> None:
+    file = tum_folder(tmp_path) / "groundtruth.txt"
+    file.write_text(f"{file.read_text()}\n0.05 {numbers}")
+    recording = open_recording(tmp_path)
+    assert [r.stamp_ns for r in recording.records(["/ground_truth"])] == [0, 100_000_000, 200_000_000]
+    assert "1 of 4 poses of groundtruth.txt are none" in recording.notes[0]
+
+
 def test_a_missing_picture_is_named(tmp_path: Path) -> None:
     (tum_folder(tmp_path) / "depth/0.100000.png").unlink()
     with pytest.raises(FileNotFoundError, match=r"expected the picture depth/0\.100000\.png"):
@@ -78,7 +87,6 @@ def test_a_broken_picture_is_named_when_it_is_wanted(tmp_path: Path) -> None:
     [
         ("associations.txt", "0.0 rgb/0.000000.png 0.0", "expected 4 columns"),
         ("associations.txt", "zero rgb/0.000000.png 0 depth/0.000000.png", "expected a time in seconds, got 'zero'"),
-        ("groundtruth.txt", "0.0 0 0 0 0 0 0 0", "expected timestamp tx ty tz"),
         ("groundtruth.txt", "0.0 0 0 0 0 0 0 one", "expected timestamp tx ty tz"),
         ("camera.yaml", "fx: [", "expected YAML"),
         ("camera.yaml", "525", "expected a mapping"),
