@@ -9,7 +9,7 @@ al., "A Benchmark for the Evaluation of RGB-D SLAM Systems" (2012).
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -36,9 +36,15 @@ TYPES = {
 }
 CAMERA_FRAME, WORLD_FRAME = "camera", "world"
 ASSOCIATION_NS = 20_000_000  # as the benchmark's associate.py
+NS_DIGITS = 19
+END_OF_TIME_S = 2**31  # what the stamp of a message holds, until 2038
 MILLIMETRES = 1000.0
 # The benchmark's own advice for sequences without calibration: ROS's default camera and depth in steps of 0.2 mm.
 DEFAULT_CAMERA = {"fx": 525.0, "fy": 525.0, "cx": 319.5, "cy": 239.5, "depth_scale": 5000.0}
+
+
+Picture = tuple[int, str]  # stamp, file
+Pair = tuple[int, str, int, str]  # colour stamp, colour file, depth stamp, depth file
 
 
 class Moment(NamedTuple):
@@ -55,8 +61,8 @@ class TumRecording(Recording):
     kind = "TUM RGB-D folder"
 
     def __init__(self, path: Path) -> None:
-        self.path, self.notes = path, []
-        pairs = _pairs(path)
+        self.path = path
+        pairs, self.notes = _pairs(path)
         self._camera, self._depth_scale, self._distortion = self._read_camera(path / pairs[0][1])
         moments = [m for pair in pairs for m in self._moments(*pair)] + self._ground_truth()
         order = list(TYPES)
@@ -114,33 +120,43 @@ def _read_yaml(file: Path) -> dict[str, Any]:
     return values
 
 
-def _pairs(folder: Path) -> list[tuple[int, str, int, str]]:
-    """(colour stamp, colour file, depth stamp, depth file) of every associated pair."""
+def _pairs(folder: Path) -> tuple[list[Pair], list[str]]:
+    """Every associated pair, and a note for the user on the pictures that have no partner."""
     names = ("associations.txt", "associate.txt", "association.txt", "assoc.txt")
     file = next((folder / name for name in names if (folder / name).exists()), None)
     if file is not None:
-        pairs = [(_stamp(row[0], file), row[1], _stamp(row[2], file), row[3]) for row in _rows(file, 4)]
+        pairs, notes = [(_stamp(row[0], file), row[1], _stamp(row[2], file), row[3]) for row in _rows(file, 4)], []
     else:
-        pairs = _associate(_pictures(folder, "rgb"), _pictures(folder, "depth"))
+        colour, depth = _pictures(folder, "rgb"), _pictures(folder, "depth")
+        pairs = _associate(colour, depth)
+        notes = _unpaired(len(pairs), len(colour), len(depth))
     missing = next((name for _, c, _, d in pairs for name in (c, d) if not (folder / name).exists()), None)
     if missing:
         raise FileNotFoundError(f"{folder}: expected the picture {missing} that its list names, got no such file")
     if not pairs:
         raise FileNotFoundError(f"{folder}: expected colour and depth pictures within 20 ms of each other, got none")
-    return pairs
+    return pairs, notes
 
 
-def _pictures(folder: Path, name: str) -> list[tuple[int, str]]:
-    """(stamp, file) of a list like rgb.txt, or of the pictures themselves where they are named by time."""
+def _unpaired(pairs: int, colour: int, depth: int) -> list[str]:
+    if colour == depth == pairs:
+        return []
+    alone = f"{colour - pairs} of {colour} colour and {depth - pairs} of {depth} depth pictures"
+    return [f"{alone} have no partner within 20 ms and are left out"]
+
+
+def _pictures(folder: Path, name: str) -> list[Picture]:
+    """The pictures of a list like rgb.txt, or those of the folder itself where they are named by time."""
     file = folder / f"{name}.txt"
     if file.exists():
         return [(_stamp(row[0], file), row[1]) for row in _rows(file, 2)]
-    pictures = sorted((folder / name).glob("*.*")) if (folder / name).is_dir() else []
+    pictures = (folder / name).glob("*.*") if (folder / name).is_dir() else []
     return [(_stamp(picture.stem, picture), f"{name}/{picture.name}") for picture in pictures]
 
 
-def _associate(colour: list[tuple[int, str]], depth: list[tuple[int, str]]) -> list[tuple[int, str, int, str]]:
+def _associate(colour: list[Picture], depth: list[Picture]) -> list[Pair]:
     """Each colour picture with the depth picture nearest in time, each used once, best pairs first."""
+    colour, depth = sorted(colour), sorted(depth)  # the names of files and the lines of lists may be in any order
     depth_ns = np.array([stamp for stamp, _ in depth], np.int64)
     near = [(abs(stamp - int(d)), i, j) for i, (stamp, _) in enumerate(colour) for j, d in _around(depth_ns, stamp)]
     pairs: dict[int, int] = {}
@@ -185,10 +201,15 @@ def _rows(file: Path, columns: int) -> list[list[str]]:
 
 
 def _stamp(text: str, file: Path) -> int:
+    """Nanoseconds of a time in seconds, or of 19 digits that are nanoseconds already: those of 2001 and later."""
+    is_ns = len(text) == NS_DIGITS and text.isdecimal()
     try:
-        return int((Decimal(text) * 10**9).to_integral_value())
-    except InvalidOperation:
-        raise ValueError(f"{file}: expected a time in seconds, got {text!r}") from None
+        seconds = Decimal(text) / (10**9 if is_ns else 1)
+        if abs(seconds) < END_OF_TIME_S:
+            return int((seconds * 10**9).to_integral_value())
+    except ArithmeticError:  # no number, or none that can be compared
+        pass
+    raise ValueError(f"{file}: expected a time in seconds (or 19 digits of nanoseconds), got {text!r}")
 
 
 def _read_picture(file: Path, flags: int) -> Array:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
@@ -43,6 +43,16 @@ def tum_folder(path: Path, frames: int = 3, scale: float = 1000, lists: bool = F
     (path / "groundtruth.txt").write_text("\n".join(truth))
     camera = {"width": 64, "height": 48, "fx": 50.0, "fy": 50.0, "cx": 31.5, "cy": 23.5, "depth_scale": scale}
     (path / "camera.yaml").write_text("\n".join(f"{name}: {value}" for name, value in camera.items()))
+    return path
+
+
+def numbered_folder(path: Path, greys: Mapping[str, int]) -> Path:
+    """A TUM RGB-D folder of nothing but small pictures: by the names of their times, colour of a grey and depth."""
+    (path / "rgb").mkdir(parents=True)
+    (path / "depth").mkdir()
+    for name, grey in greys.items():
+        cv2.imwrite(str(path / f"rgb/{name}.png"), np.full((4, 4, 3), grey, np.uint8))
+        cv2.imwrite(str(path / f"depth/{name}.png"), np.full((4, 4), 5000, np.uint16))
     return path
 
 
