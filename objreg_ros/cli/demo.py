@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import json
-import signal
-import sys
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
@@ -65,7 +63,6 @@ def command(**asked: Any) -> None:
     Ends with the books of every node, latencies, constraints and their true error, and with pictures in the folder of
     --out. Of a recording that is no rosbag2, what the graph uses is written as one first.
     """
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that the with blocks end the nodes
     run(Asked(**asked))
 
 
