@@ -98,7 +98,7 @@ class TumRecording(Recording):
             numbers = {name: float(values[name]) for name in ("fx", "fy", "cx", "cy")}
             camera = Intrinsics(**numbers, width=int(values["width"]), height=int(values["height"]))
             distortion = [float(value) for value in values.get("distortion", (0.0,) * 5)]
-            return camera, float(values["depth_scale"]), distortion
+            return camera, _depth_scale(values["depth_scale"]), distortion
         except (KeyError, TypeError, ValueError) as error:
             raise ValueError(f"{file}: expected numbers fx fy cx cy width height depth_scale, got: {error}") from error
 
@@ -108,6 +108,14 @@ class TumRecording(Recording):
         moments = [moment for moment in told if moment is not None]
         self.notes += passed_over(len(told) - len(moments), len(told), file.name)
         return moments
+
+
+def _depth_scale(value: Any) -> float:
+    """Steps of depth in a metre; ValueError for what depth cannot be divided by."""
+    scale = float(value)
+    if not 0 < scale < float("inf"):
+        raise ValueError(f"depth_scale {scale}, which is none above 0")
+    return scale
 
 
 def _read_yaml(file: Path) -> dict[str, Any]:

@@ -122,6 +122,7 @@ def test_a_broken_picture_is_named_when_it_is_wanted(tmp_path: Path) -> None:
         ("camera.yaml", "525", "expected a mapping"),
         ("camera.yaml", "fx: 0", "expected numbers fx fy"),
         ("camera.yaml", "fx: wide", "expected numbers fx fy"),
+        *[("camera.yaml", f"depth_scale: {scale}", "depth_scale") for scale in ("0", "-1000", ".nan", ".inf")],
     ],
 )
 def test_a_broken_text_is_refused(file: str, text: str, complaint: str, tmp_path: Path) -> None:
