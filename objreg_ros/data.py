@@ -69,6 +69,10 @@ def _require(owner: Any, truth: bool, expected: str, got: object) -> None:
         raise ValueError(f"{type(owner).__name__}: expected {expected}, got {got}")
 
 
+# No lens comes near these; beyond them rays do not fit into float32.
+LEAST_PX, MOST_PX = 1e-3, 1e6
+
+
 @word
 class Intrinsics:
     """A pinhole camera without distortion: pixel ``u = fx x/z + cx``, pixel centres on integers."""
@@ -83,7 +87,10 @@ class Intrinsics:
     def __post_init__(self) -> None:
         numbers = (self.fx, self.fy, self.cx, self.cy)
         _require(self, all(np.isfinite(numbers)), "finite fx fy cx cy", numbers)
-        _require(self, self.fx > 0 and self.fy > 0, "focal lengths above 0 px", numbers[:2])
+        focal, centre = numbers[:2], numbers[2:]
+        in_reach = min(focal) >= LEAST_PX and max(focal) <= MOST_PX
+        _require(self, in_reach, f"focal lengths of {LEAST_PX} to {MOST_PX:.0f} px", focal)
+        _require(self, max(map(abs, centre)) <= MOST_PX, f"a principal point within {MOST_PX:.0f} px", centre)
         _require(self, self.width > 0 and self.height > 0, "a size above 0 px", (self.width, self.height))
 
     def scaled(self, step: int, first: tuple[int, int] | None = None) -> Intrinsics:

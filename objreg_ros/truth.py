@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from objreg_ros.bridge import from_msg
 from objreg_ros.data import Array, LoopClosure, Rejected
 from objreg_ros.geometry import interpolate, inverse, pose_error
+from objreg_ros.recording.poses import passed_over, pose_of
 from objreg_ros.recording.record import Recording
 
 STRICT = (3.0, 5.0)  # degrees, centimetres
@@ -27,9 +27,13 @@ Error = tuple[float, float]
 
 
 class Truth:
-    """The true path of the camera. Stamps must increase; later poses of an earlier time are left out."""
+    """The true path of the camera. Stamps must increase; later poses of an earlier time are left out.
 
-    def __init__(self, poses: Iterable[tuple[int, Array]]) -> None:
+    ``notes`` say what is odd about it, for the user.
+    """
+
+    def __init__(self, poses: Iterable[tuple[int, Array]], notes: Sequence[str] = ()) -> None:
+        self.notes = tuple(notes)
         self.stamps_ns: list[int] = []
         self.poses: list[Array] = []
         for stamp_ns, T_world_camera in poses:
@@ -39,10 +43,11 @@ class Truth:
 
     @classmethod
     def of(cls, recording: Recording, topic: str | None) -> Truth:
-        """The truth on a topic of a recording; without poses if ``topic`` is None."""
-        records = recording.records([topic]) if topic else ()
-        words = (from_msg.odometry(record.message) for record in records)
-        return cls((word.stamp_ns, word.T_odom_body) for word in words)
+        """The truth on a topic of a recording; without poses if ``topic`` is None. What is no pose is passed over."""
+        told = [pose_of(record) for record in (recording.records([topic]) if topic else ())]
+        words = [word for word in told if word is not None]
+        notes = passed_over(len(told) - len(words), len(told), f"the ground truth {topic}")
+        return cls(((word.stamp_ns, word.T_odom_body) for word in words), notes)
 
     @property
     def length(self) -> float:

@@ -138,7 +138,11 @@ def test_a_broken_word_is_refused_with_expected_and_got(make: Any, changes: dict
 
 
 @pytest.mark.parametrize(
-    "change", [{"fx": 0.0}, {"fy": -1.0}, {"cx": NAN}, {"width": 0}, {"height": -3}, {"fx": np.inf}]
+    "change",
+    [
+        *({"fx": 0.0}, {"fy": -1.0}, {"cx": NAN}, {"width": 0}, {"height": -3}, {"fx": np.inf}),
+        *({"fx": 1e-300}, {"fy": 1e-30}, {"fx": 1e300}, {"cx": 1e30}, {"cy": -1e9}),
+    ],
 )
 def test_a_camera_that_cannot_be_is_refused(change: dict) -> None:
     with pytest.raises(ValueError, match="Intrinsics: expected"):

@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from recording.folders import lost
 
 from objreg_ros.data import LoopClosure
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
+from objreg_ros.recording import messages, open_recording, write_rosbag2
+from objreg_ros.recording.record import Record
 from objreg_ros.truth import Truth, summarise
 
 MS = 1_000_000
@@ -62,6 +67,15 @@ def test_a_truth_without_poses_tells_nothing() -> None:
 def test_a_pose_of_an_earlier_time_is_left_out() -> None:
     truth = Truth([(100, at(1)), (50, at(5)), (100, at(6)), (200, at(2))])
     assert truth.stamps_ns == [100, 200]
+
+
+def test_a_dropout_of_the_truth_is_passed_over_and_counted(tmp_path: Path) -> None:
+    told = [Record.of("/gt", messages.pose_stamped(at(i), i * 50 * MS, "world"), i * 50 * MS) for i in range(4)]
+    write_rosbag2(tmp_path / "bag", [told[0], lost(told[1]), lost(told[2], float("nan")), told[3]])
+    with open_recording(tmp_path / "bag") as recording:
+        truth = Truth.of(recording, "/gt")
+    assert truth.stamps_ns == [0, 150 * MS]
+    assert len(truth.notes) == 1 and "2 of 4 poses of the ground truth /gt are none" in truth.notes[0]
 
 
 def test_the_length_of_the_way_is_told() -> None:

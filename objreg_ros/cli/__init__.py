@@ -6,7 +6,10 @@
 
 from __future__ import annotations
 
+import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -27,7 +30,7 @@ SUMMARIES = {
     "params": "Show every parameter, or write the files that are made from them.",
 }
 FOLDER = Path(__file__).parent
-BROKEN, INTERRUPTED = 1, 130
+BROKEN, INTERRUPTED, TERMINATED = 1, 130, 143
 FIRST_TIME = "the first time compiles for a minute"
 
 
@@ -60,9 +63,13 @@ def group() -> None:
 
 
 def main(*arguments: Any) -> None:
-    """The executable. A broken input is one line on stderr and exit 1; anything else is a bug and shows itself."""
+    """The executable. A broken input is one line on stderr and exit 1; anything else is a bug and shows itself.
+
+    SIGINT and SIGTERM end what was begun, with the usual status.
+    """
     try:
-        code = group.main(args=list(arguments) or None, standalone_mode=False)
+        with _ended_by_sigterm():
+            code = group.main(args=list(arguments) or None, standalone_mode=False)
         sys.exit(code if isinstance(code, int) else 0)
     except click.ClickException as error:
         error.show()
@@ -72,3 +79,26 @@ def main(*arguments: Any) -> None:
         sys.exit(BROKEN)
     except (KeyboardInterrupt, click.Abort):
         sys.exit(INTERRUPTED)
+
+
+@contextmanager
+def _ended_by_sigterm() -> Iterator[None]:
+    """Within the block SIGTERM leaves through every `with` and `finally`, as Ctrl-C does.
+
+    ROS hears it too and shuts down: what it says of that, even in place of the exit, is no bug.
+    """
+    told: list[int] = []
+
+    def end(number: int, _: object) -> None:
+        told.append(number)
+        sys.exit(TERMINATED)
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    except Exception:
+        if not told:
+            raise
+        sys.exit(TERMINATED)
+    finally:
+        signal.signal(signal.SIGTERM, before)

@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import json
-import signal
-import sys
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
@@ -65,7 +63,6 @@ def command(**asked: Any) -> None:
     Ends with the books of every node, latencies, constraints and their true error, and with pictures in the folder of
     --out. Of a recording that is no rosbag2, what the graph uses is written as one first.
     """
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that the with blocks end the nodes
     run(Asked(**asked))
 
 
@@ -79,6 +76,8 @@ def run(asked: Asked) -> None:
     with open_recording(bag) as source:
         live = run_live(bag, setup_of(asked, inputs), asked.out / "logs", _say)
         truth = Truth.of(source, inputs.ground_truth)
+        for note in truth.notes:
+            _say(f"! {note}")
         told = {"recording": str(bag.resolve()), "name": recording.resolve().name, "inputs": inputs.outright}
         _write(asked.out / "demo.json", {**told, "T_base_camera": T_base_camera}, live, truth)
         _draw(asked.out, live, truth, source, inputs)
@@ -99,6 +98,8 @@ def calibrated(asked: Asked) -> Asked:
 def _inputs(recording: Path, asked: Asked) -> Inputs:
     depth_source = read_settings(asked.params_file, asked.changes).of("segmenter", SegmenterNodeParams).source
     with open_recording(recording) as source:
+        for note in source.notes:
+            _say(f"! {note}")
         inputs = choose_inputs(source.topics, parse_remaps(asked.remaps), depth_source)
         if inputs.complete:
             return inputs

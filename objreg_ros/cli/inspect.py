@@ -78,6 +78,8 @@ def _say_truth(source: Recording, inputs: Inputs) -> None:
     truth = Truth.of(source, inputs.ground_truth)
     if truth.poses:
         click.echo(f"ground truth: {len(truth.poses)} poses, {truth.length:.2f} m\n")
+    for note in truth.notes:
+        click.echo(f"! {note}")
 
 
 def columns(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -61,6 +61,8 @@ def command(
     with open_recording(recording) as source:
         inputs = _inputs(source, remaps, odometry, settings.of("segmenter", SegmenterNodeParams).source)
         truth = Truth.of(source, inputs.ground_truth)
+        for note in (*source.notes, *truth.notes):
+            click.echo(f"! {note}", err=True)
         run = _run(source, inputs, settings, max_frames, odometry)
     summary = run.summary(truth)
     _say(run, summary)

@@ -77,7 +77,7 @@ def command(
         selection.require_some(source)
         click.echo(profile.apply(), err=True)
         rclpy.init(args=list(ros_args))
-        latched = {names[topic] for topic in source.latched & names.keys()}
+        latched = {names[topic] for topic in source.latched.keys() & names.keys()}
         player = Player({out: source.topics[topic].msgtype for topic, out in names.items()}, clock, latched)
         try:
             _prepare(player, inputs, names, wait)

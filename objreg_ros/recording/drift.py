@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from objreg_ros.bridge import from_msg
 from objreg_ros.data import Array
 from objreg_ros.geometry import inverse, pose, rotation_angle, rotation_from_vector
 from objreg_ros.recording import messages
+from objreg_ros.recording.poses import pose_of
 from objreg_ros.recording.record import Record
 
 ODOM = "/drifting_odom"
@@ -53,12 +53,12 @@ class DriftingOdometry:
 
 
 def with_drifting_odometry(records: Iterable[Record], ground_truth: str, seed: int) -> Iterator[Record]:
-    """The records, and behind each of the topic ``ground_truth`` an Odometry on `ODOM` of the same stamp."""
+    """The records, and behind each pose of the topic ``ground_truth`` an Odometry on `ODOM` of the same stamp."""
     odometry = DriftingOdometry(seed)
     for record in records:
         yield record
-        if record.topic == ground_truth:
-            truth = from_msg.odometry(record.message)
+        truth = pose_of(record) if record.topic == ground_truth else None
+        if truth is not None:
             T_odom_camera = odometry.step(truth.T_odom_body)
             message = messages.odometry(T_odom_camera, np.eye(6), truth.stamp_ns, "odom", "camera")
             yield Record.of(ODOM, message, record.stamp_ns)

@@ -40,13 +40,17 @@ class Rule:
 
 DEPTH_ENCODING = r"/compressedDepth$"  # a transport that takes nothing but depth
 STEREO = r"stereo/image_(raw|rect)(/|$)"  # OAK-D: the depth of its two grey cameras
+COLOUR_FOLDER = r"/(rgb|colou?r)(/|$)"
+# A word before a folder of colour is a camera's name: /depth_cam/rgb/image_raw, /right_arm/camera/color/image_raw.
+IS_KIND = rf"(?!.*{COLOUR_FOLDER})"
+HALF_OF_STEREO = rf"(^|/)(left|right)(/|$)|(?<![a-z])(left|right){IS_KIND}"
 
 # The first of two pictures that fit equally is the one of the shorter name: raw before compressed.
 RULES = {
     "image": Rule(
         PICTURES,
-        r"(?<!rgb_to_)depth|(^|/)ir(/|_|$)|infra|disparity|mask|label|(^|/)theora"
-        rf"|objects|view|left|right|{STEREO}|{DEPTH_ENCODING}",
+        rf"(?<!rgb_to_)depth{IS_KIND}|(^|/)ir(/|_|$)|infra|disparity|mask|label|(^|/)theora"
+        rf"|objects|(^|/)view(/|$)|{HALF_OF_STEREO}|{STEREO}|{DEPTH_ENCODING}",
         (
             r"rgb_to_depth/image",  # Azure Kinect: colour in the geometry of its native depth
             r"^/?image$",
@@ -63,12 +67,12 @@ RULES = {
     ),
     "points": Rule(
         ("sensor_msgs/msg/PointCloud2",),
-        r"objects|view|velodyne|lidar|ouster|livox|map",
+        r"objects|(^|/)view(/|$)|velodyne|lidar|ouster|livox|map",
         (r"^/?points$", r"depth_registered/points", r"hd/points|qhd/points|sd/points", r"points2?$", r"points|cloud"),
     ),
     "depth": Rule(
         PICTURES,
-        r"(^|/)ir(/|_|$)|infra|rgb_to_depth|disparity",
+        rf"(^|/)ir(/|_|$)|infra|rgb_to_depth|disparity|{COLOUR_FOLDER}(?!.*[dD]epth)",
         (
             r"^/?depth/image$",
             r"depth_registered/hw_registered/image_rect",

@@ -81,11 +81,17 @@ class Recording(ABC):
         return {}
 
     @property
-    def latched(self) -> frozenset[str]:
-        """The topics whose last messages a late subscriber still got, like /tf_static."""
-        offers = self.offered_qos().items()
+    def latched(self) -> dict[str, int]:
+        """The topics whose last messages a late subscriber still got, like /tf_static, and of how many at least.
+
+        That is one a publisher where nobody recorded the depth.
+        """
         kept = QosDurability.TRANSIENT_LOCAL
-        return frozenset(topic for topic, profiles in offers if any(offer.durability is kept for offer in profiles))
+        depths = {
+            topic: sum(max(1, offer.depth) for offer in profiles if offer.durability is kept)
+            for topic, profiles in self.offered_qos().items()
+        }
+        return {topic: depth for topic, depth in depths.items() if depth}
 
     def _types(self) -> Typestore:
         """The message types as the recording knows them."""

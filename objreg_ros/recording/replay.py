@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import queue
 import threading
+from collections import deque
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from objreg_ros.recording.inputs import GRAPH_TOPICS, Inputs
@@ -27,10 +28,22 @@ class Selection:
     end: float | None = None
 
     def records(self, recording: Recording) -> Iterator[Record]:
-        """The selected records, in order of time."""
+        """The selected records, in order of time.
+
+        They begin with what was latched before the start, as a subscriber that came then got it: with the time of the
+        start, and with its own stamp in its header.
+        """
         start_ns = recording.start_ns + round(self.start * 1e9)
         end_ns = None if self.end is None else recording.start_ns + round(self.end * 1e9)
-        return recording.records(set(self.names), start_ns, end_ns)
+        yield from self._latched(recording, start_ns)
+        yield from recording.records(set(self.names), start_ns, end_ns)
+
+    def _latched(self, recording: Recording, start_ns: int) -> list[Record]:
+        """The last messages of each latched topic before a time, as many as were kept."""
+        last = {topic: deque[Record](maxlen=depth) for topic, depth in recording.latched.items() if topic in self.names}
+        for record in recording.records(set(last), end_ns=start_ns) if last else ():
+            last[record.topic].append(replace(record, stamp_ns=start_ns))
+        return [record for records in last.values() for record in records]
 
     def require_some(self, recording: Recording) -> None:
         """ValueError where the times leave nothing of the recording."""

@@ -105,7 +105,7 @@ def warnings(recording: Recording, inputs: Inputs) -> list[str]:
         found.append("no odometry: the registrar follows the camera by itself, and the gate is less strict")
     if inputs.ground_truth is None:
         found.append("no ground truth: the true error of constraints cannot be told")
-    return [*found, *_first_messages(recording, inputs), *_stamps(recording, inputs)]
+    return [*found, *_first_messages(recording, inputs), *_frames(recording, inputs), *_stamps(recording, inputs)]
 
 
 def _first_messages(recording: Recording, inputs: Inputs) -> list[str]:
@@ -140,6 +140,23 @@ def _try(
 
 def _size(hw: tuple[int, int]) -> str:
     return f"{hw[1]} × {hw[0]}"
+
+
+def _frames(recording: Recording, inputs: Inputs) -> list[str]:
+    """Whether a depth image is in the frame of colour, as one that is registered to it is."""
+    colour, depth = (_frame_id(recording, topic) for topic in (inputs.image, inputs.depth))
+    if not colour or not depth or colour == depth:
+        return []
+    return [
+        f"colour is in the frame {colour} and depth in {depth}: depth that is not registered to colour gives wrong "
+        "objects; record registered depth (RealSense: align_depth.enable:=true, OpenNI: depth_registered)"
+    ]
+
+
+def _frame_id(recording: Recording, topic: str | None) -> str:
+    """The frame of a topic's first message; empty if it tells none."""
+    record = next(recording.records([topic]), None) if topic else None
+    return "" if record is None else str(record.message.header.frame_id).lstrip("/")
 
 
 def _stamps(recording: Recording, inputs: Inputs) -> list[str]:

@@ -9,7 +9,7 @@ al., "A Benchmark for the Evaluation of RGB-D SLAM Systems" (2012).
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,8 +20,9 @@ import yaml
 from numpy.typing import NDArray
 
 from objreg_ros.data import Intrinsics
-from objreg_ros.geometry import pose, rotation_from_quaternion
+from objreg_ros.geometry import is_rigid, pose, rotation_from_quaternion
 from objreg_ros.recording import messages
+from objreg_ros.recording.poses import passed_over
 from objreg_ros.recording.record import Record, Recording, Topic
 
 Array = NDArray[Any]
@@ -35,9 +36,15 @@ TYPES = {
 }
 CAMERA_FRAME, WORLD_FRAME = "camera", "world"
 ASSOCIATION_NS = 20_000_000  # as the benchmark's associate.py
+NS_DIGITS = 19
+END_OF_TIME_S = 2**31  # what the stamp of a message holds, until 2038
 MILLIMETRES = 1000.0
 # The benchmark's own advice for sequences without calibration: ROS's default camera and depth in steps of 0.2 mm.
 DEFAULT_CAMERA = {"fx": 525.0, "fy": 525.0, "cx": 319.5, "cy": 239.5, "depth_scale": 5000.0}
+
+
+Picture = tuple[int, str]  # stamp, file
+Pair = tuple[int, str, int, str]  # colour stamp, colour file, depth stamp, depth file
 
 
 class Moment(NamedTuple):
@@ -54,10 +61,10 @@ class TumRecording(Recording):
     kind = "TUM RGB-D folder"
 
     def __init__(self, path: Path) -> None:
-        self.path, self.notes = path, []
-        pairs = _pairs(path)
+        self.path = path
+        pairs, self.notes = _pairs(path)
         self._camera, self._depth_scale, self._distortion = self._read_camera(path / pairs[0][1])
-        moments = [m for pair in pairs for m in self._moments(*pair)] + _ground_truth(path)
+        moments = [m for pair in pairs for m in self._moments(*pair)] + self._ground_truth()
         order = list(TYPES)
         self._sequence = sorted(moments, key=lambda m: (m.stamp_ns, order.index(m.topic)))
         counts = {name: sum(m.topic == name for m in moments) for name in TYPES}
@@ -91,9 +98,24 @@ class TumRecording(Recording):
             numbers = {name: float(values[name]) for name in ("fx", "fy", "cx", "cy")}
             camera = Intrinsics(**numbers, width=int(values["width"]), height=int(values["height"]))
             distortion = [float(value) for value in values.get("distortion", (0.0,) * 5)]
-            return camera, float(values["depth_scale"]), distortion
+            return camera, _depth_scale(values["depth_scale"]), distortion
         except (KeyError, TypeError, ValueError) as error:
             raise ValueError(f"{file}: expected numbers fx fy cx cy width height depth_scale, got: {error}") from error
+
+    def _ground_truth(self) -> list[Moment]:
+        file = self.path / "groundtruth.txt"
+        told = [_true_moment(row, file) for row in _rows(file, 8)] if file.exists() else []
+        moments = [moment for moment in told if moment is not None]
+        self.notes += passed_over(len(told) - len(moments), len(told), file.name)
+        return moments
+
+
+def _depth_scale(value: Any) -> float:
+    """Steps of depth in a metre; ValueError for what depth cannot be divided by."""
+    scale = float(value)
+    if not 0 < scale < float("inf"):
+        raise ValueError(f"depth_scale {scale}, which is none above 0")
+    return scale
 
 
 def _read_yaml(file: Path) -> dict[str, Any]:
@@ -106,33 +128,43 @@ def _read_yaml(file: Path) -> dict[str, Any]:
     return values
 
 
-def _pairs(folder: Path) -> list[tuple[int, str, int, str]]:
-    """(colour stamp, colour file, depth stamp, depth file) of every associated pair."""
+def _pairs(folder: Path) -> tuple[list[Pair], list[str]]:
+    """Every associated pair, and a note for the user on the pictures that have no partner."""
     names = ("associations.txt", "associate.txt", "association.txt", "assoc.txt")
     file = next((folder / name for name in names if (folder / name).exists()), None)
     if file is not None:
-        pairs = [(_stamp(row[0], file), row[1], _stamp(row[2], file), row[3]) for row in _rows(file, 4)]
+        pairs, notes = [(_stamp(row[0], file), row[1], _stamp(row[2], file), row[3]) for row in _rows(file, 4)], []
     else:
-        pairs = _associate(_pictures(folder, "rgb"), _pictures(folder, "depth"))
+        colour, depth = _pictures(folder, "rgb"), _pictures(folder, "depth")
+        pairs = _associate(colour, depth)
+        notes = _unpaired(len(pairs), len(colour), len(depth))
     missing = next((name for _, c, _, d in pairs for name in (c, d) if not (folder / name).exists()), None)
     if missing:
         raise FileNotFoundError(f"{folder}: expected the picture {missing} that its list names, got no such file")
     if not pairs:
         raise FileNotFoundError(f"{folder}: expected colour and depth pictures within 20 ms of each other, got none")
-    return pairs
+    return pairs, notes
 
 
-def _pictures(folder: Path, name: str) -> list[tuple[int, str]]:
-    """(stamp, file) of a list like rgb.txt, or of the pictures themselves where they are named by time."""
+def _unpaired(pairs: int, colour: int, depth: int) -> list[str]:
+    if colour == depth == pairs:
+        return []
+    alone = f"{colour - pairs} of {colour} colour and {depth - pairs} of {depth} depth pictures"
+    return [f"{alone} have no partner within 20 ms and are left out"]
+
+
+def _pictures(folder: Path, name: str) -> list[Picture]:
+    """The pictures of a list like rgb.txt, or those of the folder itself where they are named by time."""
     file = folder / f"{name}.txt"
     if file.exists():
         return [(_stamp(row[0], file), row[1]) for row in _rows(file, 2)]
-    pictures = sorted((folder / name).glob("*.*")) if (folder / name).is_dir() else []
+    pictures = (folder / name).glob("*.*") if (folder / name).is_dir() else []
     return [(_stamp(picture.stem, picture), f"{name}/{picture.name}") for picture in pictures]
 
 
-def _associate(colour: list[tuple[int, str]], depth: list[tuple[int, str]]) -> list[tuple[int, str, int, str]]:
+def _associate(colour: list[Picture], depth: list[Picture]) -> list[Pair]:
     """Each colour picture with the depth picture nearest in time, each used once, best pairs first."""
+    colour, depth = sorted(colour), sorted(depth)  # the names of files and the lines of lists may be in any order
     depth_ns = np.array([stamp for stamp, _ in depth], np.int64)
     near = [(abs(stamp - int(d)), i, j) for i, (stamp, _) in enumerate(colour) for j, d in _around(depth_ns, stamp)]
     pairs: dict[int, int] = {}
@@ -147,19 +179,25 @@ def _around(stamps: Array, stamp: int) -> list[tuple[int, int]]:
     return [(j, int(stamps[j])) for j in (place - 1, place) if 0 <= j < len(stamps)]
 
 
-def _ground_truth(folder: Path) -> list[Moment]:
-    file = folder / "groundtruth.txt"
-    return [_true_moment(row, file) for row in _rows(file, 8)] if file.exists() else []
-
-
-def _true_moment(row: list[str], file: Path) -> Moment:
+def _true_moment(row: list[str], file: Path) -> Moment | None:
+    """A row of the ground truth; None where its numbers are no pose. ValueError where they are no numbers."""
     try:
         numbers = np.array([float(text) for text in row[1:8]])
-        T_world_camera = pose(rotation_from_quaternion(numbers[3:]), numbers[:3])
     except ValueError as error:
         raise ValueError(f"{file}: expected timestamp tx ty tz qx qy qz qw, got {' '.join(row)}") from error
-    stamp_ns = _stamp(row[0], file)
+    stamp_ns, T_world_camera = _stamp(row[0], file), _true_pose(numbers)
+    if T_world_camera is None:
+        return None
     return Moment(stamp_ns, GROUND_TRUTH, partial(messages.pose_stamped, T_world_camera, stamp_ns, WORLD_FRAME))
+
+
+def _true_pose(numbers: Array) -> Array | None:
+    """``T_world_camera`` of tx ty tz qx qy qz qw; None where they are no pose."""
+    try:
+        T_world_camera = pose(rotation_from_quaternion(numbers[3:]), numbers[:3])
+    except ValueError:
+        return None
+    return T_world_camera if is_rigid(T_world_camera) else None
 
 
 def _rows(file: Path, columns: int) -> list[list[str]]:
@@ -171,10 +209,15 @@ def _rows(file: Path, columns: int) -> list[list[str]]:
 
 
 def _stamp(text: str, file: Path) -> int:
+    """Nanoseconds of a time in seconds, or of 19 digits that are nanoseconds already: those of 2001 and later."""
+    is_ns = len(text) == NS_DIGITS and text.isdecimal()
     try:
-        return int((Decimal(text) * 10**9).to_integral_value())
-    except InvalidOperation:
-        raise ValueError(f"{file}: expected a time in seconds, got {text!r}") from None
+        seconds = Decimal(text) / (10**9 if is_ns else 1)
+        if abs(seconds) < END_OF_TIME_S:
+            return int((seconds * 10**9).to_integral_value())
+    except ArithmeticError:  # no number, or none that can be compared
+        pass
+    raise ValueError(f"{file}: expected a time in seconds (or 19 digits of nanoseconds), got {text!r}")
 
 
 def _read_picture(file: Path, flags: int) -> Array:

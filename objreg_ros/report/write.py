@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from objreg_ros.bridge import from_msg
 from objreg_ros.data import Array
 from objreg_ros.geometry import mounting
 from objreg_ros.recording import Recording
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.opening import open_recording
+from objreg_ros.recording.poses import pose_of
 from objreg_ros.report.page import page
 from objreg_ros.report.pictures import Album
 from objreg_ros.report.story import Story
@@ -74,10 +74,9 @@ def _with_odometry(
     """
     if any("T_odom_camera" in row for row in glimpses):
         return list(glimpses)
-    records = recording.records([topic]) if topic else ()
-    words = (from_msg.odometry(record.message) for record in records)
+    words = [pose_of(record) for record in (recording.records([topic]) if topic else ())]
     T_body_camera = np.eye(4) if T_base_camera is None else T_base_camera
-    poses = {word.stamp_ns: (word.T_odom_body @ T_body_camera).tolist() for word in words}
+    poses = {word.stamp_ns: (word.T_odom_body @ T_body_camera).tolist() for word in words if word is not None}
     rows = glimpses or [{"stamp_ns": stamp} for stamp in sorted(poses)]
     stamps = np.array(sorted(poses), np.int64)
     return [{**row, "T_odom_camera": poses.get(_nearest(stamps, row["stamp_ns"]))} for row in rows]

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 import sys
+import time
 
 import click
 import pytest
@@ -44,6 +47,31 @@ def test_a_broken_input_is_one_line_and_exit_1(capsys: pytest.CaptureFixture[str
         main("offline", "/nowhere/at/all")
     error = capsys.readouterr().err
     assert end.value.code == 1 and error.count("\n") == 1 and error.startswith("objreg: /nowhere/at/all: no such file")
+
+
+@pytest.mark.parametrize("said", [SystemExit, RuntimeError])
+def test_sigterm_ends_what_was_begun_and_says_so_by_its_status(
+    said: type[BaseException], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ended = []
+
+    def work(**_: object) -> None:
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(10)
+        except SystemExit:
+            ended.append(True)
+            raise said(143) from None  # as ROS, which the signal shuts down
+
+    before = signal.signal(signal.SIGTERM, signal.SIG_IGN)  # a miss shall not end the tests
+    try:
+        monkeypatch.setattr(group, "main", work)
+        with pytest.raises(SystemExit) as end:
+            main("replay")
+        assert (end.value.code, ended) == (143, [True])
+        assert signal.getsignal(signal.SIGTERM) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def test_the_group_is_a_click_group() -> None:

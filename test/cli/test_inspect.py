@@ -3,11 +3,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
-from recording.folders import tum_folder
+from recording.folders import lost, tum_folder
 
 from objreg_ros.cli.inspect import columns, command
+from objreg_ros.recording import Record, messages, write_rosbag2
 from objreg_ros.registrar.store import Store
 
 
@@ -17,6 +19,14 @@ def test_a_recording_is_told_with_its_inputs_and_its_truth(tmp_path: Path) -> No
     for text in ("TUM RGB-D folder, 0.20 s", "sensor_msgs/Image", "64 × 48 16UC1, camera", "3 poses, 1.00 m"):
         assert text in result.output
     assert "! no odometry" in result.output
+
+
+def test_poses_of_the_truth_that_are_none_are_counted(tmp_path: Path) -> None:
+    truth = Record.of("/gt", messages.pose_stamped(np.eye(4), 10**9, "world"), 10**9)
+    write_rosbag2(tmp_path / "bag", [truth, lost(truth)])
+    result = CliRunner().invoke(command, [str(tmp_path / "bag")])
+    assert "1 poses, 0.00 m" in result.output
+    assert "! 1 of 2 poses of the ground truth /gt are none" in result.output
 
 
 def test_a_remap_shows_in_the_inputs(tmp_path: Path) -> None:

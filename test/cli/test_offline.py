@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 from detector.tiny_model import save_constant_model, tf_outputs
-from recording.folders import tum_folder
+from recording.folders import lost, tum_folder
 
 from objreg_ros.cli.offline import command
 from objreg_ros.offline import Run
+from objreg_ros.recording import Record, open_recording, write_rosbag2
 from objreg_ros.recording.inputs import Inputs
 
 KEYS = {"frames", "detections", "objects", "constraints", "rejected", "stage_ms", "truth"}
@@ -22,6 +23,11 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("model")
     (folder / "labelmap.txt").write_text("cup\ntv\n")
     return save_constant_model(folder / "tiny.onnx", tf_outputs([[0.3, 0.3, 0.7, 0.7]], [0], [0.9]))
+
+
+def read(recording: Path) -> list[Record]:
+    with open_recording(recording) as source:
+        return list(source.records())
 
 
 def offline(*words: object) -> str:
@@ -41,6 +47,14 @@ def test_a_folder_goes_through_the_real_rooms_and_gives_its_json(model: Path, tm
         "ground_truth": "/ground_truth",
     }
     assert summary["stage_ms"].keys() == {"decode", "detect", "segment", "register"}
+
+
+def test_what_is_odd_about_the_recording_and_its_truth_is_said(model: Path, tmp_path: Path) -> None:
+    with (tum_folder(tmp_path, frames=2) / "groundtruth.txt").open("a") as file:
+        file.write("\n0.3 nan nan nan 0 0 0 1")
+    assert "! 1 of 3 poses of groundtruth.txt are none" in offline(tmp_path, "--model", model)
+    write_rosbag2(tmp_path / "bag", [lost(r) if r.topic == "/ground_truth" else r for r in read(tmp_path)])
+    assert "! 2 of 2 poses of the ground truth /ground_truth are none" in offline(tmp_path / "bag", "--model", model)
 
 
 def test_a_run_stops_early(model: Path, tmp_path: Path) -> None:

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,16 @@ def tum_folder(path: Path, frames: int = 3, scale: float = 1000, lists: bool = F
     return path
 
 
+def numbered_folder(path: Path, greys: Mapping[str, int]) -> Path:
+    """A TUM RGB-D folder of nothing but small pictures: by the names of their times, colour of a grey and depth."""
+    (path / "rgb").mkdir(parents=True)
+    (path / "depth").mkdir()
+    for name, grey in greys.items():
+        cv2.imwrite(str(path / f"rgb/{name}.png"), np.full((4, 4, 3), grey, np.uint8))
+        cv2.imwrite(str(path / f"depth/{name}.png"), np.full((4, 4), 5000, np.uint16))
+    return path
+
+
 def records(frames: int = 3) -> Iterator[Record]:
     """Colour and depth with camera_info and odometry, every tenth of a second from 1 s."""
     for i in range(frames):
@@ -65,6 +76,16 @@ def uncalibrated(stamp_ns: int) -> Record:
     info = messages.camera_info(CAMERA, stamp_ns, "camera")
     info.k[:], info.p[:] = 0, 0
     return Record.of("/camera_info", info, stamp_ns)
+
+
+def lost(record: Record, value: float = 0.0) -> Record:
+    """The record of a pose as a motion capture says it while it sees nothing: every number is ``value``."""
+    made = deepcopy(record.message)
+    pose = made.pose.pose if hasattr(made.pose, "pose") else made.pose
+    for numbers, names in ((pose.position, "xyz"), (pose.orientation, "xyzw")):
+        for name in names:
+            setattr(numbers, name, value)
+    return Record.of(record.topic, made, record.stamp_ns)
 
 
 def noetic_bag(path: Path, frames: int = 3) -> Path:

@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability
 from rosbags.rosbag1 import Writer as Rosbag1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from objreg_ros.bridge import from_msg
-from objreg_ros.recording import open_recording, write_rosbag2
+from objreg_ros.recording import Record, messages, open_recording, write_rosbag2
 from objreg_ros.recording.messages import standard_types
 
 from .folders import CAMERA, records
@@ -140,7 +141,7 @@ def cut(file: Path, share: float) -> None:
     file.write_bytes(file.read_bytes()[: int(file.stat().st_size * share)])
 
 
-@pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.9, 0.999])
 def test_a_truncated_rosbag2_says_what_to_do(bag: Path, share: float) -> None:
     file = next(f for f in bag.iterdir() if f.suffix in (".mcap", ".db3"))
     cut(file, share)
@@ -154,6 +155,73 @@ def test_a_truncated_rosbag1_says_what_to_do(rosbag1: Path, share: float) -> Non
     cut(rosbag1, share)
     with pytest.raises(ValueError, match=r"expected a whole bag.*rosbag reindex"):
         open_recording(rosbag1)
+
+
+def spoil(file: Path) -> None:
+    """Noise for the middle third of a file."""
+    whole = file.read_bytes()
+    third = len(whole) // 3
+    file.write_bytes(whole[:third] + np.random.default_rng(0).bytes(third) + whole[2 * third :])
+
+
+def noisy(count: int = 60) -> list[Record]:
+    """Pictures that compress, but not to nothing."""
+    pixels = np.random.default_rng(0).integers(0, 16, (count, 48, 64, 3)).astype(np.uint8)
+    return [Record.of("/image", messages.image(rgb, "rgb8", i, "camera"), i) for i, rgb in enumerate(pixels)]
+
+
+def read_all(bag: Path) -> None:
+    with open_recording(bag) as recording:
+        for record in recording.records():
+            assert record.message is not None
+
+
+@pytest.mark.parametrize(
+    ("plugin", "mode"),
+    [
+        (StoragePlugin.SQLITE3, CompressionMode.FILE),
+        (StoragePlugin.SQLITE3, CompressionMode.MESSAGE),
+        (StoragePlugin.MCAP, CompressionMode.FILE),
+        (StoragePlugin.MCAP, CompressionMode.MESSAGE),
+        (StoragePlugin.MCAP, CompressionMode.STORAGE),
+    ],
+)
+def test_a_rosbag2_with_damaged_bytes_says_what_to_do(
+    plugin: StoragePlugin, mode: CompressionMode, tmp_path: Path
+) -> None:
+    writer = Writer(tmp_path / "bag", version=9, storage_plugin=plugin)
+    writer.set_compression(mode, CompressionFormat.ZSTD)
+    with writer:
+        connection = writer.add_connection("/image", "sensor_msgs/msg/Image", typestore=standard_types())
+        for record in noisy():
+            writer.write(connection, record.stamp_ns, record.cdr)
+    spoil(next(file for file in (tmp_path / "bag").iterdir() if file.suffix != ".yaml"))
+    with pytest.raises(ValueError, match="expected a whole bag"):
+        read_all(tmp_path / "bag")
+
+
+@pytest.mark.parametrize("compression", ["LZ4", "BZ2"])
+def test_a_rosbag1_with_damaged_bytes_says_what_to_do(compression: str, tmp_path: Path) -> None:
+    types = get_typestore(Stores.ROS1_NOETIC)
+    kind = "std_msgs/msg/String"
+    writer = Rosbag1Writer(tmp_path / "one.bag")
+    writer.set_compression(Rosbag1Writer.CompressionFormat[compression])
+    with writer:
+        connection = writer.add_connection("/noise", kind, typestore=types)
+        for i in range(20):
+            noise = np.random.default_rng(i).bytes(3000).hex()
+            writer.write(connection, i, types.serialize_ros1(types.types[kind](data=noise), kind))
+    spoil(tmp_path / "one.bag")
+    with pytest.raises(ValueError, match=r"expected a whole bag.*rosbag reindex"):
+        read_all(tmp_path / "one.bag")
+
+
+def test_a_bug_is_not_called_a_broken_bag(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with open_recording(bag) as recording:
+        record = next(recording.records())
+        monkeypatch.setattr(AnyReader, "deserialize", lambda *_: 1 // 0)
+        with pytest.raises(ZeroDivisionError):
+            _ = record.message
 
 
 def test_metadata_that_are_no_metadata_are_refused_in_one_line(bag: Path) -> None:

@@ -11,7 +11,7 @@ from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
 from objreg_ros.recording import open_recording
 from objreg_ros.recording.drift import ODOM, Drift, DriftingOdometry, with_drifting_odometry
 
-from .folders import tum_folder
+from .folders import lost, tum_folder
 
 
 def walk(steps: int) -> list[np.ndarray]:
@@ -55,3 +55,10 @@ def test_every_true_pose_is_followed_by_odometry_of_its_stamp(tmp_path: Path) ->
     assert [from_msg.stamp_ns(m) for m in odom] == [0, 100_000_000, 200_000_000]
     moved = np.linalg.norm(from_msg.odometry(odom[1]).T_odom_body[:3, 3])
     assert moved == pytest.approx(0.5, abs=0.1) and len(records) == 15
+
+
+def test_a_moment_without_a_true_pose_has_no_odometry(tmp_path: Path) -> None:
+    records = open_recording(tum_folder(tmp_path, frames=4)).records(["/ground_truth"])
+    truth = [lost(record) if record.stamp_ns == 100_000_000 else record for record in records]
+    odom = [r.stamp_ns for r in with_drifting_odometry(truth, "/ground_truth", seed=3) if r.topic == ODOM]
+    assert odom == [0, 200_000_000, 300_000_000]

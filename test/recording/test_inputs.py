@@ -89,6 +89,29 @@ DRIVERS = {
         "/cam0/image_raw /cam1/image_raw /cam2/frame/compressedDepth:jpeg /camera_info:info",
         "image=/cam0/image_raw depth=/cam2/frame/compressedDepth camera_info=/camera_info",
     ),
+    "a camera called depth": (
+        "/depth_cam/rgb/image_raw /depth_cam/rgb/image_raw/compressed:jpeg /depth_cam/rgb/camera_info:info "
+        "/depth_cam/depth/image_raw /depth_cam/depth/camera_info:info /depth_cam/depth/points:points",
+        "image=/depth_cam/rgb/image_raw points=/depth_cam/depth/points camera_info=/depth_cam/rgb/camera_info",
+    ),
+    "a camera on the right arm": (
+        "/right_arm/camera/color/image_raw /right_arm/camera/color/camera_info:info "
+        "/right_arm/camera/aligned_depth_to_color/image_raw /right_arm/camera/aligned_depth_to_color/camera_info:info",
+        "image=/right_arm/camera/color/image_raw depth=/right_arm/camera/aligned_depth_to_color/image_raw "
+        "camera_info=/right_arm/camera/aligned_depth_to_color/camera_info",
+    ),
+    "the preview of an OAK-D": (
+        "/oakd/rgb/preview/image_raw /oakd/rgb/preview/camera_info:info /oakd/stereo/image_raw "
+        "/oakd/stereo/camera_info:info",
+        "image=/oakd/rgb/preview/image_raw depth=/oakd/stereo/image_raw camera_info=/oakd/stereo/camera_info",
+    ),
+    "ZED": (
+        "/zed/zed_node/left/color/rect/image /zed/zed_node/right/color/rect/image /zed/zed_node/rgb/color/rect/image "
+        "/zed/zed_node/rgb/color/rect/camera_info:info /zed/zed_node/depth/depth_registered "
+        "/zed/zed_node/depth/camera_info:info /zed/zed_node/left_raw/image_raw_color",
+        "image=/zed/zed_node/rgb/color/rect/image depth=/zed/zed_node/depth/depth_registered "
+        "camera_info=/zed/zed_node/depth/camera_info",
+    ),
     "truth as odometry": (
         "/odometry/filtered:odom /vicon/camera:odom",
         "odom=/odometry/filtered ground_truth=/vicon/camera",
@@ -175,6 +198,7 @@ def test_an_input_can_be_left_out() -> None:
         "/camera/color/image_raw /camera/color/camera_info:info /usb_cam/image_raw /usb_cam/image_raw/compressed:jpeg",
         "/stereo/left/image_raw /stereo/right/image_raw /cam0/image_raw /camera_info:info",
         "/rgb_to_depth/image_raw /rgb/image_raw /rgb/camera_info:info",
+        "/depth_cam/rgb/image_raw /depth_cam/rgb/image_raw/compressed:jpeg /depth_cam/rgb/camera_info:info",
         "/feed /camera_info:info",
     ],
 )
@@ -192,6 +216,22 @@ def test_a_lone_depth_image_is_not_taken_for_colour() -> None:
     for depth in ("/oak/stereo/image_raw", "/oak/stereo/image_raw/compressedDepth", "/cam2/image_raw/compressedDepth"):
         inputs = choose_inputs(topics(f"{depth} /camera_info:info"))
         assert (inputs.image, inputs.depth) == (None, depth)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "/zed/left/color/rect/image",
+        "/zed/right_raw/image_raw_color",
+        "/cam/image_left",
+        "/camera/rgb/depth/image",
+        "/depth_cam/depth/image_raw",
+        "/front_left_camera/depth/image_rect_raw",
+        "/detector/view",
+    ],
+)
+def test_half_of_a_stereo_camera_depth_and_views_are_no_colour(name: str) -> None:
+    assert choose_inputs(topics(name)).image is None
 
 
 def test_an_empty_topic_is_no_input() -> None:

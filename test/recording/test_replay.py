@@ -8,12 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from objreg_ros.recording import Recording, open_recording
+from objreg_ros.bridge import from_msg
+from objreg_ros.recording import Recording, open_recording, write_rosbag2
+from objreg_ros.recording.bags import latched_qos
 from objreg_ros.recording.inputs import Inputs, choose_inputs
 from objreg_ros.recording.record import Topic
 from objreg_ros.recording.replay import Selection, graph_names, read_ahead, recorded_names
 
-from .folders import tum_folder
+from .folders import STEP_NS, records, tum_folder
 
 
 @pytest.fixture
@@ -46,6 +48,31 @@ def test_a_selection_is_a_part_in_time_of_some_topics(recording: Recording) -> N
     assert selection.count(recording) == 3
     assert Selection({"/image": "image"}).count(recording) == 11
     assert Selection({"/image": "image"}, start=99).count(recording) == 0
+
+
+def latched_infos(path: Path, *depths: int) -> Path:
+    """A rosbag2 of 1 s whose camera_info, from as many publishers, came in its first four tenths only."""
+    told = [r for r in records(11) if r.topic != "/camera_info" or r.stamp_ns < 10**9 + 4 * STEP_NS]
+    write_rosbag2(path, told, offered_qos={"/camera_info": [latched_qos(depth) for depth in depths]})
+    return path
+
+
+@pytest.mark.parametrize(("depths", "told"), [((1,), [3]), ((0, 0), [2, 3]), ((2, 1), [1, 2, 3])])
+def test_a_selection_begins_with_what_was_latched_before_it(
+    depths: tuple[int, ...], told: list[int], tmp_path: Path
+) -> None:
+    with open_recording(latched_infos(tmp_path / "bag", *depths)) as recording:
+        played = list(Selection({"/camera_info": "camera_info", "/image": "image"}, start=0.5).records(recording))
+        latched, others = played[: len(told)], played[len(told) :]
+        assert [from_msg.stamp_ns(r.message) for r in latched] == [10**9 + k * STEP_NS for k in told]
+        assert {(r.topic, r.stamp_ns) for r in latched} == {("/camera_info", others[0].stamp_ns)}
+        assert [r.topic for r in others] == ["/image"] * 6
+
+
+def test_what_was_latched_is_played_once_and_only_if_it_is_selected(tmp_path: Path) -> None:
+    with open_recording(latched_infos(tmp_path / "bag", 1)) as recording:
+        assert sum(1 for _ in Selection({"/camera_info": "camera_info"}).records(recording)) == 4
+        assert {r.topic for r in Selection({"/image": "image"}, start=0.5).records(recording)} == {"/image"}
 
 
 @pytest.mark.parametrize(("start", "end"), [(99.0, None), (0.5, 0.2), (0.5, 0.5)])

@@ -24,12 +24,14 @@ def said(recording: Recording) -> str:
     return "\n".join(warnings(recording, choose_inputs(recording.topics)))
 
 
-def depth_and_colour(depth: np.ndarray, encoding: str, camera: Intrinsics = CAMERA, later: int = 0) -> list[Record]:
+def depth_and_colour(
+    depth: np.ndarray, encoding: str, camera: Intrinsics = CAMERA, later: int = 0, frame_id: str = "c"
+) -> list[Record]:
     rgb = np.zeros((48, 64, 3), np.uint8)
     return [
         Record.of("/camera_info", messages.camera_info(camera, 5, "c"), 5),
         Record.of("/image", messages.image(rgb, "rgb8", 5, "c"), 5),
-        Record.of("/depth/image", messages.image(depth, encoding, 5 + later, "c"), 5),
+        Record.of("/depth/image", messages.image(depth, encoding, 5 + later, frame_id), 5),
     ]
 
 
@@ -70,6 +72,26 @@ def test_depth_of_another_size_than_colour_is_said(tmp_path: Path) -> None:
     small = Intrinsics(fx=25.0, fy=25.0, cx=15.5, cy=11.5, width=32, height=24)
     recording = bag(tmp_path / "bag", depth_and_colour(METRE[::2, ::2], "16UC1", small))
     assert "colour has 64 × 48 pixels and depth 32 × 24" in said(recording)
+
+
+def test_depth_in_another_frame_than_colour_is_said_with_how_to_register_it(tmp_path: Path) -> None:
+    recording = bag(tmp_path / "bag", depth_and_colour(METRE, "16UC1", frame_id="camera_depth_optical_frame"))
+    told = said(recording)
+    assert "colour is in the frame c and depth in camera_depth_optical_frame" in told
+    assert "align_depth.enable:=true" in told and "depth_registered" in told
+
+
+@pytest.mark.parametrize("frame_id", ["c", "/c", ""])
+def test_depth_in_the_frame_of_colour_or_in_none_is_fine(frame_id: str, tmp_path: Path) -> None:
+    assert "in the frame" not in said(bag(tmp_path / "bag", depth_and_colour(METRE, "16UC1", frame_id=frame_id)))
+
+
+def test_only_depth_that_would_be_used_is_looked_at(tmp_path: Path) -> None:
+    rows = np.ones((48, 64), [("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
+    cloud = Record.of("/points", messages.point_cloud(rows, 5, "c"), 5)
+    recording = bag(tmp_path / "bag", [*depth_and_colour(METRE, "16UC1", frame_id="other"), cloud])
+    inputs = choose_inputs(recording.topics, source="points")
+    assert inputs.points and not [warning for warning in warnings(recording, inputs) if "in the frame" in warning]
 
 
 def test_an_encoding_that_no_node_reads_is_said(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 from objreg_ros.bridge import from_msg
 from objreg_ros.recording import open_recording
 
-from .folders import tum_folder
+from .folders import numbered_folder, tum_folder
 
 
 @pytest.mark.parametrize("lists", [False, True])
@@ -55,9 +55,44 @@ def test_a_folder_of_pictures_named_by_time_needs_no_list(tmp_path: Path) -> Non
     assert open_recording(tmp_path).topics["/image"].count == 3
 
 
+@pytest.mark.parametrize("lists", [False, True])
+def test_pictures_in_any_order_lose_no_pair(lists: bool, tmp_path: Path) -> None:
+    folder = numbered_folder(tmp_path, {f"{9 + k / 2:.1f}": k for k in range(5)})  # "10.0" is before "9.0" in a list
+    if lists:
+        for name in ("rgb", "depth"):
+            files = sorted((folder / name).iterdir())
+            (folder / f"{name}.txt").write_text("\n".join(f"{file.stem} {name}/{file.name}" for file in files))
+    recording = open_recording(folder)
+    assert [r.stamp_ns // 10**6 for r in recording.records(["/image"])] == [9000, 9500, 10000, 10500, 11000]
+    assert [int(from_msg.image(r.message).rgb[0, 0, 0]) for r in recording.records(["/image"])] == [0, 1, 2, 3, 4]
+    assert not [note for note in recording.notes if "partner" in note]
+
+
+def test_pictures_named_in_nanoseconds_are_read_to_the_last_digit(tmp_path: Path) -> None:
+    recording = open_recording(numbered_folder(tmp_path, {"1403636579763555584": 0, "1403636579813555456": 1}))
+    assert [r.stamp_ns for r in recording.records(["/image"])] == [1403636579763555584, 1403636579813555456]
+
+
+def test_pictures_without_a_partner_are_counted(tmp_path: Path) -> None:
+    folder = numbered_folder(tmp_path, {f"{k}.0": k for k in range(4)})
+    (folder / "depth/2.0.png").unlink()
+    (folder / "rgb/3.0.png").rename(folder / "rgb/3.5.png")
+    notes = open_recording(folder).notes
+    assert "2 of 4 colour and 1 of 3 depth pictures have no partner within 20 ms and are left out" in notes
+
+
 def test_a_folder_without_truth_has_no_truth(tmp_path: Path) -> None:
     (tum_folder(tmp_path) / "groundtruth.txt").unlink()
     assert "/ground_truth" not in open_recording(tmp_path).topics
+
+
+@pytest.mark.parametrize("numbers", ["0 0 0 0 0 0 0", "nan nan nan 0 0 0 1", "0 0 0 nan nan nan nan"])
+def test_a_row_of_the_truth_that_is_no_pose_is_passed_over_and_counted(numbers: str, tmp_path: Path) -> None:
+    file = tum_folder(tmp_path) / "groundtruth.txt"
+    file.write_text(f"{file.read_text()}\n0.05 {numbers}")
+    recording = open_recording(tmp_path)
+    assert [r.stamp_ns for r in recording.records(["/ground_truth"])] == [0, 100_000_000, 200_000_000]
+    assert "1 of 4 poses of groundtruth.txt are none" in recording.notes[0]
 
 
 def test_a_missing_picture_is_named(tmp_path: Path) -> None:
@@ -77,13 +112,17 @@ def test_a_broken_picture_is_named_when_it_is_wanted(tmp_path: Path) -> None:
     ("file", "text", "complaint"),
     [
         ("associations.txt", "0.0 rgb/0.000000.png 0.0", "expected 4 columns"),
-        ("associations.txt", "zero rgb/0.000000.png 0 depth/0.000000.png", "expected a time in seconds, got 'zero'"),
-        ("groundtruth.txt", "0.0 0 0 0 0 0 0 0", "expected timestamp tx ty tz"),
+        ("associations.txt", "zero rgb/0.000000.png 0 depth/0.000000.png", "expected a time in .*, got 'zero'"),
+        *[
+            ("associations.txt", f"{time} rgb/0.000000.png 0 depth/0.000000.png", "expected a time in seconds")
+            for time in ("inf", "nan", "1e400", "1e999999999", "9000000000000000000", "1305031102175")
+        ],
         ("groundtruth.txt", "0.0 0 0 0 0 0 0 one", "expected timestamp tx ty tz"),
         ("camera.yaml", "fx: [", "expected YAML"),
         ("camera.yaml", "525", "expected a mapping"),
         ("camera.yaml", "fx: 0", "expected numbers fx fy"),
         ("camera.yaml", "fx: wide", "expected numbers fx fy"),
+        *[("camera.yaml", f"depth_scale: {scale}", "depth_scale") for scale in ("0", "-1000", ".nan", ".inf")],
     ],
 )
 def test_a_broken_text_is_refused(file: str, text: str, complaint: str, tmp_path: Path) -> None:

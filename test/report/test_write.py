@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recording.folders import records
+from recording.folders import lost, records
 
 from objreg_ros.recording import write_rosbag2
 from objreg_ros.recording.inputs import Inputs
@@ -54,6 +54,15 @@ def test_frames_without_a_pose_get_that_of_the_odometry_at_their_time(tmp_path: 
     write_report(tmp_path / "out.html", [tmp_path / "demo.json"])
     text = (tmp_path / "out.html").read_text()
     assert "Object map" in text and "cup, " in text
+
+
+def test_odometry_that_is_no_pose_is_passed_over(tmp_path: Path) -> None:
+    told = [lost(record) if record.topic == "/odom" and i < 9 else record for i, record in enumerate(records(30))]
+    write_rosbag2(tmp_path / "bag", told)
+    run = {"recording": str(tmp_path / "bag"), "constraints": [], "rejected": {}}
+    (tmp_path / "demo.json").write_text(json.dumps(run))
+    write_report(tmp_path / "out.html", [tmp_path / "demo.json"])
+    assert "the way of the camera from above" in (tmp_path / "out.html").read_text()
 
 
 def test_a_camera_that_is_mounted_on_the_body_of_the_odometry_is_placed_there(

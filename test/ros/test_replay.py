@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -94,6 +95,21 @@ def test_a_lossless_replay_without_nodes_says_so(fresh: Graph, tmp_path: Path) -
     command = [sys.executable, "-m", "objreg_ros.cli", "replay", str(tum_folder(tmp_path / "tum")), "--lossless"]
     done = subprocess.run([*command, "--wait", "0"], env=fresh.environment(), capture_output=True, text=True)
     assert done.returncode == 1 and "expected the nodes to publish `finished`, got none" in done.stderr
+
+
+@pytest.mark.parametrize(("how", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_replay_that_is_told_to_end_does_so_with_the_usual_status(
+    how: signal.Signals, status: int, fresh: Graph, tmp_path: Path
+) -> None:
+    words = ["replay", str(tum_folder(tmp_path / "tum")), "--loop", "--wait", "0"]
+    command = [sys.executable, "-m", "objreg_ros.cli", *words]
+    with subprocess.Popen(command, env=fresh.environment(), stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        while "nobody listens to /depth/image" not in process.stderr.readline():  # then it plays
+            assert process.poll() is None
+        process.send_signal(how)
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == status and "Traceback" not in said, said
 
 
 def end_keyframe(graph: Graph) -> None:

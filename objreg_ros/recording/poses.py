@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The poses that a recording tells, and what stands in their place where there was none."""
+
+from __future__ import annotations
+
+from objreg_ros.bridge import from_msg
+from objreg_ros.data import Odometry
+from objreg_ros.recording.record import Record
+
+
+def pose_of(record: Record) -> Odometry | None:
+    """The pose in a record of a type that `from_msg.odometry` reads; None where its numbers are none.
+
+    A motion capture says zeros or NaN while it does not see its markers. ValueError where the recording is broken.
+    """
+    message = record.message
+    try:
+        return from_msg.odometry(message)
+    except ValueError:
+        return None
+
+
+def passed_over(count: int, of: int, what: str) -> list[str]:
+    """A note for the user on ``count`` of ``of`` poses that were none; no note of 0."""
+    told = f"{count} of {of} poses of {what} are none (NaN, or a quaternion of length 0) and are passed over"
+    return [told] if count else []
