@@ -18,7 +18,7 @@ from objreg_ros.bridge import from_msg
 from objreg_ros.cli import live_table, options
 from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
 from objreg_ros.cli.played import as_rosbag2, simulated_room
-from objreg_ros.cli.settings import parse_change, read_settings, ros_argument
+from objreg_ros.cli.settings import parse_change, read_settings, ros_argument, tell_ignored
 from objreg_ros.data import ColourImage, Intrinsics
 from objreg_ros.offline import constraint_with_error, refusal
 from objreg_ros.recording import Recording, open_recording
@@ -97,7 +97,9 @@ def calibrated(asked: Asked) -> Asked:
 
 
 def _inputs(recording: Path, asked: Asked) -> Inputs:
-    depth_source = read_settings(asked.params_file, asked.changes).of("segmenter", SegmenterNodeParams).source
+    settings = read_settings(asked.params_file, asked.changes)
+    tell_ignored(settings)
+    depth_source = settings.of("segmenter", SegmenterNodeParams).source
     with open_recording(recording) as source:
         inputs = choose_inputs(source.topics, parse_remaps(asked.remaps), depth_source)
         if inputs.complete:

@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 from objreg_ros.cli import FIRST_TIME, options
 from objreg_ros.cli.options import require_writable
-from objreg_ros.cli.settings import Settings, read_settings
+from objreg_ros.cli.settings import Settings, read_settings, tell_ignored
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.offline import Run, Timing, build_rooms, run_offline
 from objreg_ros.recording import Record, Recording, open_recording
@@ -58,6 +58,7 @@ def command(
     if json_file is not None:
         require_writable("--json", json_file)
     settings = read_settings(params_file, [*changes, *_model_changes(model, labels)])
+    tell_ignored(settings)
     with open_recording(recording) as source:
         inputs = _inputs(source, remaps, odometry, settings.of("segmenter", SegmenterNodeParams).source)
         truth = Truth.of(source, inputs.ground_truth)
