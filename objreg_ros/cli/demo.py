@@ -105,7 +105,8 @@ def _inputs(recording: Path, asked: Asked) -> Inputs:
         if inputs.complete:
             return inputs
         wanted = inputs.wanted(depth_source)
-        raise ValueError(f"{recording}: expected {wanted}, got {', '.join(source.topics)}; see --remap")
+        other = "" if depth_source == "auto" else ", or leave out segmenter.source"
+        raise ValueError(f"{recording}: expected {wanted}, got {', '.join(source.topics)}; see --remap{other}")
 
 
 def _say(text: str) -> None:
