@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -13,6 +14,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
 REFUSED = rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError
+SOURCE_LINE = re.compile(r",? at /\S+:\d+")  # of rcl's own code, in what it says
 SIGNALS = signal.SIGINT, signal.SIGTERM
 
 
@@ -48,7 +50,7 @@ def begin(args: Sequence[str] | None) -> None:
     try:
         rclpy.init(args=None if args is None else list(args))
     except REFUSED as error:
-        said = " ".join(str(error).split())
+        said = " ".join(SOURCE_LINE.sub("", str(error)).split())
         raise ValueError(
             "ROS arguments: expected remaps like -r __ns:=/robot, parameters like -p name:=value, and parameter files "
             f"of node: ros__parameters: name: value; got: {said}"
