@@ -47,4 +47,11 @@ def model(name: str) -> Path:
         return path
     if path.name != name:
         raise FileNotFoundError(f"{name}: expected a model file there, got none; `objreg fetch-model` gets one")
-    return user_models() / name if (user_models() / name).is_file() else find(f"models/{name}")
+    places = [user_models() / name, *(folder / "models" / name for folder in folders())]
+    for place in places:
+        if place.is_file():
+            return place
+    raise FileNotFoundError(
+        f"{name}: expected a model of this name in {user_models()} or in models/ of {NAME}, got none; `objreg "
+        "fetch-model` gets one of COCO, ssd_mobilenet_v1_12.onnx, and one that lies elsewhere is named by its path"
+    )

@@ -64,6 +64,15 @@ def test_a_model_is_a_path_or_a_name_in_the_users_folder_or_ours(
     assert share.model(str(ours)) == ours
 
 
+def test_a_model_of_a_name_that_is_nowhere_is_refused_with_how_to_get_one(
+    elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_DATA_HOME", str(elsewhere / "share"))
+    with pytest.raises(FileNotFoundError, match=r"^a\.onnx: expected .* in .*share/objreg_ros/models or") as refused:
+        share.model("a.onnx")
+    assert "`objreg fetch-model` gets one" in str(refused.value) and "installed?" not in str(refused.value)
+
+
 def test_a_model_that_is_named_with_its_folder_is_looked_for_there_only(elsewhere: Path) -> None:
     put(elsewhere / "prefix", "models/a.onnx")
     with pytest.raises(FileNotFoundError, match=r"^elsewhere/a\.onnx: expected a model file there, got none"):

@@ -224,7 +224,7 @@ def labels(message: Any) -> dict[int, str]:
     """The names of the classes: std_msgs/String with JSON ``{"id": "name"}``."""
     try:
         return {int(number): str(name) for number, name in json.loads(message.data).items()}
-    except (ValueError, AttributeError) as error:
+    except (ValueError, AttributeError, RecursionError) as error:
         raise ValueError(f'labels: expected JSON like {{"0": "cup"}}, got {message.data[:80]!r}') from error
 
 

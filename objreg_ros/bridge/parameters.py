@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from difflib import get_close_matches
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -19,6 +20,7 @@ from objreg_ros.params import Declaration, Params
 
 Kind = TypeVar("Kind", bound=Params)
 
+OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides.")  # declared where ROS wants them
 TYPES = {
     (bool, False): Parameter.Type.BOOL,
     (int, False): Parameter.Type.INTEGER,
@@ -34,14 +36,19 @@ TYPES = {
 class Parameters:
     """The declared parameters of ``node`` and their current values, one `Params` a class.
 
-    ValueError at construction for a start value that is refused. ``changed`` is called after a live change.
+    ValueError at construction for a start value that is refused; a name that nobody declared is warned of.
+    ``changed`` is called after a live change.
     """
 
     def __init__(self, node: Node, *kinds: type[Params]) -> None:
         self.changed: Callable[[], None] = lambda: None
         self._declarations = {d.name: d for kind in kinds for d in kind.declarations()}
-        start = {name: _declare(node, declaration) for name, declaration in self._declarations.items()}
-        self._current = {kind: kind(**_part(kind, start)) for kind in kinds}
+        try:
+            start = {name: _declare(node, declaration) for name, declaration in self._declarations.items()}
+            self._current = {kind: kind(**_part(kind, start)) for kind in kinds}
+        except ValueError as error:
+            raise ValueError(f"{node.get_name()}: {error}") from error
+        _warn_of_unknown(node, list(self._declarations))
         node.add_post_set_parameters_callback(self._adopt)
 
     def of(self, kind: type[Kind]) -> Kind:
@@ -70,6 +77,16 @@ class Parameters:
 
 def _part(kind: type[Params], values: dict[str, Any]) -> dict[str, Any]:
     return {d.name: values[d.name] for d in kind.declarations() if d.name in values}
+
+
+def _warn_of_unknown(node: Node, known: Sequence[str]) -> None:
+    """Say which start values nobody asked for: ROS drops them in silence, and with them a slip of the pen."""
+    given = getattr(node, "_parameter_overrides", {})  # rclpy tells of them nowhere else
+    for name in given:
+        if not node.has_parameter(name) and not name.startswith(OF_ROS):
+            near = get_close_matches(name, known, n=1)
+            hint = f"did you mean {near[0]}?" if near else f"see `ros2 param list {node.get_fully_qualified_name()}`"
+            node.get_logger().warning(f"parameter {name} is ignored: this node has none of that name; {hint}")
 
 
 def _declare(node: Node, declaration: Declaration) -> Any:

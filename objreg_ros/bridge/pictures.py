@@ -91,7 +91,11 @@ def _measured(metres: Array) -> Array:
 
 def _decoded(data: Any, flags: int, conversion: int | None, expected: str) -> Array:
     buffer = np.frombuffer(data, np.uint8)
-    pixels = cv2.imdecode(buffer, flags) if buffer.size else None
+    try:
+        pixels = cv2.imdecode(buffer, flags) if buffer.size else None
+    except (cv2.error, MemoryError) as error:  # where the header tells of more pixels than OpenCV takes
+        got = f"{buffer.size} bytes that OpenCV refuses: {' '.join(str(error).split())}"
+        raise ValueError(f"compressed image: expected {expected} of at most 2^30 pixels, got {got}") from error
     if pixels is None:
         raise ValueError(f"compressed image: expected {expected}, got {buffer.size} bytes that do not decode")
     return np.asarray(pixels if conversion is None else cv2.cvtColor(pixels, conversion))

@@ -5,31 +5,42 @@ from __future__ import annotations
 
 import gc
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 
 import rclpy
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.executors import SingleThreadedExecutor
 
 from objreg_ros.bridge import profile
 from objreg_ros.bridge.door import Door
+from objreg_ros.bridge.lifetime import FirstSignal, begin, hear_first_signal, shutdown_as_interrupt
 
 
 def run(make: Callable[[], Door], args: Sequence[str] | None = None) -> int:
     """Run one node until SIGINT or SIGTERM; the exit status.
 
-    What the node refuses at start (ValueError, OSError) is one line on stderr and status 1. A bug propagates.
+    What ROS or the node refuses at start, and what cannot be written at the end (ValueError, OSError), is one line on
+    stderr and status 1. A bug propagates. For the main thread of a process that ends with it: signals stay unheard.
     """
+    first_signal = hear_first_signal()
     transport = profile.apply()
-    rclpy.init(args=None if args is None else list(args))
     try:
-        return _serve(make, transport)
-    except (KeyboardInterrupt, ExternalShutdownException):
+        begin(args)
+    except ValueError as error:
+        return _refuse(error)
+    try:
+        with shutdown_as_interrupt():
+            return _serve(make, transport, first_signal)
+    except KeyboardInterrupt:  # before there was a node
         return 0
     finally:
+        first_signal.deafen()
         rclpy.try_shutdown()
         gc.freeze()  # else Python looks through every object of every library once more before it ends
+
+
+def _refuse(error: Exception) -> int:
+    print(" ".join(str(error).split()), file=sys.stderr)
+    return 1
 
 
 def _settle() -> None:
@@ -38,34 +49,44 @@ def _settle() -> None:
     gc.freeze()
 
 
-@contextmanager
-def _unless_shut_down() -> Iterator[None]:
-    """What ROS says because a signal ended it between two of its own steps is no error."""
-    try:
-        yield
-    except rclpy_implementation.RCLError:
-        if rclpy.ok():
-            raise
-
-
-def _serve(make: Callable[[], Door], transport: str) -> int:
-    try:
-        door = make()
-    except (ValueError, OSError) as error:
-        print(" ".join(str(error).split()), file=sys.stderr)
-        return 1
-    door.get_logger().info(transport)
-    _settle()
+def _serve(make: Callable[[], Door], transport: str, first_signal: FirstSignal) -> int:
     executor = SingleThreadedExecutor()
-    executor.add_node(door)
     try:
-        with _unless_shut_down():
-            executor.spin_until_future_complete(door.failure)
-        if rclpy.ok() and door.failure.done():
-            door.failure.result()  # raises what ended the worker
-        return 0
-    finally:
         try:
-            door.close()
-        finally:
-            executor.shutdown()  # last: the thread that heard the signal may still ring the bell that this takes down
+            door = make()
+        except (ValueError, OSError) as error:
+            return _refuse(error)
+        try:
+            _spin(door, executor, transport)
+        except BaseException:
+            first_signal.deafen()
+            _close(door)
+            raise
+        first_signal.deafen()
+        return _close(door)
+    finally:
+        executor.shutdown()  # last: the thread that heard the signal may still ring the bell that this takes down
+
+
+def _spin(door: Door, executor: SingleThreadedExecutor, transport: str) -> None:
+    """Until a signal; what ended the worker is raised."""
+    try:
+        with shutdown_as_interrupt():
+            door.get_logger().info(transport)
+            _settle()
+            executor.add_node(door)
+            executor.spin_until_future_complete(door.failure)
+    except KeyboardInterrupt:
+        return
+    if rclpy.ok() and door.failure.done():
+        door.failure.result()
+
+
+def _close(door: Door) -> int:
+    """The exit status; what cannot be written any more is said, since nobody else would."""
+    name = door.get_name()
+    try:
+        door.close()
+    except (ValueError, OSError) as error:
+        return _refuse(OSError(f"{name}: its last work is lost: {error}"))
+    return 0

@@ -96,7 +96,7 @@ def _ended_by_sigterm() -> Iterator[None]:
     before = signal.signal(signal.SIGTERM, end)
     try:
         yield
-    except Exception:
+    except (Exception, KeyboardInterrupt):
         if not told:
             raise
         sys.exit(TERMINATED)

@@ -16,7 +16,7 @@ from objreg_ros.bridge import from_msg
 from objreg_ros.cli import live_table, options
 from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
 from objreg_ros.cli.played import as_rosbag2, simulated_room
-from objreg_ros.cli.settings import parse_change, read_settings, ros_argument
+from objreg_ros.cli.settings import parse_change, read_settings, ros_argument, tell_ignored
 from objreg_ros.data import ColourImage, Intrinsics
 from objreg_ros.offline import constraint_with_error, refusal
 from objreg_ros.recording import Recording, open_recording
@@ -96,7 +96,9 @@ def calibrated(asked: Asked) -> Asked:
 
 
 def _inputs(recording: Path, asked: Asked) -> Inputs:
-    depth_source = read_settings(asked.params_file, asked.changes).of("segmenter", SegmenterNodeParams).source
+    settings = read_settings(asked.params_file, asked.changes)
+    tell_ignored(settings)
+    depth_source = settings.of("segmenter", SegmenterNodeParams).source
     with open_recording(recording) as source:
         for note in source.notes:
             _say(f"! {note}")
@@ -104,7 +106,8 @@ def _inputs(recording: Path, asked: Asked) -> Inputs:
         if inputs.complete:
             return inputs
         wanted = inputs.wanted(depth_source)
-        raise ValueError(f"{recording}: expected {wanted}, got {', '.join(source.topics)}; see --remap")
+        other = "" if depth_source == "auto" else ", or leave out segmenter.source"
+        raise ValueError(f"{recording}: expected {wanted}, got {', '.join(source.topics)}; see --remap{other}")
 
 
 def _say(text: str) -> None:
@@ -114,18 +117,26 @@ def _say(text: str) -> None:
 def setup_of(asked: Asked, inputs: Inputs) -> Setup:
     """The arguments of the nodes and of the player, which plays just these inputs."""
     everywhere = [] if asked.params_file is None else ["--params-file", str(asked.params_file)]
-    everywhere += ["-p", "reliable:=true"] if asked.lossless else []
     node_args = {room: list(everywhere) for room in ROOMS}
     named = {"model": asked.model, "labels": asked.labels}
-    changes = [*(f"detector.{name}={value}" for name, value in named.items() if value), *asked.changes]
+    changes = [f"{room}.reliable=true" for room in ROOMS if asked.lossless]
+    changes += [*(f"detector.{name}={value}" for name, value in named.items() if value), *asked.changes]
     for room, name, value in map(parse_change, changes):
         if room not in ROOMS:
             raise ValueError(f"--set: expected a node of the demo ({', '.join(ROOMS)}), got {room}; leave it out")
-        node_args[room] += ["-p", ros_argument(name, value)]
+        node_args[room] += _override(room, ros_argument(name, value))
     replay = ["--lossless"] if asked.lossless else ["--rate", str(asked.rate)]
     replay += [] if asked.seconds is None else ["--end", str(asked.seconds)]
     remaps = [f"{name}:={topic}" for name, topic in inputs.outright.items()]
     return Setup(node_args, [*replay, *(word for remap in remaps for word in ("--remap", remap))])
+
+
+def _override(room: str, argument: str) -> list[str]:
+    """What sets a parameter of a node whatever its file says, for all nodes (``/**``) or for this one.
+
+    To ROS the name that came last for the first time has the last word, so it is said for all and for the one.
+    """
+    return ["-p", argument, "-p", f"{room}:{argument}"]
 
 
 def _sent(source: Recording, inputs: Inputs, seconds: float | None, live: Live) -> dict[str, int]:

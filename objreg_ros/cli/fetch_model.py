@@ -100,11 +100,10 @@ def fetch(source: Source, path: Path) -> None:
         except (OSError, HTTPException) as error:
             failures.append(f"{url}: {getattr(error, 'reason', None) or error}")
     else:
+        labels = " and run this again, which adds its labels" if source.labels else " and its labels beside it as .txt"
         raise ValueError(
-            f"{source.file}: expected a download, got "
-            + "; ".join(failures)
-            + f". Are you online? Behind a proxy, set "
-            f"HTTPS_PROXY; or get the file elsewhere and put it at {path}. Try again to go on where it stopped"
+            f"{source.file}: expected a download, got {'; '.join(failures)}. Are you online? Behind a proxy, set "
+            f"HTTPS_PROXY; or get the file elsewhere, put it at {path}{labels}. Try again to go on where it stopped"
         )
     _accept(part, source)
     os.replace(part, path)

@@ -31,6 +31,8 @@ def command(recording: Path, remaps: tuple[str, ...], picture: Path | None) -> N
     if is_store(recording):
         _say_store(recording, picture)
         return
+    if picture is not None:
+        raise ValueError(f"--picture: expected a store of the registrar, whose objects it draws, got {recording}")
     with open_recording(recording) as source:
         inputs = choose_inputs(source.topics, parse_remaps(remaps))
         _say_what_it_is(source)

@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 from objreg_ros.cli import FIRST_TIME, options
 from objreg_ros.cli.options import require_writable
-from objreg_ros.cli.settings import Settings, read_settings
+from objreg_ros.cli.settings import Settings, read_settings, tell_ignored
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.offline import Run, Timing, build_rooms, run_offline
 from objreg_ros.recording import Record, Recording, open_recording
@@ -57,7 +57,9 @@ def command(
     """
     if json_file is not None:
         require_writable("--json", json_file)
+    _require_seed(odometry)
     settings = read_settings(params_file, [*changes, *_model_changes(model, labels)])
+    tell_ignored(settings)
     with open_recording(recording) as source:
         inputs = _inputs(source, remaps, odometry, settings.of("segmenter", SegmenterNodeParams).source)
         truth = Truth.of(source, inputs.ground_truth)
@@ -71,6 +73,13 @@ def command(
         json_file.write_text(json.dumps({**told, **summary}, indent=1))
 
 
+def _require_seed(odometry: str | None) -> None:
+    """ValueError for a drift that does not say its seed."""
+    is_drift = odometry is not None and (odometry + ":").startswith(DRIFT)
+    if is_drift and not str(odometry).removeprefix(DRIFT).isdigit():
+        raise ValueError(f"--odometry: expected drift: and a seed like drift:1, got {odometry!r}")
+
+
 def _model_changes(model: str | None, labels: str | None) -> list[str]:
     named = {"detector.model": model, "detector.labels": labels}
     return [f"{name}={value}" for name, value in named.items() if value]
@@ -80,11 +89,15 @@ def _inputs(source: Recording, remaps: tuple[str, ...], odometry: str | None, de
     asked = parse_remaps(remaps)
     if odometry is not None:
         asked["odom"] = "" if odometry == "none" or odometry.startswith(DRIFT) else odometry
+        if asked["odom"] and asked["odom"] not in source.topics:
+            there = ", ".join(source.topics)
+            raise ValueError(f"--odometry: expected a topic of {there}, or none, or drift:SEED, got {odometry!r}")
     inputs = choose_inputs(source.topics, asked, depth_source)
     if not inputs.complete:
         there = ", ".join(f"{topic.name} ({topic.msgtype})" for topic in source.topics.values()) or "no topics"
         wanted = inputs.wanted(depth_source)
-        raise ValueError(f"{source.path}: expected {wanted}, got {there}; choose with --remap input:=/topic")
+        other = "" if depth_source == "auto" else ", or leave out segmenter.source"
+        raise ValueError(f"{source.path}: expected {wanted}, got {there}; choose with --remap input:=/topic{other}")
     if (odometry or "").startswith(DRIFT):
         if inputs.ground_truth is None:
             raise ValueError(f"{source.path}: --odometry {odometry} needs a ground truth, and there is none")
@@ -119,10 +132,7 @@ def _records(source: Recording, inputs: Inputs, odometry: str | None) -> Iterato
     records = source.records(set(inputs.chosen().values()))
     if odometry is None or not odometry.startswith(DRIFT) or inputs.ground_truth is None:
         return records
-    seed = odometry.removeprefix(DRIFT)
-    if not seed.isdigit():
-        raise ValueError(f"--odometry: expected drift: and a seed like drift:1, got {odometry!r}")
-    return with_drifting_odometry(records, inputs.ground_truth, int(seed))
+    return with_drifting_odometry(records, inputs.ground_truth, int(odometry.removeprefix(DRIFT)))
 
 
 def _say(run: Run, summary: dict) -> None:

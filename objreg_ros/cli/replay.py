@@ -66,6 +66,7 @@ def command(
     import rclpy
 
     from objreg_ros.bridge import profile
+    from objreg_ros.bridge.lifetime import begin, shutdown_as_interrupt
     from objreg_ros.bridge.player import Player
 
     with open_recording(recording) as source:
@@ -76,19 +77,20 @@ def command(
         selection = Selection(names, start, end)
         selection.require_some(source)
         click.echo(profile.apply(), err=True)
-        rclpy.init(args=list(ros_args))
+        begin(ros_args)
         latched = {names[topic] for topic in source.latched.keys() & names.keys()}
-        player = Player({out: source.topics[topic].msgtype for topic, out in names.items()}, clock, latched)
-        try:
-            _prepare(player, inputs, names, wait)
-            receipts = player.listen_to_receipts(wait) if lossless else None
-            while True:
-                _play_once(player, source, selection, inputs, None if lossless else rate, receipts, patience)
-                if not loop:
-                    break
-        finally:
-            player.close()
-            rclpy.try_shutdown()
+        with shutdown_as_interrupt():
+            player = Player({out: source.topics[topic].msgtype for topic, out in names.items()}, clock, latched)
+            try:
+                _prepare(player, inputs, names, wait)
+                receipts = player.listen_to_receipts(wait) if lossless else None
+                while True:
+                    _play_once(player, source, selection, inputs, None if lossless else rate, receipts, patience)
+                    if not loop:
+                        break
+            finally:
+                player.close()
+                rclpy.try_shutdown()
         _say(player, receipts)
 
 

@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
+import click
 import yaml
 
 from objreg_ros.bridge.params import DoorParams
@@ -30,17 +31,21 @@ EVERYWHERE = ("use_sim_time",)  # what rclpy itself declares
 
 
 class Settings:
-    """The parameters of every node, checked."""
+    """The parameters of every node, checked; ``ignored`` are the sections of their file that are for other nodes."""
 
-    def __init__(self, values: Mapping[str, Mapping[str, Any]]) -> None:
+    def __init__(self, values: Mapping[str, Mapping[str, Any]], ignored: Sequence[str] = ()) -> None:
         self._values = {node: dict(values.get(node, {})) for node in NODES}
+        self.ignored = tuple(ignored)
         for node, kinds in NODES.items():
             known = _known(node)
             unknown = sorted(set(self._values[node]) - known)
             if unknown:
                 raise ValueError(f"{node}: no parameter {', '.join(unknown)}; there are {', '.join(sorted(known))}")
             for kind in kinds:
-                self.of(node, kind)
+                try:
+                    self.of(node, kind)
+                except ValueError as error:
+                    raise ValueError(f"{node}: {error}") from error
 
     def of(self, node: str, kind: type[Kind]) -> Kind:
         """The values of one class of a node."""
@@ -60,10 +65,30 @@ def read_settings(file: Path | None, changes: Iterable[str]) -> Settings:
     """
     sections = {} if file is None else _sections(file)
     values = {node: _values_of(sections, node) for node in NODES}
+    of_file = {node: dict(given) for node, given in values.items()}
     for change in changes:
         node, name, value = parse_change(change)
         values[node][name] = value
-    return Settings(values)
+    try:
+        return Settings(values, [title for title in sections if _node_of(title) not in (ALL, *NODES)])
+    except ValueError:
+        _require_good(file, of_file)
+        raise
+
+
+def _require_good(file: Path | None, values: Mapping[str, Mapping[str, Any]]) -> None:
+    """ValueError with the name of the file where its values are refused even by themselves."""
+    try:
+        Settings(values)
+    except ValueError as error:
+        raise ValueError(f"{file}: {error}") from error
+
+
+def tell_ignored(settings: Settings) -> None:
+    """Say on stderr which sections of a parameter file are for none of our nodes: one may be misspelt."""
+    if settings.ignored:
+        names = ", ".join(settings.ignored)
+        click.echo(f"! ignored of the parameter file: {names}; the nodes are {', '.join(NODES)}", err=True)
 
 
 def ros_argument(name: str, value: Any) -> str:
@@ -76,14 +101,13 @@ def ros_argument(name: str, value: Any) -> str:
 
 
 def _sections(file: Path) -> dict[str, dict[str, Any]]:
-    """The parameters under each of the names of our nodes, in the order of the file: the last word holds, as in ROS."""
-    names = {ALL, *(name for node in NODES for name in _names_of_node(node))}
+    """The parameters under each name of a node, in the order of the file: the last word holds, as in ROS."""
     try:
-        content = dict(yaml.safe_load(file.read_text()) or {})
-        sections = {name: dict(section[KEY]) for name, section in content.items() if name in names}
+        sections = dict(_titled(dict(yaml.safe_load(file.read_text()) or {}), ""))
     except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
         raise ValueError(f"{file}: expected a ROS 2 parameter file (node: {KEY}: name: value), got: {error}") from error
-    unknown = sorted(set(sections.get(ALL, ())) - set(EVERYWHERE).union(*map(_known, NODES)))
+    for_all = {name for title, section in sections.items() if _node_of(title) == ALL for name in section}
+    unknown = sorted(for_all - set(EVERYWHERE).union(*map(_known, NODES)))
     if unknown:
         raise ValueError(f"{file}: no node has a parameter {', '.join(unknown)}")
     return sections
@@ -92,15 +116,27 @@ def _sections(file: Path) -> dict[str, dict[str, Any]]:
 def _values_of(sections: Mapping[str, Mapping[str, Any]], node: str) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for title, section in sections.items():
-        if title == ALL:
+        if _node_of(title) == ALL:
             values |= {name: value for name, value in section.items() if name in _known(node)}
-        elif title in _names_of_node(node):
+        elif _node_of(title) == node:
             values |= {name: value for name, value in section.items() if name not in EVERYWHERE}
     return values
 
 
-def _names_of_node(node: str) -> tuple[str, ...]:
-    return f"/**/{node}", node, f"/{node}"
+def _titled(content: Mapping[str, Any], outer: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Title and parameters of every section, also of those in the section of their namespace."""
+    for name, section in content.items():
+        title = f"{outer}/{str(name).strip('/')}" if outer else str(name)
+        if KEY not in section and section and all(isinstance(inner, Mapping) for inner in section.values()):
+            yield from _titled(section, title)
+        else:
+            yield title, dict(section[KEY])
+
+
+def _node_of(title: str) -> str:
+    """The node that a section is for, in whatever namespace; `ALL` where it is for every one."""
+    name = title.rpartition("/")[2]
+    return ALL if name in ("*", "**") else name
 
 
 def _known(node: str) -> set[str]:
@@ -117,7 +153,10 @@ def parse_change(change: str) -> tuple[str, str, Any]:
     if not sign or not dot or node not in NODES:
         raise ValueError(f"--set: expected node.parameter=value with a node of {', '.join(NODES)}, got {change!r}")
     declaration = next((d for kind in NODES[node] for d in kind.declarations() if d.name == name), None)
-    return node, name, text if declaration is None else declaration.check(_value(declaration, text))
+    try:
+        return node, name, text if declaration is None else declaration.check(_value(declaration, text))
+    except ValueError as error:
+        raise ValueError(f"--set {node}.{error}") from error
 
 
 def _value(declaration: Declaration, text: str) -> Any:

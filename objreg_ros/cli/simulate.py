@@ -68,9 +68,9 @@ def command(
         story = simulate(
             out, scenario, seed, frames, rate, sensors, points, jpeg, progress=lambda n: bar.update(n - bar.n)
         )
-    click.echo(f"{out}: {scenario}, seed {seed}, {frames} frames at {story.rate:.1f} Hz, truth in {out / 'truth'}")
+    click.echo(f"{out}: {scenario}, seed {seed}, {frames} frames at {story.rate:.3g} Hz, truth in {out / 'truth'}")
     if story.rate < rate - 1e-6:
-        click.echo(f"note: {frames} frames are few for this path, so they come at {story.rate:.1f} Hz, not {rate:g}")
+        click.echo(f"note: {frames} frames are few for this path, so they come at {story.rate:.3g} Hz, not {rate:g}")
 
 
 def camera_of(name: str, size: str | None) -> Intrinsics:
@@ -111,11 +111,19 @@ def sensors_of(camera: Intrinsics, stress: bool, settings: tuple[str, ...]) -> S
         section, _, name = key.partition(".")
         if section not in SECTIONS or not text:
             raise ValueError(
-                f"set: expected SECTION.NAME=VALUE with a section of {', '.join(SECTIONS)}, got {setting!r}"
+                f"--set: expected SECTION.NAME=VALUE with a section of {', '.join(SECTIONS)}, got {setting!r}"
             )
         values[section][name] = _parsed(SECTIONS[section], name, text)
-    made = {section: SECTIONS[section].from_mapping(chosen) for section, chosen in values.items()}
+    made = {section: _made(section, chosen) for section, chosen in values.items()}
     return Sensors(camera, **made)  # type: ignore[arg-type]
+
+
+def _made(section: str, values: dict[str, object]) -> Params:
+    kind = SECTIONS[section]
+    try:
+        return kind.from_mapping(values)
+    except ValueError as error:
+        raise ValueError(f"--set {section}: {str(error).removeprefix(f'{kind.__name__}: ')}") from error
 
 
 def _parsed(section: type[Params], name: str, text: str) -> object:

@@ -8,6 +8,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import permutations
 from typing import Protocol
 
 import numpy as np
@@ -17,6 +18,7 @@ from objreg_ros.detector.boxes import decode
 from objreg_ros.detector.runtime import Port
 
 RAW_CONTRACT = "ssd_raw/1"
+TFLITE_OP = "TFLite_Detection_PostProcess"
 
 
 @dataclass(frozen=True)
@@ -138,7 +140,7 @@ def _softmax(logits: Array) -> Array:
 
 
 def _roles(outputs: tuple[Port, ...], probe: Mapping[str, Array]) -> dict[str, str]:
-    """Which output is boxes, classes, scores and count: by shape, then by name, then by the order of TFLite's op."""
+    """Which output is boxes, classes, scores and count: by shape, then by name, then by what the probe gave."""
     roles: dict[str, str] = {}
     flat: list[str] = []
     for name in (port.name for port in outputs if not port.name.startswith("raw_")):
@@ -149,8 +151,41 @@ def _roles(outputs: tuple[Port, ...], probe: Mapping[str, Array]) -> dict[str, s
             flat.append(name)
         elif probe[name].size == 1:
             roles.setdefault("count", name)
-    named = {role: name for name in flat for role, word in (("classes", "class"), ("scores", "score")) if word in name}
-    return roles | (named if len(named) == 2 else dict(zip(("classes", "scores"), flat, strict=False)))
+    if len(flat) < 2:
+        return roles
+    classes, scores = _named(flat) or _told_apart({name: probe[name] for name in flat})
+    return roles | {"classes": classes, "scores": scores}
+
+
+def _named(flat: list[str]) -> tuple[str, str] | None:
+    """The names of classes and scores, where the names tell, or are those of TFLite's own operation; else None."""
+    if all(name.startswith(TFLITE_OP) for name in flat):
+        classes, scores, *_ = sorted(flat)  # :1 and :2; the boxes have no number
+        return classes, scores
+    by_class = [name for name in flat if any(word in name.lower() for word in ("class", "label"))]
+    by_score = [name for name in flat if "score" in name.lower() and name not in by_class]
+    if len(flat) == 2 and len(by_class) + len(by_score) == 1:  # one is named, so the other is the other
+        by_class = by_class or [name for name in flat if name not in by_score]
+        by_score = by_score or [name for name in flat if name not in by_class]
+    return (by_class[-1], by_score[-1]) if by_class and by_score else None
+
+
+def _told_apart(flat: Mapping[str, Array]) -> tuple[str, str]:
+    """The names of classes and scores by their values: whole numbers, and 0 … 1. ValueError where that tells nothing.
+
+    The order tells nothing either: TFLite's operation has classes before scores, TF2's export scores before classes.
+    """
+    whole = {name for name, values in flat.items() if (np.rint(values) == values).all()}
+    shares = {name for name, values in flat.items() if ((values >= 0) & (values <= 1 + 1e-3)).all()}
+    pairs = [pair for pair in permutations(flat, 2) if pair[0] in whole and pair[1] in shares]
+    if len(pairs) != 1:
+        may = "either" if pairs else "neither"
+        raise ValueError(
+            "outputs of the model: expected names or values that tell the classes from the scores, got "
+            f"{_shapes(flat)}, which by their values may be {may}; export it again, or rename "
+            "its outputs, with `classes` in the name of the one and `scores` in that of the other"
+        )
+    return pairs[0]
 
 
 def _first_class(inputs: tuple[Port, ...], names: tuple[str, ...]) -> int:

@@ -69,7 +69,7 @@ def _head(story: Story, tracks: Tracks | None) -> str:
     judged = sum(story.error(closure) is not None for closure in story.closures)
     tiles = [
         _tile(f"{story.summary.get('frames', len(story.glimpses)):,}", "frames", _count_note(story)),
-        _tile(f"{len(story.closures)}", "constraints", f"{_refused_count(story)} candidates refused"),
+        _tile(f"{len(story.closures)}", "constraints", _refused_note(story)),
     ]
     if judged:
         tone = "bad" if false else "good"
@@ -93,11 +93,12 @@ def _tile(value: str, name: str, note: str, tone: str = "") -> str:
     )
 
 
-def _refused_count(story: Story) -> int:
-    """How many candidates were tried in vain."""
+def _refused_note(story: Story) -> str:
+    """How many candidates were tried in vain, and how many more the table of reasons counts that were not tried."""
     counts = story.summary.get("rejected", {})
-    untried = {reason.value for reason in UNTRIED}
-    return sum(count for reason, count in counts.items() if reason not in untried)
+    untried = sum(counts.get(reason.value, 0) for reason in UNTRIED)
+    tried = f"{sum(counts.values()) - untried} candidates refused"
+    return f"{tried}, {untried} more not tried" if untried else tried
 
 
 def _count_note(story: Story) -> str:

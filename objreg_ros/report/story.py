@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from objreg_ros.geometry import rigid_fit, transform
 from objreg_ros.mapper.pose_graph import PoseGraph
 from objreg_ros.report.trajectory_error import absolute_errors
 from objreg_ros.truth import FALSE, Error, Truth, within
+
+Row = TypeVar("Row")
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,11 +61,14 @@ class Story:
 
     @classmethod
     def of(cls, name: str, summary: Mapping[str, Any], truth: Truth) -> Story:
-        """The story of a run's JSON; the map is made here. Keys that are missing leave their section out."""
-        glimpses = tuple(_glimpse(row) for row in summary.get("glimpses", ()))
-        closures = tuple(_closure(row) for row in summary.get("constraints", ()))
+        """The story of a run's JSON; the map is made here. Keys that are missing leave their section out.
+
+        ValueError for what `objreg offline --json` would not write.
+        """
+        glimpses = _read(name, summary, "glimpses", _glimpse)
+        closures = _read(name, summary, "constraints", _closure)
         graph = mapped(glimpses, closures)
-        refusals = tuple(_refusal(row) for row in summary.get("refusals", ()))
+        refusals = _read(name, summary, "refusals", _refusal)
         return cls(name, summary, truth, glimpses, closures, refusals, graph, graph.optimise().pruned)
 
     @property
@@ -166,6 +171,16 @@ def positions(poses: Sequence[Array]) -> Array:
 
 def _laid_over(poses: Sequence[Array], true: Sequence[Array]) -> Array:
     return transform(rigid_fit(positions(poses), positions(true)), positions(poses))
+
+
+def _read(name: str, summary: Mapping[str, Any], key: str, read: Callable[[Any], Row]) -> tuple[Row, ...]:
+    try:
+        return tuple(read(row) for row in summary.get(key, ()))
+    except (TypeError, KeyError, AttributeError, ValueError) as error:
+        got = " ".join(str(summary[key]).split())[:80]
+        raise ValueError(
+            f"{name}: expected {key} as `objreg offline --json` writes them, got {got} ({error!r}); run it again"
+        ) from error
 
 
 def _glimpse(row: Mapping[str, Any]) -> Glimpse:

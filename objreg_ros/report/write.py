@@ -108,4 +108,9 @@ def _read(file: Path) -> Mapping[str, Any]:
         raise ValueError(f"{file}: expected the JSON of `objreg offline --json`, got: {error}") from error
     if not isinstance(summary, dict) or "constraints" not in summary:
         raise ValueError(f"{file}: expected the JSON of `objreg offline --json`, got JSON without constraints")
+    for key in ("constraints", "refusals", "glimpses"):
+        if not isinstance(summary.get(key, []), list):
+            raise ValueError(
+                f"{file}: expected a list of {key} as `objreg offline --json` writes it, got {summary[key]}"
+            )
     return summary

@@ -10,6 +10,9 @@ from typing import Any
 
 from geometry_msgs.msg import Vector3Stamped
 from nav_msgs.msg import Odometry
+from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.qos import DurabilityPolicy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from std_msgs.msg import String
 
@@ -17,7 +20,8 @@ from objreg_ros.bridge import from_msg, qos, to_msg
 from objreg_ros.bridge.matching import MatchingDoor
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.sync import Match, Need, Stream
-from objreg_ros.data import DepthImage, Frame
+from objreg_ros.data import DepthImage, Detections, Frame
+from objreg_ros.segmenter.doubts import range_doubt, registration_doubt
 from objreg_ros.segmenter.organise import organise
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
@@ -25,6 +29,7 @@ from objreg_ros.segmenter.segment import Segmenter
 POINTS = {"points": PointCloud2}
 DEPTH = {"depth/image": Image, "depth/image/compressedDepth": CompressedImage}
 SOURCES = {"auto": {**POINTS, **DEPTH}, "points": POINTS, "depth": DEPTH}
+LOOK_S = 0.5  # between two looks for who keeps a camera_info
 ODOM_DEPTH = 1000  # odometry is small and many times as frequent as frames
 IMAGES = {"image": Image, "image/compressed": CompressedImage}
 
@@ -47,6 +52,8 @@ class SegmenterNode(MatchingDoor):
     def _listen(self) -> None:
         self.listen(String, "labels", self._hear_labels, qos.latched())
         self.listen(CameraInfo, "camera_info", self._hear_camera, self.sensor(), watched="camera_info")
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._look = self.create_timer(LOOK_S, self._look_for_kept_camera, clock=steady)
         if self._inputs.colour and self._inputs.source != "points":
             self.listen_to_first("image", IMAGES, self._hear_image, self.sensor())
         self.listen_to_first("depth", SOURCES[self._inputs.source], self._hear_depth, self.sensor())
@@ -54,6 +61,20 @@ class SegmenterNode(MatchingDoor):
             self.listen(Odometry, "odom", self._hear_odom, self.sensor())
         self.listen(PointCloud2, "detections_table", self._hear_detections, qos.room(), watched="detections_table")
         self.expect("detections_table", "detections_table")
+
+    def _look_for_kept_camera(self) -> None:
+        """Get what a driver that publishes its camera once keeps for who comes late, unless it came in time.
+
+        Only where there is such a driver: the others would warn of a QoS that they do not have.
+        """
+        if self._camera_info is not None:
+            self._look.cancel()
+            return
+        publishers = self.get_publishers_info_by_topic(self.resolve_topic_name("camera_info"))
+        if any(publisher.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for publisher in publishers):
+            self._look.cancel()
+            quiet = SubscriptionEventCallbacks(use_default_callbacks=False)
+            self.create_subscription(CameraInfo, "camera_info", self._hear_camera, qos.latched(), event_callbacks=quiet)
 
     def adopt(self) -> None:
         """Live parameters hold from the next frame on."""
@@ -68,6 +89,7 @@ class SegmenterNode(MatchingDoor):
 
     def _hear_camera(self, message: Any) -> None:
         self._camera_info = message
+        self.watch.forget("camera_info")  # once is enough
         self.feed("camera_info", from_msg.stamp_ns(message), message)
 
     def _hear_image(self, _: str, message: Any) -> None:
@@ -95,7 +117,8 @@ class SegmenterNode(MatchingDoor):
         if topic in DEPTH:
             streams.append(Stream("camera_info", Need.LATCHED))
             streams.append(Stream("image", Need.OPTIONAL, slop_ns))
-            self.expect("camera_info", "camera_info")
+            if self._camera_info is None:
+                self.expect("camera_info", "camera_info")
         else:
             self.hang_up("image")  # a cloud brings its own colour
         self.get_logger().info(f"depth comes from {self.resolve_topic_name(topic)}")
@@ -112,8 +135,18 @@ class SegmenterNode(MatchingDoor):
         gravity = from_msg.level_gravity(payload.payloads.get("odom"), self._inputs.mounting)
         with self.ledger.timed("segment"):
             frame = self._segmenter.segment(detections, depth, gravity)
+        self._doubt(detections, depth, frame)
         self._publish(frame, names)
         return True
+
+    def _doubt(self, detections: Detections, depth: DepthImage, frame: Frame) -> None:
+        doubts = {
+            "registration": registration_doubt(detections, depth),
+            "range": range_doubt(depth, frame.view, self._segmenter.params),
+        }
+        for reason, text in doubts.items():
+            if text is not None:
+                self.throttled.remind(reason, text)
 
     def _depth(self, match: Match) -> DepthImage:
         if "camera_info" in match.payloads:

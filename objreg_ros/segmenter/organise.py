@@ -19,11 +19,12 @@ FIT_ERROR_PX = 1.5  # the median distance that a pixel may have from where the f
 def organise(cloud: PointCloud, intrinsics: Intrinsics | None = None) -> DepthImage:
     """The depth image of a cloud.
 
-    An organised cloud (H > 1) gives its z; with no ``intrinsics`` (or intrinsics of another size) the camera is fitted
-    to the cloud's own points. An unorganised cloud (H = 1) is projected with ``intrinsics``, the nearest point of a
-    pixel wins; a thinned one gives the smaller image that its points fill. NaN, infinity, 0 and 65535 are "no depth".
+    An organised cloud (H > 1) gives its z; with no ``intrinsics`` (or intrinsics of another size, or that do not see
+    the points in their pixels) the camera is fitted to the cloud's own points. An unorganised cloud (H = 1) is
+    projected with ``intrinsics``, the nearest point of a pixel wins; a thinned one gives the smaller image
+    that its points fill. NaN, infinity, 0 and 65535 are "no depth".
     Raises ValueError when the camera is not known and cannot be fitted, when nothing was measured, and when the points
-    do not lie in front of the camera (negative z: the cloud is not in an optical frame).
+    do not lie in front of the camera or in their pixels (the cloud is not in an optical frame).
     """
     xyz = cloud.xyz
     measured = _measured(xyz)
@@ -33,6 +34,8 @@ def organise(cloud: PointCloud, intrinsics: Intrinsics | None = None) -> DepthIm
         height, width = xyz.shape[:2]
         if intrinsics is None or (intrinsics.height, intrinsics.width) != (height, width):
             intrinsics = fit_intrinsics(xyz, in_front)
+        elif not _error_px(xyz, in_front, intrinsics) <= FIT_ERROR_PX:
+            intrinsics = _fitted_instead(xyz, in_front, intrinsics)
         depth, rgb = np.where(in_front, xyz[..., 2], np.float32(0)), cloud.rgb
     else:
         if intrinsics is None:
@@ -88,6 +91,30 @@ def fit_intrinsics(xyz: Array, valid: Array) -> Intrinsics:
         )
     height, width = valid.shape
     return Intrinsics(fx=fx, fy=fy, cx=cx, cy=cy, width=width, height=height)
+
+
+def _error_px(xyz: Array, valid: Array, camera: Intrinsics) -> float:
+    """The median distance of pixels from where a camera sees their points; 0 where there are too few to tell."""
+    step = max(1, int(np.sqrt(valid.size / SAMPLE)))
+    rows, cols = np.nonzero(valid[::step, ::step])
+    if len(rows) < MIN_FIT:
+        return 0.0
+    x, y, z = xyz[::step, ::step][rows, cols].T.astype(np.float64)
+    beside = camera.fx * x / z + camera.cx - cols * step
+    below = camera.fy * y / z + camera.cy - rows * step
+    return float(np.median(np.maximum(np.abs(beside), np.abs(below))))
+
+
+def _fitted_instead(xyz: Array, valid: Array, camera: Intrinsics) -> Intrinsics:
+    """The camera of the cloud itself where the one that came beside it is another's."""
+    try:
+        return fit_intrinsics(xyz, valid)
+    except ValueError as error:
+        off = _error_px(xyz, valid, camera)
+        raise ValueError(
+            "expected an organised cloud in the optical frame (x right, y down, z forward) of its camera_info, got one "
+            f"whose points lie {off:.3g} px beside their pixels; transform it to the camera's optical frame"
+        ) from error
 
 
 def _fit_line(ratio: Array, pixel: Array) -> tuple[float, float, float]:

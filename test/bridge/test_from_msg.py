@@ -252,7 +252,7 @@ def test_labels_are_json() -> None:
     assert from_msg.labels(SimpleNamespace(data=json.dumps({"3": "cup"}))) == {3: "cup"}
 
 
-@pytest.mark.parametrize("text", ["", "cup", "[1]", '{"a": "cup"}'])
+@pytest.mark.parametrize("text", ["", "cup", "[1]", '{"a": "cup"}', pytest.param("[" * 100_000, id="deep")])
 def test_labels_of_another_shape_are_refused(text: str) -> None:
     with pytest.raises(ValueError, match="labels: expected JSON"):
         from_msg.labels(SimpleNamespace(data=text))

@@ -92,7 +92,14 @@ def test_a_start_value_is_refused_in_the_words_of_params(made: Made, override: s
         PotParams().replaced(**values)
     with pytest.raises(ValueError) as got:
         made(override)
-    assert str(got.value) == str(expected.value)
+    assert str(got.value) == f"pot: {expected.value}"
+
+
+def test_a_start_value_that_nobody_asked_for_is_warned_of(made: Made, capfd: pytest.CaptureFixture[str]) -> None:
+    made("treshold:=0.4", "zoom:=2", "count:=4", "use_sim_time:=false", "qos_overrides./a.publisher.depth:=3")
+    first, second = [line for line in capfd.readouterr().err.splitlines() if "WARN" in line]
+    assert "parameter treshold is ignored: this node has none of that name; did you mean threshold?" in first
+    assert "parameter zoom is ignored" in second and "see `ros2 param list /pot`" in second
 
 
 def test_a_live_change_is_taken_and_told(made: Made) -> None:

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import array
 import struct
+import zlib
 
 import cv2
 import numpy as np
@@ -89,6 +90,39 @@ def test_a_compressed_image_is_rgb(kind: str) -> None:
 def test_a_broken_compressed_image_is_refused(data: bytes) -> None:
     with pytest.raises(ValueError, match="do not decode"):
         colour_pixels(messages.compressed(data, "jpeg"))
+
+
+def png_that_claims(width: int, height: int, bits: int, colour: int) -> bytes:
+    """A PNG whose header tells of so many pixels, and which has next to none."""
+    parts = (
+        (b"IHDR", struct.pack(">IIBBBBB", width, height, bits, colour, 0, 0, 0)),
+        (b"IDAT", zlib.compress(bytes(100))),
+        (b"IEND", b""),
+    )
+    framed = (struct.pack(">I", len(d)) + k + d + struct.pack(">I", zlib.crc32(k + d)) for k, d in parts)
+    return b"\x89PNG\r\n\x1a\n" + b"".join(framed)
+
+
+def jpeg_that_claims(width: int, height: int) -> bytes:
+    jpeg = bytearray(cv2.imencode(".jpg", np.zeros((16, 16, 3), np.uint8))[1].tobytes())
+    frame = jpeg.index(b"\xff\xc0")
+    jpeg[frame + 5 : frame + 9] = struct.pack(">HH", height, width)
+    return bytes(jpeg)
+
+
+CLAIMS = {"jpeg": jpeg_that_claims(65500, 65500), "png": png_that_claims(60000, 60000, 8, 2)}
+
+
+@pytest.mark.parametrize("data", CLAIMS.values(), ids=CLAIMS)
+def test_a_header_that_claims_too_many_pixels_is_refused(data: bytes) -> None:
+    with pytest.raises(ValueError, match=r"expected a jpeg or png of at most 2\^30 pixels, got \d+ bytes"):
+        colour_pixels(messages.compressed(data, "jpeg"))
+
+
+def test_compressed_depth_that_claims_too_many_pixels_is_refused() -> None:
+    data = bytes(12) + png_that_claims(60000, 60000, 16, 0)
+    with pytest.raises(ValueError, match=r"expected compressedDepth png of at most 2\^30 pixels"):
+        depth_metres(messages.compressed(data, "16UC1; compressedDepth png"))
 
 
 @pytest.mark.parametrize("big", [False, True])

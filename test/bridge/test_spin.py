@@ -9,6 +9,7 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import NoReturn
 
 import pytest
@@ -28,7 +29,10 @@ def on_its_own(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A graph that ends at this machine; the transport and the frozen garbage of a node are not for other tests."""
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     monkeypatch.setattr("objreg_ros.bridge.profile.apply", lambda: "the transport")
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     yield
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
     gc.unfreeze()
     rclpy.try_shutdown()
 
@@ -66,6 +70,72 @@ def test_a_node_that_is_told_to_end_is_closed_with_status_0() -> None:
                 time.sleep(0.001)
 
     assert run(Terminated, []) == 0 and ended_well()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_a_node_is_made_ends_it_at_once_with_status_0(number: signal.Signals) -> None:
+    went_on = []
+
+    def make() -> Door:
+        os.kill(os.getpid(), number)
+        deadline = time.monotonic() + 10.0
+        while time.monotonic() < deadline:
+            time.sleep(0.001)
+        went_on.append(True)
+        return Short()
+
+    assert run(make, []) == 0 and not went_on and not rclpy.ok()
+
+
+def test_what_ros_says_of_a_node_that_a_signal_caught_half_made_is_no_bug() -> None:
+    def make() -> Door:
+        rclpy.shutdown()
+        return Short()
+
+    assert run(make, []) == 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_another_signal_does_not_interrupt_what_is_written_at_the_end(number: signal.Signals) -> None:
+    written = []
+
+    class Writing(Short):
+        def end(self) -> None:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(1.0)
+
+        def close(self) -> None:
+            for _ in range(3):
+                os.kill(os.getpid(), number)
+                time.sleep(0.01)
+            written.append("the last keyframe")
+            super().close()
+
+    assert run(Writing, []) == 0 and ended_well() and written
+
+
+@pytest.mark.parametrize("error", [OSError, ValueError])
+def test_what_cannot_be_written_at_the_end_is_one_line_and_status_1(
+    error: type[Exception], capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Full(Short):
+        def close(self) -> None:
+            super().close()
+            raise error("disk\n full")
+
+    assert run(Full, []) == 1 and ended_well()
+    assert capsys.readouterr().err.splitlines()[-1] == "short: its last work is lost: disk full"
+
+
+@pytest.mark.parametrize("content", ["/**:\n  threshold: 0.4\n", "/**:\n  ros__parameters:\n    model: 'open\n"])
+def test_an_ill_formed_parameter_file_is_one_line_of_ours_and_status_1(
+    content: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "ill.yaml"
+    file.write_text(content)
+    assert run(Short, ["--ros-args", "--params-file", str(file)]) == 1 and not rclpy.ok()
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("ROS arguments: expected remaps like") and "ill.yaml" in line
 
 
 def test_a_node_that_is_interrupted_is_closed_with_status_0() -> None:

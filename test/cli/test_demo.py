@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import permutations
 from pathlib import Path
 
 import pytest
@@ -33,14 +34,14 @@ def test_without_options_the_nodes_run_with_their_own_defaults_at_the_recordings
 def test_options_reach_the_node_that_they_are_for() -> None:
     asked = replace(ASKED, model="my.onnx", changes=("registrar.seed=4",), params_file=Path("p.yaml"))
     args = setup_of(asked, INPUTS).node_args
-    assert args["detector"] == ["--params-file", "p.yaml", "-p", 'model:="my.onnx"']
-    assert args["registrar"] == ["--params-file", "p.yaml", "-p", "seed:=4"]
+    assert args["detector"] == ["--params-file", "p.yaml", "-p", 'model:="my.onnx"', "-p", 'detector:model:="my.onnx"']
+    assert args["registrar"] == ["--params-file", "p.yaml", "-p", "seed:=4", "-p", "registrar:seed:=4"]
     assert args["segmenter"] == ["--params-file", "p.yaml"]
 
 
 def test_lossless_asks_every_node_for_reliable_delivery_and_keeps_no_pace() -> None:
     setup = setup_of(replace(ASKED, lossless=True, seconds=2.0), INPUTS)
-    assert all("reliable:=true" in arguments for arguments in setup.node_args.values())
+    assert all(f"{room}:reliable:=true" in arguments for room, arguments in setup.node_args.items())
     assert setup.replay_args[:3] == ["--lossless", "--end", "2.0"]
 
 
@@ -51,11 +52,32 @@ def test_the_player_plays_just_the_inputs_that_were_chosen() -> None:
 
 def test_a_change_reaches_its_node_in_its_type() -> None:
     changes = ("registrar.T_base_camera=0,0,0.1,0,0,0,1", "registrar.label_groups=cup mouse,tv", "registrar.store=123")
-    assert setup_of(replace(ASKED, changes=changes), INPUTS).node_args["registrar"][1::2] == [
-        "T_base_camera:=[0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0]",
-        'label_groups:=["cup mouse", "tv"]',
-        'store:="123"',
+    assert setup_of(replace(ASKED, changes=changes), INPUTS).node_args["registrar"][3::4] == [
+        "registrar:T_base_camera:=[0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0]",
+        'registrar:label_groups:=["cup mouse", "tv"]',
+        'registrar:store:="123"',
     ]
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("titles", list(permutations(("/**", "/**/detector", "detector"), 2)))
+def test_a_change_wins_over_every_section_of_the_parameter_file(titles: tuple[str, ...], tmp_path: Path) -> None:
+    pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+    from rclpy.context import Context
+    from rclpy.node import Node
+
+    file = tmp_path / "p.yaml"
+    file.write_text("".join(f"{title}:\n  ros__parameters: {{threshold: 0.3, model: a}}\n" for title in titles))
+    asked = replace(ASKED, params_file=file, changes=("detector.threshold=0.9",), model="my.onnx", lossless=True)
+    context = Context()
+    context.init(args=["--ros-args", *setup_of(asked, INPUTS).node_args["detector"]])
+    node = Node("detector", context=context, start_parameter_services=False)
+    declared = (
+        node.declare_parameter(name, value) for name, value in (("threshold", 0.5), ("model", ""), ("reliable", False))
+    )
+    assert [parameter.value for parameter in declared] == [0.9, "my.onnx", True]
+    node.destroy_node()
+    context.try_shutdown()
 
 
 @pytest.mark.parametrize(

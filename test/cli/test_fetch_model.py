@@ -149,6 +149,10 @@ def test_offline_the_error_says_what_was_tried_and_what_to_do(tmp_path: Path) ->
     path = tmp_path / "some.onnx"
     with pytest.raises(ValueError, match=r"127\.0\.0\.1:9.*refused.*Are you online\?.*HTTPS_PROXY.*put it at"):
         fetch(Source("some.onnx", ("http://127.0.0.1:9/some.onnx",)), path)
+    with pytest.raises(
+        ValueError, match=r"put it at .*some\.onnx and run this again, which adds its labels\. Try again"
+    ):
+        fetch(Source("some.onnx", ("http://127.0.0.1:9/some.onnx",), labels="models/coco.txt"), path)
 
 
 def test_a_missing_page_is_named_with_its_status(server: Server, tmp_path: Path) -> None:

@@ -47,6 +47,12 @@ def test_a_picture_that_cannot_be_drawn_is_not_said_to_be(name: str, tmp_path: P
     assert isinstance(result.exception, OSError) and "drawn into" not in result.output
 
 
+def test_a_picture_of_a_recording_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"--picture: expected a store of the registrar, .* got .*tum"):
+        words = [str(tum_folder(tmp_path / "tum")), "--picture", str(tmp_path / "q.png")]
+        CliRunner().invoke(command, words, catch_exceptions=False)
+
+
 def test_nothing_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match="no such file"):
         CliRunner().invoke(command, [str(tmp_path / "x")], catch_exceptions=False)

@@ -11,7 +11,9 @@ import pytest
 
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
+import click
 from click.testing import CliRunner, Result
+from rclpy.executors import ExternalShutdownException
 from recording.folders import STEP_NS, noetic_bag, records, robot_bag, tum_folder
 
 from objreg_ros.bridge.player import Item
@@ -194,6 +196,20 @@ def test_what_cannot_be_played_is_refused_before_ros_starts(
 def test_a_number_that_cannot_be_is_refused(stage: Stage, folder: Path, words: tuple[str, str]) -> None:
     result = replay(folder, *words)
     assert result.exit_code == 2 and f"Invalid value for '{words[0]}'" in result.output and stage.ros_args is None
+
+
+def test_arguments_that_ros_cannot_read_are_refused_in_one_line(folder: Path) -> None:
+    with pytest.raises(ValueError, match=r"ROS arguments: expected remaps like -r __ns:=/robot.*got.*__ns=/robot"):
+        replay(folder, "--", "--ros-args", "-r", "__ns=/robot")
+
+
+def test_a_player_that_a_signal_ends_ends_as_if_interrupted(stage: Stage, folder: Path) -> None:
+    def play(*_: object) -> None:
+        raise ExternalShutdownException
+
+    stage.play = play  # type: ignore[method-assign]
+    result = CliRunner().invoke(command, [str(folder)], standalone_mode=False)
+    assert isinstance(result.exception, click.Abort | KeyboardInterrupt) and stage.closed and stage.shut_down
 
 
 def test_the_player_is_closed_and_ros_shut_down_when_a_play_fails(

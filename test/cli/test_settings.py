@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from objreg_ros.cli.settings import NODES, Settings, names_of, parse_change, read_settings, ros_argument
+from objreg_ros.cli.settings import NODES, Settings, names_of, parse_change, read_settings, ros_argument, tell_ignored
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.registrar.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
@@ -38,6 +38,42 @@ def test_of_two_sections_the_last_in_the_file_holds_as_in_ros(titles: tuple[str,
     for first, last in (titles, titles[::-1]):
         file.write_text(f"{first}:\n  ros__parameters: {{seed: 1}}\n{last}:\n  ros__parameters: {{seed: 2}}\n")
         assert read_settings(file, ()).of("registrar", RegistrarParams).seed == 2
+
+
+@pytest.mark.parametrize("title", ["/robot/registrar", "robot/registrar", "/*/registrar", "/robot/**", "/*"])
+def test_a_section_is_for_a_node_by_the_last_part_of_its_name(title: str, tmp_path: Path) -> None:
+    (tmp_path / "p.yaml").write_text(f"{title}:\n  ros__parameters: {{seed: 5}}\n")
+    settings = read_settings(tmp_path / "p.yaml", ())
+    assert settings.of("registrar", RegistrarParams).seed == 5 and not settings.ignored
+
+
+def test_a_section_may_lie_in_that_of_its_namespace(tmp_path: Path) -> None:
+    (tmp_path / "p.yaml").write_text("robot:\n  registrar:\n    ros__parameters: {seed: 5}\n")
+    assert read_settings(tmp_path / "p.yaml", ()).of("registrar", RegistrarParams).seed == 5
+
+
+def test_a_section_that_is_for_no_node_of_ours_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "p.yaml").write_text("/**/registar:\n  ros__parameters: {seed: 5}\ncamera:\n  ros__parameters: {}\n")
+    settings = read_settings(tmp_path / "p.yaml", ())
+    assert settings.ignored == ("/**/registar", "camera")
+    tell_ignored(settings)
+    tell_ignored(read_settings(None, ()))
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("! ignored of the parameter file: /**/registar, camera; the nodes are detector, segmenter")
+
+
+def test_a_refused_value_is_told_with_its_file_and_node_or_with_its_option(tmp_path: Path) -> None:
+    file = tmp_path / "p.yaml"
+    file.write_text("/**/detector:\n  ros__parameters: {threshold: 2.0}\n")
+    with pytest.raises(ValueError, match=r"p\.yaml: detector: threshold: expected 0 … 1, got 2\.0"):
+        read_settings(file, ["registrar.seed=1"])
+    with pytest.raises(ValueError, match=r"--set detector\.threshold: expected 0 … 1, got 2\.0"):
+        read_settings(None, ["detector.threshold=2"])
+
+
+def test_what_a_file_says_may_be_good_only_with_a_change(tmp_path: Path) -> None:
+    (tmp_path / "p.yaml").write_text("segmenter:\n  ros__parameters: {z_min: 5.0}\n")
+    assert read_settings(tmp_path / "p.yaml", ["segmenter.z_max=6"]).of("segmenter", SegmenterParams).z_min == 5.0
 
 
 def test_a_parameter_that_no_node_has_is_refused_even_for_all(tmp_path: Path) -> None:

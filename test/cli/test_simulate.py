@@ -19,7 +19,7 @@ def test_the_command_writes_a_recording_and_says_what_it_is(tmp_path: Path) -> N
     options = ["--scenario", "orbit", "--seed", "3", "--frames", "2", "--size", "160x120", "--jpeg"]
     result = CliRunner().invoke(command, [str(out), *options])
     assert result.exit_code == 0, result.output
-    assert "orbit, seed 3, 2 frames" in result.output
+    assert "orbit, seed 3, 2 frames" in result.output and " 0.0 Hz" not in result.output
     assert read_truth(out).intrinsics.width == 160
 
 
@@ -58,6 +58,13 @@ def test_parameters_are_set_by_section_and_name() -> None:
 def test_a_parameter_that_is_not_there_or_out_of_range_is_refused(setting: str) -> None:
     with pytest.raises(ValueError, match=r"expected|no parameter"):
         sensors_of(KINECT, False, (setting,))
+
+
+def test_what_is_refused_is_named_by_its_section() -> None:
+    with pytest.raises(ValueError, match=r"^--set depth: no parameter nois; there are noise_floor, "):
+        sensors_of(KINECT, False, ("depth.nois=1",))
+    with pytest.raises(ValueError, match=r"^--set depth: far: expected"):
+        sensors_of(KINECT, False, ("depth.far=-1",))
 
 
 def test_stress_makes_the_depth_worse() -> None:

@@ -53,6 +53,44 @@ def test_outputs_behind_the_count_are_not_read_and_the_count_may_be_absent() -> 
     assert classes_of(tf(without), without) == [1, 4]
 
 
+CALLED = tuple(f"StatefulPartitionedCall:{k}" for k in range(4))
+
+
+@pytest.mark.parametrize(
+    "order", ["boxes classes scores count", "scores boxes count classes", "count scores classes boxes"]
+)
+@pytest.mark.parametrize("scores", [[0.9, 0.3], [1.0, 0.3]])
+def test_outputs_whose_names_say_nothing_are_told_apart_by_their_values(order: str, scores: list[float]) -> None:
+    values = dict(
+        zip(("boxes", "classes", "scores", "count"), tf_outputs([BOX, BOX], [1, 0], scores).values(), strict=True)
+    )
+    outputs = {name: values[role] for name, role in zip(CALLED, order.split(), strict=True)}
+    contract = tf(outputs)
+    assert classes_of(contract, outputs) == [1]
+    assert contract.read([outputs[name] for name in contract.names], 0.0).score == pytest.approx(scores)
+
+
+@pytest.mark.parametrize(("classes", "scores"), [([1, 0], [1, 1]), ([0, 0], [0, 0]), ([2.5, 1.0], [0.5, 3.0])])
+def test_outputs_that_neither_names_nor_values_tell_apart_are_refused(
+    classes: list[float], scores: list[float]
+) -> None:
+    outputs = tf_outputs([BOX, BOX], classes, scores, names=CALLED)
+    with pytest.raises(
+        ValueError, match=r"expected names or values that tell .*got .*rename its outputs, with `classes`"
+    ):
+        tf(outputs)
+
+
+@pytest.mark.parametrize("names", [("boxes", "labels", "scores"), ("b", "detected_Class", "s"), ("b", "c", "Score")])
+@pytest.mark.parametrize("swapped", [False, True])
+def test_names_tell_even_where_the_values_do_not(names: tuple[str, ...], swapped: bool) -> None:
+    outputs = tf_outputs([BOX, BOX], [1, 0], [1, 0], names=names)
+    if swapped:
+        outputs = dict(reversed(outputs.items()))
+    contract = tf(outputs)
+    assert contract.names == names
+
+
 def test_raw_outputs_of_a_tf_graph_are_no_detections() -> None:
     outputs = {"raw_detection_boxes": np.zeros((1, 50, 4))} | tf_outputs([BOX], [3], [0.9], names=TF_API)
     assert classes_of(tf(outputs), outputs) == [2]

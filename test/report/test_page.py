@@ -46,6 +46,12 @@ def test_the_head_tells_of_false_constraints_and_of_the_error() -> None:
     assert "no truth to judge" in page([(Story.of("walk", summary(), Truth([])), None)])
 
 
+def test_the_head_counts_what_was_tried_apart_from_what_was_not() -> None:
+    assert "2 candidates refused, 1 more not tried" in page([(Story.of("walk", summary(), TRUTH), None)])
+    told = {**summary(), "rejected": {"texture_disagrees": 2}}
+    assert "2 candidates refused<" in page([(Story.of("walk", told, TRUTH), None)])
+
+
 def test_every_reason_has_its_meaning() -> None:
     assert set(MEANINGS) == {reason.value for reason in Reason}
 

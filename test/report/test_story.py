@@ -34,6 +34,13 @@ def test_every_frame_is_on_the_way_of_a_camera_at_rest_too() -> None:
     assert tracks.odometry.shape == tracks.corrected.shape == (COUNT, 3)
 
 
+@pytest.mark.parametrize("key", ["constraints", "glimpses", "refusals"])
+@pytest.mark.parametrize("value", [3, [3], [{}], [{"stamp_ns": "x", "from_ns": 1}], "ab"])
+def test_json_of_another_form_is_refused_by_the_name_of_its_run(key: str, value: object) -> None:
+    with pytest.raises(ValueError, match=f"^walk: expected {key} as `objreg offline --json` writes them, got "):
+        Story.of("walk", {**summary(), key: value}, TRUTH)
+
+
 def test_without_truth_nothing_is_false_and_there_are_no_errors() -> None:
     story = Story.of("walk", summary(false=True), Truth([]))
     assert not any(story.is_false(closure) for closure in story.closures)

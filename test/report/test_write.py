@@ -114,3 +114,10 @@ def test_what_is_no_run_is_refused_by_name(tmp_path: Path, text: str) -> None:
     (tmp_path / "run.json").write_text(text)
     with pytest.raises(ValueError, match=r"run\.json: expected the JSON of `objreg offline --json`"):
         write_report(tmp_path / "out.html", [tmp_path / "run.json"])
+
+
+@pytest.mark.parametrize("key", ["constraints", "refusals", "glimpses"])
+def test_a_number_in_the_place_of_a_list_is_refused_by_the_name_of_its_file(tmp_path: Path, key: str) -> None:
+    (tmp_path / "run.json").write_text(json.dumps({"constraints": [], "recording": str(tmp_path), key: 3}))
+    with pytest.raises(ValueError, match=rf"run\.json: expected a list of {key} as .* got 3"):
+        write_report(tmp_path / "page.html", [tmp_path / "run.json"])

@@ -36,7 +36,7 @@ def test_a_wrong_model_file_ends_the_detector_with_one_clear_line(
 
 def test_a_parameter_out_of_range_ends_a_node_in_the_words_of_params(graph: Graph) -> None:
     ended = start(graph, "segmenter", "-p slop:=-1.0")
-    assert (ended.returncode, ended.stderr.strip()) == (1, "slop: expected at least 0, got -1.0")
+    assert (ended.returncode, ended.stderr.strip()) == (1, "segmenter: slop: expected at least 0, got -1.0")
 
 
 @pytest.mark.parametrize("namespace", ["/", "/robot"])

@@ -116,6 +116,26 @@ def test_a_cloud_that_cannot_be_used_is_refused_with_expected_and_got(
         organise(PointCloud(xyz=xyz, rgb=None, stamp_ns=0), camera)
 
 
+@pytest.mark.parametrize("above", [0.0, 0.35])
+def test_a_cloud_with_x_forward_is_refused_beside_a_camera_of_its_size(above: float) -> None:
+    optical = back_project(hilly_depth(), CAMERA.fx, CAMERA.fy, CAMERA.cx, 0.0 if above == 0.0 else CAMERA.cy)
+    forward = np.stack([optical[..., 2], -optical[..., 0], above + np.abs(optical[..., 1]) + 0.01], axis=-1)
+    with pytest.raises(ValueError, match=r"expected an organised cloud in the optical frame .* px beside their pixels"):
+        organise(PointCloud(xyz=forward.astype(np.float32), rgb=None, stamp_ns=0), CAMERA)
+
+
+def test_a_camera_that_does_not_see_the_points_in_their_pixels_gives_way_to_the_clouds_own() -> None:
+    other = Intrinsics(fx=250.0, fy=250.0, cx=32.0, cy=24.0, width=64, height=48)
+    got = organise(cloud_of(hilly_depth()), other).intrinsics
+    assert (got.fx, got.fy, got.cx, got.cy) == pytest.approx((300.0, 310.0, 30.2, 22.9), abs=1e-2)
+
+
+def test_a_cloud_of_too_few_points_to_tell_keeps_its_camera() -> None:
+    xyz = np.full((48, 64, 3), np.nan, np.float32)
+    xyz[:2, :8] = (0.0, 0.0, 1.0)
+    assert organise(PointCloud(xyz=xyz, rgb=None, stamp_ns=0), CAMERA).intrinsics == CAMERA
+
+
 def test_intrinsics_fit_in_spite_of_noise_and_holes() -> None:
     rng = np.random.default_rng(1)
     xyz = np.array(cloud_of(hilly_depth()).xyz)

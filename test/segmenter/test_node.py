@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The segmenter behind its door: messages in, a frame and words of warning out."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+rclpy = pytest.importorskip("rclpy", reason="the door needs ROS 2")
+
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2  # noqa: E402
+from std_msgs.msg import String  # noqa: E402
+
+from objreg_ros.bridge import qos, to_msg  # noqa: E402
+from objreg_ros.data import DepthImage, Detections, Intrinsics  # noqa: E402
+from objreg_ros.segmenter.node import LOOK_S, SegmenterNode  # noqa: E402
+from objreg_ros.segmenter.segment import Segmenter  # noqa: E402
+
+CAMERA = Intrinsics(fx=300.0, fy=300.0, cx=160.0, cy=120.0, width=320, height=240)
+NAMES = {0: "cup"}
+
+
+class Camera:
+    """A camera whose info was published before the segmenter came, and that is kept for it or published again."""
+
+    def __init__(self, kept: bool) -> None:
+        self.node = rclpy.create_node("camera")
+        self.info = self.node.create_publisher(CameraInfo, "camera_info", qos.latched() if kept else qos.room())
+        self.info.publish(to_msg.camera_info(CAMERA, 1, "eye"))
+        self.depth = self.node.create_publisher(Image, "depth/image", qos.room())
+        self.table = self.node.create_publisher(PointCloud2, "detections_table", qos.room())
+        self.labels = self.node.create_publisher(String, "labels", qos.latched())
+        self.labels.publish(to_msg.labels(NAMES))
+        self.said: list[str] = []
+        self.door = SegmenterNode()
+        self.door.throttled._write = self.said.append
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(self.door)
+        self.executor.add_node(self.node)
+        self.wait(lambda: min(p.get_subscription_count() for p in (self.depth, self.table, self.labels)) > 0)
+        self.wait(lambda: len(self.door.connected) >= 4)
+
+    def wait(self, done: Callable[[], Any], seconds: float = 20.0) -> None:
+        end = time.monotonic() + seconds
+        while not done():
+            assert time.monotonic() < end, f"nothing came; the books say {self.door.ledger.balance()}"
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def see(self, metres: float, frame_id: str, picture_frame_id: str) -> None:
+        """One frame with one box."""
+        stamp_ns = 10**9
+        depth = np.full((CAMERA.height, CAMERA.width), metres, np.float32)
+        seen = Detections(
+            xyxy=np.array([[100, 70, 220, 170]], np.float32), score=np.ones(1, np.float32), label=("cup",),
+            image_hw=depth.shape, stamp_ns=stamp_ns, frame_id=picture_frame_id,
+        )  # fmt: skip
+        word = DepthImage(depth=depth, rgb=None, intrinsics=CAMERA, stamp_ns=stamp_ns, frame_id=frame_id)
+        message = Image(
+            header=to_msg.header(stamp_ns, frame_id), height=CAMERA.height, width=CAMERA.width, encoding="32FC1",
+            step=4 * CAMERA.width, data=word.depth.tobytes(),
+        )  # fmt: skip
+        self.table.publish(to_msg.detections_table(seen, NAMES))
+        self.depth.publish(message)
+        self.wait(lambda: self.door.ledger.balance().published == 1)
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[bool], Camera]]:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    monkeypatch.setattr(Segmenter, "warm", lambda self: None)
+    rclpy.init(args=["--ros-args", "-p", "colour:=false"], domain_id=100 + os.getpid() % 100)
+    cameras: list[Camera] = []
+
+    def make(kept: bool = True) -> Camera:
+        cameras.append(Camera(kept))
+        return cameras[-1]
+
+    yield make
+    for camera in cameras:
+        camera.door.close()
+        camera.executor.shutdown()
+        camera.node.destroy_node()
+    rclpy.try_shutdown()
+
+
+def test_a_camera_info_that_was_published_once_and_kept_serves_a_segmenter_that_comes_late(
+    made: Callable[..., Camera],
+) -> None:
+    camera = made()
+    camera.see(1.2, "eye", "eye")
+    assert camera.said == [] and not camera.door.watch.silent()
+
+
+def test_a_camera_that_keeps_nothing_is_heard_without_a_word_of_qos(
+    made: Callable[..., Camera], capfd: pytest.CaptureFixture[str]
+) -> None:
+    camera = made(kept=False)
+    camera.wait(lambda: camera.door.connected.get("/camera_info"))
+    later = time.monotonic() + 2 * LOOK_S
+    camera.wait(lambda: time.monotonic() > later)
+    camera.info.publish(to_msg.camera_info(CAMERA, 1, "eye"))
+    camera.see(1.2, "eye", "eye")
+    assert "QoS" not in capfd.readouterr().err and camera.said == []
+
+
+def test_depth_of_another_frame_than_the_picture_is_told_with_what_to_do(made: Callable[..., Camera]) -> None:
+    camera = made()
+    camera.see(1.2, "depth_eye", "colour_eye")
+    (line,) = camera.said
+    assert "got colour in 'colour_eye' and depth in 'depth_eye'" in line and "align_depth.enable:=true" in line
+
+
+def test_millimetres_as_floats_are_told_with_what_to_do(made: Callable[..., Camera]) -> None:
+    camera = made()
+    camera.see(1200.0, "eye", "eye")
+    (line,) = camera.said
+    assert "z_min … z_max" in line and "16UC1" in line
