@@ -158,6 +158,17 @@ def test_a_reduced_camera_sees_the_rays_of_the_pixels_that_it_keeps(step: int) -
     assert np.allclose((np.arange(small.height) - small.cy) / small.fy, (rows - CAMERA.cy) / CAMERA.fy)
 
 
+@pytest.mark.parametrize("T", [R_MIRRORED, R_SCALED, np.full((4, 4), np.nan), np.eye(3)])
+def test_an_odometry_that_is_no_rigid_motion_is_refused(T: np.ndarray) -> None:
+    with pytest.raises(ValueError, match=r"Odometry\.T_odom_body: expected"):
+        data.Odometry(T_odom_body=T, stamp_ns=5)
+
+
+def test_each_flag_of_a_point_is_the_bit_that_stores_and_messages_have_for_it() -> None:
+    bits = {"EDGE": 1, "CUT_BY_IMAGE": 2, "CUT_BY_BOX": 4, "WALL_LIKE": 8, "UNSUPPORTED": 16}
+    assert {flag.name: int(flag) for flag in PointFlag} == bits
+
+
 def test_no_objects_and_no_points_are_allowed() -> None:
     nothing = detections(xyxy=floats(0, 4), score=floats(0), label=())
     empty = cloud(xyz=floats(0, 3), normals=floats(0, 3), flags=np.zeros(0, np.uint16))

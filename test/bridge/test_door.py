@@ -84,6 +84,28 @@ def test_an_input_that_is_hung_up_has_no_subscriptions_and_hears_nothing_more(do
     assert door.count_subscribers("/quiet") == door.count_subscribers("/loud") == 0
 
 
+@pytest.mark.parametrize(("publishers", "lost"), [(1, {"word": 3}), (2, {})])
+def test_what_the_transport_lost_is_counted_where_one_publisher_numbered_it(
+    door: Door, publishers: int, lost: dict[str, int]
+) -> None:
+    door.count_publishers = {"/word": publishers}.__getitem__  # type: ignore[method-assign]
+    for count in (3, 0):
+        door._note_loss("word", count)
+    assert door.ledger.balance().lost == lost
+
+
+def test_the_rate_is_of_what_came_since_the_last_report(door: Door) -> None:
+    told: list[Any] = []
+    door._diagnostics.publish = told.append  # type: ignore[method-assign]
+    for since, frames in ((4.0, range(8)), (2.0, range(8, 11))):
+        door._last = (time.monotonic() - since, door._last[1])
+        for stamp_ns in frames:
+            door.accept(stamp_ns)
+        door._report()
+    rates = [float(value.value) for array in told for value in array.status[0].values if value.key == "rate [Hz]"]
+    assert rates == pytest.approx([2.0, 1.5], rel=0.1)
+
+
 def test_while_a_service_waits_for_work_aside_the_node_hears_on(door: Door) -> None:
     heard: list[str] = []
     go = threading.Event()

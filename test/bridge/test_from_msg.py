@@ -63,6 +63,14 @@ def test_binning_and_region_of_interest_move_the_camera() -> None:
     assert (camera.width, camera.height) == (20, 15)
 
 
+def test_each_axis_is_binned_by_its_own_number() -> None:
+    info = messages.camera_info(K, 64, 48)
+    info.binning_x, info.binning_y, info.roi.y_offset = 2, 4, 4
+    camera = from_msg.intrinsics(info)
+    assert (camera.fx, camera.fy, camera.cx, camera.cy) == (250.0, 127.5, 15.75, 4.875)
+    assert (camera.width, camera.height) == (32, 12)
+
+
 def test_intrinsics_of_ros_1_are_read_too() -> None:
     info = messages.camera_info(K, 64, 48)
     info.K, info.P = info.k, info.p
@@ -82,10 +90,11 @@ def test_the_camera_of_a_rectified_picture_is_that_of_the_projection_matrix() ->
     assert (camera.fx, camera.cx, camera.cy) == (200.0, 10.25, 9.25)
 
 
-@pytest.mark.parametrize("fx", [-400.0, float("nan")])
-def test_a_projection_matrix_that_cannot_be_is_refused_though_K_could(fx: float) -> None:
-    with pytest.raises(ValueError, match=r"expected a calibrated P with focal lengths above 0, got .(-400|nan)"):
-        from_msg.intrinsics(messages.camera_info(K, 64, 48, (fx, *P[1:])))
+@pytest.mark.parametrize("f", [-400.0, float("nan")])
+@pytest.mark.parametrize("axis", [0, 5])
+def test_a_projection_matrix_that_cannot_be_is_refused_though_K_could(f: float, axis: int) -> None:
+    with pytest.raises(ValueError, match=r"expected a calibrated P with focal lengths above 0, got .*(-400|nan)"):
+        from_msg.intrinsics(messages.camera_info(K, 64, 48, (*P[:axis], f, *P[axis + 1 :])))
 
 
 def test_the_view_is_of_the_camera_of_its_projection_matrix() -> None:
@@ -248,6 +257,10 @@ def test_a_frame_may_have_an_at_sign_in_its_name() -> None:
     assert from_msg.moment("robot@home/camera@0.000000007") == ("robot@home/camera", 7)
 
 
+def test_a_moment_before_time_zero_is_a_moment() -> None:
+    assert from_msg.moment("camera@-2.750000000") == ("camera", -1_250_000_000)
+
+
 def test_labels_are_json() -> None:
     assert from_msg.labels(SimpleNamespace(data=json.dumps({"3": "cup"}))) == {3: "cup"}
 
@@ -263,6 +276,13 @@ def test_a_table_of_detections_comes_best_first() -> None:
     found = from_msg.detections(messages.own_table(rows), {3: "cup"})
     assert found.label == ("9", "cup") and found.image_hw == (48, 64)
     assert found.xyxy[1].tolist() == [1, 2, 30, 40] and found.score.tolist() == [0.75, 0.5]
+
+
+def test_detections_of_one_score_stay_in_their_order() -> None:
+    scores = np.random.default_rng(1).choice([0.25, 0.5, 0.75], 400).tolist()
+    rows = np.array([(k, 0, 500, 40, score, 3, 640, 480) for k, score in enumerate(scores)], DETECTIONS)
+    order = sorted(range(400), key=lambda k: -scores[k])
+    assert from_msg.detections(messages.own_table(rows), {}).xyxy[:, 0].tolist() == order
 
 
 def test_an_empty_table_is_no_detection_of_the_size_at_hand() -> None:
@@ -320,6 +340,11 @@ def gravity_message(x: float, y: float, z: float) -> SimpleNamespace:
     return SimpleNamespace(header=messages.header(), vector=messages.xyz(x, y, z))
 
 
+def test_gravity_is_a_direction_and_no_more_than_certain() -> None:
+    falls, confidence = from_msg.gravity(gravity_message(0, 3.0, 4.0))
+    assert falls is not None and falls.tolist() == [0, 0.6, 0.8] and confidence == 1.0
+
+
 def test_a_frame_is_made_of_its_four_messages() -> None:
     view, info = view_messages()
     frame = from_msg.frame(
@@ -341,8 +366,10 @@ def test_the_camera_sits_where_the_body_carries_it() -> None:
     T_body_camera = np.eye(4)
     T_body_camera[1, 3] = 2
     parts = (messages.own_table(object_rows()), view, info, gravity_message(0, 0, 0), {})
-    frame = from_msg.frame(*parts, [from_msg.odometry(messages.odometry(at=(1, 0, 0)))], T_body_camera)
-    assert frame.T_odom_camera is not None and frame.T_odom_camera[:3, 3].tolist() == [1, 2, 0]
+    half = np.sqrt(0.5)
+    word = from_msg.odometry(messages.odometry((0, 0, half, half), (1, 0, 0)))  # the body's y is back along odom's x
+    frame = from_msg.frame(*parts, [word], T_body_camera)
+    assert frame.T_odom_camera is not None and np.allclose(frame.T_odom_camera[:3, 3], (-1, 0, 0))
     assert frame.gravity is None and frame.gravity_confidence == 0
 
 
@@ -350,7 +377,7 @@ def test_a_pose_between_two_messages_is_between_theirs() -> None:
     around = [from_msg.odometry(messages.odometry(at=(x, 0, 0), stamp_ns=60 + 40 * x)) for x in (1, 2)]
     np.testing.assert_allclose(from_msg.pose_at(110, around)[:3, 3], (1.25, 0, 0))
     assert from_msg.pose_at(110, around[:1])[0, 3] == 1
-    assert from_msg.pose_at(500, around)[0, 3] == 2
+    assert from_msg.pose_at(500, around)[0, 3] == 2 and from_msg.pose_at(0, around)[0, 3] == 1
 
 
 def test_there_is_nothing_between_poses_in_two_frames() -> None:
@@ -359,8 +386,9 @@ def test_there_is_nothing_between_poses_in_two_frames() -> None:
     assert [from_msg.pose_at(moment, around)[0, 3] for moment in (120, 180)] == [1, 2]
 
 
-def test_messages_of_two_moments_are_no_frame() -> None:
-    view, info = view_messages()
-    later = messages.own_table(object_rows(), stamp_ns=5)
+@pytest.mark.parametrize("other", range(4))
+def test_messages_of_two_moments_are_no_frame(other: int) -> None:
+    parts = [messages.own_table(object_rows()), *view_messages(), gravity_message(0, 1, 0)]
+    parts[other].header = messages.header(stamp_ns=5)
     with pytest.raises(ValueError, match="of one stamp"):
-        from_msg.frame(later, view, info, gravity_message(0, 1, 0), {})
+        from_msg.frame(*parts, {})

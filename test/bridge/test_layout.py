@@ -50,3 +50,12 @@ def test_one_name_twice_is_refused() -> None:
 def test_columns_of_any_type_come_as_float32() -> None:
     records = np.array([[(1, 2.5)]], [("a", ">i2"), ("b", ">f8")])
     assert columns(records, "b", "a").tolist() == [[[2.5, 1.0]]] and columns(records, "a").dtype == np.float32
+
+
+@pytest.mark.parametrize("kind", ["i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8"])
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_a_field_of_every_datatype_is_read(kind: str, order: str) -> None:
+    values = np.array([[1, 100]], order + kind)
+    records = np.zeros((1, 2), [("pad", order + "u4"), ("a", order + kind)])
+    records["a"] = values
+    assert table(messages.cloud(records))["a"].tolist() == [[1, 100]]

@@ -68,4 +68,4 @@ def test_a_stage_is_measured_and_the_way_from_in_to_out_too() -> None:
         pass
     ledger.publish(1)
     stages = ledger.balance().stage_ms
-    assert set(stages) == {"detect", "total"} and 0 <= stages["detect"][0] <= stages["total"][1]
+    assert set(stages) == {"detect", "total"} and 0 <= stages["detect"][0] <= stages["total"][1] < 10_000.0

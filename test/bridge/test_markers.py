@@ -8,7 +8,7 @@ pytest.importorskip("rclpy", reason="the messages of ROS 2 are not installed")
 
 from visualization_msgs.msg import Marker
 
-from objreg_ros.bridge.markers import Scene
+from objreg_ros.bridge.markers import GOLD, WHITE, Scene
 from objreg_ros.data import Frame, Intrinsics, LoopClosure, Reason, Rejected, View
 from objreg_ros.geometry import pose
 
@@ -68,6 +68,13 @@ def test_objects_are_shown_with_their_names() -> None:
     markers = Scene().markers([(7, "cup", np.array([1.0, 2.0, 3.0]))], 5, "odom").markers
     (name,) = [marker for marker in markers if marker.type == Marker.TEXT_VIEW_FACING]
     assert name.text == "cup 7" and name.header.frame_id == "odom" and name.pose.position.y == 2.0
+
+
+def test_each_marker_has_the_colour_of_its_kind() -> None:
+    for marker in Scene().markers([(7, "cup", np.zeros(3))], 5, "odom").markers:
+        expected = {Marker.TEXT_VIEW_FACING: WHITE, Marker.SPHERE: GOLD}.get(marker.type)
+        if expected is not None:
+            assert (marker.color.r, marker.color.g, marker.color.b, marker.color.a) == pytest.approx(expected)
 
 
 def test_nothing_is_left_of_a_cleared_scene() -> None:

@@ -77,6 +77,19 @@ def test_what_comes_before_it_is_known_how_to_match_is_not_lost(door: Pairs) -> 
     assert door.taken == [("a5", "b5")]
 
 
+def test_several_frames_that_came_early_are_matched_in_the_order_they_came_in(door: Pairs) -> None:
+    found: list[Match] = []
+    door.worker.put = lambda job: found.append(job[1])  # type: ignore[method-assign]
+    for stamp_ns in (9 + JUMP_NS, 3, 4, 5):  # the clock began anew after the first
+        door.feed("a", stamp_ns, f"a{stamp_ns}")
+    for stamp_ns in (3, 4, 5):
+        door.feed("b", stamp_ns, f"b{stamp_ns}")
+    assert not door.begun and not found
+    door.begin([Stream("a"), Stream("b")])
+    assert door.begun and [(match["a"], match["b"]) for match in found] == [("a3", "b3"), ("a4", "b4"), ("a5", "b5")]
+    assert door.ledger.balance().dropped == {"time_jump": 1}
+
+
 def test_what_came_once_is_not_pushed_out_by_a_busy_stream_before_matching_begins(door: Pairs) -> None:
     door.feed("names", 0, "cup")
     for stamp_ns in range(1000):

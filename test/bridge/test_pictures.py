@@ -58,6 +58,18 @@ def test_an_unknown_encoding_is_named() -> None:
         depth_metres(messages.image(flat(1, 2, 3), "rgb8"))
 
 
+@pytest.mark.parametrize(
+    "pixels", [np.zeros((4, 6), np.uint8), np.zeros((4, 6, 3), np.uint16)], ids=["8 bits", "colour"]
+)
+@pytest.mark.parametrize(("kind", "head"), [("16UC1; png", b""), ("16UC1; compressedDepth png", bytes(12))])
+def test_compressed_depth_that_is_not_of_16_bits_and_one_channel_is_refused(
+    pixels: np.ndarray, kind: str, head: bytes
+) -> None:
+    png = cv2.imencode(".png", pixels)[1].tobytes()
+    with pytest.raises(ValueError, match=f"expected 16 bits of one channel, got {pixels.dtype}"):
+        depth_metres(messages.compressed(head + png, kind))
+
+
 def test_an_empty_image_is_refused() -> None:
     message = messages.image(flat(200, 30, 10), "rgb8")
     message.width = 0
@@ -70,6 +82,12 @@ def test_a_truncated_image_is_refused_with_expected_and_got() -> None:
     message.data = message.data[:-1]
     with pytest.raises(ValueError, match="expected 72 bytes for 6 × 4, got 71"):
         colour_pixels(message)
+
+
+def test_a_single_row_may_leave_its_step_out() -> None:
+    message = messages.image(flat(200, 30, 10)[:1], "rgb8")
+    message.step = 0
+    assert (colour_pixels(message) == RED).all()
 
 
 def test_a_step_below_the_line_is_refused() -> None:

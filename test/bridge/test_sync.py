@@ -7,7 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from objreg_ros.bridge.sync import JUMP_NS, MOST_BYTES, PATIENCE_NS, SILENCE_NS, Match, Need, Stream, Synchroniser
+from objreg_ros.bridge.sync import (
+    ENCLOSING,
+    JUMP_NS,
+    MOST_BYTES,
+    PATIENCE_NS,
+    SILENCE_NS,
+    Match,
+    Need,
+    Stream,
+    Synchroniser,
+)
 
 EXACT = (Stream("image"), Stream("depth"))
 
@@ -126,6 +136,31 @@ def test_an_enclosing_stream_gives_what_is_on_either_side_of_a_time() -> None:
     assert accounts_hold(sync)
 
 
+def test_what_encloses_one_time_encloses_the_next_one_too() -> None:
+    sync = Synchroniser((Stream("image"), Stream("odom", Need.OPTIONAL, slop_ns=10, enclosing=True)))
+    sync.add("odom", 30, "before")
+    for image in (41, 44, 49):
+        sync.add("image", image, image)
+    found = sync.add("odom", 60, "after")
+    assert pairs(found, "image", "odom") == [(image, ("before", "after")) for image in (41, 44, 49)]
+    assert sync.queues["odom"].matched == 2 and accounts_hold(sync)
+
+
+@pytest.mark.parametrize(("gap_ns", "found"), [(10 * ENCLOSING, ("before", "after")), (10 * ENCLOSING + 1, None)])
+def test_two_enclose_a_time_up_to_a_number_of_slops(gap_ns: int, found: tuple[str, str] | None) -> None:
+    assert 20 * ENCLOSING > 100  # ms: with a slop of 20, odometry of 10 Hz encloses what comes between
+    sync = Synchroniser((Stream("image"), Stream("odom", Need.OPTIONAL, slop_ns=10, enclosing=True)))
+    sync.add("odom", 0, "before")
+    sync.add("image", 30, "i")
+    assert pairs(sync.add("odom", gap_ns, "after"), "odom") == [(found,)]
+
+
+@pytest.mark.parametrize("need", [Need.REQUIRED, Need.LATCHED])
+def test_an_enclosing_stream_that_is_not_optional_is_refused(need: Need) -> None:
+    with pytest.raises(ValueError, match="odom: expected an enclosing stream to be optional"):
+        Stream("odom", need, enclosing=True)
+
+
 def test_an_optional_stream_that_died_is_given_up_when_the_queue_is_full() -> None:
     sync = Synchroniser((Stream("image", depth=2), Stream("odom", Need.OPTIONAL, slop_ns=10)))
     sync.add("odom", 0, "o")
@@ -153,6 +188,13 @@ def test_a_full_queue_drops_its_oldest_with_a_reason() -> None:
     for t in range(0, 5 * PATIENCE_NS, PATIENCE_NS):
         other.add("depth", t, t)
     assert other.queues["depth"].dropped == {"queue_full": 2} and accounts_hold(sync) and accounts_hold(other)
+
+
+def test_what_nothing_waited_for_was_not_matched_rather_than_crowded_out() -> None:
+    sync = Synchroniser((Stream("image"), Stream("odom", Need.OPTIONAL, depth=3)))
+    for t in range(0, 5 * PATIENCE_NS, PATIENCE_NS):
+        sync.add("odom", t, t)
+    assert sync.queues["odom"].dropped == {"unmatched": 2} and accounts_hold(sync)
 
 
 def test_what_comes_fast_waits_long_enough_for_a_slow_partner() -> None:

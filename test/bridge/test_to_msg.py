@@ -3,6 +3,8 @@ from __future__ import annotations
 
 import json
 from array import array
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ import pytest
 pytest.importorskip("rclpy", reason="the messages of ROS 2 are not installed")
 
 from objreg_ros.bridge import from_msg, to_msg
-from objreg_ros.bridge.layout import OBJECTS, table
+from objreg_ros.bridge.layout import OBJECTS, SUPPORT_ID, table
 from objreg_ros.data import (
     ColourImage,
     DepthImage,
@@ -85,8 +87,9 @@ def test_a_stamp_survives_to_the_nanosecond() -> None:
 
 def test_a_colour_image_comes_back_as_it_was() -> None:
     rgb = RNG.integers(0, 256, (5, 7, 3), dtype=np.uint8)
-    for pixels in (rgb, rgb[:, ::-1]):  # contiguous and not
+    for pixels in (rgb, rgb[:, ::-1], rgb[::-1]):  # contiguous and not
         message = to_msg.image(ColourImage(rgb=pixels, stamp_ns=STAMP, frame_id="kinect"))
+        assert (message.step, len(message.data)) == (3 * 7, 5 * 3 * 7)
         back = from_msg.image(message)
         assert np.array_equal(back.rgb, pixels) and (back.stamp_ns, back.frame_id) == (STAMP, "kinect")
 
@@ -111,6 +114,7 @@ def test_a_camera_comes_back_as_it_was() -> None:
     back = from_msg.intrinsics(info)
     assert (back.fx, back.fy, back.cx, back.cy, back.width, back.height) == (525.0, 524.5, 3.25, 2.5, 8, 6)
     assert np.array_equal(info.p.reshape(3, 4)[:, :3], info.k.reshape(3, 3)) and not info.p.reshape(3, 4)[:, 3].any()
+    assert np.array_equal(info.r.reshape(3, 3), np.eye(3)) and not np.any(info.d)
 
 
 @pytest.mark.parametrize("coloured", [True, False])
@@ -148,9 +152,32 @@ def test_no_detection_gives_an_empty_table_with_the_header_of_the_image() -> Non
     assert len(from_msg.detections(message, NAMES)) == 0
 
 
+def test_a_box_of_vision_msgs_has_its_middle_and_its_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    def made(**fields: object) -> SimpleNamespace:
+        bbox = SimpleNamespace(center=SimpleNamespace(position=SimpleNamespace()))
+        return SimpleNamespace(bbox=bbox, hypothesis=SimpleNamespace(), results=[], detections=[], **fields)
+
+    for name in ("Detection2D", "Detection2DArray", "ObjectHypothesisWithPose"):
+        monkeypatch.setattr(to_msg, name, made, raising=False)
+    boxes, score = np.array([[10, 20, 40, 100]], np.float32), np.array([0.5], np.float32)
+    word = Detections(xyxy=boxes, score=score, label=("tv",), image_hw=(480, 640), stamp_ns=STAMP, frame_id="kinect")
+    message = to_msg.detection_array(word)
+    (found,) = message.detections
+    (result,) = found.results
+    assert (found.bbox.center.position.x, found.bbox.center.position.y) == (25.0, 60.0)
+    assert (found.bbox.size_x, found.bbox.size_y) == (30.0, 80.0)
+    assert (result.hypothesis.class_id, result.hypothesis.score) == ("tv", 0.5)
+    assert from_msg.stamp_ns(message) == from_msg.stamp_ns(found) == STAMP
+
+
 def test_a_label_that_was_not_published_is_refused_with_its_name() -> None:
     with pytest.raises(ValueError, match=r"'dog'.*2 published labels"):
         to_msg.objects(frame_of(cloud_of("dog", 1, 3)), NAMES)
+
+
+def test_a_number_that_means_the_support_is_no_label() -> None:
+    with pytest.raises(ValueError, match=f"'{SUPPORT_ID}'"):
+        to_msg.objects(frame_of(cloud_of(str(SUPPORT_ID), 1, 3)), NAMES)
 
 
 def test_a_class_without_a_name_keeps_its_number() -> None:
@@ -198,11 +225,26 @@ def test_gravity_carries_its_confidence_as_its_length() -> None:
     assert falls == pytest.approx([0.0, 0.6, 0.8]) and confidence == pytest.approx(0.5)
 
 
+def test_gravity_that_is_unknown_is_a_vector_without_length() -> None:
+    message = to_msg.gravity(replace(frame_of(), gravity=None, gravity_confidence=0.0))
+    assert (message.vector.x, message.vector.y, message.vector.z) == (0, 0, 0)
+    assert from_msg.gravity(message) == (None, 0.0)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_a_cloud_is_dense_only_where_every_axis_of_every_point_is_known(axis: int) -> None:
+    xyz = np.ones((2, 3, 3), np.float32)
+    assert to_msg.points(PointCloud(xyz=xyz, rgb=None, stamp_ns=STAMP)).is_dense
+    xyz[1, 1, axis] = np.nan
+    assert not to_msg.points(PointCloud(xyz=xyz, rgb=None, stamp_ns=STAMP)).is_dense
+
+
 def test_a_constraint_comes_back_with_both_moments_and_its_covariance() -> None:
     sent = closure()
     message = to_msg.constraint(sent)
     assert message.header.frame_id == "front@0.000000005"
     assert message.child_frame_id == "kinect@1700000000.123456789"
+    assert from_msg.stamp_ns(message) == STAMP
     back = from_msg.loop_closure(message)
     assert (back.from_ns, back.to_ns, back.from_frame_id, back.to_frame_id) == (5, STAMP, "front", "kinect")
     assert np.allclose(back.T_from_to, sent.T_from_to, atol=1e-12) and np.array_equal(back.covariance, sent.covariance)
@@ -213,6 +255,7 @@ def test_each_object_of_a_closure_is_one_transform_that_names_it() -> None:
     messages = to_msg.transforms(sent)
     assert [m.child_frame_id for m in messages] == [f"kinect@1700000000.123456789/cup_{n}" for n in (3, 8)]
     assert all(np.allclose(from_msg.odometry(m).T_odom_body, sent.T_from_to, atol=1e-12) for m in messages)
+    assert {(from_msg.stamp_ns(m), m.header.frame_id) for m in messages} == {(STAMP, "front@0.000000005")}
 
 
 def test_landmarks_tell_where_each_object_of_a_keyframe_was_and_which_it_is() -> None:
@@ -238,8 +281,10 @@ def test_a_path_keeps_the_time_and_the_place_of_each_pose() -> None:
 
 def test_odometry_comes_back_as_it_was() -> None:
     T = pose(rotation_from_vector(np.array([3.0, 0.5, 0.2])), np.array([3.0, 2.0, 1.0]))
-    back = from_msg.odometry(to_msg.odometry(Odometry(T_odom_body=T, stamp_ns=STAMP, child_frame_id="kinect")))
-    assert np.allclose(back.T_odom_body, T, atol=1e-12) and back.child_frame_id == "kinect"
+    word = Odometry(T_odom_body=T, stamp_ns=STAMP, frame_id="world", child_frame_id="kinect")
+    back = from_msg.odometry(to_msg.odometry(word))
+    assert np.allclose(back.T_odom_body, T, atol=1e-12)
+    assert (back.stamp_ns, back.frame_id, back.child_frame_id) == (STAMP, "world", "kinect")
 
 
 def test_labels_come_back_with_numbers_for_keys() -> None:

@@ -99,7 +99,9 @@ def test_a_closure_between_cameras_becomes_one_between_the_bodies_of_the_keyfram
 
 
 def test_a_closure_moved_by_odometry_is_known_less_well_by_what_that_wanders() -> None:
-    sigmas, T = (0.02, 0.03), {stamp: pose(np.eye(3), [0.1 * stamp, 0.0, 0.0]) for stamp in (0, 1, 20, 22)}
+    sigmas = (0.02, 0.03)
+    way = {0: (0.0, 0.0, 0.0), 1: (0.1, 0.0, 0.2), 20: (2.0, -0.5, 1.5), 22: (2.0, -0.3, 1.9)}  # x, y, turn about z
+    T = {stamp: pose(rotation_from_vector(np.array([0, 0, yaw])), [x, y, 0.0]) for stamp, (x, y, yaw) in way.items()}
     T_body_camera = pose(rotation_from_vector(np.array([0.2, -0.5, 0.1])), np.array([0.3, 0.1, 0.15]))
     T_from_to = inverse(T[0] @ T_body_camera) @ T[20] @ T_body_camera
     closure = LoopClosure(from_ns=0, to_ns=20, T_from_to=T_from_to, covariance=1e-10 * np.eye(6), labels=())
@@ -115,6 +117,14 @@ def test_a_closure_moved_by_odometry_is_known_less_well_by_what_that_wanders() -
         errors.append(difference(moved.T_from_to, inverse(T[1]) @ T[22]))
     seen, said = np.cov(np.array(errors).T), moved.covariance
     np.testing.assert_allclose(np.sqrt(np.diag(seen)), np.sqrt(np.diag(said)), rtol=0.15)
+    spread = np.sqrt(np.outer(np.diag(said), np.diag(said)))
+    np.testing.assert_allclose(seen / spread, said / spread, atol=0.15)
+
+
+def test_odometry_wanders_with_metres_and_radians_alike() -> None:
+    T = pose(rotation_from_vector(np.array([0.0, 0.3, 0.4])), np.array([0.0, 1.5, 2.0]))
+    three_each = np.sqrt(np.diag(wandering(T, (0.02, 0.01)))).reshape(2, 3)
+    assert np.linalg.norm(three_each, axis=1) == pytest.approx([0.02 * np.sqrt(3.0), 0.01 * np.sqrt(3.0)])
 
 
 def test_a_closure_outside_odometry_is_refused_with_the_span() -> None:

@@ -25,6 +25,8 @@ from objreg_ros.bridge import from_msg, qos, to_msg  # noqa: E402
 from objreg_ros.data import LoopClosure  # noqa: E402
 from objreg_ros.geometry import pose, rotation_from_vector  # noqa: E402
 from objreg_ros.mapper.node import MapperNode  # noqa: E402
+from objreg_ros.mapper.optimisation import Solution  # noqa: E402
+from objreg_ros.mapper.pose_graph import Problem  # noqa: E402
 
 from .bent import SECOND, bent, closure, odometry, square  # noqa: E402
 
@@ -99,6 +101,12 @@ def test_the_path_ends_where_the_walk_began_once_constraints_are_in(outside: Out
     assert outside.door.ledger.balance().published == len(ROUND_TRIP)
 
 
+def test_the_path_grows_with_every_keyframe_before_any_constraint(outside: Outside) -> None:
+    outside.drive(BENT[:40])
+    keyframes = outside.door.extra_diagnostics()["keyframes"]
+    outside.wait(lambda: outside.paths and len(outside.paths[-1].poses) == keyframes > 3)
+
+
 def test_the_correction_carries_odom_to_map(outside: Outside) -> None:
     outside.drive(BENT)
     outside.send(ROUND_TRIP)
@@ -147,6 +155,29 @@ def test_a_constraint_within_a_gap_of_the_odometry_is_dropped(outside: Outside) 
     outside.wait(lambda: outside.door.extra_diagnostics()["odometry"] == 22)
     outside.send([closure(TRUE, 5, 40)])
     outside.wait(lambda: outside.door.ledger.balance().dropped == {"odometry_gap": 1})
+
+
+def test_a_constraint_from_the_very_first_moment_waits_for_the_second(outside: Outside) -> None:
+    outside.drive(BENT[:5])
+    outside.send([closure(TRUE, 0, 90)])
+    outside.wait(lambda: outside.door.extra_diagnostics()["constraints without odometry"] == 1)
+    assert not outside.door.ledger.balance().dropped
+
+
+def test_what_was_solved_when_a_reset_came_is_of_no_map(outside: Outside, monkeypatch: pytest.MonkeyPatch) -> None:
+    outside.drive(BENT)
+    outside.send(ROUND_TRIP)
+    outside.wait(lambda: outside.door.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP))
+    outside.wait(outside.settled)
+    door, solve = outside.door, Problem.solve
+
+    def reset_meanwhile(problem: Problem) -> Solution:
+        door._reset(None, Trigger.Response())
+        return solve(problem)
+
+    monkeypatch.setattr(Problem, "solve", reset_meanwhile)
+    door.compute(0, None)
+    assert (door.extra_diagnostics()["keyframes"], door.extra_diagnostics()["constraints kept"]) == (0, 0)
 
 
 def test_a_jump_back_in_time_starts_a_new_map(outside: Outside) -> None:
@@ -211,7 +242,10 @@ def test_without_odometry_the_oldest_constraints_make_room(outside: Outside, mon
 def test_the_services_answer(outside: Outside, tmp_path: Path) -> None:
     outside.drive(BENT[:40])
     door = outside.door
-    assert door._save(None, Trigger.Response()).message == str(tmp_path / "map.g2o")
+    offered = {name for name, _ in door.get_service_names_and_types_by_node("mapper", "/")}
+    assert offered >= {"/mapper/reset", "/mapper/save", "/mapper/enable"}
+    saved = door._save(None, Trigger.Response())
+    assert saved.success and saved.message == str(tmp_path / "map.g2o")
     text = (tmp_path / "map.g2o").read_text()
     assert text.count("VERTEX_SE3:QUAT") == len(door._graph.keyframes) == text.count("EDGE_SE3:QUAT") + 1
     assert door._enable(SetBool.Request(data=False), SetBool.Response()).success
@@ -247,3 +281,9 @@ def test_every_odometry_that_is_not_late_brings_the_correction_to_tf(outside: Ou
         outside.door._hear_odometry(to_msg.odometry(replace(word, stamp_ns=word.stamp_ns - 1000)))
     assert [from_msg.stamp_ns(message) for message in broadcaster.sent] == [w.stamp_ns for w in odometry(BENT[:3])]
     assert {(m.header.frame_id, m.child_frame_id) for m in broadcaster.sent} == {("map", "odom")}
+
+
+def test_the_correction_is_of_the_frame_that_odometry_is_in(outside: Outside) -> None:
+    broadcaster = outside.door._broadcaster = Broadcaster(outside.door)
+    outside.door._hear_odometry(to_msg.odometry(replace(odometry(BENT)[0], frame_id="world")))
+    assert [(m.header.frame_id, m.child_frame_id) for m in broadcaster.sent] == [("map", "world")]

@@ -78,3 +78,27 @@ def test_an_edge_within_the_limit_is_kept_and_shares_the_error() -> None:
     solution = optimise(poses, [*edges, edge(0, 5, translation(5.0, 0.3), uncertain=True)], max_residual=5.0)
     assert all(solution.kept)
     assert 0.05 < solution.poses[5][1, 3] < 0.3
+
+
+@pytest.mark.parametrize(("sigmas", "kept"), [(4.5, True), (5.5, False)])
+def test_an_edge_is_kept_up_to_the_limit_in_its_standard_deviations(sigmas: float, kept: bool) -> None:
+    sure = edge(0, 1, translation(1.0), sigma=1e-3)
+    off = edge(0, 1, translation(1.0, 0.1 * sigmas), sigma=0.1, uncertain=True)
+    assert optimise([np.eye(4), translation(1.0)], [sure, off], max_residual=5.0).kept == (True, kept)
+
+
+def test_right_edges_that_begin_far_off_are_kept() -> None:
+    """Odometry that turned all along: its two ends are metres apart, and nothing but the closures says so."""
+    turn = pose(rotation_from_vector(np.array([0.0, 0.0, 0.1])), np.array([1.0, 0.0, 0.0]))
+    poses = [np.eye(4)]
+    for _ in range(20):
+        poses.append(poses[-1] @ turn)
+    spread = np.diag([0.05**-2] * 3 + [0.05**-2] * 3)
+    steps = [Edge(k, k + 1, turn, spread, False) for k in range(20)]
+    sure = np.eye(6) / 0.02**2
+    straight = [Edge(k, k + 10, translation(10.0), sure, True) for k in range(11)]
+    solution = optimise(poses, [*steps, *straight], max_residual=5.0)
+    assert all(solution.kept)
+    assert np.linalg.norm(solution.poses[-1][:3, 3] - (20.0, 0.0, 0.0)) < 0.5 * np.linalg.norm(
+        poses[-1][:3, 3] - (20.0, 0.0, 0.0)
+    )

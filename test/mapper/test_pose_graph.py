@@ -11,9 +11,11 @@ import pytest
 
 from objreg_ros.data import Array, LoopClosure, Odometry
 from objreg_ros.geometry import interpolate, inverse, pose, pose_error, rotation_from_vector
+from objreg_ros.mapper.optimisation import Solution
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.pose_graph import PoseGraph
 from objreg_ros.mapper.sparse import TOLERANCE_DEG, TOLERANCE_M
+from objreg_ros.mapper.steady import Steady
 from objreg_ros.mapper.trajectory import Trajectory
 
 from .bent import SECOND, bent, closure, distances, odometry, square
@@ -144,6 +146,21 @@ def test_a_closure_waits_for_its_odometry() -> None:
     assert graph.add_closure(RIGHT[0])
 
 
+@pytest.mark.parametrize("missing", ["the first", "the second"])
+def test_a_closure_waits_while_odometry_knows_but_one_of_its_moments(missing: str) -> None:
+    graph, steps = PoseGraph(), range(20, 60) if missing == "the first" else range(20)
+    for k in steps:
+        graph.add_odometry(odometry(BENT)[k])
+    assert not graph.add_closure(closure(TRUE, 10, 40)) and all(tie.closure is None for tie in graph.ties)
+
+
+def test_a_closure_within_one_keyframe_ties_nothing() -> None:
+    graph = PoseGraph(MapperParams(keyframe_translation=10.0, keyframe_rotation=180.0))
+    for pose_in_time in odometry(BENT):
+        graph.add_odometry(pose_in_time)
+    assert graph.add_closure(closure(TRUE, 10, 40)) and graph.ties == []
+
+
 @pytest.mark.parametrize("to", [29, 30])
 def test_a_closure_of_two_runs_of_the_clock_is_refused(to: int) -> None:
     graph, ties = mapped([]), len(mapped([]).ties)
@@ -204,6 +221,37 @@ def test_keyframes_are_apart_by_the_parameters() -> None:
     assert len(near.keyframes) > 2.5 * len(far.keyframes)
     steps = [np.linalg.norm((inverse(a) @ b)[:3, 3]) for a, b in pairwise(far.keyframes.poses)]
     assert min(steps) >= 0.8
+
+
+def test_a_turn_on_the_spot_becomes_a_keyframe_by_its_degrees() -> None:
+    graph = PoseGraph(MapperParams(keyframe_rotation=15.0))
+    turns = (0.0, 14.0, 16.0, 30.0, 32.0)
+    poses = [pose(rotation_from_vector(np.radians([0.0, 0.0, turn])), np.zeros(3)) for turn in turns]
+    assert [graph.add_odometry(word) for word in odometry(poses)] == [True, False, True, False, True]
+
+
+def test_between_keyframes_the_correction_goes_over_from_the_one_to_the_other() -> None:
+    graph = PoseGraph(MapperParams(keyframe_translation=1.0))
+    for word in odometry([pose(np.eye(3), np.array([0.25 * k, 0.0, 0.0])) for k in range(9)]):
+        graph.add_odometry(word)
+    aside = [pose(np.eye(3), np.array([x, y, 0.0])) for x, y in ((0.0, 0.0), (1.0, 0.1), (2.0, 0.4))]
+    graph.adopt(graph.problem(), Solution(tuple(aside), (True, True)))
+    found = [T[:2, 3] for T in graph.corrected(o.stamp_ns for o in odometry([np.eye(4)] * 9))]
+    expected = [0.0, 0.025, 0.05, 0.075, 0.1, 0.175, 0.25, 0.325, 0.4]
+    np.testing.assert_allclose(found, [(0.25 * k, y) for k, y in enumerate(expected)], atol=1e-9)
+
+
+def test_a_pruned_closure_misfits_by_the_limit_and_what_is_steady_by_how_unexpected_it_is() -> None:
+    graph = PoseGraph(MapperParams(odometry_translation_error=0.02, steady_distance=0.02, max_residual=5.0))
+    ahead = [pose(np.eye(3), np.array([x, 0.0, 0.0])) for x in (0.0, 1.0)]
+    for word in odometry(ahead):
+        graph.add_odometry(word)
+    assert graph.add_closure(closure(ahead, 0, 1, SIDEWAYS))
+    problem = graph.problem()
+    solution = Solution(problem.poses, (True, False))
+    assert problem._misfit(solution, Steady()) == pytest.approx(5.0**2)
+    stretched = 0.04**2 / (0.02**2 / 3)  # of a step of 1 m that is known to 0.02 m in all, a third of that an axis
+    assert problem._misfit(solution, Steady(along=0.04)) == pytest.approx(5.0**2 + stretched + 2.0**2)
 
 
 def test_time_that_runs_back_is_refused() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import Array
-from objreg_ros.geometry import inverse, pose_error
+from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
 from objreg_ros.mapper.steady import Steady, estimate, step
 
 from .bent import square
@@ -43,6 +43,13 @@ def test_heading_turns_about_up_with_the_way() -> None:
     assert angle == pytest.approx(np.degrees(0.1 * length), rel=1e-4)
 
 
+def test_a_way_that_turns_all_along_ends_where_half_of_the_turn_points() -> None:
+    ahead = pose(np.eye(3), np.array([2.0, 0.0, 0.0]))
+    T = step(np.eye(4), ahead, Steady(heading=0.1, along=0.05, across=0.02))
+    np.testing.assert_allclose(T[:3, :3], rotation_from_vector(np.array([0.0, 0.0, 0.2])), atol=1e-12)
+    np.testing.assert_allclose(T[:3, 3], rotation_from_vector(np.array([0.0, 0.0, 0.1])) @ (2.1, 0.04, 0.0), atol=1e-12)
+
+
 def test_a_steady_error_is_found() -> None:
     found = estimate(TRUE, MAPPED, SIGMAS, Steady(0.1, 0.1, 0.1))
     np.testing.assert_allclose(found, WRONG, atol=1e-3)
@@ -56,3 +63,17 @@ def test_what_is_not_expected_is_not_found() -> None:
 
 def test_a_map_that_is_odometry_tells_nothing() -> None:
     np.testing.assert_allclose(estimate(TRUE, TRUE, SIGMAS, Steady(0.1, 0.1, 0.1)), 0.0, atol=1e-9)
+
+
+def test_long_steps_tell_as_much_as_short_ones() -> None:
+    true = square(laps=2, per_side=2)
+    mapped = [true[0]]
+    for a, b in pairwise(true):
+        mapped.append(mapped[-1] @ step(a, b, WRONG))
+    np.testing.assert_allclose(estimate(true, mapped, SIGMAS, Steady(0.1, 0.1, 0.1)), WRONG, atol=1e-3)
+
+
+def test_a_rest_tells_nothing_and_harms_nothing() -> None:
+    rested = ([poses[k] for k in (*range(9), *range(8, len(TRUE)))] for poses in (TRUE, MAPPED))
+    found = estimate(*rested, SIGMAS, Steady(0.1, 0.1, 0.1))
+    np.testing.assert_allclose(found, estimate(TRUE, MAPPED, SIGMAS, Steady(0.1, 0.1, 0.1)), atol=1e-12)

@@ -152,6 +152,12 @@ def test_of_two_infos_that_fit_equally_the_shorter_name_wins() -> None:
     assert choose_inputs(there).camera_info == "/camera_info"
 
 
+def test_of_several_infos_in_other_folders_none_is_taken_for_the_cameras() -> None:
+    there = topics("/head/image /head/depth/image /arm/camera_info:info /gripper/camera_info:info")
+    assert choose_inputs(there).camera_info is None
+    assert choose_inputs({name: there[name] for name in list(there)[:3]}).camera_info == "/arm/camera_info"
+
+
 def test_a_remap_wins_over_everything() -> None:
     there = topics("/image /other /depth/image /camera_info:info /points:points")
     assert choose_inputs(there, {"image": "/other"}).image == "/other"

@@ -31,6 +31,14 @@ def test_records_come_in_order_of_time(tmp_path: Path) -> None:
     assert seen[:4] == [(0, "/ground_truth"), (0, "/image"), (4_000_000, "/camera_info"), (4_000_000, "/depth/image")]
 
 
+def test_a_folder_lasts_until_its_last_picture_has_come(tmp_path: Path) -> None:
+    recording = open_recording(tum_folder(tmp_path))
+    stamps = [record.stamp_ns for record in recording.records()]
+    assert recording.start_ns == stamps[0] and recording.end_ns > stamps[-1]
+    part = [record.stamp_ns for record in recording.records(None, recording.start_ns, recording.end_ns)]
+    assert part == stamps and recording.seconds == pytest.approx((stamps[-1] - stamps[0]) * 1e-9)
+
+
 def test_pictures_farther_apart_than_the_association_are_no_pair(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match="expected colour and depth pictures within 20 ms"):
         open_recording(tum_folder(tmp_path, lists=True, lag=0.03))

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import pose, rotation_from_vector, skew
-from objreg_ros.registrar.covariance import covariance_of, spread_of, worst_translation
+from objreg_ros.registrar.covariance import NEAREST, covariance_of, spread_of, worst_translation
 from objreg_ros.registrar.params import RegistrarParams
 
 from .samples import candidate
@@ -37,7 +37,8 @@ def test_little_information_is_scaled() -> None:
 
 def test_no_information_is_a_large_covariance_and_not_an_error() -> None:
     C = covariance_of(candidate(information=np.zeros((6, 6))).alignment, PARAMS)
-    assert np.isfinite(C).all() and np.linalg.eigvalsh(C).min() > 1.0
+    assert np.isfinite(C).all()
+    assert np.diag(C) == pytest.approx([4.0 + 0.01**2] * 3 + [4.0 + np.radians(0.5) ** 2] * 3)
 
 
 def test_a_free_axis_is_open_and_the_others_are_not() -> None:
@@ -72,6 +73,21 @@ def test_a_wrong_calibration_is_a_share_of_the_motion_about_what_was_seen() -> N
     assert sigma == pytest.approx([0.05 * 0.4] * 3 + [0.05 * np.sin(0.4 / 2.0)] * 3, rel=1e-6)
     still = replace(alignment, T_target_source=np.eye(4))
     assert np.allclose(covariance_of(still, params), spread_of(still, params))
+
+
+def test_a_slide_that_turns_is_open_as_a_turn() -> None:
+    around = np.array([[0.6, 0.0, 0.0, 0.0, 0.8, 0.0]])
+    params = PARAMS.replaced(slack_rotation=60.0)
+    C = covariance_of(candidate(information=1e9 * np.eye(6), slack=around).alignment, params)
+    assert around[0] @ C @ around[0] == pytest.approx(np.radians(60.0) ** 2, rel=1e-3)
+
+
+def test_nothing_that_was_seen_counts_as_nearer_than_a_camera_sees() -> None:
+    params, near = PARAMS.replaced(covariance_calibration=0.05), np.array([0.0, 0.0, 0.1])
+    T = pose(np.eye(3), np.array([0.15, 0.0, 0.0]))
+    seen = replace(candidate(information=1e12 * np.eye(6)).alignment, T_target_source=T, middle=near)
+    C = covariance_of(seen, params) - spread_of(seen, params)
+    assert np.sqrt(np.diag(C)[3:]) == pytest.approx([0.05 * np.sin(0.15 / NEAREST)] * 3)
 
 
 @pytest.mark.parametrize("angle", [90.0, 135.0, 180.0])

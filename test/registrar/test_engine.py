@@ -4,17 +4,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from objreg_ros.data import View
 from objreg_ros.geometry import inverse, pose_error, rotation_from_vector
-from objreg_ros.registrar.engine import Engine
+from objreg_ros.registrar import engine as engine_module
+from objreg_ros.registrar.candidate import ObjectPair
+from objreg_ros.registrar.covariance import spread_of
+from objreg_ros.registrar.engine import Engine, held
 from objreg_ros.registrar.keyframe import Context, Keyframe
 from objreg_ros.registrar.params import RegistrarParams
 
 from .rooms import ROOM, keyframe, seen_from
+from .samples import candidate, moved
 
 PARAMS = RegistrarParams()
 
@@ -52,6 +58,55 @@ def test_a_pose_is_brought_to_where_gravity_is_kept_as_far_as_that_is_known() ->
         spreads.append(np.linalg.inv(best.alignment.information)[3:, 3:].trace())
     assert errors[0] < 0.1 and errors[1] > 0.8
     assert spreads[0] < spreads[1]
+
+
+def test_what_is_told_besides_makes_the_whole_covariance_smaller_and_leaves_a_covariance_of_the_warp(
+    engine: Engine,
+) -> None:
+    warp, added = np.diag([0.04, 0.01, 0.0, 0.0, 0.0, 0.02]), np.diag([100.0, 0.0, 0.0, 0.0, 400.0, 0.0])
+    doubtful = candidate(information=1e3 * np.eye(6), warp=warp)
+    alone = spread_of(doubtful.alignment, PARAMS)
+    informed = engine._informed(doubtful, added)
+    assert np.array_equal(informed.alignment.information, doubtful.alignment.information + added)
+    whole = np.linalg.inv(np.linalg.inv(alone) + added) + informed.warp
+    np.testing.assert_allclose(whole, np.linalg.inv(np.linalg.inv(alone + warp) + added), atol=1e-12)
+    assert np.linalg.eigvalsh(informed.warp).min() > -1e-12
+
+
+def test_a_pose_is_steadied_where_it_was_pushed_and_does_not_slide(
+    engine: Engine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(engine_module, "steadied", lambda *_: 100.0 * np.eye(6))
+    pair: Any = SimpleNamespace(source=None, target=None)
+    for one, more in (
+        (candidate(resistance=0.3), 100.0),
+        (candidate(resistance=None), 0.0),
+        (candidate(resistance=0.3, slack=np.eye(6)[:1]), 0.0),
+    ):
+        added = engine._steadied(pair, one).alignment.information - one.alignment.information
+        np.testing.assert_allclose(added, more * np.eye(6), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("share", "violations", "rivals"), [(0.9, 0.0, 1), (1.1, 0.0, 0), (0.9, 2.1 * PARAMS.max_violations, 0)]
+)
+def test_the_half_turn_of_a_lone_object_is_a_rival_where_it_is_not_far_behind_nor_floats(
+    engine: Engine, monkeypatch: pytest.MonkeyPatch, share: float, violations: float, rivals: int
+) -> None:
+    one, half, views = candidate(explained=(ObjectPair(0, 0, "cup"),), score=0.8, occluded=0.1), moved(0.4), "views"
+    behind = share * PARAMS.finished_margin
+    seen = replace(one.verification, score=0.8 + 0.1 - 0.3 - behind, occluded=0.3, violations=violations)
+    monkeypatch.setattr(engine_module, "half_turned", lambda *_: half)
+    monkeypatch.setattr(engine_module, "verify", lambda source, target, T, *_: seen if T is half else None)
+    monkeypatch.setattr(engine_module, "refine", lambda *_: views)
+    monkeypatch.setattr(engine_module, "gather", lambda source, target, alignment, *_: (alignment, one))
+    pair: Any = SimpleNamespace(source=SimpleNamespace(sight=None), target=SimpleNamespace(sight=None))
+    assert engine._turned(pair, one) == rivals * [(views, one)]
+    assert engine._turned(pair, candidate()) == []
+
+
+def test_what_is_held_has_no_slack_at_all() -> None:
+    assert held(candidate(slack=np.eye(6)[:2]).alignment).slack.shape == (0, 6)
 
 
 def gravity_error(T_target_source: np.ndarray, source: Keyframe, target: Keyframe) -> float:

@@ -3,13 +3,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
+from objreg_ros.geometry import pose, rotation_from_vector
+from objreg_ros.registrar import evidence
 from objreg_ros.registrar.candidate import ObjectPair
-from objreg_ros.registrar.evidence import agreement, lead, worth
+from objreg_ros.registrar.evidence import agreement, gather, gravity_error_deg, lead, resistance_of, worth
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.prepared import prepare
 
+from . import rooms
 from .samples import candidate
 
 PARAMS = RegistrarParams()
@@ -37,8 +45,40 @@ def test_that_an_object_looks_alike_is_no_lead_and_that_it_looks_otherwise_is_no
 def test_objects_that_stand_add_to_what_views_say_and_those_that_moved_take_away() -> None:
     assert agreement(BOX, (), None, PARAMS) == pytest.approx(PARAMS.object_bonus)
     assert agreement(BOX, BOX, 0.0, PARAMS) == pytest.approx(0.0)
+    assert agreement(3 * BOX, 3 * BOX, 0.0, PARAMS) == pytest.approx(0.0)  # two say all
+    assert agreement(BOX, 3 * BOX, 0.0, PARAMS) == pytest.approx(-PARAMS.object_bonus)
 
 
 def test_without_a_rival_a_candidate_leads_by_more_than_any_limit() -> None:
     assert lead(candidate(), [], PARAMS) > 2.0
     assert np.isfinite(lead(candidate(), [], PARAMS))
+
+
+def test_a_pose_is_pushed_where_surfaces_or_a_warped_depth_leave_it_doubtful(monkeypatch: pytest.MonkeyPatch) -> None:
+    pushes: list[tuple[Any, ...]] = []
+    monkeypatch.setattr(evidence, "resistance", lambda *given: pushes.append(given) or 0.25)
+    variance = (2.0 * PARAMS.doubtful_sigma) ** 2
+    warped = {"warp": np.diag([variance, 0, 0, 0, 0, 0])}
+    slack = {"information": np.diag([1.0 / variance, 1e6, 1e6, 1e6, 1e6, 1e6])}
+    for doubtful, resists in (({}, None), (warped, 0.25), (slack, 0.25)):
+        views: Any = ("source", "target")
+        assert resistance_of(candidate(**doubtful), *views, PARAMS) == resists
+    assert [given[:2] for given in pushes] == [views, views]
+    assert [given[3][0, 0] for given in pushes] == pytest.approx([variance, variance], rel=0.2)
+
+
+@pytest.mark.parametrize(("here", "there"), [(True, True), (True, False), (False, True)])
+def test_a_yaw_is_known_where_the_object_tells_it_in_both_views(here: bool, there: bool) -> None:
+    ready = prepare(rooms.keyframe(rooms.seen_from(0.0)), PARAMS)
+    views = (replace(ready, yaw_known=(told,) * len(ready.yaw_known)) for told in (here, there))
+    found = gather(*views, candidate().alignment, ("features",), PARAMS)
+    assert found.explained and found.yaw_known is (here and there)
+
+
+@pytest.mark.parametrize("angle", [0.0, 3.0, 90.0, 180.0])
+def test_the_error_of_gravity_is_the_angle_between_what_the_two_views_felt(angle: float) -> None:
+    tilted: Any = SimpleNamespace(up=rotation_from_vector(np.radians([angle, 0.0, 0.0])) @ (0.0, -1.0, 0.0))
+    level: Any = SimpleNamespace(up=np.array([0.0, -1.0, 0.0]))
+    T = pose(rotation_from_vector(np.radians([0.0, 40.0, 0.0])), np.ones(3))  # about what falls
+    assert gravity_error_deg(tilted, level, T) == pytest.approx(angle, abs=1e-5)
+    assert gravity_error_deg(level, SimpleNamespace(up=None), T) is None  # type: ignore[arg-type]

@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from objreg_ros.data import Reason
+from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.registrar.candidate import Candidate, ObjectPair
 from objreg_ros.registrar.gate import judge, refuse
 from objreg_ros.registrar.odometry import Prior
@@ -184,6 +187,10 @@ def test_an_object_that_looks_alike_makes_up_for_views_that_like_little() -> Non
     assert refusal is not None and refusal[0] is Reason.LOW_OVERLAP
 
 
+def test_an_object_that_looks_otherwise_takes_nothing_from_what_views_like() -> None:
+    assert refuse(candidate(score=1.1 * PARAMS.min_score, likeness=-1.0), PARAMS) is None
+
+
 def test_a_plain_table_needs_no_print_where_several_objects_stand_where_they_should() -> None:
     several = tuple(ObjectPair(k, k, "cup") for k in range(PARAMS.min_objects_plain))
     plain = {"texture": 0.5 * PARAMS.min_texture}
@@ -212,6 +219,15 @@ def test_a_pose_far_from_odometry_is_refused_unless_it_is_our_own_tracking() -> 
     assert refusal is not None and refusal[0] is Reason.ODOMETRY
 
 
+@pytest.mark.parametrize(("beyond", "accepted"), [(0.9, True), (1.1, False)])
+def test_odometry_refuses_a_turn_as_well_as_a_shift_beyond_its_sigmas(beyond: float, accepted: bool) -> None:
+    sigmas = beyond * PARAMS.odometry_sigmas
+    turned = pose(rotation_from_vector(np.radians([0.0, sigmas * 1.0, 0.0])), np.zeros(3))
+    for prior in (_prior(sigmas * 0.05), replace(_prior(0.0), T_target_source=turned)):
+        refusal = refuse(candidate(), PARAMS, prior)
+        assert (refusal is None) is accepted and (accepted or refusal[0] is Reason.ODOMETRY)
+
+
 def test_the_second_candidate_is_taken_when_the_first_is_refused() -> None:
     good = candidate()
     assert judge((candidate(violations=0.4), good), PARAMS) is good
@@ -220,6 +236,11 @@ def test_the_second_candidate_is_taken_when_the_first_is_refused() -> None:
 def test_the_refusal_is_that_of_the_best_candidate() -> None:
     verdict = judge((candidate(violations=0.4), candidate(texture=-1.0)), PARAMS)
     assert isinstance(verdict, tuple) and verdict[0] is Reason.FREE_SPACE
+
+
+def test_the_best_candidate_is_the_first_whatever_views_like_more() -> None:
+    good = candidate(score=0.6)
+    assert judge((candidate(violations=0.4, score=0.6), good, candidate(violations=0.4, score=0.9)), PARAMS) is good
 
 
 def test_no_candidate_at_all_is_no_hypothesis() -> None:
@@ -261,7 +282,9 @@ def test_a_rival_that_hides_more_is_the_rival_that_it_were_if_all_of_that_agreed
     assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
 
 
-@pytest.mark.parametrize("against", [{"violations": 0.4}, {"floating": 0.3}, {"explained": ()}], ids=str)
+@pytest.mark.parametrize(
+    "against", [{"violations": 0.4}, {"floating": 0.3}, {"explained": ()}, {"gravity_error_deg": 30.0}], ids=str
+)
 def test_a_pose_that_cannot_be_true_is_no_rival(against: dict) -> None:
     one = lone()
     assert isinstance(judge((one, rival(one, 0.05)), PARAMS), tuple)

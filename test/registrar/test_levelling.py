@@ -71,6 +71,20 @@ def test_gravity_says_nothing_of_a_turn_about_itself() -> None:
     assert across @ found.information @ across == pytest.approx(0.5 / np.radians(PARAMS.gravity_noise) ** 2)
 
 
+@pytest.mark.parametrize("weights", [(0.2, 1.0), (1.0, 0.2)])
+def test_what_is_told_is_as_doubtful_as_both_gravities_together(weights: tuple[float, float]) -> None:
+    found = levelling(*(seen(UP, weight) for weight in weights), TRUE, spread(), PARAMS)
+    assert found is not None
+    across = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
+    doubt = (1.0 / 0.2 + 1.0 / 1.0) * np.radians(PARAMS.gravity_noise) ** 2
+    assert across @ found.information @ across == pytest.approx(1.0 / doubt)
+
+
+@pytest.mark.parametrize("weights", [(0.0, 1.0), (1.0, 0.0)])
+def test_gravity_without_weight_tells_nothing(weights: tuple[float, float]) -> None:
+    assert levelling(*(seen(UP, weight) for weight in weights), TRUE, spread(), PARAMS) is None
+
+
 @pytest.mark.parametrize("unknown", ["source", "target"])
 def test_without_gravity_nothing_is_told(unknown: str) -> None:
     views = [seen(None if unknown == name else UP) for name in ("source", "target")]

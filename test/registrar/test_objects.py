@@ -6,13 +6,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from objreg_ros.geometry import pose
+from objreg_ros.geometry import inverse, pose
 from objreg_ros.registrar.objects import explain, likeness
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import prepare
 
-from .rooms import keyframe, seen_from
+from .rooms import ROOM, keyframe, seen_from
 
 PARAMS = RegistrarParams()
 
@@ -26,6 +27,29 @@ def test_the_middle_of_a_large_thing_may_wander_with_the_side_that_is_seen() -> 
         return len(explain(grown, grown, aside, PARAMS)[0])
 
     assert explained(0.1) == 0 and explained(1.0) == len(here.groups)
+
+
+def test_an_object_has_moved_where_each_view_looks_through_where_the_other_saw_it() -> None:
+    elsewhere = ("bottle", (1.5, 0.6, 0.72), (1.58, 0.68, 1.0))
+    later = tuple(elsewhere if box[0] == "bottle" else box for box in ROOM)
+    here, aside = seen_from(0.0), seen_from(20.0)
+    now, then = (prepare(keyframe(*seen, seed=k), PARAMS) for k, seen in enumerate(((here, later), (aside, ROOM))))
+    T_then_now = inverse(aside) @ here
+    for source, target, T in ((now, then, T_then_now), (then, now, inverse(T_then_now))):
+        explained, moved = explain(source, target, T, PARAMS)
+        assert {pair.label for pair in explained} == {"book", "cup", "keyboard"}
+        assert [pair.label for pair in moved] == ["bottle"]
+
+
+@pytest.mark.parametrize("there_first", [True, False])
+def test_an_object_that_still_stands_undetected_has_not_moved_to_where_another_came(there_first: bool) -> None:
+    bottle = ("bottle", (1.5, 0.6, 0.72), (1.58, 0.68, 1.0))
+    seen = keyframe(seen_from(0.0), (*ROOM, bottle), seed=1)
+    known = next(item for item in seen.objects if item.cloud.label == "bottle")
+    undetected = replace(seen, objects=tuple(item for item in seen.objects if item is not known))
+    views = [prepare(key, PARAMS) for key in (keyframe(seen_from(0.0), seed=2), undetected)]
+    explained, moved = explain(*(views if there_first else views[::-1]), np.eye(4), PARAMS)
+    assert {pair.label for pair in explained} == {"book", "cup", "keyboard"} and moved == ()
 
 
 def test_an_object_a_little_aside_looks_more_alike_within_reach_than_where_it_is() -> None:

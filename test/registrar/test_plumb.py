@@ -90,3 +90,11 @@ def test_old_views_are_forgotten_as_odometry_may_tilt() -> None:
         found, _ = plumb.feel(T, T[:3, :3].T @ tilt @ DOWN, 1.0)
     assert found is not None
     assert error_deg(found, T) == pytest.approx(8.0, abs=0.1)
+
+
+@pytest.mark.parametrize("there", [camera(0.0, 2.0), camera(120.0), camera(60.0, 1.0)], ids=["gone", "turned", "both"])
+def test_two_metres_or_a_hundred_and_twenty_degrees_are_as_much_of_a_way(there: np.ndarray) -> None:
+    plumb, start = line(), camera(0.0)
+    plumb.feel(start, start[:3, :3].T @ DOWN, 1.0)
+    _, weight = plumb.feel(there, there[:3, :3].T @ DOWN, 1.0)
+    assert weight == pytest.approx(1.0 - np.exp(-1.0) + ONE_VIEW)

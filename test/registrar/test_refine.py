@@ -10,7 +10,7 @@ from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
 from objreg_ros.registrar.candidate import Verification
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import prepare
-from objreg_ros.registrar.refine import about_camera, refine, settle
+from objreg_ros.registrar.refine import about_camera, refine, settle, warp
 
 from .rooms import keyframe, seen_from
 
@@ -89,6 +89,17 @@ def test_information_moves_from_the_target_camera_to_the_source_camera() -> None
     C = np.linalg.inv(about_camera(H, T))
     assert C[1, 1] == pytest.approx(1.0 + 4.0 / 100.0)  # a turn of the target camera moves what is 2 m away
     assert C[0, 0] == pytest.approx(1.0)
+
+
+def test_what_a_warped_depth_turns_moves_the_source_camera_along(pair, monkeypatch) -> None:
+    T, turns = pose(np.eye(3), np.array([2.0, 0.0, 1.0])), np.diag([0.1, 0.2, 0.3, 0.0, 0.0, 0.01])
+    monkeypatch.setattr("objreg_ros.registrar.refine.warped", lambda *_: turns)
+    C = warp(*pair, T, PARAMS)
+    assert (C[0, 0], C[1, 1], C[5, 5]) == pytest.approx((0.1, 0.2 + 2.0**2 * 0.01, 0.01))
+    assert C[1, 5] == pytest.approx(2.0 * 0.01)  # a turn about z moves what lies along x along y
+    known = turns + 1e-3 * np.eye(6)
+    monkeypatch.setattr("objreg_ros.registrar.refine.warped", lambda *_: known)
+    np.testing.assert_allclose(warp(*pair, T, PARAMS), np.linalg.inv(about_camera(np.linalg.inv(known), T)), atol=1e-9)
 
 
 @pytest.fixture

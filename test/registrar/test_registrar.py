@@ -6,18 +6,22 @@ from __future__ import annotations
 import sqlite3
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from objreg_ros.data import Array, Frame, LoopClosure, Reason, Rejected
-from objreg_ros.geometry import inverse, pose_error
+from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
+from objreg_ros.registrar.candidate import ObjectPair
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.registrar import Registrar
+from objreg_ros.registrar.registrar import Registrar, closure_of
+from objreg_ros.registrar.sighting import sightings_of
 from objreg_ros.registrar.store import StoreError
 
 from . import rooms
-from .samples import SECOND
+from .samples import SECOND, box, candidate, keyframe
 
 PARAMS = RegistrarParams()
 HERE = rooms.look_at((0.2, 0.0, 1.3), (1.8, 0.0, 0.75))
@@ -176,6 +180,37 @@ def test_a_closure_says_how_far_an_object_has_moved() -> None:
     assert closures[0].evidence["yaw_known"] in (0.0, 1.0)
 
 
+def test_a_closure_names_each_label_once_and_the_farthest_of_several_that_moved() -> None:
+    here, there = (
+        keyframe(number, number, tuple(box("cup", (x, 0.0, 1.0), instance=k) for k, x in enumerate(places, 1)))
+        for number, places in ((2, (0.0, 0.3, 0.6, 0.9)), (1, (0.0, 0.3, 1.1, 1.0)))
+    )
+    pairs = [ObjectPair(k, k, "cup") for k in range(4)]
+    sightings = [seen.of_landmark(number, np.eye(3)) for number, seen in enumerate(sightings_of(here), 7)]
+    accepted: Any = SimpleNamespace(
+        target=replace(there, frame_id="front"), candidate=candidate(explained=pairs[:2], moved=pairs[2:])
+    )
+    closure = closure_of(here, sightings, accepted, PARAMS)
+    assert closure.labels == ("cup",) and [match.object_id for match in closure.matches] == [7, 8]
+    assert closure.moved == {"cup": pytest.approx(0.5)}
+    assert (closure.from_ns, closure.to_ns) == (there.stamp_ns, here.stamp_ns)
+    assert (closure.from_frame_id, closure.to_frame_id) == ("front", "camera")
+
+
+def test_a_link_turns_what_is_here_into_the_frame_of_the_session_there() -> None:
+    yaws = (0.3, 0.5, 1.1)  # of the camera there, of the closure, of the camera here
+    there_camera, T, here_camera = (pose(rotation_from_vector(np.array([0.0, yaw, 0.0])), np.ones(3)) for yaw in yaws)
+    registrar, there = Registrar(PARAMS), keyframe(1, T_odom_camera=there_camera)
+    (known,) = sightings_of(there)
+    registrar._store.add(there, [known.of_landmark(7, np.eye(3))])
+    accepted: Any = SimpleNamespace(target=there, candidate=candidate(T, explained=(ObjectPair(0, 0, "cup"),)))
+    (link,) = registrar._links(keyframe(2, 30.0, T_odom_camera=here_camera), accepted)
+    assert (link.index, link.of.landmark) == (0, 7)
+    np.testing.assert_allclose(
+        link.R_there_here, rotation_from_vector(np.array([0.0, 0.3 + 0.5 - 1.1, 0.0])), atol=1e-9
+    )
+
+
 def test_landmarks_of_another_session_are_known_but_not_here(tmp_path: Path) -> None:
     for expected in (False, True):
         registrar = Registrar(RegistrarParams(store=str(tmp_path / "place.db")))
@@ -232,6 +267,12 @@ def test_a_place_of_an_earlier_run_of_the_clock_that_reached_this_one_closes_not
     (told,) = [r for r in rejected if r.reason is Reason.CLOCK]
     assert told.detail == "the clock began anew at 12.000 s; sessions up to 1 had seen that time before"
     assert {closure.from_ns for closure in closures if closure.to_ns in (12 * SECOND, 40 * SECOND)} <= {12 * SECOND}
+
+
+def test_a_closure_of_an_earlier_run_of_the_clock_makes_none_of_this_one_redundant() -> None:
+    runs = [_frame(t, T) for _ in range(2) for t, T in ((10.0, HERE), (40.0, BESIDE))]
+    closures, _ = _run(Registrar(PARAMS), *runs)
+    assert [(closure.from_ns, closure.to_ns) for closure in closures] == 2 * [(10 * SECOND, 40 * SECOND)]
 
 
 def test_however_often_a_clock_began_anew_its_last_run_closes_loops() -> None:

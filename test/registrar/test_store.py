@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import random
 import signal
+import shutil
 import sqlite3
 import subprocess
 import sys
@@ -159,6 +160,48 @@ def test_the_oldest_keyframes_are_those_beyond_a_number() -> None:
     assert store.beyond(3) == numbers[:2] and store.beyond(9) == []
 
 
+def test_the_oldest_are_known_when_a_store_is_opened_again(tmp_path: Path) -> None:
+    store = Store(tmp_path / "place.db")
+    numbers = [_add(store, float(i)) for i in range(5)]
+    store.close()
+    assert Store(tmp_path / "place.db").beyond(3) == numbers[:2]
+
+
+def test_what_was_removed_is_neither_there_nor_counted() -> None:
+    store = Store()
+    first, second = _add(store), _add(store, session=1)
+    store.remove([second])
+    with pytest.raises(KeyError):
+        store.keyframe(second)
+    assert (store.keyframe_ids(), store.counts()["keyframes"], store.counts()["objects"]) == ([first], 1, 1)
+    assert (store.counts()["sessions"], store.next_session()) == (1, 1)
+
+
+def test_objects_of_one_landmark_are_counted_as_one() -> None:
+    store = Store()
+    for number, landmark in ((1, 7), (2, 7), (3, 9)):
+        written = keyframe(number, float(number))
+        store.add(written, [sightings_of(written)[0].of_landmark(landmark, np.eye(3))])
+    assert (store.counts()["objects"], store.counts()["landmarks"]) == (3, 2)
+
+
+def test_the_last_session_that_reached_a_moment_is_one_before_and_may_end_with_it() -> None:
+    store = Store()
+    for session, seconds in ((0, 30.0), (1, 20.0), (2, 40.0)):
+        _add(store, seconds, session=session)
+    reached = {
+        s: [store.last_session_beyond(k, round(s * 1e9)) for k in (0, 1, 2, 3)] for s in (15, 20, 25, 30, 35, 45)
+    }
+    assert reached == {
+        15: [-1, 0, 1, 2],
+        20: [-1, 0, 1, 2],
+        25: [-1, 0, 0, 2],
+        30: [-1, 0, 0, 2],
+        35: [-1, -1, -1, 2],
+        45: [-1, -1, -1, -1],
+    }
+
+
 def test_clearing_forgets_all_but_the_ids() -> None:
     store = Store()
     _add(store)
@@ -203,6 +246,23 @@ def test_a_copy_never_goes_where_a_registrar_writes(tmp_path: Path) -> None:
         with pytest.raises(StoreError, match="in use by another registrar"):
             store.save(path)
     other.close()
+
+
+def test_a_store_that_was_saved_is_whole_without_the_log_beside_it(tmp_path: Path) -> None:
+    store = Store(tmp_path / "place.db")
+    _add(store)
+    assert store.save() == str(tmp_path / "place.db")
+    shutil.copy(tmp_path / "place.db", tmp_path / "alone.db")
+    assert Store(tmp_path / "alone.db").counts()["keyframes"] == 1
+
+
+def test_what_was_not_used_for_longest_leaves_the_memory_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store_module, "CACHED", 2)
+    store = Store()
+    first, second = (_add(store, float(i)) for i in range(2))
+    left, kept = store.keyframe(second), store.keyframe(first)
+    _add(store, 2.0)
+    assert store.keyframe(first) is kept and store.keyframe(second) is not left
 
 
 def test_only_the_last_few_keyframes_stay_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:

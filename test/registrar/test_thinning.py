@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from objreg_ros.registrar.thinning import Thinning
 
 from .samples import SECOND
@@ -21,3 +23,26 @@ def test_what_came_to_nothing_is_not_in_the_way() -> None:
     thinning.accept(0, 60 * SECOND)
     thinning.withdraw(0, 60 * SECOND)
     assert not thinning.redundant(0, 60 * SECOND)
+
+
+@pytest.mark.parametrize(
+    ("from_s", "to_s", "redundant"),
+    [
+        (9.1, 59.6, True),
+        (10.9, 61.4, True),
+        (9.0, 60.5, False),
+        (11.0, 60.5, False),
+        (10.0, 59.5, False),
+        (10.0, 61.5, False),
+    ],
+)
+def test_near_is_less_than_the_span_before_and_after_at_either_end(from_s: float, to_s: float, redundant: bool) -> None:
+    thinning = Thinning(1.0)
+    thinning.accept(10 * SECOND, 60 * SECOND + SECOND // 2)
+    assert thinning.redundant(round(from_s * SECOND), round(to_s * SECOND)) is redundant
+
+
+def test_without_a_span_only_the_very_pair_is_redundant() -> None:
+    thinning = Thinning(0.0)
+    thinning.accept(5, 7)
+    assert thinning.redundant(5, 7) and not thinning.redundant(5, 8) and not thinning.redundant(4, 7)

@@ -3,13 +3,26 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
+from objreg_ros.registrar import verify as verify_module
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.verify import floating, verify
-from objreg_ros.registrar.visibility import prepare_sight
+from objreg_ros.registrar.verify import (
+    NO_TEXTURE,
+    WORST,
+    floating,
+    look,
+    looks,
+    rank,
+    rated,
+    rated_quickly,
+    verify,
+)
+from objreg_ros.registrar.visibility import INLIERS, OCCLUDED, SEEN, VIOLATIONS, prepare_sight
 
 from .rooms import keyframe, seen_from
 
@@ -58,3 +71,49 @@ def test_a_ragged_edge_does_not_float_and_a_thing_that_is_gone_does(sights) -> N
 
 def test_views_that_do_not_meet_float_altogether(sights) -> None:
     assert floating(*sights, pose(np.eye(3), np.array([0.0, 0.0, 90.0])), PARAMS) == 1.0
+
+
+def test_many_poses_are_looked_at_both_ways_like_each_alone(sights) -> None:
+    source, target = sights
+    poses = np.stack([TRUTH, pose(rotation_from_vector(np.array([0.0, 0.1, 0.0])), np.array([0.1, 0.0, 0.05])) @ TRUTH])
+    forward, backward = looks(source, target, poses, PARAMS, 3000)
+    for k, T in enumerate(poses):
+        np.testing.assert_allclose(forward[k], look(source, target, T, PARAMS, 3000), rtol=1e-6)
+        np.testing.assert_allclose(backward[k], look(target, source, inverse(T), PARAMS, 3000), rtol=1e-6)
+    alone = [verify(source, target, T, PARAMS, 3000).score for T in poses]
+    assert rank(source, target, poses, PARAMS, 3000) == pytest.approx(alone) and alone[0] > alone[1]
+
+
+def counted(seen: int, inliers: int, violations: int = 0, occluded: int = 0) -> np.ndarray:
+    """What one way of looking counts."""
+    counts = np.zeros(10)
+    counts[[SEEN, INLIERS, VIOLATIONS, OCCLUDED]] = seen, inliers, violations, occluded
+    return counts
+
+
+def test_v_is_of_the_worse_way_the_grey_and_the_share_that_could_be_tested() -> None:
+    forward, backward = counted(100, 90, 10), counted(300, 150, 3)
+    for ways in ((forward, backward), (backward, forward)):
+        assert rated(*ways, 0.4, 400) == pytest.approx(0.4 + 0.5 - 3.0 * 0.1 - 0.65)
+        assert rated(*ways, 0.4, 4000) == pytest.approx(0.4 + 0.5 - 3.0 * 0.1 - 0.5 - 0.65)
+        assert rated_quickly(*ways, False, 400) == pytest.approx(rated(*ways, NO_TEXTURE, 400))
+    for ways in ((forward, counted(0, 0)), (counted(0, 0), forward)):
+        assert rated(*ways, 1.0, 400) == WORST
+
+
+def test_what_is_said_of_a_pose_is_what_the_worse_way_says_of_each(monkeypatch: pytest.MonkeyPatch) -> None:
+    ways = {1: counted(100, 90, 10, 5), 2: counted(300, 150, 3, 60)}
+    monkeypatch.setattr(verify_module, "look", lambda source, *_: ways[source.side])
+    one, other = (SimpleNamespace(side=side, textured=False, points=range(200)) for side in (1, 2))
+    for sights in ((one, other), (other, one)):
+        found = verify(*sights, TRUTH, PARAMS)
+        assert (found.inliers, found.violations, found.occluded, found.texture) == (0.5, 0.1, 0.2, None)
+        assert found.tested == 400 and found.score == pytest.approx(NO_TEXTURE + 0.5 - 3.0 * 0.1 - 0.65)
+
+
+def test_views_of_which_only_one_sees_the_other_do_not_meet(monkeypatch: pytest.MonkeyPatch) -> None:
+    ways = {1: counted(100, 90), 2: counted(0, 0)}
+    monkeypatch.setattr(verify_module, "look", lambda source, *_: ways[source.side])
+    one, other = (SimpleNamespace(side=side, textured=False, points=range(200)) for side in (1, 2))
+    for sights in ((one, other), (other, one)):
+        assert (verify(*sights, TRUTH, PARAMS).tested, verify(*sights, TRUTH, PARAMS).score) == (0, WORST)

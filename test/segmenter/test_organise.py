@@ -71,6 +71,14 @@ def test_the_nearest_of_two_points_in_a_pixel_wins() -> None:
     assert image.rgb[23, 30].tolist() == [1, 1, 1]
 
 
+def test_points_beside_the_image_are_left_out_on_every_side() -> None:
+    depth = hilly_depth()
+    inside = cloud_of(depth).xyz.reshape(1, -1, 3)
+    beside = np.array([[[-0.4, 0, 1], [0.4, 0, 1], [0, -0.4, 1], [0, 0.4, 1], [0.4, 0.4, 1]]], np.float32)
+    both = PointCloud(xyz=np.concatenate([inside, beside], axis=1), rgb=None, stamp_ns=0)
+    np.testing.assert_allclose(organise(both, CAMERA).depth, depth, rtol=1e-6)
+
+
 def test_a_thinned_cloud_gives_the_smaller_image_that_its_points_fill() -> None:
     scene = Scene().plane().box((-0.1, -0.1, 0), (0.1, 0.1, 0.15))
     image = scene.image(0.001)
