@@ -96,17 +96,22 @@ def test_messages_are_heard_while_a_reset_waits_for_the_search_in_hand(make: Mak
     node.close()
 
 
-@pytest.mark.parametrize("shut_down", [False, True])
-def test_the_node_ends_well_where_its_last_keyframes_cannot_be_stored(
-    make: Making, tmp_path: Path, capfd: pytest.CaptureFixture[str], shut_down: bool
-) -> None:
-    node = make()
+def with_two_to_store(node: RegistrarNode) -> RegistrarNode:
+    """The node with a keyframe that waits for its search, and another in hand."""
     node._registrar.track(frame(0, CUP))
     waiting = node._registrar.end()
     assert waiting is not None
     node.searcher.close()
     node.searcher.put((0, waiting))
     node._registrar.track(frame(30, CUP))
+    return node
+
+
+@pytest.mark.parametrize("shut_down", [False, True])
+def test_the_node_ends_well_where_its_last_keyframes_cannot_be_stored(
+    make: Making, tmp_path: Path, capfd: pytest.CaptureFixture[str], shut_down: bool
+) -> None:
+    node = with_two_to_store(make())
     with held(tmp_path / "place.db"):
         if shut_down:
             rclpy.shutdown()
@@ -120,13 +125,7 @@ def test_the_node_ends_well_where_its_last_keyframes_cannot_be_stored(
 def test_a_keyframe_that_cannot_be_stored_is_not_in_the_way_of_the_next(
     make: Making, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    node = make()
-    node._registrar.track(frame(0, CUP))
-    waiting = node._registrar.end()
-    assert waiting is not None
-    node.searcher.close()
-    node.searcher.put((0, waiting))
-    node._registrar.track(frame(30, CUP))
+    node = with_two_to_store(make())
     add, tries = node._registrar._store.add, []
 
     def full_once(*arguments: Any) -> None:
