@@ -18,12 +18,14 @@ class Course(Generic[T]):
 
     A leap is back by `JUMP_NS` or ahead by `AHEAD_NS`: of a looped bag or a clock that was set, or of one message that
     was stamped wrongly, which must not part what came before from what comes after. ``on_alone`` is given the stamp and
-    the item of such a one.
+    the item of such a one. What nothing speaks against for a while is believed too: who sends one item and waits for
+    what becomes of it sends no next one.
     """
 
     def __init__(self, on_alone: Callable[[int, T], None]) -> None:
         self._on_alone = on_alone
         self._held: tuple[int, T] | None = None
+        self._asked: tuple[int, T] | None = None  # what was held at the last `believe`
         self._last_ns: int | None = None
 
     @property
@@ -43,6 +45,15 @@ class Course(Generic[T]):
             return []
         self._last_ns = stamp_ns if self._last_ns is None else max(stamp_ns, self._last_ns)
         return [(stamp_ns, item)]
+
+    def believe(self) -> list[tuple[int, T]]:
+        """The stamp and item that were held at the last call of this already; to be called now and again."""
+        held, asked = self._held, self._asked
+        self._asked = held
+        if held is None or held is not asked:
+            return []
+        self._held, self._last_ns = None, held[0]
+        return [held]
 
     def end(self) -> None:
         """Let go of what is held: nothing more will come."""

@@ -8,10 +8,13 @@ from collections.abc import Mapping, Sequence
 from itertools import chain, count
 from typing import Any
 
+from rclpy.clock import Clock, ClockType
+
 from objreg_ros.bridge.door import Door
 from objreg_ros.bridge.sync import Drop, Need, Stream, Synchroniser
 from objreg_ros.params import Params
 
+ALONE_S = 0.5  # after once to twice this a stamp that has leapt alone is believed
 EARLY = 30  # messages of a stream that are kept until it is known how they are matched
 
 Early = tuple[int, str, int, Any]  # order of arrival, stream, stamp, payload
@@ -30,6 +33,7 @@ class MatchingDoor(Door):
         self._order = count()
         self._sync: Synchroniser | None = None
         self._reference = ""
+        self.create_timer(ALONE_S, self._believe, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def begin(self, streams: Sequence[Stream]) -> None:
         """Start matching; what was fed to streams that are not among these is forgotten."""
@@ -53,6 +57,10 @@ class MatchingDoor(Door):
                 self.accept(stamp_ns)
             for match in self._sync.add(name, stamp_ns, payload):
                 self.worker.put((match.stamp_ns, match))
+
+    def _believe(self) -> None:
+        for match in () if self._sync is None else self._sync.believe():
+            self.worker.put((match.stamp_ns, match))
 
     def _unmatched(self, name: str, stamp_ns: int, why: str) -> None:
         if name == self._reference:

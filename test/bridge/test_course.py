@@ -39,5 +39,24 @@ def test_of_two_that_leap_to_different_times_the_last_is_asked_for() -> None:
     assert passed([NOW, NOW + 2 * AHEAD_NS, 5, 6]) == ([NOW, 5, 6], [NOW + 2 * AHEAD_NS])
 
 
+def test_one_that_nothing_speaks_against_for_a_while_is_believed() -> None:
+    course: Course[str] = Course(lambda stamp_ns, item: pytest.fail("it was let go"))
+    assert course.admit(NOW, "old") == [(NOW, "old")] and course.believe() == []
+    assert course.admit(5, "new") == []
+    assert course.believe() == [] and course.believe() == [(5, "new")] and course.believe() == []
+    assert course.admit(6, "newer") == [(6, "newer")]
+
+
+def test_each_one_that_leaps_has_its_own_while() -> None:
+    alone: list[int] = []
+    course: Course[str] = Course(lambda stamp_ns, item: alone.append(stamp_ns))
+    for stamp in (NOW, 0):
+        course.admit(stamp, "item")
+    assert course.believe() == []
+    for stamp in (NOW + 1, 1):
+        course.admit(stamp, "item")
+    assert course.believe() == [] and course.believe() == [(1, "item")] and alone == [0]
+
+
 def test_one_that_leaps_at_the_end_is_let_go() -> None:
     assert passed([NOW, 0]) == ([NOW], [0])

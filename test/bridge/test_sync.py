@@ -260,6 +260,14 @@ def test_one_stamp_that_is_far_from_its_neighbours_is_left_out_and_nothing_else(
         assert all(q.dropped == {"odd_stamp": 1} for q in sync.queues.values()) and accounts_hold(sync)
 
 
+def test_a_jump_back_of_one_item_is_believed_after_a_while() -> None:
+    sync = Synchroniser(EXACT)
+    for name in ("image", "depth"):
+        sync.add(name, 5 * JUMP_NS, "old")
+    assert sync.add("image", 1, "i") == sync.add("depth", 1, "d") == sync.believe() == []
+    assert pairs(sync.believe(), "image", "depth") == [("i", "d")] and accounts_hold(sync)
+
+
 def test_a_stream_that_follows_anothers_jump_back_loses_nothing_in_silence() -> None:
     sync = Synchroniser((Stream("image"), Stream("depth"), Stream("odom", Need.OPTIONAL)))
     for name, stamp in (("depth", 1), ("odom", 1 + JUMP_NS), ("odom", 1), ("odom", 1), ("image", 0)):
