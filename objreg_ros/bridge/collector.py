@@ -76,8 +76,8 @@ class Collector(Node):
 
     def close(self) -> None:
         """End the node."""
-        self._executor.shutdown()
         self.destroy_node()
+        self._executor.shutdown()  # last, as in `player`
 
     def _hear_books(self, message: DiagnosticArray) -> None:
         for status in message.status:

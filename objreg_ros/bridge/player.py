@@ -195,8 +195,8 @@ class Player(Node):
 
     def close(self) -> None:
         """End the node."""
-        self._executor.shutdown()
         self.destroy_node()
+        self._executor.shutdown()  # last: the thread that heard a signal may still ring the bell that this takes down
 
 
 def is_installed(kind: str) -> bool:
