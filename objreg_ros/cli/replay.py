@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -63,8 +64,6 @@ def command(
     With --all, topics of a type that is not installed here, or that ROS 2 has with other fields, are left out, and
     named. Arguments behind -- go to ROS, like -- --ros-args -r __ns:=/robot.
     """
-    import rclpy
-
     from objreg_ros.bridge import profile
     from objreg_ros.bridge.lifetime import begin, shutdown_as_interrupt
     from objreg_ros.bridge.player import Player
@@ -79,19 +78,27 @@ def command(
         click.echo(profile.apply(), err=True)
         begin(ros_args)
         latched = {names[topic] for topic in source.latched.keys() & names.keys()}
-        with shutdown_as_interrupt():
-            player = Player({out: source.topics[topic].msgtype for topic, out in names.items()}, clock, latched)
-            try:
-                _prepare(player, inputs, names, wait)
-                receipts = player.listen_to_receipts(wait) if lossless else None
-                while True:
-                    _play_once(player, source, selection, inputs, None if lossless else rate, receipts, patience)
-                    if not loop:
-                        break
-            finally:
-                player.close()
-                rclpy.try_shutdown()
+        kinds = {out: source.topics[topic].msgtype for topic, out in names.items()}
+        with shutdown_as_interrupt(), _begun(Player(kinds, clock, latched)) as player:
+            _prepare(player, inputs, names, wait)
+            receipts = player.listen_to_receipts(wait) if lossless else None
+            again = True
+            while again:
+                _play_once(player, source, selection, inputs, None if lossless else rate, receipts, patience)
+                again = loop
         _say(player, receipts)
+
+
+@contextmanager
+def _begun(player: Player) -> Iterator[Player]:
+    """The player, closed at the end, and ROS with it."""
+    import rclpy
+
+    try:
+        yield player
+    finally:
+        player.close()
+        rclpy.try_shutdown()
 
 
 def playable_names(source: Recording, inputs: Inputs) -> dict[str, str]:

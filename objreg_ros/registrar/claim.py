@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One registrar for a store: two would give the same ids to different things."""
+"""One registrar for a store: two would give the same ids to different things.
+
+Our own few lines, as rosdep has no key for the library that has them, `filelock`.
+"""
 
 from __future__ import annotations
 

@@ -24,8 +24,9 @@ def export(path: str | Path, folder: str | Path) -> Iterator[Path]:
 
     ``objects/<landmark>_<label>/keyframe_<id>_<instance>.ply`` is one view of an object and
     ``contexts/keyframe_<id>.ply`` what was around it, both in m in the frame of the session. Their points are doubles,
-    since that frame may be UTM's, where a float steps by half a metre. ``map.json`` holds keyframes with their objects,
-    the landmarks that those are of, and closures. StoreError (an OSError) if it is no store or damaged, OSError if
+    since that frame may be UTM's, where a float steps by half a metre. ``map.json`` holds keyframes with their objects
+    (``frames`` is how many showed one, ``density`` in points per square metre of it), the landmarks that those are of,
+    and closures. StoreError (an OSError) if it is no store or damaged, OSError if
     there is anything in the folder already.
     """
     folder = Path(folder)
@@ -104,6 +105,8 @@ def _keyframe_json(keyframe: Keyframe, sightings: list[Sighting]) -> dict[str, A
                 "score": sighting.score,
                 "position": sighting.position.tolist(),
                 "points": len(item.cloud),
+                "frames": item.sightings,
+                "density": item.cloud.density,
             }
             for item, sighting in zip(keyframe.objects, sightings, strict=True)
         ],

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -53,6 +54,7 @@ def test_points_far_from_the_origin_of_the_odometry_keep_their_places(tmp_path: 
 def test_a_store_becomes_clouds_in_the_frame_of_the_session_and_a_map(tmp_path: Path) -> None:
     store = Store(tmp_path / "place.db")
     taken = keyframe(1, 2.0, (box("cell phone", (0, 0, 1)),), T_odom_camera=moved(5.0))
+    taken = replace(taken, objects=(replace(taken.objects[0], sightings=3),))
     (sighting,) = sightings_of(taken)
     closure = LoopClosure(from_ns=1, to_ns=2, T_from_to=moved(0.3), covariance=np.eye(6), labels=("cup",))
     store.add(taken, [sighting.of_landmark(7, np.eye(3))], [closure])
@@ -65,7 +67,8 @@ def test_a_store_becomes_clouds_in_the_frame_of_the_session_and_a_map(tmp_path: 
     ]
     assert abs(float(_read_ply(files[0])["x"].mean()) - 5.0) < 0.05
     content = json.loads(files[2].read_text())
-    assert content["keyframes"][0]["objects"][0]["landmark"] == 7
+    (item,) = content["keyframes"][0]["objects"]
+    assert (item["landmark"], item["frames"], item["density"]) == (7, 3, taken.objects[0].cloud.density)
     assert [(known["landmark"], known["label"], known["sightings"]) for known in content["landmarks"]] == [
         (7, "cell phone", 1)
     ]
