@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.geometry import inverse, vector_from_rotation
+from objreg_ros.geometry import inverse, pose, vector_from_rotation
 
 STAGE = 4.0  # mu shrinks by this factor from stage to stage
 PRUNED = 0.25  # the weight of an edge whose squared residual is mu
@@ -74,11 +74,17 @@ def _stages(poses: Sequence[Array], edges: Sequence[Edge], wanted: float) -> lis
 
 
 def _optimise_once(poses: Sequence[Array], edges: Sequence[Edge], mu: float) -> tuple[list[Array], Array]:
-    """Poses and weights of the edges at one value of mu."""
+    """Poses and weights of the edges at one value of mu.
+
+    About where the first node is: Open3D turns poses about the origin, and far from it, as in UTM's frame, a step is
+    so ill-conditioned that it takes none and switches every edge off.
+    """
     import open3d as o3d
 
     registration = o3d.pipelines.registration
-    graph = _open3d_graph(registration, poses, edges)
+    T_map_first = pose(np.eye(3), poses[0][:3, 3])
+    T_first_map = inverse(T_map_first)
+    graph = _open3d_graph(registration, [T_first_map @ T for T in poses], edges)
     # Open3D derives mu from a distance and the mean of information(5, 5), which it takes for a count of points.
     mean_information = float(np.mean([edge.information[5, 5] for edge in edges]))
     option = registration.GlobalOptimizationOption(
@@ -96,13 +102,13 @@ def _optimise_once(poses: Sequence[Array], edges: Sequence[Edge], mu: float) -> 
             option,
         )
     weights = np.array([edge.confidence if edge.uncertain else 1.0 for edge in graph.edges])
-    return [np.array(node.pose) for node in graph.nodes], weights
+    return [T_map_first @ node.pose for node in graph.nodes], weights
 
 
 def _open3d_graph(registration: Any, poses: Sequence[Array], edges: Sequence[Edge]) -> Any:
     graph = registration.PoseGraph()
-    for pose in poses:
-        graph.nodes.append(registration.PoseGraphNode(np.array(pose)))
+    for T in poses:
+        graph.nodes.append(registration.PoseGraphNode(np.array(T)))
     for edge in edges:
         graph.edges.append(
             registration.PoseGraphEdge(

@@ -180,7 +180,7 @@ class PoseGraph:
 
     def corrected(self, stamps_ns: Iterable[int]) -> list[Array]:
         """``T_map_body`` at any moments that odometry covers; ValueError for one that it does not."""
-        return [self._correction_at(stamp) @ self.odometry.at(stamp) for stamp in stamps_ns]
+        return [self._corrected_at(stamp, self.odometry.at(stamp)) for stamp in stamps_ns]
 
     def _correction(self, k: int) -> Array:
         """``T_map_odom`` at a keyframe."""
@@ -189,13 +189,17 @@ class PoseGraph:
         k = min(k, len(self._solved) - 1)
         return self._solved[k] @ inverse(self.keyframes.poses[k])
 
-    def _correction_at(self, stamp_ns: int) -> Array:
-        """``T_map_odom`` between keyframes goes over smoothly from the one to the other."""
-        corrections = Trajectory()
+    def _corrected_at(self, stamp_ns: int, T_odom_body: Array) -> Array:
+        """``T_map_body``: between keyframes it goes over smoothly from the correction of the one to the other's.
+
+        What goes over is where they put the body. The corrections themselves turn about the origin of odometry, and
+        between two of them a body far from there would leave its way.
+        """
+        bodies = Trajectory()
         near = self.keyframes.nearest(stamp_ns)
         for k in range(max(near - 1, 0), min(near + 2, len(self.keyframes))):
-            corrections.append(self.keyframes.stamps_ns[k], self._correction(k))
-        return corrections.at(min(max(stamp_ns, corrections.stamps_ns[0]), corrections.stamps_ns[-1]))
+            bodies.append(self.keyframes.stamps_ns[k], self._correction(k) @ T_odom_body)
+        return bodies.at(min(max(stamp_ns, bodies.stamps_ns[0]), bodies.stamps_ns[-1]))
 
     def _moved_on(self, T_odom_body: Array) -> bool:
         if not self.keyframes.poses:

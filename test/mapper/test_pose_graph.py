@@ -57,6 +57,19 @@ def test_wrong_edges_are_pruned_and_change_nothing() -> None:
     assert distances(corrected(dirty), corrected(clean)).max() < 0.005
 
 
+def test_a_map_far_from_the_origin_of_odometry_is_the_same_map() -> None:
+    T_utm_odom = pose(np.eye(3), np.array([450_000.0, 5_400_000.0, 120.0]))
+    near, far = mapped(RIGHT), PoseGraph()
+    for known in odometry(BENT):
+        far.add_odometry(replace(known, T_odom_body=T_utm_odom @ known.T_odom_body))
+    for constraint in RIGHT:
+        assert far.add_closure(constraint)
+    near.optimise()
+    assert not far.optimise().pruned
+    there = [inverse(T_utm_odom) @ T for T in corrected(far)]
+    assert distances(there, corrected(near)).max() < 1e-6
+
+
 def test_without_closures_the_map_is_odometry() -> None:
     graph = mapped([])
     assert graph.optimise().kept == ()
