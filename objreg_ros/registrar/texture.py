@@ -113,7 +113,7 @@ def _greys(laid, detail):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True, nogil=True)
 def _mirrored(place, size):  # type: ignore[no-untyped-def]
     """The row or column that is seen in a place beyond the first or the last."""
-    return max(0, min(abs(place), 2 * size - 2 - place))
+    return max(0, min(abs(place), 2 * size - 2 - place, size - 1))
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)

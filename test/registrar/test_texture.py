@@ -10,7 +10,7 @@ import pytest
 
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.texture import NARROW, compare, texture
+from objreg_ros.registrar.texture import NARROW, WINDOW, _mirrored, compare, texture
 from objreg_ros.registrar.verify import verify
 from objreg_ros.registrar.visibility import SHADED, Sight, correlation, prepare_sight
 
@@ -52,6 +52,12 @@ def test_a_print_that_is_shifted_does_not_correlate() -> None:
 def test_a_darker_picture_has_the_same_print() -> None:
     bright, dark = (texture(sight(0.0), sight(25.0, by), between(0.0, 25.0), PARAMS) for by in (1.0, 0.5))
     assert dark == pytest.approx(bright, abs=0.02)
+
+
+def test_what_is_mirrored_beyond_the_rim_is_of_the_picture_however_small_that_is() -> None:
+    for size in (1, 4, WINDOW // 2, 160):
+        seen = [_mirrored(place, size) for place in range(-(WINDOW // 2), size + WINDOW // 2)]
+        assert min(seen) == 0 and max(seen) == size - 1
 
 
 def test_both_ways_round_give_the_same_texture() -> None:
