@@ -16,6 +16,7 @@ import numpy as np
 from objreg_ros.data import Array
 
 MOST_PAIRS = 6000  # of matches that agree, each of which gives a pose to weigh
+ASIDE = 1e-8  # the square of 0.1 mm: a baseline that is no farther aside of its direction fixes no pose with it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -102,6 +103,15 @@ def _dot(a, b):  # type: ignore[no-untyped-def]
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
+@numba.njit(cache=True, nogil=True, inline="always")
+def _aside(n, m, baseline, length):  # type: ignore[no-untyped-def]
+    """The square of how far the sum of two normals is aside of a baseline; 0 where that has no length."""
+    if length == 0.0:
+        return 0.0
+    along = (_dot(n, baseline) + _dot(m, baseline)) / length
+    return _dot(n, n) + 2.0 * _dot(n, m) + _dot(m, m) - along * along
+
+
 @numba.njit(cache=True, nogil=True)
 def _consistent_pairs(P, Q, N, M, up_p, up_q, upright, tolerance, shortest, most):  # type: ignore[no-untyped-def]
     """Pairs (K, 2) of matches that one rigid motion can explain, from the best ones on, at most ``most``."""
@@ -120,8 +130,14 @@ def _consistent_pairs(P, Q, N, M, up_p, up_q, upright, tolerance, shortest, most
                 continue
             if upright:
                 hp, hq = _dot(dp, up_p), _dot(dq, up_q)
-                if abs(hp - hq) > tolerance or lp * lp - hp * hp < 0.5 * shortest * shortest:
+                if (
+                    abs(hp - hq) > tolerance
+                    or lp * lp - hp * hp < 0.5 * shortest * shortest
+                    or lq * lq - hq * hq < ASIDE
+                ):
                     continue
+            elif min(_aside(N[i], N[j], dp, lp), _aside(M[i], M[j], dq, lq)) < ASIDE:
+                continue
             if known[i] and known[j]:
                 if (
                     abs(_dot(N[i], N[j]) - _dot(M[i], M[j])) > 0.25

@@ -44,6 +44,25 @@ def test_matches_that_agree_on_nothing_give_no_pose() -> None:
     assert poses(alone, UP, UP, 0.06, 0.3, 5) == ()
 
 
+def standing(source, target, normals) -> Matches:
+    unknown = np.zeros((2, 3)) if normals is None else np.array([normals, normals], float)
+    return Matches(
+        source=np.array(source, float), target=np.array(target, float),
+        source_normals=unknown, target_normals=unknown, weights=np.ones(2),
+    )  # fmt: skip
+
+
+def test_a_baseline_that_stands_upright_in_one_frame_gives_no_pose() -> None:
+    """It tells no turn about gravity, however little its length differs from that of a slanted one."""
+    leaning = standing([[0, 0, 0], [0.25, 0, 0.4]], [[0, 0, 0], [0, 0, 0.45]], None)
+    assert poses(leaning, UP, UP, 0.06, 0.3, 5) == ()
+
+
+def test_a_baseline_along_its_own_normals_gives_no_pose_without_gravity() -> None:
+    steps = standing([[0, 0, 1], [0, 0, 1.5]], [[0, 0, 1], [0, 0, 1.5]], [0, 0, -1])
+    assert poses(steps, None, None, 0.06, 0.3, 5) == ()
+
+
 def test_poses_that_are_the_same_come_back_once() -> None:
     near = YAW @ pose(np.eye(3), np.array([0.01, 0.0, 0.0]))
     chosen = distinct(np.stack([near, YAW, np.eye(4)]), np.array([1.0, 2.0, 0.5]), np.zeros(3), 5, 0.1, 0.05)
