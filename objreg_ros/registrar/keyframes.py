@@ -207,7 +207,7 @@ class Keyframer:
             return None
         labels: Counter[str] = Counter()
         for frame in stretch.frames:
-            labels |= Counter(item.label for item in frame.objects)
+            labels |= Counter(item.label for item in frame.objects if len(item))
         if labels.total() < self._params.keyframe_min_objects or not self._is_news(stretch, labels):
             return None
         self._last = (stretch.session.number, stretch.T_session_first, labels)

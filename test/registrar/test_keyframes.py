@@ -49,6 +49,12 @@ def test_frames_without_objects_make_no_keyframe() -> None:
     assert _run(Keyframer(PARAMS), [frame(0.1 * i, (), moved(0.1 * i)) for i in range(10)]) == []
 
 
+def test_objects_without_points_make_no_keyframe() -> None:
+    cup = CUP[0]
+    nowhere = replace(cup, xyz=cup.xyz[:0], normals=cup.normals[:0], flags=cup.flags[:0], rgb=None)
+    assert _run(Keyframer(PARAMS), [frame(0.1 * i, (nowhere,), moved(0.1 * i)) for i in range(10)]) == []
+
+
 def test_without_odometry_the_views_give_the_motion() -> None:
     frames = [frame(0.1 * i, CUP, None, scene_view(moved(0.03 * i))) for i in range(6)]
     stretches = _run(Keyframer(PARAMS), frames)
