@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from objreg_ros.data import Array, LoopClosure
 from objreg_ros.report.drawing import Plot
@@ -123,8 +124,8 @@ def heaps(labels: Sequence[str], xy: Array) -> list[tuple[str, Array]]:
     for label in dict.fromkeys(labels):
         rest = xy[[name == label for name in labels]]
         while len(rest) >= HEAP_SIGHTINGS:
-            distances = np.linalg.norm(rest[:, None] - rest[None], axis=2)
-            near = distances[(distances < HEAP_RADIUS).sum(axis=1).argmax()] < HEAP_RADIUS
+            beside = cKDTree(rest).query_ball_point(rest, HEAP_RADIUS, return_length=True)
+            near = np.linalg.norm(rest - rest[beside.argmax()], axis=1) < HEAP_RADIUS
             if near.sum() < HEAP_SIGHTINGS:
                 break
             found.append((label, rest[near].mean(axis=0)))

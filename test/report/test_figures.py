@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from xml.etree import ElementTree
 
 import numpy as np
@@ -54,6 +55,16 @@ def test_the_map_names_every_object_once() -> None:
 def test_heaps_of_one_label_are_told_apart_and_strays_have_no_name() -> None:
     xy = np.array([[0.0, 0.0]] * 5 + [[3.0, 0.0]] * 5 + [[9.0, 9.0]])
     assert [tuple(place) for _, place in figures.heaps(["cup"] * 11, xy)] == [(0.0, 0.0), (3.0, 0.0)]
+
+
+def test_heaps_of_a_long_run_need_no_more_memory_than_its_sightings() -> None:
+    xy = np.random.default_rng(0).normal(0.0, 0.05, (5000, 2))
+    tracemalloc.start()
+    (heap,) = figures.heaps(["cup"] * len(xy), xy)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert heap[0] == "cup" and np.abs(heap[1]).max() < 0.01
+    assert most < 100 * xy.nbytes
 
 
 def test_names_that_would_cover_each_other_are_moved_apart() -> None:
