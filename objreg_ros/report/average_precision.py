@@ -37,11 +37,11 @@ def average_precision(
     A detection that finds nothing is no error where it is smaller than ``least_area`` px^2, as COCO counts it when only
     larger objects are asked for.
     """
-    rows = [_judge(one, known, label, least_area) for one, known in zip(seen, truth, strict=True)]
-    score, verdict = (np.concatenate(part) if rows else np.zeros(0) for part in zip(*rows, strict=True))
     wanted = sum(_wanted(known, label) for known in truth)
     if wanted == 0:
         return None
+    rows = [_judge(one, known, label, least_area) for one, known in zip(seen, truth, strict=True)]
+    score, verdict = (np.concatenate(part) for part in zip(*rows, strict=True))
     counted = verdict >= 0
     right = verdict[counted][np.argsort(-score[counted], kind="stable")]
     found = np.cumsum(right)

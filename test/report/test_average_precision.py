@@ -48,6 +48,10 @@ def test_what_is_missed_is_lost_recall() -> None:
     assert average_precision([seen()], [known(A)], "cap") == 0.0
 
 
+def test_without_any_image_there_is_nothing_to_be_found() -> None:
+    assert average_precision([], [], "cap") is None
+
+
 def test_a_second_box_on_the_same_object_is_wrong() -> None:
     one = [seen((A, 0.9), ((0, 0, 10, 9), 0.8), (B, 0.7))]
     assert average_precision(one, [known(A, B)], "cap") == pytest.approx(0.5 + 0.5 * 2 / 3)
