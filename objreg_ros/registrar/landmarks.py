@@ -12,6 +12,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from itertools import islice, product
+from math import prod
 
 import numpy as np
 
@@ -157,12 +158,17 @@ class Landmarks:
         return best
 
     def _near(self, sighting: Sighting) -> set[int]:
-        """The landmarks of the sighting's session and label group that may be within reach of it."""
+        """The landmarks of the sighting's session and label group that may be within reach of it.
+
+        A thing may be so large that fewer cells are known than it reaches.
+        """
         reach = 2.0 * self._params.landmark_radius + MIDDLE_WANDERS * sighting.extent  # the largest that it can be
         low, high = (np.floor((sighting.position + side * reach) / CELL).astype(int) for side in (-1, 1))
         session, group, *_ = self._cell(sighting)
-        cells = product(*(range(a, b + 1) for a, b in zip(low.tolist(), high.tolist(), strict=True)))
-        return set().union(*(self._there.get((session, group, x, y, z), ()) for x, y, z in cells))
+        spans = [range(a, b + 1) for a, b in zip(low.tolist(), high.tolist(), strict=True)]
+        if prod(map(len, spans)) > len(self._there):
+            return set().union(*(there for cell, there in self._there.items() if cell[:2] == (session, group)))
+        return set().union(*(self._there.get((session, group, x, y, z), ()) for x, y, z in product(*spans)))
 
     def _cell(self, sighting: Sighting) -> Cell:
         x, y, z = np.floor(sighting.position / CELL).astype(int).tolist()

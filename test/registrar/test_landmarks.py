@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import tracemalloc
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -32,6 +35,17 @@ def test_an_object_at_the_same_place_of_a_session_keeps_its_id() -> None:
     landmarks = Landmarks(PARAMS)
     assert _take(landmarks, _seen(1, CUP, BOOK)) == [1, 2]
     assert _take(landmarks, _seen(2, BOOK, box("mouse", (-0.3, 0, 1)), x=0.3)) == [3, 1]
+
+
+def test_an_object_with_a_stray_point_far_away_keeps_its_id_and_costs_no_more() -> None:
+    landmarks = Landmarks(PARAMS)
+    vast = tuple(replace(sighting, extent=100.0) for sighting in (*_seen(1, CUP), *_seen(2, CUP)))
+    assert _take(landmarks, vast[:1]) == [1]
+    tracemalloc.start()
+    assert _take(landmarks, vast[1:]) == [1]
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 1e6
 
 
 def test_two_objects_of_one_keyframe_are_never_one_landmark() -> None:
