@@ -14,9 +14,10 @@ Beside ours, in the same run: the usual ways to register two object clouds, on t
 
     python benchmarks/registration.py --seed 7 --cache CACHE --json registration.json
 
-`--cache` keeps every finished piece, so that a run that was stopped goes on where it was. Each condition has a process
-of its own; `--processes 1` runs them one after the other, for times that nothing disturbs. `--quick` is small pieces of
-the same in a fixed order, as many as fit into its time beside compiling every kernel, should none be compiled yet.
+`--cache` keeps every finished piece, so that a run that was stopped goes on where it was, if the code is the same. Each
+condition has a process of its own; `--processes 1` runs them one after the other, for times that nothing disturbs.
+`--quick` is small pieces of the same in a fixed order, as many as fit into its time beside compiling every kernel,
+should none be compiled yet.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from typing import Any
 
 import click
 import numpy as np
+from closure import code
 from cloud_peers import Peer, cloud_peers
 from command_line import given
 from looks import Setting, Shot, Shots, around, four, strangers
@@ -80,7 +82,7 @@ class Bench:
         self.engine = Engine(self.params)
         self.seed = seed
         self.setting = Setting(CONDITIONS[condition], seed, self.params)
-        self._cache = None if cache is None else cache / f"{condition}_{seed}"
+        self._cache = None if cache is None else cache / f"{condition}_{seed}_{code()}"
         self.rows: list[dict[str, Any]] = []
         self.joint: list[dict[str, Any]] = []
         self.negatives: list[dict[str, Any]] = []
