@@ -101,7 +101,7 @@ class RegistrarParams(Params):
     )
     shape_rounds: int = param(8, "most rounds of the climb of an object's pose", ge=0)
     scene_seeds: int = param(8, "poses that the middles of the objects propose for all together", ge=0)
-    drawn: int = param(2, "best upright poses that are drawn to where the room fits", ge=0)
+    drawn: int = param(2, "best upright poses that are drawn to where the room fits", ge=1)
     drawing_points: int = param(300, "points of everything seen by which a pose is drawn to where the room fits", ge=20)
     drawing_rounds: int = param(10, "most iterations in which a pose is drawn to where the room fits", ge=0)
     drawing_reach: float = param(
@@ -133,7 +133,7 @@ class RegistrarParams(Params):
     )
     shape_grey: float = param(3.0, "weight of the grey's correlation in the score of an object's pose", ge=0.0)
     shape_grey_expected: float = param(0.3, "correlation of grey that says nothing", ge=-1.0, le=1.0)
-    shape_grey_noise: float = param(12.0, "standard deviation of grey that is noise", ge=0.0)
+    shape_grey_noise: float = param(12.0, "standard deviation of grey that is noise", ge=0.1)
     surface_voxel: float = param(0.03, "distance of the points of a surface that others are aligned to", "m", ge=0.005)
     thing_voxel: float = param(0.012, "distance of the points of objects, which are aligned too", "m", ge=0.002)
     thing_points: int = param(400, "most points of the objects that are aligned", ge=0)

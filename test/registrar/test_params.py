@@ -46,3 +46,9 @@ def test_the_node_s_other_values_are_checked_too() -> None:
 def test_a_list_that_the_search_could_not_use_is_refused_when_it_is_set(values: dict, said: str) -> None:
     with pytest.raises(ValueError, match=said):
         RegistrarParams(**values)
+
+
+@pytest.mark.parametrize("values", [{"drawn": 0}, {"shape_grey_noise": 0.0}])
+def test_a_number_without_which_no_shape_is_laid_upon_another_is_refused_when_it_is_set(values: dict) -> None:
+    with pytest.raises(ValueError, match=f"{next(iter(values))}: expected at least .*, got 0"):
+        RegistrarParams(**values)
