@@ -16,8 +16,9 @@ poses from chains       `engine` finishes the `shortlist` of the `hypotheses`, f
 refinement              `icp` brings many to their basin; `refine` ends a few, with `direct` where there is grey
                         and `contradiction` to say how well the surfaces hold the pose; `liking` compares
                         poses near each other; `levelling` ends with what gravity tells
-evidence                `evidence`, of `verify`, `visibility` and `texture` (views, through `projection`), `objects`
-                        (explained or moved), `symmetry`, `sliding` and `pushing`
+evidence                `evidence`, of `verify`, `visibility` and `texture` (views, through `projection`),
+                        `surroundings` (views without a lone object), `objects` (explained or moved), `symmetry`,
+                        `sliding` and `pushing`
 yes or no               `gate`, on a `candidate` with its evidence; then `covariance` and `thinning`
 ======================  ==========================================================================================
 

@@ -48,9 +48,10 @@ class Candidate:
     and ``likeness_nearby`` that of each a little aside, where it looks most alike: what it is, if not where;
     ``yaw_known`` says that the shape of one of them tells its yaw; ``margin`` is how much more the candidate is worth
     than any other. ``resistance`` is how much less the views like the pose pushed to where it would be false,
-    along the directions in which it is known least; None where it is known well enough without. ``warp (6, 6)`` is the
-    covariance [t r] that a warped depth adds to the alignment's. ``floating`` is the share of the tested pixels that
-    float in seen free space beyond doubt.
+    along the directions in which it is known least; None where it is known well enough without. ``surroundings`` is
+    what the views say of it without the one object that it explains; None where that is small in both, and where it
+    explains several or none. ``warp (6, 6)`` is the covariance [t r] that a warped depth adds to the alignment's.
+    ``floating`` is the share of the tested pixels that float in seen free space beyond doubt.
     """
 
     alignment: Alignment
@@ -65,6 +66,7 @@ class Candidate:
     yaw_known: bool = False
     margin: float = 0.0
     resistance: float | None = None
+    surroundings: Verification | None = None
     floating: float = 1.0
     warp: Array = field(default_factory=lambda: np.zeros((6, 6)))
 

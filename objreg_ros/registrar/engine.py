@@ -15,7 +15,7 @@ from objreg_ros.data import Alignment, Array
 from objreg_ros.registrar.candidate import Candidate
 from objreg_ros.registrar.consensus import near
 from objreg_ros.registrar.covariance import covariance_of, spread_of, worst_translation
-from objreg_ros.registrar.evidence import gather, lead, resistance_of, unhidden, worth
+from objreg_ros.registrar.evidence import gather, lead, resistance_of, surroundings_of, unhidden, worth
 from objreg_ros.registrar.hypotheses import Hypothesis
 from objreg_ros.registrar.keyframe import Keyframe
 from objreg_ros.registrar.levelling import levelling
@@ -94,9 +94,10 @@ class Engine:
         return candidate.verification.score >= least
 
     def _pushed(self, pair: Pair, candidate: Candidate) -> Candidate:
-        """The candidate with how the views resist a push."""
-        drop = resistance_of(candidate, pair.source, pair.target, self._params)
-        return self._steadied(pair, replace(candidate, resistance=drop))
+        """The candidate with how the views resist a push, and what they say without the object that it is of."""
+        asked = candidate, pair.source, pair.target, self._params
+        told = replace(candidate, resistance=resistance_of(*asked), surroundings=surroundings_of(*asked))
+        return self._steadied(pair, told)
 
     def _levelled(self, pair: Pair, candidate: Candidate) -> Candidate:
         """The candidate brought within its covariance to where gravity is kept, and known better by it.

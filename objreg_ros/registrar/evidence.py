@@ -15,6 +15,7 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
 from objreg_ros.registrar.refine import warp
 from objreg_ros.registrar.sliding import resistance
+from objreg_ros.registrar.surroundings import verify_surroundings
 from objreg_ros.registrar.verify import WORST, floating, verify
 
 
@@ -46,6 +47,17 @@ def resistance_of(candidate: Candidate, source: Prepared, target: Prepared, para
     if worst_translation(C) <= params.doubtful_sigma:
         return None
     return resistance(source, target, candidate.T_target_source, C, params)
+
+
+def surroundings_of(
+    candidate: Candidate, source: Prepared, target: Prepared, params: RegistrarParams
+) -> Verification | None:
+    """What the views say of a lone object's pose without the object (`verify_surroundings`)."""
+    if len(candidate.explained) != 1:
+        return None
+    (pair,), T = candidate.explained, candidate.T_target_source
+    own = source.own[pair.source], target.own[pair.target]
+    return verify_surroundings(source.sight, target.sight, own, T, params)
 
 
 def gravity_error_deg(source: Prepared, target: Prepared, T_target_source: Array) -> float | None:

@@ -9,6 +9,7 @@ Publishing nothing is better than a false closure.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -254,6 +255,22 @@ def _several_otherwise(candidate: Candidate, params: RegistrarParams) -> bool:
     return len(candidate.explained) > 1 and likeness is not None and likeness < params.min_likeness_several
 
 
+def _surroundings(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
+    """What is around a lone object must pass by itself what the views as a whole do: the object may have moved.
+
+    Where fewer chains than should came to the pose, there must be enough of it.
+    """
+    around, seen = candidate.surroundings, candidate.verification
+    if around is None:
+        return None
+    beside = f"without the {candidate.explained[0].label}"
+    if _is_alone(candidate, params) and around.tested < params.min_surroundings * seen.tested:
+        return Reason.LOW_OVERLAP, f"{beside} {around.tested} pixels < {params.min_surroundings:.2f} of {seen.tested}"
+    rest = replace(candidate, verification=around)
+    refusals = (check(rest, params) for check in (_overlap, _free_space, _texture))
+    return next(((reason, f"{beside} {told}") for reason, told in filter(None, refusals)), None)
+
+
 def _odometry(candidate: Candidate, params: RegistrarParams, prior: Prior) -> Refusal | None:
     rotation, translation = pose_error(candidate.T_target_source, prior.T_target_source)
     most_rotation = params.odometry_sigmas * prior.rotation_deg
@@ -277,4 +294,5 @@ CHECKS: tuple[Check, ...] = (  # of a candidate alone, before what others and od
     _texture,
     _score,
     _stationary,
+    _surroundings,
 )

@@ -285,6 +285,13 @@ class RegistrarParams(Params):
         "proposed; one that is known within doubtful_sigma is not pushed, and needs no more than min_score_doubtful",
         ge=-3.0,
     )
+    min_surroundings: float = param(
+        0.15,
+        "least share of what both views see that is not of a lone object that fewer than min_chains proposed and that "
+        "fills much of either: what moved and fills the view agrees with itself",
+        ge=0.0,
+        le=1.0,
+    )
     max_violations_doubtful: float = param(
         0.02, "share of tested pixels in seen free space for which V need not make up", ge=0.0, le=1.0
     )

@@ -18,6 +18,7 @@ from objreg_ros.registrar.keyframe import Keyframe
 from objreg_ros.registrar.labels import LabelGroups
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.shape import Shape, prepare_shape
+from objreg_ros.registrar.surroundings import own_pixels
 from objreg_ros.registrar.symmetry import tells_yaw
 from objreg_ros.registrar.tracking import view_normals
 from objreg_ros.registrar.visibility import Sight, halved, prepare_sight
@@ -30,8 +31,8 @@ class Prepared:
     ``surface`` to be aligned to, ``xyz`` and ``normals (M, 3)`` to align with; ``up (3,)`` is against gravity, or None,
     and ``up_weight`` 0..1 how much was seen that tells it; ``groups`` the confusable group of each object,
     ``centroids (K, 3)`` their middles and ``extents (K,)`` m, ``shapes`` what is laid upon others and ``yaw_known``
-    whether that tells a turn; ``scene`` is all of them as one shape; ``middle (3,)`` that of everything: where poses
-    are compared.
+    whether that tells a turn; ``own`` is where the view shows each (h, w) bool; ``scene`` is all of them as one shape;
+    ``middle (3,)`` that of everything: where poses are compared.
     """
 
     keyframe: Keyframe
@@ -46,6 +47,7 @@ class Prepared:
     groups: tuple[str, ...]
     yaw_known: tuple[bool, ...]
     shapes: tuple[Shape | None, ...]
+    own: tuple[Array, ...]
     scene: Shape | None
     centroids: Array
     extents: Array
@@ -77,9 +79,10 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
         shapes = tuple(
             prepare_shape(keyframe, [i], params.shape_points, params.seed) for i in range(len(keyframe.objects))
         )
+        sight = prepare_sight(keyframe.view, *seeing)
         return Prepared(
             keyframe=keyframe,
-            sight=prepare_sight(keyframe.view, *seeing),
+            sight=sight,
             coarse=prepare_sight(halved(keyframe.view), *seeing),
             **_shuffled(*joined(coarse, sampled(things, params.thing_points, params.seed)), params.seed),
             up=up,
@@ -89,6 +92,7 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
                 tells_yaw(item.cloud, up, shape, params) for item, shape in zip(keyframe.objects, shapes, strict=True)
             ),
             shapes=shapes,
+            own=tuple(own_pixels(item, sight) for item in keyframe.objects),
             scene=prepare_shape(keyframe, range(len(keyframe.objects)), params.scene_points, params.seed),
             centroids=np.array([item.centroid for item in keyframe.objects]).reshape(-1, 3),
             extents=np.array([item.extent for item in keyframe.objects]),

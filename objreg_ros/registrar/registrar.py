@@ -343,6 +343,7 @@ def _evidence(candidate: Candidate) -> dict[str, float]:
         "moved": len(candidate.moved),
         "gravity_error_deg": candidate.gravity_error_deg,
         "resistance": candidate.resistance,
+        "score_of_surroundings": None if candidate.surroundings is None else candidate.surroundings.score,
         "yaw_known": candidate.yaw_known,
     }
     return {name: float(number) for name, number in numbers.items() if number is not None}

@@ -13,7 +13,15 @@ import pytest
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.registrar import evidence
 from objreg_ros.registrar.candidate import ObjectPair
-from objreg_ros.registrar.evidence import agreement, gather, gravity_error_deg, lead, resistance_of, worth
+from objreg_ros.registrar.evidence import (
+    agreement,
+    gather,
+    gravity_error_deg,
+    lead,
+    resistance_of,
+    surroundings_of,
+    worth,
+)
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import prepare
 
@@ -73,6 +81,19 @@ def test_a_yaw_is_known_where_the_object_tells_it_in_both_views(here: bool, ther
     views = (replace(ready, yaw_known=(told,) * len(ready.yaw_known)) for told in (here, there))
     found = gather(*views, candidate().alignment, ("features",), PARAMS)
     assert found.explained and found.yaw_known is (here and there)
+
+
+def test_the_views_are_asked_without_the_object_where_it_is_the_only_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[Any, ...]] = []
+    monkeypatch.setattr(evidence, "verify_surroundings", lambda *given: asked.append(given) or "without")
+    source: Any = SimpleNamespace(sight="a", own=("cup of a", "book of a"))
+    target: Any = SimpleNamespace(sight="b", own=("book of b", "cup of b"))
+    cup, book = ObjectPair(0, 1, "cup"), ObjectPair(1, 0, "book")
+    for explained, told in (((cup,), "without"), ((cup, book), None), ((), None)):
+        assert surroundings_of(candidate(explained=explained), source, target, PARAMS) == told
+    ((*views, own, T, _),) = asked
+    assert (views, own) == (["a", "b"], ("cup of a", "cup of b"))
+    assert np.array_equal(T, candidate().T_target_source)
 
 
 @pytest.mark.parametrize("angle", [0.0, 3.0, 90.0, 180.0])

@@ -85,6 +85,41 @@ def test_a_lone_object_must_respect_free_space_more_than_several() -> None:
     assert refuse(candidate(**far), PARAMS) is None
 
 
+@pytest.mark.parametrize(
+    ("around", "reason"),
+    [
+        ({"texture": -0.1}, Reason.TEXTURE),
+        ({"violations": 1.1 * PARAMS.max_violations}, Reason.FREE_SPACE),
+        ({"inliers": 0.5 * PARAMS.min_inliers}, Reason.LOW_OVERLAP),
+        ({"tested": PARAMS.min_tested - 1}, Reason.LOW_OVERLAP),
+        ({"score": -1.0}, None),  # what is little scores little
+        ({}, None),
+    ],
+)
+def test_what_is_around_a_lone_object_must_agree_by_itself(around: dict[str, float], reason: Reason | None) -> None:
+    lone = candidate(explained=(CUP,), margin=1.0, surroundings=replace(candidate().verification, **around))
+    refusal = refuse(lone, PARAMS)
+    assert (None if refusal is None else refusal[0]) is reason
+    assert refusal is None or refusal[1].startswith("without the cup ")
+
+
+def test_a_lone_object_that_one_chain_proposed_must_leave_something_of_the_views() -> None:
+    seen = candidate().verification
+    for chains, share, accepted in (
+        (("objects",), 0.9, False),
+        (("objects", "odometry"), 0.9, False),
+        (("objects",), 1.1, True),
+        (("features", "objects"), 0.9, True),
+    ):
+        around = replace(seen, tested=round(share * PARAMS.min_surroundings * seen.tested))
+        lone = candidate(
+            explained=(CUP,), margin=1.0, resistance=1.0, agreeing_chains=chains, surroundings=around, yaw_known=True
+        )
+        refusal = refuse(lone, PARAMS)
+        assert (refusal is None) is accepted, (chains, share, refusal)
+        assert refusal is None or (refusal[0] is Reason.LOW_OVERLAP and "without the cup" in refusal[1])
+
+
 def test_several_objects_that_look_otherwise_may_not_float_either() -> None:
     far = {"floating": 0.5 * (PARAMS.max_floating_alone + PARAMS.max_floating)}
     assert refuse(candidate(**far, likeness=0.0), PARAMS) is None

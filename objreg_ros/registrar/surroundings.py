@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the views say of a pose without the object that speaks for it.
+
+An object that has moved agrees with itself. Where it fills the views it outvotes everything that stayed, so a lone one
+that fills much of them is left out, and what is around it is asked alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.registrar.candidate import Verification
+from objreg_ros.registrar.keyframe import KeyObject
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.verify import verify
+from objreg_ros.registrar.visibility import NEAREST, SHADELESS, Band, Print, Sight, pixels_of
+
+MUCH = 0.05  # of what a view measured: an object that fills less outvotes nothing
+RIM = np.ones((5, 5), np.uint8)  # px: a cloud leaves out the ragged rim of its object
+NEAR = 0.02  # m before and behind an object's points: what lies there in its pixels is it
+
+
+def own_pixels(item: KeyObject, sight: Sight) -> Array:
+    """Where a view shows an object (h, w) bool."""
+    xyz, own = item.cloud.xyz, np.zeros(sight.near.shape, np.uint8)
+    rows, columns = pixels_of(xyz[xyz[:, 2] > NEAREST], sight)
+    inside = (rows >= 0) & (rows < own.shape[0]) & (columns >= 0) & (columns < own.shape[1])
+    own[rows[inside], columns[inside]] = 1
+    low, high = xyz[:, 2].min() - NEAR, xyz[:, 2].max() + NEAR
+    return np.asarray((cv2.dilate(own, RIM) > 0) & (sight.far >= low) & (sight.near <= high))
+
+
+def verify_surroundings(
+    source: Sight, target: Sight, own: tuple[Array, Array], T_target_source: Array, params: RegistrarParams
+) -> Verification | None:
+    """`verify` without the pixels ``own (h, w) bool`` of either view; None where they are few in both."""
+    if max(_share(source, own[0]), _share(target, own[1])) < MUCH:
+        return None
+    return verify(without(source, own[0]), without(target, own[1]), T_target_source, params)
+
+
+def without(sight: Sight, own: Array) -> Sight:
+    """A view as if it had measured nothing at the pixels ``own (h, w) bool``, for `verify`: its ``front`` stays."""
+    grey, left, printed = sight.grey, ~own[pixels_of(sight.points, sight)], ~own[pixels_of(sight.grey.points, sight)]
+    return replace(
+        sight,
+        near=np.where(own, np.float32(0.0), sight.near),
+        far=np.where(own, np.float32(0.0), sight.far),
+        points=sight.points[left],
+        bands=tuple(Band(band.detail, band.shades[left]) for band in sight.bands),
+        grey=Print(np.where(own, np.float32(SHADELESS), grey.detail), grey.points[printed], grey.shades[printed]),
+    )
+
+
+def _share(sight: Sight, own: Array) -> float:
+    """How much of what a view measured is at the pixels ``own (h, w) bool``."""
+    measured = sight.far > 0
+    return float(own[measured].mean()) if measured.any() else 0.0
