@@ -15,7 +15,8 @@ TOLERANCE_M, TOLERANCE_DEG = 1e-3, 0.05
 EACH_AXIS = np.repeat([TOLERANCE_M, np.radians(TOLERANCE_DEG)], 3) / np.sqrt(3)  # so that three of them keep within it
 SECOND_NS = 1_000_000_000
 GAP_NS = 1_000_000_000  # while nothing comes for longer, and for `MISSED` times as long as usual,
-MISSED = 5.0  # nobody knows what happens
+MISSED = 5.0  # nobody knows what happens;
+LONGEST_NS = 60_000_000_000  # nor for longer than this, whatever is usual: the first pose may have no time at all
 NEWEST = 0.1  # the weight of the newest time between two poses in what is usual
 
 
@@ -69,11 +70,14 @@ class SparseTrajectory(Trajectory):
         self._least, self._most = _nothing()
 
     def _is_gap(self, waited_ns: int) -> bool:
-        if waited_ns > max(GAP_NS, MISSED * self._usual_ns):
-            return True
-        known = np.isfinite(self._usual_ns)
-        self._usual_ns = (1.0 - NEWEST) * self._usual_ns + NEWEST * waited_ns if known else float(waited_ns)
-        return False
+        """Whether nothing came for too long. A gap tells what is usual too, else poses that come seldomer never do."""
+        longest_ns = min(max(GAP_NS, MISSED * self._usual_ns), LONGEST_NS)
+        is_gap, told_ns = waited_ns > longest_ns, min(waited_ns, longest_ns)
+        if np.isfinite(self._usual_ns):
+            self._usual_ns += NEWEST * (told_ns - self._usual_ns)
+        elif not is_gap:
+            self._usual_ns = float(told_ns)
+        return is_gap
 
     def _velocity_from(self, before: int) -> tuple[Array, Array]:
         """The velocity (6,) from a kept pose to the newest, m/s in the world and rad/s in the body, and its slack."""

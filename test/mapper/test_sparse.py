@@ -74,6 +74,22 @@ def test_poses_that_always_come_seldom_have_no_gaps() -> None:
     assert trajectory.in_gap(80 * SECOND) and not trajectory.in_gap(SECOND)
 
 
+def test_poses_that_begin_to_come_seldom_have_gaps_for_a_while_only() -> None:
+    trajectory = SparseTrajectory()
+    for stamp_ns in (0, STEP_NS, *range(2 * SECOND, 100 * SECOND, 2 * SECOND)):
+        trajectory.append(stamp_ns, at([0.0, 0.0, 0.0], [0.0, 0.0, 0.0]))
+    assert trajectory.in_gap(SECOND) and not any(map(trajectory.in_gap, range(20 * SECOND, 98 * SECOND, SECOND)))
+
+
+def test_what_lies_behind_a_first_pose_that_has_no_time_is_not_covered() -> None:
+    trajectory, begins_ns = SparseTrajectory(), 10**9 * SECOND
+    for stamp_ns in (0, *range(begins_ns, begins_ns + SECOND, STEP_NS)):
+        trajectory.append(stamp_ns, at([0.0, 0.0, 0.0], [0.0, 0.0, 0.0]))
+    assert not trajectory.covers(begins_ns - 3600 * SECOND) and trajectory.covers(begins_ns + STEP_NS // 2)
+    trajectory.append(begins_ns + 4 * SECOND, at([0.0, 0.0, 0.0], [0.0, 0.0, 0.0]))
+    assert trajectory.in_gap(begins_ns + 2 * SECOND)
+
+
 def test_the_first_the_newest_and_what_is_pinned_stay_as_they_are() -> None:
     poses, pins = [at([0.001 * k, 0.0, 0.0], [0.0, 0.0, 0.0]) for k in range(400)], (100, 101, 250)
     trajectory = kept_of(poses, pins)
