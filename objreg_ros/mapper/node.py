@@ -44,6 +44,7 @@ class MapperNode(Door):
         self._waiting: list[LoopClosure] = []
         self._enabled, self._odom_frame = True, "odom"
         self._odometry_count = self._passed_over_count = 0
+        self._ended_ns = 0  # the last moment of the run of the clock before this one
         self._course: Course[Odometry] = Course(self._pass_over)
         self._begin()
         self._path = self.create_publisher(PathMsg, "path", qos.latched())
@@ -116,6 +117,7 @@ class MapperNode(Door):
             self._passed_over_count += 1
             return False
         self.get_logger().warning(f"time jumped back by {back_ns / 1e9:.3f} s: a new map")
+        self._ended_ns = known[-1]
         self._start_anew("time_jump")
         return True
 
@@ -154,12 +156,22 @@ class MapperNode(Door):
             self.drop(closure.to_ns, "odometry_gap", "no odometry came around a moment of the constraint")
         elif self._came_too_early(closure):
             self.drop(closure.to_ns, "before_odometry", "odometry begins after the first moment of the constraint")
+        elif self._is_of_old_run(closure):
+            self.drop(closure.to_ns, "time_jump", "it was found before time jumped back, and came after that")
         else:
             self._waiting.append(closure)
 
     def _came_too_early(self, closure: LoopClosure) -> bool:
         known = self._graph.odometry.stamps_ns
         return bool(known) and closure.from_ns < known[0]
+
+    def _is_of_old_run(self, closure: LoopClosure) -> bool:
+        """Whether a constraint ends in what was before time jumped back: the registrar searches for a while.
+
+        It speaks of what was, so one of this run does not end long after the newest odometry.
+        """
+        known = self._graph.odometry.stamps_ns
+        return bool(known) and known[-1] + JUMP_NS < closure.to_ns <= self._ended_ns
 
     def _overtaken(self, job: tuple[int, Any]) -> None:
         self.conclude(job[0], lambda: True)  # the newer job solves the graph with this constraint in it

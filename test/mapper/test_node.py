@@ -231,6 +231,16 @@ def test_constraints_that_wait_do_not_outlive_a_jump_back_in_time_or_a_reset(out
     assert outside.settled() and door.extra_diagnostics()["constraints without odometry"] == 0
 
 
+def test_a_constraint_that_was_found_before_time_jumped_back_is_not_tied_after_it(outside: Outside) -> None:
+    outside.drive(BENT[:60])
+    for again in odometry(BENT)[:2]:
+        outside.odom.publish(to_msg.odometry(again))
+    outside.wait(lambda: outside.door.extra_diagnostics()["keyframes"] == 1)
+    outside.send([closure(TRUE, 5, 58), closure(TRUE, 0, 8)])
+    outside.wait(lambda: outside.door.ledger.balance().dropped == {"time_jump": 1})
+    outside.wait(lambda: outside.door.extra_diagnostics()["constraints without odometry"] == 1)
+
+
 def test_without_odometry_the_oldest_constraints_make_room(outside: Outside, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("objreg_ros.mapper.node.MOST_WAITING", 2)
     outside.send(ROUND_TRIP[:3])
