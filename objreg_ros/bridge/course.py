@@ -9,6 +9,7 @@ from typing import Generic, TypeVar
 from objreg_ros.data import JUMP_NS
 
 AHEAD_NS = 60_000_000_000  # a stamp that leaps so far ahead is believed once the next one follows it
+PERIODS = 2  # of a stream have to pass until its silence speaks for what is held
 
 T = TypeVar("T")
 
@@ -18,15 +19,17 @@ class Course(Generic[T]):
 
     A leap is back by `JUMP_NS` or ahead by `AHEAD_NS`: of a looped bag or a clock that was set, or of one message that
     was stamped wrongly, which must not part what came before from what comes after. ``on_alone`` is given the stamp and
-    the item of such a one. What nothing speaks against for a while is believed too: who sends one item and waits for
-    what becomes of it sends no next one.
+    the item of such a one. What nothing speaks against for a while, longer where items come seldom, is believed too:
+    who sends one item and waits for what becomes of it sends no next one.
     """
 
     def __init__(self, on_alone: Callable[[int, T], None]) -> None:
         self._on_alone = on_alone
         self._held: tuple[int, T] | None = None
         self._asked: tuple[int, T] | None = None  # what was held at the last `believe`
+        self._waited_ns = 0  # since that was asked for first
         self._last_ns: int | None = None
+        self._period_ns = 0  # between the last two that were in order
 
     @property
     def holding(self) -> bool:
@@ -43,14 +46,20 @@ class Course(Generic[T]):
         if self._leaps(stamp_ns):
             self._held = stamp_ns, item
             return []
-        self._last_ns = stamp_ns if self._last_ns is None else max(stamp_ns, self._last_ns)
+        if self._last_ns is None:
+            self._last_ns = stamp_ns
+        elif stamp_ns > self._last_ns:
+            self._last_ns, self._period_ns = stamp_ns, stamp_ns - self._last_ns
         return [(stamp_ns, item)]
 
-    def believe(self) -> list[tuple[int, T]]:
-        """The stamp and item that were held at the last call of this already; to be called now and again."""
+    def believe(self, passed_ns: int) -> list[tuple[int, T]]:
+        """The stamp and item that were held at the last call of this already, and for as long as two more take to come.
+
+        To be called now and again, with the time that has passed since the last call.
+        """
         held, asked = self._held, self._asked
-        self._asked = held
-        if held is None or held is not asked:
+        self._asked, self._waited_ns = held, self._waited_ns + passed_ns if held is asked else 0
+        if held is None or held is not asked or self._waited_ns < PERIODS * self._period_ns:
             return []
         self._held, self._last_ns = None, held[0]
         return [held]

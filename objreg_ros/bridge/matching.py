@@ -14,7 +14,7 @@ from objreg_ros.bridge.door import Door
 from objreg_ros.bridge.sync import Drop, Need, Stream, Synchroniser
 from objreg_ros.params import Params
 
-ALONE_S = 0.5  # after once to twice this a stamp that has leapt alone is believed
+ALONE_S = 0.5  # after once to twice this a stamp that has leapt alone is believed, later where the stream is slow
 EARLY = 30  # messages of a stream that are kept until it is known how they are matched
 
 Early = tuple[int, str, int, Any]  # order of arrival, stream, stamp, payload
@@ -59,7 +59,7 @@ class MatchingDoor(Door):
                 self.worker.put((match.stamp_ns, match))
 
     def _believe(self) -> None:
-        for match in () if self._sync is None else self._sync.believe():
+        for match in () if self._sync is None else self._sync.believe(round(1e9 * ALONE_S)):
             self.worker.put((match.stamp_ns, match))
 
     def _unmatched(self, name: str, stamp_ns: int, why: str) -> None:

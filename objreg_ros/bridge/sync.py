@@ -230,9 +230,9 @@ class Synchroniser:
         queue.hear(Item(stamp_ns, payload))
         return [*self._matches(), *self._make_room(queue)]
 
-    def believe(self) -> list[Match]:
-        """The matches by what has leapt in time alone, and was so at the last call; to be called now and again."""
-        found = [(queue, item) for queue in self.queues.values() for item in queue.course.believe()]
+    def believe(self, passed_ns: int) -> list[Match]:
+        """The matches by what has leapt in time alone and is believed: see `Course.believe`."""
+        found = [(queue, item) for queue in self.queues.values() for item in queue.course.believe(passed_ns)]
         return [match for queue, item in found for match in self._take(queue, *item)]
 
     def flush(self) -> list[Match]:

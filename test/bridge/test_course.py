@@ -7,6 +7,7 @@ from objreg_ros.bridge.course import AHEAD_NS, Course
 from objreg_ros.data import JUMP_NS
 
 NOW = 1000 * JUMP_NS
+PASSED = JUMP_NS // 2  # between two calls of `believe`
 
 
 def passed(stamps: list[int]) -> tuple[list[int], list[int]]:
@@ -41,10 +42,20 @@ def test_of_two_that_leap_to_different_times_the_last_is_asked_for() -> None:
 
 def test_one_that_nothing_speaks_against_for_a_while_is_believed() -> None:
     course: Course[str] = Course(lambda stamp_ns, item: pytest.fail("it was let go"))
-    assert course.admit(NOW, "old") == [(NOW, "old")] and course.believe() == []
+    assert course.admit(NOW, "old") == [(NOW, "old")] and course.believe(PASSED) == []
     assert course.admit(5, "new") == []
-    assert course.believe() == [] and course.believe() == [(5, "new")] and course.believe() == []
+    assert course.believe(PASSED) == [] and course.believe(PASSED) == [(5, "new")] and course.believe(PASSED) == []
     assert course.admit(6, "newer") == [(6, "newer")]
+
+
+@pytest.mark.parametrize("period", [JUMP_NS, 3 * JUMP_NS])
+def test_one_that_leaps_alone_is_not_believed_before_the_next_of_a_slow_stream_can_come(period: int) -> None:
+    alone: list[int] = []
+    course: Course[str] = Course(lambda stamp_ns, item: alone.append(stamp_ns))
+    for stamp in (NOW, NOW + period, NOW + period, 0):
+        course.admit(stamp, "item")
+    assert all(course.believe(PASSED) == [] for _ in range(1 + period // PASSED))
+    assert course.admit(NOW + 3 * period, "next") == [(NOW + 3 * period, "next")] and alone == [0]
 
 
 def test_each_one_that_leaps_has_its_own_while() -> None:
@@ -52,10 +63,10 @@ def test_each_one_that_leaps_has_its_own_while() -> None:
     course: Course[str] = Course(lambda stamp_ns, item: alone.append(stamp_ns))
     for stamp in (NOW, 0):
         course.admit(stamp, "item")
-    assert course.believe() == []
+    assert course.believe(PASSED) == []
     for stamp in (NOW + 1, 1):
         course.admit(stamp, "item")
-    assert course.believe() == [] and course.believe() == [(1, "item")] and alone == [0]
+    assert course.believe(PASSED) == [] and course.believe(PASSED) == [(1, "item")] and alone == [0]
 
 
 def test_one_that_leaps_at_the_end_is_let_go() -> None:

@@ -264,8 +264,8 @@ def test_a_jump_back_of_one_item_is_believed_after_a_while() -> None:
     sync = Synchroniser(EXACT)
     for name in ("image", "depth"):
         sync.add(name, 5 * JUMP_NS, "old")
-    assert sync.add("image", 1, "i") == sync.add("depth", 1, "d") == sync.believe() == []
-    assert pairs(sync.believe(), "image", "depth") == [("i", "d")] and accounts_hold(sync)
+    assert sync.add("image", 1, "i") == sync.add("depth", 1, "d") == sync.believe(JUMP_NS) == []
+    assert pairs(sync.believe(JUMP_NS), "image", "depth") == [("i", "d")] and accounts_hold(sync)
 
 
 def test_a_stream_that_follows_anothers_jump_back_loses_nothing_in_silence() -> None:
