@@ -64,10 +64,13 @@ class Course(Generic[T]):
         self._held, self._last_ns = None, held[0]
         return [held]
 
-    def end(self) -> None:
-        """Let go of what is held: nothing more will come."""
+    def end(self) -> list[tuple[int, T]]:
+        """What is held, since nothing more will speak against it; what leapt back is let go, and parts nothing."""
         held, self._held = self._held, None
+        if held is not None and self._last_ns is not None and held[0] > self._last_ns:
+            return [held]
         self._let_go(held)
+        return []
 
     def _let_go(self, held: tuple[int, T] | None) -> None:
         if held is not None:

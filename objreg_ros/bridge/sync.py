@@ -237,9 +237,8 @@ class Synchroniser:
 
     def flush(self) -> list[Match]:
         """The matches that are still possible when nothing more will come; the rest is dropped as unmatched."""
-        found = []
-        for queue in self.queues.values():
-            queue.course.end()
+        ended = [(queue, item) for queue in self.queues.values() for item in queue.course.end()]
+        found = [match for queue, item in ended for match in self._take(queue, *item)]
         while self._reference.items:
             found += self._resolve(self._reference.items[0])
         for queue in self._others:

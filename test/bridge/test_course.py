@@ -15,7 +15,7 @@ def passed(stamps: list[int]) -> tuple[list[int], list[int]]:
     alone: list[int] = []
     course: Course[str] = Course(lambda stamp_ns, item: alone.append(stamp_ns))
     admitted = [stamp_ns for stamp in stamps for stamp_ns, _ in course.admit(stamp, "item")]
-    course.end()
+    admitted += [stamp_ns for stamp_ns, _ in course.end()]
     assert not course.holding
     return admitted, alone
 
@@ -69,5 +69,6 @@ def test_each_one_that_leaps_has_its_own_while() -> None:
     assert course.believe(PASSED) == [] and course.believe(PASSED) == [(1, "item")] and alone == [0]
 
 
-def test_one_that_leaps_at_the_end_is_let_go() -> None:
+def test_one_that_leaps_back_at_the_end_is_let_go_and_one_that_leaps_ahead_is_believed() -> None:
     assert passed([NOW, 0]) == ([NOW], [0])
+    assert passed([NOW, NOW + AHEAD_NS]) == ([NOW, NOW + AHEAD_NS], [])

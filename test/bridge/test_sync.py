@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from objreg_ros.bridge.course import AHEAD_NS
 from objreg_ros.bridge.sync import (
     ENCLOSING,
     JUMP_NS,
@@ -266,6 +267,14 @@ def test_a_jump_back_of_one_item_is_believed_after_a_while() -> None:
         sync.add(name, 5 * JUMP_NS, "old")
     assert sync.add("image", 1, "i") == sync.add("depth", 1, "d") == sync.believe(JUMP_NS) == []
     assert pairs(sync.believe(JUMP_NS), "image", "depth") == [("i", "d")] and accounts_hold(sync)
+
+
+@pytest.mark.parametrize("looks", [2, 3, 4])
+def test_a_recording_of_a_few_looks_that_are_minutes_apart_is_matched_to_its_end(looks: int) -> None:
+    sync = Synchroniser(EXACT)
+    found = [match for k in range(looks) for name in ("image", "depth") for match in sync.add(name, k * AHEAD_NS, k)]
+    found += sync.flush()
+    assert [match["image"] for match in found] == list(range(looks)) and accounts_hold(sync)
 
 
 def test_a_stream_that_follows_anothers_jump_back_loses_nothing_in_silence() -> None:
