@@ -209,6 +209,7 @@ class Synchroniser:
         self.queues = {stream.name: Queue(stream, on_drop) for stream in streams}
         self._reference = self.queues[streams[0].name]
         self._others = [queue for queue in self.queues.values() if queue is not self._reference]
+        self._partners_first = [*self._others, self._reference]  # lest a match goes without what it need not have
 
     def add(self, name: str, stamp_ns: int, payload: Any) -> list[Match]:
         """Take one item of a stream; KeyError for a stream that was not named."""
@@ -232,12 +233,12 @@ class Synchroniser:
 
     def believe(self, passed_ns: int) -> list[Match]:
         """The matches by what has leapt in time alone and is believed: see `Course.believe`."""
-        found = [(queue, item) for queue in self.queues.values() for item in queue.course.believe(passed_ns)]
+        found = [(queue, item) for queue in self._partners_first for item in queue.course.believe(passed_ns)]
         return [match for queue, item in found for match in self._take(queue, *item)]
 
     def flush(self) -> list[Match]:
         """The matches that are still possible when nothing more will come; the rest is dropped as unmatched."""
-        ended = [(queue, item) for queue in self.queues.values() for item in queue.course.end()]
+        ended = [(queue, item) for queue in self._partners_first for item in queue.course.end()]
         found = [match for queue, item in ended for match in self._take(queue, *item)]
         while self._reference.items:
             found += self._resolve(self._reference.items[0])

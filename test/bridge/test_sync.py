@@ -269,6 +269,14 @@ def test_a_jump_back_of_one_item_is_believed_after_a_while() -> None:
     assert pairs(sync.believe(JUMP_NS), "image", "depth") == [("i", "d")] and accounts_hold(sync)
 
 
+def test_what_is_believed_together_is_matched_together() -> None:
+    sync = Synchroniser((*EXACT, Stream("odom", Need.OPTIONAL)))
+    for stamp in (5 * JUMP_NS, 1):
+        for name in sync.queues:
+            sync.add(name, stamp, name)
+    assert sync.believe(JUMP_NS) == [] and [match["odom"] for match in sync.believe(JUMP_NS)] == ["odom"]
+
+
 @pytest.mark.parametrize("looks", [2, 3, 4])
 def test_a_recording_of_a_few_looks_that_are_minutes_apart_is_matched_to_its_end(looks: int) -> None:
     sync = Synchroniser(EXACT)
