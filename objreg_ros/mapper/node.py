@@ -108,7 +108,8 @@ class MapperNode(Door):
         if odometry.stamp_ns > known[-1]:
             if self._graph.leaps(odometry):
                 self.get_logger().warning(
-                    "odometry leapt faster than max_speed: a new map; is there more than one publisher on odom?"
+                    "odometry leapt faster than max_speed, or to its origin: a new map; "
+                    "is there more than one publisher on odom?"
                 )
                 self._start_anew("odometry_leap")
             return True

@@ -201,6 +201,16 @@ def test_odometry_that_is_elsewhere_at_once_has_leapt() -> None:
     assert not graph.leaps(replace(away, stamp_ns=5 * SECOND))  # it had the time
 
 
+def test_odometry_that_comes_back_at_its_origin_has_begun_anew_however_long_nothing_came() -> None:
+    graph, origin = PoseGraph(), Odometry(T_odom_body=np.eye(4), stamp_ns=20 * SECOND)
+    graph.add_odometry(Odometry(T_odom_body=pose(np.eye(3), np.array([0.4, 0.0, 0.0])), stamp_ns=0))
+    assert not graph.leaps(origin)
+    graph.add_odometry(Odometry(T_odom_body=pose(np.eye(3), np.array([4.0, 0.0, 0.0])), stamp_ns=10 * SECOND))
+    assert graph.leaps(origin) and not graph.leaps(replace(origin, stamp_ns=11 * SECOND))
+    beside = pose(np.eye(3), np.array([0.02, 0.0, 0.0]))
+    assert not graph.leaps(replace(origin, T_odom_body=beside))
+
+
 def test_the_place_of_the_camera_on_the_body_is_honoured() -> None:
     """Closures between cameras that look sideways give the same map as closures between bodies."""
     T_body_camera = pose(rotation_from_vector(np.array([-1.2, 1.2, -1.2])), np.array([0.1, 0.0, 0.4]))
