@@ -107,9 +107,10 @@ class MapperNode(Door):
             return True
         if odometry.stamp_ns > known[-1]:
             if self._graph.leaps(odometry):
-                self.get_logger().warning(
+                self.throttled.warn(
+                    "odometry_leap",
                     "odometry leapt faster than max_speed, or to its origin: a new map; "
-                    "is there more than one publisher on odom?"
+                    "is there more than one publisher on odom?",
                 )
                 self._start_anew("odometry_leap")
             return True

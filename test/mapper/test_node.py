@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
 
 from objreg_ros.bridge import from_msg, qos, to_msg  # noqa: E402
+from objreg_ros.bridge.log import ThrottledLog  # noqa: E402
 from objreg_ros.data import LoopClosure  # noqa: E402
 from objreg_ros.geometry import pose, rotation_from_vector  # noqa: E402
 from objreg_ros.mapper.node import MapperNode  # noqa: E402
@@ -146,6 +148,16 @@ def test_odometry_that_begins_anew_elsewhere_starts_a_new_map(outside: Outside) 
     outside.odom.publish(to_msg.odometry(replace(odometry(BENT)[40], T_odom_body=away @ BENT[40])))
     outside.wait(lambda: outside.door.extra_diagnostics()["keyframes"] == 1)
     assert keyframes > 3
+
+
+def test_two_publishers_of_odometry_do_not_fill_the_log(outside: Outside, monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[str] = []
+    log = SimpleNamespace(warning=said.append)
+    monkeypatch.setattr(outside.door, "get_logger", lambda: log)
+    monkeypatch.setattr(outside.door, "throttled", ThrottledLog(log.warning))
+    away = pose(np.eye(3), np.array([3.0, 0.0, 0.0]))
+    outside.drive([away @ T if k % 2 else T for k, T in enumerate(BENT[:20])])
+    assert len(said) == 1 and "more than one publisher" in said[0]
 
 
 def test_a_constraint_within_a_gap_of_the_odometry_is_dropped(outside: Outside) -> None:
