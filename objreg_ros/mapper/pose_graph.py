@@ -21,7 +21,7 @@ from objreg_ros.mapper.trajectory import Trajectory
 FREEDOMS = 6  # of a closure
 ROUNDS = 6  # most times that odometry is corrected
 AGAIN_S = 1.0  # no odometry is back sooner when what makes it is started again,
-AT_ORIGIN = 0.01  # and then it is at its origin: m, rad
+AT_ORIGIN = 1e-4  # and then it is at its very origin: m, rad
 SETTLED = 5e-4  # rad/m and m/m: a change of its steady error that matters no more
 
 

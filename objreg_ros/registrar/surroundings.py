@@ -26,9 +26,10 @@ NEAR = 0.02  # m before and behind an object's points: what lies there in its pi
 
 def own_pixels(item: KeyObject, sight: Sight) -> Array:
     """Where a view shows an object (h, w) bool."""
-    xyz, own = item.cloud.xyz, np.zeros(sight.near.shape, np.uint8)
+    xyz, (height, width) = item.cloud.xyz, sight.near.shape
     rows, columns = pixels_of(xyz[xyz[:, 2] > NEAREST], sight)
-    inside = (rows >= 0) & (rows < own.shape[0]) & (columns >= 0) & (columns < own.shape[1])
+    inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
+    own = np.zeros((height, width), np.uint8)
     own[rows[inside], columns[inside]] = 1
     low, high = xyz[:, 2].min() - NEAR, xyz[:, 2].max() + NEAR
     return np.asarray((cv2.dilate(own, RIM) > 0) & (sight.far >= low) & (sight.near <= high))
