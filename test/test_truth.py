@@ -11,7 +11,7 @@ from objreg_ros.data import LoopClosure
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
 from objreg_ros.recording import messages, open_recording, write_rosbag2
 from objreg_ros.recording.record import Record
-from objreg_ros.truth import Truth, summarise
+from objreg_ros.truth import MAX_GAP_NS, Truth, spread, summarise
 
 MS = 1_000_000
 
@@ -51,6 +51,11 @@ def test_between_two_poses_the_truth_is_interpolated() -> None:
     truth = Truth([(0, at(0, 0)), (100 * MS, at(1, 0.4))])
     T = truth.at(25 * MS)
     assert T is not None and np.allclose(T, at(0.25, 0.1))
+
+
+def test_over_more_than_the_longest_gap_the_truth_is_not_interpolated() -> None:
+    assert Truth([(0, at(0)), (MAX_GAP_NS, at(1))]).at(MAX_GAP_NS // 2) is not None
+    assert Truth([(0, at(0)), (MAX_GAP_NS + 1, at(1))]).at(MAX_GAP_NS // 2) is None
 
 
 @pytest.mark.parametrize("stamp_ms", [-1, 101, 250, 401])
@@ -93,3 +98,7 @@ def test_a_summary_counts_what_is_strict_loose_and_false() -> None:
 def test_a_summary_of_nothing_has_no_numbers() -> None:
     summary = summarise([])
     assert summary["count"] == 0 and summary["rotation_deg"] == {"median": None, "p95": None, "max": None}
+
+
+def test_a_spread_is_the_median_the_95th_percentile_and_the_largest() -> None:
+    assert spread(range(101)) == {"median": 50.0, "p95": 95.0, "max": 100.0}

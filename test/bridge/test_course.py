@@ -25,7 +25,7 @@ def test_what_is_in_order_or_a_little_late_passes_at_once() -> None:
     assert passed(stamps) == (stamps, [])
 
 
-@pytest.mark.parametrize("odd", [0, NOW - JUMP_NS, NOW + AHEAD_NS + 1])
+@pytest.mark.parametrize("odd", [0, NOW + 1 - JUMP_NS, NOW + 1 + AHEAD_NS])
 def test_one_that_leaps_alone_is_kept_out(odd: int) -> None:
     assert passed([NOW, NOW + 1, odd, NOW + 2, NOW + 3]) == ([NOW, NOW + 1, NOW + 2, NOW + 3], [odd])
 
@@ -34,6 +34,15 @@ def test_one_that_leaps_alone_is_kept_out(odd: int) -> None:
 def test_two_that_leap_are_a_jump_of_the_clock(leap: int) -> None:
     stamps = [NOW, NOW + leap, NOW + leap + 1, NOW + leap + 2]
     assert passed(stamps) == (stamps, [])
+
+
+def test_two_of_the_very_same_time_are_a_jump_of_the_clock_too() -> None:
+    assert passed([NOW, 0, 0, 1]) == ([NOW, 0, 0, 1], [])
+
+
+def test_one_that_is_late_does_not_set_the_clock_back() -> None:
+    late = NOW - JUMP_NS // 2
+    assert passed([NOW, late, NOW - JUMP_NS, NOW + 1]) == ([NOW, late, NOW + 1], [NOW - JUMP_NS])
 
 
 def test_of_two_that_leap_to_different_times_the_last_is_asked_for() -> None:

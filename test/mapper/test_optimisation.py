@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from objreg_ros.data import Array
 from objreg_ros.geometry import inverse, pose, rotation_from_vector, vector_from_rotation
 from objreg_ros.mapper.constraint import Constraint, local_information, open3d_information
-from objreg_ros.mapper.optimisation import Edge, optimise, squared_residual
+from objreg_ros.mapper.optimisation import Edge, _stages, optimise, squared_residual
 
 
 def translation(x: float, y: float = 0.0) -> Array:
@@ -53,6 +53,13 @@ def test_the_first_node_stays() -> None:
     solution = optimise([start, np.eye(4)], [edge(0, 1, translation(1.0))], max_residual=5.0)
     np.testing.assert_allclose(solution.poses[0], start, atol=1e-9)
     np.testing.assert_allclose(solution.poses[1], translation(4.0, 4.0), atol=1e-6)
+
+
+def test_stages_come_down_fourfold_from_the_largest_residual_that_may_be_pruned_to_the_wanted_one() -> None:
+    poses = [np.eye(4), translation(1.0)]
+    said = [edge(0, 1, translation(1.0 + 0.1 * np.sqrt(r)), uncertain=r < 1e3) for r in (1.0, 40.0, 1e4)]
+    assert _stages(poses, said, 4.0) == [64.0, 16.0, 4.0]
+    assert _stages(poses, said[::2], 4.0) == [4.0]
 
 
 def test_a_residual_counts_standard_deviations() -> None:

@@ -50,6 +50,19 @@ def test_a_way_that_turns_all_along_ends_where_half_of_the_turn_points() -> None
     np.testing.assert_allclose(T[:3, 3], rotation_from_vector(np.array([0.0, 0.0, 0.1])) @ (2.1, 0.04, 0.0), atol=1e-12)
 
 
+def test_what_goes_across_a_ramp_goes_level() -> None:
+    T = step(np.eye(4), pose(np.eye(3), np.array([2.0, 0.0, 1.0])), Steady(across=0.1))
+    np.testing.assert_allclose(T[:3, 3], (2.0, 0.2, 1.0), atol=1e-12)
+
+
+@pytest.mark.parametrize("length", [0.5, 2.0])
+def test_a_steady_error_is_believed_as_far_as_it_stands_out_of_what_wanders(length: float) -> None:
+    ahead, farther = (pose(np.eye(3), np.array([x, 0.0, 0.0])) for x in (length, 1.05 * length))
+    found = estimate([np.eye(4), ahead], [np.eye(4), farther], SIGMAS, Steady(0.1, 0.01, 0.1))
+    wandering = SIGMAS[0] ** 2 * length / 3.0 / length**2  # of the step along the way, as a share of it
+    assert found.along == pytest.approx(0.05 * 0.01**2 / (0.01**2 + wandering))
+
+
 def test_a_steady_error_is_found() -> None:
     found = estimate(TRUE, MAPPED, SIGMAS, Steady(0.1, 0.1, 0.1))
     np.testing.assert_allclose(found, WRONG, atol=1e-3)

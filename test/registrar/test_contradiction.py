@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import Array
-from objreg_ros.registrar.contradiction import information, warped
+from objreg_ros.registrar.contradiction import FREEDOMS, _spread, information, warped
 from objreg_ros.registrar.icp import Surface, prepare_surface
 from objreg_ros.registrar.params import RegistrarParams
 
@@ -56,6 +56,18 @@ def test_a_perfect_fit_is_as_good_as_the_noise_of_the_camera() -> None:
     assert 0.4 * resisting < found[0, 0] < resisting  # the closest of a cell is not every point's closest
 
 
+def test_errors_that_cancel_within_a_patch_count_as_noise_of_their_size() -> None:
+    xyz, _ = corner(0.05)
+    turns = np.where(np.rint(xyz / 0.05).sum(axis=1) % 2 == 0, 1.0, -1.0)
+    assert (sigma(shifted(0.008 * turns)) > 2.0 * sigma(shifted(0.0 * turns))).all()
+
+
+def test_few_patches_count_for_more_as_a_pose_follows_six_of_them() -> None:
+    J, ones = np.zeros((6, 2 * FREEDOMS)), np.ones(2 * FREEDOMS)
+    J[0] = 1.0
+    assert _spread(J, ones, np.arange(2 * FREEDOMS))[0, 0] == pytest.approx(2.0 * 2 * FREEDOMS)
+
+
 def test_what_no_point_resists_is_next_to_unknown() -> None:
     xyz, normals = corner(0.05)
     wall = normals[:, 2] != 0
@@ -89,3 +101,13 @@ def test_a_warped_depth_turns_a_camera_more_about_a_small_thing_than_about_a_lar
     xyz, normals = corner(0.05)
     near_the_corner = np.linalg.norm(xyz - np.array([0.0, 0.0, 2.0]), axis=1) < 0.45
     assert worst_shift(xyz[near_the_corner], normals[near_the_corner], 0.01) > 1.5 * worst_shift(xyz, normals, 0.01)
+
+
+def test_a_patch_aside_may_lie_off_by_the_share_of_its_distance() -> None:
+    x, y = (grid.ravel() for grid in np.meshgrid(np.linspace(3.02, 3.22, 21), np.linspace(0.02, 0.22, 21)))
+    xyz, normals = np.stack([x, y, np.full_like(x, 4.1)], axis=1), np.tile([0.0, 0.0, -1.0], (len(x), 1))
+    flat = xyz.astype(np.float32), normals.astype(np.float32)
+    C = warped(*flat, grid_of(xyz, normals), np.eye(4), PARAMS.replaced(depth_warp=0.01))
+    middle = xyz.mean(axis=0)
+    ahead = np.array([0.0, 0.0, 1.0, middle[1], -middle[0], 0.0])  # how a left step moves it along the axis
+    assert np.sqrt(ahead @ C @ ahead) == pytest.approx(0.01 * np.linalg.norm(middle), rel=0.02)

@@ -6,10 +6,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
-from objreg_ros.registrar.direct import finish
+from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector, transform
+from objreg_ros.registrar.direct import _add_grey, finish
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared, prepare
+from objreg_ros.registrar.projection import between, project
+from objreg_ros.registrar.visibility import SHADELESS
 
 from .rooms import keyframe, seen_from
 
@@ -36,3 +38,31 @@ def test_a_turn_about_the_line_of_sight_is_found_both_ways() -> None:
     a, b = wall(FRONT @ truth, 1), wall(FRONT, 2)
     assert pose_error(finish(a, b, np.eye(4), PARAMS)[0], truth)[0] < 0.3
     assert pose_error(finish(b, a, np.eye(4), PARAMS)[0], inverse(truth))[0] < 0.3
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_a_step_goes_down_the_slope_of_the_weighed_error_of_grey_on_surfaces(backwards: bool) -> None:
+    draw, camera, sigma = np.random.default_rng(0), (80.0, 90.0, 40.0, 30.0), 0.7
+    T = pose(rotation_from_vector(np.array([0.2, -0.15, 0.3])), np.array([0.1, -0.05, 0.2]))
+    detail = draw.normal(size=(60, 80)).astype(np.float32)
+    fine = detail.astype(float)
+    near = np.full(detail.shape, 2.0, np.float32)
+    far = np.where(np.arange(80) < 60, near, np.float32(9.0))  # on the right a depth jump
+    u, v, z = draw.uniform(5.0, 70.0, 300), draw.uniform(5.0, 50.0, 300), draw.uniform(1.5, 2.5, 300)
+    landed = np.stack([(u - 40.0) / 80.0 * z, (v - 30.0) / 90.0 * z, z], axis=1)
+    points = transform(T if backwards else inverse(T), landed).astype(np.float32)
+    shades = draw.normal(size=300).astype(np.float32)
+    shades[:50] = SHADELESS
+    counts = (shades < SHADELESS) & (u < 59.4)
+
+    def cost(step: np.ndarray) -> float:
+        moved = pose(rotation_from_vector(step[3:]), step[:3]) @ T
+        us, vs, _ = project(points, inverse(moved) if backwards else moved, camera)
+        errors = [(between(fine, us[k], vs[k])[0] - float(shades[k])) / sigma for k in np.flatnonzero(counts)]
+        return sum(0.5 * e * e / (1.0 + e * e) for e in errors)
+
+    H, g = np.zeros((6, 6)), np.zeros(6)
+    own = np.ascontiguousarray(inverse(T) if backwards else T)
+    _add_grey((points, shades), own, (near, far, detail, camera), T, backwards, sigma, (1.0, 0.0), H, g)
+    slope = [(cost(1e-6 * axis) - cost(-1e-6 * axis)) / 2e-6 for axis in np.eye(6)]
+    assert np.allclose(g, slope, rtol=1e-3, atol=1e-3 * np.abs(g).max())

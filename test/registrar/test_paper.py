@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
-from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector, transform
+from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector, skew, transform
 from objreg_ros.registrar.covariance import covariance_of
-from objreg_ros.registrar.paper import PaperEngine, register
+from objreg_ros.registrar.paper import LEAST_PAIRS, PaperEngine, _correspond, register
 from objreg_ros.registrar.params import RegistrarParams
 
 from . import rooms
@@ -42,6 +43,27 @@ def test_a_start_from_the_truth_stays_there_and_its_covariance_is_valid() -> Non
     found = register(_corner(), transform(T, _corner()), T, PARAMS)
     assert found is not None and np.allclose(found.T_target_source, T, atol=1e-9)
     assert np.linalg.eigvalsh(covariance_of(found, PARAMS)).min() > 0
+
+
+def test_the_information_is_that_of_a_step_about_the_camera_of_every_point() -> None:
+    T = pose(rotation_from_vector(np.array([0.3, 2.0, -0.5])), np.array([1.0, 0.0, 2.0]))
+    found = register(_corner(), transform(T, _corner()), T, PARAMS)
+    J = np.concatenate([np.hstack([np.eye(3), -skew(T[:3, :3] @ point)]) for point in _corner()])
+    assert found is not None and np.allclose(found.information * 1e-8, J.T @ J, atol=1e-6 * len(J))
+
+
+def test_fewer_than_six_pairs_give_nothing() -> None:
+    points = _corner()[::200]
+    for count in (LEAST_PAIRS - 1, LEAST_PAIRS):
+        found = register(points[:count], points[:count], np.eye(4), PARAMS)
+        assert (found is None) is (count < LEAST_PAIRS)
+
+
+def test_of_the_points_that_share_a_partner_the_closest_has_it() -> None:
+    tree = cKDTree([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    pairs = _correspond(tree, np.array([[0.02, 0, 0], [0.01, 0, 0], [1.0, 0, 0], [0.0, 0.5, 0]]), 0.1)
+    assert pairs.source.tolist() == [1, 2] and pairs.target.tolist() == [0, 1]
+    assert pairs.distance == pytest.approx([0.01, 0.0])
 
 
 def test_the_middle_of_what_was_aligned_is_that_of_the_points_in_the_target_frame() -> None:

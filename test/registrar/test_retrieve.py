@@ -10,7 +10,7 @@ import pytest
 
 from objreg_ros.data import ObjectCloud
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.retrieve import Index
+from objreg_ros.registrar.retrieve import Index, _tally, _turns
 from objreg_ros.registrar.sighting import Sighting, sightings_of
 
 from .samples import box, keyframe, moved
@@ -75,6 +75,18 @@ def test_an_object_of_another_size_or_colour_gets_a_lower_vote() -> None:
     index = _index(_seen(1, 0, box("box", (0, 0, 1), 0.4)), _seen(2, 10, box("box", (0, 0, 1), 0.1)))
     ranked = index.query(_seen(9, 100, box("box", (0, 0, 1), 0.1)))
     assert [place.keyframe_id for place in ranked] == [2, 1] and ranked[0].votes > 2 * ranked[1].votes
+
+
+def test_an_object_votes_once_for_a_keyframe_by_the_likest_that_it_shows_and_all_votes_add_up() -> None:
+    numbers, ballots = np.array([7, 3, 7, 3, 7]), np.array([0, 0, 0, 1, 1])
+    first, votes = _tally(numbers, ballots, np.array([0.9, 0.8, 0.5, 0.4, 0.1]))
+    assert first.tolist() == [1, 0] and votes == pytest.approx([1.2, 1.0])
+
+
+def test_what_is_near_another_place_takes_no_turn_of_its_pass() -> None:
+    near = np.eye(3, dtype=bool)
+    near[0, 1] = near[1, 0] = True
+    assert _turns(near, np.ones((3, 3), bool)).tolist() == [0, 3, 1]
 
 
 def test_neighbours_of_a_chosen_keyframe_give_way_to_other_moments() -> None:

@@ -13,9 +13,10 @@ from objreg_ros.geometry import inverse, transform
 from objreg_ros.registrar.keyframe import Keyframe
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import prepare
-from objreg_ros.registrar.scrutiny import Scrutiny
+from objreg_ros.registrar.scrutiny import ALONG, Scrutiny, liked_closely
 from objreg_ros.registrar.shape import upright_motion, upright_pose
-from objreg_ros.registrar.verify import WORST
+from objreg_ros.registrar.shape_score import alike
+from objreg_ros.registrar.verify import WORST, looks, verify
 
 from .rooms import shade
 from .shapes import ELL, error, from_side, keyframe
@@ -49,6 +50,29 @@ def test_the_true_motion_is_worth_more_than_one_that_is_off(looked, off: tuple) 
 def test_a_motion_under_which_the_views_do_not_meet_is_worth_least(looked) -> None:
     scrutiny, truth, _ = looked
     assert scrutiny.of(truth + np.array([0.0, 30.0, 0.0, 0.0])) == WORST
+
+
+def test_a_motion_is_worth_what_the_views_and_the_shapes_like_and_what_is_hidden_less_what_floats(looked) -> None:
+    scrutiny, truth, _ = looked
+    motion = truth + np.array([0.0, 0.06, 0.0, 0.0])
+    (source, target), (a, b), T = scrutiny._views, scrutiny._shapes, upright_pose(*scrutiny._shapes, motion)
+    seen = verify(source.sight, target.sight, T, PARAMS, PARAMS.quick_sample)
+    ways = looks(source.sight, target.sight, T[None], PARAMS, PARAMS.quick_sample)
+    (liked,) = liked_closely(source, target, T[None], ways, PARAMS, PARAMS.quick_sample)
+    assert seen.occluded > 0.05 and seen.violations > 0.01
+    for likeness, violations in ((0.0, 0.0), (2.0, 0.0), (0.0, 3.0)):
+        weighed = PARAMS.replaced(upright_likeness=likeness, upright_violations=violations)
+        more = likeness * np.clip(alike(a, b, motion, PARAMS), -1.0, 1.0) - violations * seen.violations
+        worth = Scrutiny(source, target, a, b, weighed).of(motion)
+        assert worth == pytest.approx(liked + seen.occluded + more, abs=1e-6)
+
+
+def test_a_thing_may_stand_farther_or_nearer_by_a_share_of_the_mean_of_both_extents(looked) -> None:
+    scrutiny, truth, _ = looked
+    shifts = np.array(scrutiny._taken_for(truth))[1 : 1 + 2 * len(ALONG)] - truth
+    wide = 0.5 * sum(shape.extent for shape in scrutiny._shapes)
+    assert not shifts[:, [0, 3]].any()
+    assert np.allclose(np.linalg.norm(shifts, axis=1), np.repeat(np.abs(ALONG), 2) * wide)
 
 
 @pytest.mark.parametrize("off", [(0.08, 0.03, 0.02), (0.0, -0.08, 0.0), (np.pi, 0.0, 0.0)])

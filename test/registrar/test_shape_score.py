@@ -4,11 +4,22 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from objreg_ros.geometry import inverse
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.shape import upright_motion
-from objreg_ros.registrar.shape_score import alike, climb, weights_of
+from objreg_ros.registrar.shape_score import (
+    COUNTS,
+    HIDDEN,
+    INLIERS,
+    VIOLATIONS,
+    alike,
+    climb,
+    tally,
+    weights_of,
+)
+from objreg_ros.registrar.silhouette import BESIDE, INSIDE, RIM
 
 from .shapes import BOX, ELL, from_side
 from .test_shape_search import shape_of
@@ -60,3 +71,30 @@ def test_a_climb_never_ends_lower() -> None:
     reached = climb(source.sight, target.sight, motion, extent, weights_of(PARAMS), 400, steps, 8)
     assert reached > alike(source, target, start, PARAMS) + 0.1
     assert abs(reached - alike(source, target, motion, PARAMS)) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("behind", "on", "facing", "what", "counted"),
+    [
+        (0.0, INSIDE, -1.0, INLIERS, 1.0),
+        (0.0, RIM, -1.0, INLIERS, 1.0),
+        (0.0, INSIDE, 1.0, INLIERS, 0.0),
+        (-0.1, INSIDE, -1.0, VIOLATIONS, 1.0),
+        (-0.1, BESIDE, -1.0, VIOLATIONS, 1.0),
+        (-0.1, RIM, -1.0, VIOLATIONS, 0.0),
+        (0.1, INSIDE, -1.0, HIDDEN, 0.0),
+        (0.2, INSIDE, -1.0, HIDDEN, 0.5),
+        (0.4, INSIDE, -1.0, HIDDEN, 1.0),
+        (0.1, BESIDE, -1.0, HIDDEN, 0.5),
+        (0.1, RIM, -1.0, HIDDEN, 0.5),
+    ],
+)
+def test_a_point_is_on_the_surface_floats_or_is_hidden_the_more_the_deeper_it_lies(
+    behind: float, on: int, facing: float, what: int, counted: float
+) -> None:
+    depth, mask, out = np.ones((3, 3), np.float32), np.full((3, 3), on, np.uint8), np.zeros(COUNTS)
+    point, normal = np.array([[0.0, 0.0, 1.0 + behind]], np.float32), np.array([[0.0, 0.0, facing]], np.float32)
+    grey = np.zeros((3, 3), np.float32)
+    tally(point, normal, grey[0, :1], 1, np.eye(4)[:3], depth, mask, grey, np.array([1.0, 1.0, 1.5, 1.5]), 0.2, out)
+    assert out[what] == pytest.approx(counted, abs=1e-5)
+    assert out[[INLIERS, VIOLATIONS, HIDDEN]].sum() == pytest.approx(counted, abs=1e-5)

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import Array, View
-from objreg_ros.geometry import inverse, pose, pose_error
+from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
+from objreg_ros.registrar.hypotheses import Hypothesis
 from objreg_ros.registrar.keyframe import Context, Keyframe
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Pair, prepare
-from objreg_ros.registrar.shortlist import shortlist
+from objreg_ros.registrar.shortlist import _hopeful, shortlist
 
 from .rooms import keyframe, look_at, seen_from
 
@@ -63,6 +64,16 @@ def test_the_best_come_first_and_are_distinct_and_few() -> None:
     worth = [seed.worth for seed in best]
     assert worth == sorted(worth, reverse=True) and worth[-1] >= worth[0] - PARAMS.finished_margin
     assert len(best) <= PARAMS.finished and len({seed.chain for seed in seeds}) >= 2
+
+
+def test_what_is_held_and_keeps_gravity_about_as_well_as_the_gate_wants_it_goes_on_and_all_where_nothing_does() -> None:
+    seen = keyframe(SQUARELY, WALL)
+    tilts = np.radians(PARAMS.max_gravity_error) * np.array([0.0, 1.4, 1.6])
+    turned = [pose(rotation_from_vector(np.array([0.0, 0.0, tilt])), np.zeros(3)) for tilt in tilts]
+    seeds = [Hypothesis(T_target_source=T, chain="features", worth=0.0) for T in turned]
+    for firm, hopeful in (((1, 1, 1), (0, 1)), ((0, 1, 1), (1,)), ((0, 0, 1), (0, 1, 2)), ((0, 0, 0), (0, 1, 2))):
+        found = _hopeful(pair_of(seen, seen), seeds, np.array(firm, bool), PARAMS)
+        assert [id(seed) for seed in found] == [id(seeds[k]) for k in hopeful]
 
 
 def test_nothing_is_short_listed_where_no_chain_proposes_anything() -> None:

@@ -10,7 +10,7 @@ from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector,
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared, prepare
 from objreg_ros.registrar.pushing import pushed
-from objreg_ros.registrar.sliding import HELD, preferred, resistance, resisted, steadied
+from objreg_ros.registrar.sliding import HELD, HOPE, _peaks, preferred, resistance, resisted, steadied
 
 from .rooms import ROOM, keyframe, seen_from
 
@@ -29,6 +29,15 @@ def test_what_stands_on_a_table_holds_it() -> None:
     free, held = resisted(*views(TABLE, 0.0, 20.0), TRUTH, SIDEWAYS, 1.0, PARAMS)
     assert free.shape == (0, 6) and held.shape == (1, 6)
     assert min(abs(held[0, 0] - HELD * push) for push in PARAMS.pushes) < 1e-9 and not held[0, 1:].any()
+
+
+def test_a_turn_about_what_was_seen_is_as_long_as_its_rim_moves() -> None:
+    source, target = views(TABLE, 0.0, 20.0)
+    lever, extent = transform(TRUTH, source.middle) - TRUTH[:3, 3], 1.2
+    about = np.concatenate([-np.cross(target.up, lever), target.up])
+    free, held = resisted(source, target, TRUTH, about[None], extent, PARAMS)
+    assert len(free) == 0 and len(held) == 1
+    assert min(abs(np.linalg.norm(held[0, 3:]) * extent - HELD * push) for push in PARAMS.pushes) < 1e-9
 
 
 def test_nothing_holds_a_bare_wall() -> None:
@@ -69,6 +78,19 @@ def test_what_views_say_of_a_direction_counts_once() -> None:
     sure = PARAMS.replaced(doubtful_sigma=1e-3)  # they are asked on and on
     once = steadied(*grey, TRUTH, C, PARAMS.replaced(doubtful_sigma=0.1))[0, 0]
     assert steadied(*grey, TRUTH, C, sure)[0, 0] == pytest.approx(once, rel=0.05)
+
+
+def test_nothing_is_held_by_a_push_that_is_longer_than_may_steady() -> None:
+    C = np.diag([0.2**2, 1e-6, 1e-6, 1e-8, 1e-8, 1e-8])
+    grey = [prepare(keyframe(seen_from(a), TABLE, seed=k), PARAMS) for k, a in enumerate((0.0, 20.0))]
+    assert not steadied(*grey, TRUTH, C, PARAMS.replaced(steadying_push=0.0)).any()
+
+
+def test_peaks_are_what_no_neighbour_exceeds_the_best_first_hopeful_and_aside_from_the_middle() -> None:
+    V = np.full((9, 9), -1.0, np.float32)
+    V[4, 4], V[3, 4] = 0.0, 0.9  # the pose itself, and beside it
+    V[1, 1], V[7, 2], V[7, 3], V[1, 7] = 0.9 * -HOPE, 0.5, 0.4, 1.1 * -HOPE
+    assert _peaks(V.ravel(), 9) == [7 * 9 + 2, 1 * 9 + 1]
 
 
 def test_a_pose_that_came_to_rest_beside_the_truth_is_left_for_it() -> None:

@@ -25,6 +25,14 @@ def test_what_came_to_nothing_is_not_in_the_way() -> None:
     assert not thinning.redundant(0, 60 * SECOND)
 
 
+def test_one_that_came_to_nothing_leaves_those_beside_it() -> None:
+    thinning = Thinning(1.0)
+    for from_s in (0, 30):
+        thinning.accept(from_s * SECOND, 60 * SECOND)
+    thinning.withdraw(0, 60 * SECOND)
+    assert not thinning.redundant(0, 60 * SECOND) and thinning.redundant(30 * SECOND, 60 * SECOND)
+
+
 @pytest.mark.parametrize(
     ("from_s", "to_s", "redundant"),
     [

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -43,6 +45,43 @@ def test_a_guess_makes_a_larger_motion_reachable() -> None:
     T = pose(rotation_from_vector(np.array([0.0, 0.3, 0.0])), np.array([0.3, 0.0, 0.0]))
     found = view_motion(scene_view(T), surface_of(scene_view()), T @ MOTIONS[0])
     assert found is not None and pose_error(found, T)[0] < 0.2
+
+
+def test_a_view_without_grey_is_aligned_by_its_shape() -> None:
+    found = view_motion(replace(scene_view(MOTIONS[0]), grey=None), surface_of(scene_view()))
+    assert found is not None and pose_error(found, MOTIONS[0])[1] < 1.0
+
+
+def test_what_moved_by_itself_or_changed_its_colour_hardly_moves_the_rest() -> None:
+    view = scene_view(MOTIONS[0])
+    xyz, grey = view.xyz.copy(), view.grey.copy()
+    xyz[40:80, 40:80] *= 0.98
+    grey[20:60, 100:140] = 255
+    for other in (replace(view, xyz=xyz), replace(view, grey=grey)):
+        found = view_motion(other, surface_of(scene_view()))
+        assert found is not None and pose_error(found, MOTIONS[0])[1] < 0.25
+
+
+def test_a_brighter_picture_is_no_motion() -> None:
+    view = scene_view(MOTIONS[0])
+    found = view_motion(replace(view, grey=view.grey + np.uint8(25)), surface_of(scene_view()))
+    assert found is not None and pose_error(found, MOTIONS[0])[1] < 0.25
+
+
+@pytest.mark.parametrize(("nearer", "found"), [(60, True), (100, False)])
+def test_a_motion_is_believed_where_most_of_the_view_agrees(nearer: int, found: bool) -> None:
+    view = scene_view(MOTIONS[0])
+    xyz = view.xyz.copy()
+    xyz[:, :nearer] *= 0.5
+    assert (view_motion(replace(view, xyz=xyz), surface_of(scene_view())) is not None) is found
+
+
+@pytest.mark.parametrize(("side", "found"), [(30, False), (60, True)])
+def test_a_few_pixels_tell_no_motion(side: int, found: bool) -> None:
+    view = scene_view(MOTIONS[0])
+    xyz = np.full_like(view.xyz, np.nan)
+    xyz[30 : 30 + side, 60 : 60 + side] = view.xyz[30 : 30 + side, 60 : 60 + side]
+    assert (view_motion(replace(view, xyz=xyz), surface_of(scene_view())) is not None) is found
 
 
 def test_two_views_of_different_scenes_have_no_motion() -> None:

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from objreg_ros.data import Array, View
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
 from objreg_ros.registrar import verify as verify_module
 from objreg_ros.registrar.params import RegistrarParams
@@ -22,9 +23,9 @@ from objreg_ros.registrar.verify import (
     rated_quickly,
     verify,
 )
-from objreg_ros.registrar.visibility import INLIERS, OCCLUDED, SEEN, VIOLATIONS, prepare_sight
+from objreg_ros.registrar.visibility import INLIERS, OCCLUDED, SEEN, VIOLATIONS, Sight, prepare_sight
 
-from .rooms import keyframe, seen_from
+from .rooms import CAMERA, keyframe, seen_from
 
 PARAMS = RegistrarParams()
 
@@ -67,6 +68,28 @@ def test_a_ragged_edge_does_not_float_and_a_thing_that_is_gone_does(sights) -> N
     assert floating(*sights, a_little_off, PARAMS) < verify(*sights, a_little_off, PARAMS).violations
     far_off = pose(np.eye(3), np.array([0.0, 0.0, -0.4])) @ TRUTH
     assert floating(*sights, far_off, PARAMS) > 0.1
+
+
+def seen_at(depth: float | Array) -> Sight:
+    """What is seen of a surface at this depth, one of each column of the image or of all."""
+    v, u = np.mgrid[0 : CAMERA.height, 0 : CAMERA.width]
+    rays = np.stack([(u - CAMERA.cx) / CAMERA.fx, (v - CAMERA.cy) / CAMERA.fy, np.ones_like(u, float)], axis=-1)
+    xyz = (rays * np.broadcast_to(depth, u.shape)[..., None]).astype(np.float32)
+    return prepare_sight(View(xyz=xyz, grey=None, intrinsics=CAMERA), 4.0, 3.0)
+
+
+@pytest.mark.parametrize(("tolerances", "share"), [(1.8, 0.0), (2.2, 1.0)])
+def test_what_is_nearer_by_more_than_twice_the_tolerance_floats(tolerances: float, share: float) -> None:
+    tolerance = PARAMS.depth_tolerance + PARAMS.depth_tolerance_growth * 2.0**2
+    nearer = seen_at(2.0), seen_at(2.0 + tolerances * tolerance)
+    assert floating(*nearer, np.eye(4), PARAMS) == floating(*nearer[::-1], np.eye(4), PARAMS) == share
+
+
+def test_nothing_floats_a_few_pixels_beside_what_is_as_near() -> None:
+    column = np.arange(CAMERA.width)
+    post, beside = (seen_at(np.where((column >= at) & (column < at + 3), 1.0, 2.0)) for at in (80, 84))
+    assert verify(post, beside, np.eye(4), PARAMS).violations > 0.01
+    assert floating(post, beside, np.eye(4), PARAMS) == 0.0
 
 
 def test_views_that_do_not_meet_float_altogether(sights) -> None:
