@@ -25,3 +25,4 @@ def test_a_store_is_exported(tmp_path: Path) -> None:
     arguments = [str(tmp_path / "place.db"), str(tmp_path / "out")]
     result = CliRunner().invoke(export.command, arguments, catch_exceptions=False)
     assert result.exit_code == 0 and (tmp_path / "out" / "map.json").is_file()
+    assert "wrote 1 files into" in result.output

@@ -56,10 +56,28 @@ def test_a_perfect_fit_is_as_good_as_the_noise_of_the_camera() -> None:
     assert 0.4 * resisting < found[0, 0] < resisting  # the closest of a cell is not every point's closest
 
 
+def wall_aside() -> tuple[Array, Array]:
+    """A piece of wall that is one patch, as points and normals."""
+    x, y = (grid.ravel() for grid in np.meshgrid(np.linspace(3.02, 3.22, 21), np.linspace(0.02, 0.22, 21)))
+    return np.stack([x, y, np.full_like(x, 4.1)], axis=1), np.tile([0.0, 0.0, -1.0], (len(x), 1))
+
+
+def ahead_of(xyz: Array) -> Array:
+    """How a left step [t r] moves the middle of points along the optical axis."""
+    x, y, _ = xyz.mean(axis=0)
+    return np.array([0.0, 0.0, 1.0, y, -x, 0.0])
+
+
 def test_errors_that_cancel_within_a_patch_count_as_noise_of_their_size() -> None:
-    xyz, _ = corner(0.05)
-    turns = np.where(np.rint(xyz / 0.05).sum(axis=1) % 2 == 0, 1.0, -1.0)
-    assert (sigma(shifted(0.008 * turns)) > 2.0 * sigma(shifted(0.0 * turns))).all()
+    xyz, normals = wall_aside()
+    turns, flat = np.where(np.arange(len(xyz)) % 2 == 0, 1.0, -1.0), normals.astype(np.float32)
+    surface, ahead = grid_of(xyz, normals), ahead_of(xyz)
+
+    def sigma_ahead(error: float) -> float:
+        moved = (xyz + error * turns[:, None] * normals).astype(np.float32)
+        return float(np.sqrt(ahead @ np.linalg.inv(information(moved, flat, surface, np.eye(4), PARAMS)) @ ahead))
+
+    assert sigma_ahead(0.008) > 2.0 * sigma_ahead(0.0)
 
 
 def test_few_patches_count_for_more_as_a_pose_follows_six_of_them() -> None:
@@ -104,10 +122,8 @@ def test_a_warped_depth_turns_a_camera_more_about_a_small_thing_than_about_a_lar
 
 
 def test_a_patch_aside_may_lie_off_by_the_share_of_its_distance() -> None:
-    x, y = (grid.ravel() for grid in np.meshgrid(np.linspace(3.02, 3.22, 21), np.linspace(0.02, 0.22, 21)))
-    xyz, normals = np.stack([x, y, np.full_like(x, 4.1)], axis=1), np.tile([0.0, 0.0, -1.0], (len(x), 1))
+    xyz, normals = wall_aside()
     flat = xyz.astype(np.float32), normals.astype(np.float32)
     C = warped(*flat, grid_of(xyz, normals), np.eye(4), PARAMS.replaced(depth_warp=0.01))
-    middle = xyz.mean(axis=0)
-    ahead = np.array([0.0, 0.0, 1.0, middle[1], -middle[0], 0.0])  # how a left step moves it along the axis
-    assert np.sqrt(ahead @ C @ ahead) == pytest.approx(0.01 * np.linalg.norm(middle), rel=0.02)
+    ahead = ahead_of(xyz)
+    assert np.sqrt(ahead @ C @ ahead) == pytest.approx(0.01 * np.linalg.norm(xyz.mean(axis=0)), rel=0.02)

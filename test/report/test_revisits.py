@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -33,6 +35,13 @@ def test_a_view_overlaps_itself_wholly_and_its_back_not_at_all() -> None:
 def test_half_a_picture_to_the_side_is_half_an_overlap() -> None:
     width_m = 160 / CAMERA.fx * 2.0
     assert overlap(wall(0), wall(1, x=width_m / 2)) == pytest.approx(0.5, abs=0.03)
+
+
+@pytest.mark.parametrize(("shift", "share"), [(0.09, 1.0), (0.12, 0.0)])
+def test_at_two_metres_a_depth_is_the_same_within_ten_centimetres(shift: float, share: float) -> None:
+    seen = wall(0)
+    nearer = replace(seen, T_world_camera=pose(np.eye(3), np.array([0.0, 0.0, shift])))
+    assert overlap(seen, nearer) == pytest.approx(share, abs=0.15)
 
 
 def test_a_place_is_revisited_after_the_gap_and_not_before() -> None:
