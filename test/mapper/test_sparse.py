@@ -63,6 +63,7 @@ def test_moments_in_a_gap_are_not_covered_and_its_ends_are() -> None:
     assert all(trajectory.in_gap(stamp) and not trajectory.covers(stamp) for stamp in inside)
     assert all(trajectory.covers(stamp) and not trajectory.in_gap(stamp) for stamp in ends)
     assert trajectory.at(silent_ns)[0, 3] == pytest.approx(20.0)
+    assert {SECOND - STEP_NS, silent_ns} <= set(trajectory.stamps_ns)
 
 
 def test_poses_that_always_come_seldom_have_no_gaps() -> None:

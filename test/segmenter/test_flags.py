@@ -9,7 +9,7 @@ import pytest
 from objreg_ros.data import DepthImage, PointFlag
 from objreg_ros.segmenter.boxes import Box
 from objreg_ros.segmenter.extract import Pixels
-from objreg_ros.segmenter.flags import MIN_CELLS, whole_flags
+from objreg_ros.segmenter.flags import MIN_CELLS, _fit_plane, whole_flags
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.segmenter.surface import Window
 
@@ -145,3 +145,11 @@ def test_where_next_to_nothing_is_seen_around_a_patch_it_is_not_known_to_be_a_wa
     chosen[40] = False  # a row is all that is around
     flags = whole_flags(scene.image(), pixels_within(INSIDE), surface, chosen, (0, 0, width, 40))
     assert (PointFlag.WALL_LIKE in flags) == is_wall
+
+
+def test_a_plane_that_leans_both_ways_is_found_in_a_corner_of_it() -> None:
+    x, y = np.linspace(-0.5, 0.5, 64).astype(np.float32), np.linspace(-0.4, 0.4, 48).astype(np.float32)
+    depth = (1.0 / (0.3 * x - 0.2 * y[:, None] + 0.5)).astype(np.float32)
+    chosen = np.add.outer(np.arange(48), np.arange(64)) < 50
+    slope = np.sqrt(0.3**2 + 0.2**2 + 0.5**2)
+    assert _fit_plane(depth, x, y, chosen) == pytest.approx((0.3, -0.2, 0.5, slope), abs=1e-4)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from objreg_ros.segmenter.holes import fill_holes
+from objreg_ros.segmenter.holes import _bounds, fill_holes
 
 JUMP = (0.012, 0.008)
 
@@ -37,3 +37,18 @@ def test_what_is_seen_through_a_hole_stays_outside() -> None:
     depth[5:7, 5:7] = 1.5
     fill_holes(chosen, depth, JUMP)
     assert not chosen[5:7, 5:7].any()
+
+
+def test_a_hole_of_one_cell_in_the_smallest_ring_is_filled() -> None:
+    chosen = np.ones((3, 3), bool)
+    chosen[1, 1] = False
+    fill_holes(chosen, np.ones((3, 3), np.float32), JUMP)
+    assert chosen.all()
+
+
+def test_the_bounds_are_those_of_all_rows_from_the_first_to_the_last() -> None:
+    chosen = np.zeros((6, 9), bool)
+    for row, column in ((0, 3), (2, 1), (2, 6), (3, 2)):
+        chosen[row, column] = True
+    assert tuple(_bounds(chosen)) == (1, 0, 7, 4)
+    assert tuple(_bounds(np.zeros((6, 9), bool))) == (0, 0, 0, 0)
