@@ -11,7 +11,7 @@ import pytest
 
 from objreg_ros.data import ObjectCloud
 from objreg_ros.geometry import pose, rotation_from_vector
-from objreg_ros.registrar.landmarks import Landmarks, Link
+from objreg_ros.registrar.landmarks import Landmarks, Link, Merge
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.sighting import Sighting, sightings_of
 
@@ -46,6 +46,54 @@ def test_an_object_with_a_stray_point_far_away_keeps_its_id_and_costs_no_more() 
     _, most = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert most < 1e6
+
+
+@pytest.mark.parametrize(
+    ("extent", "way", "apart", "same"),
+    [
+        (0.1, 0.0, 0.115, True),
+        (1.0, 0.0, 0.125, False),  # of the smaller extent
+        (0.1, 0.5, 0.165, True),
+        (0.1, -0.5, 0.165, True),
+        (0.1, 10.0, 0.21, True),
+        (0.1, 10.0, 0.23, False),  # drift counts up to the radius
+    ],
+)
+def test_an_object_may_be_aside_by_the_radius_a_share_of_its_extent_and_the_drift(
+    extent: float, way: float, apart: float, same: bool
+) -> None:
+    landmarks = Landmarks(PARAMS.replaced(landmark_radius=0.1, odometry_drift=0.1))
+    first = replace(_seen(1, CUP)[0], position=np.array([0.45, 0.0, 0.0]), extent=0.1, travelled=20.0)
+    aside = first.position + np.array([apart, 0.0, 0.0])
+    _take(landmarks, (first,))
+    later = replace(first, keyframe_id=2, position=aside, extent=extent, travelled=20.0 + way)
+    assert _take(landmarks, (later,)) == [1 if same else 2]
+
+
+def test_what_a_closure_claims_for_another_object_is_not_taken_for_its_place() -> None:
+    landmarks = Landmarks(PARAMS)
+    named, _ = landmarks.assign(_seen(1, CUP))
+    landmarks.add(named)
+    claimed = Link(index=1, of=named[0], R_there_here=np.eye(3))
+    assert _take(landmarks, _seen(2, CUP, box("cup", (0.8, 0, 1))), [claimed]) == [2, 1]
+
+
+def test_what_became_of_another_leaves_its_votes_and_no_trace_where_it_was() -> None:
+    landmarks = Landmarks(PARAMS)
+    mouse, elsewhere = box("mouse", (3, 0, 1)), box("mouse", (5, 0, 1))
+    landmarks.add(seen.of_landmark(1, np.eye(3)) for seen in _seen(1, CUP))
+    landmarks.add(seen.of_landmark(2, np.eye(3)) for seen in (*_seen(2, mouse), *_seen(3, elsewhere)))
+    landmarks.add((), {2: Merge(into=1, R_into_old=np.eye(3))})
+    assert [(known.landmark, known.label) for known in landmarks.known()] == [(1, "mouse")]
+    assert _take(landmarks, _seen(4, mouse)) == [3]
+
+
+def test_what_became_of_one_that_is_not_known_has_the_axes_of_that_one() -> None:
+    landmarks, R = Landmarks(PARAMS), rotation_from_vector(np.array([0.0, 0.0, 0.5]))
+    landmarks.add(seen.of_landmark(2, np.eye(3)) for seen in _seen(1, CUP))
+    landmarks.add((), {2: Merge(into=1, R_into_old=R)})
+    (again,), _ = landmarks.assign(_seen(2, CUP))
+    assert again.landmark == 1 and np.allclose(again.R_landmark_session, R)
 
 
 def test_two_objects_of_one_keyframe_are_never_one_landmark() -> None:
