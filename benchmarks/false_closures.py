@@ -8,6 +8,7 @@ it is said how often the best pose that was proposed was loosely right, and why 
 
     python benchmarks/false_closures.py --json OUT
     python benchmarks/false_closures.py --simulate look-alikes:82 --simulate moved:103:qvga:stress
+    python benchmarks/false_closures.py --simulate moved:704:realsense_d435 --model truth
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -72,13 +74,13 @@ def told(text: str) -> Told:
     return story
 
 
-def measure(story: Told, frames: int) -> dict[str, Any]:
+def measure(story: Told, frames: int, model: str) -> dict[str, Any]:
     """The figures of one recording, which is gone afterwards."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "recording"
         sensors = sensors_of(camera_of(story.camera, None), story.stress, ())
         simulate(path, story.scenario, story.seed, frames, sensors=sensors, jpeg=True, threads=1)
-        with read_source(path, detector_of(), story.seed) as source:
+        with read_source(path, detector_of(model), story.seed) as source:
             registrar = Registrar(RegistrarParams().replaced(**EAGER, **source.camera))
             outcomes = [*(registrar.process(frame) for frame in source.frames), registrar.finish()]
             registrar.close()
@@ -146,14 +148,15 @@ def line(name: str, row: dict[str, Any], group: str = "all") -> str:
     help="Simulate this; may be repeated.",
 )
 @click.option("--frames", type=click.IntRange(min=2), default=400, show_default=True, help="Frames of a recording.")
+@click.option("--model", default="", help="ONNX model; `truth` takes the true boxes.")
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
 @click.option("--processes", type=click.IntRange(min=1), default=2, show_default=True, help="Recordings at once.")
-def main(stories: list[Told], frames: int, json_file: Path | None, processes: int) -> None:
+def main(stories: list[Told], frames: int, model: str, json_file: Path | None, processes: int) -> None:
     """Hold every keyframe of simulated recordings against ten others, and count what is falsely accepted."""
     rows: dict[str, dict[str, Any]] = {}
     click.echo(HEAD)
     with ProcessPoolExecutor(processes, multiprocessing.get_context("fork"), initializer=_begin) as pool:
-        for story, row in zip(stories, pool.map(measure, stories, [frames] * len(stories)), strict=True):
+        for story, row in zip(stories, pool.map(partial(measure, frames=frames, model=model), stories), strict=True):
             name = f"{story.scenario} {story.seed}, {story.camera}{', stress' * story.stress}"
             rows[name] = row
             click.echo(line(name, row))
