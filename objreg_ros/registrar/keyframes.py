@@ -22,6 +22,9 @@ from objreg_ros.registrar.plumb import PlumbLine
 from objreg_ros.registrar.tracking import Surface, surface_of, view_motion
 
 
+UNSET_NS = 0  # the stamp of a camera that starts before the simulated clock does: no clock began then
+
+
 class Clock(NamedTuple):
     """A run of the clock: time has only grown since ``began_ns``, and ``session`` was the first in it.
 
@@ -148,7 +151,7 @@ class Keyframer:
         if last_ns is not None and 0 <= last_ns - frame.stamp_ns < JUMP_NS:
             return None
         self._last_ns = frame.stamp_ns
-        if last_ns is None or frame.stamp_ns < last_ns:
+        if last_ns is None or frame.stamp_ns < last_ns or (last_ns == UNSET_NS and frame.stamp_ns > JUMP_NS):
             self._clock = Clock(frame.stamp_ns, self.next_session)
             return self._start(frame)
         if session is None or not session.goes_on(frame) or session.leaps(frame, self._params.max_speed):

@@ -93,6 +93,14 @@ def test_a_frame_that_comes_late_or_twice_is_passed_over() -> None:
     assert stamps == sorted(set(stamps)) and min(stamps) == 5 * SECOND
 
 
+def test_a_first_stamp_that_nobody_set_begins_no_clock() -> None:
+    frames = [frame(at, CUP, moved(0.0)) for at in (0.0, 500.0, 500.1, 500.2)]
+    unset, told = (s.clock for s in _run(Keyframer(PARAMS), frames))
+    assert unset == Clock(0, 0) and told == Clock(500 * SECOND, 1)
+    (from_zero,) = {s.clock for s in _run(Keyframer(PARAMS), [frame(0.1 * k, CUP, moved(0.03 * k)) for k in range(6)])}
+    assert from_zero == Clock(0, 0)
+
+
 def test_a_clock_runs_until_time_goes_back() -> None:
     frames = [frame(t, CUP, moved(t)) for t in (5.0, 6.0)] + [frame(7.0, CUP, None, scene_view(moved(9.0)))]
     frames += [frame(t, CUP, moved(t)) for t in (1.0, 2.0)]
