@@ -21,7 +21,6 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.plumb import PlumbLine
 from objreg_ros.registrar.tracking import Surface, surface_of, view_motion
 
-
 UNSET_NS = 0  # the stamp of a camera that starts before the simulated clock does: no clock began then
 
 
