@@ -127,7 +127,7 @@ class Landmarks:
         for sighting in sightings:
             number = sighting.landmark
             known = self._known[number] = self._known.pop(number, _Known(sighting))
-            self._there[self._cell(known.last)].discard(number)
+            self._leave(known.last, number)
             self._there[self._cell(sighting)].add(number)
             known.last = sighting
             known.votes[sighting.label] += round(1000 * sighting.score)
@@ -142,10 +142,21 @@ class Landmarks:
         return sorted(k for k in spared if all(k in spare.get(number, ()) for number in self._shown[k]))
 
     def forget(self, keyframe_ids: Iterable[int]) -> None:
-        """Forget from where these keyframes saw their objects; the landmarks stay known."""
+        """Forget from where these keyframes saw their objects, and the landmarks that no other keyframe shows."""
         for keyframe_id in keyframe_ids:
             for number in self._shown.pop(keyframe_id, ()):
-                del self._known[number].views[keyframe_id]
+                known = self._known[number]
+                del known.views[keyframe_id]
+                if not known.views:
+                    self._leave(known.last, number)
+                    del self._known[number]
+
+    def _leave(self, sighting: Sighting, number: int) -> None:
+        """A landmark is no longer where it was seen so."""
+        cell = self._cell(sighting)
+        self._there[cell].discard(number)
+        if not self._there[cell]:
+            del self._there[cell]
 
     def _same_place(self, sighting: Sighting, taken: set[int]) -> int:
         """The landmark that this session saw last at this place, 0 if there is none."""
@@ -210,7 +221,7 @@ class Landmarks:
         gone, new = self._known.pop(old, None), merge.into
         if gone is None:
             return
-        self._there[self._cell(gone.last)].discard(old)
+        self._leave(gone.last, old)
         gone.last = gone.last.of_landmark(new, merge.R_into_old @ gone.last.R_landmark_session)
         gone.views = {keyframe_id: merge.R_into_old @ view for keyframe_id, view in gone.views.items()}
         known = self._known.setdefault(new, gone)

@@ -239,3 +239,14 @@ def test_the_landmarks_of_late_are_those_of_the_session_that_were_seen_last() ->
     _take(landmarks, _seen(6, box("cup", (5, 0, 1)), session=1))
     assert [known.landmark for known in landmarks.recent(0, 3)] == [3, 4]
     assert [known.landmark for known in landmarks.recent(1, 3)] == [5]
+
+
+def test_a_landmark_whose_last_keyframe_is_forgotten_is_gone_and_its_id_is_not_given_again() -> None:
+    landmarks = Landmarks(PARAMS)
+    for keyframe_id in (1, 2):
+        assert _take(landmarks, _seen(keyframe_id, CUP)) == [1]
+    landmarks.forget([1])
+    assert [known.landmark for known in landmarks.known()] == [1]
+    landmarks.forget([2])
+    assert not landmarks.known() and not landmarks._there
+    assert _take(landmarks, _seen(3, CUP)) == [2]
