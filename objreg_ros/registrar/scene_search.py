@@ -42,7 +42,7 @@ def from_shapes(source: Prepared, target: Prepared, params: RegistrarParams) -> 
     a, b = pairs[0] if alone else (source.scene, target.scene)
     assert a is not None and b is not None
     scale = Worth(source, target, a, b, params)
-    motions = np.array([upright_motion(a, b, fit.T_target_source) for fit in found])
+    motions = upright_motion(a, b, np.array([fit.T_target_source for fit in found]))
     worth = scale.of(motions)
     best = np.argsort(-worth, kind="stable")[: params.drawn]
     best = best[worth[best] >= worth[best[0]] - params.shape_margin]
@@ -52,8 +52,8 @@ def from_shapes(source: Prepared, target: Prepared, params: RegistrarParams) -> 
         closer = Scrutiny(source, target, a, b, params).improved(motions[order])
         motions, worth = np.concatenate([closer[0], motions]), np.concatenate([closer[1], worth])
         order = np.argsort(-worth, kind="stable")
-    poses = [(upright_pose(a, b, motions[k]), float(worth[k])) for k in order]
-    return [Hypothesis(T_target_source=T, chain="objects", worth=value) for T, value in poses]
+    best_first = zip(upright_pose(a, b, motions[order]), worth[order].tolist(), strict=True)
+    return [Hypothesis(T_target_source=T, chain="objects", worth=value) for T, value in best_first]
 
 
 def half_turned(
@@ -107,7 +107,7 @@ def register_scenes(source: Prepared, target: Prepared, params: RegistrarParams)
         seeds += glance(a, b, EACH, params)
     feet_a, feet_b = (np.array([shape.foot for shape in shapes]) for shapes in zip(*pairs, strict=True))
     up = pairs[0][1].R_upright_camera[2]
-    levelled = [_levelled(feet_a, feet_b, up, T, params.centroid_tolerance) for T in seeds]
+    levelled = _levelled(feet_a, feet_b, up, np.array(seeds), params.centroid_tolerance)
     return improve(source.scene, target.scene, levelled, params)
 
 
@@ -118,14 +118,17 @@ def shape_pairs(source: Prepared, target: Prepared) -> list[tuple[Shape, Shape]]
 
 
 def _levelled(feet_source: Array, feet_target: Array, up: Array, T_target_source: Array, tolerance: float) -> Array:
-    """The pose raised or lowered so that the objects that it brings together stand at the same height.
+    """The poses (K, 4, 4) raised or lowered so that the objects that each brings together stand at the same height.
 
     What an object stands on is known to a millimetre, its middle to centimetres. Feet (P, 3) of P pairs that may be
     one object, ``up (3,)`` in the target's frame.
     """
-    gaps = feet_target - transform(T_target_source, feet_source)
-    near = np.linalg.norm(gaps, axis=1) < 2.0 * tolerance
-    T = T_target_source.copy()
-    if near.any():
-        T[:3, 3] += np.median(gaps[near] @ up) * up
+    R, t = T_target_source[:, :3, :3], T_target_source[:, None, :3, 3]
+    gaps = feet_target - (feet_source @ R.transpose(0, 2, 1) + t)
+    near = np.linalg.norm(gaps, axis=2) < 2.0 * tolerance
+    rises = np.sort(np.where(near, gaps @ up, np.inf), axis=1)
+    T, some, count = T_target_source.copy(), near.any(axis=1), near.sum(axis=1)
+    rises, count = rises[some], count[some]
+    rows = np.arange(len(rises))
+    T[some, :3, 3] += 0.5 * (rises[rows, (count - 1) // 2] + rises[rows, count // 2])[:, None] * up
     return T

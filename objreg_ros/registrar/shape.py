@@ -179,21 +179,22 @@ def footing(keyframe: Keyframe, index: int, R_upright_camera: Array) -> float:
 
 
 def upright_pose(source: Shape, target: Shape, motion: Array) -> Array:
-    """``T_target_source (4, 4)`` of a motion (yaw, x, y, rise) between the upright axes about the two origins."""
-    c, s = np.cos(motion[0]), np.sin(motion[0])
-    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    shift = motion[1:] + target.origin - turn @ source.origin
-    back = target.R_upright_camera.T
-    return pose(back @ turn @ source.R_upright_camera, back @ shift)
+    """``T_target_source (..., 4, 4)`` of motions (yaw, x, y, rise) (..., 4) between the upright axes of two origins."""
+    c, s = np.cos(motion[..., 0]), np.sin(motion[..., 0])
+    turn = np.zeros((*c.shape, 3, 3))
+    turn[..., 0, 0], turn[..., 0, 1], turn[..., 1, 0], turn[..., 1, 1], turn[..., 2, 2] = c, -s, s, c, 1.0
+    shift = motion[..., 1:] + target.origin - turn @ source.origin
+    R_upright_target = target.R_upright_camera
+    return pose(R_upright_target.T @ turn @ source.R_upright_camera, shift @ R_upright_target)
 
 
 def upright_motion(source: Shape, target: Shape, T_target_source: Array) -> Array:
-    """(yaw, x, y, rise) of the upright motion nearest to a pose."""
-    turn = target.R_upright_camera @ T_target_source[:3, :3] @ source.R_upright_camera.T
-    yaw = np.arctan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1])
-    at = source.R_upright_camera.T @ source.origin
-    moved = target.R_upright_camera @ (T_target_source[:3, :3] @ at + T_target_source[:3, 3]) - target.origin
-    return np.array([yaw, *moved])
+    """(yaw, x, y, rise) (..., 4) of the upright motions nearest to poses (..., 4, 4)."""
+    R, t = T_target_source[..., :3, :3], T_target_source[..., :3, 3]
+    turn = target.R_upright_camera @ R @ source.R_upright_camera.T
+    yaw = np.arctan2(turn[..., 1, 0] - turn[..., 0, 1], turn[..., 0, 0] + turn[..., 1, 1])
+    moved = (R @ source.foot + t) @ target.R_upright_camera.T - target.origin
+    return np.concatenate([yaw[..., None], moved], axis=-1)
 
 
 def turned_half(motion: Array, through: Array) -> Array:

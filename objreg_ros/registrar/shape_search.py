@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numba
@@ -40,7 +39,7 @@ def register_shapes(source: Shape, target: Shape, params: RegistrarParams) -> li
 def glance(source: Shape, target: Shape, most: int, params: RegistrarParams) -> list[Array]:
     """The poses of ``source`` upon ``target`` that look best at first, at most so many: a tenth of a registration."""
     motions, scores = _begun(source, target, params.glance_yaws, CLEARED_AT_A_GLANCE, params.glance, params)
-    return [upright_pose(source, target, motions[k]) for k in np.argsort(-scores, kind="stable")[:most]]
+    return list(upright_pose(source, target, motions[np.argsort(-scores, kind="stable")[:most]]))
 
 
 def _begun(
@@ -56,12 +55,12 @@ def _reach(source: Shape, target: Shape) -> float:
     return min(WIDEST_REACH, 0.25 * (source.extent + target.extent))
 
 
-def improve(source: Shape, target: Shape, poses: Sequence[Array], params: RegistrarParams) -> list[Fitting]:
-    """Poses (4, 4) of ``source`` near ``target``, made upright and brought to where both silhouettes like them best.
+def improve(source: Shape, target: Shape, poses: Array, params: RegistrarParams) -> list[Fitting]:
+    """Poses (K, 4, 4) of ``source`` near ``target``, made upright and brought to where both silhouettes like them best.
 
     The best distinct ones come back, best first.
     """
-    motions = np.array([upright_motion(source, target, T) for T in poses]).reshape(-1, 4)
+    motions = upright_motion(source, target, poses)
     extent = 0.5 * (source.extent + target.extent)
     settling = extent, weights_of(params), params.shape_glance, WIDEST_REACH
     moved, scores = _started(source.sight, target.sight, target.surface.grid, motions, *settling, CLEARED)
@@ -82,7 +81,8 @@ def _finished(
     sights = source.sight, target.sight, target.surface.grid
     found, worth = _finish(*sights, motions, scores, extent, weights_of(params), numbers, margin, reach)
     order = np.argsort(-worth, kind="stable")
-    return [Fitting(upright_pose(source, target, found[k]), float(worth[k])) for k in order]
+    poses = upright_pose(source, target, found[order])
+    return [Fitting(T, score) for T, score in zip(poses, worth[order].tolist(), strict=True)]
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True)

@@ -61,7 +61,7 @@ def test_a_pose_nearby_is_improved() -> None:
     source, target = shape_of(ELL, 25.0, 1), shape_of(ELL, 0.0, 2)
     rough = inverse(from_side(0.0)) @ from_side(25.0)
     rough[0, 3] += 0.02  # the camera's x is level
-    better = improve(source, target, [rough], PARAMS)[0].T_target_source
+    better = improve(source, target, np.array([rough]), PARAMS)[0].T_target_source
     assert error(better, 25.0, 0.0)[1] < 0.5 * error(rough, 25.0, 0.0)[1]
 
 
