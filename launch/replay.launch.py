@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The three nodes on a recording: ``ros2 launch objreg_ros replay.launch.py recording:=my_bag lossless:=true``.
+"""The nodes on a recording: ``ros2 launch objreg_ros replay.launch.py recording:=my_bag lossless:=true``.
 
 Every argument of objreg.launch.py is taken too: the player publishes where the nodes listen, the depth of source, and
 /clock with use_sim_time; lossless asks for reliable delivery. The launch ends with the recording.
