@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The words that pass between the rooms.
 
-Every word checks shape and dtype when it is made and raises ValueError with what it expected and what it got; its
-arrays are read-only. Points are float32 metres in the camera's optical frame (x right, y down, z forward), poses
-float64, time integer nanoseconds, angles radians. A pose ``T_a_b`` maps points of b into a.
+Every word but `Rejected` checks shape and dtype of its arrays when it is made and raises ValueError with what it
+expected and what it got; the arrays are read-only. Points are float32 metres in the camera's optical frame (x right,
+y down, z forward), poses float64, time integer nanoseconds, angles radians. A pose ``T_a_b`` maps points of b into a.
 A failure is None, a `Rejected` or an exception. It is never a pose.
 """
 
@@ -197,7 +197,7 @@ class DepthImage:
 class PointFlag(IntFlag):
     """What the segmenter knows of a point, or of the object that it belongs to (then all its points carry it)."""
 
-    EDGE = 1  # the point lies at a depth jump: its position lies
+    EDGE = 1  # the point is at a depth jump: its position is not to be trusted
     CUT_BY_IMAGE = 2  # the object leaves the image
     CUT_BY_BOX = 4  # the object leaves its detection box
     WALL_LIKE = 8  # a flat patch of something larger, not an object of its own
@@ -417,7 +417,8 @@ UNTRIED = frozenset({Reason.NO_CANDIDATE, Reason.REDUNDANT, Reason.OVER_BUDGET, 
 class Rejected:
     """A refused closure: the reason, and the numbers behind it in ``detail``.
 
-    ``T_from_to (4, 4)`` is the pose that was turned down, for a look at it and nothing else; None where none was tried.
+    ``T_from_to (4, 4)`` is the pose that was turned down, unchecked, for a look at it and nothing else; None where none
+    was found.
     """
 
     reason: Reason

@@ -2,7 +2,7 @@
 """A recording through the three rooms without ROS: deterministic, as fast as the CPU goes.
 
 The inputs are decoded and brought together by the code that the nodes use, so the same recording gives the same
-constraints here and in the live graph.
+constraints here and in the live graph, where that loses no frame (a lossless replay).
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ class Run:
     rejected: Counter[str] = field(default_factory=Counter)
     refusals: list[Rejected] = field(default_factory=list)
     glimpses: list[dict[str, Any]] = field(default_factory=list)  # `glimpse` of every frame
-    dropped: Counter[str] = field(default_factory=Counter)
+    dropped: Counter[str] = field(default_factory=Counter)  # ``malformed_<input>``, ``depth_<why>``, ``frame_<why>``
     complaints: dict[str, str] = field(default_factory=dict)  # the first of each kind
     stage_s: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
 
@@ -317,7 +317,10 @@ def run_offline(
     max_frames: int | None = None,
     on_frame: Callable[[int], None] = lambda frames: None,
 ) -> Run:
-    """Drive the rooms with a recording's records; ``on_frame`` hears how many frames are through."""
+    """Drive the rooms with a recording's records, to their end or to ``max_frames``; what came out.
+
+    ``on_frame`` hears how many frames are through.
+    """
     line = Line(rooms, inputs, timing or Timing(), max_frames)
     name_of = {topic: name for name, topic in inputs.chosen().items()}
     for record in records:

@@ -23,8 +23,8 @@ Early = tuple[int, str, int, Any]  # order of arrival, stream, stamp, payload
 class MatchingDoor(Door):
     """Hands a `Match` to the worker for every message of the first stream that found its partners.
 
-    That first stream is what the books count. `begin` says how streams are matched; the newest that each stream was
-    fed before then waits.
+    That first stream is what the books count. `begin` says how streams are matched; the newest `EARLY` messages that
+    each stream was fed before then wait.
     """
 
     def __init__(self, name: str, *kinds: type[Params]) -> None:

@@ -30,7 +30,7 @@ INPUTS = {  # what a node hears of the nodes before it
 }
 SETTLE_S = 3.0  # for the nodes to find us and each other, after we have found some of them
 # One image and one depth are on their way at a time, so that none is overtaken. Where the graph stays silent, it may
-# wait for what comes next (slow odometry, say): a second goes after 1 s of silence, a third after 10 s.
+# wait for what comes next (slow odometry, say): one more goes after each of these times of silence.
 SILENCE_S = (1.0, 10.0, 30.0)
 LAST_S = 5.0  # how long to wait at the end for depth that is newer than any image: it has no partner
 

@@ -17,7 +17,9 @@ from objreg_ros.recording.writer import STORAGES
 @click.command()
 @options.recording
 @click.argument("out", type=click.Path(path_type=Path))
-@click.option("--storage", type=click.Choice(list(STORAGES)), default="mcap", show_default=True)
+@click.option(
+    "--storage", type=click.Choice(list(STORAGES)), default="mcap", show_default=True, help="The kind of files in OUT."
+)
 def command(recording: Path, out: Path, storage: str) -> None:
     """Write RECORDING (rosbag1, rosbag2 or a TUM RGB-D folder) as the rosbag2 folder OUT.
 

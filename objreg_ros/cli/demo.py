@@ -56,7 +56,13 @@ class Asked:
 @click.option("--seconds", type=click.FloatRange(min=0, min_open=True), help="Play only this many seconds.")
 @click.option("--rate", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True, help="Speed.")
 @click.option("--lossless", is_flag=True, help="Wait for every frame instead of keeping the pace.")
-@click.option("--out", type=click.Path(file_okay=False, path_type=Path), default=Path("out/demo"), show_default=True)
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path("out/demo"),
+    show_default=True,
+    help="Where everything is written.",
+)
 def command(**asked: Any) -> None:
     """Play RECORDING (or a simulated room) through three live nodes and show what came out.
 

@@ -8,8 +8,16 @@ from pathlib import Path
 
 import click
 
+from objreg_ros.recording.inputs import GRAPH_TOPICS
+
 recording = click.argument("recording", type=click.Path(path_type=Path))
-remap = click.option("--remap", "remaps", multiple=True, metavar="INPUT:=TOPIC", help="Take an input from this topic.")
+remap = click.option(
+    "--remap",
+    "remaps",
+    multiple=True,
+    metavar="INPUT:=TOPIC",
+    help=f"Take an input from this topic, or from none. Inputs: {', '.join(GRAPH_TOPICS)}.",
+)
 params = click.option(
     "--params",
     "params_file",

@@ -124,6 +124,8 @@ class PoseGraph:
     def add_closure(self, closure: LoopClosure) -> bool:
         """Tie the two keyframes nearest to the closure's moments; False if odometry does not cover both (yet).
 
+        Moments nearest to one and the same keyframe tie nothing, which is True too.
+
         In a gap of the odometry it never will (`in_gap`): where the camera was by then nobody knows. ValueError for a
         closure whose *from* is not before its *to*: the registrar looks back, so its moments are of two runs of the
         clock, and this odometry knows at most one of them.

@@ -2,8 +2,9 @@
 """Folders in the TUM RGB-D layout, as a recording of standard messages.
 
 ``rgb/`` and ``depth/`` (16-bit PNG registered to colour), ``associations.txt`` or ``rgb.txt`` and ``depth.txt``,
-``groundtruth.txt`` (timestamp tx ty tz qx qy qz qw of the colour camera in the world), ``camera.yaml``. See Sturm et
-al., "A Benchmark for the Evaluation of RGB-D SLAM Systems" (2012).
+``groundtruth.txt`` (timestamp tx ty tz qx qy qz qw of the colour camera in the world) and ``camera.yaml`` (fx fy cx cy
+width height depth_scale distortion, each with a default), which may both be missing. See Sturm et al., "A Benchmark
+for the Evaluation of RGB-D SLAM Systems" (2012).
 """
 
 from __future__ import annotations

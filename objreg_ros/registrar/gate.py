@@ -61,7 +61,7 @@ def refuse(
 
 
 def is_possible(candidate: Candidate, params: RegistrarParams) -> bool:
-    """Whether a pose may be the true one for all that is seen: it explains an object, and free space allows it."""
+    """Whether a pose may be the true one for all that is seen: it explains an object, keeps gravity and free space."""
     return bool(candidate.explained) and not any(check(candidate, params) for check in (_gravity, _free_space))
 
 

@@ -325,7 +325,7 @@ class RegistrarParams(Params):
     )
     min_likeness_unrivalled: float = param(
         -0.2,
-        "least likeness of a lone object that grey alone confirms",
+        "least likeness of a lone object where there is grey, unless that confirms the pose (see min_margin_painted)",
         ge=-1.0,
         le=1.0,
     )

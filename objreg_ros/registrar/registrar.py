@@ -101,7 +101,7 @@ class Registrar:
             return self._landmarks.recent(self._session, RECENT)
 
     def counts(self) -> dict[str, int]:
-        """How many keyframes, objects, landmarks, sessions and closures the store holds."""
+        """How many ``keyframes``, ``objects``, ``landmarks``, ``sessions`` and ``closures`` the store holds."""
         with self._lock:
             return self._store.counts()
 
@@ -155,13 +155,16 @@ class Registrar:
             )
 
     def reset(self) -> None:
-        """Forget everything, in the store too."""
+        """Forget everything, in the store too; StoreError, and nothing is forgotten, where that cannot be."""
         with self._lock:
             self._store.clear()
             self._start(self._keyframer.next_session)
 
     def save(self, path: str = "") -> str:
-        """Bring the store's file up to date, or write a copy of it to ``path``; returns where it is."""
+        """Bring the store's file up to date, or write a copy of it to ``path``; returns where it is.
+
+        StoreError where that cannot be, and without ``path`` where the store is in memory only.
+        """
         with self._lock:
             return self._store.save(path)
 

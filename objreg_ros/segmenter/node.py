@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The door of the segmenter: ``points``, or ``depth/image`` with ``camera_info`` and ``image``, and
-``detections_table`` in, and ``odom`` where gravity comes from it; ``objects``, ``view``, ``view/camera_info`` and
-``gravity`` out."""
+``detections_table`` and ``labels`` in, and ``odom`` where gravity comes from it; ``objects``, ``view``,
+``view/camera_info`` and ``gravity`` out."""
 
 from __future__ import annotations
 
