@@ -94,7 +94,7 @@ class Engine:
         return candidate.verification.score >= least
 
     def _pushed(self, pair: Pair, candidate: Candidate) -> Candidate:
-        """The candidate with how the views resist a push, and what they say without the object that it is of."""
+        """The candidate with how the views resist a push, and what they say without the objects that it is of."""
         asked = candidate, pair.source, pair.target, self._params
         told = replace(candidate, resistance=resistance_of(*asked), surroundings=surroundings_of(*asked))
         return self._steadied(pair, told)

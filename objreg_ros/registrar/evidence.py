@@ -52,12 +52,13 @@ def resistance_of(candidate: Candidate, source: Prepared, target: Prepared, para
 def surroundings_of(
     candidate: Candidate, source: Prepared, target: Prepared, params: RegistrarParams
 ) -> Verification | None:
-    """What the views say of a lone object's pose without the object (`verify_surroundings`)."""
-    if len(candidate.explained) != 1:
+    """What the views say of a pose without the objects that it explains, where those are few: `verify_surroundings`."""
+    pairs, T = candidate.explained, candidate.T_target_source
+    if not 0 < len(pairs) < params.min_objects_plain:
         return None
-    (pair,), T = candidate.explained, candidate.T_target_source
-    own = source.own[pair.source], target.own[pair.target]
-    return verify_surroundings(source.sight, target.sight, own, T, params)
+    own_source = np.any([source.own[pair.source] for pair in pairs], axis=0)
+    own_target = np.any([target.own[pair.target] for pair in pairs], axis=0)
+    return verify_surroundings(source.sight, target.sight, (own_source, own_target), T, params)
 
 
 def gravity_error_deg(source: Prepared, target: Prepared, T_target_source: Array) -> float | None:

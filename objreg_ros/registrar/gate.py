@@ -94,6 +94,14 @@ def _overlap(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
     return None
 
 
+def _enough(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
+    """The views must see more of the same where one object alone speaks for the pose, by one chain."""
+    tested = candidate.verification.tested
+    if not _is_alone(candidate, params) or tested >= params.min_tested_alone:
+        return None
+    return Reason.LOW_OVERLAP, f"1 object and {tested} pixels tested < {params.min_tested_alone}"
+
+
 def _free_space(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
     """Stricter for a lone object: a half turn about it is seen in free space alone, by what floats beyond doubt.
 
@@ -152,8 +160,12 @@ def _least_liked(candidate: Candidate, params: RegistrarParams) -> float:
 
 def _is_alone(candidate: Candidate, params: RegistrarParams) -> bool:
     """Whether at most one object lies upon itself under the pose, and fewer chains than should came to it."""
-    independent = {SAME_EVIDENCE.get(chain, chain) for chain in candidate.agreeing_chains}
-    return len(candidate.explained) < 2 and len(independent) < params.min_chains
+    return len(candidate.explained) < 2 and _few_chains(candidate, params)
+
+
+def _few_chains(candidate: Candidate, params: RegistrarParams) -> bool:
+    """Whether fewer independent chains than should came to the pose."""
+    return len({SAME_EVIDENCE.get(chain, chain) for chain in candidate.agreeing_chains}) < params.min_chains
 
 
 def _firm(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
@@ -239,11 +251,12 @@ def _least_fall(candidate: Candidate, sigma: float, params: RegistrarParams) -> 
 
     V falls with the square of a push, so it grows with the variance, up to where the views by themselves hold the pose
     firmly: then it is known, however far the surfaces would let it slide. Several objects that look otherwise leave
-    more to the views; a lone one has checks of its own.
+    more to the views, and so do two that one chain brought together; a lone one has checks of its own.
     """
     least = params.rival_margin * max(1.0, (sigma / params.max_slack_sigma) ** 2)
     least = max(params.rival_margin, min(params.firm_margin, least))
-    return least * (params.otherwise_factor if _several_otherwise(candidate, params) else 1.0)
+    two = 2 <= len(candidate.explained) < params.min_objects_plain and _few_chains(candidate, params)
+    return least * (params.doubt_factor if two or _several_otherwise(candidate, params) else 1.0)
 
 
 def _several_otherwise(candidate: Candidate, params: RegistrarParams) -> bool:
@@ -256,14 +269,14 @@ def _several_otherwise(candidate: Candidate, params: RegistrarParams) -> bool:
 
 
 def _surroundings(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
-    """What is around a lone object must pass by itself what the views as a whole do: the object may have moved.
+    """What is around a lone object, or around two, must pass by itself what whole views do: they may have moved.
 
-    Where fewer chains than should came to the pose, there must be enough of it.
+    Around a lone one there must be enough of it, too, where fewer chains than should came to the pose.
     """
     around, seen = candidate.surroundings, candidate.verification
     if around is None:
         return None
-    beside = f"without the {candidate.explained[0].label}"
+    beside = f"without the {' and the '.join(pair.label for pair in candidate.explained)}"
     if _is_alone(candidate, params) and around.tested < params.min_surroundings * seen.tested:
         return Reason.LOW_OVERLAP, f"{beside} {around.tested} pixels < {params.min_surroundings:.2f} of {seen.tested}"
     rest = replace(candidate, verification=around)
@@ -294,5 +307,6 @@ CHECKS: tuple[Check, ...] = (  # of a candidate alone, before what others and od
     _texture,
     _score,
     _stationary,
+    _enough,
     _surroundings,
 )

@@ -254,6 +254,7 @@ class RegistrarParams(Params):
 
     # What decides a closure.
     min_tested: int = param(600, "least number of pixels that both views must see", ge=1)
+    min_tested_alone: int = param(2000, "the same for a lone object's pose that fewer than min_chains proposed", ge=1)
     min_inliers: float = param(0.35, "least share of tested pixels whose depth agrees", ge=0.0, le=1.0)
     max_violations: float = param(0.07, "largest share of tested pixels in seen free space", ge=0.0, le=1.0)
     max_floating: float = param(
@@ -295,10 +296,10 @@ class RegistrarParams(Params):
     max_violations_doubtful: float = param(
         0.02, "share of tested pixels in seen free space for which V need not make up", ge=0.0, le=1.0
     )
-    otherwise_factor: float = param(
+    doubt_factor: float = param(
         1.5,
         "how many times as much V must fall over a push where several objects look otherwise (see "
-        "min_likeness_several)",
+        "min_likeness_several), or fewer than min_chains brought fewer than min_objects_plain together",
         ge=1.0,
     )
     firm_margin: float = param(

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the views say of a pose without the object that speaks for it.
+"""What the views say of a pose without the objects that speak for it.
 
-An object that has moved agrees with itself. Where it fills the views it outvotes everything that stayed, so a lone one
-that fills much of them is left out, and what is around it is asked alone.
+An object that has moved agrees with itself. Where it fills the views it outvotes everything that stayed, and so do two
+that moved together. So one or two that fill much of the views are left out, and what is around them is asked alone.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.verify import verify
 from objreg_ros.registrar.visibility import NEAREST, SHADELESS, Band, Print, Sight, pixels_of
 
-MUCH = 0.05  # of what a view measured: an object that fills less outvotes nothing
+MUCH = 0.05  # of what a view measured: objects that fill less outvote nothing
 RIM = np.ones((5, 5), np.uint8)  # px: a cloud leaves out the ragged rim of its object
 NEAR = 0.02  # m before and behind an object's points: what lies there in its pixels is it
 

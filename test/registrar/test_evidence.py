@@ -83,17 +83,22 @@ def test_a_yaw_is_known_where_the_object_tells_it_in_both_views(here: bool, ther
     assert found.explained and found.yaw_known is (here and there)
 
 
-def test_the_views_are_asked_without_the_object_where_it_is_the_only_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_views_are_asked_without_the_objects_where_those_are_few(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[Any, ...]] = []
     monkeypatch.setattr(evidence, "verify_surroundings", lambda *given: asked.append(given) or "without")
-    source: Any = SimpleNamespace(sight="a", own=("cup of a", "book of a"))
-    target: Any = SimpleNamespace(sight="b", own=("book of b", "cup of b"))
-    cup, book = ObjectPair(0, 1, "cup"), ObjectPair(1, 0, "book")
-    for explained, told in (((cup,), "without"), ((cup, book), None), ((), None)):
+    first, second, both = (
+        np.array([[True, False, False]]),
+        np.array([[False, False, True]]),
+        np.array([[True, False, True]]),
+    )
+    source: Any = SimpleNamespace(sight="a", own=(first, second, first))
+    target: Any = SimpleNamespace(sight="b", own=(second, first, first))
+    cup, book, can = ObjectPair(0, 1, "cup"), ObjectPair(1, 0, "book"), ObjectPair(2, 2, "soda can")
+    for explained, told in (((cup,), "without"), ((cup, book), "without"), ((cup, book, can), None), ((), None)):
         assert surroundings_of(candidate(explained=explained), source, target, PARAMS) == told
-    ((*views, own, T, _),) = asked
-    assert (views, own) == (["a", "b"], ("cup of a", "cup of b"))
-    assert np.array_equal(T, candidate().T_target_source)
+    for (*views, own, T, _), pixels in zip(asked, ((first, first), (both, both)), strict=True):
+        assert views == ["a", "b"] and np.array_equal(own, pixels)
+        assert np.array_equal(T, candidate().T_target_source)
 
 
 @pytest.mark.parametrize("angle", [0.0, 3.0, 90.0, 180.0])

@@ -96,11 +96,44 @@ def test_a_lone_object_must_respect_free_space_more_than_several() -> None:
         ({}, None),
     ],
 )
-def test_what_is_around_a_lone_object_must_agree_by_itself(around: dict[str, float], reason: Reason | None) -> None:
-    lone = candidate(explained=(CUP,), margin=1.0, surroundings=replace(candidate().verification, **around))
-    refusal = refuse(lone, PARAMS)
+@pytest.mark.parametrize("explained", [(CUP,), (CUP, ObjectPair(1, 1, "book"))], ids=len)
+def test_what_is_around_few_objects_must_agree_by_itself(
+    around: dict[str, float], reason: Reason | None, explained: tuple[ObjectPair, ...]
+) -> None:
+    few = candidate(explained=explained, margin=1.0, surroundings=replace(candidate().verification, **around))
+    refusal = refuse(few, PARAMS)
     assert (None if refusal is None else refusal[0]) is reason
-    assert refusal is None or refusal[1].startswith("without the cup ")
+    assert refusal is None or refusal[1].startswith(
+        ("without the cup ", "without the cup and the book ")[len(explained) - 1]
+    )
+
+
+def test_a_lone_object_that_one_chain_proposed_must_be_seen_with_more_of_the_views() -> None:
+    for chains, tested, accepted in (
+        (("objects",), PARAMS.min_tested_alone - 1, False),
+        (("objects",), PARAMS.min_tested_alone, True),
+        (("features", "objects"), PARAMS.min_tested_alone - 1, True),
+    ):
+        lone = candidate(
+            explained=(CUP,), margin=1.0, resistance=1.0, agreeing_chains=chains, tested=tested, yaw_known=True
+        )
+        refusal = refuse(lone, PARAMS)
+        assert (refusal is None) is accepted, (chains, tested, refusal)
+        assert refusal is None or (refusal[0] is Reason.LOW_OVERLAP and f"{PARAMS.min_tested_alone}" in refusal[1])
+
+
+def test_two_objects_that_one_chain_brought_together_leave_more_to_a_push() -> None:
+    two, three = (tuple(ObjectPair(k, k, "cup") for k in range(n)) for n in (2, 3))
+    short = PARAMS.rival_margin * (0.5 + 0.5 * PARAMS.doubt_factor)
+    for explained, chains, accepted in (
+        (two, ("objects",), False),
+        (two, ("objects", "odometry"), False),
+        (two, ("centroids", "features"), True),
+        (three, ("objects",), True),
+    ):
+        refusal = refuse(candidate(explained=explained, agreeing_chains=chains, resistance=short), PARAMS)
+        assert (refusal is None) is accepted, (explained, chains, refusal)
+        assert refusal is None or refusal[0] is Reason.SLACK
 
 
 def test_a_lone_object_that_one_chain_proposed_must_leave_something_of_the_views() -> None:
