@@ -50,8 +50,8 @@ class Candidate:
     than any other. ``resistance`` is how much less the views like the pose pushed to where it would be false,
     along the directions in which it is known least; None where it is known well enough without. ``surroundings`` is
     what the views say of it without the objects that it explains; None where those are small in both, and where they
-    are none, or so many that they would not move together. ``warp (6, 6)`` is the covariance [t r] that a warped depth adds to the alignment's.
-    ``floating`` is the share of the tested pixels that float in seen free space beyond doubt.
+    are none, or so many that they would not move together. ``warp (6, 6)`` is the covariance [t r] that a warped depth
+    adds to the alignment's. ``floating`` is the share of the tested pixels that float in seen free space beyond doubt.
     """
 
     alignment: Alignment
