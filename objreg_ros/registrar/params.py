@@ -254,7 +254,11 @@ class RegistrarParams(Params):
 
     # What decides a closure.
     min_tested: int = param(600, "least number of pixels that both views must see", ge=1)
-    min_tested_alone: int = param(2000, "the same for a lone object's pose that fewer than min_chains proposed", ge=1)
+    min_tested_alone: int = param(
+        2000,
+        "least number of pixels that both views must see for a lone object's pose that fewer than min_chains proposed",
+        ge=1,
+    )
     min_inliers: float = param(0.35, "least share of tested pixels whose depth agrees", ge=0.0, le=1.0)
     max_violations: float = param(0.07, "largest share of tested pixels in seen free space", ge=0.0, le=1.0)
     max_floating: float = param(
