@@ -46,7 +46,7 @@ def verify_surroundings(
 
 def without(sight: Sight, own: Array) -> Sight:
     """A view as if it had measured nothing at the pixels ``own (h, w) bool``, for `verify`: its ``front`` stays."""
-    grey, left, printed = sight.grey, ~own[pixels_of(sight.points, sight)], ~own[pixels_of(sight.grey.points, sight)]
+    grey, left, printed = sight.grey, ~_shown(own, sight.points, sight), ~_shown(own, sight.grey.points, sight)
     return replace(
         sight,
         near=np.where(own, np.float32(0.0), sight.near),
@@ -55,6 +55,12 @@ def without(sight: Sight, own: Array) -> Sight:
         bands=tuple(Band(band.detail, band.shades[left]) for band in sight.bands),
         grey=Print(np.where(own, np.float32(SHADELESS), grey.detail), grey.points[printed], grey.shades[printed]),
     )
+
+
+def _shown(own: Array, points: Array, sight: Sight) -> Array:
+    """Which points (P, 3) of a view are at the pixels ``own (h, w) bool``; those beyond its image are at the rim."""
+    rows, columns = (np.clip(at, 0, size - 1) for at, size in zip(pixels_of(points, sight), own.shape, strict=True))
+    return np.asarray(own[rows, columns])
 
 
 def _share(sight: Sight, own: Array) -> float:

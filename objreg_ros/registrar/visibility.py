@@ -104,9 +104,8 @@ def prepare_sight(view: View, sight_range: float, detail_sigma: float, seed: int
 
 def pixels_of(points: Array, sight: Sight) -> tuple[Array, Array]:
     """The rows and the columns (P,) of the pixels that ``points (P, 3)`` before the camera are in, or would be."""
-    fx, fy, cx, cy = sight.camera
-    x, y, z = points.T
-    return np.rint(fy * y / z + cy).astype(np.intp), np.rint(fx * x / z + cx).astype(np.intp)
+    u, v, _ = project(points, np.eye(4), sight.camera)
+    return np.rint(v).astype(np.intp), np.rint(u).astype(np.intp)
 
 
 def halved(view: View) -> View:

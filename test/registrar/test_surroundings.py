@@ -94,3 +94,11 @@ def test_views_without_grey_are_asked_for_their_depth_alone(rooms) -> None:
     blind = replace(before, textured=False)
     found = verify_surroundings(blind, after, own, np.eye(4), PARAMS)
     assert found is not None and found.texture is None and found.inliers > 0.95
+
+
+def test_a_camera_that_is_not_that_of_its_points_breaks_nothing(rooms) -> None:
+    before, after, own = rooms
+    for wrong in (0.5, 2.0):
+        other = replace(before, intrinsics=replace(CAMERA, fx=wrong * CAMERA.fx, cx=0.2 * CAMERA.cx))
+        assert len(without(other, own[0]).points) < len(other.points)
+        assert verify_surroundings(other, after, own, np.eye(4), PARAMS) is not None
