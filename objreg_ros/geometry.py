@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.floating]
 
+AGAIN_S = 1.0  # no odometry is back sooner when what makes it is started again,
+SAME_POSE = 1e-4  # and then it is where it first was, to this: m, rad
+
 
 def inverse(T_a_b: Array) -> Array:
     """The inverse motion ``T_b_a`` of a rigid (4, 4) ``T_a_b``."""
@@ -139,11 +142,15 @@ def pose_error(T_estimated: Array, T_true: Array) -> tuple[float, float]:
     return float(rotation), float(100.0 * np.linalg.norm(T_estimated[:3, 3] - T_true[:3, 3]))
 
 
-def leaps(T_before_after: Array, seconds: float, max_speed: float) -> bool:
-    """Whether a body cannot have moved so within a time: faster than ``max_speed`` m/s, or two turns a second.
+def leaps(T_odom_before: Array, T_odom_after: Array, seconds: float, max_speed: float, T_odom_first: Array) -> bool:
+    """Whether odometry has begun anew between two poses (4, 4): no body moves so within that time.
 
-    With half a metre and 20 degrees to spare, for what a filter puts right at once.
+    Faster than ``max_speed`` m/s, or two turns a second, with half a metre and 20 degrees to spare for what a filter
+    puts right at once. Nor, however long nothing came, from somewhere else to exactly ``T_odom_first``, where it began.
     """
+    if seconds > AGAIN_S and np.allclose(T_odom_after, T_odom_first, rtol=0.0, atol=SAME_POSE):
+        seconds = 0.0
+    T_before_after = inverse(T_odom_before) @ T_odom_after
     turned = np.degrees(rotation_angle(T_before_after[:3, :3]))
     return bool(np.linalg.norm(T_before_after[:3, 3]) > 0.5 + max_speed * seconds or turned > 20.0 + 720.0 * seconds)
 

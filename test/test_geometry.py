@@ -158,11 +158,23 @@ def test_a_pose_after_many_products_is_made_rigid_again() -> None:
     np.testing.assert_allclose(g.rigid(T), T, atol=1e-3)
 
 
+def leaps(T_after: np.ndarray, seconds: float, max_speed: float) -> bool:
+    """Whether odometry leaps there from where it first was."""
+    return g.leaps(np.eye(4), T_after, seconds, max_speed, T_odom_first=np.eye(4))
+
+
 def test_what_no_body_does_is_a_leap() -> None:
     half_turn = g.pose(QUARTER_TURN @ QUARTER_TURN, np.zeros(3))
     ahead = g.pose(np.eye(3), np.array([1.0, 0.0, 0.0]))
-    assert g.leaps(ahead, 0.05, 5.0) and not g.leaps(ahead, 0.2, 5.0) and not g.leaps(ahead, 0.05, 20.0)
-    assert g.leaps(half_turn, 0.1, 5.0) and not g.leaps(half_turn, 0.5, 5.0)
+    assert leaps(ahead, 0.05, 5.0) and not leaps(ahead, 0.2, 5.0) and not leaps(ahead, 0.05, 20.0)
+    assert leaps(half_turn, 0.1, 5.0) and not leaps(half_turn, 0.5, 5.0)
+
+
+def test_coming_back_to_exactly_the_first_pose_after_a_silence_is_a_leap() -> None:
+    first, away, near = (g.pose(QUARTER_TURN, np.array([x, 2.0, 0.0])) for x in (1.0, 4.0, 1.3))
+    assert g.leaps(away, first, 60.0, 5.0, first) and not g.leaps(away, first, 0.9, 5.0, first)
+    assert not g.leaps(away, near, 60.0, 5.0, first)  # it may have driven there
+    assert not g.leaps(near, first, 60.0, 5.0, first)  # a robot that stands still where it began
 
 
 def test_the_rigid_fit_finds_the_motion_and_never_a_mirror() -> None:

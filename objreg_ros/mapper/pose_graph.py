@@ -20,8 +20,6 @@ from objreg_ros.mapper.trajectory import Trajectory
 
 FREEDOMS = 6  # of a closure
 ROUNDS = 6  # most times that odometry is corrected
-AGAIN_S = 1.0  # no odometry is back sooner when what makes it is started again,
-AT_ORIGIN = 1e-4  # and then it is at its very origin: m, rad
 SETTLED = 5e-4  # rad/m and m/m: a change of its steady error that matters no more
 
 
@@ -150,16 +148,11 @@ class PoseGraph:
         return self.odometry.in_gap(closure.from_ns) or self.odometry.in_gap(closure.to_ns)
 
     def leaps(self, odometry: Odometry) -> bool:
-        """Whether odometry has begun anew elsewhere: no body moves so from the newest pose to this later one.
-
-        Nor, however long nothing came, from somewhere else to exactly where odometry begins.
-        """
+        """Whether odometry has begun anew: no body moves so from the newest pose to this later one."""
         if not len(self.odometry):
             return False
         seconds = 1e-9 * (odometry.stamp_ns - self.odometry.stamps_ns[-1])
-        if seconds > AGAIN_S and np.allclose(odometry.T_odom_body, np.eye(4), rtol=0.0, atol=AT_ORIGIN):
-            seconds = 0.0
-        return leaps(inverse(self.odometry.poses[-1]) @ odometry.T_odom_body, seconds, self.params.max_speed)
+        return leaps(self.odometry.poses[-1], odometry.T_odom_body, seconds, self.params.max_speed, np.eye(4))
 
     def optimise(self) -> Summary:
         """Solve and adopt in one go."""

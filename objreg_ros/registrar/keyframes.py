@@ -81,14 +81,16 @@ class _Session:
     plumb: PlumbLine
     first: Frame  # of the last stretch
     last_ns: int  # of the last frame that was followed
+    T_odom_first: Array  # of its first camera, where there is odometry
     odometry: tuple[int, Array] | None = None  # the last that it had: stamp in ns, T_odom_camera
 
     def leaps(self, frame: Frame, max_speed: float) -> bool:
-        """Whether odometry has begun anew elsewhere: no camera moves so fast."""
+        """Whether odometry has begun anew: no camera moves so fast."""
         if self.odometry is None or frame.T_odom_camera is None:
             return False
         last_ns, T_odom_last = self.odometry
-        return leaps(inverse(T_odom_last) @ frame.T_odom_camera, 1e-9 * (frame.stamp_ns - last_ns), max_speed)
+        seconds = 1e-9 * (frame.stamp_ns - last_ns)
+        return leaps(T_odom_last, frame.T_odom_camera, seconds, max_speed, self.T_odom_first)
 
     def follow(self, frame: Frame) -> None:
         """Go on to a frame."""
@@ -190,6 +192,7 @@ class Keyframer:
             plumb=PlumbLine(self._params.gravity_metres, self._params.gravity_degrees),
             first=frame,
             last_ns=frame.stamp_ns,
+            T_odom_first=T_session_frame,
         )
         self._session.follow(frame)
         self.next_session += 1

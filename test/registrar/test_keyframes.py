@@ -85,6 +85,12 @@ def test_odometry_that_begins_anew_elsewhere_begins_a_new_session() -> None:
     assert {s.session for s in _run(Keyframer(fast), restarted)} == {0}
 
 
+def test_odometry_that_is_back_where_it_began_after_a_silence_begins_a_new_session() -> None:
+    there = [frame(0.1 * i, CUP, moved(0.1 * i)) for i in range(10)]
+    assert {s.session for s in _run(Keyframer(PARAMS), [*there, frame(60.0, CUP, moved(0.0))])} == {0, 1}
+    assert {s.session for s in _run(Keyframer(PARAMS), [*there, frame(60.0, CUP, moved(0.2))])} == {0}
+
+
 def test_a_frame_that_comes_late_or_twice_is_passed_over() -> None:
     frames = [frame(t, CUP, moved(0.03 * k)) for k, t in enumerate((5.0, 5.1, 5.0, 4.2, 5.1, 5.2, 5.3, 5.4, 5.5))]
     stretches = _run(Keyframer(PARAMS), frames)
