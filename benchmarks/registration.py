@@ -187,7 +187,7 @@ class Bench:
             row["right"] = within(row["pose_error"], FALSE)
             row["false"] = row["accepted"] and not row["right"]
             if row["accepted"]:
-                row["nees"] = nees(best.T_target_source, truth, covariance_of(best.alignment, self.calibrated))
+                row["nees"] = nees(best.T_target_source, truth, covariance_of(best, self.calibrated))
         return row
 
     def figures(self) -> dict[str, Any]:

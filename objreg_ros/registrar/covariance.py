@@ -2,8 +2,10 @@
 """How wrong an accepted pose may be.
 
 The inverse information of a registration is scaled, floored, and opened along directions that the data leave free, each
-by a parameter. What no residual shows comes on top: a camera whose lens or depth is not quite as its calibration says
-measures every motion wrong by a share of it. config/covariance.yaml says how the parameters were calibrated.
+by a parameter. The less the views like a pose, and the more its residuals are, the less they know of what is wrong with
+it: so much larger is the scale. What no residual shows comes on top: a camera whose lens or depth is not quite as its
+calibration says measures every motion wrong by a share of it. config/covariance.yaml says how the parameters were
+calibrated.
 """
 
 from __future__ import annotations
@@ -12,14 +14,17 @@ import numpy as np
 
 from objreg_ros.data import Alignment, Array
 from objreg_ros.geometry import rotation_angle, skew
+from objreg_ros.registrar.candidate import Candidate
 from objreg_ros.registrar.params import RegistrarParams
 
 NEAREST = 0.3  # m: nothing is seen nearer
 
 
-def covariance_of(alignment: Alignment, params: RegistrarParams) -> Array:
+def covariance_of(candidate: Candidate, params: RegistrarParams) -> Array:
     """(6, 6) float64 [tx ty tz rx ry rz] of ``T_target_source`` in the target frame, positive definite."""
-    C = spread_of(alignment, params, params.covariance_scale)
+    alignment, disliked = candidate.alignment, 1.0 - candidate.verification.score
+    doubt = float(np.exp(params.covariance_disliked * disliked)) * alignment.rmse / params.covariance_rmse
+    C = spread_of(alignment, params, params.covariance_scale * doubt)
     return C + _miscalibrated(alignment, params.covariance_calibration)
 
 

@@ -104,7 +104,7 @@ class Engine:
 
         Its evidence stays that of the pose that the views like.
         """
-        C = covariance_of(candidate.alignment, self._params) + candidate.warp
+        C = covariance_of(candidate, self._params) + candidate.warp
         step = levelling(pair.source, pair.target, candidate.T_target_source, C, self._params)
         return candidate if step is None else self._informed(brought(candidate, step.T), step.information)
 

@@ -354,7 +354,15 @@ class RegistrarParams(Params):
     odometry_sigmas: float = param(4.0, "largest distance from odometry in its standard deviations", ge=0.0)
 
     # How wrong an accepted pose may be; config/covariance.yaml says how these were calibrated.
-    covariance_scale: float = param(0.68, "factor of the covariance of a registration", ge=0.0)
+    covariance_scale: float = param(
+        0.45, "factor of the covariance of a registration liked by 1 and with an rmse of covariance_rmse", ge=0.0
+    )
+    covariance_disliked: float = param(
+        2.4, "growth of the logarithm of covariance_scale for each 1 that the views like a pose less", ge=0.0, le=10.0
+    )
+    covariance_rmse: float = param(
+        0.0065, "rmse of the residuals at which covariance_scale holds; it grows in proportion", "m", ge=1e-4
+    )
     covariance_patch: float = param(0.8, "edge of a patch of surface whose points err together", "m", ge=0.01)
     covariance_calibration: float = param(
         0.035, "error of a motion, as a share of it, by a camera that is not quite as its calibration says", ge=0.0

@@ -306,7 +306,7 @@ def closure_of(
         from_ns=item.target.stamp_ns,
         to_ns=keyframe.stamp_ns,
         T_from_to=candidate.T_target_source,
-        covariance=covariance_of(candidate.alignment, params),
+        covariance=covariance_of(candidate, params),
         labels=tuple(dict.fromkeys(match.label for match in matches)) or tuple(dict.fromkeys(keyframe.labels)),
         matches=matches,
         evidence=_evidence(candidate) | _moved(keyframe, item),

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector, skew, transform
-from objreg_ros.registrar.covariance import covariance_of
+from objreg_ros.registrar.covariance import spread_of
 from objreg_ros.registrar.paper import LEAST_PAIRS, PaperEngine, _correspond, register
 from objreg_ros.registrar.params import RegistrarParams
 
@@ -42,7 +42,7 @@ def test_a_start_from_the_truth_stays_there_and_its_covariance_is_valid() -> Non
     T = pose(rotation_from_vector(np.array([0.0, 2.0, 0.0])), np.array([1.0, 0.0, 2.0]))
     found = register(_corner(), transform(T, _corner()), T, PARAMS)
     assert found is not None and np.allclose(found.T_target_source, T, atol=1e-9)
-    assert np.linalg.eigvalsh(covariance_of(found, PARAMS)).min() > 0
+    assert np.linalg.eigvalsh(spread_of(found, PARAMS)).min() > 0
 
 
 def test_the_information_is_that_of_a_step_about_the_camera_of_every_point() -> None:

@@ -44,7 +44,7 @@ def test_a_parameter_out_of_range_ends_a_node_in_the_words_of_params(graph: Grap
     ("room", "file", "setting", "wrong"),
     [
         ("mapper", "config/objreg.yaml", "keyframe_translation: 0.25", "keyframe_translation: -5.0"),
-        ("registrar", "config/covariance.yaml", "covariance_scale: 0.68", "covariance_scale: -5.0"),
+        ("registrar", "config/covariance.yaml", "covariance_scale: 0.45", "covariance_scale: -5.0"),
     ],
 )
 def test_a_copy_of_our_parameter_files_is_read_in_any_namespace(
