@@ -14,7 +14,7 @@ from objreg_ros.segmenter.support import FLOOR, GROWTH, Ground, Plane, fit_level
 from objreg_ros.segmenter.surface import EXACT, Surface, Window
 
 OWN_TOP = 0.65  # a level part with more of it in a box is a top of the object there, not what it stands on
-LOWEST = 0.1  # with less than this share of the box's cells below it a level part is no top
+LOWEST = 0.1  # with less than this share of the cells in and around the box below it a level part is no top
 MANY = 9000  # cells of which every third in each row and column is enough for a plane
 MIN_NEAR = 12  # coarse cells of a part around a box that say something
 REACH = 3  # coarse cells that a support surface is thought to go on
@@ -73,7 +73,7 @@ def _find_beneath(parts, total, normal, offset, window, grid, coarse_step, here)
             around_it += near[k]
     if around_it + on_it < MIN_NEAR:
         return False
-    is_top = on_it > 0 and around_it <= on_it and _share_below(normal, offset, window, grid) > LOWEST
+    is_top = on_it > 0 and around_it <= on_it and _share_below(normal, offset, grid) > LOWEST
     kept, some = np.zeros(len(total), np.bool_), False
     for k in range(1, len(total)):
         kept[k] = near[k] >= MIN_NEAR and not (is_top and within[k] > OWN_TOP * total[k])
@@ -134,13 +134,12 @@ def _any_row(mask, first, end, marks):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _share_below(normal, offset, window, grid):  # type: ignore[no-untyped-def]
-    """Which share of the cells in ``window`` lies well below a plane."""
-    depth, x, y, (first_u, first_v, step) = grid
-    left, top = first_u // step, first_v // step
+def _share_below(normal, offset, grid):  # type: ignore[no-untyped-def]
+    """Which share of the cells lies well below a plane; around a tight box there are some where in it are none."""
+    depth, x, y, _ = grid
     known, below = 0, 0
-    for i in range(window[1] - top, window[3] - top):
-        for j in range(window[0] - left, window[2] - left):
+    for i in range(depth.shape[0]):
+        for j in range(depth.shape[1]):
             z = depth[i, j]
             if z > 0:
                 known += 1

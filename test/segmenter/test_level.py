@@ -18,16 +18,20 @@ NOISE = 0.0015
 BASE = 0.0005  # metres that are added to the noise
 
 
-def around(scene: Scene, ground: Ground, owner: int, margin: int = 10) -> tuple[Surface, Window, np.ndarray]:
+def around(
+    scene: Scene, ground: Ground, owner: int, margin: int = 10, pad: float = 0.08
+) -> tuple[Surface, Window, np.ndarray]:
     """The cells in and around the box of a thing, the box in cells of the frame, and which thing each cell shows."""
     step, (h, w) = ground.surface.step, ground.surface.depth.shape
-    left, top, right, bottom = (round(edge / step) for edge in scene.box_of(owner))
+    left, top, right, bottom = (round(edge / step) for edge in scene.box_of(owner, pad=pad))
     crop = (max(0, left - margin), max(0, top - margin), min(w, right + margin), min(h, bottom + margin))
     owners = scene.owner[::step, ::step][crop[1] : crop[3], crop[0] : crop[2]]
     return ground.surface.crop(crop), (left, top, right, bottom), owners
 
 
-def level_shares(scene: Scene, owner: int, bend: float = 0.0, base: float = BASE, margin: int = 10) -> list[float]:
+def level_shares(
+    scene: Scene, owner: int, bend: float = 0.0, base: float = BASE, margin: int = 10, pad: float = 0.08
+) -> list[float]:
     """Which share of each thing's cells around a box is level: nothing, the first thing, the second …
 
     ``bend`` is the error of depth at the left and the right of the image, as a share of it.
@@ -35,7 +39,7 @@ def level_shares(scene: Scene, owner: int, bend: float = 0.0, base: float = BASE
     image = scene.image(NOISE)
     warp = 1.0 + bend * np.linspace(-1.0, 1.0, scene.camera.width) ** 2
     ground = scene.ground(replace(image, depth=(image.depth * warp).astype(np.float32)))
-    surface, window, owners = around(scene, ground, owner, margin)
+    surface, window, owners = around(scene, ground, owner, margin, pad)
     level, found = support_cells(surface, window, ground, base)
     assert level.shape == surface.depth.shape
     assert found == level.any()
@@ -61,6 +65,17 @@ def test_a_large_level_top_is_the_object_s_own_where_its_table_is_seen_around_it
     assert len(scene.ground(scene.image(NOISE)).supports) == 2  # the top is one of them
     _, table, box = level_shares(scene, 2)
     assert table > 0.95
+    assert box < 0.1
+
+
+@pytest.mark.parametrize("height", [0.03, 0.05])
+@pytest.mark.parametrize("tilt_deg", [50, 60, 70])
+def test_a_low_top_that_fills_its_box_is_the_object_s_own_where_its_table_is_seen_around_it(
+    height: float, tilt_deg: float
+) -> None:
+    scene = Scene(tilt_deg=tilt_deg).plane().box((-0.1, -0.075, 0), (0.1, 0.075, height))
+    _, table, box = level_shares(scene, 2, pad=0.0)
+    assert table > 0.9
     assert box < 0.1
 
 
