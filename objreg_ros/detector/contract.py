@@ -83,8 +83,8 @@ class TfDetection:
     def read(self, outputs: list[Array], threshold: float) -> Candidates:
         """See `Contract`."""
         boxes, classes, scores = (output[0] for output in outputs[:3])
-        count = int(outputs[3].reshape(-1)[0]) if len(outputs) > 3 else len(scores)
-        good = (np.arange(len(scores)) < count) & (scores >= threshold)
+        count = _count(outputs[3]) if len(outputs) > 3 else len(scores)
+        good = (np.arange(len(scores)) < count) & (scores >= threshold) & ~_padding(boxes, scores)
         index = np.rint(classes[good]).astype(np.int64) - self.first
         if len(index) and not 0 <= index.min() <= index.max() < self.labels:
             raise ValueError(
@@ -119,12 +119,31 @@ class RawSsd:
 
     def read(self, outputs: list[Array], threshold: float) -> Candidates:
         """See `Contract`."""
+        shapes = [output.shape[:2] for output in outputs]
+        if shapes != [(1, len(self.priors))] * 2:
+            raise ValueError(
+                f"heads of the model: expected a row for each of {len(self.priors)} priors, got {shapes[0]} and "
+                f"{shapes[1]}; export the model with the one input size that its priors are for"
+            )
         likely = np.flatnonzero(_may_reach(outputs[1][0], threshold))
         score = _softmax(outputs[1][0][likely].astype(np.float32))[:, 1:]
         rows, index = np.nonzero(score >= threshold)
         chosen = likely[rows]
         xyxy = decode(outputs[0][0][chosen].astype(np.float32), self.priors[chosen], self.variances)
         return Candidates(xyxy, score[rows, index], index)
+
+
+def _count(output: Array) -> int:
+    """How many boxes a model says that it gives."""
+    said = float(output.reshape(-1)[0])
+    if not math.isfinite(said):
+        raise ValueError(f"count of the model: expected how many boxes there are, got {said}; export the model again")
+    return int(said)
+
+
+def _padding(boxes: Array, scores: Array) -> Array:
+    """Which rows (N,) bool only fill the model's answer up: neither a score nor an area."""
+    return np.asarray((scores <= 0.0) & (boxes[:, :2] >= boxes[:, 2:]).any(axis=1))
 
 
 def _may_reach(logits: Array, threshold: float) -> Array:

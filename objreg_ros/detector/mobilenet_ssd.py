@@ -10,7 +10,7 @@ import numpy as np
 
 from objreg_ros.data import Array, ColourImage, Detections
 from objreg_ros.detector.boxes import area, clip, suppress
-from objreg_ros.detector.contract import Candidates, recognise
+from objreg_ros.detector.contract import Candidates, RawSsd, recognise
 from objreg_ros.detector.labels import UNNAMED, find_labels
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.detector.picture import Picture
@@ -36,6 +36,8 @@ class Detector:
             self._runtime.inputs, self._runtime.outputs, self._runtime.metadata, self._probe(),
             len(self.labels), params.label_offset,
         )  # fmt: skip
+        if isinstance(self._contract, RawSsd):  # whose priors are for pictures of one size
+            self._picture = self._picture.sized(*PROBE_SIZE)
 
     @classmethod
     def of(cls, params: DetectorParams, find_model: Callable[[str], Path]) -> Detector:
@@ -78,8 +80,5 @@ class Detector:
         """The model's answer to a grey picture, by output. Running it also warms the model up."""
         size = (self._picture.height or PROBE_SIZE[0], self._picture.width or PROBE_SIZE[1])
         names = tuple(port.name for port in self._runtime.outputs)
-        try:
-            answer = self._runtime.run(self._picture.tensor(np.full((*size, 3), 127, np.uint8)), names)
-        except Exception as error:  # onnxruntime's errors share no base of their own
-            raise ValueError(f"model: expected it to run on a {size[1]} x {size[0]} picture, got: {error}") from error
+        answer = self._runtime.run(self._picture.tensor(np.full((*size, 3), 127, np.uint8)), names)
         return dict(zip(names, (np.asarray(value) for value in answer), strict=True))

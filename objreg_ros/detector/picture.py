@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -42,6 +42,10 @@ class Picture:
         height, width = (size[1], last) if channels_first else size
         mean, scale = (_numbers(metadata, f"objreg.{key}", usual) for key, usual in (("mean", MEAN), ("scale", SCALE)))
         return cls(height, width, channels_first, floating, mean, scale)
+
+    def sized(self, height: int, width: int) -> Picture:
+        """The same of one size, where the graph takes any."""
+        return replace(self, height=self.height or height, width=self.width or width)
 
     def tensor(self, rgb: Array) -> Array:
         """The input tensor for ``rgb (H, W, 3) uint8``."""

@@ -47,8 +47,14 @@ class Runtime:
         self.metadata: dict[str, str] = dict(self._session.get_modelmeta().custom_metadata_map)
 
     def run(self, tensor: Array, outputs: tuple[str, ...]) -> list[Array]:
-        """The named outputs for the one input."""
-        return list(self._session.run(list(outputs), {self.inputs[0].name: tensor}))
+        """The named outputs for the one input; ValueError where the graph does not compute with it."""
+        try:
+            return list(self._session.run(list(outputs), {self.inputs[0].name: tensor}))
+        except Exception as error:  # onnxruntime's errors share no base of their own
+            raise ValueError(
+                f"model: expected it to run on a picture {list(tensor.shape)}, as its input is {self.inputs[0]}, "
+                f"got: {error}"
+            ) from error
 
 
 def make_options(threads: int) -> onnxruntime.SessionOptions:

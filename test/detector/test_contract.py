@@ -96,6 +96,20 @@ def test_raw_outputs_of_a_tf_graph_are_no_detections() -> None:
     assert classes_of(tf(outputs), outputs) == [2]
 
 
+def test_rows_that_only_fill_the_answer_up_have_no_class() -> None:
+    outputs = tf_outputs([BOX, [0.0] * 4], [3, 0], [0.9, 0.0], names=TF_API[:3])
+    contract = tf(outputs)
+    assert contract.read([outputs[name] for name in contract.names], 0.0).index.tolist() == [2]
+
+
+def test_a_count_that_is_no_number_is_refused() -> None:
+    outputs = tf_outputs([BOX], [3], [0.9], names=TF_API)
+    contract = tf(outputs)
+    outputs[TF_API[3]] = np.array([np.inf], np.float32)
+    with pytest.raises(ValueError, match=r"expected how many boxes there are, got inf"):
+        contract.read([outputs[name] for name in contract.names], 0.5)
+
+
 def test_a_class_without_a_label_is_refused_with_what_to_do() -> None:
     outputs = tf_outputs([BOX], [7], [0.9])
     with pytest.raises(ValueError, match=r"expected one of 5 labels, got number 7 .*label_offset"):
@@ -151,6 +165,13 @@ def test_no_row_that_reaches_the_threshold_is_lost_to_the_shortcut(threshold: fl
 def test_priors_that_do_not_match_the_heads_are_refused() -> None:
     with pytest.raises(ValueError, match=r"from 1 priors and 2 labels, got loc \[1, 2, 4\]"):
         raw(HEADS, raw_metadata(PRIORS[:1], ["a", "b"]))
+
+
+@pytest.mark.parametrize("rows", [1, 3])
+def test_heads_of_another_size_of_picture_are_refused(rows: int) -> None:
+    contract = raw(HEADS, raw_metadata(PRIORS, ["a", "b"]))
+    with pytest.raises(ValueError, match=rf"expected a row for each of 2 priors, got \(1, {rows}\)"):
+        contract.read([np.zeros((1, rows, 4)), np.zeros((1, rows, 3))], 0.5)
 
 
 def test_fewer_labels_than_classes_are_refused() -> None:

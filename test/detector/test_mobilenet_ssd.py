@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import ColourImage
-from objreg_ros.detector.mobilenet_ssd import Detector
+from objreg_ros.detector.mobilenet_ssd import PROBE_SIZE, Detector
 from objreg_ros.detector.params import DetectorParams
+from objreg_ros.detector.runtime import Runtime
 
 from .tiny_model import TF_API, onnx, raw_metadata, save_constant_model, tf_outputs
 
@@ -98,6 +99,22 @@ def test_raw_heads_with_priors_in_the_metadata_detect(tmp_path: Path) -> None:
     seen = one.detect(picture())
     assert one.labels == ("cap", "soda can") and seen.label == ("soda can",)
     assert seen.xyxy[0] == pytest.approx([256, 144, 384, 336], abs=1e-3)
+
+
+def test_raw_heads_of_open_input_size_always_see_pictures_of_the_size_of_their_priors(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    heads = {"loc": np.zeros((1, 1, 4)), "logits": np.array([[[0, 6]]], float)}
+    metadata = raw_metadata(np.array([[0.75, 0.75, 0.1, 0.1]], np.float32), ["cap"])
+    path = save_constant_model(tmp_path / "raw.onnx", heads, (1, "h", "w", 3), metadata=metadata)
+    shapes, run = [], Runtime.run
+    monkeypatch.setattr(
+        Runtime, "run", lambda self, tensor, names: shapes.append(tensor.shape) or run(self, tensor, names)
+    )
+    one = Detector(DetectorParams(), path)
+    small = ColourImage(rgb=np.zeros((240, 320, 3), np.uint8), stamp_ns=0)
+    assert one.detect(small).xyxy[0] == pytest.approx([224, 168, 256, 192], abs=1e-3)
+    assert set(shapes) == {(1, *PROBE_SIZE, 3)}
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,13 @@ def test_an_open_size_takes_the_picture_as_it_is() -> None:
     assert picture.tensor(np.zeros((50, 70, 3), np.uint8)).shape == (1, 50, 70, 3)
 
 
+def test_a_size_that_is_asked_for_holds_where_the_graph_takes_any() -> None:
+    anything, fixed = (Picture.of((Port("x", "uint8", (1, *size, 3)),), {}) for size in ((None, None), (30, 40)))
+    rgb = np.zeros((50, 70, 3), np.uint8)
+    assert anything.sized(480, 640).tensor(rgb).shape == (1, 480, 640, 3)
+    assert fixed.sized(480, 640).tensor(rgb).shape == (1, 30, 40, 3)
+
+
 def test_floats_are_normalised_in_either_layout() -> None:
     rgb = np.full((30, 40, 3), (0, 127, 255), np.uint8)
     last = Picture.of((Port("x", "float", (1, 30, 40, 3)),), {})

@@ -25,6 +25,12 @@ def test_a_graph_shows_its_ports_and_metadata_and_runs(tmp_path: Path) -> None:
     assert runtime.run(np.ones((1, 2, 2, 3), np.uint8), ("answer",))[0].tolist() == [[4.0]]
 
 
+def test_a_picture_that_the_graph_does_not_take_is_refused(tmp_path: Path) -> None:
+    runtime = Runtime(save_constant_model(tmp_path / "m.onnx", {"answer": np.zeros((1, 1))}), threads=1)
+    with pytest.raises(ValueError, match=r"expected it to run on a picture \[1, 2, 2, 3\], as its input is picture"):
+        runtime.run(np.ones((1, 2, 2, 3), np.uint8), ("answer",))
+
+
 def test_a_missing_file_is_refused_with_a_way_out(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"expected a file, got none.*objreg fetch-model"):
         Runtime(tmp_path / "none.onnx", threads=1)
