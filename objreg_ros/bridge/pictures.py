@@ -27,13 +27,14 @@ COLOUR: dict[str, tuple[str, int, int | None]] = {
     "8UC4": ("u1", 4, cv2.COLOR_BGRA2RGB),
 }
 DEPTH = {"16UC1": "u2", "mono16": "u2", "32FC1": "f4"}
+AS_STORED = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION  # depth knows nothing of how a jpeg is to be held
 COMPRESSED_DEPTH_HEADER = 12  # compressed_depth_image_transport: an enum and two floats before the PNG
 
 
 def colour_pixels(message: Any) -> Array:
     """(H, W, 3) uint8 RGB of an Image or CompressedImage; ValueError for an encoding that is no colour."""
     if hasattr(message, "format"):
-        return _decoded(message.data, cv2.IMREAD_COLOR, cv2.COLOR_BGR2RGB, "a jpeg or png")
+        return _decoded(message.data, AS_STORED, cv2.COLOR_BGR2RGB, "a jpeg or png")
     if message.encoding not in COLOUR:
         raise ValueError(f"image: expected an encoding of {', '.join(COLOUR)}, got {message.encoding!r}")
     dtype, channels, conversion = COLOUR[message.encoding]

@@ -104,6 +104,14 @@ def test_a_compressed_image_is_rgb(kind: str) -> None:
     assert np.abs(rgb.astype(int) - RED).max() <= 2
 
 
+def test_a_jpeg_is_taken_as_it_is_stored_however_it_is_to_be_held() -> None:
+    data = cv2.imencode(".jpg", np.zeros((40, 60, 3), np.uint8))[1].tobytes()
+    turned = b"Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"  # orientation 6
+    tagged = data[:2] + b"\xff\xe1" + struct.pack(">H", len(turned) + 2) + turned + data[2:]
+    assert cv2.imdecode(np.frombuffer(tagged, np.uint8), cv2.IMREAD_COLOR).shape == (60, 40, 3)
+    assert colour_pixels(messages.compressed(tagged, "jpeg")).shape == (40, 60, 3)
+
+
 @pytest.mark.parametrize("data", [b"", b"\xff\xd8\xff\xe0 no jpeg"])
 def test_a_broken_compressed_image_is_refused(data: bytes) -> None:
     with pytest.raises(ValueError, match="do not decode"):
