@@ -30,11 +30,9 @@ def _within(measured: Array, z_min: float, z_max: float) -> bool:
 
 
 def registration_doubt(detections: Detections, depth: DepthImage) -> str | None:
-    """A word where boxes and depth of one size have different frames, so are hardly registered; else None."""
+    """A word where boxes and depth have different frames, so are hardly registered; else None."""
     seen, measured = detections.frame_id, depth.frame_id
     if not len(detections) or not seen or not measured or seen == measured:
-        return None
-    if detections.image_hw != depth.depth.shape:
         return None
     return (
         f"expected depth that is registered to the colour image, of whose frame it then is, got colour in {seen!r} and "

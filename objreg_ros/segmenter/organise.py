@@ -11,6 +11,7 @@ FAR = 65.0  # metres; 65535 mm and 65535 m both mean "no depth"
 MIN_FIT = 30  # points that a fit of the intrinsics needs
 STEPS = (1, 2, 3, 4, 6, 8)  # pixels in each row and column that become one for a thinned cloud
 SAMPLE, NEAREST = 20000, 0.3  # points, and which share of them, that tell whether a cloud fills an image
+IN_IMAGE = 0.4  # share of the points in front that a camera sees; half where depth sees wider than colour
 FILLED = 0.75  # share of these that have a point right of them, and below
 BEGUN = 0.9  # share of the points in every step-th column, and row, of a cloud that was thinned to these
 FIT_ERROR_PX = 1.5  # the median distance that a pixel may have from where the fitted camera sees its point
@@ -131,13 +132,9 @@ def _project(points: Array, rgb: Array | None, camera: Intrinsics) -> tuple[Arra
     That is the one with the most pixels of ``camera`` and its reductions that the points fill, ``camera`` if they fill
     none; of one pixel the nearest point wins.
     """
+    _require_in_image(points, camera)
     for grid in (*(camera.scaled(step, _first(points, camera, step)) for step in STEPS), camera):
         inside, index = _pixels(points, grid)
-        if len(index) == 0:
-            raise ValueError(
-                f"expected points within the {camera.width}x{camera.height} image, got none of {len(points)} there; "
-                "is the cloud in the optical frame of this camera?"
-            )
         z = points[inside, 2]
         if _is_filled(index, z, grid):
             break
@@ -149,6 +146,15 @@ def _project(points: Array, rgb: Array | None, camera: Intrinsics) -> tuple[Arra
     colour = np.zeros((grid.height * grid.width, 3), np.uint8)
     colour[index[far_first]] = rgb[inside][far_first]
     return depth.reshape(grid.height, grid.width), colour.reshape(grid.height, grid.width, 3), grid
+
+
+def _require_in_image(points: Array, camera: Intrinsics) -> None:
+    seen = len(_pixels(points, camera)[1])
+    if seen < max(1.0, IN_IMAGE * len(points)):
+        raise ValueError(
+            f"expected points within the {camera.width}x{camera.height} image, got {seen} of {len(points)} there; "
+            "transform the cloud to the optical frame of this camera (x right, y down, z forward)"
+        )
 
 
 def _first(points: Array, camera: Intrinsics, step: int) -> tuple[int, int] | None:

@@ -65,5 +65,6 @@ def test_one_frame_and_frames_without_a_name_are_not_doubted(seen: str, measured
     assert registration_doubt(boxes(seen), of(flat(1.0), measured)) is None
 
 
-def test_depth_of_another_size_is_not_doubted_for_its_frame() -> None:
-    assert registration_doubt(boxes("a", (10, 20)), of(flat(1.0), "b")) is None
+def test_depth_of_another_size_and_frame_is_doubted_too() -> None:
+    assert registration_doubt(boxes("a", (10, 20)), of(flat(1.0), "b")) is not None
+    assert registration_doubt(boxes("a", (10, 20)), of(flat(1.0), "a")) is None

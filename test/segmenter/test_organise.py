@@ -79,6 +79,16 @@ def test_points_beside_the_image_are_left_out_on_every_side() -> None:
     np.testing.assert_allclose(organise(both, CAMERA).depth, depth, rtol=1e-6)
 
 
+def test_a_cloud_most_of_which_a_camera_does_not_see_is_refused_and_one_that_sees_wider_is_not() -> None:
+    depth = hilly_depth()
+    inside = cloud_of(depth).xyz.reshape(1, -1, 3)
+    beside = inside + np.array([1.0, 0.0, 0.0], np.float32)
+    wider, elsewhere = (np.concatenate([inside, *[beside] * n], axis=1) for n in (1, 2))
+    np.testing.assert_allclose(organise(PointCloud(xyz=wider, rgb=None, stamp_ns=0), CAMERA).depth, depth, rtol=1e-6)
+    with pytest.raises(ValueError, match=r"expected points within the 64x48 image, got 3072 of 9216 there"):
+        organise(PointCloud(xyz=elsewhere, rgb=None, stamp_ns=0), CAMERA)
+
+
 def test_a_thinned_cloud_gives_the_smaller_image_that_its_points_fill() -> None:
     scene = Scene().plane().box((-0.1, -0.1, 0), (0.1, 0.1, 0.15))
     image = scene.image(0.001)
