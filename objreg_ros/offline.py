@@ -200,7 +200,7 @@ class Line:
     def _streams(self) -> list[Stream]:
         streams = [Stream("depth"), Stream("detections", slop_ns=self._timing.slop_ns)]
         if self._timing.level_odom:
-            streams.append(Stream("odom", Need.OPTIONAL, self._timing.slop_ns, ODOM_DEPTH))
+            streams.append(Stream("odom", Need.OPTIONAL, self._timing.slop_ns, ODOM_DEPTH, enclosing=True))
         if self._from_points:
             return streams
         colour = [Stream("image", Need.OPTIONAL, self._timing.slop_ns)] if self._timing.colour else []
@@ -262,7 +262,7 @@ class Line:
     def _frame(self, match: Match) -> Frame:
         with self._timed("decode"):
             depth = self._depth(match)
-            gravity = from_msg.level_gravity(match.payloads.get("odom"), self._timing.T_level_camera)
+            gravity = from_msg.level_gravity(match.stamp_ns, match.payloads.get("odom"), self._timing.T_level_camera)
         with self._timed("segment"):
             return as_sent(self._rooms.segmenter.segment(match["detections"], depth, gravity))
 

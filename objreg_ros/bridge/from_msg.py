@@ -172,14 +172,16 @@ def pose_at(moment_ns: int, words: Sequence[Odometry]) -> Array:
     return interpolate(first.T_odom_body, last.T_odom_body, min(1.0, max(0.0, share)))
 
 
-def level_gravity(word: Odometry | None, T_body_camera: Array | None = None) -> Array | None:
+def level_gravity(moment_ns: int, words: Sequence[Odometry] | None, T_body_camera: Array | None = None) -> Array | None:
     """The way things fall (3,) in the camera frame by an odometry whose frame is level with z up; None without one.
 
-    ``T_body_camera`` is where the camera sits on the body that the odometry speaks of; the same place if None.
+    ``words`` are those of `pose_at`. ``T_body_camera`` is where the camera sits on the body that the odometry speaks
+    of; the same place if None.
     """
-    if word is None:
+    if not words:
         return None
-    T_level_camera = word.T_odom_body if T_body_camera is None else word.T_odom_body @ T_body_camera
+    T_level_body = pose_at(moment_ns, words)
+    T_level_camera = T_level_body if T_body_camera is None else T_level_body @ T_body_camera
     return -T_level_camera[2, :3]
 
 

@@ -20,7 +20,7 @@ from objreg_ros.bridge import from_msg, qos, to_msg
 from objreg_ros.bridge.matching import MatchingDoor
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.sync import Match, Need, Stream
-from objreg_ros.data import DepthImage, Detections, Frame
+from objreg_ros.data import Array, DepthImage, Detections, Frame
 from objreg_ros.segmenter.doubts import range_doubt, registration_doubt
 from objreg_ros.segmenter.organise import organise
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
@@ -113,7 +113,7 @@ class SegmenterNode(MatchingDoor):
         slop_ns = round(self._inputs.slop * 1e9)
         streams = [Stream("depth"), Stream("detections", slop_ns=slop_ns), Stream("labels", Need.LATCHED)]
         if self._inputs.level_odom:
-            streams.append(Stream("odom", Need.OPTIONAL, slop_ns, ODOM_DEPTH))
+            streams.append(Stream("odom", Need.OPTIONAL, slop_ns, ODOM_DEPTH, enclosing=True))
         if topic in DEPTH:
             streams.append(Stream("camera_info", Need.LATCHED))
             streams.append(Stream("image", Need.OPTIONAL, slop_ns))
@@ -132,12 +132,21 @@ class SegmenterNode(MatchingDoor):
         names = payload["labels"]
         shape = depth.depth.shape
         detections = self.read("detections", from_msg.detections, payload["detections"], names, shape)
-        gravity = from_msg.level_gravity(payload.payloads.get("odom"), self._inputs.mounting)
+        gravity = self._level_gravity(payload)
         with self.ledger.timed("segment"):
             frame = self._segmenter.segment(detections, depth, gravity)
         self._doubt(detections, depth, frame)
         self._publish(frame, names)
         return True
+
+    def _level_gravity(self, match: Match) -> Array | None:
+        gravity = from_msg.level_gravity(match.stamp_ns, match.payloads.get("odom"), self._inputs.mounting)
+        if gravity is None and self._inputs.level_odom:
+            self.throttled.remind(
+                "level_odom", "expected odometry around a frame, as level_odom is on, got none: gravity is estimated; "
+                "is odom published 8 times a second at least, stamped by the clock of the camera?"
+            )  # fmt: skip
+        return gravity
 
     def _doubt(self, detections: Detections, depth: DepthImage, frame: Frame) -> None:
         doubts = {

@@ -217,11 +217,11 @@ def test_gravity_is_down_in_the_frame_of_a_level_odometry() -> None:
     on_its_side = from_msg.odometry(
         messages.odometry((half, 0, 0, half), (1, 2, 3))
     )  # a quarter turn about x: the body's y is up
-    assert from_msg.level_gravity(None) is None
-    assert np.allclose(from_msg.level_gravity(from_msg.odometry(messages.odometry())), (0, 0, -1))
-    assert np.allclose(from_msg.level_gravity(on_its_side), (0, -1, 0))
+    assert from_msg.level_gravity(0, None) is None
+    assert np.allclose(from_msg.level_gravity(0, (from_msg.odometry(messages.odometry()),)), (0, 0, -1))
+    assert np.allclose(from_msg.level_gravity(0, (on_its_side,)), (0, -1, 0))
     T_body_camera = pose(rotation_from_vector(np.array([0, 0, np.pi / 2])), np.ones(3))  # the body's y is its x
-    assert np.allclose(from_msg.level_gravity(on_its_side, T_body_camera), (-1, 0, 0))
+    assert np.allclose(from_msg.level_gravity(0, (on_its_side,), T_body_camera), (-1, 0, 0))
 
 
 def test_a_stamped_pose_and_a_transform_are_odometry_too() -> None:
