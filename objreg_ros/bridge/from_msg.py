@@ -211,10 +211,10 @@ def loop_closure(message: Any) -> LoopClosure:
 
 
 def moment(frame_id: str) -> tuple[str, int]:
-    """The frame and the time in nanoseconds of ``name@sec.nsec`` with nine digits behind the point."""
-    name, _, time = frame_id.rpartition("@")
+    """The frame, of whatever name, and the time in ns of ``name@sec.nsec`` with nine digits behind the point."""
+    name, at, time = frame_id.rpartition("@")
     seconds, _, nanoseconds = time.partition(".")
-    if not name or not seconds.lstrip("-").isdigit() or not nanoseconds.isdigit() or len(nanoseconds) != 9:
+    if not at or not seconds.lstrip("-").isdigit() or not nanoseconds.isdigit() or len(nanoseconds) != 9:
         raise ValueError(f"constraint: expected a frame_id like camera@12.000000034, got {frame_id!r}")
     return name, int(seconds) * NANOSECONDS + int(nanoseconds)
 
