@@ -44,9 +44,10 @@ class Store:
     """
 
     def __init__(self, path: str | Path = "", read_only: bool = False) -> None:
-        self.path = str(Path(path).expanduser()) if str(path) else ""
+        self.path = str(Path(path).expanduser().resolve()) if str(path) else ""  # of a link what it leads to
         self._cache: OrderedDict[int, Keyframe] = OrderedDict()
         self._sessions: dict[int, int] = {}  # of the keyframes, the oldest first: to count them is to read the file
+        self._closures = 0  # that are stored: they are never forgotten, and to count them is to read them all
         self._claim: Claim | None = None
         if not self.path and not read_only:
             self._connection = _connect(":memory:")
@@ -60,6 +61,7 @@ class Store:
             self._connection = self._opened(Path(self.path), read_only)
             undo.callback(self._connection.close)
             self._sessions.update(self._connection.execute("SELECT id, session FROM keyframe ORDER BY id"))
+            self._closures = self._one("SELECT COUNT(*) FROM closure")
             undo.pop_all()
 
     @staticmethod
@@ -68,7 +70,9 @@ class Store:
             create(path)
         check(path)
         connection = _connect(read_only_uri(path) if read_only else str(path))
-        if not read_only:
+        if read_only:
+            connection.execute("BEGIN")  # all that is read is of one moment
+        else:
             connection.execute("PRAGMA journal_mode = WAL")
             renew(connection)
         return connection
@@ -91,11 +95,13 @@ class Store:
                 _insert(transaction, "object", object_row(item, sighting))
             newest = max((sighting.landmark for sighting in sightings), default=0)
             transaction.execute("UPDATE highest SET landmark = MAX(landmark, ?)", (newest,))
-            for closure in closures:
-                _insert(transaction, "closure", _closure_row(closure))
+            rows = [_closure_row(closure) for closure in closures]
+            for row in rows:
+                _insert(transaction, "closure", row)
             for old, merge in (merged or {}).items():
                 _rename(transaction, old, merge)
         self._sessions[keyframe.keyframe_id] = keyframe.session
+        self._closures += len(rows)
         self._remember(keyframe)
 
     def keyframe(self, keyframe_id: int) -> Keyframe:
@@ -146,6 +152,7 @@ class Store:
                 transaction.execute(f"DELETE FROM {table}")
         self._cache.clear()
         self._sessions.clear()
+        self._closures = 0
 
     def next_keyframe(self) -> int:
         """An id that no keyframe ever had here."""
@@ -172,7 +179,7 @@ class Store:
             "objects": self._one("SELECT COUNT(*) FROM object"),
             "landmarks": self._one("SELECT COUNT(DISTINCT landmark) FROM object"),
             "sessions": len(set(self._sessions.values())),
-            "closures": self._one("SELECT COUNT(*) FROM closure"),
+            "closures": self._closures,
         }
 
     def save(self, path: str | Path = "") -> str:

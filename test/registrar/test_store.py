@@ -288,6 +288,41 @@ def test_a_store_that_is_only_read_is_not_changed(tmp_path: Path) -> None:
     assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["place.db"]
 
 
+def test_who_reads_sees_one_moment_whatever_is_written_and_removed_meanwhile(tmp_path: Path) -> None:
+    store = Store(tmp_path / "place.db")
+    first, second = _add(store), _add(store, 1.0)
+    reader = Store(tmp_path / "place.db", read_only=True)
+    store.remove([first])
+    _add(store, 2.0)
+    assert [reader.keyframe(k).keyframe_id for k in reader.keyframe_ids()] == [first, second]
+    assert reader.counts()["objects"] == 2
+    reader.close()
+    store.close()
+
+
+def test_a_link_to_a_store_that_is_not_there_yet_stays_a_link_and_nobody_else_opens_it(tmp_path: Path) -> None:
+    link, path = tmp_path / "link.db", tmp_path / "disk" / "place.db"
+    path.parent.mkdir()
+    link.symlink_to(path)
+    store = Store(link)
+    _add(store)
+    assert link.is_symlink() and path.is_file()
+    with pytest.raises(StoreError, match="in use by another registrar"):
+        Store(path)
+    store.close()
+
+
+def test_closures_are_counted_over_restarts_and_outlive_their_keyframes(tmp_path: Path) -> None:
+    closure = LoopClosure(from_ns=1, to_ns=2, T_from_to=np.eye(4), covariance=np.eye(6), labels=("cup",))
+    for total in (2, 4):
+        store = Store(tmp_path / "place.db")
+        written = keyframe(store.next_keyframe(), float(total))
+        store.add(written, sightings_of(written), [closure, closure])
+        store.remove([written.keyframe_id])
+        assert store.counts()["closures"] == total == len(list(store.closures()))
+        store.close()
+
+
 def test_a_second_writer_is_refused_while_readers_see_what_is_written(tmp_path: Path) -> None:
     path = tmp_path / "place.db"
     store = Store(path)
