@@ -136,9 +136,9 @@ class Door(Node):
         """Warn when none of ``topics`` speaks."""
         self.watch.expect(name, {topic: self.resolve_topic_name(topic) for topic in topics})
 
-    def sensor(self) -> QoSProfile:
+    def sensor(self, depth: int = 10) -> QoSProfile:
         """The QoS of what a camera or an odometry sends."""
-        return qos.sensor(self.settings.of(DoorParams).reliable)
+        return qos.sensor(self.settings.of(DoorParams).reliable, depth)
 
     # The life of a frame
 

@@ -5,16 +5,18 @@ from __future__ import annotations
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
+ODOMETRY = 1000  # words of odometry, some seconds of the fastest
 KEPT_CONSTRAINTS = 1000  # of the latched constraints: what a mapper that comes late still gets
 
 
-def sensor(reliable: bool) -> QoSProfile:
+def sensor(reliable: bool, depth: int = 10) -> QoSProfile:
     """What a camera sends. Best effort matches every publisher; reliable only reliable ones, and loses nothing.
 
-    Ten messages deep: the newest wins in our own queue, where what it replaces is counted, and not inside DDS.
+    Ten messages deep: the newest wins in our own queue, where what it replaces is counted, and not inside DDS. Odometry
+    is small and every word of it counts: `ODOMETRY` deep, so that what holds Python up for seconds loses none.
     """
     reliability = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
-    return QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=10, reliability=reliability)
+    return QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=depth, reliability=reliability)
 
 
 def room(depth: int = 20) -> QoSProfile:

@@ -46,7 +46,7 @@ class Worker(Generic[Job]):
         """Finish the job in hand, leave the one that waits, end the thread."""
         with self._ready:
             self._open = False
-            self._ready.notify()
+            self._ready.notify_all()
         if self._thread is not threading.current_thread():
             self._thread.join()
 
@@ -80,6 +80,7 @@ class Backlog(Worker[Job]):
         nice: int = 0,
     ) -> None:
         self._waiting: deque[Job] = deque()
+        self._busy = False
         self._newest, self._settle = work, settle
         super().__init__(self._by_age, settle, failed, nice)
 
@@ -87,7 +88,7 @@ class Backlog(Worker[Job]):
         """Hand over a job; never waits."""
         with self._ready:
             self._waiting.append(job)
-            self._ready.notify()
+            self._ready.notify_all()
 
     def rest(self) -> list[Job]:
         """Take back every job that has not begun, the oldest first."""
@@ -96,11 +97,20 @@ class Backlog(Worker[Job]):
             self._waiting.clear()
         return waiting
 
+    def drain(self) -> None:
+        """Wait until every job is done, or the worker is closed."""
+        with self._ready:
+            self._ready.wait_for(lambda: not (self._waiting or self._busy) or not self._open)
+
     def _take(self) -> Job | None:
         """The oldest job; with those behind it still in the queue, so that none is lost whatever this one raises."""
         with self._ready:
             self._ready.wait_for(lambda: self._waiting or not self._open)
+            self._busy = self._open
             return self._waiting.popleft() if self._open else None
 
     def _by_age(self, job: Job) -> None:
         (self._settle if self._waiting else self._newest)(job)
+        with self._ready:
+            self._busy = False
+            self._ready.notify_all()

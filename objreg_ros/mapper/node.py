@@ -20,6 +20,7 @@ from objreg_ros.bridge.door import Door
 from objreg_ros.bridge.spin import run
 from objreg_ros.data import JUMP_NS, LoopClosure, Odometry
 from objreg_ros.mapper.adapters.g2o import graph_text
+from objreg_ros.mapper.optimisation import load
 from objreg_ros.mapper.params import MapperNodeParams, MapperParams
 from objreg_ros.mapper.pose_graph import PoseGraph, Summary
 
@@ -46,12 +47,13 @@ class MapperNode(Door):
         self._odometry_count = self._passed_over_count = 0
         self._ended_ns = 0  # the last moment of the run of the clock before this one
         self._course: Course[Odometry] = Course(self._pass_over)
+        load()
         self._begin()
         self._path = self.create_publisher(PathMsg, "path", qos.latched())
         self._correction = self.create_publisher(TransformStamped, "correction", qos.latched())
         self._broadcaster = None if TransformBroadcaster is None else TransformBroadcaster(self)
         self._serve()
-        self.listen(OdometryMsg, "odom", self._hear_odometry, self.sensor(), watched="odom")
+        self.listen(OdometryMsg, "odom", self._hear_odometry, self.sensor(qos.ODOMETRY), watched="odom")
         self.listen(OdometryMsg, "constraints", self._hear_constraint, qos.latched(qos.KEPT_CONSTRAINTS))
         self.expect("odom", "odom")
 

@@ -10,6 +10,7 @@ would be switched off at once, so mu comes down in stages from the largest resid
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +20,11 @@ from objreg_ros.geometry import inverse, pose, vector_from_rotation
 
 STAGE = 4.0  # mu shrinks by this factor from stage to stage
 PRUNED = 0.25  # the weight of an edge whose squared residual is mu
+
+
+def load() -> None:
+    """Import Open3D now and not when the first map is solved: it takes seconds, in which nothing else runs."""
+    import_module("open3d")
 
 
 class Edge(NamedTuple):

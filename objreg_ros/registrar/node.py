@@ -75,7 +75,7 @@ class RegistrarNode(MatchingDoor):
     def _listen(self, odom_slop_ns: int) -> None:
         room = {"objects": PointCloud2, "view": PointCloud2, "view/camera_info": CameraInfo, "gravity": Vector3Stamped}
         self.listen(String, "labels", self._hear_labels, qos.latched())
-        self.listen(Odometry, "odom", self._hear_odom, self.sensor())
+        self.listen(Odometry, "odom", self._hear_odom, self.sensor(qos.ODOMETRY))
         for topic, kind in room.items():
             self.listen(kind, topic, self._hear(topic), qos.room(), watched=topic)
         self.expect("objects", "objects")
@@ -208,12 +208,13 @@ class RegistrarNode(MatchingDoor):
         return response
 
     def _settle_and_save(self) -> tuple[bool, str]:
-        """Whether it could be, and where it is or what was in the way."""
+        """Whether it could be, and where it is or what was in the way. The last keyframe comes after all others."""
         try:
             with self._tracking:
+                self.searcher.drain()
                 stretch = self._registrar.end()
-            if stretch is not None:
-                self._publish(self._registrar.search(stretch, self._seconds))
+                if stretch is not None:
+                    self._publish(self._registrar.search(stretch, self._seconds))
             return True, self._registrar.save()
         except (ValueError, OSError) as error:
             return False, str(error)

@@ -58,7 +58,7 @@ class SegmenterNode(MatchingDoor):
             self.listen_to_first("image", IMAGES, self._hear_image, self.sensor())
         self.listen_to_first("depth", SOURCES[self._inputs.source], self._hear_depth, self.sensor())
         if self._inputs.level_odom:
-            self.listen(Odometry, "odom", self._hear_odom, self.sensor())
+            self.listen(Odometry, "odom", self._hear_odom, self.sensor(qos.ODOMETRY))
         self.listen(PointCloud2, "detections_table", self._hear_detections, qos.room(), watched="detections_table")
         self.expect("detections_table", "detections_table")
 

@@ -118,6 +118,16 @@ def test_a_backlog_settles_what_was_overtaken_before_it_works_on_the_newest() ->
     assert held.done == [("work", 1), ("settle", 2), ("settle", 3), ("work", 4)] and held.backlog.rest() == []
 
 
+def test_who_drains_a_backlog_waits_for_the_last_job() -> None:
+    held = Overtaken()
+    threading.Timer(0.05, held.go.set).start()
+    held.backlog.drain()
+    assert held.done[-1] == ("work", 4)
+    held.backlog.drain()  # there is nothing to wait for
+    held.backlog.close()
+    held.backlog.drain()
+
+
 def test_a_closed_backlog_gives_back_what_it_did_not_begin() -> None:
     held = Overtaken()
     rest = held.backlog.rest()
