@@ -58,6 +58,15 @@ def wandering(T_motion: Array, sigmas: tuple[float, float]) -> Array:
     return np.diag(way * np.repeat(np.square(sigmas) / 3, 3))
 
 
+def unseen(seconds: float, max_speed: float) -> Array:
+    """The covariance (6, 6) of a motion of which nothing was told for so long: to anywhere that a body gets, any turn.
+
+    Odometry that is silent for a while may have begun anew meanwhile.
+    """
+    turn = np.pi if seconds > 0.0 else 0.0
+    return np.diag(np.square(np.repeat([max_speed * seconds, turn], 3)))
+
+
 def _turning(lever: Array) -> Array:
     """What an error [t r] of a pose makes of one that follows it at ``lever (3,)`` m."""
     J = np.eye(6)

@@ -11,7 +11,7 @@ import numpy as np
 
 from objreg_ros.data import Array, LoopClosure, Odometry
 from objreg_ros.geometry import inverse, leaps, rotation_angle
-from objreg_ros.mapper.constraint import Constraint, between_keyframes, open3d_information, wandering
+from objreg_ros.mapper.constraint import Constraint, between_keyframes, open3d_information, unseen, wandering
 from objreg_ros.mapper.optimisation import Edge, Solution, optimise, squared_residual
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.sparse import SparseTrajectory
@@ -211,10 +211,12 @@ class PoseGraph:
         return bool(turned or np.linalg.norm(T_last_body[:3, 3]) >= self.params.keyframe_translation)
 
     def _step(self) -> Tie:
-        """What odometry says between the two newest keyframes."""
+        """What odometry says between the two newest keyframes: next to nothing where it was silent meanwhile."""
         k1, k2 = len(self.keyframes) - 2, len(self.keyframes) - 1
         T_k1_k2 = inverse(self.keyframes.poses[k1]) @ self.keyframes.poses[k2]
-        return Tie(k1, k2, Constraint(T_k1_k2, wandering(T_k1_k2, self.params.odometry_sigmas)))
+        silent_s = self.odometry.silent_s(self.keyframes.stamps_ns[k1], self.keyframes.stamps_ns[k2])
+        C = wandering(T_k1_k2, self.params.odometry_sigmas) + unseen(silent_s, self.params.max_speed)
+        return Tie(k1, k2, Constraint(T_k1_k2, C))
 
 
 def _edge(tie: Tie) -> Edge:

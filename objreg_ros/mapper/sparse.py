@@ -65,6 +65,10 @@ class SparseTrajectory(Trajectory):
         k = bisect_left(self._gaps, stamp_ns, key=lambda gap: gap[1])
         return k < len(self._gaps) and self._gaps[k][0] < stamp_ns < self._gaps[k][1]
 
+    def silent_s(self, first_ns: int, last_ns: int) -> float:
+        """For how many seconds between two moments nothing came."""
+        return sum(max(0, min(end, last_ns) - max(start, first_ns)) for start, end in self._gaps) / SECOND_NS
+
     def pin(self) -> None:
         """The newest pose is to stay, as it is."""
         self._least, self._most = _nothing()

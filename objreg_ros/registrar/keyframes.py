@@ -21,6 +21,7 @@ from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.plumb import PlumbLine
 from objreg_ros.registrar.tracking import Surface, surface_of, view_motion
 
+SILENCE_S = 5.0  # odometry may have begun anew in it without a leap
 UNSET_NS = 0  # the stamp of a camera that starts before the simulated clock does: no clock began then
 
 
@@ -92,6 +93,15 @@ class _Session:
         seconds = 1e-9 * (frame.stamp_ns - last_ns)
         return leaps(T_odom_last, frame.T_odom_camera, seconds, max_speed, self.T_odom_first)
 
+    def silent_s(self, frame: Frame) -> float:
+        """For how many seconds there was no frame before this one."""
+        return 1e-9 * (frame.stamp_ns - self.last_ns)
+
+    def lose(self, seconds: float, max_speed: float) -> None:
+        """After a long silence nobody knows the way there, nor which way things fall."""
+        self.way.lose(seconds, max_speed)
+        self.plumb.forget()
+
     def follow(self, frame: Frame) -> None:
         """Go on to a frame."""
         self.last_ns = frame.stamp_ns
@@ -148,7 +158,7 @@ class Keyframer:
 
         One that is not later than the last, but by no jump, is passed over.
         """
-        last_ns, session, stretch = self._last_ns, self._session, self._open
+        last_ns, session = self._last_ns, self._session
         if last_ns is not None and 0 <= last_ns - frame.stamp_ns < JUMP_NS:
             return None
         self._last_ns = frame.stamp_ns
@@ -160,17 +170,16 @@ class Keyframer:
         T_session_frame = self._follow(frame)
         if T_session_frame is None:
             return None if self._may_come_back(session, frame) else self._start(frame)
+        silent_s = session.silent_s(frame)
+        ended = self._end() if silent_s > SILENCE_S or self._is_over(frame, T_session_frame) else None
+        if silent_s > SILENCE_S:
+            session.lose(silent_s, self._params.max_speed)
         session.follow(frame)
         frame = _levelled(session, frame)
-        if stretch is None:
+        if self._open is None:
             self._begin(session, frame, T_session_frame)
-            return None
-        T_first_frame = inverse(stretch.T_session_first) @ T_session_frame
-        if not self._ends(stretch, frame, T_first_frame):
-            self._collect(stretch, frame, T_first_frame)
-            return None
-        ended = self._end()
-        self._begin(session, frame, T_session_frame)
+        else:
+            self._collect(self._open, frame, inverse(self._open.T_session_first) @ T_session_frame)
         return ended
 
     def finish(self) -> Stretch | None:
@@ -247,11 +256,15 @@ class Keyframer:
             stretch.frames.append(frame)
             stretch.motions.append(T_first_frame)
 
-    def _ends(self, stretch: _Open, frame: Frame, T_first_frame: Array) -> bool:
+    def _is_over(self, frame: Frame, T_session_frame: Array) -> bool:
         """Whether the frame is of another moment, or odometry is back: it tells no motion from a pose of our own."""
+        stretch = self._open
+        if stretch is None:
+            return False
         lasted = 1e-9 * (frame.stamp_ns - stretch.first.stamp_ns)
         back = frame.T_odom_camera is not None and stretch.session.in_odometry and not stretch.by_odometry
-        return back or lasted > self._params.keyframe_seconds or self._moved(T_first_frame, 1.0)
+        moved = self._moved(inverse(stretch.T_session_first) @ T_session_frame, 1.0)
+        return back or moved or lasted > self._params.keyframe_seconds
 
     def _is_news(self, stretch: _Open, labels: Counter[str]) -> bool:
         if self._last is None or self._last[0] != stretch.session.number:

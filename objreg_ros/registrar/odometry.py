@@ -12,6 +12,8 @@ from objreg_ros.geometry import inverse, rotation_angle
 from objreg_ros.registrar.keyframe import Keyframe
 from objreg_ros.registrar.params import RegistrarParams
 
+TURNS_DEG_S = 360.0  # nothing turns faster for long
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Prior:
@@ -41,10 +43,25 @@ class Way:
 
     def go(self, T_session_camera: Array) -> None:
         """Go on to another pose, straight."""
-        motion = inverse(self.T_session_camera) @ T_session_camera
-        self.travelled += float(np.linalg.norm(motion[:3, 3]))
-        self.turned += float(np.degrees(rotation_angle(motion[:3, :3])))
+        metres, degrees = self._to(T_session_camera)
+        self.travelled += metres
+        self.turned += degrees
         self.T_session_camera = T_session_camera
+
+    def is_near(self, T_session_camera: Array, metres: float, degrees: float) -> bool:
+        """Whether another pose is no farther away than that."""
+        moved, turned = self._to(T_session_camera)
+        return moved <= metres and turned <= degrees
+
+    def lose(self, seconds: float, max_speed: float) -> None:
+        """Nothing was seen for so long: it may have gone as far as it gets, odometry may have begun anew meanwhile."""
+        self.travelled += max_speed * seconds
+        self.turned += TURNS_DEG_S * seconds
+
+    def _to(self, T_session_camera: Array) -> tuple[float, float]:
+        """Metres and degrees to another pose."""
+        motion = inverse(self.T_session_camera) @ T_session_camera
+        return float(np.linalg.norm(motion[:3, 3])), float(np.degrees(rotation_angle(motion[:3, :3])))
 
 
 def expect(source: Keyframe, target: Keyframe, params: RegistrarParams) -> Prior | None:

@@ -15,6 +15,7 @@ from objreg_ros.data import Array
 from objreg_ros.registrar.odometry import Way
 
 ONE_VIEW = 0.02  # weight of what a single view tells, beside 1 of many from around
+AT_REST_M, AT_REST_DEG = 0.01, 0.5  # what odometry may jitter by while the camera rests
 DOUBT = 3  # power of a view's own confidence: 0.96 err by 0.7 degrees, below 0.9 by 2.4
 
 
@@ -45,9 +46,15 @@ class PlumbLine:
             return None, 0.0
         return T_session_camera[:3, :3].T @ falls / weight, min(1.0, weight)
 
+    def forget(self) -> None:
+        """Begin again: nothing carries over to where the camera is now."""
+        self._falls, self._way = np.zeros(3), None
+
     def _go(self, T_session_camera: Array) -> float:
-        """What is kept of all that was told, after going on to a pose."""
+        """What is kept of all that was told, after going on to a pose; all of it where that is as good as at rest."""
         way = self._way = self._way or Way(T_session_camera)
+        if way.is_near(T_session_camera, AT_REST_M, AT_REST_DEG):
+            return 1.0
         travelled, turned = way.travelled, way.turned
         way.go(T_session_camera)
         return float(np.exp((travelled - way.travelled) / self.metres + (turned - way.turned) / self.degrees))

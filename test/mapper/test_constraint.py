@@ -15,6 +15,7 @@ from objreg_ros.mapper.constraint import (
     inverted,
     local_information,
     open3d_information,
+    unseen,
     wandering,
 )
 from objreg_ros.mapper.trajectory import Trajectory
@@ -125,6 +126,11 @@ def test_odometry_wanders_with_metres_and_radians_alike() -> None:
     T = pose(rotation_from_vector(np.array([0.0, 0.3, 0.4])), np.array([0.0, 1.5, 2.0]))
     three_each = np.sqrt(np.diag(wandering(T, (0.02, 0.01)))).reshape(2, 3)
     assert np.linalg.norm(three_each, axis=1) == pytest.approx([0.02 * np.sqrt(3.0), 0.01 * np.sqrt(3.0)])
+
+
+def test_in_a_silence_a_body_may_have_gone_as_far_as_it_gets_and_turned_any_way() -> None:
+    assert np.sqrt(np.diag(unseen(4.0, 2.0))) == pytest.approx([8.0] * 3 + [np.pi] * 3)
+    assert not unseen(0.0, 2.0).any()
 
 
 def test_a_closure_outside_odometry_is_refused_with_the_span() -> None:

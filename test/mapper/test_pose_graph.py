@@ -95,6 +95,10 @@ class EveryPose(Trajectory):
     def pin(self) -> None:
         """Everything stays."""
 
+    def silent_s(self, first_ns: int, last_ns: int) -> float:
+        """It never is."""
+        return 0.0
+
 
 def often(poses: list[Array]) -> list[Odometry]:
     """The walk of `odometry` at 200 Hz, trembling by a third of a millimetre."""
@@ -209,6 +213,22 @@ def test_odometry_that_comes_back_at_its_origin_has_begun_anew_however_long_noth
     assert graph.leaps(origin) and not graph.leaps(replace(origin, stamp_ns=11 * SECOND))
     beside = pose(np.eye(3), np.array([0.02, 0.0, 0.0]))
     assert not graph.leaps(replace(origin, T_odom_body=beside))
+
+
+def test_odometry_that_began_anew_elsewhere_in_a_silence_gives_way_to_closures() -> None:
+    """The second lap is told from another origin, as by an odometry that was started again beside the old one."""
+    again = pose(rotation_from_vector(np.array([0.0, 0.0, 0.3])), np.array([1.0, -0.5, 0.0]))
+    late = [replace(word, stamp_ns=word.stamp_ns + 20 * SECOND) for word in odometry([again @ T for T in TRUE])]
+    graph = PoseGraph()
+    for word in (*odometry(TRUE)[:HALF], *late[HALF:]):
+        assert not graph.leaps(word)
+        graph.add_odometry(word)
+    for right in RIGHT[1:]:
+        assert graph.add_closure(replace(right, to_ns=right.to_ns + 20 * SECOND))
+    summary = graph.optimise()
+    assert not summary.pruned
+    found = graph.corrected([word.stamp_ns for word in late[HALF + 5 :]])
+    assert distances(found, TRUE[HALF + 5 :]).max() < 0.02
 
 
 def test_the_place_of_the_camera_on_the_body_is_honoured() -> None:

@@ -62,6 +62,8 @@ def test_moments_in_a_gap_are_not_covered_and_its_ends_are() -> None:
     inside, ends = [SECOND, silent_ns - 1], [SECOND - STEP_NS, silent_ns, silent_ns + STEP_NS]
     assert all(trajectory.in_gap(stamp) and not trajectory.covers(stamp) for stamp in inside)
     assert all(trajectory.covers(stamp) and not trajectory.in_gap(stamp) for stamp in ends)
+    longest = trajectory.silent_s(0, 1000 * SECOND)
+    assert longest > 0.0 and trajectory.silent_s(ends[0], ends[0]) == 0.0
     assert trajectory.at(silent_ns)[0, 3] == pytest.approx(20.0)
     assert {SECOND - STEP_NS, silent_ns} <= set(trajectory.stamps_ns)
 

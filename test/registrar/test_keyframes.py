@@ -17,6 +17,7 @@ from .samples import CAMERA, SECOND, box, frame, moved, scene_view
 
 PARAMS = RegistrarParams(keyframe_translation=0.1, keyframe_rotation=10.0, keyframe_seconds=1.0, keyframe_frames=4)
 CUP = (box("cup", (0, 0, 1)),)
+DOWN = np.array([0.0, 1.0, 0.0])  # of a camera that is level
 
 
 def _run(keyframer: Keyframer, frames: list[Frame]) -> list[Stretch]:
@@ -89,6 +90,16 @@ def test_odometry_that_is_back_where_it_began_after_a_silence_begins_a_new_sessi
     there = [frame(0.1 * i, CUP, moved(0.1 * i)) for i in range(10)]
     assert {s.session for s in _run(Keyframer(PARAMS), [*there, frame(60.0, CUP, moved(0.0))])} == {0, 1}
     assert {s.session for s in _run(Keyframer(PARAMS), [*there, frame(60.0, CUP, moved(0.2))])} == {0}
+
+
+@pytest.mark.parametrize(("silence", "knows"), [(4.0, True), (30.0, False)])
+def test_after_a_long_silence_nobody_knows_the_way_there_nor_which_way_things_fall(silence: float, knows: bool) -> None:
+    there = [replace(frame(0.1 * k, CUP, moved(0.1 * k)), gravity=DOWN, gravity_confidence=1.0) for k in range(30)]
+    back = replace(frame(2.9 + silence, CUP, moved(2.5)), gravity=DOWN, gravity_confidence=1.0)
+    *_, before, after = _run(Keyframer(PARAMS), [*there, back])
+    assert before.session == after.session
+    assert (after.travelled - before.travelled < 1.0) is knows
+    assert (after.frames[0].gravity_confidence > before.frames[0].gravity_confidence - 0.1) is knows
 
 
 def test_a_frame_that_comes_late_or_twice_is_passed_over() -> None:

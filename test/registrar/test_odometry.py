@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import pose, rotation_from_vector
-from objreg_ros.registrar.odometry import Prior, Way, expect
+from objreg_ros.registrar.odometry import TURNS_DEG_S, Prior, Way, expect
 from objreg_ros.registrar.params import RegistrarParams
 
 from .samples import keyframe, moved
@@ -50,6 +50,18 @@ def test_a_way_adds_up_what_was_gone_and_turned_from_pose_to_pose() -> None:
     for T in (TURNED, moved(3.0), moved(2.5)):
         way.go(T)
     assert way.travelled == pytest.approx(1.0 + 2.0 + 0.5) and way.turned == pytest.approx(90.0 + 90.0)
+
+
+def test_a_way_is_as_long_as_it_may_have_been_while_nothing_was_seen() -> None:
+    way = Way(np.eye(4))
+    way.lose(3.0, 2.0)
+    assert way.travelled == pytest.approx(6.0) and way.turned == pytest.approx(3.0 * TURNS_DEG_S)
+
+
+def test_a_pose_is_near_the_last_one_in_place_and_turn() -> None:
+    way, aside = Way(np.eye(4)), pose(rotation_from_vector(np.radians([0.0, 2.0, 0.0])), np.array([0.1, 0.0, 0.0]))
+    assert way.is_near(aside, 0.11, 2.1)
+    assert not way.is_near(aside, 0.09, 2.1) and not way.is_near(aside, 0.11, 1.9)
 
 
 def test_what_is_expected_is_as_uncertain_whichever_of_the_two_came_first() -> None:

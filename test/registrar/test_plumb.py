@@ -63,6 +63,32 @@ def test_a_camera_that_rests_learns_nothing() -> None:
     np.testing.assert_allclose(weights, ONE_VIEW)
 
 
+def test_a_camera_that_rests_learns_nothing_however_its_odometry_jitters() -> None:
+    rng, plumb, weights = np.random.default_rng(0), line(), []
+    for _ in range(2000):
+        T = camera(0.05 * rng.standard_normal(), 5e-4 * rng.standard_normal())
+        weights.append(plumb.feel(T, T[:3, :3].T @ DOWN, 1.0)[1])
+    np.testing.assert_allclose(weights, ONE_VIEW)
+
+
+def test_a_camera_that_creeps_learns_as_one_that_strides() -> None:
+    creeping, striding = line(), line()
+    for k in range(1001):
+        T = camera(0.1 * k)
+        slow = creeping.feel(T, T[:3, :3].T @ DOWN, 1.0)[1]
+    for k in range(11):
+        T = camera(10.0 * k)
+        fast = striding.feel(T, T[:3, :3].T @ DOWN, 1.0)[1]
+    assert slow == pytest.approx(fast, abs=0.02)
+
+
+def test_what_is_forgotten_is_not_carried_on() -> None:
+    plumb, T = taught(20), camera(200.0)
+    plumb.forget()
+    assert plumb.feel(T, T[:3, :3].T @ DOWN, 1.0)[1] == pytest.approx(ONE_VIEW)
+    assert taught(20).feel(T, T[:3, :3].T @ DOWN, 1.0)[1] > 0.5
+
+
 def test_a_view_that_tells_nothing_is_told_by_those_before_it() -> None:
     plumb, T = taught(10), camera(110.0)
     found, weight = plumb.feel(T, None, 0.0)
