@@ -65,7 +65,9 @@ class SegmenterNodeParams(Params):
     )
     slop: float = param(0.02, "largest distance in time between depth and what goes with it", "s", ge=0.0)
     colour: bool = param(True, "take the colour of the points from `image` when depth comes as an image")
-    level_odom: bool = param(False, "take gravity from `odom`, whose frame an IMU keeps level with z up")
+    level_odom: bool = param(
+        False, "take gravity from `odom`, whose frame an IMU keeps level with z up; frames are no more often than it"
+    )
     T_base_camera: tuple[float, ...] = param(
         (), "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: the odometry is the camera's"
     )
