@@ -47,7 +47,6 @@ class MapperNode(Door):
         self._odometry_count = self._passed_over_count = 0
         self._ended_ns = 0  # the last moment of the run of the clock before this one
         self._course: Course[Odometry] = Course(self._pass_over)
-        load()
         self._begin()
         self._path = self.create_publisher(PathMsg, "path", qos.latched())
         self._correction = self.create_publisher(TransformStamped, "correction", qos.latched())
@@ -56,6 +55,7 @@ class MapperNode(Door):
         self.listen(OdometryMsg, "odom", self._hear_odometry, self.sensor(qos.ODOMETRY), watched="odom")
         self.listen(OdometryMsg, "constraints", self._hear_constraint, qos.latched(qos.KEPT_CONSTRAINTS))
         self.expect("odom", "odom")
+        load()  # what comes meanwhile waits in the queues of DDS
 
     def _serve(self) -> None:
         self.create_service(Trigger, "~/reset", self._reset)
