@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from html import escape
 
@@ -176,21 +177,41 @@ def _reason_row(name: str, count: str, meaning: str, example: str) -> str:
 
 
 def _accepted(story: Story, album: Album | None) -> str:
-    chosen = chosen_closures(story) if album else []
-    pairs = [_closure_pair(story, closure, album) for closure in chosen if album]
+    if album is None:
+        return ""
+    chosen = chosen_closures(story)
+    pairs = [pair for closure in chosen if (pair := _closure_pair(story, closure, album))]
     words = (
-        f"{len([p for p in pairs if p])} of {len(story.closures)}. Right: the second moment laid over the first by the "
+        f"{len(pairs)} of {len(story.closures)}. Right: the second moment laid over the first by the "
         "constraint, magenta over green. Grey is agreement, coloured fringes are not; dark was not seen by both."
     )
-    return _section("Accepted registrations", words, "".join(pairs)) if any(pairs) else ""
+    return _registrations("Accepted registrations", words, pairs, _lacking(chosen, album))
 
 
 def _refused(story: Story, album: Album | None) -> str:
-    pairs = [_refusal_pair(story, refusal, album) for refusal in chosen_refusals(story)] if album else []
+    if album is None:
+        return ""
+    chosen = chosen_refusals(story)
+    pairs = [pair for refusal in chosen if (pair := _refusal_pair(story, refusal, album))]
     words = (
         "Candidates that were tried and turned down. Right: the second moment laid over the first by the refused pose."
     )
-    return _section("Refused registrations", words, "".join(pairs)) if any(pairs) else ""
+    return _registrations("Refused registrations", words, pairs, _lacking(chosen, album))
+
+
+def _registrations(title: str, words: str, pairs: Sequence[str], lacking: str) -> str:
+    """A section of pictures and of what has none; empty where there is nothing of either."""
+    told = " ".join(part for part in (words if pairs else "", lacking) if part)
+    return _section(title, told, "".join(pairs)) if told else ""
+
+
+def _lacking(chosen: Sequence[LoopClosure | Rejected], album: Album) -> str:
+    """How many of the chosen have no picture, and why; empty where all have one."""
+    whys = Counter(why for c in chosen if (why := album.lacking(c.from_ns) or album.lacking(c.to_ns)))
+    if not whys:
+        return ""
+    reasons = "; ".join(why if count == 1 else f"{why} ({count} times)" for why, count in whys.most_common())
+    return f"No picture of {whys.total()} of these {len(chosen)}: {reasons}."
 
 
 def _closure_pair(story: Story, closure: LoopClosure, album: Album) -> str:

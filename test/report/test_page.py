@@ -78,3 +78,19 @@ def test_closures_of_two_runs_of_the_clock_are_left_out_of_the_map_and_counted()
 
 def test_names_are_escaped() -> None:
     assert "<b>" not in page([(Story.of("<b>", summary(), TRUTH), None)])
+
+
+class Blank:
+    """An album with no picture of any moment after the sixth second."""
+
+    def lacking(self, stamp_ns: int) -> str:
+        return "nothing is near" if stamp_ns > 6 * 10**9 else ""
+
+    def at(self, stamp_ns: int) -> None:
+        return None
+
+
+def test_what_has_no_picture_is_counted_with_the_reason() -> None:
+    text = page([(Story.of("walk", summary(), TRUTH), Blank())])
+    assert "Accepted registrations" in text and "No picture of 4 of these 4: nothing is near (4 times)." in text
+    assert "No picture of 2 of these 2: nothing is near (2 times)." in text
