@@ -80,6 +80,12 @@ def test_names_are_escaped() -> None:
     assert "<b>" not in page([(Story.of("<b>", summary(), TRUTH), None)])
 
 
+def test_keyframes_that_stand_further_apart_than_the_mapper_s_are_told() -> None:
+    assert "a keyframe stands only every" not in page([(Story.of("walk", summary(), TRUTH), None)])
+    text = page([(Story.of("walk", summary(), TRUTH, most_keyframes=30), None)])
+    assert "The way is long: a keyframe stands only every 0." in text
+
+
 class Blank:
     """An album with no picture of any moment after the sixth second."""
 
