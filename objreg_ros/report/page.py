@@ -152,6 +152,9 @@ def _timeline(story: Story) -> str:
     if any(story.is_false(closure) for closure in story.closures):
         entries.insert(2, ("false", "false closure"))
     words = "What was detected, which moments were tied together, and what was refused and why."
+    if story.out_of_time:
+        counts = ", ".join(f"{count} {what}" for what, count in story.out_of_time.items())
+        words += f" Left out: {counts}, more than an hour from the longest part of the run; are their stamps right?"
     drawing = f"<figure class=card>{legend(entries)}{figures.timeline(story)}</figure>"
     return _section("Timeline", words, drawing + _reasons(story))
 

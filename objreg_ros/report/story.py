@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
 from typing import Any, TypeVar
 
 import numpy as np
@@ -18,6 +20,7 @@ from objreg_ros.truth import FALSE, Error, Truth, within
 
 Row = TypeVar("Row")
 
+PAUSE_NS = 3_600_000_000_000  # what is further from a run is not of it: one stamp of 0 would make it last for decades
 MOST_KEYFRAMES = 1000  # of the corrected way: to solve it takes 1.1 GB, and memory grows with the square
 
 
@@ -74,11 +77,41 @@ class Story:
         refusals = _read(name, summary, "refusals", _refusal)
         return cls(name, summary, truth, glimpses, closures, refusals, graph, graph.optimise().pruned)
 
+    @cached_property
+    def stretch_ns(self) -> tuple[int, int]:
+        """The first and the last moment of the most frames that have no pause of `PAUSE_NS` between them.
+
+        Without frames, of all closures. A camera that starts before its clock stamps its first frames with 0.
+        """
+        moments = sorted(glimpse.stamp_ns for glimpse in self.glimpses)
+        if not moments:
+            ends = [stamp for closure in self.closures for stamp in (closure.from_ns, closure.to_ns)]
+            return min(ends, default=0), max(ends, default=0)
+        pauses = [k for k in range(1, len(moments)) if moments[k] - moments[k - 1] > PAUSE_NS]
+        parts = [moments[a:b] for a, b in pairwise([0, *pauses, len(moments)])]
+        longest = max(parts, key=len)
+        return longest[0], longest[-1]
+
     @property
     def start_ns(self) -> int:
         """The first moment of the run."""
-        moments = [glimpse.stamp_ns for glimpse in self.glimpses] or [closure.from_ns for closure in self.closures]
-        return min(moments, default=0)
+        return self.stretch_ns[0]
+
+    def in_time(self, stamp_ns: int) -> bool:
+        """Whether a moment is on the timeline: no more than `PAUSE_NS` from the run."""
+        first_ns, last_ns = self.stretch_ns
+        return first_ns - PAUSE_NS <= stamp_ns <= last_ns + PAUSE_NS
+
+    @property
+    def out_of_time(self) -> dict[str, int]:
+        """How many frames, closures and refusals are not on the timeline, without the kinds of which all are."""
+        ends = {
+            "frames": [glimpse.stamp_ns for glimpse in self.glimpses],
+            "closures": [closure.to_ns for closure in self.closures],
+            "refusals": [refusal.to_ns for refusal in self.refusals],
+        }
+        counts = {what: sum(not self.in_time(stamp) for stamp in stamps) for what, stamps in ends.items()}
+        return {what: count for what, count in counts.items() if count}
 
     def seconds(self, stamp_ns: int) -> float:
         """The time since the first moment."""

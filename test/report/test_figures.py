@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import tracemalloc
 from xml.etree import ElementTree
 
@@ -10,8 +11,9 @@ import numpy as np
 
 from objreg_ros.report import figures
 from objreg_ros.report.story import Story
+from objreg_ros.truth import Truth
 
-from .runs import TRUTH, closure, summary
+from .runs import STEP_NS, TRUE, TRUTH, closure, summary, with_a_stray
 
 STORY = Story.of("walk", summary(false=True), TRUTH)
 
@@ -44,6 +46,19 @@ def test_the_timeline_has_a_dot_a_refusal_and_a_row_a_reason() -> None:
     assert count(svg, "refused") == 3
     assert "texture disagrees" in svg and "no candidate" in svg
     assert count(svg, "seen") > 3  # the cups and the book come and go
+
+
+def test_the_timeline_and_the_error_are_of_the_run_without_what_is_of_another_time() -> None:
+    stray_ns = -1_700_000_000 * 10**9
+    known = Truth([(stray_ns, TRUE[0]), *((k * STEP_NS, T) for k, T in enumerate(TRUE))])
+    story = Story.of("walk", with_a_stray(stray_ns), known)
+    svg = figures.timeline(story)
+    assert count(svg, "refused") == 3 and "ghost," not in svg
+    bars = [child for child in ElementTree.fromstring(svg) if "seen" in (child.get("class") or "").split()]
+    assert max(float(bar.get("width", 0)) for bar in bars) > 20
+    assert stray_ns in story.tracks().stamps_ns
+    (line, _) = re.findall(r'points="([^"]+)"', figures.error_over_time(story, story.tracks()))
+    assert len({point.split(",")[0] for point in line.split()}) == len(TRUE)
 
 
 def test_the_map_names_every_object_once() -> None:

@@ -11,7 +11,7 @@ from objreg_ros.report.page import MEANINGS, page
 from objreg_ros.report.story import Story
 from objreg_ros.truth import Truth
 
-from .runs import TRUTH, closure, summary
+from .runs import TRUTH, closure, summary, with_a_stray
 
 VOID = {"meta", "img", "br"}
 
@@ -84,6 +84,12 @@ def test_keyframes_that_stand_further_apart_than_the_mapper_s_are_told() -> None
     assert "a keyframe stands only every" not in page([(Story.of("walk", summary(), TRUTH), None)])
     text = page([(Story.of("walk", summary(), TRUTH, most_keyframes=30), None)])
     assert "The way is long: a keyframe stands only every 0." in text
+
+
+def test_what_is_of_another_time_is_counted_beside_the_timeline() -> None:
+    assert "Left out:" not in page([(Story.of("walk", summary(), TRUTH), None)])
+    text = page([(Story.of("walk", with_a_stray(-1_700_000_000 * 10**9), TRUTH), None)])
+    assert "Left out: 1 frames, 1 refusals, more than an hour from the longest part of the run" in text
 
 
 class Blank:

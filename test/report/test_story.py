@@ -10,7 +10,7 @@ from objreg_ros.geometry import rotation_from_vector
 from objreg_ros.report.story import Story
 from objreg_ros.truth import Truth
 
-from .runs import COUNT, TRUE, TRUTH, summary
+from .runs import COUNT, TRUE, TRUTH, summary, with_a_stray
 
 
 def test_closures_bend_the_way_back_to_the_truth() -> None:
@@ -113,3 +113,19 @@ def test_a_camera_that_turns_and_turns_on_its_spot_gets_few_keyframes_too() -> N
         T[:3, :3] = rotation_from_vector(np.array([0.0, 0.0, 2.0 * k]))
         row["T_odom_camera"] = T.tolist()
     assert len(Story.of("turn", told, TRUTH, most_keyframes=10).graph.keyframes) <= 10
+
+
+@pytest.mark.parametrize("years", [-54, 3])
+def test_a_frame_of_another_time_does_not_stretch_the_run_and_is_counted(years: int) -> None:
+    story = Story.of("walk", with_a_stray(years * 31_536_000 * 10**9), TRUTH)
+    assert story.stretch_ns == (0, TRUTH.stamps_ns[-1]) and story.seconds(10**9) == 1.0
+    assert story.out_of_time == {"frames": 1, "refusals": 1}
+    assert Story.of("walk", summary(), TRUTH).out_of_time == {}
+
+
+def test_a_run_with_a_short_rest_is_one_stretch() -> None:
+    told = summary()
+    for row in told["glimpses"][60:]:
+        row["stamp_ns"] += 3000 * 10**9
+    story = Story.of("walk", told, TRUTH)
+    assert story.out_of_time == {} and story.stretch_ns[1] > 3000 * 10**9
