@@ -26,7 +26,7 @@ class Ground:
 
     def __init__(self, xyz: Array) -> None:
         self.middle = xyz.mean(axis=0)
-        axes = np.linalg.svd(xyz - self.middle, full_matrices=True)[2][:2]
+        axes = np.linalg.svd(xyz - self.middle, full_matrices=len(xyz) < 3)[2][:2]  # full: all axes, and (N, N) besides
         self.axes = axes * np.where(axes[np.arange(2), np.abs(axes).argmax(axis=1)] < 0, -1.0, 1.0)[:, None]
 
     def flat(self, xyz: Array) -> Array:
