@@ -14,8 +14,8 @@ Check = Callable[[Any], bool]
 def require_form(name: str, summary: Mapping[str, Any]) -> None:
     """ValueError for the first field that is not as `objreg offline --json` or `objreg demo` writes it.
 
-    Fields that are missing are those of an older version, and no error. What is in constraints, refusals and glimpses
-    is for `Story.of` to say.
+    Fields that are missing are those of an older version, and no error. What else is in constraints, refusals and
+    glimpses is for `Story.of` to say.
     """
     for field, (words, fits) in FIELDS.items():
         if field in summary and not fits(summary[field]):
@@ -36,8 +36,12 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def _is_list(value: Any) -> bool:
-    return isinstance(value, list)
+def _is_rows(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(row, dict) for row in value)
+
+
+def _is_glimpses(value: Any) -> bool:
+    return _is_rows(value) and all(isinstance(row.get("stamp_ns"), int) for row in value)
 
 
 def _is_mounting(value: Any) -> bool:
@@ -72,7 +76,7 @@ FIELDS: dict[str, tuple[str, Check]] = {
     "rejected": ("an object of counts by reason", _each(_is_count)),
     "stage_ms": ("an object of p50 and p95 in ms by stage", _each(_is_stage)),
     "nodes": ("an object of published and stage_ms (p50, p95) by node", _each(_is_node)),
-    "constraints": ("a list", _is_list),
-    "refusals": ("a list", _is_list),
-    "glimpses": ("a list", _is_list),
+    "constraints": ("a list of objects", _is_rows),
+    "refusals": ("a list of objects", _is_rows),
+    "glimpses": ("a list of objects with stamp_ns", _is_glimpses),
 }

@@ -247,13 +247,18 @@ def _read(name: str, summary: Mapping[str, Any], key: str, read: Callable[[Any],
 
 
 def _glimpse(row: Mapping[str, Any]) -> Glimpse:
-    pose = row.get("T_odom_camera")
+    pose, stamp_ns = row.get("T_odom_camera"), int(row["stamp_ns"])
     return Glimpse(
-        stamp_ns=int(row["stamp_ns"]),
-        T_odom_camera=None if pose is None else np.array(pose, float),
+        stamp_ns=stamp_ns,
+        T_odom_camera=None if pose is None else _rigid(pose, stamp_ns),
         labels=tuple(map(_spaced, row.get("labels", ()))),
         objects=tuple((_spaced(label), np.array(xyz, float)) for label, xyz in row.get("objects", ())),
     )
+
+
+def _rigid(pose: Any, stamp_ns: int) -> Array:
+    """The pose (4, 4); ValueError if it is none."""
+    return Odometry(T_odom_body=np.array(pose, float), stamp_ns=stamp_ns).T_odom_body
 
 
 def _closure(row: Mapping[str, Any]) -> LoopClosure:

@@ -31,6 +31,9 @@ BAD: list[tuple[str, Any]] = [
     ("nodes", {"segmenter": {"stage_ms": {}}}),
     ("nodes", {"segmenter": {"published": 3, "stage_ms": {"x": 5}}}),
     ("constraints", 3),
+    ("refusals", [None]),
+    ("glimpses", [3]),
+    ("glimpses", [{}]),
 ]
 
 

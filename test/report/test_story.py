@@ -42,6 +42,14 @@ def test_json_of_another_form_is_refused_by_the_name_of_its_run(key: str, value:
         Story.of("walk", {**summary(), key: value}, TRUTH)
 
 
+@pytest.mark.parametrize("pose", [[[float("nan")] * 4] * 4, np.eye(3).tolist(), np.zeros((4, 4)).tolist()])
+def test_a_frame_without_a_rigid_pose_is_refused_by_the_name_of_its_run(pose: list[list[float]]) -> None:
+    told = summary()
+    told["glimpses"][3]["T_odom_camera"] = pose
+    with pytest.raises(ValueError, match=r"^walk: expected glimpses as `objreg offline --json` writes them, got "):
+        Story.of("walk", told, TRUTH)
+
+
 def test_without_truth_nothing_is_false_and_there_are_no_errors() -> None:
     story = Story.of("walk", summary(false=True), Truth([]))
     assert not any(story.is_false(closure) for closure in story.closures)
