@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from recording.folders import STEP_NS, records, uncalibrated
 
+from objreg_ros.bridge.layout import VIEW
 from objreg_ros.data import DepthImage, Intrinsics
 from objreg_ros.geometry import pose
-from objreg_ros.recording import write_rosbag2
-from objreg_ros.recording.inputs import choose_inputs
+from objreg_ros.recording import Record, messages, write_rosbag2
+from objreg_ros.recording.inputs import Inputs, choose_inputs
 from objreg_ros.recording.opening import open_recording
 from objreg_ros.report.pictures import WIDTH, Album, chosen_closures, chosen_refusals, data_uri, overlay
 from objreg_ros.report.story import Story
@@ -104,3 +105,16 @@ def test_an_album_waits_for_the_first_calibrated_camera(tmp_path: Path) -> None:
     write_rosbag2(tmp_path / "bag", told)
     with open_recording(tmp_path / "bag") as recording:
         assert Album(recording, choose_inputs(recording.topics)).at(10**9) is not None
+
+
+@pytest.mark.parametrize("coloured", [True, False])
+def test_a_cloud_has_its_own_colour_and_needs_no_calibrated_camera(tmp_path: Path, coloured: bool) -> None:
+    v, u = np.mgrid[:48, :64]
+    rows = np.zeros((48, 64), VIEW if coloured else [("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
+    rows["x"], rows["y"], rows["z"] = (u - 31.5) / 50.0, (v - 23.5) / 50.0, 1.0
+    told = [uncalibrated(5), Record.of("/points", messages.point_cloud(rows, 5, "camera"), 10**12)]
+    write_rosbag2(tmp_path / "bag", told)
+    with open_recording(tmp_path / "bag") as recording:
+        album = Album(recording, Inputs(points="/points", camera_info="/camera_info"))
+        assert (album.at(5) is not None) == coloured
+        assert album.lacking(5) == ("" if coloured else "the cloud has no colour")
