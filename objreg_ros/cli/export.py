@@ -18,9 +18,11 @@ def command(store: Path, folder: Path) -> None:
     """Write the objects, contexts and closures of STORE into FOLDER, new or empty, as PLY clouds and one map.json.
 
     Clouds are in metres as doubles, in the frame of the session (of its odometry, or of its first camera). STORE is not
-    changed.
+    changed. Keyframes that are damaged are left out and named.
     """
-    written = 0
-    for _ in tqdm(export(store, folder), desc="write", unit=" files", disable=None):
+    written, damaged = 0, list[str]()
+    for _ in tqdm(export(store, folder, damaged.append), desc="write", unit=" files", disable=None):
         written += 1
+    for line in damaged:
+        click.echo(f"! {line}", err=True)
     click.echo(f"wrote {written} files into {folder}")

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from pathlib import Path
 
 import click
@@ -35,3 +36,21 @@ def require_writable(option: str, file: Path) -> None:
         raise OSError(f"{option}: expected an existing folder {file.parent}, got none; create it or choose another")
     if not os.access(file if file.exists() else file.parent, os.W_OK):
         raise OSError(f"{option}: expected permission to write {file}, got none; choose another place")
+    try:
+        _try_to_write(file)
+    except OSError as error:
+        why = error.strerror or error
+        raise OSError(f"{option}: expected a place that takes a file, got at {file}: {why}; choose another") from error
+
+
+def _try_to_write(file: Path) -> None:
+    """OSError where a file can be neither made nor opened for writing, whatever its permissions say; leaves no trace.
+
+    What is no plain file, as a pipe, is not opened: that would wait for its reader.
+    """
+    if not file.exists():
+        with tempfile.TemporaryFile(dir=file.parent):
+            return
+    if file.is_file():
+        with file.open("ab"):
+            return

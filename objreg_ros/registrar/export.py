@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -17,33 +19,66 @@ from objreg_ros.registrar.landmarks import Landmark, Landmarks
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.sighting import Sighting
 from objreg_ros.registrar.store import Store
+from objreg_ros.registrar.store_file import StoreError
+
+MOST_BYTES = 200  # of a label in the name of a file, which may have 255 in all
 
 
-def export(path: str | Path, folder: str | Path) -> Iterator[Path]:
+def export(path: str | Path, folder: str | Path, tell: Callable[[str], None] = lambda line: None) -> Iterator[Path]:
     """Write the store at ``path`` into ``folder`` and yield each file as it is written. The store is not changed.
 
     ``objects/<landmark>_<label>/keyframe_<id>_<instance>.ply`` is one view of an object and
     ``contexts/keyframe_<id>.ply`` what was around it, both in m in the frame of the session. Their points are doubles,
     since that frame may be UTM's, where a float steps by half a metre. ``map.json`` holds keyframes with their objects
     (``frames`` is how many showed one, ``density`` in points per square metre of it), the landmarks that those are of,
-    and closures. StoreError (an OSError) if it is no store or damaged, OSError if
-    there is anything in the folder already.
+    closures, and the ids of the keyframes that are ``damaged``: they are left out, and ``tell`` hears why.
+    StoreError (an OSError) if it is no store, OSError if there is anything in the folder already or it cannot be
+    written: then nothing of the export stays.
     """
     folder = Path(folder)
     _refuse_used(folder)
     store = Store(path, read_only=True)
     try:
-        keyframes = []
-        for keyframe_id in store.keyframe_ids():
-            keyframe, sightings = store.keyframe(keyframe_id), list(store.sightings(keyframe_id))
-            yield from _write_clouds(folder, keyframe, sightings)
-            keyframes.append(_keyframe_json(keyframe, sightings))
-        landmarks = [_landmark_json(known) for known in Landmarks(RegistrarParams(), store.sightings()).known()]
-        closures = [_closure_json(closure) for closure in store.closures()]
-        content = {"keyframes": keyframes, "landmarks": landmarks, "closures": closures}
-        yield _write_json(folder / "map.json", content)
+        with _all_or_nothing(folder):
+            yield from _write(store, folder, tell)
     finally:
         store.close()
+
+
+def _write(store: Store, folder: Path, tell: Callable[[str], None]) -> Iterator[Path]:
+    keyframes: list[dict[str, Any]] = []
+    seen: list[Sighting] = []
+    damaged: list[int] = []
+    for keyframe_id in store.keyframe_ids():
+        try:
+            keyframe, sightings = store.keyframe(keyframe_id), list(store.sightings(keyframe_id))
+        except StoreError as error:
+            damaged.append(keyframe_id)
+            tell(f"keyframe {keyframe_id} is left out: {error}")
+            continue
+        yield from _write_clouds(folder, keyframe, sightings)
+        keyframes.append(_keyframe_json(keyframe, sightings))
+        seen += sightings
+    landmarks = [_landmark_json(known) for known in Landmarks(RegistrarParams(), seen).known()]
+    closures = [_closure_json(closure) for closure in store.closures()]
+    content = {"keyframes": keyframes, "landmarks": landmarks, "closures": closures, "damaged": damaged}
+    yield _write_json(folder / "map.json", content)
+
+
+@contextmanager
+def _all_or_nothing(folder: Path) -> Iterator[None]:
+    """Take away what was written into a new or empty folder where that does not come to its end."""
+    was_there = folder.exists()
+    try:
+        yield
+    except BaseException:
+        for name in ("objects", "contexts"):
+            shutil.rmtree(folder / name, ignore_errors=True)
+        with suppress(OSError):
+            (folder / "map.json").unlink(missing_ok=True)
+            if not was_there:
+                folder.rmdir()
+        raise
 
 
 def write_ply(path: Path, xyz: Array, normals: Array, rgb: Array | None) -> Path:
@@ -151,4 +186,6 @@ def _write_json(path: Path, content: dict[str, Any]) -> Path:
 
 
 def _file_name(label: str) -> str:
-    return "".join(letter if letter.isalnum() else "_" for letter in label)
+    """The label with letters and digits only, cut where it is too long for a name."""
+    name = "".join(letter if letter.isalnum() else "_" for letter in label)
+    return name.encode()[:MOST_BYTES].decode(errors="ignore")

@@ -26,7 +26,7 @@ class Ground:
 
     def __init__(self, xyz: Array) -> None:
         self.middle = xyz.mean(axis=0)
-        axes = np.linalg.svd(xyz - self.middle, full_matrices=True)[2][:2]
+        axes = np.linalg.svd(xyz - self.middle, full_matrices=len(xyz) < 3)[2][:2]  # full: all axes, and (N, N) besides
         self.axes = axes * np.where(axes[np.arange(2), np.abs(axes).argmax(axis=1)] < 0, -1.0, 1.0)[:, None]
 
     def flat(self, xyz: Array) -> Array:
@@ -59,8 +59,11 @@ def error_over_time(story: Story, tracks: Tracks) -> str:
     """The distance from the truth, before and after."""
     if tracks.odometry_error is None or tracks.corrected_error is None:
         return ""
-    times = (tracks.stamps_ns - story.start_ns) * 1e-9
-    errors = {"odometry": 100 * tracks.odometry_error, "corrected": 100 * tracks.corrected_error}
+    shown = np.array([story.in_time(int(stamp)) for stamp in tracks.stamps_ns])
+    if not shown.any():
+        return ""
+    times = (tracks.stamps_ns[shown] - story.start_ns) * 1e-9
+    errors = {"odometry": 100 * tracks.odometry_error[shown], "corrected": 100 * tracks.corrected_error[shown]}
     top = max(float(error.max()) for error in errors.values())
     plot = Plot((float(times[0]), float(times[-1]) + 1e-9), (0.0, 1.08 * max(top, 1.0)), height=220)
     plot.x_axis("s")
@@ -71,7 +74,7 @@ def error_over_time(story: Story, tracks: Tracks) -> str:
 
 
 def timeline(story: Story) -> str:
-    """Rows over time: detections by label, closures as bows, refusals by reason."""
+    """Rows over time: detections by label, closures as bows, refusals by reason; without what is `out_of_time`."""
     names = [label for label, _ in Counter(label for g in story.glimpses for label in g.labels).most_common()]
     labels, rare = names[:MOST_LABELS], names[MOST_LABELS:]
     reasons = [reason for reason, _ in Counter(refusal.reason for refusal in story.refusals).most_common()]
@@ -88,6 +91,8 @@ def timeline(story: Story) -> str:
     _draw_detections(plot, story, row_of)
     _draw_closures(plot, story, level["closures"])
     for refusal in story.refusals:
+        if not story.in_time(refusal.to_ns):
+            continue
         words = f"{refusal.detail} ({story.seconds(refusal.from_ns):.1f} s, {story.seconds(refusal.to_ns):.1f} s)"
         plot.dot(story.seconds(refusal.to_ns), -level[refusal.reason.value], "refused", words)
     return plot.svg("detections, closures and refusals over time")
@@ -166,25 +171,28 @@ def _index(tracks: Tracks, stamp_ns: int) -> int:
 
 def _moments(story: Story) -> list[int]:
     moments = [glimpse.stamp_ns for glimpse in story.glimpses]
-    return moments + [c.to_ns for c in story.closures] + [r.to_ns for r in story.refusals]
+    moments += [c.to_ns for c in story.closures] + [r.to_ns for r in story.refusals]
+    return [moment for moment in moments if story.in_time(moment)]
 
 
 def _draw_detections(plot: Plot, story: Story, level: dict[str, float]) -> None:
     """A bar for every stretch of frames in which a label was detected."""
-    stamps = [glimpse.stamp_ns for glimpse in story.glimpses]
+    glimpses = [glimpse for glimpse in story.glimpses if story.in_time(glimpse.stamp_ns)]
+    stamps = [glimpse.stamp_ns for glimpse in glimpses]
     pause = 2.5 * float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
     for label, row in level.items():
-        seen = np.array([g.stamp_ns for g in story.glimpses if label in g.labels])
-        for stretch in np.split(seen, np.flatnonzero(np.diff(seen) > pause) + 1):
+        seen = np.array([g.stamp_ns for g in glimpses if label in g.labels], np.int64)
+        for stretch in np.split(seen, np.flatnonzero(np.diff(seen) > pause) + 1) if len(seen) else ():
             times = [story.seconds(int(stretch[i])) for i in (0, -1)]
             plot.bar(times[0], times[1], -row, "seen", f"{label}, {times[0]:.1f} to {times[1]:.1f} s")
 
 
 def _draw_closures(plot: Plot, story: Story, row: float) -> None:
-    longest = max((abs(c.to_ns - c.from_ns) for c in story.closures), default=1)
-    for closure in story.closures:
+    closures = [closure for closure in story.closures if story.in_time(closure.to_ns)]
+    longest = max((abs(c.to_ns - c.from_ns) for c in closures if story.in_time(c.from_ns)), default=1)
+    for closure in closures:
         start, end = sorted(story.seconds(stamp) for stamp in (closure.from_ns, closure.to_ns))
-        rise = 2.4 * LANE * abs(closure.to_ns - closure.from_ns) / longest
+        rise = 2.4 * LANE * min(abs(closure.to_ns - closure.from_ns) / longest, 1.0)
         style = verdict(story, closure)
         plot.arc(start, end, -row, rise, style, closure_words(story, closure))
         for moment in (start, end):

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from html import escape
 
@@ -130,6 +131,8 @@ def _way(story: Story, tracks: Tracks | None) -> str:
     words = "From above. Closures tie places that were seen twice; the pose graph takes the drift out of odometry."
     if story.pruned:
         words += f" The mapper pruned {len(story.pruned)} of {len(story.closures)} closures."
+    if story.keyframe_step is not None:
+        words += f" The way is long: a keyframe stands only every {story.keyframe_step:.2g} m, to bound the memory."
     if story.left_out:
         words += f" {story.left_out} frames are left out: their time is not later than that of the frames before them."
     across = len(story.closures) - len(of_one_clock(story.closures))
@@ -149,6 +152,9 @@ def _timeline(story: Story) -> str:
     if any(story.is_false(closure) for closure in story.closures):
         entries.insert(2, ("false", "false closure"))
     words = "What was detected, which moments were tied together, and what was refused and why."
+    if story.out_of_time:
+        counts = ", ".join(f"{count} {what}" for what, count in story.out_of_time.items())
+        words += f" Left out: {counts}, more than an hour from the longest part of the run; are their stamps right?"
     drawing = f"<figure class=card>{legend(entries)}{figures.timeline(story)}</figure>"
     return _section("Timeline", words, drawing + _reasons(story))
 
@@ -176,21 +182,41 @@ def _reason_row(name: str, count: str, meaning: str, example: str) -> str:
 
 
 def _accepted(story: Story, album: Album | None) -> str:
-    chosen = chosen_closures(story) if album else []
-    pairs = [_closure_pair(story, closure, album) for closure in chosen if album]
+    if album is None:
+        return ""
+    chosen = chosen_closures(story)
+    pairs = [pair for closure in chosen if (pair := _closure_pair(story, closure, album))]
     words = (
-        f"{len([p for p in pairs if p])} of {len(story.closures)}. Right: the second moment laid over the first by the "
+        f"{len(pairs)} of {len(story.closures)}. Right: the second moment laid over the first by the "
         "constraint, magenta over green. Grey is agreement, coloured fringes are not; dark was not seen by both."
     )
-    return _section("Accepted registrations", words, "".join(pairs)) if any(pairs) else ""
+    return _registrations("Accepted registrations", words, pairs, _lacking(chosen, album))
 
 
 def _refused(story: Story, album: Album | None) -> str:
-    pairs = [_refusal_pair(story, refusal, album) for refusal in chosen_refusals(story)] if album else []
+    if album is None:
+        return ""
+    chosen = chosen_refusals(story)
+    pairs = [pair for refusal in chosen if (pair := _refusal_pair(story, refusal, album))]
     words = (
         "Candidates that were tried and turned down. Right: the second moment laid over the first by the refused pose."
     )
-    return _section("Refused registrations", words, "".join(pairs)) if any(pairs) else ""
+    return _registrations("Refused registrations", words, pairs, _lacking(chosen, album))
+
+
+def _registrations(title: str, words: str, pairs: Sequence[str], lacking: str) -> str:
+    """A section of pictures and of what has none; empty where there is nothing of either."""
+    told = " ".join(part for part in (words if pairs else "", lacking) if part)
+    return _section(title, told, "".join(pairs)) if told else ""
+
+
+def _lacking(chosen: Sequence[LoopClosure | Rejected], album: Album) -> str:
+    """How many of the chosen have no picture, and why; empty where all have one."""
+    whys = Counter(why for c in chosen if (why := album.lacking(c.from_ns) or album.lacking(c.to_ns)))
+    if not whys:
+        return ""
+    reasons = "; ".join(why if count == 1 else f"{why} ({count} times)" for why, count in whys.most_common())
+    return f"No picture of {whys.total()} of these {len(chosen)}: {reasons}."
 
 
 def _closure_pair(story: Story, closure: LoopClosure, album: Album) -> str:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import cv2
@@ -14,46 +14,67 @@ from objreg_ros.bridge import from_msg
 from objreg_ros.data import UNTRIED, Array, DepthImage, LoopClosure, Rejected
 from objreg_ros.geometry import back_project, transform
 from objreg_ros.recording.inputs import Inputs
-from objreg_ros.recording.record import Record, Recording
+from objreg_ros.recording.record import Recording
+from objreg_ros.report.shelf import SLOP_NS, Cameras, Shelf
 from objreg_ros.report.story import Story
 from objreg_ros.segmenter.organise import organise
 
-WINDOW_NS = 150_000_000  # how far from a moment its pictures may have been recorded
 WIDTH = 320  # px of one picture
 QUALITY = 82
 
 
 class Album:
-    """The colour and depth of a recording at any moment."""
+    """The colour and depth of a recording at any moment, by the stamps of the messages."""
 
     def __init__(self, recording: Recording, inputs: Inputs) -> None:
-        self._recording, self._inputs = recording, inputs
-        self._known: dict[int, DepthImage | None] = {}
-        info = () if inputs.camera_info is None else recording.records([inputs.camera_info])
-        self._camera_info = next((record.message for record in info), None)
+        source = inputs.depth or inputs.points
+        self._is_cloud = inputs.depth is None
+        image = None if self._is_cloud else inputs.image  # a cloud has its colour in it
+        self._source, self._image = (Shelf(recording, topic) if topic else None for topic in (source, image))
+        self._cameras = Cameras(recording, inputs.camera_info)
+        self._known: dict[int, DepthImage | str] = {}
 
     def at(self, stamp_ns: int) -> DepthImage | None:
-        """The depth image with colour at a moment; None where the recording has none with colour."""
+        """The depth image with colour at a moment; None where there is none or it cannot be read, see `lacking`."""
+        seen = self._seen(stamp_ns)
+        return None if isinstance(seen, str) else seen
+
+    def lacking(self, stamp_ns: int) -> str:
+        """Why there is no picture of a moment, in words; empty where there is one."""
+        seen = self._seen(stamp_ns)
+        return seen if isinstance(seen, str) else ""
+
+    def _seen(self, stamp_ns: int) -> DepthImage | str:
         if stamp_ns not in self._known:
             self._known[stamp_ns] = self._read(stamp_ns)
         return self._known[stamp_ns]
 
-    def _read(self, stamp_ns: int) -> DepthImage | None:
-        source = self._inputs.depth or self._inputs.points
-        topics = [topic for topic in (self._inputs.image, source) if topic]
-        near = list(self._recording.records(topics, stamp_ns - WINDOW_NS, stamp_ns + WINDOW_NS))
-        depth = _nearest((r for r in near if r.topic == source), stamp_ns)
-        colour = _nearest((r for r in near if r.topic == self._inputs.image), stamp_ns)
-        if depth is None:
-            return None
-        seen = self._depth_image(depth, colour)
-        return seen if seen.rgb is not None else None
+    def _read(self, stamp_ns: int) -> DepthImage | str:
+        """The depth image with colour, or why there is none."""
+        if self._source is None or (self._image is None and not self._is_cloud):
+            return "the recording has no colour with depth"
+        try:
+            depth = self._source.nearest(stamp_ns)
+            if depth is None:
+                return _nothing_near(self._source, "the moment")
+            colour = None if self._image is None else self._image.nearest(from_msg.stamp_ns(depth))
+            seen = self._depth_image(depth, colour)
+        except (ValueError, OSError) as error:
+            return f"it cannot be read: {error}"
+        if seen.rgb is not None:
+            return seen
+        if self._image is None:
+            return "the cloud has no colour"
+        return _nothing_near(self._image, "the depth") if colour is None else "the colour is not of the depth's size"
 
     def _depth_image(self, depth: Any, colour: Any) -> DepthImage:
-        if self._inputs.depth is None:
+        camera_info = self._cameras.at(from_msg.stamp_ns(depth))
+        if self._is_cloud:
             cloud = from_msg.point_cloud(depth)
-            return organise(cloud, from_msg.camera_of_cloud(self._camera_info, cloud))
-        return from_msg.depth_image(depth, self._camera_info, colour)
+            return organise(cloud, from_msg.camera_of_cloud(camera_info, cloud))
+        if camera_info is None:
+            raise ValueError("expected a calibrated camera_info, got none")
+        return from_msg.depth_image(depth, camera_info, colour)
 
 
 def overlay(target: DepthImage, source: DepthImage, T_target_source: Array) -> Array:
@@ -97,9 +118,9 @@ def data_uri(rgb: Array) -> str:
     return "data:image/jpeg;base64," + base64.b64encode(jpeg.tobytes()).decode("ascii")
 
 
-def _nearest(records: Iterable[Record], stamp_ns: int) -> Any:
-    messages = [record.message for record in records]
-    return min(messages, key=lambda m: abs(from_msg.stamp_ns(m) - stamp_ns), default=None)
+def _nothing_near(shelf: Shelf, what: str) -> str:
+    passed = f", and {shelf.unreadable} messages of it cannot be read" if shelf.unreadable else ""
+    return f"nothing on {shelf.topic} is within {SLOP_NS * 1e-6:.0f} ms of {what}{passed}"
 
 
 def _grey(image: DepthImage) -> Array:

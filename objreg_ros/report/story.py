@@ -4,18 +4,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
 from typing import Any, TypeVar
 
 import numpy as np
 
 from objreg_ros.data import Array, LoopClosure, Odometry, Reason, Rejected
 from objreg_ros.geometry import rigid_fit, transform
+from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.pose_graph import PoseGraph
 from objreg_ros.report.trajectory_error import absolute_errors
 from objreg_ros.truth import FALSE, Error, Truth, within
 
 Row = TypeVar("Row")
+
+PAUSE_NS = 3_600_000_000_000  # what is further from a run is not of it: one stamp of 0 would make it last for decades
+MOST_KEYFRAMES = 1000  # of the corrected way: to solve it takes 1.1 GB, and memory grows with the square
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,22 +66,52 @@ class Story:
     pruned: tuple[LoopClosure, ...] = ()
 
     @classmethod
-    def of(cls, name: str, summary: Mapping[str, Any], truth: Truth) -> Story:
+    def of(cls, name: str, summary: Mapping[str, Any], truth: Truth, most_keyframes: int = MOST_KEYFRAMES) -> Story:
         """The story of a run's JSON; the map is made here. Keys that are missing leave their section out.
 
         ValueError for what `objreg offline --json` would not write.
         """
         glimpses = _read(name, summary, "glimpses", _glimpse)
         closures = _read(name, summary, "constraints", _closure)
-        graph = mapped(glimpses, closures)
+        graph = mapped(glimpses, closures, most_keyframes)
         refusals = _read(name, summary, "refusals", _refusal)
         return cls(name, summary, truth, glimpses, closures, refusals, graph, graph.optimise().pruned)
+
+    @cached_property
+    def stretch_ns(self) -> tuple[int, int]:
+        """The first and the last moment of the most frames that have no pause of `PAUSE_NS` between them.
+
+        Without frames, of all closures. A camera that starts before its clock stamps its first frames with 0.
+        """
+        moments = sorted(glimpse.stamp_ns for glimpse in self.glimpses)
+        if not moments:
+            ends = [stamp for closure in self.closures for stamp in (closure.from_ns, closure.to_ns)]
+            return min(ends, default=0), max(ends, default=0)
+        pauses = [k for k in range(1, len(moments)) if moments[k] - moments[k - 1] > PAUSE_NS]
+        parts = [moments[a:b] for a, b in pairwise([0, *pauses, len(moments)])]
+        longest = max(parts, key=len)
+        return longest[0], longest[-1]
 
     @property
     def start_ns(self) -> int:
         """The first moment of the run."""
-        moments = [glimpse.stamp_ns for glimpse in self.glimpses] or [closure.from_ns for closure in self.closures]
-        return min(moments, default=0)
+        return self.stretch_ns[0]
+
+    def in_time(self, stamp_ns: int) -> bool:
+        """Whether a moment is on the timeline: no more than `PAUSE_NS` from the run."""
+        first_ns, last_ns = self.stretch_ns
+        return first_ns - PAUSE_NS <= stamp_ns <= last_ns + PAUSE_NS
+
+    @property
+    def out_of_time(self) -> dict[str, int]:
+        """How many frames, closures and refusals are not on the timeline, without the kinds of which all are."""
+        ends = {
+            "frames": [glimpse.stamp_ns for glimpse in self.glimpses],
+            "closures": [closure.to_ns for closure in self.closures],
+            "refusals": [refusal.to_ns for refusal in self.refusals],
+        }
+        counts = {what: sum(not self.in_time(stamp) for stamp in stamps) for what, stamps in ends.items()}
+        return {what: count for what, count in counts.items() if count}
 
     def seconds(self, stamp_ns: int) -> float:
         """The time since the first moment."""
@@ -95,6 +131,12 @@ class Story:
         """How many frames with odometry are not on the map because time does not advance at them."""
         told = sum(glimpse.T_odom_camera is not None for glimpse in self.glimpses)
         return told - len(advancing(self.glimpses))
+
+    @property
+    def keyframe_step(self) -> float | None:
+        """How far apart the keyframes stand, m, where a long way asked for fewer than the mapper makes; else None."""
+        step = self.graph.params.keyframe_translation
+        return None if step == MapperParams().keyframe_translation else step
 
     def poses_before_and_after(self) -> tuple[list[int], list[Array], list[Array]]:
         """The stamps of the frames on the map, and ``T_odom_camera`` and ``T_map_camera`` (4, 4) at each."""
@@ -154,14 +196,35 @@ def of_one_clock(closures: Sequence[LoopClosure]) -> list[LoopClosure]:
     return [closure for closure in closures if closure.from_ns < closure.to_ns]
 
 
-def mapped(glimpses: Sequence[Glimpse], closures: Sequence[LoopClosure]) -> PoseGraph:
-    """The pose graph of the frames with odometry at which time advances, with every closure of one clock."""
-    graph = PoseGraph()
-    for stamp_ns, T_odom_camera in posed(glimpses):
-        graph.add_odometry(Odometry(T_odom_body=T_odom_camera, stamp_ns=stamp_ns))
+def mapped(
+    glimpses: Sequence[Glimpse], closures: Sequence[LoopClosure], most_keyframes: int = MOST_KEYFRAMES
+) -> PoseGraph:
+    """The pose graph of the frames with odometry at which time advances, with every closure of one clock.
+
+    Where that makes more keyframes than ``most_keyframes``, they stand further apart than the mapper's.
+    """
+    graph = _of_odometry(glimpses, MapperParams())
+    while len(graph.keyframes) > most_keyframes:
+        graph = _of_odometry(glimpses, _sparser(graph.params, 1.1 * len(graph.keyframes) / most_keyframes))
     for closure in of_one_clock(closures):
         graph.add_closure(closure)
     return graph
+
+
+def _of_odometry(glimpses: Sequence[Glimpse], params: MapperParams) -> PoseGraph:
+    graph = PoseGraph(params)
+    for stamp_ns, T_odom_camera in posed(glimpses):
+        graph.add_odometry(Odometry(T_odom_body=T_odom_camera, stamp_ns=stamp_ns))
+    return graph
+
+
+def _sparser(params: MapperParams, factor: float) -> MapperParams:
+    """With so many times the motion from keyframe to keyframe."""
+    return replace(
+        params,
+        keyframe_translation=factor * params.keyframe_translation,
+        keyframe_rotation=min(factor * params.keyframe_rotation, 180.0),
+    )
 
 
 def positions(poses: Sequence[Array]) -> Array:
@@ -184,13 +247,18 @@ def _read(name: str, summary: Mapping[str, Any], key: str, read: Callable[[Any],
 
 
 def _glimpse(row: Mapping[str, Any]) -> Glimpse:
-    pose = row.get("T_odom_camera")
+    pose, stamp_ns = row.get("T_odom_camera"), int(row["stamp_ns"])
     return Glimpse(
-        stamp_ns=int(row["stamp_ns"]),
-        T_odom_camera=None if pose is None else np.array(pose, float),
+        stamp_ns=stamp_ns,
+        T_odom_camera=None if pose is None else _rigid(pose, stamp_ns),
         labels=tuple(map(_spaced, row.get("labels", ()))),
         objects=tuple((_spaced(label), np.array(xyz, float)) for label, xyz in row.get("objects", ())),
     )
+
+
+def _rigid(pose: Any, stamp_ns: int) -> Array:
+    """The pose (4, 4); ValueError if it is none."""
+    return Odometry(T_odom_body=np.array(pose, float), stamp_ns=stamp_ns).T_odom_body
 
 
 def _closure(row: Mapping[str, Any]) -> LoopClosure:

@@ -17,6 +17,7 @@ from objreg_ros.recording import Recording
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.opening import open_recording
 from objreg_ros.recording.poses import pose_of
+from objreg_ros.report.form import require_form
 from objreg_ros.report.page import page
 from objreg_ros.report.pictures import Album
 from objreg_ros.report.story import Story
@@ -108,9 +109,5 @@ def _read(file: Path) -> Mapping[str, Any]:
         raise ValueError(f"{file}: expected the JSON of `objreg offline --json`, got: {error}") from error
     if not isinstance(summary, dict) or "constraints" not in summary:
         raise ValueError(f"{file}: expected the JSON of `objreg offline --json`, got JSON without constraints")
-    for key in ("constraints", "refusals", "glimpses"):
-        if not isinstance(summary.get(key, []), list):
-            raise ValueError(
-                f"{file}: expected a list of {key} as `objreg offline --json` writes it, got {summary[key]}"
-            )
+    require_form(str(file), summary)
     return summary

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import pytest
 from click.testing import CliRunner
 
 from objreg_ros.cli import export, inspect
@@ -26,3 +28,15 @@ def test_a_store_is_exported(tmp_path: Path) -> None:
     result = CliRunner().invoke(export.command, arguments, catch_exceptions=False)
     assert result.exit_code == 0 and (tmp_path / "out" / "map.json").is_file()
     assert "wrote 1 files into" in result.output
+
+
+def test_a_damaged_keyframe_is_named_and_the_others_are_exported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def damaged(store: Path, folder: Path, tell: Callable[[str], None]) -> Iterator[Path]:
+        tell("keyframe 5 is left out: damaged")
+        yield folder / "map.json"
+
+    monkeypatch.setattr("objreg_ros.cli.export.export", damaged)
+    result = CliRunner().invoke(export.command, ["place.db", str(tmp_path / "out")], catch_exceptions=False)
+    assert result.exit_code == 0 and "! keyframe 5 is left out: damaged" in result.output

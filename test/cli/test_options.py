@@ -87,3 +87,25 @@ def test_a_file_that_may_not_be_written_is_refused(tmp_path: Path, monkeypatch: 
         monkeypatch.setattr("os.access", lambda path, mode, forbidden=forbidden: path != forbidden)  # as root may
         with pytest.raises(OSError, match=r"^--out: expected permission to write .*, got none; choose another"):
             require_writable("--out", file)
+
+
+def test_a_folder_that_takes_no_file_whatever_its_permissions_say_is_refused_in_one_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("os.access", lambda *_: True)  # as root may
+    with pytest.raises(
+        OSError, match=r"^--out: expected a place that takes a file, got at /proc/x: .*; choose another$"
+    ):
+        require_writable("--out", Path("/proc/x"))
+
+
+def test_a_file_that_refuses_to_be_written_is_refused_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(30, "Read-only file system")
+
+    (tmp_path / "old.html").write_text("old")
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(OSError, match=r"got at .*old\.html: Read-only file system; choose another"):
+        require_writable("--out", tmp_path / "old.html")

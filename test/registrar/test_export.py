@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import json
+import sqlite3
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -85,6 +87,57 @@ def test_two_objects_of_a_keyframe_are_two_files_even_where_they_are_one_landmar
     first, second, *_ = export(tmp_path / "place.db", tmp_path / "out")
     middles = [float(_read_ply(file)["x"].mean()) for file in (first, second)]
     assert np.allclose(middles, (0.0, 0.4), atol=0.02)
+
+
+def _store_of(path: Path, *labels: str) -> Path:
+    """A store with a keyframe for each label."""
+    store = Store(path)
+    for number, label in enumerate(labels, start=1):
+        taken = keyframe(number, 2.0 * number, (box(label, (0, 0, 1)),))
+        store.add(taken, [s.of_landmark(number, np.eye(3)) for s in sightings_of(taken)])
+    store.close()
+    return path
+
+
+def _damage(path: Path, table: str, column: str, number: int) -> None:
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.execute(f"UPDATE {table} SET {column} = x'00' WHERE id = ?", (number,))
+
+
+@pytest.mark.parametrize(("table", "column"), [("keyframe", "view"), ("object", "cloud"), ("object", "position")])
+def test_a_damaged_keyframe_is_left_out_and_named(tmp_path: Path, table: str, column: str) -> None:
+    _damage(_store_of(tmp_path / "place.db", "cup", "book", "can"), table, column, 2)
+    told: list[str] = []
+    *clouds, content = export(tmp_path / "place.db", tmp_path / "out", told.append)
+    assert len(clouds) == 4 and not any("000002" in file.name for file in clouds)
+    kept = json.loads(content.read_text())
+    assert [row["id"] for row in kept["keyframes"]] == [1, 3] and kept["damaged"] == [2]
+    assert [row["label"] for row in kept["landmarks"]] == ["cup", "can"]
+    assert len(told) == 1 and told[0].startswith("keyframe 2 is left out: ")
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_an_export_that_fails_leaves_nothing_half_written(
+    tmp_path: Path, there: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> Path:
+        raise OSError("no space left")
+
+    _store_of(tmp_path / "place.db", "cup", "book")
+    if there:
+        (tmp_path / "out").mkdir()
+    with monkeypatch.context() as patched:
+        patched.setattr("objreg_ros.registrar.export._write_json", refuse)
+        with pytest.raises(OSError, match="no space left"):
+            list(export(tmp_path / "place.db", tmp_path / "out"))
+    assert (tmp_path / "out").exists() == there and not list(tmp_path.glob("out/*"))
+    assert len(list(export(tmp_path / "place.db", tmp_path / "out"))) == 5
+
+
+def test_a_label_too_long_for_the_name_of_a_file_is_cut_there_and_whole_in_the_map(tmp_path: Path) -> None:
+    first, *_, content = export(_store_of(tmp_path / "place.db", "ü" * 200), tmp_path / "out")
+    assert first.parent.name == "00001_" + "ü" * 100
+    assert json.loads(content.read_text())["landmarks"][0]["label"] == "ü" * 200
 
 
 def test_a_folder_that_holds_something_is_refused_and_left_as_it_is(tmp_path: Path) -> None:

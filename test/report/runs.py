@@ -73,3 +73,11 @@ def summary(false: bool = False) -> dict[str, Any]:
         "glimpses": [glimpse(k, T) for k, T in enumerate(odometry())],
         "stage_ms": {"detect": {"p50": 8.0, "p95": 11.0}, "register": {"p50": 0.2, "p95": 90.0}},
     }
+
+
+def with_a_stray(stamp_ns: int) -> dict[str, Any]:
+    """The walk with a frame of another time before it, whose label nothing else has, and with a refusal of then."""
+    told = summary()
+    stray = {**told["glimpses"][0], "stamp_ns": stamp_ns, "labels": ["ghost"]}
+    refused = {**refusal("low_overlap", 0, 0), "from_ns": stamp_ns, "to_ns": stamp_ns}
+    return {**told, "glimpses": [stray, *told["glimpses"]], "refusals": [*told["refusals"], refused]}

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import tracemalloc
 from xml.etree import ElementTree
 
@@ -10,8 +11,9 @@ import numpy as np
 
 from objreg_ros.report import figures
 from objreg_ros.report.story import Story
+from objreg_ros.truth import Truth
 
-from .runs import TRUTH, closure, summary
+from .runs import STEP_NS, TRUE, TRUTH, closure, summary, with_a_stray
 
 STORY = Story.of("walk", summary(false=True), TRUTH)
 
@@ -46,6 +48,19 @@ def test_the_timeline_has_a_dot_a_refusal_and_a_row_a_reason() -> None:
     assert count(svg, "seen") > 3  # the cups and the book come and go
 
 
+def test_the_timeline_and_the_error_are_of_the_run_without_what_is_of_another_time() -> None:
+    stray_ns = -1_700_000_000 * 10**9
+    known = Truth([(stray_ns, TRUE[0]), *((k * STEP_NS, T) for k, T in enumerate(TRUE))])
+    story = Story.of("walk", with_a_stray(stray_ns), known)
+    svg = figures.timeline(story)
+    assert count(svg, "refused") == 3 and "ghost," not in svg
+    bars = [child for child in ElementTree.fromstring(svg) if "seen" in (child.get("class") or "").split()]
+    assert max(float(bar.get("width", 0)) for bar in bars) > 20
+    assert stray_ns in story.tracks().stamps_ns
+    (line, _) = re.findall(r'points="([^"]+)"', figures.error_over_time(story, story.tracks()))
+    assert len({point.split(",")[0] for point in line.split()}) == len(TRUE)
+
+
 def test_the_map_names_every_object_once() -> None:
     svg = figures.object_map(STORY, corrected=True)
     names = [node.text for node in ElementTree.fromstring(svg) if node.get("class") == "name"]
@@ -77,3 +92,12 @@ def test_the_ground_is_the_plane_of_the_way() -> None:
     angles = np.linspace(0, 2 * np.pi, 50)
     xyz = np.column_stack([2 * np.cos(angles), np.full(50, 0.7), np.sin(angles)])
     np.testing.assert_allclose(np.ptp(figures.Ground(xyz).flat(xyz), axis=0), [4.0, 2.0], atol=0.02)
+
+
+def test_the_ground_of_a_long_way_needs_no_more_memory_than_the_way() -> None:
+    xyz = np.random.default_rng(0).normal(size=(5000, 3))
+    tracemalloc.start()
+    ground = figures.Ground(xyz)
+    assert tracemalloc.get_traced_memory()[1] < 5e6
+    tracemalloc.stop()
+    assert ground.flat(xyz).shape == (5000, 2) and figures.Ground(xyz[:1]).axes.shape == (2, 3)

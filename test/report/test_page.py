@@ -11,7 +11,7 @@ from objreg_ros.report.page import MEANINGS, page
 from objreg_ros.report.story import Story
 from objreg_ros.truth import Truth
 
-from .runs import TRUTH, closure, summary
+from .runs import TRUTH, closure, summary, with_a_stray
 
 VOID = {"meta", "img", "br"}
 
@@ -78,3 +78,31 @@ def test_closures_of_two_runs_of_the_clock_are_left_out_of_the_map_and_counted()
 
 def test_names_are_escaped() -> None:
     assert "<b>" not in page([(Story.of("<b>", summary(), TRUTH), None)])
+
+
+def test_keyframes_that_stand_further_apart_than_the_mapper_s_are_told() -> None:
+    assert "a keyframe stands only every" not in page([(Story.of("walk", summary(), TRUTH), None)])
+    text = page([(Story.of("walk", summary(), TRUTH, most_keyframes=30), None)])
+    assert "The way is long: a keyframe stands only every 0." in text
+
+
+def test_what_is_of_another_time_is_counted_beside_the_timeline() -> None:
+    assert "Left out:" not in page([(Story.of("walk", summary(), TRUTH), None)])
+    text = page([(Story.of("walk", with_a_stray(-1_700_000_000 * 10**9), TRUTH), None)])
+    assert "Left out: 1 frames, 1 refusals, more than an hour from the longest part of the run" in text
+
+
+class Blank:
+    """An album with no picture of any moment after the sixth second."""
+
+    def lacking(self, stamp_ns: int) -> str:
+        return "nothing is near" if stamp_ns > 6 * 10**9 else ""
+
+    def at(self, stamp_ns: int) -> None:
+        return None
+
+
+def test_what_has_no_picture_is_counted_with_the_reason() -> None:
+    text = page([(Story.of("walk", summary(), TRUTH), Blank())])
+    assert "Accepted registrations" in text and "No picture of 4 of these 4: nothing is near (4 times)." in text
+    assert "No picture of 2 of these 2: nothing is near (2 times)." in text

@@ -3,14 +3,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from recording.folders import STEP_NS, records, uncalibrated
 
+from objreg_ros.bridge.layout import VIEW
 from objreg_ros.data import DepthImage, Intrinsics
 from objreg_ros.geometry import pose
-from objreg_ros.recording.inputs import choose_inputs
+from objreg_ros.recording import Record, messages, write_rosbag2
+from objreg_ros.recording.inputs import Inputs, choose_inputs
 from objreg_ros.recording.opening import open_recording
 from objreg_ros.report.pictures import WIDTH, Album, chosen_closures, chosen_refusals, data_uri, overlay
 from objreg_ros.report.story import Story
@@ -74,3 +78,43 @@ def test_an_album_finds_the_pictures_of_a_moment(shared: Path) -> None:
 def test_a_story_of_few_closures_shows_them_all(count: int) -> None:
     told = {**summary(), "constraints": summary()["constraints"][:count]}
     assert len(chosen_closures(Story.of("walk", told, TRUTH))) == count
+
+
+def test_an_album_says_why_it_has_no_picture_of_a_moment(tmp_path: Path) -> None:
+    colourless = [record for record in records(3) if record.topic != "/image" or record.stamp_ns > 10**9]
+    write_rosbag2(tmp_path / "bag", colourless)
+    with open_recording(tmp_path / "bag") as recording:
+        inputs = choose_inputs(recording.topics)
+        album = Album(recording, inputs)
+        assert album.at(10**9 + STEP_NS) is not None and album.lacking(10**9 + STEP_NS) == ""
+        assert album.at(10**9) is None and "nothing on /image is within 50 ms of the depth" in album.lacking(10**9)
+        assert "nothing on /depth/image is within 50 ms of the moment" in album.lacking(5)
+        assert "no colour with depth" in Album(recording, replace(inputs, image=None)).lacking(10**9)
+
+
+def test_a_picture_that_cannot_be_read_is_none_and_said(tmp_path: Path) -> None:
+    told = [uncalibrated(r.stamp_ns) if r.topic == "/camera_info" else r for r in records(3)]
+    write_rosbag2(tmp_path / "bag", told)
+    with open_recording(tmp_path / "bag") as recording:
+        album = Album(recording, choose_inputs(recording.topics))
+        assert album.at(10**9) is None and "expected a calibrated camera_info, got none" in album.lacking(10**9)
+
+
+def test_an_album_waits_for_the_first_calibrated_camera(tmp_path: Path) -> None:
+    told = [uncalibrated(r.stamp_ns) if r.topic == "/camera_info" and r.stamp_ns == 10**9 else r for r in records(3)]
+    write_rosbag2(tmp_path / "bag", told)
+    with open_recording(tmp_path / "bag") as recording:
+        assert Album(recording, choose_inputs(recording.topics)).at(10**9) is not None
+
+
+@pytest.mark.parametrize("coloured", [True, False])
+def test_a_cloud_has_its_own_colour_and_needs_no_calibrated_camera(tmp_path: Path, coloured: bool) -> None:
+    v, u = np.mgrid[:48, :64]
+    rows = np.zeros((48, 64), VIEW if coloured else [("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
+    rows["x"], rows["y"], rows["z"] = (u - 31.5) / 50.0, (v - 23.5) / 50.0, 1.0
+    told = [uncalibrated(5), Record.of("/points", messages.point_cloud(rows, 5, "camera"), 10**12)]
+    write_rosbag2(tmp_path / "bag", told)
+    with open_recording(tmp_path / "bag") as recording:
+        album = Album(recording, Inputs(points="/points", camera_info="/camera_info"))
+        assert (album.at(5) is not None) == coloured
+        assert album.lacking(5) == ("" if coloured else "the cloud has no colour")

@@ -6,10 +6,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from objreg_ros.geometry import rotation_from_vector
 from objreg_ros.report.story import Story
 from objreg_ros.truth import Truth
 
-from .runs import COUNT, TRUE, TRUTH, summary
+from .runs import COUNT, TRUE, TRUTH, summary, with_a_stray
 
 
 def test_closures_bend_the_way_back_to_the_truth() -> None:
@@ -39,6 +40,14 @@ def test_every_frame_is_on_the_way_of_a_camera_at_rest_too() -> None:
 def test_json_of_another_form_is_refused_by_the_name_of_its_run(key: str, value: object) -> None:
     with pytest.raises(ValueError, match=f"^walk: expected {key} as `objreg offline --json` writes them, got "):
         Story.of("walk", {**summary(), key: value}, TRUTH)
+
+
+@pytest.mark.parametrize("pose", [[[float("nan")] * 4] * 4, np.eye(3).tolist(), np.zeros((4, 4)).tolist()])
+def test_a_frame_without_a_rigid_pose_is_refused_by_the_name_of_its_run(pose: list[list[float]]) -> None:
+    told = summary()
+    told["glimpses"][3]["T_odom_camera"] = pose
+    with pytest.raises(ValueError, match=r"^walk: expected glimpses as `objreg offline --json` writes them, got "):
+        Story.of("walk", told, TRUTH)
 
 
 def test_without_truth_nothing_is_false_and_there_are_no_errors() -> None:
@@ -94,3 +103,37 @@ def test_the_pose_that_was_refused_is_told_where_there_was_one() -> None:
     refusals = Story.of("walk", told, TRUTH).refusals
     assert refusals[0].T_from_to is None
     np.testing.assert_array_equal(refusals[1].T_from_to, np.eye(4))
+
+
+def test_a_long_way_gets_fewer_keyframes_and_still_bends_back_to_the_truth() -> None:
+    whole, thin = Story.of("walk", summary(), TRUTH), Story.of("walk", summary(), TRUTH, most_keyframes=30)
+    assert whole.keyframe_step is None and thin.keyframe_step is not None
+    assert 5 < len(thin.graph.keyframes) <= 30 < len(whole.graph.keyframes)
+    tracks = thin.tracks()
+    before, after = (np.sqrt(np.mean(error**2)) for error in (tracks.odometry_error, tracks.corrected_error))
+    assert len(tracks.corrected) == COUNT and after < 0.6 * before
+
+
+def test_a_camera_that_turns_and_turns_on_its_spot_gets_few_keyframes_too() -> None:
+    told = summary()
+    for k, row in enumerate(told["glimpses"]):
+        T = np.eye(4)
+        T[:3, :3] = rotation_from_vector(np.array([0.0, 0.0, 2.0 * k]))
+        row["T_odom_camera"] = T.tolist()
+    assert len(Story.of("turn", told, TRUTH, most_keyframes=10).graph.keyframes) <= 10
+
+
+@pytest.mark.parametrize("years", [-54, 3])
+def test_a_frame_of_another_time_does_not_stretch_the_run_and_is_counted(years: int) -> None:
+    story = Story.of("walk", with_a_stray(years * 31_536_000 * 10**9), TRUTH)
+    assert story.stretch_ns == (0, TRUTH.stamps_ns[-1]) and story.seconds(10**9) == 1.0
+    assert story.out_of_time == {"frames": 1, "refusals": 1}
+    assert Story.of("walk", summary(), TRUTH).out_of_time == {}
+
+
+def test_a_run_with_a_short_rest_is_one_stretch() -> None:
+    told = summary()
+    for row in told["glimpses"][60:]:
+        row["stamp_ns"] += 3000 * 10**9
+    story = Story.of("walk", told, TRUTH)
+    assert story.out_of_time == {} and story.stretch_ns[1] > 3000 * 10**9

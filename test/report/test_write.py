@@ -119,5 +119,7 @@ def test_what_is_no_run_is_refused_by_name(tmp_path: Path, text: str) -> None:
 @pytest.mark.parametrize("key", ["constraints", "refusals", "glimpses"])
 def test_a_number_in_the_place_of_a_list_is_refused_by_the_name_of_its_file(tmp_path: Path, key: str) -> None:
     (tmp_path / "run.json").write_text(json.dumps({"constraints": [], "recording": str(tmp_path), key: 3}))
-    with pytest.raises(ValueError, match=rf"run\.json: expected a list of {key} as .* got 3"):
+    with pytest.raises(
+        ValueError, match=rf"run\.json: expected {key} to be a list of .*, got 3; run objreg offline again"
+    ):
         write_report(tmp_path / "page.html", [tmp_path / "run.json"])
