@@ -122,9 +122,8 @@ def _obstacles(source: Recording) -> dict[str, str]:
     """The topics that cannot be published here, each with the reason. The bytes of a rosbag2 go out as they are."""
     from objreg_ros.bridge.player import is_installed
 
-    reasons = source.obstacles() if source.kind == "rosbag1" else {}
     absent = {t.name: f"{t.msgtype} is not installed" for t in source.topics.values() if not is_installed(t.msgtype)}
-    return {**absent, **reasons}
+    return {**absent, **source.obstacles(shipped_only=False)}
 
 
 def _prepare(player: Player, inputs: Inputs, names: dict[str, str], wait: float) -> None:

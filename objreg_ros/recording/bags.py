@@ -27,7 +27,7 @@ from rosbags.rosbag2 import ReaderError as Rosbag2Error
 from rosbags.serde import SerdeError
 from rosbags.typesys.store import Typestore
 
-from objreg_ros.recording.messages import serialise, standard_types
+from objreg_ros.recording.messages import difference, serialise, standard_types
 from objreg_ros.recording.record import Record, Recording, Topic
 
 # What the library lets through when the bytes of a file are not what they should be.
@@ -87,8 +87,15 @@ class BagRecording(Recording):
         offers.update({topic: [latched_qos(count)] for topic, count in latched.items()})
         return {topic: profiles for topic, profiles in offers.items() if profiles}
 
+    def _obstacle(self, msgtype: str, shipped_only: bool) -> str:
+        """The bytes of a rosbag2 are passed on as they are, so the fields have to be the same."""
+        if not self._reader.is2:
+            return super()._obstacle(msgtype, shipped_only)
+        passes = not shipped_only and msgtype not in standard_types().fielddefs
+        return "" if passes else difference(msgtype, self._types())
+
     def _types(self) -> Typestore:
-        return standard_types() if self._reader.is2 else self._reader.typestore
+        return self._reader.typestore
 
     def close(self) -> None:
         """Close the file."""

@@ -71,9 +71,13 @@ class Recording(ABC):
     ) -> Iterator[Record]:
         """The records of some topics (None: of all) from ``start_ns`` and before ``end_ns``, in order of time."""
 
-    def obstacles(self) -> dict[str, str]:
-        """The topics whose records ROS 2 cannot have (`Record.cdr` refuses them), each with the reason."""
-        reasons = {topic.name: obstacle(topic.msgtype, self._types()) for topic in self.topics.values()}
+    def obstacles(self, shipped_only: bool = True) -> dict[str, str]:
+        """The topics whose records ROS 2 cannot have (`Record.cdr` refuses them, or its bytes are read wrongly).
+
+        Each with the reason. Without ``shipped_only``, a type that ROS 2 does not ship is none by itself where ROS 2
+        has recorded it: its bytes can be passed on.
+        """
+        reasons = {topic.name: self._obstacle(topic.msgtype, shipped_only) for topic in self.topics.values()}
         return {name: reason for name, reason in reasons.items() if reason}
 
     def offered_qos(self) -> dict[str, list[Qos]]:
@@ -92,6 +96,10 @@ class Recording(ABC):
             for topic, profiles in self.offered_qos().items()
         }
         return {topic: depth for topic, depth in depths.items() if depth}
+
+    def _obstacle(self, msgtype: str, shipped_only: bool) -> str:
+        """Why ROS 2 cannot have what is of a type, in words; empty if it can."""
+        return obstacle(msgtype, self._types())
 
     def _types(self) -> Typestore:
         """The message types as the recording knows them."""

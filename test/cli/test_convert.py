@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from recording.folders import noetic_bag, records, tum_folder
+from recording.folders import humble_bag, noetic_bag, records, tum_folder
 
 from objreg_ros.bridge import from_msg
 from objreg_ros.cli.convert import command
@@ -40,6 +40,14 @@ def test_topics_that_ros_2_does_not_have_are_left_out_by_name(tmp_path: Path) ->
     assert "left out: /markers (visualization_msgs/msg/Marker has no texture_resource, which" in result.output
     with open_recording(tmp_path / "bag") as bag:
         assert set(bag.topics) == {"/image", "/depth/image", "/camera_info", "/odom"}
+
+
+def test_a_topic_whose_type_has_other_fields_in_jazzy_is_left_out_by_name(tmp_path: Path) -> None:
+    result = CliRunner().invoke(command, [str(humble_bag(tmp_path / "old")), str(tmp_path / "bag")])
+    assert result.exit_code == 0 and "2 records" in result.output
+    assert "left out: /range (sensor_msgs/msg/Range has other fields than in ROS 2 Jazzy: variance)" in result.output
+    with open_recording(tmp_path / "bag") as bag:
+        assert set(bag.topics) == {"/chatter", "/nothing"}
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])

@@ -14,7 +14,7 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 import click
 from click.testing import CliRunner, Result
 from rclpy.executors import ExternalShutdownException
-from recording.folders import STEP_NS, noetic_bag, records, robot_bag, tum_folder
+from recording.folders import STEP_NS, humble_bag, noetic_bag, records, robot_bag, tum_folder
 
 from objreg_ros.bridge.player import Item
 from objreg_ros.bridge.receipts import DEPTH, IMAGE, ORDER, Receipts
@@ -240,6 +240,14 @@ def test_what_ros_1_has_with_other_fields_is_left_out_by_name(
     said = capsys.readouterr().err
     assert "left out: /tf (ROS 2 does not ship tf/msg/tfMessage)" in said
     assert "left out: /markers (visualization_msgs/msg/Marker has no texture_resource" in said
+
+
+def test_what_another_ros_2_has_with_other_fields_is_left_out_by_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with open_recording(humble_bag(tmp_path / "bag")) as source:
+        assert set(playable_names(source, choose_inputs(source.topics))) == {"/chatter", "/nothing"}
+    assert "left out: /range (sensor_msgs/msg/Range has other fields" in capsys.readouterr().err
 
 
 def test_an_input_that_cannot_be_played_is_refused(tmp_path: Path) -> None:

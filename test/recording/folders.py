@@ -127,6 +127,24 @@ def robot_bag(path: Path, frames: int = 3) -> Path:
     return path
 
 
+def humble_bag(path: Path, plugin: StoragePlugin = StoragePlugin.MCAP) -> Path:
+    """A rosbag2 of ROS 2 Humble: /range is of a type that has fewer fields there, /chatter and /nothing are not."""
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    made = types.types
+    header = made["std_msgs/msg/Header"](stamp=made["builtin_interfaces/msg/Time"](1, 0), frame_id="sonar")
+    words = {"radiation_type": 0, "field_of_view": 0.5, "min_range": 0.1, "max_range": 4.0, "range": 1.5}
+    said = {
+        "/range": made["sensor_msgs/msg/Range"](header=header, **words),
+        "/chatter": made["std_msgs/msg/String"](data="hello"),
+        "/nothing": made["std_msgs/msg/Empty"](),
+    }
+    with Rosbag2Writer(path, version=9, storage_plugin=plugin) as writer:
+        for topic, message in said.items():
+            connection = writer.add_connection(topic, message.__msgtype__, typestore=types)
+            writer.write(connection, 10**9, types.serialize_cdr(message, message.__msgtype__))
+    return path
+
+
 def _old(message: Any, types: Typestore) -> Any:
     """A message with the fields that its type has in ROS 1."""
     if not hasattr(message, "__msgtype__"):

@@ -16,7 +16,7 @@ from objreg_ros.bridge import from_msg
 from objreg_ros.recording import Record, messages, open_recording, write_rosbag2
 from objreg_ros.recording.messages import standard_types
 
-from .folders import CAMERA, records
+from .folders import CAMERA, humble_bag, records, robot_bag
 
 STORAGES = ("mcap", "sqlite3")
 
@@ -135,6 +135,21 @@ def test_a_real_rosbag1_gives_its_cloud(shared: Path) -> None:
         cloud = from_msg.point_cloud(next(recording.records()).message)
     assert cloud.organised and cloud.xyz.shape == (480, 640, 3) and cloud.rgb is not None
     assert np.isfinite(cloud.xyz[..., 2]).mean() > 0.5
+
+
+@pytest.mark.parametrize("plugin", [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+def test_a_rosbag2_names_the_topics_that_ros_2_jazzy_has_with_other_fields(
+    plugin: StoragePlugin, tmp_path: Path
+) -> None:
+    with open_recording(humble_bag(tmp_path / "bag", plugin)) as recording:
+        assert recording.obstacles() == recording.obstacles(shipped_only=False)
+        assert list(recording.obstacles()) == ["/range"] and "variance" in recording.obstacles()["/range"]
+
+
+def test_a_type_that_ros_2_does_not_ship_is_an_obstacle_only_where_that_is_asked(tmp_path: Path) -> None:
+    with open_recording(robot_bag(tmp_path / "bag")) as recording:
+        assert recording.obstacles() == {"/meta": "ROS 2 does not ship acme_msgs/msg/Meta"}
+        assert recording.obstacles(shipped_only=False) == {}
 
 
 def cut(file: Path, share: float) -> None:
