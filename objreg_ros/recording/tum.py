@@ -2,8 +2,8 @@
 """Folders in the TUM RGB-D layout, as a recording of standard messages.
 
 ``rgb/`` and ``depth/`` (16-bit PNG registered to colour), ``associations.txt`` or ``rgb.txt`` and ``depth.txt``,
-``groundtruth.txt`` (timestamp tx ty tz qx qy qz qw of the colour camera in the world) and ``camera.yaml`` (fx fy cx cy
-width height depth_scale distortion, each with a default), which may both be missing. See Sturm et al., "A Benchmark
+``groundtruth.txt`` (timestamp tx ty tz qx qy qz qw of the colour camera in the world) and ``camera.yaml`` (see
+`tum_camera`), which may both be missing. See Sturm et al., "A Benchmark
 for the Evaluation of RGB-D SLAM Systems" (2012).
 """
 
@@ -17,14 +17,13 @@ from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
-from objreg_ros.data import Intrinsics
 from objreg_ros.geometry import is_rigid, pose, rotation_from_quaternion
 from objreg_ros.recording import messages
 from objreg_ros.recording.poses import passed_over
 from objreg_ros.recording.record import Record, Recording, Topic
+from objreg_ros.recording.tum_camera import TumCamera, read_camera
 
 Array = NDArray[Any]
 
@@ -40,9 +39,7 @@ ASSOCIATION_NS = 20_000_000  # as the benchmark's associate.py
 NS_DIGITS = 19
 END_OF_TIME_S = 2**31  # what the stamp of a message holds, until 2038
 MILLIMETRES = 1000.0
-# The benchmark's own advice for sequences without calibration: ROS's default camera and depth in steps of 0.2 mm.
-DEFAULT_CAMERA = {"fx": 525.0, "fy": 525.0, "cx": 319.5, "cy": 239.5, "depth_scale": 5000.0}
-
+COLOUR = cv2.IMREAD_COLOR
 
 Picture = tuple[int, str]  # stamp, file
 Pair = tuple[int, str, int, str]  # colour stamp, colour file, depth stamp, depth file
@@ -64,7 +61,7 @@ class TumRecording(Recording):
     def __init__(self, path: Path) -> None:
         self.path = path
         pairs, self.notes = _pairs(path)
-        self._camera, self._depth_scale, self._distortion = self._read_camera(path / pairs[0][1])
+        self._camera = self._read_camera(path / pairs[0][1])
         moments = [m for pair in pairs for m in self._moments(*pair)] + self._ground_truth()
         order = list(TYPES)
         self._sequence = sorted(moments, key=lambda m: (m.stamp_ns, order.index(m.topic)))
@@ -82,26 +79,19 @@ class TumRecording(Recording):
                 yield Record.made(topic, TYPES[topic], stamp_ns, make)
 
     def _moments(self, colour_ns: int, colour: str, depth_ns: int, depth: str) -> list[Moment]:
-        info = partial(messages.camera_info, self._camera, depth_ns, CAMERA_FRAME, self._distortion)
+        camera = self._camera
+        info = partial(messages.camera_info, camera.intrinsics, depth_ns, CAMERA_FRAME, camera.distortion)
         return [
             Moment(depth_ns, CAMERA_INFO, info),
             Moment(colour_ns, IMAGE, partial(_colour_message, self.path / colour, colour_ns)),
-            Moment(depth_ns, DEPTH, partial(_depth_message, self.path / depth, depth_ns, self._depth_scale)),
+            Moment(depth_ns, DEPTH, partial(_depth_message, self.path / depth, depth_ns, camera.depth_scale)),
         ]
 
-    def _read_camera(self, picture: Path) -> tuple[Intrinsics, float, list[float]]:
-        file = self.path / "camera.yaml"
-        height, width = _read_picture(picture, cv2.IMREAD_COLOR).shape[:2]
-        if not file.exists():
-            self.notes.append("no camera.yaml: the benchmark's default camera (525 px, depth / 5000) is assumed")
-        values = {"width": width, "height": height, **DEFAULT_CAMERA, **(_read_yaml(file) if file.exists() else {})}
-        try:
-            numbers = {name: float(values[name]) for name in ("fx", "fy", "cx", "cy")}
-            camera = Intrinsics(**numbers, width=int(values["width"]), height=int(values["height"]))
-            distortion = [float(value) for value in values.get("distortion", (0.0,) * 5)]
-            return camera, _depth_scale(values["depth_scale"]), distortion
-        except (KeyError, TypeError, ValueError) as error:
-            raise ValueError(f"{file}: expected numbers fx fy cx cy width height depth_scale, got: {error}") from error
+    def _read_camera(self, picture: Path) -> TumCamera:
+        height, width = _read_picture(picture, COLOUR).shape[:2]
+        camera = read_camera(self.path / "camera.yaml", width, height)
+        self.notes += camera.notes
+        return camera
 
     def _ground_truth(self) -> list[Moment]:
         file = self.path / "groundtruth.txt"
@@ -109,24 +99,6 @@ class TumRecording(Recording):
         moments = [moment for moment in told if moment is not None]
         self.notes += passed_over(len(told) - len(moments), len(told), file.name)
         return moments
-
-
-def _depth_scale(value: Any) -> float:
-    """Steps of depth in a metre; ValueError for what depth cannot be divided by."""
-    scale = float(value)
-    if not 0 < scale < float("inf"):
-        raise ValueError(f"depth_scale {scale}, which is none above 0")
-    return scale
-
-
-def _read_yaml(file: Path) -> dict[str, Any]:
-    try:
-        values = yaml.safe_load(file.read_text())
-    except yaml.YAMLError as error:
-        raise ValueError(f"{file}: expected YAML, got: {error}") from error
-    if not isinstance(values, dict):
-        raise ValueError(f"{file}: expected a mapping like fx: 525.0, got {type(values).__name__}")
-    return values
 
 
 def _pairs(folder: Path) -> tuple[list[Pair], list[str]]:
@@ -229,7 +201,7 @@ def _read_picture(file: Path, flags: int) -> Array:
 
 
 def _colour_message(file: Path, stamp_ns: int) -> Any:
-    rgb = cv2.cvtColor(_read_picture(file, cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
+    rgb = cv2.cvtColor(_read_picture(file, COLOUR), cv2.COLOR_BGR2RGB)
     return messages.image(rgb, "rgb8", stamp_ns, CAMERA_FRAME)
 
 

@@ -55,7 +55,15 @@ def test_a_folder_without_calibration_says_what_is_assumed(tmp_path: Path) -> No
     recording = open_recording(tmp_path)
     assert "default camera" in recording.notes[0]
     camera = from_msg.intrinsics(next(recording.records(["/camera_info"])).message)
-    assert (camera.fx, camera.width) == (525.0, 64)
+    assert (camera.fx, camera.width) == (52.5, 64)
+
+
+def test_what_a_folders_calibration_lacks_is_said(tmp_path: Path) -> None:
+    (tum_folder(tmp_path) / "camera.yaml").write_text("fx: 50\nfy: 50\ncx: 31.5\ncy: 23.5\ndepth_factor: 1000")
+    assert open_recording(tmp_path).notes == [
+        "camera.yaml does not give all of the camera, so this is assumed: depth_scale 5000",
+        "camera.yaml: not known, and not used: depth_factor",
+    ]
 
 
 def test_a_folder_of_pictures_named_by_time_needs_no_list(tmp_path: Path) -> None:
@@ -130,7 +138,10 @@ def test_a_broken_picture_is_named_when_it_is_wanted(tmp_path: Path) -> None:
         ("camera.yaml", "525", "expected a mapping"),
         ("camera.yaml", "fx: 0", "expected numbers fx fy"),
         ("camera.yaml", "fx: wide", "expected numbers fx fy"),
-        *[("camera.yaml", f"depth_scale: {scale}", "depth_scale") for scale in ("0", "-1000", ".nan", ".inf")],
+        *[
+            ("camera.yaml", f"fx: 50\ndepth_scale: {scale}", "got: depth_scale")
+            for scale in ("0", "-1000", ".nan", ".inf")
+        ],
     ],
 )
 def test_a_broken_text_is_refused(file: str, text: str, complaint: str, tmp_path: Path) -> None:
