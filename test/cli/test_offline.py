@@ -80,6 +80,18 @@ def test_drifting_odometry_is_named_in_the_json(model: Path, tmp_path: Path) -> 
     assert all(glimpse["T_odom_camera"] is not None for glimpse in summary["glimpses"])
 
 
+def test_drifting_odometry_is_the_cameras_own_and_takes_no_mounting(model: Path, tmp_path: Path) -> None:
+    mounted = [f"{room}.T_base_camera=[0.3, 0.0, 0.5, -0.5, 0.5, -0.5, 0.5]" for room in ("registrar", "segmenter")]
+    words = [word for change in (*mounted, "segmenter.level_odom=true") for word in ("--set", change)]
+    folder, told = tum_folder(tmp_path / "tum", frames=3), []
+    for name, changes in (("plain", []), ("mounted", words)):
+        file = tmp_path / f"{name}.json"
+        output = offline(folder, "--model", model, "--json", file, "--odometry", "drift:3", *changes)
+        told.append([glimpse["T_odom_camera"] for glimpse in json.loads(file.read_text())["glimpses"]])
+    assert told[0] == told[1] and len(told[0]) == 3
+    assert "! --odometry drift:3 is the camera's own and not level: T_base_camera" in output
+
+
 @pytest.mark.parametrize("odometry", ["drift", "drift:", "drift:x"])
 def test_a_drift_without_a_seed_is_refused_before_anything_is_prepared(odometry: str, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="--odometry: expected drift: and a seed like drift:1"):
