@@ -23,6 +23,7 @@ from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_ros.truth import Truth
 
 DRIFT = "drift:"
+STILL = "all frames have the stamp {} ns, so none closes a loop: record them again with the time in their headers"
 CAMERAS_OWN = (
     "--odometry {} is the camera's own and not level: T_base_camera and segmenter.level_odom are left out of this run"
 )
@@ -155,6 +156,8 @@ def _say(run: Run, summary: dict) -> None:
             click.echo(f"  {title} {reason}: {count}")
     for complaint in run.complaints.values():
         click.echo(f"  first of them: {complaint}")
+    if run.frames > 1 and len({glimpse["stamp_ns"] for glimpse in run.glimpses}) == 1:
+        click.echo(f"  ! {STILL.format(run.glimpses[0]['stamp_ns'])}")
     for stage, ms in summary["stage_ms"].items():
         click.echo(f"  {stage}: {ms['p50']:.1f} ms median, {ms['p95']:.1f} ms p95")
     truth = summary["truth"]

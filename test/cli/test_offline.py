@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
@@ -30,6 +31,11 @@ def read(recording: Path) -> list[Record]:
         return list(source.records())
 
 
+def unstamped(message: Any) -> Any:
+    message.header.stamp.sec = message.header.stamp.nanosec = 0
+    return message
+
+
 def offline(*words: object) -> str:
     result = CliRunner().invoke(command, [str(word) for word in words], catch_exceptions=False)
     assert result.exit_code == 0, result.output
@@ -55,6 +61,13 @@ def test_what_is_odd_about_the_recording_and_its_truth_is_said(model: Path, tmp_
     assert "! 1 of 3 poses of groundtruth.txt are none" in offline(tmp_path, "--model", model)
     write_rosbag2(tmp_path / "bag", [lost(r) if r.topic == "/ground_truth" else r for r in read(tmp_path)])
     assert "! 2 of 2 poses of the ground truth /ground_truth are none" in offline(tmp_path / "bag", "--model", model)
+
+
+def test_frames_whose_stamps_stand_still_are_said(model: Path, tmp_path: Path) -> None:
+    still = [Record.of(r.topic, unstamped(r.message), r.stamp_ns) for r in read(tum_folder(tmp_path / "tum"))]
+    write_rosbag2(tmp_path / "bag", still)
+    assert "! all frames have the stamp 0 ns, so none closes a loop" in offline(tmp_path / "bag", "--model", model)
+    assert "all frames have" not in offline(tmp_path / "tum", "--model", model)
 
 
 def test_a_run_stops_early(model: Path, tmp_path: Path) -> None:
