@@ -61,8 +61,8 @@ def command(
 ) -> None:
     """Publish RECORDING under the names that the nodes listen to.
 
-    With --all, topics of a type that is not installed here, or that ROS 2 has with other fields, are left out, and
-    named. Arguments behind -- go to ROS, like -- --ros-args -r __ns:=/robot.
+    With --all, topics of a type that is not installed here, or that ROS 2 has with other fields, or whose name it does
+    not allow, are left out, and named. Arguments behind -- go to ROS, like -- --ros-args -r __ns:=/robot.
     """
     from objreg_ros.bridge import profile
     from objreg_ros.bridge.lifetime import begin, shutdown_as_interrupt

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
@@ -13,6 +14,9 @@ from rosbags.interfaces import Qos, QosDurability
 from rosbags.typesys.store import Typestore
 
 from objreg_ros.recording.messages import obstacle, serialise, standard_types
+
+VALID_NAME = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")  # in ROS 2: no word begins with a digit
+LONGEST_NAME = 247
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +59,12 @@ class Record:
         return self.encode()
 
 
+def misnamed(topic: str) -> str:
+    """Why ROS 2 cannot have a topic of this name, in words; empty if it can."""
+    fits = VALID_NAME.fullmatch(topic) is not None and len(topic) <= LONGEST_NAME
+    return "" if fits else "no valid name in ROS 2"
+
+
 class Recording(ABC):
     """A recording that is open; a context manager. ``notes`` say what was assumed or is odd, for the user."""
 
@@ -77,7 +87,10 @@ class Recording(ABC):
         Each with the reason. Without ``shipped_only``, a type that ROS 2 does not ship is none by itself where ROS 2
         has recorded it: its bytes can be passed on.
         """
-        reasons = {topic.name: self._obstacle(topic.msgtype, shipped_only) for topic in self.topics.values()}
+        reasons = {
+            topic.name: misnamed(topic.name) or self._obstacle(topic.msgtype, shipped_only)
+            for topic in self.topics.values()
+        }
         return {name: reason for name, reason in reasons.items() if reason}
 
     def offered_qos(self) -> dict[str, list[Qos]]:

@@ -37,6 +37,7 @@ def test_topics_that_ros_2_does_not_have_are_left_out_by_name(tmp_path: Path) ->
     assert result.exit_code == 0 and "12 records" in result.output
     assert "left out: /tf (ROS 2 does not ship tf/msg/tfMessage)" in result.output
     assert "left out: /rosout (ROS 2 does not ship rosgraph_msgs/msg/Log)" in result.output
+    assert "left out: /arm/0 (no valid name in ROS 2)" in result.output
     assert "left out: /markers (visualization_msgs/msg/Marker has no texture_resource, which" in result.output
     with open_recording(tmp_path / "bag") as bag:
         assert set(bag.topics) == {"/image", "/depth/image", "/camera_info", "/odom"}

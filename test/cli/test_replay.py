@@ -239,6 +239,7 @@ def test_what_ros_1_has_with_other_fields_is_left_out_by_name(
         assert set(playable_names(source, choose_inputs(source.topics))) == ROBOT
     said = capsys.readouterr().err
     assert "left out: /tf (ROS 2 does not ship tf/msg/tfMessage)" in said
+    assert "left out: /arm/0 (no valid name in ROS 2)" in said
     assert "left out: /markers (visualization_msgs/msg/Marker has no texture_resource" in said
 
 

@@ -89,7 +89,7 @@ def lost(record: Record, value: float = 0.0) -> Record:
 
 
 def noetic_bag(path: Path, frames: int = 3) -> Path:
-    """A rosbag1 with `records`, and with what any robot of ROS 1 says besides: /tf, /rosout and /markers."""
+    """A rosbag1 with `records`, and with what any robot of ROS 1 says besides: /tf, /rosout, /markers and /arm/0."""
     types = get_typestore(Stores.ROS1_NOETIC)
     types.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", "tf/msg/tfMessage"))
     made = types.types
@@ -98,6 +98,7 @@ def noetic_bag(path: Path, frames: int = 3) -> Path:
     others = {
         "/tf": made["tf/msg/tfMessage"](transforms=[]),
         "/rosout": made["rosgraph_msgs/msg/Log"](header=header, **words),
+        "/arm/0": made["std_msgs/msg/String"](data="a name that ROS 2 does not allow"),
         "/markers": made["visualization_msgs/msg/MarkerArray"](markers=[]),
     }
     with Rosbag1Writer(path) as writer:
