@@ -50,8 +50,18 @@ class Record:
 
     @property
     def message(self) -> Any:
-        """The message, decoded now; keep it if it is needed twice. Its fields are those of the ROS message."""
+        """The message, decoded now; keep it if it is needed twice. Its fields are those of the ROS message.
+
+        ValueError for bytes or a picture that does not decode; what comes after it may still do.
+        """
         return self.decode()
+
+    def read(self) -> Any | None:
+        """The message; None where it does not decode."""
+        try:
+            return self.decode()
+        except ValueError:
+            return None
 
     @property
     def cdr(self) -> bytes:

@@ -156,7 +156,8 @@ def _frames(recording: Recording, inputs: Inputs) -> list[str]:
 def _frame_id(recording: Recording, topic: str | None) -> str:
     """The frame of a topic's first message; empty if it tells none."""
     record = _first(recording, topic)
-    return "" if record is None else str(record.message.header.frame_id).lstrip("/")
+    message = None if record is None else record.read()
+    return "" if message is None else str(message.header.frame_id).lstrip("/")
 
 
 def _stamps(recording: Recording, inputs: Inputs) -> list[str]:
@@ -200,9 +201,10 @@ def _pace(stamps: np.ndarray) -> float:
 
 
 def _header_stamps(recording: Recording, topic: str | None, start_ns: int) -> np.ndarray:
-    """The first `SAMPLE` stamps of what was recorded from a time on."""
-    records = islice(recording.records([topic], start_ns), SAMPLE) if topic else ()
-    return np.array([from_msg.stamp_ns(record.message) for record in records], np.int64)
+    """The first `SAMPLE` stamps of what was recorded from a time on and decodes."""
+    messages = (record.read() for record in recording.records([topic], start_ns)) if topic else iter(())
+    readable = islice((message for message in messages if message is not None), SAMPLE)
+    return np.array([from_msg.stamp_ns(message) for message in readable], np.int64)
 
 
 def _first(recording: Recording, topic: str | None) -> Record | None:

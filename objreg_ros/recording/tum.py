@@ -9,7 +9,8 @@ for the Evaluation of RGB-D SLAM Systems" (2012).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import suppress
 from decimal import Decimal
 from functools import partial
 from pathlib import Path
@@ -61,7 +62,7 @@ class TumRecording(Recording):
     def __init__(self, path: Path) -> None:
         self.path = path
         pairs, self.notes = _pairs(path)
-        self._camera = self._read_camera(path / pairs[0][1])
+        self._camera = self._read_camera([path / colour for _, colour, _, _ in pairs])
         moments = [m for pair in pairs for m in self._moments(*pair)] + self._ground_truth()
         order = list(TYPES)
         self._sequence = sorted(moments, key=lambda m: (m.stamp_ns, order.index(m.topic)))
@@ -72,7 +73,7 @@ class TumRecording(Recording):
     def records(
         self, topics: Collection[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
     ) -> Iterator[Record]:
-        """See `Recording.records`. OSError for a picture that cannot be read."""
+        """See `Recording.records`. The message of a picture that does not decode is a ValueError."""
         for stamp_ns, topic, make in self._sequence:
             wanted = topics is None or topic in topics
             if wanted and (start_ns is None or stamp_ns >= start_ns) and (end_ns is None or stamp_ns < end_ns):
@@ -87,8 +88,8 @@ class TumRecording(Recording):
             Moment(depth_ns, DEPTH, partial(_depth_message, self.path / depth, depth_ns, camera.depth_scale)),
         ]
 
-    def _read_camera(self, picture: Path) -> TumCamera:
-        height, width = _read_picture(picture, COLOUR).shape[:2]
+    def _read_camera(self, pictures: Sequence[Path]) -> TumCamera:
+        height, width = _first_size(pictures)
         camera = read_camera(self.path / "camera.yaml", width, height)
         self.notes += camera.notes
         return camera
@@ -193,10 +194,18 @@ def _stamp(text: str, file: Path) -> int:
     raise ValueError(f"{file}: expected a time in seconds (or 19 digits of nanoseconds), got {text!r}")
 
 
+def _first_size(files: Sequence[Path]) -> tuple[int, ...]:
+    """Height and width of the first picture that decodes; ValueError where none does."""
+    for file in files:
+        with suppress(ValueError):
+            return _read_picture(file, COLOUR).shape[:2]
+    raise ValueError(f"{files[0]}: expected a picture, got {len(files)} that do not decode; check the download")
+
+
 def _read_picture(file: Path, flags: int) -> Array:
     pixels = cv2.imread(str(file), flags)
     if pixels is None:
-        raise OSError(f"{file}: expected a picture, got a file that does not decode; check the download")
+        raise ValueError(f"{file}: expected a picture, got a file that does not decode; check the download")
     return np.asarray(pixels)
 
 
@@ -209,7 +218,7 @@ def _depth_message(file: Path, stamp_ns: int, scale: float) -> Any:
     """16UC1 where the steps are millimetres, else 32FC1 metres."""
     pixels = _read_picture(file, cv2.IMREAD_UNCHANGED)
     if pixels.dtype != np.uint16 or pixels.ndim != 2:
-        raise OSError(f"{file}: expected a 16-bit picture of one channel, got {pixels.dtype} {pixels.shape}")
+        raise ValueError(f"{file}: expected a 16-bit picture of one channel, got {pixels.dtype} {pixels.shape}")
     if scale == MILLIMETRES:
         return messages.image(pixels, "16UC1", stamp_ns, CAMERA_FRAME)
     metres = np.where(pixels == np.iinfo(np.uint16).max, np.float32(0), pixels / np.float32(scale)).astype(np.float32)

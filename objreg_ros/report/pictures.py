@@ -30,7 +30,7 @@ class Album:
         self._recording, self._inputs = recording, inputs
         self._known: dict[int, DepthImage | None] = {}
         info = () if inputs.camera_info is None else recording.records([inputs.camera_info])
-        self._camera_info = next((record.message for record in info), None)
+        self._camera_info = next((message for record in info if (message := record.read()) is not None), None)
 
     def at(self, stamp_ns: int) -> DepthImage | None:
         """The depth image with colour at a moment; None where the recording has none with colour."""
@@ -98,8 +98,8 @@ def data_uri(rgb: Array) -> str:
 
 
 def _nearest(records: Iterable[Record], stamp_ns: int) -> Any:
-    messages = [record.message for record in records]
-    return min(messages, key=lambda m: abs(from_msg.stamp_ns(m) - stamp_ns), default=None)
+    messages = (record.read() for record in records)
+    return min((m for m in messages if m is not None), key=lambda m: abs(from_msg.stamp_ns(m) - stamp_ns), default=None)
 
 
 def _grey(image: DepthImage) -> Array:

@@ -29,6 +29,14 @@ def test_poses_of_the_truth_that_are_none_are_counted(tmp_path: Path) -> None:
     assert "! 1 of 2 poses of the ground truth /gt are none" in result.output
 
 
+def test_a_broken_picture_is_no_end_of_the_inspection(tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path)
+    for place in ("rgb", "depth"):
+        (folder / place / "0.000000.png").write_bytes(b"no png")
+    result = CliRunner().invoke(command, [str(folder)])
+    assert result.exit_code == 0 and "not readable: " in result.output
+
+
 def test_a_remap_shows_in_the_inputs(tmp_path: Path) -> None:
     result = CliRunner().invoke(command, [str(tum_folder(tmp_path)), "--remap", "depth:="])
     assert "! the graph cannot run: expected points or a depth image" in result.output

@@ -70,6 +70,14 @@ def test_frames_whose_stamps_stand_still_are_said(model: Path, tmp_path: Path) -
     assert "all frames have" not in offline(tmp_path / "tum", "--model", model)
 
 
+def test_a_broken_picture_costs_its_frame_and_not_the_run(model: Path, tmp_path: Path) -> None:
+    folder, file = tum_folder(tmp_path / "tum", frames=4), tmp_path / "out.json"
+    (folder / "depth/0.100000.png").write_bytes(b"no png")
+    output = offline(folder, "--model", model, "--json", file)
+    assert "3 frames" in output and "dropped malformed_depth: 1" in output and "0.100000.png: expected a" in output
+    assert json.loads(file.read_text())["dropped"] == {"malformed_depth": 1}
+
+
 def test_a_run_stops_early(model: Path, tmp_path: Path) -> None:
     assert "2 frames" in offline(tum_folder(tmp_path, frames=4), "--model", model, "--max-frames", 2)
 

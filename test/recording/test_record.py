@@ -77,6 +77,14 @@ def test_the_bytes_of_what_ros_2_does_not_ship_are_refused_and_its_message_is_no
         _ = record.cdr
 
 
+def test_what_does_not_decode_reads_as_nothing() -> None:
+    def make() -> object:
+        raise ValueError("broken bytes")
+
+    assert Record.of("/camera_info", INFO, 7).read() is INFO
+    assert Record.made("/camera_info", "sensor_msgs/msg/CameraInfo", 7, make).read() is None
+
+
 def test_topics_that_ros_2_cannot_have_are_told_with_the_reason_and_no_others() -> None:
     shelf = Shelf("sensor_msgs/msg/Image", "my_msgs/msg/Odd", "rosgraph_msgs/msg/Log")
     assert shelf.obstacles() == {

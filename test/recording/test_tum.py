@@ -120,8 +120,20 @@ def test_a_missing_picture_is_named(tmp_path: Path) -> None:
 def test_a_broken_picture_is_named_when_it_is_wanted(tmp_path: Path) -> None:
     (tum_folder(tmp_path) / "depth/0.100000.png").write_bytes(b"no png")
     recording = open_recording(tmp_path)
-    with pytest.raises(OSError, match=r"0\.100000\.png: expected a picture"):
+    with pytest.raises(ValueError, match=r"0\.100000\.png: expected a picture"):
         _ = [r.message for r in recording.records(["/depth/image"])]
+    assert [r.read() is None for r in recording.records(["/depth/image"])] == [False, True, False]
+
+
+def test_a_broken_first_picture_keeps_no_folder_from_being_read(tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path)
+    (folder / "rgb/0.000000.png").write_bytes(b"no png")
+    info = next(open_recording(folder).records(["/camera_info"])).message
+    assert (info.width, info.height) == (64, 48)
+    for file in (folder / "rgb").iterdir():
+        file.write_bytes(b"no png")
+    with pytest.raises(ValueError, match=r"0\.000000\.png: expected a picture, got 3 that do not decode"):
+        open_recording(folder)
 
 
 @pytest.mark.parametrize(
