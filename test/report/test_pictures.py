@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from recording.folders import tum_folder
 
 from objreg_ros.data import DepthImage, Intrinsics
 from objreg_ros.geometry import pose
@@ -68,6 +69,14 @@ def test_an_album_finds_the_pictures_of_a_moment(shared: Path) -> None:
         assert seen is not None and seen.rgb is not None
         assert abs(seen.stamp_ns - 1_000_000_000) < 50_000_000
         assert album.at(10**15) is None
+
+
+def test_an_album_passes_over_a_picture_that_does_not_decode(tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path, frames=4)
+    (folder / "depth/0.100000.png").write_bytes(b"no png")
+    recording = open_recording(folder)
+    seen = Album(recording, choose_inputs(recording.topics)).at(100_000_000)
+    assert seen is not None and seen.stamp_ns != 100_000_000
 
 
 @pytest.mark.parametrize("count", [0, 1])
