@@ -24,6 +24,7 @@ from objreg_ros.geometry import is_rigid, pose, rotation_from_quaternion
 from objreg_ros.recording import messages
 from objreg_ros.recording.poses import passed_over
 from objreg_ros.recording.record import Record, Recording, Topic
+from objreg_ros.recording.text import read_text
 from objreg_ros.recording.tum_camera import TumCamera, read_camera
 
 Array = NDArray[Any]
@@ -38,9 +39,11 @@ TYPES = {
 CAMERA_FRAME, WORLD_FRAME = "camera", "world"
 ASSOCIATION_NS = 20_000_000  # as the benchmark's associate.py
 NS_DIGITS = 19
+MOST_NAMED = 5  # files in a note
 END_OF_TIME_S = 2**31  # what the stamp of a message holds, until 2038
 MILLIMETRES = 1000.0
-COLOUR = cv2.IMREAD_COLOR
+COLOUR = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION  # depth is not turned either
+PICTURE_FILES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp")
 
 Picture = tuple[int, str]  # stamp, file
 Pair = tuple[int, str, int, str]  # colour stamp, colour file, depth stamp, depth file
@@ -111,7 +114,7 @@ def _pairs(folder: Path) -> tuple[list[Pair], list[str]]:
     else:
         colour, depth = _pictures(folder, "rgb"), _pictures(folder, "depth")
         pairs = _associate(colour, depth)
-        notes = _unpaired(len(pairs), len(colour), len(depth))
+        notes = _unpaired(len(pairs), len(colour), len(depth)) + _strangers(folder)
     missing = next((name for _, c, _, d in pairs for name in (c, d) if not (folder / name).exists()), None)
     if missing:
         raise FileNotFoundError(f"{folder}: expected the picture {missing} that its list names, got no such file")
@@ -132,8 +135,27 @@ def _pictures(folder: Path, name: str) -> list[Picture]:
     file = folder / f"{name}.txt"
     if file.exists():
         return [(_stamp(row[0], file), row[1]) for row in _rows(file, 2)]
-    pictures = (folder / name).glob("*.*") if (folder / name).is_dir() else []
+    pictures = [file for file in _files(folder, name) if _is_picture(file)]
     return [(_stamp(picture.stem, picture), f"{name}/{picture.name}") for picture in pictures]
+
+
+def _files(folder: Path, name: str) -> list[Path]:
+    """What is in the folder of pictures, where no list says it."""
+    here = folder / name
+    return sorted(here.iterdir()) if here.is_dir() and not here.with_suffix(".txt").exists() else []
+
+
+def _is_picture(file: Path) -> bool:
+    return file.suffix.lower() in PICTURE_FILES and not file.name.startswith(".")
+
+
+def _strangers(folder: Path) -> list[str]:
+    """A note for the user on files among the pictures that are none."""
+    names = [
+        f"{name}/{file.name}" for name in ("rgb", "depth") for file in _files(folder, name) if not _is_picture(file)
+    ]
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return [f"no pictures, and left out: {', '.join(names[:MOST_NAMED])}{more}"] if names else []
 
 
 def _associate(colour: list[Picture], depth: list[Picture]) -> list[Pair]:
@@ -175,7 +197,8 @@ def _true_pose(numbers: Array) -> Array | None:
 
 
 def _rows(file: Path, columns: int) -> list[list[str]]:
-    lines = [line.split() for line in file.read_text().splitlines() if line.strip() and not line.startswith("#")]
+    told = (line.strip() for line in read_text(file).splitlines())
+    lines = [line.split() for line in told if line and not line.startswith("#")]
     short = next((line for line in lines if len(line) < columns), None)
     if short is not None:
         raise ValueError(f"{file}: expected {columns} columns in each line, got {' '.join(short)!r}")

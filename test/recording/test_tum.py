@@ -3,6 +3,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -87,6 +88,44 @@ def test_pictures_in_any_order_lose_no_pair(lists: bool, tmp_path: Path) -> None
 def test_pictures_named_in_nanoseconds_are_read_to_the_last_digit(tmp_path: Path) -> None:
     recording = open_recording(numbered_folder(tmp_path, {"1403636579763555584": 0, "1403636579813555456": 1}))
     assert [r.stamp_ns for r in recording.records(["/image"])] == [1403636579763555584, 1403636579813555456]
+
+
+def test_files_among_the_pictures_that_are_none_are_left_out_by_name(tmp_path: Path) -> None:
+    folder = numbered_folder(tmp_path, {"1.0": 0, "2.0": 1})
+    for name in ("rgb/.DS_Store", "rgb/._1.0.png", "rgb/Thumbs.db", "depth/notes.txt"):
+        (folder / name).write_text("x")
+    recording = open_recording(folder)
+    assert recording.topics["/image"].count == 2
+    told = "no pictures, and left out: rgb/.DS_Store, rgb/._1.0.png, rgb/Thumbs.db, depth/notes.txt"
+    assert told in recording.notes
+
+
+@pytest.mark.parametrize("comment", ["\ufeff# times", "  # times", "\t# times"])
+def test_a_comment_may_follow_a_byte_order_mark_or_spaces(comment: str, tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path)
+    for name in ("associations.txt", "groundtruth.txt"):
+        (folder / name).write_text(f"{comment}\n{(folder / name).read_text()}", encoding="utf-8")
+    assert open_recording(folder).topics["/ground_truth"].count == 3
+
+
+def test_a_text_of_another_encoding_is_refused_by_name(tmp_path: Path) -> None:
+    (tum_folder(tmp_path) / "groundtruth.txt").write_bytes("# caf\xe9\n".encode("latin-1"))
+    with pytest.raises(ValueError, match=r"groundtruth\.txt: expected text in UTF-8"):
+        open_recording(tmp_path)
+
+
+def test_colour_is_not_turned_as_its_camera_was_held_since_depth_is_not(tmp_path: Path) -> None:
+    folder = numbered_folder(tmp_path, {"1.0": 0})
+    (folder / "rgb/1.0.png").unlink()
+    _, jpeg = cv2.imencode(".jpg", np.zeros((4, 8, 3), np.uint8))
+    turned = b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0\0"  # TIFF: orientation 6
+    exif = b"\xff\xe1" + (len(turned) + 8).to_bytes(2, "big") + b"Exif\0\0" + turned
+    (folder / "rgb/1.0.jpg").write_bytes(jpeg[:2].tobytes() + exif + jpeg[2:].tobytes())
+    assert cv2.imread(str(folder / "rgb/1.0.jpg")).shape == (8, 4, 3)
+    recording = open_recording(folder)
+    assert from_msg.image(next(recording.records(["/image"])).message).rgb.shape == (4, 8, 3)
+    info = next(recording.records(["/camera_info"])).message
+    assert (info.width, info.height) == (8, 4)
 
 
 def test_pictures_without_a_partner_are_counted(tmp_path: Path) -> None:
