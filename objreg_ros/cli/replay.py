@@ -69,6 +69,8 @@ def command(
     from objreg_ros.bridge.player import Player
 
     with open_recording(recording) as source:
+        for note in source.notes:
+            click.echo(f"! {note}", err=True)
         inputs = choose_inputs(source.topics, parse_remaps(remaps), depth_source)
         names = playable_names(source, inputs) if everything else graph_names(source, inputs)
         if not names:
@@ -83,10 +85,10 @@ def command(
             _prepare(player, inputs, names, wait)
             receipts = player.listen_to_receipts(wait) if lossless else None
             again = True
-            while again:
-                _play_once(player, source, selection, inputs, None if lossless else rate, receipts, patience)
-                again = loop
-        _say(player, receipts)
+            with _told_at_the_end(player, receipts):
+                while again:
+                    _play_once(player, source, selection, inputs, None if lossless else rate, receipts, patience)
+                    again = loop
 
 
 @contextmanager
@@ -161,6 +163,20 @@ def _items(source: Recording, selection: Selection, inputs: Inputs) -> Iterator[
         name, kind = selection.names[record.topic], kinds.get(record.topic, "")
         cdr = record.cdr
         yield Item(name, record.stamp_ns, cdr, kind, header_stamp_ns(cdr) if kind else 0)
+
+
+@contextmanager
+def _told_at_the_end(player: Player, receipts: Receipts | None) -> Iterator[None]:
+    """Says what was sent, where a signal ends the play too."""
+    from objreg_ros.bridge.lifetime import shutdown_as_interrupt
+
+    try:
+        with shutdown_as_interrupt():
+            yield
+    except (KeyboardInterrupt, SystemExit):
+        _say(player, receipts)
+        raise
+    _say(player, receipts)
 
 
 def _say(player: Player, receipts: Receipts | None) -> None:
