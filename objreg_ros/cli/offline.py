@@ -80,7 +80,7 @@ def command(
 def _require_seed(odometry: str | None) -> None:
     """ValueError for a drift that does not say its seed."""
     is_drift = odometry is not None and (odometry + ":").startswith(DRIFT)
-    if is_drift and not str(odometry).removeprefix(DRIFT).isdigit():
+    if is_drift and not str(odometry).removeprefix(DRIFT).isdecimal():
         raise ValueError(f"--odometry: expected drift: and a seed like drift:1, got {odometry!r}")
 
 

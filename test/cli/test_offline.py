@@ -113,7 +113,7 @@ def test_drifting_odometry_is_the_cameras_own_and_takes_no_mounting(model: Path,
     assert "! --odometry drift:3 is the camera's own and not level: T_base_camera" in output
 
 
-@pytest.mark.parametrize("odometry", ["drift", "drift:", "drift:x"])
+@pytest.mark.parametrize("odometry", ["drift", "drift:", "drift:x", "drift:²", "drift:-1"])
 def test_a_drift_without_a_seed_is_refused_before_anything_is_prepared(odometry: str, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="--odometry: expected drift: and a seed like drift:1"):
         offline(tmp_path / "no_recording", "--odometry", odometry)

@@ -265,6 +265,45 @@ def test_text_that_is_called_a_bag_is_refused(tmp_path: Path) -> None:
             open_recording(tmp_path / f"x{suffix}")
 
 
+def test_a_topic_of_two_types_is_that_of_the_more_messages_and_the_others_are_counted(tmp_path: Path) -> None:
+    types = standard_types()
+    word, number = (types.types[f"std_msgs/msg/{name}"] for name in ("String", "Int8"))
+    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        for made in (number(data=1), word(data="a"), word(data="b")):
+            kind = made.__msgtype__
+            known = [c for c in writer.connections if c.msgtype == kind]
+            connection = known[0] if known else writer.add_connection("/x", kind, typestore=types)
+            writer.write(connection, 5, types.serialize_cdr(made, kind))
+    with open_recording(tmp_path / "bag") as recording:
+        assert recording.topics["/x"].msgtype == "std_msgs/msg/String" and recording.topics["/x"].count == 2
+        assert [record.message.data for record in recording.records()] == ["a", "b"]
+        (note,) = recording.notes
+    assert note == "/x is std_msgs/msg/String and also std_msgs/msg/Int8: its 1 messages of that type are left out"
+
+
+def test_a_rosbag1_without_messages_begins_and_lasts_nowhere(tmp_path: Path) -> None:
+    types = get_typestore(Stores.ROS1_NOETIC)
+    with Rosbag1Writer(tmp_path / "one.bag") as writer:
+        writer.add_connection("/x", "std_msgs/msg/String", typestore=types)
+    with open_recording(tmp_path / "one.bag") as recording:
+        assert (recording.start_ns, recording.end_ns, recording.topics["/x"].count) == (0, 0, 0)
+
+
+def test_a_bag_that_may_not_be_read_is_not_called_broken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_rosbag2(tmp_path / "bag", records())
+    (file,) = (tmp_path / "bag").glob("*.mcap")
+    whole = Path.open
+
+    def refuse(path: Path, *words: object, **more: object) -> object:
+        if path.suffix == ".mcap":
+            raise PermissionError(13, "Permission denied", str(path))
+        return whole(path, *words, **more)  # type: ignore[call-overload]
+
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(PermissionError, match=r"expected permission to read it, got: Permission denied"):
+        open_recording(file)
+
+
 def test_an_empty_bag_has_no_topics(tmp_path: Path) -> None:
     write_rosbag2(tmp_path / "bag", [], "mcap")
     with open_recording(tmp_path / "bag") as recording:
