@@ -211,6 +211,12 @@ class Line:
         """Whether as many frames have gone through as were asked for."""
         return self._max_frames is not None and self.run.frames >= self._max_frames
 
+    def take_record(self, name: str, record: Record) -> None:
+        """One recorded message of an input; one that does not decode is counted as dropped."""
+        message = self._kept("depth" if name == "points" else name, lambda: record.message)
+        if message is not None:
+            self.take(name, message)
+
     def take(self, name: str, message: Any) -> None:
         """One message of an input of the graph. One that breaks its contract is counted as dropped."""
         stamp_ns = from_msg.stamp_ns(message)
@@ -325,7 +331,7 @@ def run_offline(
     name_of = {topic: name for name, topic in inputs.chosen().items()}
     for record in records:
         if record.topic in name_of:
-            line.take(name_of[record.topic], record.message)
+            line.take_record(name_of[record.topic], record)
             on_frame(line.run.frames)
         if line.full:
             break

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from objreg_ros.data import Array, LoopClosure, Rejected
+from objreg_ros.data import JUMP_NS, Array, LoopClosure, Rejected
 from objreg_ros.geometry import interpolate, inverse, pose_error
 from objreg_ros.recording.poses import passed_over, pose_of
 from objreg_ros.recording.record import Recording
@@ -27,19 +27,18 @@ Error = tuple[float, float]
 
 
 class Truth:
-    """The true path of the camera. Stamps must increase; later poses of an earlier time are left out.
+    """The true path of the camera. Stamps must increase: later poses of an earlier time are left out.
 
-    ``notes`` say what is odd about it, for the user.
+    So is one whose stamp leaps ahead alone, for it would leave out all that follow. ``notes`` say what is odd about it,
+    for the user.
     """
 
     def __init__(self, poses: Iterable[tuple[int, Array]], notes: Sequence[str] = ()) -> None:
-        self.notes = tuple(notes)
-        self.stamps_ns: list[int] = []
-        self.poses: list[Array] = []
-        for stamp_ns, T_world_camera in poses:
-            if not self.stamps_ns or stamp_ns > self.stamps_ns[-1]:
-                self.stamps_ns.append(stamp_ns)
-                self.poses.append(T_world_camera)
+        told = list(poses)
+        kept = _in_course([stamp_ns for stamp_ns, _ in told])
+        self.stamps_ns: list[int] = [told[i][0] for i in kept]
+        self.poses: list[Array] = [told[i][1] for i in kept]
+        self.notes = (*notes, *_out_of_course(len(told) - len(kept), len(told)))
 
     @classmethod
     def of(cls, recording: Recording, topic: str | None) -> Truth:
@@ -80,6 +79,22 @@ class Truth:
     def errors(self, closures: Iterable[LoopClosure]) -> list[Error]:
         """The error of every closure that the truth tells of."""
         return [error for closure in closures if (error := self.error(closure)) is not None]
+
+
+def _in_course(stamps_ns: Sequence[int]) -> list[int]:
+    """Which of the stamps increase, without one that is `JUMP_NS` ahead of the two behind it and parts their course."""
+    kept: list[int] = []
+    for i, stamp_ns in enumerate(stamps_ns):
+        behind, last_ns = stamps_ns[i + 1 : i + 3], stamps_ns[kept[-1]] if kept else None
+        is_alone = bool(behind) and stamp_ns - max(behind) >= JUMP_NS and (last_ns is None or behind[0] > last_ns)
+        if not is_alone and (last_ns is None or stamp_ns > last_ns):
+            kept.append(i)
+    return kept
+
+
+def _out_of_course(count: int, of: int) -> list[str]:
+    told = f"{count} of {of} poses of the ground truth are left out: their stamps do not increase, or leap ahead alone"
+    return [told] if count else []
 
 
 def within(error: Error, bound: Error) -> bool:

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -127,6 +128,43 @@ def test_broken_messages_are_counted_and_the_run_goes_on() -> None:
     assert len(chain.frames) == 1
     assert run.dropped == {"malformed_depth": 1, "malformed_image": 1, "depth_unmatched": 1}
     assert "got 'bayer'" in run.complaints["malformed_image"]
+
+
+def undecodable(topic: str, stamp_ns: int) -> Iterator[Record]:
+    def decode() -> None:
+        raise ValueError("expected a whole bag")
+
+    for record in records(4):
+        broken = (record.topic, record.stamp_ns) == (topic, stamp_ns)
+        yield replace(record, decode=decode) if broken else record
+
+
+@pytest.mark.parametrize(
+    ("topic", "frames", "dropped"),
+    [
+        ("/odom", 4, {"malformed_odom": 1}),
+        ("/camera_info", 4, {"malformed_camera_info": 1}),
+        ("/image", 3, {"malformed_image": 1, "depth_unmatched": 1}),
+        ("/depth/image", 3, {"malformed_depth": 1}),
+    ],
+)
+def test_a_message_that_does_not_decode_is_counted_and_the_run_goes_on(
+    topic: str, frames: int, dropped: dict[str, int]
+) -> None:
+    rooms, _ = simple_rooms()
+    run = run_offline(undecodable(topic, 1100 * MS), rooms, INPUTS)
+    assert (run.frames, run.dropped) == (frames, dropped)
+    assert "expected a whole bag" in next(iter(run.complaints.values()))
+
+
+def test_a_recording_that_breaks_off_ends_the_run() -> None:
+    def breaking() -> Iterator[Record]:
+        yield from records(2)
+        raise ValueError("expected a whole bag")
+
+    rooms, _ = simple_rooms()
+    with pytest.raises(ValueError, match="expected a whole bag"):
+        run_offline(breaking(), rooms, INPUTS)
 
 
 def lost() -> Iterator[Record]:

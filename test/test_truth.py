@@ -74,6 +74,31 @@ def test_a_pose_of_an_earlier_time_is_left_out() -> None:
     assert truth.stamps_ns == [100, 200]
 
 
+@pytest.mark.parametrize("stray", [0, 1, 3, 4])
+@pytest.mark.parametrize("leap_s", [5, 24 * 3600])
+def test_a_stamp_that_leaps_ahead_alone_leaves_out_no_other_pose(stray: int, leap_s: int) -> None:
+    stamps = [100 * MS * i + (i == stray) * leap_s * 10**9 for i in range(6)]
+    truth = Truth([(stamp_ns, at(i)) for i, stamp_ns in enumerate(stamps)])
+    assert truth.stamps_ns == [100 * MS * i for i in range(6) if i != stray]
+    assert truth.notes == (
+        "1 of 6 poses of the ground truth are left out: their stamps do not increase, or leap ahead alone",
+    )
+
+
+def test_a_stamp_that_leaps_back_alone_leaves_out_no_other_pose() -> None:
+    truth = Truth([(stamp_s * 10**9, at(0)) for stamp_s in (100, 0, 101, 102)])
+    assert truth.stamps_ns == [100 * 10**9, 101 * 10**9, 102 * 10**9] and "1 of 4 poses" in truth.notes[0]
+
+
+def test_where_time_begins_anew_the_first_run_stays() -> None:
+    truth = Truth([(stamp_s * 10**9, at(0)) for stamp_s in (0, 2, 4, 0, 2, 4, 6)])
+    assert [stamp_ns // 10**9 for stamp_ns in truth.stamps_ns] == [0, 2, 4, 6] and "3 of 7 poses" in truth.notes[0]
+
+
+def test_a_truth_in_order_has_no_note() -> None:
+    assert Truth([(0, at(0)), (10**12, at(1))]).notes == ()
+
+
 def test_a_dropout_of_the_truth_is_passed_over_and_counted(tmp_path: Path) -> None:
     told = [Record.of("/gt", messages.pose_stamped(at(i), i * 50 * MS, "world"), i * 50 * MS) for i in range(4)]
     write_rosbag2(tmp_path / "bag", [told[0], lost(told[1]), lost(told[2], float("nan")), told[3]])

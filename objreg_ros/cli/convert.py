@@ -24,10 +24,14 @@ def command(recording: Path, out: Path, storage: str) -> None:
     """Write RECORDING (rosbag1, rosbag2 or a TUM RGB-D folder) as the rosbag2 folder OUT.
 
     The topics keep the QoS of their publishers; what ROS 1 latched becomes transient local. Topics of a type that ROS 2
-    does not ship, or not with the same fields, are left out, and named.
+    does not ship, or not with the same fields, or whose name it does not allow, are left out, and named;
+    so are topics without messages.
     """
     with open_recording(recording) as source:
-        obstacles = source.obstacles()
+        for note in source.notes:
+            click.echo(f"! {note}", err=True)
+        silent = {topic.name: "no messages" for topic in source.topics.values() if not topic.count}
+        obstacles = {**silent, **source.obstacles()}
         for name, reason in obstacles.items():
             click.echo(f"left out: {name} ({reason})", err=True)
         kept = _with_progress(source, set(source.topics) - set(obstacles))

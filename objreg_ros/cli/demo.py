@@ -195,6 +195,8 @@ def camera_of(source: Recording, inputs: Inputs) -> Intrinsics | None:
 
 def _image(source: Recording, inputs: Inputs, stamp_ns: int) -> ColourImage | None:
     """The colour image of one moment."""
-    messages = (record.message for record in source.records([inputs.image or ""]))
-    found = next((message for message in messages if from_msg.stamp_ns(message) == stamp_ns), None)
+    messages = (record.read() for record in source.records([inputs.image or ""]))
+    found = next(
+        (message for message in messages if message is not None and from_msg.stamp_ns(message) == stamp_ns), None
+    )
     return None if found is None else from_msg.image(found)

@@ -53,9 +53,8 @@ def _say_store(store: Path, picture: Path | None) -> None:
 def _say_what_it_is(source: Recording) -> None:
     start = datetime.fromtimestamp(source.start_ns * 1e-9, UTC)
     records = sum(topic.count for topic in source.topics.values())
-    click.echo(
-        f"{source.path}: {source.kind}, {source.seconds:.2f} s from {start:%Y-%m-%d %H:%M:%S} UTC, {records} records\n"
-    )
+    begins = f" from {start:%Y-%m-%d %H:%M:%S} UTC" if records else ""
+    click.echo(f"{source.path}: {source.kind}, {source.seconds:.2f} s{begins}, {records} records\n")
 
 
 def _say_topics(source: Recording) -> None:

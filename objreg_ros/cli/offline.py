@@ -23,6 +23,10 @@ from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_ros.truth import Truth
 
 DRIFT = "drift:"
+STILL = "all frames have the stamp {} ns, so none closes a loop: record them again with the time in their headers"
+CAMERAS_OWN = (
+    "--odometry {} is the camera's own and not level: T_base_camera and segmenter.level_odom are left out of this run"
+)
 
 
 @click.command()
@@ -76,8 +80,12 @@ def command(
 def _require_seed(odometry: str | None) -> None:
     """ValueError for a drift that does not say its seed."""
     is_drift = odometry is not None and (odometry + ":").startswith(DRIFT)
-    if is_drift and not str(odometry).removeprefix(DRIFT).isdigit():
+    if is_drift and not str(odometry).removeprefix(DRIFT).isdecimal():
         raise ValueError(f"--odometry: expected drift: and a seed like drift:1, got {odometry!r}")
+
+
+def _drifts(odometry: str | None) -> bool:
+    return (odometry or "").startswith(DRIFT)
 
 
 def _model_changes(model: str | None, labels: str | None) -> list[str]:
@@ -88,7 +96,7 @@ def _model_changes(model: str | None, labels: str | None) -> list[str]:
 def _inputs(source: Recording, remaps: tuple[str, ...], odometry: str | None, depth_source: str) -> Inputs:
     asked = parse_remaps(remaps)
     if odometry is not None:
-        asked["odom"] = "" if odometry == "none" or odometry.startswith(DRIFT) else odometry
+        asked["odom"] = "" if odometry == "none" or _drifts(odometry) else odometry
         if asked["odom"] and asked["odom"] not in source.topics:
             there = ", ".join(source.topics)
             raise ValueError(f"--odometry: expected a topic of {there}, or none, or drift:SEED, got {odometry!r}")
@@ -98,7 +106,7 @@ def _inputs(source: Recording, remaps: tuple[str, ...], odometry: str | None, de
         wanted = inputs.wanted(depth_source)
         other = "" if depth_source == "auto" else ", or leave out segmenter.source"
         raise ValueError(f"{source.path}: expected {wanted}, got {there}; choose with --remap input:=/topic{other}")
-    if (odometry or "").startswith(DRIFT):
+    if _drifts(odometry):
         if inputs.ground_truth is None:
             raise ValueError(f"{source.path}: --odometry {odometry} needs a ground truth, and there is none")
         return Inputs(**{**inputs.chosen(), "odom": ODOM})
@@ -106,7 +114,7 @@ def _inputs(source: Recording, remaps: tuple[str, ...], odometry: str | None, de
 
 
 def _run(source: Recording, inputs: Inputs, settings: Settings, max_frames: int | None, odometry: str | None) -> Run:
-    timing = _timing(settings)
+    timing = _timing(settings, odometry)
     click.echo(f"preparing the rooms ({FIRST_TIME})", err=True)
     rooms, close = build_rooms(
         settings.of("detector", DetectorParams),
@@ -122,15 +130,19 @@ def _run(source: Recording, inputs: Inputs, settings: Settings, max_frames: int 
         close()
 
 
-def _timing(settings: Settings) -> Timing:
+def _timing(settings: Settings, odometry: str | None) -> Timing:
     segmenter, registrar = settings.of("segmenter", SegmenterNodeParams), settings.of("registrar", RegistrarNodeParams)
     slop_ns, odom_slop_ns = round(segmenter.slop * 1e9), round(registrar.odom_slop * 1e9)
+    if _drifts(odometry):
+        if registrar.mounting is not None or segmenter.level_odom:
+            click.echo(f"! {CAMERAS_OWN.format(odometry)}", err=True)
+        return Timing(slop_ns, odom_slop_ns, colour=segmenter.colour)
     return Timing(slop_ns, odom_slop_ns, registrar.mounting, segmenter.colour, segmenter.level_odom, segmenter.mounting)
 
 
 def _records(source: Recording, inputs: Inputs, odometry: str | None) -> Iterator[Record]:
     records = source.records(set(inputs.chosen().values()))
-    if odometry is None or not odometry.startswith(DRIFT) or inputs.ground_truth is None:
+    if odometry is None or not _drifts(odometry) or inputs.ground_truth is None:
         return records
     return with_drifting_odometry(records, inputs.ground_truth, int(odometry.removeprefix(DRIFT)))
 
@@ -144,6 +156,8 @@ def _say(run: Run, summary: dict) -> None:
             click.echo(f"  {title} {reason}: {count}")
     for complaint in run.complaints.values():
         click.echo(f"  first of them: {complaint}")
+    if run.frames > 1 and len({glimpse["stamp_ns"] for glimpse in run.glimpses}) == 1:
+        click.echo(f"  ! {STILL.format(run.glimpses[0]['stamp_ns'])}")
     for stage, ms in summary["stage_ms"].items():
         click.echo(f"  {stage}: {ms['p50']:.1f} ms median, {ms['p95']:.1f} ms p95")
     truth = summary["truth"]

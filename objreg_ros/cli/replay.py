@@ -61,14 +61,16 @@ def command(
 ) -> None:
     """Publish RECORDING under the names that the nodes listen to.
 
-    With --all, topics of a type that is not installed here, or that ROS 2 has with other fields, are left out, and
-    named. Arguments behind -- go to ROS, like -- --ros-args -r __ns:=/robot.
+    With --all, topics of a type that is not installed here, or that ROS 2 has with other fields, or whose name it does
+    not allow, are left out, and named. Arguments behind -- go to ROS, like -- --ros-args -r __ns:=/robot.
     """
     from objreg_ros.bridge import profile
     from objreg_ros.bridge.lifetime import begin, shutdown_as_interrupt
     from objreg_ros.bridge.player import Player
 
     with open_recording(recording) as source:
+        for note in source.notes:
+            click.echo(f"! {note}", err=True)
         inputs = choose_inputs(source.topics, parse_remaps(remaps), depth_source)
         names = playable_names(source, inputs) if everything else graph_names(source, inputs)
         if not names:
@@ -83,10 +85,10 @@ def command(
             _prepare(player, inputs, names, wait)
             receipts = player.listen_to_receipts(wait) if lossless else None
             again = True
-            while again:
-                _play_once(player, source, selection, inputs, None if lossless else rate, receipts, patience)
-                again = loop
-        _say(player, receipts)
+            with _told_at_the_end(player, receipts):
+                while again:
+                    _play_once(player, source, selection, inputs, None if lossless else rate, receipts, patience)
+                    again = loop
 
 
 @contextmanager
@@ -122,9 +124,8 @@ def _obstacles(source: Recording) -> dict[str, str]:
     """The topics that cannot be published here, each with the reason. The bytes of a rosbag2 go out as they are."""
     from objreg_ros.bridge.player import is_installed
 
-    reasons = source.obstacles() if source.kind == "rosbag1" else {}
     absent = {t.name: f"{t.msgtype} is not installed" for t in source.topics.values() if not is_installed(t.msgtype)}
-    return {**absent, **reasons}
+    return {**absent, **source.obstacles(shipped_only=False)}
 
 
 def _prepare(player: Player, inputs: Inputs, names: dict[str, str], wait: float) -> None:
@@ -162,6 +163,20 @@ def _items(source: Recording, selection: Selection, inputs: Inputs) -> Iterator[
         name, kind = selection.names[record.topic], kinds.get(record.topic, "")
         cdr = record.cdr
         yield Item(name, record.stamp_ns, cdr, kind, header_stamp_ns(cdr) if kind else 0)
+
+
+@contextmanager
+def _told_at_the_end(player: Player, receipts: Receipts | None) -> Iterator[None]:
+    """Says what was sent, where a signal ends the play too."""
+    from objreg_ros.bridge.lifetime import shutdown_as_interrupt
+
+    try:
+        with shutdown_as_interrupt():
+            yield
+    except (KeyboardInterrupt, SystemExit):
+        _say(player, receipts)
+        raise
+    _say(player, receipts)
 
 
 def _say(player: Player, receipts: Receipts | None) -> None:

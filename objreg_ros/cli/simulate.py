@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import click
@@ -80,12 +81,19 @@ def camera_of(name: str, size: str | None) -> Intrinsics:
         camera = CAMERAS[name]
         return _scaled(camera, width, height) if size else camera
     try:
-        fx, fy, cx, cy = (float(part) for part in name.split(","))
+        fx, fy, cx, cy = (_finite(part) for part in name.split(","))
     except ValueError:
         raise ValueError(f"intrinsics: expected {', '.join(CAMERAS)} or fx,fy,cx,cy in pixels, got {name!r}") from None
     if not size:
         width, height = round(2 * cx + 1), round(2 * cy + 1)
     return Intrinsics(fx=fx, fy=fy, cx=cx, cy=cy, width=width, height=height)
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"expected a number, got {text}")
+    return number
 
 
 def _size_of(size: str) -> tuple[int, int]:

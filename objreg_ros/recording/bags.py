@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import struct
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ from rosbags.rosbag2 import ReaderError as Rosbag2Error
 from rosbags.serde import SerdeError
 from rosbags.typesys.store import Typestore
 
-from objreg_ros.recording.messages import serialise, standard_types
+from objreg_ros.recording.messages import difference, serialise, standard_types
 from objreg_ros.recording.record import Record, Recording, Topic
 
 # What the library lets through when the bytes of a file are not what they should be.
@@ -58,19 +58,21 @@ class BagRecording(Recording):
     """A rosbag1 file, a rosbag2 folder or a single rosbag2 file."""
 
     def __init__(self, path: Path) -> None:
-        self.path, self.notes = path, []
+        self.path = path
         with _broken_means_value_error(path):
             self._reader = AnyReader([path], default_typestore=standard_types())
             self._reader.open()
         self.kind = _kind(path)
-        self.topics = _topics(self._reader)
-        self.start_ns, self.end_ns = (self._reader.start_time, self._reader.end_time) if self.topics else (0, 0)
+        self._connections, self.notes = _one_type_each(self._reader.connections)
+        self.topics = _topics(self._connections)
+        spans = any(topic.count for topic in self.topics.values())
+        self.start_ns, self.end_ns = (self._reader.start_time, self._reader.end_time) if spans else (0, 0)
 
     def records(
         self, topics: Collection[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
     ) -> Iterator[Record]:
         """See `Recording.records`. ValueError at the place where the file is broken."""
-        wanted = [c for c in self._reader.connections if topics is None or c.topic in topics]
+        wanted = [c for c in self._connections if topics is None or c.topic in topics]
         if not wanted:
             return
         with _broken_means_value_error(self.path):
@@ -80,15 +82,22 @@ class BagRecording(Recording):
     def offered_qos(self) -> dict[str, list[Qos]]:
         """See `Recording.offered_qos`. What was latched in ROS 1 is transient local, as deep as it had publishers."""
         offers: dict[str, list[Qos]] = {}
-        for connection in self._reader.connections:
+        for connection in self._connections:
             if isinstance(connection.ext, ConnectionExtRosbag2):
                 offers.setdefault(connection.topic, []).extend(connection.ext.offered_qos_profiles)
-        latched = Counter(c.topic for c in self._reader.connections if _is_latched(c))
+        latched = Counter(c.topic for c in self._connections if _is_latched(c))
         offers.update({topic: [latched_qos(count)] for topic, count in latched.items()})
         return {topic: profiles for topic, profiles in offers.items() if profiles}
 
+    def _obstacle(self, msgtype: str, shipped_only: bool) -> str:
+        """The bytes of a rosbag2 are passed on as they are, so the fields have to be the same."""
+        if not self._reader.is2:
+            return super()._obstacle(msgtype, shipped_only)
+        passes = not shipped_only and msgtype not in standard_types().fielddefs
+        return "" if passes else difference(msgtype, self._types())
+
     def _types(self) -> Typestore:
-        return standard_types() if self._reader.is2 else self._reader.typestore
+        return self._reader.typestore
 
     def close(self) -> None:
         """Close the file."""
@@ -125,9 +134,27 @@ def _is_latched(connection: Connection) -> bool:
     return isinstance(connection.ext, ConnectionExtRosbag1) and bool(connection.ext.latching)
 
 
-def _topics(reader: AnyReader) -> dict[str, Topic]:
+def _one_type_each(connections: Iterable[Connection]) -> tuple[list[Connection], list[str]]:
+    """The connections without those of a topic's rarer types, of which ROS 2 allows one, and a note on each of these.
+
+    Of types that are as frequent the first is kept.
+    """
+    counts: dict[str, Counter[str]] = {}
+    for connection in connections:
+        counts.setdefault(connection.topic, Counter())[connection.msgtype] += connection.msgcount
+    chosen = {topic: kinds.most_common(1)[0][0] for topic, kinds in counts.items()}
+    notes = [
+        f"{topic} is {chosen[topic]} and also {kind}: its {count} messages of that type are left out"
+        for topic, kinds in counts.items()
+        for kind, count in kinds.items()
+        if kind != chosen[topic]
+    ]
+    return [connection for connection in connections if connection.msgtype == chosen[connection.topic]], notes
+
+
+def _topics(connections: Iterable[Connection]) -> dict[str, Topic]:
     counts: dict[str, Topic] = {}
-    for connection in reader.connections:
+    for connection in connections:
         before = counts[connection.topic].count if connection.topic in counts else 0
         counts[connection.topic] = Topic(connection.topic, connection.msgtype, before + connection.msgcount)
     return dict(sorted(counts.items()))
@@ -147,10 +174,19 @@ def _broken_means_value_error(path: Path) -> Iterator[None]:
     except Exception as error:
         if not _says_broken(error):
             raise
+        if (denied := _denial(error)) is not None:
+            raise PermissionError(f"{path}: expected permission to read it, got: {denied.strerror}") from error
         said = " ".join(str(error).split()).rstrip(".") or type(error).__name__
         suffix = path.suffix if path.is_file() else next((f.suffix for f in path.iterdir() if f.suffix in REPAIR), "")
         repair = REPAIR.get(suffix, "record it again or check the copy")
         raise ValueError(f"{path}: expected a whole bag, got: {said}; truncated or corrupt? {repair}") from error
+
+
+def _denial(error: BaseException | None) -> PermissionError | None:
+    """The refusal of the system that an error came of, if one did."""
+    while error is not None and not isinstance(error, PermissionError):
+        error = error.__cause__ or error.__context__
+    return error
 
 
 def _says_broken(error: Exception) -> bool:

@@ -255,14 +255,19 @@ def _best(rule: Rule, topics: Iterable[Topic]) -> str | None:
 
 def _may_be(rule: Rule, name: str) -> bool:
     """Whether a name is not ruled out, and fits a preference or has the proof that the others need."""
-    if re.search(rule.never, name):
+    if _fits(rule.never, name):
         return False
-    return _rank(rule, name) < len(rule.prefer) or re.search(rule.proof, name) is not None
+    return _rank(rule, name) < len(rule.prefer) or _fits(rule.proof, name)
+
+
+def _fits(pattern: str, name: str) -> bool:
+    """Whether a pattern is in a name; drivers do not agree on capitals either."""
+    return re.search(pattern, name, re.IGNORECASE) is not None
 
 
 def _rank(rule: Rule, name: str) -> int:
     base = COMPRESSED.sub("", name)
-    return next((i for i, pattern in enumerate(rule.prefer) if re.search(pattern, base)), len(rule.prefer))
+    return next((i for i, pattern in enumerate(rule.prefer) if _fits(pattern, base)), len(rule.prefer))
 
 
 def _camera_info_of(pictures: Iterable[str | None], topics: Mapping[str, Topic]) -> str | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
 from typing import Any
 
@@ -22,6 +22,7 @@ from objreg_ros.geometry import quaternion_from_rotation
 Array = NDArray[Any]
 
 MISSING = object()
+PADDING = "structure_needs_at_least_one_member"  # what some definitions say of a type without fields
 CDR_PREFIX = 4  # bytes before the fields; the second says the byte order
 
 
@@ -76,6 +77,23 @@ def obstacle(msgtype: str, types: Typestore) -> str:
         if inner and (why := obstacle(inner, types)):
             return why
     return ""
+
+
+def difference(msgtype: str, types: Typestore) -> str:
+    """Why the bytes of a type, as ``types`` know it, are not what ROS 2 Jazzy reads, in words; empty if they are."""
+    ours = standard_types().fielddefs.get(msgtype)
+    if ours is None:
+        return f"ROS 2 does not ship {msgtype}"
+    here, there = (_named_fields(fields) for fields in (ours[1], types.fielddefs.get(msgtype, ours)[1]))
+    odd = [name for name, field in {**here, **there}.items() if here.get(name) != there.get(name)]
+    if odd or list(here) != list(there):
+        return f"{msgtype} has other fields than in ROS 2 Jazzy: {', '.join(odd) or 'their order'}"
+    inner = (_inner_type(field) for field in here.values())
+    return next((why for kind in inner if kind and (why := difference(kind, types))), "")
+
+
+def _named_fields(fields: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    return {name: field for name, field in fields if name != PADDING}
 
 
 def _inner_type(field: Any) -> str:

@@ -11,16 +11,17 @@ from objreg_ros.recording.record import Record
 def pose_of(record: Record) -> Odometry | None:
     """The pose in a record of a type that `from_msg.odometry` reads; None where its numbers are none.
 
-    A motion capture says zeros or NaN while it does not see its markers. ValueError where the recording is broken.
+    A motion capture says zeros or NaN while it does not see its markers. What does not decode is none either.
     """
-    message = record.message
     try:
-        return from_msg.odometry(message)
+        return from_msg.odometry(record.message)
     except ValueError:
         return None
 
 
 def passed_over(count: int, of: int, what: str) -> list[str]:
     """A note for the user on ``count`` of ``of`` poses that were none; no note of 0."""
-    told = f"{count} of {of} poses of {what} are none (NaN, or a quaternion of length 0) and are passed over"
+    told = (
+        f"{count} of {of} poses of {what} are none (NaN, a quaternion of length 0, or broken bytes) and are passed over"
+    )
     return [told] if count else []

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
@@ -13,6 +14,9 @@ from rosbags.interfaces import Qos, QosDurability
 from rosbags.typesys.store import Typestore
 
 from objreg_ros.recording.messages import obstacle, serialise, standard_types
+
+VALID_NAME = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")  # in ROS 2: no word begins with a digit
+LONGEST_NAME = 247
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,13 +50,29 @@ class Record:
 
     @property
     def message(self) -> Any:
-        """The message, decoded now; keep it if it is needed twice. Its fields are those of the ROS message."""
+        """The message, decoded now; keep it if it is needed twice. Its fields are those of the ROS message.
+
+        ValueError for bytes or a picture that does not decode; what comes after it may still do.
+        """
         return self.decode()
+
+    def read(self) -> Any | None:
+        """The message; None where it does not decode."""
+        try:
+            return self.decode()
+        except ValueError:
+            return None
 
     @property
     def cdr(self) -> bytes:
         """The message as ROS 2 sends it; ValueError if it is of a ROS 1 type that ROS 2 does not have."""
         return self.encode()
+
+
+def misnamed(topic: str) -> str:
+    """Why ROS 2 cannot have a topic of this name, in words; empty if it can."""
+    fits = VALID_NAME.fullmatch(topic) is not None and len(topic) <= LONGEST_NAME
+    return "" if fits else "no valid name in ROS 2"
 
 
 class Recording(ABC):
@@ -71,9 +91,16 @@ class Recording(ABC):
     ) -> Iterator[Record]:
         """The records of some topics (None: of all) from ``start_ns`` and before ``end_ns``, in order of time."""
 
-    def obstacles(self) -> dict[str, str]:
-        """The topics whose records ROS 2 cannot have (`Record.cdr` refuses them), each with the reason."""
-        reasons = {topic.name: obstacle(topic.msgtype, self._types()) for topic in self.topics.values()}
+    def obstacles(self, shipped_only: bool = True) -> dict[str, str]:
+        """The topics whose records ROS 2 cannot have (`Record.cdr` refuses them, or its bytes are read wrongly).
+
+        Each with the reason. Without ``shipped_only``, a type that ROS 2 does not ship is none by itself where ROS 2
+        has recorded it: its bytes can be passed on.
+        """
+        reasons = {
+            topic.name: misnamed(topic.name) or self._obstacle(topic.msgtype, shipped_only)
+            for topic in self.topics.values()
+        }
         return {name: reason for name, reason in reasons.items() if reason}
 
     def offered_qos(self) -> dict[str, list[Qos]]:
@@ -92,6 +119,10 @@ class Recording(ABC):
             for topic, profiles in self.offered_qos().items()
         }
         return {topic: depth for topic, depth in depths.items() if depth}
+
+    def _obstacle(self, msgtype: str, shipped_only: bool) -> str:
+        """Why ROS 2 cannot have what is of a type, in words; empty if it can."""
+        return obstacle(msgtype, self._types())
 
     def _types(self) -> Typestore:
         """The message types as the recording knows them."""

@@ -15,7 +15,7 @@ from objreg_ros.bridge import from_msg
 from objreg_ros.bridge.layout import table
 from objreg_ros.data import Intrinsics
 from objreg_ros.recording.inputs import Inputs
-from objreg_ros.recording.record import Recording
+from objreg_ros.recording.record import Record, Recording
 
 SAMPLE = 60  # messages of colour and depth whose stamps are compared
 NEAR_NS = 20_000_000  # how far apart colour and depth may be for the nodes' default slop
@@ -130,7 +130,7 @@ def _first_messages(recording: Recording, inputs: Inputs) -> list[str]:
 def _try(
     found: list[str], name: str, recording: Recording, topic: str | None, decode: Callable[[Any], Any]
 ) -> Any | None:
-    record = next(recording.records([topic]), None) if topic else None
+    record = _first(recording, topic)
     try:
         return None if record is None else decode(record.message)
     except ValueError as error:
@@ -155,24 +155,57 @@ def _frames(recording: Recording, inputs: Inputs) -> list[str]:
 
 def _frame_id(recording: Recording, topic: str | None) -> str:
     """The frame of a topic's first message; empty if it tells none."""
-    record = next(recording.records([topic]), None) if topic else None
-    return "" if record is None else str(record.message.header.frame_id).lstrip("/")
+    record = _first(recording, topic)
+    message = None if record is None else record.read()
+    return "" if message is None else str(message.header.frame_id).lstrip("/")
 
 
 def _stamps(recording: Recording, inputs: Inputs) -> list[str]:
     """Whether the stamps in the headers let colour and depth be brought together."""
-    colour, depth = (_header_stamps(recording, topic) for topic in (inputs.image, inputs.depth or inputs.points))
+    topics = inputs.image, inputs.depth or inputs.points
+    begins = [record.stamp_ns for topic in topics if (record := _first(recording, topic)) is not None]
+    colour, depth = (_header_stamps(recording, topic, max(begins, default=0)) for topic in topics)
     found = []
     for name, stamps in (("colour", colour), ("depth", depth)):
         if (np.diff(stamps) < 0).any():
             found.append(f"the stamps of {name} go back in time: what waits is dropped there")
+        if len(stamps) > 1 and (stamps == stamps[0]).all():
+            found.append(
+                f"the first {len(stamps)} stamps of {name} are all {stamps[0]} ns: frames are told apart by them, and "
+                "none closes a loop; record it again with the time in its headers"
+            )
+    if len(begins) == len(topics) and not (len(colour) and len(depth)):
+        found.append("colour and depth were recorded at different times: none goes with the other")
     if len(colour) and len(depth):
-        apart = float(np.median(np.abs(depth[:, None] - colour[None, :]).min(axis=1)))
+        apart = _apart_ns(colour, depth)
         if apart > NEAR_NS:
             found.append(f"colour and depth are {apart * 1e-6:.0f} ms apart: raise segmenter.slop above that")
     return found
 
 
-def _header_stamps(recording: Recording, topic: str | None) -> np.ndarray:
-    records = islice(recording.records([topic]), SAMPLE) if topic else ()
-    return np.array([from_msg.stamp_ns(record.message) for record in records], np.int64)
+def _apart_ns(colour: np.ndarray, depth: np.ndarray) -> float:
+    """How far the stamps of the slower stream are from the nearest of the faster one; the median.
+
+    Only those within the time of both count, unless there are none.
+    """
+    slow, fast = sorted((colour, depth), key=_pace)
+    within = slow[(slow >= fast.min()) & (slow <= fast.max())]
+    slow = within if len(within) else slow
+    return float(np.median(np.abs(slow[:, None] - fast[None, :]).min(axis=1)))
+
+
+def _pace(stamps: np.ndarray) -> float:
+    """Stamps in a second; 0 for fewer than two."""
+    step_ns = float(np.median(np.abs(np.diff(stamps)))) if len(stamps) > 1 else 0.0
+    return 1e9 / step_ns if step_ns else 0.0
+
+
+def _header_stamps(recording: Recording, topic: str | None, start_ns: int) -> np.ndarray:
+    """The first `SAMPLE` stamps of what was recorded from a time on and decodes."""
+    messages = (record.read() for record in recording.records([topic], start_ns)) if topic else iter(())
+    readable = islice((message for message in messages if message is not None), SAMPLE)
+    return np.array([from_msg.stamp_ns(message) for message in readable], np.int64)
+
+
+def _first(recording: Recording, topic: str | None) -> Record | None:
+    return next(recording.records([topic]), None) if topic else None

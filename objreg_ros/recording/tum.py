@@ -2,14 +2,15 @@
 """Folders in the TUM RGB-D layout, as a recording of standard messages.
 
 ``rgb/`` and ``depth/`` (16-bit PNG registered to colour), ``associations.txt`` or ``rgb.txt`` and ``depth.txt``,
-``groundtruth.txt`` (timestamp tx ty tz qx qy qz qw of the colour camera in the world) and ``camera.yaml`` (fx fy cx cy
-width height depth_scale distortion, each with a default), which may both be missing. See Sturm et al., "A Benchmark
+``groundtruth.txt`` (timestamp tx ty tz qx qy qz qw of the colour camera in the world) and ``camera.yaml`` (see
+`tum_camera`), which may both be missing. See Sturm et al., "A Benchmark
 for the Evaluation of RGB-D SLAM Systems" (2012).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import suppress
 from decimal import Decimal
 from functools import partial
 from pathlib import Path
@@ -17,14 +18,14 @@ from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
-from objreg_ros.data import Intrinsics
 from objreg_ros.geometry import is_rigid, pose, rotation_from_quaternion
 from objreg_ros.recording import messages
 from objreg_ros.recording.poses import passed_over
 from objreg_ros.recording.record import Record, Recording, Topic
+from objreg_ros.recording.text import read_text
+from objreg_ros.recording.tum_camera import TumCamera, read_camera
 
 Array = NDArray[Any]
 
@@ -38,11 +39,11 @@ TYPES = {
 CAMERA_FRAME, WORLD_FRAME = "camera", "world"
 ASSOCIATION_NS = 20_000_000  # as the benchmark's associate.py
 NS_DIGITS = 19
+MOST_NAMED = 5  # files in a note
 END_OF_TIME_S = 2**31  # what the stamp of a message holds, until 2038
 MILLIMETRES = 1000.0
-# The benchmark's own advice for sequences without calibration: ROS's default camera and depth in steps of 0.2 mm.
-DEFAULT_CAMERA = {"fx": 525.0, "fy": 525.0, "cx": 319.5, "cy": 239.5, "depth_scale": 5000.0}
-
+COLOUR = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION  # depth is not turned either
+PICTURE_FILES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp")
 
 Picture = tuple[int, str]  # stamp, file
 Pair = tuple[int, str, int, str]  # colour stamp, colour file, depth stamp, depth file
@@ -64,7 +65,7 @@ class TumRecording(Recording):
     def __init__(self, path: Path) -> None:
         self.path = path
         pairs, self.notes = _pairs(path)
-        self._camera, self._depth_scale, self._distortion = self._read_camera(path / pairs[0][1])
+        self._camera = self._read_camera([path / colour for _, colour, _, _ in pairs])
         moments = [m for pair in pairs for m in self._moments(*pair)] + self._ground_truth()
         order = list(TYPES)
         self._sequence = sorted(moments, key=lambda m: (m.stamp_ns, order.index(m.topic)))
@@ -75,33 +76,26 @@ class TumRecording(Recording):
     def records(
         self, topics: Collection[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
     ) -> Iterator[Record]:
-        """See `Recording.records`. OSError for a picture that cannot be read."""
+        """See `Recording.records`. The message of a picture that does not decode is a ValueError."""
         for stamp_ns, topic, make in self._sequence:
             wanted = topics is None or topic in topics
             if wanted and (start_ns is None or stamp_ns >= start_ns) and (end_ns is None or stamp_ns < end_ns):
                 yield Record.made(topic, TYPES[topic], stamp_ns, make)
 
     def _moments(self, colour_ns: int, colour: str, depth_ns: int, depth: str) -> list[Moment]:
-        info = partial(messages.camera_info, self._camera, depth_ns, CAMERA_FRAME, self._distortion)
+        camera = self._camera
+        info = partial(messages.camera_info, camera.intrinsics, depth_ns, CAMERA_FRAME, camera.distortion)
         return [
             Moment(depth_ns, CAMERA_INFO, info),
             Moment(colour_ns, IMAGE, partial(_colour_message, self.path / colour, colour_ns)),
-            Moment(depth_ns, DEPTH, partial(_depth_message, self.path / depth, depth_ns, self._depth_scale)),
+            Moment(depth_ns, DEPTH, partial(_depth_message, self.path / depth, depth_ns, camera.depth_scale)),
         ]
 
-    def _read_camera(self, picture: Path) -> tuple[Intrinsics, float, list[float]]:
-        file = self.path / "camera.yaml"
-        height, width = _read_picture(picture, cv2.IMREAD_COLOR).shape[:2]
-        if not file.exists():
-            self.notes.append("no camera.yaml: the benchmark's default camera (525 px, depth / 5000) is assumed")
-        values = {"width": width, "height": height, **DEFAULT_CAMERA, **(_read_yaml(file) if file.exists() else {})}
-        try:
-            numbers = {name: float(values[name]) for name in ("fx", "fy", "cx", "cy")}
-            camera = Intrinsics(**numbers, width=int(values["width"]), height=int(values["height"]))
-            distortion = [float(value) for value in values.get("distortion", (0.0,) * 5)]
-            return camera, _depth_scale(values["depth_scale"]), distortion
-        except (KeyError, TypeError, ValueError) as error:
-            raise ValueError(f"{file}: expected numbers fx fy cx cy width height depth_scale, got: {error}") from error
+    def _read_camera(self, pictures: Sequence[Path]) -> TumCamera:
+        height, width = _first_size(pictures)
+        camera = read_camera(self.path / "camera.yaml", width, height)
+        self.notes += camera.notes
+        return camera
 
     def _ground_truth(self) -> list[Moment]:
         file = self.path / "groundtruth.txt"
@@ -109,24 +103,6 @@ class TumRecording(Recording):
         moments = [moment for moment in told if moment is not None]
         self.notes += passed_over(len(told) - len(moments), len(told), file.name)
         return moments
-
-
-def _depth_scale(value: Any) -> float:
-    """Steps of depth in a metre; ValueError for what depth cannot be divided by."""
-    scale = float(value)
-    if not 0 < scale < float("inf"):
-        raise ValueError(f"depth_scale {scale}, which is none above 0")
-    return scale
-
-
-def _read_yaml(file: Path) -> dict[str, Any]:
-    try:
-        values = yaml.safe_load(file.read_text())
-    except yaml.YAMLError as error:
-        raise ValueError(f"{file}: expected YAML, got: {error}") from error
-    if not isinstance(values, dict):
-        raise ValueError(f"{file}: expected a mapping like fx: 525.0, got {type(values).__name__}")
-    return values
 
 
 def _pairs(folder: Path) -> tuple[list[Pair], list[str]]:
@@ -138,7 +114,7 @@ def _pairs(folder: Path) -> tuple[list[Pair], list[str]]:
     else:
         colour, depth = _pictures(folder, "rgb"), _pictures(folder, "depth")
         pairs = _associate(colour, depth)
-        notes = _unpaired(len(pairs), len(colour), len(depth))
+        notes = _unpaired(len(pairs), len(colour), len(depth)) + _strangers(folder)
     missing = next((name for _, c, _, d in pairs for name in (c, d) if not (folder / name).exists()), None)
     if missing:
         raise FileNotFoundError(f"{folder}: expected the picture {missing} that its list names, got no such file")
@@ -159,8 +135,27 @@ def _pictures(folder: Path, name: str) -> list[Picture]:
     file = folder / f"{name}.txt"
     if file.exists():
         return [(_stamp(row[0], file), row[1]) for row in _rows(file, 2)]
-    pictures = (folder / name).glob("*.*") if (folder / name).is_dir() else []
+    pictures = [file for file in _files(folder, name) if _is_picture(file)]
     return [(_stamp(picture.stem, picture), f"{name}/{picture.name}") for picture in pictures]
+
+
+def _files(folder: Path, name: str) -> list[Path]:
+    """What is in the folder of pictures, where no list says it."""
+    here = folder / name
+    return sorted(here.iterdir()) if here.is_dir() and not here.with_suffix(".txt").exists() else []
+
+
+def _is_picture(file: Path) -> bool:
+    return file.suffix.lower() in PICTURE_FILES and not file.name.startswith(".")
+
+
+def _strangers(folder: Path) -> list[str]:
+    """A note for the user on files among the pictures that are none."""
+    names = [
+        f"{name}/{file.name}" for name in ("rgb", "depth") for file in _files(folder, name) if not _is_picture(file)
+    ]
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return [f"no pictures, and left out: {', '.join(names[:MOST_NAMED])}{more}"] if names else []
 
 
 def _associate(colour: list[Picture], depth: list[Picture]) -> list[Pair]:
@@ -202,7 +197,8 @@ def _true_pose(numbers: Array) -> Array | None:
 
 
 def _rows(file: Path, columns: int) -> list[list[str]]:
-    lines = [line.split() for line in file.read_text().splitlines() if line.strip() and not line.startswith("#")]
+    told = (line.strip() for line in read_text(file).splitlines())
+    lines = [line.split() for line in told if line and not line.startswith("#")]
     short = next((line for line in lines if len(line) < columns), None)
     if short is not None:
         raise ValueError(f"{file}: expected {columns} columns in each line, got {' '.join(short)!r}")
@@ -221,15 +217,23 @@ def _stamp(text: str, file: Path) -> int:
     raise ValueError(f"{file}: expected a time in seconds (or 19 digits of nanoseconds), got {text!r}")
 
 
+def _first_size(files: Sequence[Path]) -> tuple[int, ...]:
+    """Height and width of the first picture that decodes; ValueError where none does."""
+    for file in files:
+        with suppress(ValueError):
+            return _read_picture(file, COLOUR).shape[:2]
+    raise ValueError(f"{files[0]}: expected a picture, got {len(files)} that do not decode; check the download")
+
+
 def _read_picture(file: Path, flags: int) -> Array:
     pixels = cv2.imread(str(file), flags)
     if pixels is None:
-        raise OSError(f"{file}: expected a picture, got a file that does not decode; check the download")
+        raise ValueError(f"{file}: expected a picture, got a file that does not decode; check the download")
     return np.asarray(pixels)
 
 
 def _colour_message(file: Path, stamp_ns: int) -> Any:
-    rgb = cv2.cvtColor(_read_picture(file, cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
+    rgb = cv2.cvtColor(_read_picture(file, COLOUR), cv2.COLOR_BGR2RGB)
     return messages.image(rgb, "rgb8", stamp_ns, CAMERA_FRAME)
 
 
@@ -237,7 +241,7 @@ def _depth_message(file: Path, stamp_ns: int, scale: float) -> Any:
     """16UC1 where the steps are millimetres, else 32FC1 metres."""
     pixels = _read_picture(file, cv2.IMREAD_UNCHANGED)
     if pixels.dtype != np.uint16 or pixels.ndim != 2:
-        raise OSError(f"{file}: expected a 16-bit picture of one channel, got {pixels.dtype} {pixels.shape}")
+        raise ValueError(f"{file}: expected a 16-bit picture of one channel, got {pixels.dtype} {pixels.shape}")
     if scale == MILLIMETRES:
         return messages.image(pixels, "16UC1", stamp_ns, CAMERA_FRAME)
     metres = np.where(pixels == np.iinfo(np.uint16).max, np.float32(0), pixels / np.float32(scale)).astype(np.float32)

@@ -98,10 +98,9 @@ class Cameras:
 
 
 def _readable(recording: Recording, topic: str) -> Iterator[Any]:
-    """The messages of a topic, up to where the file is broken."""
+    """The messages of a topic that decode, up to where the file is broken."""
     try:
-        for record in recording.records([topic]):
-            yield record.message
+        yield from (message for record in recording.records([topic]) if (message := record.read()) is not None)
     except ValueError:
         return
 

@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from recording.folders import noetic_bag, records, tum_folder
+from recording.folders import humble_bag, noetic_bag, records, tum_folder
+from rosbags.rosbag1 import Writer
+from rosbags.typesys import Stores, get_typestore
 
 from objreg_ros.bridge import from_msg
 from objreg_ros.cli.convert import command
@@ -37,9 +39,29 @@ def test_topics_that_ros_2_does_not_have_are_left_out_by_name(tmp_path: Path) ->
     assert result.exit_code == 0 and "12 records" in result.output
     assert "left out: /tf (ROS 2 does not ship tf/msg/tfMessage)" in result.output
     assert "left out: /rosout (ROS 2 does not ship rosgraph_msgs/msg/Log)" in result.output
+    assert "left out: /arm/0 (no valid name in ROS 2)" in result.output
     assert "left out: /markers (visualization_msgs/msg/Marker has no texture_resource, which" in result.output
     with open_recording(tmp_path / "bag") as bag:
         assert set(bag.topics) == {"/image", "/depth/image", "/camera_info", "/odom"}
+
+
+def test_a_topic_whose_type_has_other_fields_in_jazzy_is_left_out_by_name(tmp_path: Path) -> None:
+    result = CliRunner().invoke(command, [str(humble_bag(tmp_path / "old")), str(tmp_path / "bag")])
+    assert result.exit_code == 0 and "2 records" in result.output
+    assert "left out: /range (sensor_msgs/msg/Range has other fields than in ROS 2 Jazzy: variance)" in result.output
+    with open_recording(tmp_path / "bag") as bag:
+        assert set(bag.topics) == {"/chatter", "/nothing"}
+
+
+def test_what_is_assumed_and_topics_without_messages_are_said(tmp_path: Path) -> None:
+    (tum_folder(tmp_path / "tum") / "camera.yaml").unlink()
+    result = CliRunner().invoke(command, [str(tmp_path / "tum"), str(tmp_path / "bag")])
+    assert "! no camera.yaml: the benchmark's default camera is assumed" in result.output
+    types = get_typestore(Stores.ROS1_NOETIC)
+    with Writer(tmp_path / "one.bag") as writer:
+        writer.add_connection("/quiet", "std_msgs/msg/String", typestore=types)
+    result = CliRunner().invoke(command, [str(tmp_path / "one.bag"), str(tmp_path / "empty")])
+    assert result.exit_code == 0 and "left out: /quiet (no messages)" in result.output
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from recording.folders import lost, tum_folder
+from rosbags.rosbag2 import StoragePlugin, Writer
 
 from objreg_ros.cli.inspect import columns, command
 from objreg_ros.recording import Record, messages, write_rosbag2
+from objreg_ros.recording.messages import standard_types
 from objreg_ros.registrar.store import Store
 
 
@@ -27,6 +29,33 @@ def test_poses_of_the_truth_that_are_none_are_counted(tmp_path: Path) -> None:
     result = CliRunner().invoke(command, [str(tmp_path / "bag")])
     assert "1 poses, 0.00 m" in result.output
     assert "! 1 of 2 poses of the ground truth /gt are none" in result.output
+
+
+def test_a_broken_picture_is_no_end_of_the_inspection(tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path)
+    for place in ("rgb", "depth"):
+        (folder / place / "0.000000.png").write_bytes(b"no png")
+    result = CliRunner().invoke(command, [str(folder)])
+    assert result.exit_code == 0 and "not readable: " in result.output
+
+
+def test_a_recording_without_records_begins_at_no_time(tmp_path: Path) -> None:
+    write_rosbag2(tmp_path / "bag", [])
+    output = CliRunner().invoke(command, [str(tmp_path / "bag")]).output
+    assert "0.00 s, 0 records" in output and "UTC" not in output
+
+
+def test_a_topic_of_two_types_is_told_by_its_more_frequent_one(tmp_path: Path) -> None:
+    types = standard_types()
+    image = messages.image(np.zeros((4, 6, 3), np.uint8), "rgb8", 5, "c")
+    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        for kind, count in (("sensor_msgs/msg/Image", 2), ("std_msgs/msg/String", 1)):
+            connection = writer.add_connection("/x", kind, typestore=types)
+            made = image if count == 2 else types.types[kind](data="x")
+            for _ in range(count):
+                writer.write(connection, 5, types.serialize_cdr(made, kind))
+    output = CliRunner().invoke(command, [str(tmp_path / "bag")], catch_exceptions=False).output
+    assert "6 × 4 rgb8, c" in output and "! /x is sensor_msgs/msg/Image and also std_msgs/msg/String: its 1" in output
 
 
 def test_a_remap_shows_in_the_inputs(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
@@ -28,6 +29,11 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def read(recording: Path) -> list[Record]:
     with open_recording(recording) as source:
         return list(source.records())
+
+
+def unstamped(message: Any) -> Any:
+    message.header.stamp.sec = message.header.stamp.nanosec = 0
+    return message
 
 
 def offline(*words: object) -> str:
@@ -57,6 +63,21 @@ def test_what_is_odd_about_the_recording_and_its_truth_is_said(model: Path, tmp_
     assert "! 2 of 2 poses of the ground truth /ground_truth are none" in offline(tmp_path / "bag", "--model", model)
 
 
+def test_frames_whose_stamps_stand_still_are_said(model: Path, tmp_path: Path) -> None:
+    still = [Record.of(r.topic, unstamped(r.message), r.stamp_ns) for r in read(tum_folder(tmp_path / "tum"))]
+    write_rosbag2(tmp_path / "bag", still)
+    assert "! all frames have the stamp 0 ns, so none closes a loop" in offline(tmp_path / "bag", "--model", model)
+    assert "all frames have" not in offline(tmp_path / "tum", "--model", model)
+
+
+def test_a_broken_picture_costs_its_frame_and_not_the_run(model: Path, tmp_path: Path) -> None:
+    folder, file = tum_folder(tmp_path / "tum", frames=4), tmp_path / "out.json"
+    (folder / "depth/0.100000.png").write_bytes(b"no png")
+    output = offline(folder, "--model", model, "--json", file)
+    assert "3 frames" in output and "dropped malformed_depth: 1" in output and "0.100000.png: expected a" in output
+    assert json.loads(file.read_text())["dropped"] == {"malformed_depth": 1}
+
+
 def test_a_run_stops_early(model: Path, tmp_path: Path) -> None:
     assert "2 frames" in offline(tum_folder(tmp_path, frames=4), "--model", model, "--max-frames", 2)
 
@@ -80,7 +101,19 @@ def test_drifting_odometry_is_named_in_the_json(model: Path, tmp_path: Path) -> 
     assert all(glimpse["T_odom_camera"] is not None for glimpse in summary["glimpses"])
 
 
-@pytest.mark.parametrize("odometry", ["drift", "drift:", "drift:x"])
+def test_drifting_odometry_is_the_cameras_own_and_takes_no_mounting(model: Path, tmp_path: Path) -> None:
+    mounted = [f"{room}.T_base_camera=[0.3, 0.0, 0.5, -0.5, 0.5, -0.5, 0.5]" for room in ("registrar", "segmenter")]
+    words = [word for change in (*mounted, "segmenter.level_odom=true") for word in ("--set", change)]
+    folder, told = tum_folder(tmp_path / "tum", frames=3), []
+    for name, changes in (("plain", []), ("mounted", words)):
+        file = tmp_path / f"{name}.json"
+        output = offline(folder, "--model", model, "--json", file, "--odometry", "drift:3", *changes)
+        told.append([glimpse["T_odom_camera"] for glimpse in json.loads(file.read_text())["glimpses"]])
+    assert told[0] == told[1] and len(told[0]) == 3
+    assert "! --odometry drift:3 is the camera's own and not level: T_base_camera" in output
+
+
+@pytest.mark.parametrize("odometry", ["drift", "drift:", "drift:x", "drift:²", "drift:-1"])
 def test_a_drift_without_a_seed_is_refused_before_anything_is_prepared(odometry: str, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="--odometry: expected drift: and a seed like drift:1"):
         offline(tmp_path / "no_recording", "--odometry", odometry)

@@ -70,6 +70,6 @@ def test_of_a_rosbag1_only_the_inputs_are_written(tmp_path: Path) -> None:
 def test_a_failed_try_leaves_nothing(tmp_path: Path) -> None:
     folder = tum_folder(tmp_path / "tum")
     (folder / "depth/0.200000.png").write_bytes(b"")
-    with pytest.raises(OSError, match=r"0\.200000\.png"):
+    with pytest.raises(ValueError, match=r"0\.200000\.png"):
         as_rosbag2(folder, INPUTS, tmp_path / "out", seconds=None)
     assert list((tmp_path / "out").iterdir()) == []

@@ -14,7 +14,7 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 import click
 from click.testing import CliRunner, Result
 from rclpy.executors import ExternalShutdownException
-from recording.folders import STEP_NS, noetic_bag, records, robot_bag, tum_folder
+from recording.folders import STEP_NS, humble_bag, noetic_bag, records, robot_bag, tum_folder
 
 from objreg_ros.bridge.player import Item
 from objreg_ros.bridge.receipts import DEPTH, IMAGE, ORDER, Receipts
@@ -131,7 +131,8 @@ def test_rate_clock_and_part_are_as_asked(stage: Stage, folder: Path) -> None:
 
 def test_a_loop_plays_the_same_stamps_until_it_is_interrupted(stage: Stage, folder: Path) -> None:
     stage.most = 3
-    assert replay(folder, "--loop").exit_code == 1
+    result = replay(folder, "--loop")
+    assert result.exit_code == 1 and result.output.splitlines()[1:5] == [f"18 {topic}" for topic in sorted(PLAYED)]
     first, *others = ([item.stamp_ns for item in items] for _, _, items in stage.plays)
     assert len(first) == 24 and others == [first, first] and stage.closed and stage.shut_down
 
@@ -205,11 +206,13 @@ def test_arguments_that_ros_cannot_read_are_refused_in_one_line(folder: Path) ->
 
 def test_a_player_that_a_signal_ends_ends_as_if_interrupted(stage: Stage, folder: Path) -> None:
     def play(*_: object) -> None:
+        stage.published["image"] = 2
         raise ExternalShutdownException
 
     stage.play = play  # type: ignore[method-assign]
     result = CliRunner().invoke(command, [str(folder)], standalone_mode=False)
     assert isinstance(result.exception, click.Abort | KeyboardInterrupt) and stage.closed and stage.shut_down
+    assert "2 image" in result.output
 
 
 def test_the_player_is_closed_and_ros_shut_down_when_a_play_fails(
@@ -239,7 +242,16 @@ def test_what_ros_1_has_with_other_fields_is_left_out_by_name(
         assert set(playable_names(source, choose_inputs(source.topics))) == ROBOT
     said = capsys.readouterr().err
     assert "left out: /tf (ROS 2 does not ship tf/msg/tfMessage)" in said
+    assert "left out: /arm/0 (no valid name in ROS 2)" in said
     assert "left out: /markers (visualization_msgs/msg/Marker has no texture_resource" in said
+
+
+def test_what_another_ros_2_has_with_other_fields_is_left_out_by_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with open_recording(humble_bag(tmp_path / "bag")) as source:
+        assert set(playable_names(source, choose_inputs(source.topics))) == {"/chatter", "/nothing"}
+    assert "left out: /range (sensor_msgs/msg/Range has other fields" in capsys.readouterr().err
 
 
 def test_an_input_that_cannot_be_played_is_refused(tmp_path: Path) -> None:

@@ -75,3 +75,9 @@ def test_stress_makes_the_depth_worse() -> None:
 def test_the_list_of_parameters_needs_no_folder() -> None:
     result = CliRunner().invoke(command, ["--list"])
     assert result.exit_code == 0 and "odometry.turn_drift = 1.0" in result.output
+
+
+@pytest.mark.parametrize("intrinsics", ["500,500,inf,240", "nan,500,320,240", "500,500,320", "wide"])
+def test_intrinsics_that_are_no_numbers_are_refused(intrinsics: str) -> None:
+    with pytest.raises(ValueError, match=f"intrinsics: expected kinect.* or fx,fy,cx,cy in pixels, got '{intrinsics}'"):
+        camera_of(intrinsics, None)

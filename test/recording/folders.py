@@ -89,7 +89,7 @@ def lost(record: Record, value: float = 0.0) -> Record:
 
 
 def noetic_bag(path: Path, frames: int = 3) -> Path:
-    """A rosbag1 with `records`, and with what any robot of ROS 1 says besides: /tf, /rosout and /markers."""
+    """A rosbag1 with `records`, and with what any robot of ROS 1 says besides: /tf, /rosout, /markers and /arm/0."""
     types = get_typestore(Stores.ROS1_NOETIC)
     types.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", "tf/msg/tfMessage"))
     made = types.types
@@ -98,6 +98,7 @@ def noetic_bag(path: Path, frames: int = 3) -> Path:
     others = {
         "/tf": made["tf/msg/tfMessage"](transforms=[]),
         "/rosout": made["rosgraph_msgs/msg/Log"](header=header, **words),
+        "/arm/0": made["std_msgs/msg/String"](data="a name that ROS 2 does not allow"),
         "/markers": made["visualization_msgs/msg/MarkerArray"](markers=[]),
     }
     with Rosbag1Writer(path) as writer:
@@ -124,6 +125,24 @@ def robot_bag(path: Path, frames: int = 3) -> Path:
             if record.topic not in open_topics:
                 open_topics[record.topic] = writer.add_connection(record.topic, record.msgtype, typestore=types)
             writer.write(open_topics[record.topic], record.stamp_ns, record.cdr)
+    return path
+
+
+def humble_bag(path: Path, plugin: StoragePlugin = StoragePlugin.MCAP) -> Path:
+    """A rosbag2 of ROS 2 Humble: /range is of a type that has fewer fields there, /chatter and /nothing are not."""
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    made = types.types
+    header = made["std_msgs/msg/Header"](stamp=made["builtin_interfaces/msg/Time"](1, 0), frame_id="sonar")
+    words = {"radiation_type": 0, "field_of_view": 0.5, "min_range": 0.1, "max_range": 4.0, "range": 1.5}
+    said = {
+        "/range": made["sensor_msgs/msg/Range"](header=header, **words),
+        "/chatter": made["std_msgs/msg/String"](data="hello"),
+        "/nothing": made["std_msgs/msg/Empty"](),
+    }
+    with Rosbag2Writer(path, version=9, storage_plugin=plugin) as writer:
+        for topic, message in said.items():
+            connection = writer.add_connection(topic, message.__msgtype__, typestore=types)
+            writer.write(connection, 10**9, types.serialize_cdr(message, message.__msgtype__))
     return path
 
 

@@ -16,7 +16,7 @@ from objreg_ros.bridge import from_msg
 from objreg_ros.recording import Record, messages, open_recording, write_rosbag2
 from objreg_ros.recording.messages import standard_types
 
-from .folders import CAMERA, records
+from .folders import CAMERA, humble_bag, records, robot_bag
 
 STORAGES = ("mcap", "sqlite3")
 
@@ -137,6 +137,21 @@ def test_a_real_rosbag1_gives_its_cloud(shared: Path) -> None:
     assert np.isfinite(cloud.xyz[..., 2]).mean() > 0.5
 
 
+@pytest.mark.parametrize("plugin", [StoragePlugin.MCAP, StoragePlugin.SQLITE3])
+def test_a_rosbag2_names_the_topics_that_ros_2_jazzy_has_with_other_fields(
+    plugin: StoragePlugin, tmp_path: Path
+) -> None:
+    with open_recording(humble_bag(tmp_path / "bag", plugin)) as recording:
+        assert recording.obstacles() == recording.obstacles(shipped_only=False)
+        assert list(recording.obstacles()) == ["/range"] and "variance" in recording.obstacles()["/range"]
+
+
+def test_a_type_that_ros_2_does_not_ship_is_an_obstacle_only_where_that_is_asked(tmp_path: Path) -> None:
+    with open_recording(robot_bag(tmp_path / "bag")) as recording:
+        assert recording.obstacles() == {"/meta": "ROS 2 does not ship acme_msgs/msg/Meta"}
+        assert recording.obstacles(shipped_only=False) == {}
+
+
 def cut(file: Path, share: float) -> None:
     file.write_bytes(file.read_bytes()[: int(file.stat().st_size * share)])
 
@@ -248,6 +263,45 @@ def test_text_that_is_called_a_bag_is_refused(tmp_path: Path) -> None:
         (tmp_path / f"x{suffix}").write_text("hello " * 100)
         with pytest.raises(ValueError, match="expected a whole bag"):
             open_recording(tmp_path / f"x{suffix}")
+
+
+def test_a_topic_of_two_types_is_that_of_the_more_messages_and_the_others_are_counted(tmp_path: Path) -> None:
+    types = standard_types()
+    word, number = (types.types[f"std_msgs/msg/{name}"] for name in ("String", "Int8"))
+    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        for made in (number(data=1), word(data="a"), word(data="b")):
+            kind = made.__msgtype__
+            known = [c for c in writer.connections if c.msgtype == kind]
+            connection = known[0] if known else writer.add_connection("/x", kind, typestore=types)
+            writer.write(connection, 5, types.serialize_cdr(made, kind))
+    with open_recording(tmp_path / "bag") as recording:
+        assert recording.topics["/x"].msgtype == "std_msgs/msg/String" and recording.topics["/x"].count == 2
+        assert [record.message.data for record in recording.records()] == ["a", "b"]
+        (note,) = recording.notes
+    assert note == "/x is std_msgs/msg/String and also std_msgs/msg/Int8: its 1 messages of that type are left out"
+
+
+def test_a_rosbag1_without_messages_begins_and_lasts_nowhere(tmp_path: Path) -> None:
+    types = get_typestore(Stores.ROS1_NOETIC)
+    with Rosbag1Writer(tmp_path / "one.bag") as writer:
+        writer.add_connection("/x", "std_msgs/msg/String", typestore=types)
+    with open_recording(tmp_path / "one.bag") as recording:
+        assert (recording.start_ns, recording.end_ns, recording.topics["/x"].count) == (0, 0, 0)
+
+
+def test_a_bag_that_may_not_be_read_is_not_called_broken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_rosbag2(tmp_path / "bag", records())
+    (file,) = (tmp_path / "bag").glob("*.mcap")
+    whole = Path.open
+
+    def refuse(path: Path, *words: object, **more: object) -> object:
+        if path.suffix == ".mcap":
+            raise PermissionError(13, "Permission denied", str(path))
+        return whole(path, *words, **more)  # type: ignore[call-overload]
+
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(PermissionError, match=r"expected permission to read it, got: Permission denied"):
+        open_recording(file)
 
 
 def test_an_empty_bag_has_no_topics(tmp_path: Path) -> None:

@@ -40,6 +40,17 @@ DRIVERS = {
         "image=/camera/rgb/image_rect_color depth=/camera/depth_registered/hw_registered/image_rect_raw "
         "camera_info=/camera/depth_registered/camera_info",
     ),
+    "realsense-viewer": (
+        "/device_0/sensor_0/Depth_0/image/data /device_0/sensor_0/Depth_0/info/camera_info:info "
+        "/device_0/sensor_0/Infrared_1/image/data /device_0/sensor_1/Color_0/image/data "
+        "/device_0/sensor_1/Color_0/info/camera_info:info",
+        "image=/device_0/sensor_1/Color_0/image/data depth=/device_0/sensor_0/Depth_0/image/data "
+        "camera_info=/device_0/sensor_0/Depth_0/info/camera_info",
+    ),
+    "capitals": (
+        "/Camera/RGB/Image_Raw /Camera/Depth/Image_Raw /Camera/Depth/Camera_Info:info /Camera/IR/Image /Odom:odom",
+        "image=/Camera/RGB/Image_Raw depth=/Camera/Depth/Image_Raw camera_info=/Camera/Depth/Camera_Info odom=/Odom",
+    ),
     "the TUM benchmark": (
         "/camera/rgb/image_color /camera/rgb/camera_info:info /camera/depth/image /camera/depth/camera_info:info",
         "image=/camera/rgb/image_color depth=/camera/depth/image camera_info=/camera/depth/camera_info",

@@ -77,6 +77,21 @@ def test_what_keeps_an_old_type_from_being_brought_up_to_date_is_told() -> None:
     assert messages.obstacle("rosgraph_msgs/msg/Log", noetic) == "ROS 2 does not ship rosgraph_msgs/msg/Log"
 
 
+def test_a_type_whose_bytes_are_read_otherwise_in_ros_2_jazzy_is_told() -> None:
+    humble, foxy = get_typestore(Stores.ROS2_HUMBLE), get_typestore(Stores.ROS2_FOXY)
+    assert messages.difference("sensor_msgs/msg/Range", humble).endswith("other fields than in ROS 2 Jazzy: variance")
+    assert "visualization_msgs/msg/Marker has other" in messages.difference("visualization_msgs/msg/MarkerArray", foxy)
+    assert messages.difference("my_msgs/msg/Odd", humble) == "ROS 2 does not ship my_msgs/msg/Odd"
+
+
+def test_every_type_of_ros_2_jazzy_is_read_as_it_is_written() -> None:
+    types = messages.standard_types()
+    assert not [why for kind in types.fielddefs if (why := messages.difference(kind, types))]
+    bare = get_typestore(Stores.EMPTY)
+    bare.register({"std_msgs/msg/Empty": ([], [])})
+    assert messages.difference("std_msgs/msg/Empty", bare) == ""
+
+
 def test_a_type_that_ros_2_does_not_ship_is_refused() -> None:
     with pytest.raises(ValueError, match="my_msgs/msg/Odd: expected a type that ROS 2 ships"):
         messages.serialise(SimpleNamespace(__msgtype__="my_msgs/msg/Odd"))

@@ -13,7 +13,7 @@ from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
 from objreg_ros.recording import messages
-from objreg_ros.recording.record import Record, Recording, Topic
+from objreg_ros.recording.record import Record, Recording, Topic, misnamed
 
 from .folders import CAMERA
 
@@ -26,7 +26,7 @@ class Shelf(Recording):
 
     def __init__(self, *msgtypes: str, span: tuple[int, int] = (0, 0), types: Typestore | None = None) -> None:
         self.path, self.kind, self.notes = Path(), "shelf", []
-        self.topics = {f"/{k}": Topic(f"/{k}", msgtype, 1) for k, msgtype in enumerate(msgtypes)}
+        self.topics = {f"/t{k}": Topic(f"/t{k}", msgtype, 1) for k, msgtype in enumerate(msgtypes)}
         self.start_ns, self.end_ns = span
         self.types, self.closed = types, 0
 
@@ -77,20 +77,40 @@ def test_the_bytes_of_what_ros_2_does_not_ship_are_refused_and_its_message_is_no
         _ = record.cdr
 
 
+def test_what_does_not_decode_reads_as_nothing() -> None:
+    def make() -> object:
+        raise ValueError("broken bytes")
+
+    assert Record.of("/camera_info", INFO, 7).read() is INFO
+    assert Record.made("/camera_info", "sensor_msgs/msg/CameraInfo", 7, make).read() is None
+
+
 def test_topics_that_ros_2_cannot_have_are_told_with_the_reason_and_no_others() -> None:
     shelf = Shelf("sensor_msgs/msg/Image", "my_msgs/msg/Odd", "rosgraph_msgs/msg/Log")
     assert shelf.obstacles() == {
-        "/1": "ROS 2 does not ship my_msgs/msg/Odd",
-        "/2": "ROS 2 does not ship rosgraph_msgs/msg/Log",
+        "/t1": "ROS 2 does not ship my_msgs/msg/Odd",
+        "/t2": "ROS 2 does not ship rosgraph_msgs/msg/Log",
     }
     assert Shelf().obstacles() == {}
+
+
+@pytest.mark.parametrize("name", ["/camera/0/info", "/a/", "/a-b", "/a//b", "/é", "/" + "a" * 250, "/", ""])
+def test_a_name_that_ros_2_does_not_allow_is_an_obstacle(name: str) -> None:
+    shelf = Shelf()
+    shelf.topics = {name: Topic(name, "sensor_msgs/msg/Image", 1)}
+    assert shelf.obstacles() == shelf.obstacles(shipped_only=False) == {name: "no valid name in ROS 2"}
+
+
+@pytest.mark.parametrize("name", ["/image", "image", "/camera_0/Info", "/_a/a__b/c9"])
+def test_a_name_that_ros_2_allows_is_none(name: str) -> None:
+    assert misnamed(name) == ""
 
 
 def test_types_are_as_the_recording_knows_them() -> None:
     markers = "visualization_msgs/msg/MarkerArray"
     assert Shelf(markers).obstacles() == {}
     old = Shelf(markers, types=get_typestore(Stores.ROS1_NOETIC)).obstacles()
-    assert list(old) == ["/0"] and "has no texture_resource" in old["/0"]
+    assert list(old) == ["/t0"] and "has no texture_resource" in old["/t0"]
 
 
 @pytest.mark.parametrize(

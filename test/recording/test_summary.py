@@ -104,6 +104,44 @@ def test_stamps_that_do_not_meet_are_said(tmp_path: Path) -> None:
     assert "colour and depth are 50 ms apart: raise segmenter.slop" in said(recording)
 
 
+def streams(path: Path, colour_hz: float, depth_hz: float, colour_from_s: float = 0.0, later_s: float = 0.0) -> str:
+    """What is said of 12 s of colour and depth; depth is stamped ``later_s`` after its time."""
+    rgb, said_at = np.zeros((4, 4, 3), np.uint8), []
+    for k in range(round(12 * colour_hz)):
+        at = round((colour_from_s + k / colour_hz) * 1e9)
+        said_at.append(Record.of("/image", messages.image(rgb, "rgb8", at, "c"), at))
+    for k in range(round(12 * depth_hz)):
+        at, stamp_ns = round(k / depth_hz * 1e9), round((k / depth_hz + later_s) * 1e9)
+        said_at.append(Record.of("/depth/image", messages.image(METRE[:4, :4], "16UC1", stamp_ns, "c"), at))
+    return said(bag(path, sorted(said_at, key=lambda record: record.stamp_ns)))
+
+
+@pytest.mark.parametrize(
+    ("colour_hz", "depth_hz", "colour_from_s"), [(30, 10, 0), (10, 30, 0), (30, 5, 0), (30, 30, 5)]
+)
+def test_streams_of_other_rates_and_beginnings_that_meet_are_fine(
+    colour_hz: float, depth_hz: float, colour_from_s: float, tmp_path: Path
+) -> None:
+    told = streams(tmp_path / "bag", colour_hz, depth_hz, colour_from_s)
+    assert "apart" not in told and "different times" not in told
+
+
+def test_how_far_the_slower_stream_is_from_the_faster_one_is_said(tmp_path: Path) -> None:
+    assert "colour and depth are 40 ms apart" in streams(tmp_path / "bag", 10, 5, later_s=0.04)
+
+
+def test_streams_one_after_the_other_are_said(tmp_path: Path) -> None:
+    assert "colour and depth were recorded at different times" in streams(tmp_path / "bag", 5, 5, colour_from_s=60)
+
+
+@pytest.mark.parametrize("stamp_ns", [0, 7 * 10**9])
+def test_stamps_that_stand_still_are_said(stamp_ns: int, tmp_path: Path) -> None:
+    rgb = np.zeros((4, 4, 3), np.uint8)
+    pictures = [Record.of("/image", messages.image(rgb, "rgb8", stamp_ns, "c"), 9 + i) for i in range(3)]
+    told = said(bag(tmp_path / "bag", pictures))
+    assert f"the first 3 stamps of colour are all {stamp_ns} ns" in told and "record it again" in told
+
+
 def test_stamps_that_go_back_are_said(tmp_path: Path) -> None:
     rgb = np.zeros((4, 4, 3), np.uint8)
     pictures = [Record.of("/image", messages.image(rgb, "rgb8", t, "c"), 9 + i) for i, t in enumerate((7, 8, 5))]

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -55,7 +56,15 @@ def test_a_folder_without_calibration_says_what_is_assumed(tmp_path: Path) -> No
     recording = open_recording(tmp_path)
     assert "default camera" in recording.notes[0]
     camera = from_msg.intrinsics(next(recording.records(["/camera_info"])).message)
-    assert (camera.fx, camera.width) == (525.0, 64)
+    assert (camera.fx, camera.width) == (52.5, 64)
+
+
+def test_what_a_folders_calibration_lacks_is_said(tmp_path: Path) -> None:
+    (tum_folder(tmp_path) / "camera.yaml").write_text("fx: 50\nfy: 50\ncx: 31.5\ncy: 23.5\ndepth_factor: 1000")
+    assert open_recording(tmp_path).notes == [
+        "camera.yaml does not give all of the camera, so this is assumed: depth_scale 5000",
+        "camera.yaml: not known, and not used: depth_factor",
+    ]
 
 
 def test_a_folder_of_pictures_named_by_time_needs_no_list(tmp_path: Path) -> None:
@@ -79,6 +88,44 @@ def test_pictures_in_any_order_lose_no_pair(lists: bool, tmp_path: Path) -> None
 def test_pictures_named_in_nanoseconds_are_read_to_the_last_digit(tmp_path: Path) -> None:
     recording = open_recording(numbered_folder(tmp_path, {"1403636579763555584": 0, "1403636579813555456": 1}))
     assert [r.stamp_ns for r in recording.records(["/image"])] == [1403636579763555584, 1403636579813555456]
+
+
+def test_files_among_the_pictures_that_are_none_are_left_out_by_name(tmp_path: Path) -> None:
+    folder = numbered_folder(tmp_path, {"1.0": 0, "2.0": 1})
+    for name in ("rgb/.DS_Store", "rgb/._1.0.png", "rgb/Thumbs.db", "depth/notes.txt"):
+        (folder / name).write_text("x")
+    recording = open_recording(folder)
+    assert recording.topics["/image"].count == 2
+    told = "no pictures, and left out: rgb/.DS_Store, rgb/._1.0.png, rgb/Thumbs.db, depth/notes.txt"
+    assert told in recording.notes
+
+
+@pytest.mark.parametrize("comment", ["\ufeff# times", "  # times", "\t# times"])
+def test_a_comment_may_follow_a_byte_order_mark_or_spaces(comment: str, tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path)
+    for name in ("associations.txt", "groundtruth.txt"):
+        (folder / name).write_text(f"{comment}\n{(folder / name).read_text()}", encoding="utf-8")
+    assert open_recording(folder).topics["/ground_truth"].count == 3
+
+
+def test_a_text_of_another_encoding_is_refused_by_name(tmp_path: Path) -> None:
+    (tum_folder(tmp_path) / "groundtruth.txt").write_bytes("# caf\xe9\n".encode("latin-1"))
+    with pytest.raises(ValueError, match=r"groundtruth\.txt: expected text in UTF-8"):
+        open_recording(tmp_path)
+
+
+def test_colour_is_not_turned_as_its_camera_was_held_since_depth_is_not(tmp_path: Path) -> None:
+    folder = numbered_folder(tmp_path, {"1.0": 0})
+    (folder / "rgb/1.0.png").unlink()
+    _, jpeg = cv2.imencode(".jpg", np.zeros((4, 8, 3), np.uint8))
+    turned = b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0\0"  # TIFF: orientation 6
+    exif = b"\xff\xe1" + (len(turned) + 8).to_bytes(2, "big") + b"Exif\0\0" + turned
+    (folder / "rgb/1.0.jpg").write_bytes(jpeg[:2].tobytes() + exif + jpeg[2:].tobytes())
+    assert cv2.imread(str(folder / "rgb/1.0.jpg")).shape == (8, 4, 3)
+    recording = open_recording(folder)
+    assert from_msg.image(next(recording.records(["/image"])).message).rgb.shape == (4, 8, 3)
+    info = next(recording.records(["/camera_info"])).message
+    assert (info.width, info.height) == (8, 4)
 
 
 def test_pictures_without_a_partner_are_counted(tmp_path: Path) -> None:
@@ -112,8 +159,20 @@ def test_a_missing_picture_is_named(tmp_path: Path) -> None:
 def test_a_broken_picture_is_named_when_it_is_wanted(tmp_path: Path) -> None:
     (tum_folder(tmp_path) / "depth/0.100000.png").write_bytes(b"no png")
     recording = open_recording(tmp_path)
-    with pytest.raises(OSError, match=r"0\.100000\.png: expected a picture"):
+    with pytest.raises(ValueError, match=r"0\.100000\.png: expected a picture"):
         _ = [r.message for r in recording.records(["/depth/image"])]
+    assert [r.read() is None for r in recording.records(["/depth/image"])] == [False, True, False]
+
+
+def test_a_broken_first_picture_keeps_no_folder_from_being_read(tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path)
+    (folder / "rgb/0.000000.png").write_bytes(b"no png")
+    info = next(open_recording(folder).records(["/camera_info"])).message
+    assert (info.width, info.height) == (64, 48)
+    for file in (folder / "rgb").iterdir():
+        file.write_bytes(b"no png")
+    with pytest.raises(ValueError, match=r"0\.000000\.png: expected a picture, got 3 that do not decode"):
+        open_recording(folder)
 
 
 @pytest.mark.parametrize(
@@ -130,7 +189,10 @@ def test_a_broken_picture_is_named_when_it_is_wanted(tmp_path: Path) -> None:
         ("camera.yaml", "525", "expected a mapping"),
         ("camera.yaml", "fx: 0", "expected numbers fx fy"),
         ("camera.yaml", "fx: wide", "expected numbers fx fy"),
-        *[("camera.yaml", f"depth_scale: {scale}", "depth_scale") for scale in ("0", "-1000", ".nan", ".inf")],
+        *[
+            ("camera.yaml", f"fx: 50\ndepth_scale: {scale}", "got: depth_scale")
+            for scale in ("0", "-1000", ".nan", ".inf")
+        ],
     ],
 )
 def test_a_broken_text_is_refused(file: str, text: str, complaint: str, tmp_path: Path) -> None:

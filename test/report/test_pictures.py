@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recording.folders import STEP_NS, records, uncalibrated
+from recording.folders import STEP_NS, records, tum_folder, uncalibrated
 
 from objreg_ros.bridge.layout import VIEW
 from objreg_ros.data import DepthImage, Intrinsics
@@ -72,6 +72,16 @@ def test_an_album_finds_the_pictures_of_a_moment(shared: Path) -> None:
         assert seen is not None and seen.rgb is not None
         assert abs(seen.stamp_ns - 1_000_000_000) < 50_000_000
         assert album.at(10**15) is None
+
+
+def test_an_album_says_that_a_picture_does_not_decode_and_has_those_beside_it(tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path, frames=4)
+    (folder / "depth/0.100000.png").write_bytes(b"no png")
+    recording = open_recording(folder)
+    album = Album(recording, choose_inputs(recording.topics))
+    stamps = sorted(round(1e9 * float(file.stem)) for file in (folder / "depth").iterdir())
+    assert [album.at(stamp) is not None for stamp in stamps] == [stamp != 100_000_000 for stamp in stamps]
+    assert "1 messages of it cannot be read" in album.lacking(100_000_000)
 
 
 @pytest.mark.parametrize("count", [0, 1])

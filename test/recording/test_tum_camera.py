@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from objreg_ros.recording.tum_camera import TumCamera, read_camera
+
+WHOLE = "fx: 585\nfy: 580\ncx: 320\ncy: 240\ndepth_scale: 1000"
+
+
+def camera(folder: Path, text: str | None, width: int = 640, height: int = 480) -> TumCamera:
+    file = folder / "camera.yaml"
+    if text is not None:
+        file.write_text(text)
+    return read_camera(file, width, height)
+
+
+def pinhole(of: TumCamera) -> tuple[float, ...]:
+    return of.intrinsics.fx, of.intrinsics.fy, of.intrinsics.cx, of.intrinsics.cy
+
+
+def test_what_the_file_gives_is_taken_without_a_note(tmp_path: Path) -> None:
+    read = camera(tmp_path, f"{WHOLE}\nwidth: 640\nheight: 480\ndistortion: [0.1, 0, 0, 0, 0.2]")
+    assert pinhole(read) == (585, 580, 320, 240) and (read.intrinsics.width, read.intrinsics.height) == (640, 480)
+    assert (read.depth_scale, read.distortion, read.notes) == (1000, (0.1, 0, 0, 0, 0.2), ())
+
+
+@pytest.mark.parametrize("width", [640, 320, 1280])
+def test_the_default_camera_sees_as_much_in_pictures_of_any_width(width: int, tmp_path: Path) -> None:
+    read = camera(tmp_path, None, width, width * 3 // 4)
+    share = width / 640
+    assert pinhole(read) == (525 * share, 525 * share, 320 * share - 0.5, 240 * share - 0.5)
+    (note,) = read.notes
+    assert f"default camera is assumed (fx {525 * share:g}, fy " in note and "depth_scale 5000" in note
+
+
+def test_what_the_file_lacks_is_assumed_and_said_each_by_name(tmp_path: Path) -> None:
+    read = camera(tmp_path, "fx: 300\nfy: 300\ncx:\n", 320, 240)
+    assert pinhole(read) == (300, 300, 159.5, 119.5) and read.depth_scale == 5000
+    assert read.notes == (
+        "camera.yaml does not give all of the camera, so this is assumed: cx 159.5, cy 119.5, depth_scale 5000",
+    )
+
+
+def test_what_nobody_knows_is_said(tmp_path: Path) -> None:
+    assert camera(tmp_path, f"{WHOLE}\nmaker: Microsoft\n2: x").notes == (
+        "camera.yaml: not known, and not used: maker, 2",
+    )
+
+
+@pytest.mark.parametrize("text", ["Camera.fx: 585.0\nDepthMapFactor: 1000", "depth_scale: 1000"])
+def test_a_file_without_a_camera_is_refused_with_what_it_has(text: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=rf"expected fx, fy, cx, cy .*got {text.split(':')[0]}.*remove the file"):
+        camera(tmp_path, text)
+
+
+@pytest.mark.parametrize("value", ["0.1", "none", "{a: 1}", "[a, b]"])
+def test_distortion_that_is_no_list_of_numbers_is_refused(value: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"camera\.yaml: expected numbers .* a list of them as distortion, got: "):
+        camera(tmp_path, f"{WHOLE}\ndistortion: {value}")
+
+
+def test_a_depth_scale_that_divides_nothing_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"depth_scale 0\.0, which is none above 0"):
+        camera(tmp_path, "fx: 500\ndepth_scale: 0")
