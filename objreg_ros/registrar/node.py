@@ -52,6 +52,7 @@ class RegistrarNode(MatchingDoor):
         self._counts = dict(self._registrar.counts())
         self._accepted, self._unsearched, self._refused = 0, 0, Counter[str]()
         self._without_odometry = 0  # frames
+        self._camera: str | None = None  # the frame_id of the last frame
         self._last_refusals: dict[str, str] = {}  # by reason
         self._last_moved: dict[str, float] = {}  # m by label, of the last closure that found any
         self._names: Mapping[int, str] = {}
@@ -106,6 +107,7 @@ class RegistrarNode(MatchingDoor):
         if not self._enabled:
             raise DroppedError("disabled", "")
         frame = self._frame(payload)
+        self._watch_camera(frame.frame_id)
         self._scene.see(frame)
         with self._tracking, self.ledger.timed("track"):
             stretch = self._registrar.track(frame)
@@ -120,6 +122,16 @@ class RegistrarNode(MatchingDoor):
             self._odom_frame = odom[0].frame_id
         topics = ("objects", "view", "view/camera_info", "gravity", "labels", "odom")
         return self.read("frame", from_msg.frame, *(match[topic] for topic in topics), self._T_base_camera)
+
+    def _watch_camera(self, frame_id: str) -> None:
+        """Say so where the frames of two cameras come in turn."""
+        if self._camera not in (None, frame_id):
+            self.throttled.remind(
+                "camera",
+                f"expected frames of one camera, got one of {frame_id!r} after one of {self._camera!r}: every change "
+                "begins another session; give each camera a registrar of its own",
+            )
+        self._camera = frame_id
 
     def _search(self, job: tuple[int, Stretch]) -> None:
         self.conclude(job[0], lambda: self._find(job[1], "search", self._seconds))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The door of the registrar where its store does not let it."""
+"""The door of the registrar where keyframes wait, cameras change and its store does not let it."""
 
 from __future__ import annotations
 
@@ -18,10 +18,12 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 import rclpy
 from std_srvs.srv import Trigger
 
+from objreg_ros.registrar.keyframes import Stretch
 from objreg_ros.registrar.node import RegistrarNode
+from objreg_ros.registrar.registrar import Outcome
 from objreg_ros.registrar.store import Store
 
-from .samples import box, frame
+from .samples import SECOND, box, frame
 
 CUP = (box("cup", (0, 0, 1)),)
 Making = Callable[[], RegistrarNode]
@@ -93,6 +95,40 @@ def test_messages_are_heard_while_a_reset_waits_for_the_search_in_hand(make: Mak
     answer, heard = call(node, "reset")
     searching.join()
     assert answer.success and heard >= 5
+    node.close()
+
+
+def test_the_keyframe_that_a_save_ends_comes_after_those_that_wait(
+    make: Making, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node, stored = make(), []
+    search = node._registrar.search
+
+    def slow(stretch: Stretch, seconds: float) -> Outcome:
+        time.sleep(0.2)
+        stored.append(stretch.frames[0].stamp_ns // SECOND)
+        return search(stretch, seconds)
+
+    monkeypatch.setattr(node._registrar, "search", slow)
+    for seconds in (0, 10):
+        node._registrar.track(frame(seconds, CUP))
+        stretch = node._registrar.end()
+        assert stretch is not None
+        node.accept(seconds * SECOND)
+        node.searcher.put((seconds * SECOND, stretch))
+    node._registrar.track(frame(20, CUP))
+    answer, _ = call(node, "save")
+    assert answer.success and stored == [0, 10, 20]
+    node.close()
+
+
+def test_frames_of_two_cameras_are_told_with_what_to_do(make: Making) -> None:
+    node, said = make(), []
+    node.throttled._write = said.append
+    for frame_id in ("front", "front", "rear", "front"):
+        node._watch_camera(frame_id)
+    (line,) = said
+    assert "got one of 'rear' after one of 'front'" in line and "a registrar of its own" in line
     node.close()
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -114,6 +115,14 @@ def test_depth_of_another_frame_than_the_picture_is_told_with_what_to_do(made: C
     camera.see(1.2, "depth_eye", "colour_eye")
     (line,) = camera.said
     assert "got colour in 'colour_eye' and depth in 'depth_eye'" in line and "align_depth.enable:=true" in line
+
+
+def test_frames_without_a_level_odometry_that_is_asked_for_are_told(made: Callable[..., Camera]) -> None:
+    camera = made()
+    camera.door._inputs = replace(camera.door._inputs, level_odom=True)
+    camera.see(1.2, "eye", "eye")
+    (line,) = camera.said
+    assert "as level_odom is on, got none: gravity is estimated" in line
 
 
 def test_millimetres_as_floats_are_told_with_what_to_do(made: Callable[..., Camera]) -> None:
