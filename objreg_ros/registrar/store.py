@@ -28,6 +28,8 @@ from objreg_ros.registrar.sighting import Sighting
 from objreg_ros.registrar.store_file import StoreError, birth, check, create, read_only_uri, renew, require_place
 
 CACHED = 64  # decoded keyframes in memory, about 1 MB each
+MOST_CLOSURES = 100_000  # of 1.5 kB; the oldest are forgotten
+OLDEST_CLOSURES = "DELETE FROM closure WHERE id IN (SELECT id FROM closure ORDER BY id LIMIT ?)"
 SIGHTINGS = (
     "SELECT object.keyframe, session, stamp_ns, instance, label, score, extent, descriptor, position,"
     " object.camera, travelled, by_odometry, landmark, R_landmark_session"
@@ -47,7 +49,7 @@ class Store:
         self.path = str(Path(path).expanduser().resolve()) if str(path) else ""  # of a link what it leads to
         self._cache: OrderedDict[int, Keyframe] = OrderedDict()
         self._sessions: dict[int, int] = {}  # of the keyframes, the oldest first: to count them is to read the file
-        self._closures = 0  # that are stored: they are never forgotten, and to count them is to read them all
+        self._closures = 0  # that are stored: to count them is to read them all
         self._claim: Claim | None = None
         if not self.path and not read_only:
             self._connection = _connect(":memory:")
@@ -95,13 +97,16 @@ class Store:
                 _insert(transaction, "object", object_row(item, sighting))
             newest = max((sighting.landmark for sighting in sightings), default=0)
             transaction.execute("UPDATE highest SET landmark = MAX(landmark, ?)", (newest,))
-            rows = [_closure_row(closure) for closure in closures]
-            for row in rows:
-                _insert(transaction, "closure", row)
+            stored = self._closures
+            for closure in closures:
+                _insert(transaction, "closure", _closure_row(closure))
+                stored += 1
+            if stored > MOST_CLOSURES:
+                transaction.execute(OLDEST_CLOSURES, (stored - MOST_CLOSURES,))
             for old, merge in (merged or {}).items():
                 _rename(transaction, old, merge)
         self._sessions[keyframe.keyframe_id] = keyframe.session
-        self._closures += len(rows)
+        self._closures = min(stored, MOST_CLOSURES)
         self._remember(keyframe)
 
     def keyframe(self, keyframe_id: int) -> Keyframe:
@@ -138,7 +143,7 @@ class Store:
         return list(islice(self._sessions, max(len(self._sessions) - most, 0)))
 
     def remove(self, keyframe_ids: Sequence[int]) -> None:
-        """Forget keyframes and their objects; their closures stay."""
+        """Forget keyframes and their objects; their closures stay, up to `MOST_CLOSURES`."""
         with self._told("remove keyframes"), self._connection as transaction:
             transaction.executemany("DELETE FROM keyframe WHERE id = ?", [(k,) for k in keyframe_ids])
         for keyframe_id in keyframe_ids:

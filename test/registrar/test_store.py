@@ -323,6 +323,19 @@ def test_closures_are_counted_over_restarts_and_outlive_their_keyframes(tmp_path
         store.close()
 
 
+def test_the_oldest_closures_make_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store_module, "MOST_CLOSURES", 3)
+    store = Store()
+    for k in range(4):
+        closures = [
+            LoopClosure(from_ns=n, to_ns=n + 1, T_from_to=np.eye(4), covariance=np.eye(6), labels=("cup",))
+            for n in (2 * k, 2 * k + 1)
+        ]
+        written = keyframe(store.next_keyframe(), float(k))
+        store.add(written, sightings_of(written), closures)
+    assert [closure.from_ns for closure in store.closures()] == [5, 6, 7] and store.counts()["closures"] == 3
+
+
 def test_a_second_writer_is_refused_while_readers_see_what_is_written(tmp_path: Path) -> None:
     path = tmp_path / "place.db"
     store = Store(path)
