@@ -12,7 +12,7 @@ what is remembered      `keyframe`, `sighting`, `landmarks`; in `store` through 
 which to try            `retrieve`, by `likest` objects: `descriptor` and `labels`
 poses from chains       `engine` finishes the `shortlist` of the `hypotheses`, fed by `prepared`: `features` and
                         `consensus` on the context, `scene_search` (`shape`, `silhouette`, `shape_search`, `shape_hull`,
-                        `shape_icp`, `shape_score`, `worth`, `scrutiny`) on objects
+                        `shape_icp`, `shape_score`, `worth`, `scrutiny`) on objects; `alternatives` to a lone one's
 refinement              `icp` brings many to their basin; `refine` ends a few, with `direct` where there is grey
                         and `contradiction` to say how well the surfaces hold the pose; `liking` compares
                         poses near each other; `levelling` ends with what gravity tells

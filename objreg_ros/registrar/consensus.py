@@ -79,6 +79,8 @@ def _distinct(T, centres, order, limit, cosine, distance):  # type: ignore[no-un
     chosen = np.empty(limit, np.int64)
     n = 0
     for k in order:
+        if n == limit:
+            break
         known = False
         for m in range(n):
             c = chosen[m]
@@ -93,8 +95,6 @@ def _distinct(T, centres, order, limit, cosine, distance):  # type: ignore[no-un
         if not known:
             chosen[n] = k
             n += 1
-            if n == limit:
-                break
     return chosen[:n]
 
 

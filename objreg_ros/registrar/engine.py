@@ -12,22 +12,19 @@ from dataclasses import replace
 import numpy as np
 
 from objreg_ros.data import Alignment, Array
+from objreg_ros.registrar.alternatives import alternatives
 from objreg_ros.registrar.candidate import Candidate
 from objreg_ros.registrar.consensus import near
 from objreg_ros.registrar.covariance import covariance_of, spread_of, worst_translation
-from objreg_ros.registrar.evidence import gather, lead, resistance_of, surroundings_of, unhidden, worth
+from objreg_ros.registrar.evidence import gather, lead, resistance_of, surroundings_of, worth
 from objreg_ros.registrar.hypotheses import Hypothesis
 from objreg_ros.registrar.keyframe import Keyframe
 from objreg_ros.registrar.levelling import levelling
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Pair, Pantry
 from objreg_ros.registrar.refine import refine, warp
-from objreg_ros.registrar.scene_search import half_turned
 from objreg_ros.registrar.shortlist import shortlist
 from objreg_ros.registrar.sliding import preferred, steadied
-from objreg_ros.registrar.verify import verify
-
-HOPELESS = 2.0  # times the violations that the gate allows: what is not refined any more
 
 
 class Engine:
@@ -56,7 +53,7 @@ class Engine:
             return ()
         candidates = merged([self._judge(pair, seed, seeds) for seed in best], pair.source.middle, self._params)
         rivals = [
-            rival for one in candidates if self._promises(one, candidates[0]) for rival in self._turned(pair, one)
+            rival for one in candidates if self._promises(one, candidates[0]) for rival in self._others(pair, one)
         ]
         if rivals:
             candidates = merged([*candidates, *rivals], pair.source.middle, self._params)
@@ -74,19 +71,11 @@ class Engine:
         candidate = gather(source, target, alignment, (seed.chain, *agreeing), params)
         return replace(candidate, alignment=held(alignment)) if is_held(candidate, params) else candidate
 
-    def _turned(self, pair: Pair, candidate: Candidate) -> list[Candidate]:
-        """The half turn of a lone object's pose, where the views may allow it: the gate has to know of it."""
-        if len(candidate.explained) != 1:
-            return []
+    def _others(self, pair: Pair, candidate: Candidate) -> list[Candidate]:
+        """What else a lone object's pose could be, for all that the views say: the gate has to know of it."""
         source, target, params = pair.source, pair.target, self._params
-        T = half_turned(source, target, candidate.explained[0], candidate.T_target_source, params)
-        if T is None:
-            return []
-        seen = verify(source.sight, target.sight, T, params, params.grey_points)
-        behind = unhidden(candidate.verification) - unhidden(seen)
-        if behind > params.finished_margin or seen.violations > HOPELESS * params.max_violations:
-            return []
-        return [gather(source, target, refine(source, target, T, params), ("objects",), params)]
+        poses = alternatives(source, target, candidate, params)
+        return [gather(source, target, refine(source, target, T, params), ("objects",), params) for T in poses]
 
     def _promises(self, candidate: Candidate, best: Candidate) -> bool:
         """Whether the gate may come to a candidate, so that it is worth pushing."""

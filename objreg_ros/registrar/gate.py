@@ -235,8 +235,12 @@ def _held(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
     The covariance is that of the residuals and of a warped depth, less what views and gravity tell: two views may share
     few patches on one side, which agree with many poses. A camera that goes sideways and turns to keep looking at one
-    far thing sees next to no difference.
+    far thing sees next to no difference. Where a turn or a shift is left free by the surfaces and by the views alike,
+    nothing is known of it, however firmly they hold the rest.
     """
+    free = len(candidate.alignment.slack)
+    if free:
+        return Reason.SLACK, f"{free} of 6 directions held by neither surfaces nor views"
     sigma, drop = worst_translation(spread_of(candidate.alignment, params) + candidate.warp), candidate.resistance
     least = _least_fall(candidate, sigma, params)
     if drop is None and sigma > params.max_slack_sigma:
@@ -271,7 +275,8 @@ def _several_otherwise(candidate: Candidate, params: RegistrarParams) -> bool:
 def _surroundings(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
     """What is around a lone object, or around two, must pass by itself what whole views do: they may have moved.
 
-    Around a lone one there must be enough of it, too, where fewer chains than should came to the pose.
+    Its print may not agree much less than that of the whole either: what moved carries its own along. Around a lone one
+    there must be enough of it, too, where fewer chains than should came to the pose.
     """
     around, seen = candidate.surroundings, candidate.verification
     if around is None:
@@ -279,6 +284,9 @@ def _surroundings(candidate: Candidate, params: RegistrarParams) -> Refusal | No
     beside = f"without the {' and the '.join(pair.label for pair in candidate.explained)}"
     if _is_alone(candidate, params) and around.tested < params.min_surroundings * seen.tested:
         return Reason.LOW_OVERLAP, f"{beside} {around.tested} pixels < {params.min_surroundings:.2f} of {seen.tested}"
+    if around.texture is not None and (seen.texture or 0.0) - around.texture > params.max_fall_around:
+        fall = f"by more than {params.max_fall_around:.2f} less than {seen.texture:.2f}"
+        return Reason.TEXTURE, f"{beside} correlation {around.texture:.2f}, {fall}"
     rest = replace(candidate, verification=around)
     refusals = (check(rest, params) for check in (_overlap, _free_space, _texture))
     return next(((reason, f"{beside} {told}") for reason, told in filter(None, refusals)), None)

@@ -187,6 +187,12 @@ class RegistrarParams(Params):
     search_turns: tuple[float, ...] = param(
         (5.0,), "turns about the objects, each way, from which grey finishes a doubtful pose too", "deg"
     )
+    turns_around: tuple[float, ...] = param(
+        (5.0, 10.0, 15.0),
+        "turns about a lone object, each way, at which the search about its pose looks for others that views like",
+        "deg",
+    )
+    searched_around: int = param(4, "best others of the search about a lone object's pose that are finished", ge=0)
     searched: int = param(2, "best places of the search about a doubtful position that grey finishes", ge=1)
     steadying_texture: float = param(
         0.5, "correlation of grey from which on a position is held as far as pushes are resisted", ge=0.0, le=1.0
@@ -299,6 +305,12 @@ class RegistrarParams(Params):
     )
     max_violations_doubtful: float = param(
         0.02, "share of tested pixels in seen free space for which V need not make up", ge=0.0, le=1.0
+    )
+    max_fall_around: float = param(
+        0.3,
+        "most by which the grey may correlate less without the one or two objects that a pose is of, where they fill "
+        "much of a view: what moved carries its print along",
+        ge=0.0,
     )
     doubt_factor: float = param(
         1.5,

@@ -63,3 +63,12 @@ def pushed(T_target_source: Array, motions: Array) -> Array:
     """The poses (..., 4, 4) that a pose (4, 4) becomes by motions [t r] (..., 6)."""
     R, t = T_target_source[:3, :3], T_target_source[:3, 3]
     return pose(rotation_from_vector(motions[..., 3:]) @ R, t + motions[..., :3])
+
+
+def turned_about(T_target_source: Array, middle: Array, up: Array, turns: Array) -> Array:
+    """The poses (K, 4, 4) that a pose (4, 4) becomes by ``turns (K,)`` rad about ``up (3,)`` through ``middle (3,)``.
+
+    Both in the target's axes.
+    """
+    R = rotation_from_vector(np.asarray(turns)[:, None] * up)
+    return np.asarray(pose(R, middle - R @ middle) @ T_target_source)

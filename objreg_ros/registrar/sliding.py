@@ -13,13 +13,13 @@ import cv2
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.geometry import pose, rotation_from_vector, transform
+from objreg_ros.geometry import transform
 from objreg_ros.registrar.direct import finish
 from objreg_ros.registrar.liking import gain, liked
 from objreg_ros.registrar.objects import explain
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
-from objreg_ros.registrar.pushing import Stand, pushed
+from objreg_ros.registrar.pushing import Stand, pushed, turned_about
 from objreg_ros.registrar.texture import texture
 from objreg_ros.registrar.verify import rank, verify
 
@@ -112,8 +112,7 @@ def _turned(source: Prepared, target: Prepared, T_target_source: Array, params: 
         return []
     middle = transform(T_target_source, source.centroids.mean(axis=0))
     turns = np.radians([way * turn for turn in params.search_turns for way in (-1, 1)])
-    R = rotation_from_vector(turns[:, None] * target.up)
-    return list(pose(R, middle - R @ middle) @ T_target_source)
+    return list(turned_about(T_target_source, middle, target.up, turns))
 
 
 def _peaks(V: Array, width: int) -> list[int]:

@@ -69,6 +69,12 @@ def test_poses_that_are_the_same_come_back_once() -> None:
     assert chosen == [1, 2]
 
 
+@pytest.mark.parametrize(("limit", "count"), [(0, 0), (1, 1), (2, 2), (5, 3)])
+def test_no_more_poses_come_back_than_are_wanted(limit: int, count: int) -> None:
+    apart = np.stack([TUMBLE, YAW, np.eye(4)])
+    assert distinct(apart, np.array([1.0, 3.0, 2.0]), np.zeros(3), limit, 0.1, 0.05) == [1, 2, 0][:count]
+
+
 def test_the_same_matches_give_the_same_poses() -> None:
     first, second = (poses(matches(YAW, 10, 50), UP, UP, 0.06, 0.3, 5) for _ in range(2))
     assert all(np.array_equal(a[0], b[0]) and a[1] == b[1] for a, b in zip(first, second, strict=True))

@@ -87,22 +87,15 @@ def test_a_pose_is_steadied_where_it_was_pushed_and_does_not_slide(
         np.testing.assert_allclose(added, more * np.eye(6), atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("share", "violations", "rivals"), [(0.9, 0.0, 1), (1.1, 0.0, 0), (0.9, 2.1 * PARAMS.max_violations, 0)]
-)
-def test_the_half_turn_of_a_lone_object_is_a_rival_where_it_is_not_far_behind_nor_floats(
-    engine: Engine, monkeypatch: pytest.MonkeyPatch, share: float, violations: float, rivals: int
+def test_whatever_else_a_lone_objects_pose_could_be_is_refined_and_gathered_as_a_rival(
+    engine: Engine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    one, half, views = candidate(explained=(ObjectPair(0, 0, "cup"),), score=0.8, occluded=0.1), moved(0.4), "views"
-    behind = share * PARAMS.finished_margin
-    seen = replace(one.verification, score=0.8 + 0.1 - 0.3 - behind, occluded=0.3, violations=violations)
-    monkeypatch.setattr(engine_module, "half_turned", lambda *_: half)
-    monkeypatch.setattr(engine_module, "verify", lambda source, target, T, *_: seen if T is half else None)
-    monkeypatch.setattr(engine_module, "refine", lambda *_: views)
-    monkeypatch.setattr(engine_module, "gather", lambda source, target, alignment, *_: (alignment, one))
-    pair: Any = SimpleNamespace(source=SimpleNamespace(sight=None), target=SimpleNamespace(sight=None))
-    assert engine._turned(pair, one) == rivals * [(views, one)]
-    assert engine._turned(pair, candidate()) == []
+    one, others = candidate(explained=(ObjectPair(0, 0, "cup"),)), [moved(0.4), moved(0.2)]
+    monkeypatch.setattr(engine_module, "alternatives", lambda *_: others)
+    monkeypatch.setattr(engine_module, "refine", lambda source, target, T, *_: T)
+    monkeypatch.setattr(engine_module, "gather", lambda source, target, found, chains, *_: (found, chains))
+    pair: Any = SimpleNamespace(source=None, target=None)
+    assert engine._others(pair, one) == [(T, ("objects",)) for T in others]
 
 
 def test_what_is_held_has_no_slack_at_all() -> None:

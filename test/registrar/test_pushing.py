@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.geometry import inverse, pose_error
+from objreg_ros.geometry import inverse, pose_error, transform
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import prepare
-from objreg_ros.registrar.pushing import Stand, pushed
+from objreg_ros.registrar.pushing import Stand, pushed, turned_about
 from objreg_ros.registrar.verify import rank
 
 from .rooms import keyframe, seen_from
@@ -28,6 +28,15 @@ def test_a_push_moves_the_camera_where_it_stands() -> None:
     moved = pushed(TRUTH, np.array([0.1, 0.0, 0.0, 0.0, 0.0, np.radians(2.0)]))
     rotation, centimetres = pose_error(moved, TRUTH)
     assert rotation == pytest.approx(2.0) and centimetres == pytest.approx(10.0)
+
+
+def test_a_pose_is_turned_about_a_place_that_stays_where_it_is() -> None:
+    place, up = np.array([0.3, 0.1, 1.2]), np.array([0.0, -1.0, 0.0])
+    (turned,) = turned_about(TRUTH, place, up, np.radians([15.0]))
+    there = transform(inverse(TRUTH), place)
+    np.testing.assert_allclose(transform(turned, there), place, atol=1e-12)
+    assert pose_error(turned, TRUTH)[0] == pytest.approx(15.0)
+    np.testing.assert_allclose(turned[:3, :3] @ TRUTH[:3, :3].T @ up, up, atol=1e-12)
 
 
 def test_the_truth_falls_whichever_way_it_is_pushed_and_the_farther_the_more() -> None:

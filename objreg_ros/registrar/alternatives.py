@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Other poses of a lone object that may be the true one, for all that the views say: the gate has to know of them.
+
+Chains may miss the truth and agree on a pose beside it: an edge and a strip of table fit a decimetre farther on, and
+the front of a screen fits its back. Poses that lie upon each other with nothing else to hold them are looked for where
+chains do not look: turned half, and all around.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.geometry import transform
+from objreg_ros.registrar.candidate import Candidate
+from objreg_ros.registrar.consensus import distinct, near
+from objreg_ros.registrar.direct import finish
+from objreg_ros.registrar.evidence import unhidden
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.prepared import Prepared
+from objreg_ros.registrar.pushing import turned_about
+from objreg_ros.registrar.scene_search import half_turned
+from objreg_ros.registrar.verify import rank, verify
+
+HOPELESS = 2.0  # times the violations that the gate allows: what is not refined any more
+APART = (np.radians(4.0), 0.05)  # rad and m: poses are distinct beyond
+
+
+def alternatives(source: Prepared, target: Prepared, candidate: Candidate, params: RegistrarParams) -> list[Array]:
+    """Poses (4, 4) that views like nearly as well as a candidate's of one object; none for any other candidate."""
+    if len(candidate.explained) != 1:
+        return []
+    turned = half_turned(source, target, candidate.explained[0], candidate.T_target_source, params)
+    found = [*([] if turned is None else [turned]), *_around(source, target, candidate, params)]
+    return [T for T in found if _is_hopeful(source, target, T, candidate, params)]
+
+
+def _around(source: Prepared, target: Prepared, candidate: Candidate, params: RegistrarParams) -> list[Array]:
+    """The poses about a candidate's that views like best, finished by grey; those that agree with it are left out.
+
+    All are of a grid of upright turns about the object and shifts across the vertical; none where that is unknown.
+    """
+    if target.up is None:
+        return []
+    apart = np.radians(params.agreement_rotation), params.agreement_translation
+    grid = _grid(source, target, candidate, params)
+    grid = grid[~near(grid, candidate.T_target_source, source.middle, *apart)]
+    V = rank(source.sight, target.sight, grid, params, params.quick_sample)
+    best = distinct(grid, V, source.middle, params.searched_around, *APART)
+    return [finish(source, target, grid[k], params)[0] for k in best]
+
+
+def _grid(source: Prepared, target: Prepared, candidate: Candidate, params: RegistrarParams) -> Array:
+    """The candidate's pose (K, 4, 4) turned about its object and shifted across the vertical."""
+    T, up = candidate.T_target_source, np.asarray(target.up, float)
+    middle = transform(T, source.centroids[candidate.explained[0].source])
+    turns = np.radians([0.0, *params.turns_around, *(-turn for turn in params.turns_around)])
+    turned = turned_about(T, middle, up, turns)
+    steps = params.search_step * np.arange(-params.search_steps, params.search_steps + 1)
+    shifts = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2) @ np.linalg.svd(up[None])[2][1:]
+    grid = np.repeat(turned[:, None], len(shifts), axis=1)
+    grid[..., :3, 3] += shifts
+    return grid.reshape(-1, 4, 4)
+
+
+def _is_hopeful(source: Prepared, target: Prepared, T: Array, candidate: Candidate, params: RegistrarParams) -> bool:
+    """Whether a pose may come near to a candidate in what it is worth, had all that is hidden been seen to agree."""
+    seen = verify(source.sight, target.sight, T, params, params.grey_points)
+    behind = unhidden(candidate.verification) - unhidden(seen)
+    return behind <= params.finished_margin and seen.violations <= HOPELESS * params.max_violations
