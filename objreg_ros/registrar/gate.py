@@ -254,11 +254,13 @@ def _least_fall(candidate: Candidate, sigma: float, params: RegistrarParams) -> 
     """What V must fall by over a push of a position that the surfaces know to ``sigma`` m.
 
     V falls with the square of a push, so it grows with the variance, up to where the views by themselves hold the pose
-    firmly: then it is known, however far the surfaces would let it slide. Several objects that look otherwise leave
-    more to the views, and so do two that one chain brought together; a lone one has checks of its own.
+    firmly: then it is known, however far the surfaces would let it slide. It grows with the square of the distance of
+    what is seen, too: from afar a shift and a turn look alike, and depth is known as badly. Several objects that look
+    otherwise leave more to the views, and so do two that one chain brought together; a lone one has checks of its own.
     """
-    least = params.rival_margin * max(1.0, (sigma / params.max_slack_sigma) ** 2)
-    least = max(params.rival_margin, min(params.firm_margin, least))
+    range_m = float(np.linalg.norm(candidate.alignment.middle))
+    loose = max(1.0, sigma / params.max_slack_sigma, range_m / params.far_range)
+    least = max(params.rival_margin, min(params.firm_margin, params.rival_margin * loose**2))
     two = 2 <= len(candidate.explained) < params.min_objects_plain and _few_chains(candidate, params)
     return least * (params.doubt_factor if two or _several_otherwise(candidate, params) else 1.0)
 

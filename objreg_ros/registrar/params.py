@@ -307,7 +307,7 @@ class RegistrarParams(Params):
         0.02, "share of tested pixels in seen free space for which V need not make up", ge=0.0, le=1.0
     )
     max_fall_around: float = param(
-        0.3,
+        0.25,
         "most by which the grey may correlate less without the one or two objects that a pose is of, where they fill "
         "much of a view: what moved carries its print along",
         ge=0.0,
@@ -362,6 +362,13 @@ class RegistrarParams(Params):
     max_translation: float = param(5.0, "largest distance between the two cameras", "m", ge=0.0)
     max_slack_sigma: float = param(
         0.03, "standard deviation of a position beyond which the views must resist a push more", "m", ge=0.001
+    )
+    far_range: float = param(
+        2.5,
+        "distance of what is seen, its middle, beyond which views must resist a push more, by its square: from afar a "
+        "turn and a shift look alike",
+        "m",
+        ge=0.1,
     )
     odometry_sigmas: float = param(4.0, "largest distance from odometry in its standard deviations", ge=0.0)
 

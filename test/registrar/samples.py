@@ -111,6 +111,7 @@ def candidate(T: Array | None = None, **evidence: object) -> Candidate:
         converged=bool(evidence.pop("converged", True)),
         slack=evidence.pop("slack", np.zeros((0, 6))),
         held=evidence.pop("held", np.zeros((0, 6))),
+        middle=evidence.pop("middle", np.zeros(3)),
     )
     rest: dict[str, object] = {
         "chain": "objects",

@@ -409,6 +409,18 @@ def test_the_worse_the_surfaces_hold_a_pose_the_more_the_views_must() -> None:
     assert refuse(candidate(**loose, resistance=least - 0.01), PARAMS) is not None
 
 
+def test_the_farther_away_what_is_seen_the_more_the_views_must_hold_it() -> None:
+    near, far = (
+        candidate(resistance=1.9 * PARAMS.rival_margin, middle=np.array([0.0, 0.6, 0.8]) * share)
+        for share in (PARAMS.far_range, 1.4 * PARAMS.far_range)
+    )
+    assert refuse(near, PARAMS) is None
+    refusal = refuse(far, PARAMS)
+    assert refusal is not None and refusal[0] is Reason.SLACK
+    assert refuse(replace(far, resistance=2.0 * PARAMS.rival_margin), PARAMS) is None
+    assert refuse(replace(far, resistance=None), PARAMS) is None
+
+
 def test_several_objects_that_look_otherwise_leave_more_to_the_views() -> None:
     least = PARAMS.rival_margin
     several = {"explained": (ObjectPair(0, 0, "cup"), ObjectPair(1, 1, "book")), "resistance": 1.2 * least}
