@@ -23,7 +23,8 @@ from objreg_ros.registrar.scene_search import half_turned
 from objreg_ros.registrar.verify import rank, verify
 
 HOPELESS = 2.0  # times the violations that the gate allows: what is not refined any more
-APART = (np.radians(4.0), 0.05)  # rad and m: poses are distinct beyond
+APART = (np.radians(4.0), 0.05)  # rad and m: poses are distinct beyond, before grey finishes them
+ALIKE = (np.radians(1.0), 0.02)  # and after
 
 
 def alternatives(source: Prepared, target: Prepared, candidate: Candidate, params: RegistrarParams) -> list[Array]:
@@ -36,18 +37,21 @@ def alternatives(source: Prepared, target: Prepared, candidate: Candidate, param
 
 
 def _around(source: Prepared, target: Prepared, candidate: Candidate, params: RegistrarParams) -> list[Array]:
-    """The poses about a candidate's that views like best, finished by grey; those that agree with it are left out.
+    """The poses about a candidate's that views like best, finished by grey, but for what comes back to it.
 
-    All are of a grid of upright turns about the object and shifts across the vertical; none where that is unknown.
+    They start where they do not agree with it, in a grid of upright turns about the object and shifts across the
+    vertical; none where that is unknown.
     """
     if target.up is None:
         return []
-    apart = np.radians(params.agreement_rotation), params.agreement_translation
-    grid = _grid(source, target, candidate, params)
-    grid = grid[~near(grid, candidate.T_target_source, source.middle, *apart)]
+    agreeing = np.radians(params.agreement_rotation), params.agreement_translation
+    T_known, middle, grid = candidate.T_target_source, source.middle, _grid(source, target, candidate, params)
+    grid = grid[~near(grid, T_known, middle, *agreeing)]
     V = rank(source.sight, target.sight, grid, params, params.quick_sample)
-    best = distinct(grid, V, source.middle, params.searched_around, *APART)
-    return [finish(source, target, grid[k], params)[0] for k in best]
+    best = distinct(grid, V, middle, params.searched_around, *APART)
+    finished = np.array([finish(source, target, grid[k], params)[0] for k in best]).reshape(-1, 4, 4)
+    finished = finished[~near(finished, T_known, middle, *ALIKE)]
+    return list(finished[distinct(finished, np.arange(len(finished), 0, -1), middle, len(finished), *ALIKE)])
 
 
 def _grid(source: Prepared, target: Prepared, candidate: Candidate, params: RegistrarParams) -> Array:
