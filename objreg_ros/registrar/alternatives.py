@@ -2,8 +2,7 @@
 """Other poses of a lone object that may be the true one, for all that the views say: the gate has to know of them.
 
 Chains may miss the truth and agree on a pose beside it: an edge and a strip of table fit a decimetre farther on, and
-the front of a screen fits its back. Poses that lie upon each other with nothing else to hold them are looked for where
-chains do not look: turned half, and all around.
+the front of a screen fits its back. So others are looked for where chains do not look: turned half, and all around.
 """
 
 from __future__ import annotations
@@ -18,17 +17,20 @@ from objreg_ros.registrar.direct import finish
 from objreg_ros.registrar.evidence import unhidden
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
-from objreg_ros.registrar.pushing import turned_about
+from objreg_ros.registrar.pushing import square, turned_about
 from objreg_ros.registrar.scene_search import half_turned
 from objreg_ros.registrar.verify import rank, verify
 
 HOPELESS = 2.0  # times the violations that the gate allows: what is not refined any more
-APART = (np.radians(4.0), 0.05)  # rad and m: poses are distinct beyond, before grey finishes them
-ALIKE = (np.radians(1.0), 0.02)  # and after
+APART = (np.radians(4.0), 0.06)  # rad and m: starts are distinct beyond
+BESIDE = 1.1  # tolerances of agreement off: where the search around a pose begins, rounding aside
 
 
 def alternatives(source: Prepared, target: Prepared, candidate: Candidate, params: RegistrarParams) -> list[Array]:
-    """Poses (4, 4) that views like nearly as well as a candidate's of one object; none for any other candidate."""
+    """Poses (4, 4) that views like less than a candidate's of one object by ``finished_margin`` at most.
+
+    None for any other candidate. Some may be its own again once they are refined.
+    """
     if len(candidate.explained) != 1:
         return []
     turned = half_turned(source, target, candidate.explained[0], candidate.T_target_source, params)
@@ -37,21 +39,20 @@ def alternatives(source: Prepared, target: Prepared, candidate: Candidate, param
 
 
 def _around(source: Prepared, target: Prepared, candidate: Candidate, params: RegistrarParams) -> list[Array]:
-    """The poses about a candidate's that views like best, finished by grey, but for what comes back to it.
+    """The poses about a candidate's that views like best, finished by grey.
 
-    They start where they do not agree with it, in a grid of upright turns about the object and shifts across the
-    vertical; none where that is unknown.
+    They start in a grid of upright turns about the object and shifts across the vertical, where they do not agree with
+    the candidate. None without grey or gravity in both.
     """
-    if target.up is None:
+    told = source.sight.textured and target.sight.textured and target.up is not None
+    if not told or params.searched_around == 0:
         return []
+    grid, middle = _grid(source, target, candidate, params), source.middle
     agreeing = np.radians(params.agreement_rotation), params.agreement_translation
-    T_known, middle, grid = candidate.T_target_source, source.middle, _grid(source, target, candidate, params)
-    grid = grid[~near(grid, T_known, middle, *agreeing)]
-    V = rank(source.sight, target.sight, grid, params, params.quick_sample)
-    best = distinct(grid, V, middle, params.searched_around, *APART)
-    finished = np.array([finish(source, target, grid[k], params)[0] for k in best]).reshape(-1, 4, 4)
-    finished = finished[~near(finished, T_known, middle, *ALIKE)]
-    return list(finished[distinct(finished, np.arange(len(finished), 0, -1), middle, len(finished), *ALIKE)])
+    beside = ~near(grid, candidate.T_target_source, middle, *(BESIDE * tolerance for tolerance in agreeing))
+    V = rank(source.sight, target.sight, grid[beside], params, params.quick_sample)
+    best = distinct(grid[beside], V, middle, params.searched_around, *APART)
+    return [finish(source, target, T, params)[0] for T in grid[beside][best]]
 
 
 def _grid(source: Prepared, target: Prepared, candidate: Candidate, params: RegistrarParams) -> Array:
@@ -60,8 +61,7 @@ def _grid(source: Prepared, target: Prepared, candidate: Candidate, params: Regi
     middle = transform(T, source.centroids[candidate.explained[0].source])
     turns = np.radians([0.0, *params.turns_around, *(-turn for turn in params.turns_around)])
     turned = turned_about(T, middle, up, turns)
-    steps = params.search_step * np.arange(-params.search_steps, params.search_steps + 1)
-    shifts = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2) @ np.linalg.svd(up[None])[2][1:]
+    shifts = square(params.search_step, params.search_steps) @ np.linalg.svd(up[None])[2][1:]
     grid = np.repeat(turned[:, None], len(shifts), axis=1)
     grid[..., :3, 3] += shifts
     return grid.reshape(-1, 4, 4)

@@ -14,6 +14,7 @@ import numba
 import numpy as np
 
 from objreg_ros.data import Array
+from objreg_ros.registrar.params import RegistrarParams
 
 MOST_PAIRS = 6000  # of matches that agree, each of which gives a pose to weigh
 ASIDE = 1e-8  # the square of 0.1 mm: a baseline that is no farther aside of its direction fixes no pose with it
@@ -72,6 +73,11 @@ def near(T: Array, T_known: Array, middle: Array, angle: float, distance: float)
     cosine = 0.5 * (np.einsum("kij,ij->k", T[:, :3, :3], T_known[:3, :3]) - 1.0)
     moved = np.linalg.norm((T[:, :3, :3] - T_known[:3, :3]) @ middle + T[:, :3, 3] - T_known[:3, 3], axis=-1)
     return np.asarray((cosine > np.cos(angle)) & (moved < distance))
+
+
+def same_pose(T: Array, T_known: Array, middle: Array, params: RegistrarParams) -> Array:
+    """Which poses (K, 4, 4) agree with one, as chains do that came to the same, seen from the context's middle."""
+    return near(T, T_known, middle, np.radians(params.agreement_rotation), params.agreement_translation)
 
 
 @numba.njit(cache=True, nogil=True)

@@ -14,7 +14,7 @@ import numpy as np
 from objreg_ros.data import Alignment, Array
 from objreg_ros.registrar.alternatives import alternatives
 from objreg_ros.registrar.candidate import Candidate
-from objreg_ros.registrar.consensus import near
+from objreg_ros.registrar.consensus import same_pose
 from objreg_ros.registrar.covariance import covariance_of, spread_of, worst_translation
 from objreg_ros.registrar.evidence import gather, lead, resistance_of, surroundings_of, worth
 from objreg_ros.registrar.hypotheses import Hypothesis
@@ -52,9 +52,7 @@ class Engine:
         if not best:
             return ()
         candidates = merged([self._judge(pair, seed, seeds) for seed in best], pair.source.middle, self._params)
-        rivals = [
-            rival for one in candidates if self._promises(one, candidates[0]) for rival in self._others(pair, one)
-        ]
+        rivals = self._rivals(pair, [one for one in candidates if self._promises(one, candidates[0])])
         if rivals:
             candidates = merged([*candidates, *rivals], pair.source.middle, self._params)
         pushed = (self._pushed(pair, one) if self._promises(one, candidates[0]) else one for one in candidates)
@@ -62,20 +60,31 @@ class Engine:
 
     def _judge(self, pair: Pair, seed: Hypothesis, seeds: Sequence[Hypothesis]) -> Candidate:
         """Finish a hypothesis and gather the evidence; ``seeds`` are all that may agree with it."""
-        params, source, target = self._params, pair.source, pair.target
+        params, source = self._params, pair.source
         alignment = self._refined(pair, seed.T_target_source)
         poses = np.array([other.T_target_source for other in seeds])
         found = seed.T_target_source, alignment.T_target_source
         same = [same_pose(poses, T_known, source.middle, params) for T_known in found]
         agreeing = [other.chain for other, agrees in zip(seeds, same[0] | same[1], strict=True) if agrees]
-        candidate = gather(source, target, alignment, (seed.chain, *agreeing), params)
-        return replace(candidate, alignment=held(alignment)) if is_held(candidate, params) else candidate
+        return self._gathered(pair, alignment, (seed.chain, *agreeing))
 
-    def _others(self, pair: Pair, candidate: Candidate) -> list[Candidate]:
-        """What else a lone object's pose could be, for all that the views say: the gate has to know of it."""
+    def _gathered(self, pair: Pair, alignment: Alignment, chains: Sequence[str]) -> Candidate:
+        """The candidate of an alignment, without slack where an object holds it."""
+        candidate = gather(pair.source, pair.target, alignment, chains, self._params)
+        return replace(candidate, alignment=held(alignment)) if is_held(candidate, self._params) else candidate
+
+    def _rivals(self, pair: Pair, candidates: Sequence[Candidate]) -> list[Candidate]:
+        """What else lone objects' poses could be, for all that the views say: the gate has to know of it.
+
+        What comes to a candidate's pose is left out: it was looked for from there, and is no chain that agrees.
+        """
         source, target, params = pair.source, pair.target, self._params
-        poses = alternatives(source, target, candidate, params)
-        return [gather(source, target, refine(source, target, T, params), ("objects",), params) for T in poses]
+        poses = [T for one in candidates for T in alternatives(source, target, one, params)]
+        known, rivals = np.array([one.T_target_source for one in candidates]), []
+        for alignment in (refine(source, target, T, params) for T in poses):
+            if not same_pose(known, alignment.T_target_source, source.middle, params).any():
+                rivals.append(self._gathered(pair, alignment, ("objects",)))
+        return rivals
 
     def _promises(self, candidate: Candidate, best: Candidate) -> bool:
         """Whether the gate may come to a candidate, so that it is worth pushing."""
@@ -152,8 +161,3 @@ def merged(candidates: list[Candidate], middle: Array, params: RegistrarParams) 
             kept.append(replace(candidate, agreeing_chains=tuple(sorted(chains))))
             known |= same
     return [replace(candidate, margin=lead(candidate, kept, params)) for candidate in kept]
-
-
-def same_pose(T: Array, T_known: Array, middle: Array, params: RegistrarParams) -> Array:
-    """Which poses (K, 4, 4) differ from one by less than the tolerance of agreement, seen from the context's middle."""
-    return near(T, T_known, middle, np.radians(params.agreement_rotation), params.agreement_translation)

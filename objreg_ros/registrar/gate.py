@@ -235,12 +235,12 @@ def _held(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 
     The covariance is that of the residuals and of a warped depth, less what views and gravity tell: two views may share
     few patches on one side, which agree with many poses. A camera that goes sideways and turns to keep looking at one
-    far thing sees next to no difference. Where a turn or a shift is left free by the surfaces and by the views alike,
-    nothing is known of it, however firmly they hold the rest.
+    far thing sees next to no difference. Where a turn or a shift is held by neither the surfaces nor the views, nor by
+    an object that tells its yaw and looks alike, nothing is known of it, however firmly the rest is held.
     """
     free = len(candidate.alignment.slack)
     if free:
-        return Reason.SLACK, f"{free} of 6 directions held by neither surfaces nor views"
+        return Reason.SLACK, f"{free} of 6 directions held by nothing"
     sigma, drop = worst_translation(spread_of(candidate.alignment, params) + candidate.warp), candidate.resistance
     least = _least_fall(candidate, sigma, params)
     if drop is None and sigma > params.max_slack_sigma:
@@ -254,11 +254,13 @@ def _least_fall(candidate: Candidate, sigma: float, params: RegistrarParams) -> 
     """What V must fall by over a push of a position that the surfaces know to ``sigma`` m.
 
     V falls with the square of a push, so it grows with the variance, up to where the views by themselves hold the pose
-    firmly: then it is known, however far the surfaces would let it slide. It grows with the square of the distance of
-    what is seen, too: from afar a shift and a turn look alike, and depth is known as badly. Several objects that look
-    otherwise leave more to the views, and so do two that one chain brought together; a lone one has checks of its own.
+    firmly: then it is known, however badly the surfaces know it. It grows with the square of the distance of what is
+    seen, too, from either camera: from afar a shift and a turn look alike, and depth is known as badly. Several objects
+    that look otherwise leave more to the views, and so do two that one chain brought together; a lone one has checks of
+    its own.
     """
-    range_m = float(np.linalg.norm(candidate.alignment.middle))
+    middle, eye = candidate.alignment.middle, candidate.T_target_source[:3, 3]
+    range_m = float(np.linalg.norm(middle) + np.linalg.norm(middle - eye)) / 2.0
     loose = max(1.0, sigma / params.max_slack_sigma, range_m / params.far_range)
     least = max(params.rival_margin, min(params.firm_margin, params.rival_margin * loose**2))
     two = 2 <= len(candidate.explained) < params.min_objects_plain and _few_chains(candidate, params)
@@ -286,12 +288,18 @@ def _surroundings(candidate: Candidate, params: RegistrarParams) -> Refusal | No
     beside = f"without the {' and the '.join(pair.label for pair in candidate.explained)}"
     if _is_alone(candidate, params) and around.tested < params.min_surroundings * seen.tested:
         return Reason.LOW_OVERLAP, f"{beside} {around.tested} pixels < {params.min_surroundings:.2f} of {seen.tested}"
-    if around.texture is not None and (seen.texture or 0.0) - around.texture > params.max_fall_around:
-        fall = f"by more than {params.max_fall_around:.2f} less than {seen.texture:.2f}"
-        return Reason.TEXTURE, f"{beside} correlation {around.texture:.2f}, {fall}"
     rest = replace(candidate, verification=around)
-    refusals = (check(rest, params) for check in (_overlap, _free_space, _texture))
+    checks: tuple[Check, ...] = (_overlap, _free_space, _texture, partial(_carried, whole=seen.texture))
+    refusals = (check(rest, params) for check in checks)
     return next(((reason, f"{beside} {told}") for reason, told in filter(None, refusals)), None)
+
+
+def _carried(rest: Candidate, params: RegistrarParams, whole: float | None) -> Refusal | None:
+    """Whether the print agrees much less than that of the ``whole`` once objects are left out."""
+    texture = rest.verification.texture
+    if texture is None or whole is None or whole - texture <= params.max_fall_around:
+        return None
+    return Reason.TEXTURE, f"correlation {texture:.2f} < {whole:.2f} by more than {params.max_fall_around:.2f}"
 
 
 def _odometry(candidate: Candidate, params: RegistrarParams, prior: Prior) -> Refusal | None:

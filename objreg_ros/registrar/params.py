@@ -179,20 +179,29 @@ class RegistrarParams(Params):
     )
     search_step: float = param(
         0.05,
-        "step of the search for a better place about a doubtful position, in the plane where it may err",
+        "step of the search for a better place about a doubtful position, in the plane where it may err, and for other "
+        "poses about a lone object's",
         "m",
         ge=0.01,
     )
-    search_steps: int = param(4, "steps each way of the search about a doubtful position; 0: no search", ge=0, le=10)
+    search_steps: int = param(
+        4,
+        "steps each way of these searches; 0: none about a doubtful position, turns alone about a lone object",
+        ge=0,
+        le=10,
+    )
     search_turns: tuple[float, ...] = param(
         (5.0,), "turns about the objects, each way, from which grey finishes a doubtful pose too", "deg"
     )
     turns_around: tuple[float, ...] = param(
         (5.0, 10.0, 15.0),
-        "turns about a lone object, each way, at which the search about its pose looks for others that views like",
+        "turns about a lone object, each way, of the grid in which other poses that views like are looked for, beside "
+        "no turn; its shifts are those of search_step",
         "deg",
     )
-    searched_around: int = param(4, "best others of the search about a lone object's pose that are finished", ge=0)
+    searched_around: int = param(
+        4, "best starts about a lone object's pose that are finished; 0: no search there", ge=0
+    )
     searched: int = param(2, "best places of the search about a doubtful position that grey finishes", ge=1)
     steadying_texture: float = param(
         0.5, "correlation of grey from which on a position is held as far as pushes are resisted", ge=0.0, le=1.0
@@ -320,8 +329,8 @@ class RegistrarParams(Params):
     )
     firm_margin: float = param(
         0.4,
-        "fall of V over a push from which on views hold a pose however badly surfaces do; where something floats, the "
-        "least V is min_score and what the fall lacks of this",
+        "fall of V over a push from which on views hold a pose however badly surfaces know it; where something floats, "
+        "the least V is min_score and what the fall lacks of this",
         ge=0.0,
     )
     rival_margin: float = param(
@@ -365,8 +374,8 @@ class RegistrarParams(Params):
     )
     far_range: float = param(
         2.5,
-        "distance of what is seen, its middle, beyond which views must resist a push more, by its square: from afar a "
-        "turn and a shift look alike",
+        "mean distance of both cameras from the middle of what is seen beyond which views must resist a push more, by "
+        "its square: from afar a turn and a shift look alike",
         "m",
         ge=0.1,
     )

@@ -72,3 +72,9 @@ def turned_about(T_target_source: Array, middle: Array, up: Array, turns: Array)
     """
     R = rotation_from_vector(np.asarray(turns)[:, None] * up)
     return np.asarray(pose(R, middle - R @ middle) @ T_target_source)
+
+
+def square(step: float, steps: int) -> Array:
+    """The places (K, 2) m of a square of so many ``steps`` each way, row by row, its middle in the middle."""
+    ticks = step * np.arange(-steps, steps + 1)
+    return np.stack(np.meshgrid(ticks, ticks), axis=-1).reshape(-1, 2)

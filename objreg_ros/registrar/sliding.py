@@ -19,7 +19,7 @@ from objreg_ros.registrar.liking import gain, liked
 from objreg_ros.registrar.objects import explain
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
-from objreg_ros.registrar.pushing import Stand, pushed, turned_about
+from objreg_ros.registrar.pushing import Stand, pushed, square, turned_about
 from objreg_ros.registrar.texture import texture
 from objreg_ros.registrar.verify import rank, verify
 
@@ -92,12 +92,10 @@ def preferred(
     own = liked(source, target, T_target_source, explained, params)
     if own.seen.score < params.min_score - 2.0 * HOPE:
         return None
-    steps = params.search_step * np.arange(-params.search_steps, params.search_steps + 1)
-    pushes = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-    poses = pushed(T_target_source, pushes @ weakest(C))
+    poses = pushed(T_target_source, square(params.search_step, params.search_steps) @ weakest(C))
     V = rank(source.sight, target.sight, poses, params, params.quick_sample).astype(np.float32)
     best, liking = None, own
-    peaks = poses[_peaks(V, len(steps))[: params.searched]]
+    peaks = poses[_peaks(V, 2 * params.search_steps + 1)[: params.searched]]
     turned = _turned(source, target, T_target_source, params)
     for T in (*turned, *(finish(source, target, start, params)[0] for start in (*peaks, *turned))):
         found = liked(source, target, T, explained, params)

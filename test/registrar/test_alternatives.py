@@ -15,6 +15,7 @@ from objreg_ros.geometry import inverse, pose, pose_error, transform
 from objreg_ros.registrar import alternatives as module
 from objreg_ros.registrar.alternatives import _grid, alternatives
 from objreg_ros.registrar.candidate import Candidate, ObjectPair
+from objreg_ros.registrar.consensus import near, same_pose
 from objreg_ros.registrar.evidence import gather
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared, prepare
@@ -62,9 +63,39 @@ def test_the_truth_is_found_beside_a_wrong_pose(
     assert any(degrees < 1.0 and centimetres < 2.0 for degrees, centimetres in errors(found))
 
 
-def test_beside_the_truth_there_is_nothing_that_agrees_with_it(views: tuple[Prepared, Prepared]) -> None:
-    for degrees, centimetres in errors(alternatives(*views, beside(views, 0.0, 0.0), PARAMS)):
-        assert degrees > 1.0 or centimetres > 2.0
+def test_the_search_begins_where_poses_do_not_agree_with_the_candidate_and_far_from_each_other(
+    views: tuple[Prepared, Prepared], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "half_turned", lambda *_: None)
+    monkeypatch.setattr(module, "finish", lambda source, target, T, *_: (T, np.zeros((6, 6))))
+    monkeypatch.setattr(module, "_is_hopeful", lambda *_: True)
+    params = PARAMS.replaced(searched_around=30)
+    starts = np.array(alternatives(*views, beside(views, 0.0, 0.0), params))
+    middle = views[0].middle
+    assert len(starts) == 30
+    assert not same_pose(starts, TRUTH, middle, params).any()
+    for k, start in enumerate(starts):
+        assert np.flatnonzero(near(starts, start, middle, *module.APART)).tolist() == [k]
+
+
+def test_what_views_like_far_less_is_no_alternative(
+    views: tuple[Prepared, Prepared], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wrong = beside(views, 12.0, 0.1)
+    spoiled = replace(wrong.verification, score=5.0)
+    assert alternatives(*views, wrong, PARAMS)
+    assert alternatives(*views, replace(wrong, verification=spoiled), PARAMS) == []
+
+
+def test_without_grey_in_both_views_nothing_is_looked_for_around(
+    views: tuple[Prepared, Prepared], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "half_turned", lambda *_: None)
+    source, target = views
+    blind_source, blind_target = (replace(view, sight=replace(view.sight, textured=False)) for view in views)
+    wrong = beside(views, 12.0, 0.1)
+    assert alternatives(blind_source, target, wrong, PARAMS) == []
+    assert alternatives(source, blind_target, wrong, PARAMS) == []
 
 
 @pytest.mark.parametrize("explained", [(), (CUP, ObjectPair(1, 1, "book"))])
@@ -110,5 +141,5 @@ def test_a_half_turn_is_hopeful_where_it_is_not_far_behind_nor_floats(
     seen = replace(one.verification, score=0.8 + 0.1 - 0.3 - behind, occluded=0.3, violations=violations)
     monkeypatch.setattr(module, "half_turned", lambda *_: half)
     monkeypatch.setattr(module, "verify", lambda source, target, T, *_: seen if T is half else None)
-    blind: Any = SimpleNamespace(sight=None, up=None)
+    blind: Any = SimpleNamespace(sight=SimpleNamespace(textured=False), up=None)
     assert alternatives(blind, blind, one, PARAMS) == count * [half]

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector, transform
-from objreg_ros.registrar.consensus import Matches, distinct, near, poses
+from objreg_ros.registrar.consensus import Matches, distinct, near, poses, same_pose
+from objreg_ros.registrar.params import RegistrarParams
 
 UP = np.array([0.0, 0.0, 1.0])
 YAW = pose(rotation_from_vector(np.array([0.0, 0.0, 2.0])), np.array([0.5, -0.4, 0.1]))
@@ -88,3 +89,12 @@ def test_what_turns_or_moves_the_middle_too_far_is_not_near(turn: float, shift: 
     found = near(np.array([YAW @ other, YAW]), YAW, middle, angle=0.1, distance=0.2)
     assert found.tolist() == [is_near, True]
     assert near(np.zeros((0, 4, 4)), YAW, middle, angle=0.1, distance=0.2).shape == (0,)
+
+
+def test_poses_are_the_same_within_the_tolerances_in_which_chains_agree() -> None:
+    params, middle = RegistrarParams(), np.array([0.0, 0.0, 2.0])
+    shifted = [pose(np.eye(3), np.array([share * params.agreement_translation, 0.0, 0.0])) for share in (0.9, 1.1)]
+    turns = [np.radians(share * params.agreement_rotation) for share in (0.9, 1.1)]
+    about = [rotation_from_vector(np.array([0.0, turn, 0.0])) for turn in turns]
+    turned = [pose(R, middle - R @ middle) for R in about]
+    assert same_pose(np.array([*shifted, *turned]), np.eye(4), middle, params).tolist() == [True, False, True, False]

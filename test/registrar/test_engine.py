@@ -87,15 +87,50 @@ def test_a_pose_is_steadied_where_it_was_pushed_and_does_not_slide(
         np.testing.assert_allclose(added, more * np.eye(6), atol=1e-9)
 
 
-def test_whatever_else_a_lone_objects_pose_could_be_is_refined_and_gathered_as_a_rival(
+def test_what_else_a_lone_objects_pose_could_be_is_a_rival_unless_it_comes_to_one_that_is_known(
     engine: Engine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    one, others = candidate(explained=(ObjectPair(0, 0, "cup"),)), [moved(0.4), moved(0.2)]
-    monkeypatch.setattr(engine_module, "alternatives", lambda *_: others)
-    monkeypatch.setattr(engine_module, "refine", lambda source, target, T, *_: T)
-    monkeypatch.setattr(engine_module, "gather", lambda source, target, found, chains, *_: (found, chains))
+    known = [candidate(moved(x), explained=(ObjectPair(0, 0, "cup"),)) for x in (0.0, 1.0)]
+    others = {0.0: [moved(0.5), moved(0.1)], 1.0: [moved(-0.1), moved(1.5)]}
+    monkeypatch.setattr(engine_module, "alternatives", lambda s, t, one, p: others[one.T_target_source[0, 3]])
+    monkeypatch.setattr(engine_module, "refine", lambda s, t, T, p: candidate(T).alignment)
+    monkeypatch.setattr(engine, "_gathered", lambda pair, found, chains: (found.T_target_source[0, 3], chains))
+    pair: Any = SimpleNamespace(source=SimpleNamespace(middle=np.zeros(3)), target=None)
+    assert engine._rivals(pair, known) == [(0.5, ("objects",)), (1.5, ("objects",))]
+    assert engine._rivals(pair, []) == []
+
+
+@pytest.mark.parametrize(("yaw_known", "likeness", "left"), [(True, 1.0, 0), (False, 1.0, 1), (True, -1.0, 1)])
+def test_an_object_that_tells_its_yaw_and_looks_alike_takes_away_the_slack(
+    engine: Engine, monkeypatch: pytest.MonkeyPatch, yaw_known: bool, likeness: float, left: int
+) -> None:
+    one = candidate(yaw_known=yaw_known, likeness=likeness, slack=np.eye(6)[:1])
+    monkeypatch.setattr(engine_module, "gather", lambda *_: one)
     pair: Any = SimpleNamespace(source=None, target=None)
-    assert engine._others(pair, one) == [(T, ("objects",)) for T in others]
+    assert len(engine._gathered(pair, one.alignment, ("objects",)).alignment.slack) == left
+
+
+def test_a_pose_that_one_chain_came_to_does_not_become_two_chains_by_what_is_found_about_it() -> None:
+    lone = tuple(box for box in ROOM if box[0] not in ("book", "cup", "keyboard"))
+    source, target = keyframe(seen_from(0.0), lone, seed=1), keyframe(seen_from(20.0), lone, seed=2)
+    with_search, without = (
+        Engine(PARAMS.replaced(searched_around=n)).propose(source, target) for n in (PARAMS.searched_around, 0)
+    )
+    assert with_search[0].agreeing_chains == without[0].agreeing_chains
+    assert np.array_equal(with_search[0].T_target_source, without[0].T_target_source)
+
+
+def test_the_rivals_of_promising_candidates_are_ranked_with_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    engine, asked = Engine(PARAMS), []
+    rival = candidate(moved(0.0, 0.0, 3.0), score=9.0)
+    monkeypatch.setattr(engine, "_rivals", lambda pair, promising: asked.extend(promising) or [rival])
+    monkeypatch.setattr(engine, "_pushed", lambda pair, one: one)
+    monkeypatch.setattr(engine, "_levelled", lambda pair, one: one)
+    found = engine.propose(keyframe(seen_from(0.0), seed=1), keyframe(seen_from(20.0), seed=2))
+    assert np.array_equal(found[0].T_target_source, rival.T_target_source) and len(found) > 1
+    least = max(PARAMS.min_score, max(one.verification.score for one in asked) - PARAMS.rival_margin)
+    assert asked and all(one.verification.score >= least for one in asked)
+    assert found[0].margin < 9.0  # another one is known
 
 
 def test_what_is_held_has_no_slack_at_all() -> None:

@@ -108,16 +108,21 @@ def test_what_is_around_few_objects_must_agree_by_itself(
     )
 
 
+@pytest.mark.parametrize("chains", [("features", "objects"), ("objects",)], ids=len)
 @pytest.mark.parametrize("explained", [(CUP,), (CUP, ObjectPair(1, 1, "book"))], ids=len)
-def test_few_objects_around_which_the_print_agrees_much_less_have_moved(explained: tuple[ObjectPair, ...]) -> None:
-    def judged(around: float | None) -> object:
-        seen = replace(candidate().verification, texture=0.9)
+def test_few_objects_around_which_the_print_agrees_much_less_have_moved(
+    explained: tuple[ObjectPair, ...], chains: tuple[str, ...]
+) -> None:
+    def judged(around: float | None, whole: float | None = 0.6) -> object:
+        seen = replace(candidate().verification, texture=whole)
+        told = {"explained": explained, "agreeing_chains": chains, "margin": 1.0, "yaw_known": True, "likeness": 0.9}
         surroundings = replace(seen, texture=around)
-        return refuse(candidate(explained=explained, margin=1.0, texture=0.9, surroundings=surroundings), PARAMS)
+        return refuse(candidate(**told, texture=whole, resistance=1.0, surroundings=surroundings), PARAMS)
 
-    assert judged(0.9 - 0.9 * PARAMS.max_fall_around) is None
-    assert judged(None) is None
-    refusal = judged(0.9 - 1.1 * PARAMS.max_fall_around)
+    assert judged(0.6 - 0.9 * PARAMS.max_fall_around) is None
+    assert judged(0.99) is None
+    assert judged(None) is None and judged(None, None) is None
+    refusal = judged(0.6 - 1.1 * PARAMS.max_fall_around)
     assert isinstance(refusal, tuple) and refusal[0] is Reason.TEXTURE and "without the cup" in refusal[1]
 
 
@@ -409,16 +414,24 @@ def test_the_worse_the_surfaces_hold_a_pose_the_more_the_views_must() -> None:
     assert refuse(candidate(**loose, resistance=least - 0.01), PARAMS) is not None
 
 
-def test_the_farther_away_what_is_seen_the_more_the_views_must_hold_it() -> None:
-    near, far = (
-        candidate(resistance=1.9 * PARAMS.rival_margin, middle=np.array([0.0, 0.6, 0.8]) * share)
-        for share in (PARAMS.far_range, 1.4 * PARAMS.far_range)
-    )
-    assert refuse(near, PARAMS) is None
-    refusal = refuse(far, PARAMS)
-    assert refusal is not None and refusal[0] is Reason.SLACK
-    assert refuse(replace(far, resistance=2.0 * PARAMS.rival_margin), PARAMS) is None
-    assert refuse(replace(far, resistance=None), PARAMS) is None
+@pytest.mark.parametrize("eye", [0.0, 0.4])
+def test_the_farther_away_what_is_seen_the_more_the_views_must_hold_it(eye: float) -> None:
+    """Far from both cameras in the mean: the other one stands ``eye`` nearer."""
+    for share, least in ((0.9, 1.0), (1.0, 1.0), (1.4, 1.96)):
+        middle = np.array([0.0, 0.0, share * PARAMS.far_range + eye / 2.0])
+        seen = {"T": moved(0.0, 0.0, eye), "middle": middle}
+        assert refuse(candidate(**seen, resistance=1.01 * least * PARAMS.rival_margin), PARAMS) is None
+        refusal = refuse(candidate(**seen, resistance=0.99 * least * PARAMS.rival_margin), PARAMS)
+        assert refusal is not None and refusal[0] is Reason.SLACK
+    assert refuse(candidate(middle=np.array([0.0, 0.0, 1.4 * PARAMS.far_range])), PARAMS) is None  # not pushed
+
+
+def test_of_distance_and_what_surfaces_know_the_worse_counts() -> None:
+    far = {"middle": np.array([0.0, 0.0, 1.2 * PARAMS.far_range]), **warped(1.5 * PARAMS.max_slack_sigma)}
+    assert refuse(candidate(**far, resistance=2.3 * PARAMS.rival_margin), PARAMS) is None
+    assert refuse(candidate(**far, resistance=2.2 * PARAMS.rival_margin), PARAMS) is not None
+    far["middle"] = np.array([0.0, 0.0, 1.6 * PARAMS.far_range])
+    assert refuse(candidate(**far, resistance=2.5 * PARAMS.rival_margin), PARAMS) is not None
 
 
 def test_several_objects_that_look_otherwise_leave_more_to_the_views() -> None:
@@ -437,16 +450,17 @@ def test_several_objects_may_be_what_they_are_a_little_aside_and_a_lone_one_may_
     assert refuse(lone(likeness=-1.0, likeness_nearby=0.1), PARAMS) is not None
 
 
-def test_a_pose_that_the_views_hold_firmly_is_known_however_free_the_surfaces_would_let_it_slide() -> None:
+def test_a_pose_that_the_views_hold_firmly_is_known_however_badly_the_surfaces_know_it() -> None:
     badly, firm = warped(10.0 * PARAMS.max_slack_sigma), PARAMS.firm_margin
     assert refuse(candidate(**badly, resistance=firm + 0.01), PARAMS) is None
     refusal = refuse(candidate(**badly, resistance=firm - 0.01), PARAMS)
     assert refusal is not None and refusal[0] is Reason.SLACK
 
 
-def test_a_turn_that_neither_surfaces_nor_views_hold_is_refused_however_firmly_they_hold_the_rest() -> None:
+@pytest.mark.parametrize("direction", [0, 5])
+def test_a_direction_that_nothing_holds_is_refused_however_firmly_the_rest_is_held(direction: int) -> None:
     firm = {"resistance": 2.0 * PARAMS.firm_margin, "score": 1.0}
     assert refuse(candidate(**firm), PARAMS) is None
-    refusal = refuse(candidate(**firm, slack=np.eye(6)[5:]), PARAMS)
+    refusal = refuse(candidate(**firm, slack=np.eye(6)[direction : direction + 1]), PARAMS)
     assert refusal is not None and refusal[0] is Reason.SLACK
     assert "1 of 6" in refusal[1]

@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.geometry import inverse, pose_error, transform
+from objreg_ros.geometry import inverse, pose_error, rotation_from_vector, transform
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import prepare
-from objreg_ros.registrar.pushing import Stand, pushed, turned_about
+from objreg_ros.registrar.pushing import Stand, pushed, square, turned_about
 from objreg_ros.registrar.verify import rank
 
 from .rooms import keyframe, seen_from
@@ -36,7 +36,15 @@ def test_a_pose_is_turned_about_a_place_that_stays_where_it_is() -> None:
     there = transform(inverse(TRUTH), place)
     np.testing.assert_allclose(transform(turned, there), place, atol=1e-12)
     assert pose_error(turned, TRUTH)[0] == pytest.approx(15.0)
-    np.testing.assert_allclose(turned[:3, :3] @ TRUTH[:3, :3].T @ up, up, atol=1e-12)
+    np.testing.assert_allclose(
+        turned[:3, :3] @ TRUTH[:3, :3].T, rotation_from_vector(np.radians(15.0) * up), atol=1e-12
+    )
+
+
+def test_a_square_is_walked_row_by_row_about_its_middle() -> None:
+    np.testing.assert_allclose(square(0.1, 1)[:4], [[-0.1, -0.1], [0.0, -0.1], [0.1, -0.1], [-0.1, 0.0]])
+    assert len(square(0.05, 4)) == 81 and np.array_equal(square(0.05, 0), [[0.0, 0.0]])
+    np.testing.assert_allclose(square(0.05, 4)[40], 0.0)
 
 
 def test_the_truth_falls_whichever_way_it_is_pushed_and_the_farther_the_more() -> None:
