@@ -17,7 +17,7 @@ refinement              `icp` brings many to their basin; `refine` ends a few, w
                         and `contradiction` to say how well the surfaces hold the pose; `liking` compares
                         poses near each other; `levelling` ends with what gravity tells
 evidence                `evidence`, of `verify`, `visibility` and `texture` (views, through `projection`),
-                        `surroundings` (views without a lone object), `objects` (explained or moved), `symmetry`,
+                        `surroundings` (views without objects), `objects` (explained or moved), `symmetry`,
                         `sliding` and `pushing`
 yes or no               `gate`, on a `candidate` with its evidence; then `covariance` and `thinning`
 ======================  ==========================================================================================
