@@ -189,15 +189,18 @@ def _firm(candidate: Candidate, params: RegistrarParams) -> Refusal | None:
 def _agreement(candidate: Candidate, params: RegistrarParams, rivals: Sequence[Candidate]) -> Refusal | None:
     """Several objects, or one whose pose has no rival, and that does not look otherwise or has the views' grey for it.
 
+    Nor may the pose of several have a rival that is worth as much: one of the two is wrong.
+
     Without an object rooms that repeat themselves look alike. So do plain rooms with one object of a kind in them:
     chains agree on it, and an object that tells no yaw, or is seen to look otherwise, does not confirm them.
     """
     chains, explained = len(candidate.agreeing_chains), len(candidate.explained)
-    if explained >= params.min_objects:
-        return None
     if explained == 0:
         return Reason.FEW_OBJECTS, "0 objects < 1"
     margin = lead(candidate, rivals, params)
+    if explained >= params.min_objects:
+        told = f"{explained} objects, another possible pose is worth {margin:.2f} < {params.rival_margin:.2f} less"
+        return None if margin >= params.rival_margin else (Reason.CHAINS_DISAGREE, told)
     confirmed = any(check(candidate, params) for check in (_not_otherwise, _painted))
     if margin >= params.min_margin_alone and confirmed:
         return None

@@ -335,7 +335,8 @@ class RegistrarParams(Params):
     )
     rival_margin: float = param(
         0.1,
-        "a candidate this much below the best in V is not considered, and over a push V must fall by as much at least",
+        "a candidate this much below the best in V is not considered, over a push V must fall by as much at least, and "
+        "so much more than another possible pose must that of several objects be worth",
         ge=0.0,
     )
     min_chains: int = param(2, "chains that must agree on a lone object's pose for it not to be doubtful", ge=1)

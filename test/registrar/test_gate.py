@@ -361,6 +361,18 @@ def test_a_lone_object_whose_pose_has_a_rival_is_refused_whichever_chains_agree(
         assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
 
 
+def test_several_objects_whose_pose_has_a_rival_that_is_worth_as_much_are_refused() -> None:
+    several = candidate()
+    assert len(several.explained) >= PARAMS.min_objects
+    score = several.verification.score
+    near, far = (candidate(score=score - share * PARAMS.rival_margin) for share in (0.9, 1.1))
+    assert refuse(several, PARAMS, rivals=[several, far]) is None
+    refusal = refuse(several, PARAMS, rivals=[several, near])
+    assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE and "2 objects" in refusal[1]
+    impossible = replace(near, gravity_error_deg=2.0 * PARAMS.max_gravity_error)
+    assert judge([several, impossible], PARAMS) is several
+
+
 def test_a_rival_that_hides_more_is_the_rival_that_it_were_if_all_of_that_agreed() -> None:
     one = lone()
     assert refuse(one, PARAMS, rivals=[rival(one, 0.6)]) is None
