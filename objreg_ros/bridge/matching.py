@@ -4,17 +4,18 @@
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain, count
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
 
 from objreg_ros.bridge.door import Door
-from objreg_ros.bridge.sync import Drop, Need, Stream, Synchroniser
+from objreg_ros.bridge.sync import Drop, Match, Need, Stream, Synchroniser
 from objreg_ros.params import Params
 
 ALONE_S = 0.5  # after once to twice this a stamp that has leapt alone is believed, later where the stream is slow
+QUIET_S = 5.0  # where no stream has spoken for so long, what waits for an optional one goes without
 EARLY = 30  # messages of a stream that are kept until it is known how they are matched
 
 Early = tuple[int, str, int, Any]  # order of arrival, stream, stamp, payload
@@ -33,7 +34,8 @@ class MatchingDoor(Door):
         self._order = count()
         self._sync: Synchroniser | None = None
         self._reference = ""
-        self.create_timer(ALONE_S, self._believe, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._heard, self._quiet_s = 0, 0.0  # messages of all streams, and since when no more
+        self.create_timer(ALONE_S, self._look_after, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def begin(self, streams: Sequence[Stream]) -> None:
         """Start matching; what was fed to streams that are not among these is forgotten."""
@@ -55,11 +57,21 @@ class MatchingDoor(Door):
         elif name in self._sync.queues:
             if name == self._reference:
                 self.accept(stamp_ns)
-            for match in self._sync.add(name, stamp_ns, payload):
-                self.worker.put((match.stamp_ns, match))
+            self._hand_over(self._sync.add(name, stamp_ns, payload))
 
-    def _believe(self) -> None:
-        for match in () if self._sync is None else self._sync.believe(round(1e9 * ALONE_S)):
+    def _look_after(self) -> None:
+        """Every `ALONE_S`: see to what would wait for a message that does not come."""
+        if self._sync is None:
+            return
+        self._hand_over(self._sync.believe(round(1e9 * ALONE_S)))
+        heard = self._sync.received
+        self._quiet_s = self._quiet_s + ALONE_S if heard == self._heard else 0.0
+        self._heard = heard
+        if self._quiet_s >= QUIET_S:
+            self._hand_over(self._sync.wait_no_longer())
+
+    def _hand_over(self, matches: Iterable[Match]) -> None:
+        for match in matches:
             self.worker.put((match.stamp_ns, match))
 
     def _unmatched(self, name: str, stamp_ns: int, why: str) -> None:

@@ -236,6 +236,16 @@ class Synchroniser:
         found = [(queue, item) for queue in self._partners_first for item in queue.course.believe(passed_ns)]
         return [match for queue, item in found for match in self._take(queue, *item)]
 
+    def wait_no_longer(self) -> list[Match]:
+        """The matches of what waits for nothing but optional streams: for when nothing has come for a while.
+
+        The last frame before a camera stops waits for odometry that may have stopped with it.
+        """
+        found = []
+        while self._reference.items and not self.lacking(self._reference.items[0].stamp_ns):
+            found += self._resolve(self._reference.items[0])
+        return found
+
     def flush(self) -> list[Match]:
         """The matches that are still possible when nothing more will come; the rest is dropped as unmatched."""
         ended = [(queue, item) for queue in self._partners_first for item in queue.course.end()]
@@ -246,6 +256,11 @@ class Synchroniser:
             while queue.items:
                 queue.drop_oldest(Drop.UNMATCHED)
         return found
+
+    @property
+    def received(self) -> int:
+        """How many items have come, of all streams."""
+        return sum(queue.received for queue in self.queues.values())
 
     def lacking(self, stamp_ns: int) -> list[Stream]:
         """The streams that a match at a time needs and that have nothing for it now."""

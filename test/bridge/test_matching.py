@@ -13,7 +13,7 @@ import rclpy
 
 from objreg_ros.bridge.door import DroppedError
 from objreg_ros.bridge.log import ThrottledLog
-from objreg_ros.bridge.matching import MatchingDoor
+from objreg_ros.bridge.matching import ALONE_S, QUIET_S, MatchingDoor
 from objreg_ros.bridge.sync import JUMP_NS, PATIENCE_NS, Match, Need, Stream
 
 PATIENCE = 20.0  # seconds; a test that gets there has failed
@@ -98,6 +98,19 @@ def test_what_came_once_is_not_pushed_out_by_a_busy_stream_before_matching_begin
     door.feed("a", 999, "a999")
     door.wait()
     assert door.taken == [("a999", "b999")]
+
+
+def test_a_frame_goes_without_what_is_optional_once_every_stream_has_been_quiet_for_a_while(door: Pairs) -> None:
+    door.begin([Stream("a"), Stream("b"), Stream("odom", Need.OPTIONAL)])
+    door.feed("odom", 4, "odom")
+    for k, name in enumerate("ab"):
+        door.feed(name, 5, f"{name}5")
+        for _ in range(round(QUIET_S / ALONE_S)):
+            door._look_after()
+        assert door.ledger.balance().waiting == 1, f"quiet for too short a time after message {k}"
+    door._look_after()
+    door.wait()
+    assert door.taken == [("a5", "b5")] and door.ledger.balance().waiting == 0
 
 
 def test_a_frame_whose_partner_never_came_is_dropped_as_unmatched(door: Pairs) -> None:

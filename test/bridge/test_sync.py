@@ -298,6 +298,18 @@ def test_one_frame_played_again_and_again_matches_each_time() -> None:
     assert sum(len(sync.add(name, 7, 7)) for _ in range(4) for name in ("image", "depth")) == 4
 
 
+def test_what_waits_for_nothing_but_an_optional_stream_need_wait_no_longer() -> None:
+    sync = Synchroniser((*EXACT, Stream("odom", Need.OPTIONAL, slop_ns=2, enclosing=True)))
+    for name, stamp in (("odom", 0), ("odom", 7), ("image", 9), ("depth", 9), ("image", 20)):
+        assert sync.add(name, stamp, f"{name}{stamp}") == []
+    (match,) = sync.wait_no_longer()
+    assert (match["image"], match["depth"], match["odom"]) == ("image9", "depth9", ("odom7",))
+    assert sync.wait_no_longer() == [] and accounts_hold(sync)
+    assert sync.queues["image"].waiting == 1 and sync.received == 5  # its depth may come yet
+    assert sync.add("depth", 20, "depth20") == []
+    assert [match["odom"] for match in sync.wait_no_longer()] == [None] and accounts_hold(sync)
+
+
 def test_flush_gives_what_is_still_possible() -> None:
     sync = Synchroniser((Stream("image"), Stream("depth", slop_ns=10)))
     sync.add("depth", 97, "d")
