@@ -17,6 +17,8 @@ from typing import Any, TypeVar, dataclass_transform
 import numpy as np
 from numpy.typing import NDArray
 
+from objreg_ros import limits
+
 Array = NDArray[Any]
 
 LEAST_VARIANCE = 1e-30  # m^2, rad^2: the information of less is no number that can be reckoned with
@@ -64,13 +66,22 @@ def _hold_pose(owner: Any, name: str) -> None:
         raise ValueError(f"{type(owner).__name__}.{name}: expected a rigid motion, got {T.tolist()}")
 
 
+def _hold_place(owner: Any, name: str) -> None:
+    """A pose in a world, which is somewhere in it."""
+    _hold_pose(owner, name)
+    farthest = float(np.abs(getattr(owner, name)[:3, 3]).max())
+    _require(owner, farthest <= limits.MOST_DISTANCE, f"{name} within {limits.MOST_DISTANCE:g} m", f"{farthest:g} m")
+
+
 def _require(owner: Any, truth: bool, expected: str, got: object) -> None:
     if not truth:
         raise ValueError(f"{type(owner).__name__}: expected {expected}, got {got}")
 
 
-# No lens comes near these; beyond them rays do not fit into float32.
-LEAST_PX, MOST_PX = 1e-3, 1e6
+def _require_reach(owner: Any, xyz: Array, of: str) -> None:
+    """No index into a grid or a picture is made of a coordinate beyond `limits.MOST_RANGE`; NaN is none."""
+    farthest = float(np.fmax.reduce(np.abs(xyz), axis=None, initial=0.0))
+    _require(owner, farthest <= limits.MOST_RANGE, f"{of} within {limits.MOST_RANGE:g} m", f"{farthest:g} m")
 
 
 @word
@@ -88,10 +99,12 @@ class Intrinsics:
         numbers = (self.fx, self.fy, self.cx, self.cy)
         _require(self, all(np.isfinite(numbers)), "finite fx fy cx cy", numbers)
         focal, centre = numbers[:2], numbers[2:]
-        in_reach = min(focal) >= LEAST_PX and max(focal) <= MOST_PX
-        _require(self, in_reach, f"focal lengths of {LEAST_PX} to {MOST_PX:.0f} px", focal)
-        _require(self, max(map(abs, centre)) <= MOST_PX, f"a principal point within {MOST_PX:.0f} px", centre)
-        _require(self, self.width > 0 and self.height > 0, "a size above 0 px", (self.width, self.height))
+        least, most = limits.LEAST_FOCAL_LENGTH, limits.MOST_FOCAL_LENGTH
+        _require(self, min(focal) >= least and max(focal) <= most, f"focal lengths of {least} to {most:.0f} px", focal)
+        _require(self, max(map(abs, centre)) <= most, f"a principal point within {most:.0f} px", centre)
+        size = self.width, self.height
+        _require(self, min(size) > 0, "a size above 0 px", size)
+        _require(self, self.width * self.height <= limits.MOST_PIXELS, f"at most {limits.MOST_PIXELS} pixels", size)
 
     def scaled(self, step: int, first: tuple[int, int] | None = None) -> Intrinsics:
         """The camera that sees every ``step``-th pixel of each row and column.
@@ -143,6 +156,7 @@ class Detections:
         _require(self, bool(np.isfinite(self.xyxy).all()), "finite boxes", self.xyxy)
         _require(self, bool(((self.score >= 0) & (self.score <= 1)).all()), "scores in 0..1", self.score)
         _require(self, min(self.image_hw) > 0, "an image size above 0 px", self.image_hw)
+        _require(self, len(self) <= limits.MOST_DETECTIONS, f"at most {limits.MOST_DETECTIONS} boxes", len(self))
 
     def __len__(self) -> int:
         return len(self.label)
@@ -177,8 +191,8 @@ class PointCloud:
 class DepthImage:
     """What every depth source becomes at the segmenter's door.
 
-    ``depth (H, W) float32`` metres along the optical axis, 0 where there is none (never NaN); ``rgb (H, W, 3) uint8``
-    registered to it, or None; ``intrinsics`` of the same size.
+    ``depth (H, W) float32`` metres along the optical axis, 0 to `limits.MOST_DEPTH`, 0 where there is none (never NaN);
+    ``rgb (H, W, 3) uint8`` registered to it, or None; ``intrinsics`` of the same size.
     """
 
     depth: Array
@@ -192,6 +206,9 @@ class DepthImage:
         _hold(self, "depth", np.float32, ("H", "W"), sizes)
         if self.rgb is not None:
             _hold(self, "rgb", np.uint8, ("H", "W", 3), sizes)
+        least, most = float(self.depth.min()), float(self.depth.max())  # NaN is within no bounds
+        in_reach = least >= 0.0 and most <= limits.MOST_DEPTH
+        _require(self, in_reach, f"depth of 0 to {limits.MOST_DEPTH:g} m", f"{least:g} to {most:g} m")
 
 
 class PointFlag(IntFlag):
@@ -208,7 +225,8 @@ class PointFlag(IntFlag):
 class ObjectCloud:
     """One segmented object in one frame, in the camera frame, with a ``score`` in 0..1.
 
-    ``xyz (M, 3) float32`` m; ``normals (M, 3) float32`` of length 1, towards the camera (0 0 0 where unknown);
+    ``xyz (M, 3) float32`` m, within `limits.MOST_RANGE`; ``normals (M, 3) float32`` of length 1, towards the camera
+    (0 0 0 where unknown);
     ``rgb (M, 3) uint8`` or None; ``flags (M,) uint16`` of `PointFlag`; ``density`` measured points per square metre of
     surface; ``instance`` counts the objects of the frame from 1 (0 is the support surface).
     """
@@ -229,10 +247,16 @@ class ObjectCloud:
         _hold(self, "flags", np.uint16, ("M",), sizes)
         if self.rgb is not None:
             _hold(self, "rgb", np.uint8, ("M", 3), sizes)
-        _require(self, bool(np.isfinite(self.xyz).all()), f"finite points of {self.label!r}", "NaN or infinity")
-        _require(self, 0 <= self.score <= 1, f"a score of {self.label!r} in 0..1", self.score)
-        _require(self, 0 <= self.density < np.inf, f"a finite density of {self.label!r}, 0 or more", self.density)
+        _require(self, len(self.label) <= limits.MOST_NAME, f"a label of at most {limits.MOST_NAME} characters", "more")
         _require(self, not SURROGATE.search(self.label), "a label that UTF-8 can write", ascii(self.label))
+        _require(self, bool(np.isfinite(self.xyz).all()), f"finite points of {self.label!r}", "NaN or infinity")
+        _require_reach(self, self.xyz, f"points of {self.label!r}")
+        longest = float(np.abs(self.normals).max(initial=0.0))
+        normal = longest <= limits.MOST_NORMAL
+        _require(self, normal, f"normals of {self.label!r} of length 1 or 0", f"a part of {longest:g}")
+        _require(self, 0 <= self.score <= 1, f"a score of {self.label!r} in 0..1", self.score)
+        dense = 0 <= self.density <= limits.MOST_DENSITY
+        _require(self, dense, f"a density of {self.label!r} of 0 to {limits.MOST_DENSITY:g}", self.density)
 
     def __len__(self) -> int:
         return len(self.xyz)
@@ -246,8 +270,8 @@ class ObjectCloud:
 class View:
     """A frame at reduced size: what free space and texture are checked against, and what refinement holds on to.
 
-    ``xyz (h, w, 3) float32`` m, NaN where nothing was measured; ``grey (h, w) uint8`` or None; ``intrinsics`` of the
-    reduced camera.
+    ``xyz (h, w, 3) float32`` m, within `limits.MOST_RANGE` of the camera, NaN where nothing was measured; ``grey (h, w)
+    uint8`` or None; ``intrinsics`` of the reduced camera.
     """
 
     xyz: Array
@@ -259,6 +283,7 @@ class View:
         _hold(self, "xyz", np.float32, ("h", "w", 3), sizes)
         if self.grey is not None:
             _hold(self, "grey", np.uint8, ("h", "w"), sizes)
+        _require_reach(self, self.xyz, "points")
 
 
 @word
@@ -280,12 +305,14 @@ class Frame:
     frame_id: str = "camera"
 
     def __post_init__(self) -> None:
+        few = len(self.objects) <= limits.MOST_OBJECTS
+        _require(self, few, f"at most {limits.MOST_OBJECTS} objects", len(self.objects))
         if self.gravity is not None:
             _hold(self, "gravity", np.float64, (3,), {})
             length = float(np.linalg.norm(self.gravity))
             _require(self, abs(length - 1) < 1e-6, "gravity of length 1", length)
         if self.T_odom_camera is not None:
-            _hold_pose(self, "T_odom_camera")
+            _hold_place(self, "T_odom_camera")
 
 
 @word
@@ -298,7 +325,7 @@ class Odometry:
     child_frame_id: str = "base_link"
 
     def __post_init__(self) -> None:
-        _hold_pose(self, "T_odom_body")
+        _hold_place(self, "T_odom_body")
 
 
 @word

@@ -86,6 +86,12 @@ def test_the_array_that_was_given_stays_writable() -> None:
     assert word.xyz[0, 0] == 7  # a view: nothing was copied
 
 
+def far(metres: float) -> np.ndarray:
+    T = np.eye(4)
+    T[0, 3] = metres
+    return T
+
+
 R_MIRRORED = np.diag([1.0, 1.0, -1.0, 1.0])
 R_SCALED = np.diag([1.1, 1.1, 1.1, 1.0])
 NOT_POSITIVE = np.diag([1.0, 1, 1, 1, 1, 0])
@@ -105,8 +111,19 @@ NOT_SYMMETRIC = np.eye(6) + np.eye(6, k=1)
         (cloud, {"score": NAN}, "ObjectCloud: expected a score of 'cup' in 0..1, got nan"),
         (cloud, {"score": np.inf}, "expected a score of 'cup' in 0..1, got inf"),
         (cloud, {"score": -0.1}, "expected a score of 'cup' in 0..1, got -0.1"),
-        (cloud, {"density": NAN}, "expected a finite density of 'cup', 0 or more, got nan"),
-        (cloud, {"density": np.inf}, "expected a finite density of 'cup', 0 or more, got inf"),
+        (cloud, {"density": NAN}, "expected a density of 'cup' of 0 to 1e+12, got nan"),
+        (cloud, {"density": np.inf}, "expected a density of 'cup' of 0 to 1e+12, got inf"),
+        (cloud, {"density": 1e13}, "expected a density of 'cup' of 0 to 1e+12, got 10000000000000.0"),
+        (cloud, {"xyz": floats(4, 3) + 3e38}, "expected points of 'cup' within 1000 m, got 3e+38 m"),
+        (cloud, {"xyz": floats(4, 3) - 1001}, "expected points of 'cup' within 1000 m, got 1001 m"),
+        (cloud, {"normals": floats(4, 3) + 1e30}, "expected normals of 'cup' of length 1 or 0, got a part of 1e+30"),
+        (cloud, {"normals": np.full((4, 3), NAN)}, "expected normals of 'cup' of length 1 or 0, got a part of nan"),
+        (cloud, {"label": "x" * 1001}, "expected a label of at most 1000 characters"),
+        (view, {"xyz": floats(48, 64, 3) - 1001}, "View: expected points within 1000 m, got 1001 m"),
+        (frame, {"T_odom_camera": far(1.1e8)}, "Frame: expected T_odom_camera within 1e+08 m, got 1.1e+08 m"),
+        (depth_image, {"depth": np.full((48, 64), NAN)}, "expected depth of 0 to 100000 m, got nan to nan m"),
+        (depth_image, {"depth": floats(48, 64) - 1}, "expected depth of 0 to 100000 m, got -1 to -1 m"),
+        (depth_image, {"depth": floats(48, 64) + 1e30}, "expected depth of 0 to 100000 m, got 1e+30 to 1e+30 m"),
         (cloud, {"label": "\ud800cup"}, r"expected a label that UTF-8 can write, got '\ud800cup'"),
         (view, {"xyz": floats(24, 64, 3)}, "View.xyz: expected float32 of shape (h, w, 3)"),
         (view, {"grey": np.zeros((48, 64, 3), np.uint8)}, "View.grey: expected uint8 of shape (h, w)"),
@@ -197,3 +214,12 @@ def test_an_almost_symmetric_covariance_is_good_enough() -> None:
     covariance = np.eye(6)
     covariance[0, 1] = 1e-9
     assert closure(covariance=covariance).covariance[0, 1] == 1e-9
+
+
+def test_a_view_may_have_points_that_were_not_measured() -> None:
+    assert np.isnan(view(xyz=np.full((48, 64, 3), NAN)).xyz).all()
+
+
+def test_a_camera_of_more_pixels_than_any_picture_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"expected at most 500000000 pixels, got \(1000000, 1000000\)"):
+        data.Intrinsics(fx=500.0, fy=500.0, cx=0.0, cy=0.0, width=10**6, height=10**6)

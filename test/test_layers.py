@@ -12,7 +12,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "objreg_ros"
 ROOMS = ("detector", "segmenter", "registrar", "mapper")
 ROS = {"rclpy", "launch", "launch_ros", "tf2_ros", "ament_index_python", "rosgraph_msgs"}
 FREE_BRIDGE = ("bridge.from_msg", "bridge.course", "bridge.sync", "bridge.layout", "bridge.pictures")
-CORE = ("data", "geometry", "params", "share")
+CORE = ("limits", "data", "geometry", "params", "share")
 HOUSE = ("offline", "truth", "report")
 
 
@@ -55,6 +55,8 @@ def below(name: str, *packages: str) -> bool:
 def allowed(importer: str, imported: str) -> bool:
     """The table of the import law."""
     room = importer.split(".")[0]
+    if imported == "limits" and importer != "":
+        return True
     if importer in CORE or importer == "":
         return False
     if below(importer, "cli"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import threading
 import time
+import traceback
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -23,6 +24,7 @@ from rclpy.task import Future
 from std_msgs.msg import Header
 
 from objreg_ros.bridge import qos, to_msg
+from objreg_ros.bridge.choice import Choice
 from objreg_ros.bridge.diagnostics import CONNECTED, diagnostic
 from objreg_ros.bridge.ledger import Ledger
 from objreg_ros.bridge.log import ThrottledLog
@@ -55,11 +57,13 @@ class Door(Node):
         self.settings.changed = self.adopt
         self.ledger = Ledger()
         self.connected: dict[str, int] = {}  # full topic name → publishers that DDS has connected us to
-        self._opened: dict[str, dict[str, Subscription]] = {}  # input of `listen_to_first` → its open topics
+        self._choices: dict[str, Choice[Subscription]] = {}  # by the input of `listen_to_first`
+        self._bugs: set[str] = set()  # that the log has told of
         self._ignored: Counter[str] = Counter()  # messages that are no frame by themselves, by what is wrong with them
         self.apart = ReentrantCallbackGroup()  # of services that wait for work that is done `aside`
         self._aside: list[threading.Thread] = []
         self.failure: Future = Future()
+        self.most_pixels = self.settings.of(DoorParams).most_pixels
         self.throttled = ThrottledLog(self.get_logger().warning)
         self.watch = Watch(self.count_publishers, self.settings.of(DoorParams).silence)
         self.worker: Worker[tuple[int, Any]] = Worker(self._work, self._overtaken, self.fail)
@@ -96,11 +100,33 @@ class Door(Node):
         def hear(message: Any, info: Mapping[str, Any]) -> None:
             self._note_loss(topic, missed.before(info["publication_sequence_number"]))
             self.watch.hear(watched)
-            heard(message)
+            self._pass(topic, heard, message)
 
         full = self.resolve_topic_name(topic)
         events = SubscriptionEventCallbacks(matched=partial(self._note_match, full))
         return self.create_subscription(kind, topic, hear, profile, event_callbacks=events)  # type: ignore[arg-type]
+
+    def _pass(self, topic: str, heard: Callable[[Any], None], message: Any) -> None:
+        """Hand a message on. None ends the node: what breaks its contract already here is counted, and logged."""
+        try:
+            heard(message)
+        except ValueError as error:
+            self._ignore(topic, str(error))
+        except Exception as error:
+            self._ignore(self._bug(topic, error), str(error))
+
+    def _ignore(self, what: str, text: str) -> None:
+        self._ignored[f"malformed {what}"] += 1
+        self.throttled.warn(f"malformed_{what}", f"{what} ignored: {text}")
+
+    def _bug(self, reason: str, error: Exception) -> str:
+        """The reason with the name of an exception that nobody expected; the first of a kind is logged whole."""
+        named = f"{reason} ({type(error).__name__})"
+        if named not in self._bugs:
+            self._bugs.add(named)
+            trace = "".join(traceback.format_exception(error))
+            self.get_logger().error(f"{named}: a bug, and the node goes on; please report it with these lines: {trace}")
+        return named
 
     def _note_match(self, topic: str, event: Any) -> None:
         self.connected[topic] = event.current_count
@@ -110,26 +136,43 @@ class Door(Node):
             self.ledger.lose(topic, count)
 
     def listen_to_first(
-        self, name: str, topics: Mapping[str, type], heard: Callable[[str, Any], None], profile: QoSProfile
+        self,
+        name: str,
+        topics: Mapping[str, type],
+        decode: Callable[[str, Any], object],
+        heard: Callable[[str, Any], None],
+        profile: QoSProfile,
     ) -> None:
-        """Subscribe to topics that carry the same thing. The first that speaks is kept, the others are closed."""
-        opened = self._opened.setdefault(name, {})
+        """Subscribe to topics that carry the same thing; the first is `taken` that sends a message that decodes.
+
+        The others are closed until that one has been silent for the parameter ``silence``. ``heard`` is given the topic
+        and the message, those too that come before one is taken.
+        """
 
         def hear(topic: str, message: Any) -> None:
-            if topic not in opened:
-                return
-            for other in [other for other in opened if other != topic]:
-                self.destroy_subscription(opened.pop(other))
-            heard(topic, message)
+            if self._choices[name].hear(topic, message):
+                heard(topic, message)
 
-        for topic, kind in topics.items():
-            opened[topic] = self.listen(kind, topic, partial(hear, topic), profile, watched=name)
+        def subscribe(topic: str) -> Subscription:
+            return self.listen(topics[topic], topic, partial(hear, topic), profile, watched=name)
+
+        silence_s = self.settings.of(DoorParams).silence
+        is_valid = partial(_decodes, decode)
+        self._choices[name] = Choice(topics, subscribe, self._unsubscribe, is_valid, silence_s)
         self.expect(name, *topics)
+
+    def _unsubscribe(self, subscription: Subscription) -> None:
+        self.connected.pop(subscription.topic_name, None)
+        self.destroy_subscription(subscription)
+
+    def taken(self, name: str) -> str | None:
+        """The topic that an input of `listen_to_first` comes by; None before a valid message, or after a silence."""
+        return self._choices[name].taken
 
     def hang_up(self, name: str) -> None:
         """Close every topic of `listen_to_first`; its silence is no longer reported."""
-        for subscription in self._opened.pop(name, {}).values():
-            self.destroy_subscription(subscription)
+        if name in self._choices:
+            self._choices.pop(name).close()
         self.watch.forget(name)
 
     def expect(self, name: str, *topics: str) -> None:
@@ -154,30 +197,38 @@ class Door(Node):
         self._finished.publish(to_msg.finished(self.get_name(), stamp_ns, reason))
 
     def read(self, topic: str, decode: Callable[..., Any], *messages: Any) -> Any:
-        """The word of a message; `DroppedError` as ``malformed_<topic>`` if it breaks its contract."""
+        """The word of a message; `DroppedError` as ``malformed_<topic>`` if it breaks its contract.
+
+        With the name of the exception behind that if it is one that no decoder should raise.
+        """
         try:
             with self.ledger.timed("decode"):
                 return decode(*messages)
         except ValueError as error:
             raise DroppedError(f"malformed_{topic}", str(error)) from error
+        except Exception as error:
+            raise DroppedError(self._bug(f"malformed_{topic}", error), str(error)) from error
 
     def read_aside(self, topic: str, decode: Callable[..., Any], message: Any) -> Any:
         """The word of a message that is no frame by itself; None, counted and logged, if it breaks its contract."""
         try:
             return decode(message)
         except ValueError as error:
-            self._ignored[f"malformed {topic}"] += 1
-            self.throttled.warn(f"malformed_{topic}", f"{topic} ignored: {error}")
-            return None
+            self._ignore(topic, str(error))
+        except Exception as error:
+            self._ignore(self._bug(topic, error), str(error))
+        return None
 
     def conclude(self, stamp_ns: int, work: Callable[[], bool]) -> None:
-        """Do the last work on a frame and settle it in the books."""
+        """Do the last work on a frame and settle it in the books; what nobody expected drops it as a ``bug``."""
         try:
             done = work()
         except DroppedError as dropped:
             self.drop(stamp_ns, dropped.reason, str(dropped))
         except (ValueError, OSError) as error:
             self.drop(stamp_ns, "refused", str(error))
+        except Exception as error:
+            self.drop(stamp_ns, self._bug("bug", error), str(error))
         else:
             if done:
                 self.ledger.publish(stamp_ns)
@@ -221,6 +272,8 @@ class Door(Node):
     # Diagnostics, parameters, the end
 
     def _report(self) -> None:
+        for choice in self._choices.values():
+            choice.look()
         silent = self.watch.silent()
         for name, advice in silent.items():
             self.throttled.remind(name, advice)
@@ -255,3 +308,11 @@ class Door(Node):
         self.end_aside()
         self.worker.close()
         self.destroy_node()
+
+
+def _decodes(decode: Callable[[str, Any], object], topic: str, message: Any) -> bool:
+    try:
+        decode(topic, message)
+    except Exception:  # whatever it is, it is counted where the message is read
+        return False
+    return True

@@ -7,16 +7,20 @@ in `layout`. A message that breaks its contract raises ValueError with what was 
 
 from __future__ import annotations
 
+import itertools
 import json
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from objreg_ros.bridge.layout import SUPPORT_ID, SUPPORT_LABEL, columns, table
+from objreg_ros import limits
+from objreg_ros.bridge.layout import SUPPORT_ID, SUPPORT_LABEL, columns, table, whole_numbers
 from objreg_ros.bridge.pictures import colour_pixels, depth_metres, unpack_rgb
 from objreg_ros.data import (
+    SURROGATE,
     ColourImage,
     DepthImage,
     Detections,
@@ -32,44 +36,64 @@ from objreg_ros.geometry import interpolate, pose, rotation_from_quaternion
 
 Array = NDArray[Any]
 
-NANOSECONDS = 1_000_000_000
+COLUMNS = {"p": 4, "k": 3}  # of the matrices of a camera_info
+MOMENT = re.compile(r"(?P<name>.*)@(?P<seconds>-?[0-9]{1,10})\.(?P<nanoseconds>[0-9]{9})", re.DOTALL)
 
 
 def stamp_ns(message: Any) -> int:
-    """The time of a message with a header, of a Header or of a Time, in integer nanoseconds."""
+    """The time of a message with a header, of a Header or of a Time, in integer nanoseconds.
+
+    ValueError for one that a ROS 2 message cannot carry: seconds of more than 32 bits, a second of nanoseconds.
+    """
     stamp = getattr(message, "header", message)
     stamp = getattr(stamp, "stamp", stamp)
-    return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
+    if not 0 <= stamp.nanosec < limits.NANOSECONDS:
+        raise ValueError(f"stamp: expected nanoseconds below {limits.NANOSECONDS}, got {stamp.nanosec}")
+    return _stamp_within_limits(int(stamp.sec) * limits.NANOSECONDS + int(stamp.nanosec))
+
+
+def _stamp_within_limits(stamp_ns: int) -> int:
+    if not limits.LEAST_STAMP_NS <= stamp_ns <= limits.MOST_STAMP_NS:
+        raise ValueError(f"stamp: expected seconds of 32 bits, got {stamp_ns // limits.NANOSECONDS}")
+    return stamp_ns
+
+
+def _name(text: str, of: str) -> str:
+    if len(text) > limits.MOST_NAME:
+        raise ValueError(f"{of}: expected at most {limits.MOST_NAME} characters, got {len(text)}: {text[:40]!r}…")
+    return text
 
 
 def _when_and_where(message: Any) -> dict[str, Any]:
-    return {"stamp_ns": stamp_ns(message), "frame_id": message.header.frame_id}
+    return {"stamp_ns": stamp_ns(message), "frame_id": _name(message.header.frame_id, "frame_id")}
 
 
 # ------------------------------------------------------------------------------------------------------------- cameras
 
 
-def image(message: Any) -> ColourImage:
+def image(message: Any, most_pixels: int = limits.MOST_PIXELS_OF_PICTURE) -> ColourImage:
     """A sensor_msgs Image (rgb8 bgr8 rgba8 bgra8 mono8 mono16 8UC1 8UC3 8UC4) or CompressedImage (jpeg, png)."""
-    return ColourImage(rgb=colour_pixels(message), **_when_and_where(message))
+    return ColourImage(rgb=colour_pixels(message, most_pixels), **_when_and_where(message))
 
 
-def depth(message: Any) -> Array:
+def depth(message: Any, most_pixels: int = limits.MOST_PIXELS_OF_PICTURE) -> Array:
     """Metres (H, W) float32, 0 where there is none, of an Image (16UC1, mono16: mm; 32FC1: m) or a compressedDepth."""
-    return depth_metres(message)
+    return depth_metres(message, most_pixels)
 
 
-def depth_image(depth_message: Any, camera_info: Any, colour: Any = None) -> DepthImage:
+def depth_image(
+    depth_message: Any, camera_info: Any, colour: Any = None, most_pixels: int = limits.MOST_PIXELS_OF_PICTURE
+) -> DepthImage:
     """The depth word of a depth message, its CameraInfo and, if at hand, the colour message registered to it.
 
     Colour of another size is left out: it is not registered to this depth.
     """
-    metres = depth(depth_message)
+    metres = depth(depth_message, most_pixels)
     camera = intrinsics(camera_info)
     if metres.shape != (camera.height, camera.width):
         got = f"{metres.shape[1]} × {metres.shape[0]}"
         raise ValueError(f"depth: expected camera_info's size {camera.width} × {camera.height}, got {got} pixels")
-    rgb = None if colour is None else image(colour).rgb
+    rgb = None if colour is None else image(colour, most_pixels).rgb
     rgb = rgb if rgb is not None and rgb.shape[:2] == metres.shape else None
     return DepthImage(depth=metres, rgb=rgb, intrinsics=camera, **_when_and_where(depth_message))
 
@@ -99,14 +123,19 @@ def is_calibrated(message: Any) -> bool:
     return any(_camera_matrix(message, name).flat[0] != 0 for name in "pk")
 
 
-def camera_of_cloud(camera_info: Any, cloud: PointCloud) -> Intrinsics | None:
+def camera_of_cloud(
+    camera_info: Any, cloud: PointCloud, most_pixels: int = limits.MOST_PIXELS_OF_PICTURE
+) -> Intrinsics | None:
     """The camera that a cloud is organised or projected with; None without a ``camera_info``.
 
     None too for one that is not calibrated where the cloud is organised, since that needs none; else ValueError.
     """
     if camera_info is None or (cloud.organised and not is_calibrated(camera_info)):
         return None
-    return intrinsics(camera_info)
+    camera = intrinsics(camera_info)
+    if camera.width * camera.height > most_pixels:
+        raise ValueError(f"camera_info: expected at most {most_pixels} pixels, got {camera.width} × {camera.height}")
+    return camera
 
 
 def _calibrated(message: Any) -> Array:
@@ -121,7 +150,7 @@ def _calibrated(message: Any) -> Array:
 
 def _camera_matrix(message: Any, name: str) -> Array:
     values = getattr(message, name) if hasattr(message, name) else getattr(message, name.upper())  # as in ROS 1
-    return np.asarray(values, np.float64).reshape(3, -1)
+    return np.asarray(values, np.float64).reshape(3, COLUMNS[name])
 
 
 def point_cloud(message: Any) -> PointCloud:
@@ -152,9 +181,8 @@ def odometry(message: Any) -> Odometry:
     """An Odometry, PoseStamped, PoseWithCovarianceStamped or TransformStamped; ValueError without a rotation."""
     return Odometry(
         T_odom_body=_pose(message),
-        stamp_ns=stamp_ns(message),
-        frame_id=message.header.frame_id,
-        child_frame_id=getattr(message, "child_frame_id", ""),
+        child_frame_id=_name(getattr(message, "child_frame_id", ""), "child_frame_id"),
+        **_when_and_where(message),
     )
 
 
@@ -212,11 +240,11 @@ def loop_closure(message: Any) -> LoopClosure:
 
 def moment(frame_id: str) -> tuple[str, int]:
     """The frame, of whatever name, and the time in ns of ``name@sec.nsec`` with nine digits behind the point."""
-    name, at, time = frame_id.rpartition("@")
-    seconds, _, nanoseconds = time.partition(".")
-    if not at or not seconds.lstrip("-").isdigit() or not nanoseconds.isdigit() or len(nanoseconds) != 9:
+    found = MOMENT.fullmatch(_name(frame_id, "constraint"))
+    if found is None:
         raise ValueError(f"constraint: expected a frame_id like camera@12.000000034, got {frame_id!r}")
-    return name, int(seconds) * NANOSECONDS + int(nanoseconds)
+    seconds, nanoseconds = int(found["seconds"]), int(found["nanoseconds"])
+    return found["name"], _stamp_within_limits(seconds * limits.NANOSECONDS + nanoseconds)
 
 
 # --------------------------------------------------------------------------------------------------- between the rooms
@@ -224,10 +252,27 @@ def moment(frame_id: str) -> tuple[str, int]:
 
 def labels(message: Any) -> dict[int, str]:
     """The names of the classes: std_msgs/String with JSON ``{"id": "name"}``."""
+    if len(message.data) > limits.MOST_LABELS_TEXT:
+        raise ValueError(f"labels: expected at most {limits.MOST_LABELS_TEXT} characters, got {len(message.data)}")
     try:
-        return {int(number): str(name) for number, name in json.loads(message.data).items()}
+        told = json.loads(message.data).items()
+        return {_class_id(number): _label(name) for number, name in told}
     except (ValueError, AttributeError, RecursionError) as error:
-        raise ValueError(f'labels: expected JSON like {{"0": "cup"}}, got {message.data[:80]!r}') from error
+        got = f"{message.data[:80]!r} ({error})"
+        raise ValueError(f'labels: expected JSON like {{"0": "cup"}}, got {got}') from error
+
+
+def _class_id(text: str) -> int:
+    number = int(text)
+    if not 0 <= number <= limits.MOST_CLASS_ID:
+        raise ValueError(f"expected an id of 0 to {limits.MOST_CLASS_ID}, got {number}")
+    return number
+
+
+def _label(name: Any) -> str:
+    if not isinstance(name, str) or SURROGATE.search(name):
+        raise ValueError(f"expected a name that UTF-8 can write, got {ascii(name)[:80]}")
+    return _name(name, "label")
 
 
 def detections(message: Any, names: Mapping[int, str], image_hw: tuple[int, int] = (1, 1)) -> Detections:
@@ -252,45 +297,64 @@ Rows = tuple[Array, Array, list[str], tuple[int, int] | None]
 def _rows_of_table(message: Any, names: Mapping[int, str]) -> Rows:
     corners = ("x_min", "y_min", "x_max", "y_max")
     rows = table(message, *corners, "score", "class_id", "image_width", "image_height").reshape(1, -1)
-    label = [names.get(number, str(number)) for number in rows["class_id"][0].tolist()]
-    image_hw = (int(rows["image_height"][0, 0]), int(rows["image_width"][0, 0])) if rows.size else None
-    return columns(rows, *corners)[0], rows["score"][0].astype(np.float32), label, image_hw
+    if rows.shape[1] > limits.MOST_DETECTIONS:
+        raise ValueError(f"detections: expected at most {limits.MOST_DETECTIONS} boxes, got {rows.shape[1]}")
+    label = [names.get(number, str(number)) for number in whole_numbers(rows, "class_id")[0].tolist()]
+    height, width = whole_numbers(rows, "image_height"), whole_numbers(rows, "image_width")
+    image_hw = (int(height[0, 0]), int(width[0, 0])) if rows.size else None
+    return columns(rows, *corners)[0], columns(rows, "score")[0, :, 0], label, image_hw
 
 
 def objects(message: Any, names: Mapping[int, str]) -> tuple[tuple[ObjectCloud, ...], ObjectCloud | None]:
     """The objects (instance 1 and up, in order) and the support surface (instance 0) of an ``objects`` cloud."""
     needed = ("x", "y", "z", "normal_x", "normal_y", "normal_z", "score", "density", "class_id", "instance", "flags")
     rows = table(message, *needed).reshape(1, -1)
-    instance = rows["instance"][0].astype(np.int64)
+    if rows.shape[1] > limits.MOST_OBJECT_POINTS:
+        raise ValueError(f"objects: expected at most {limits.MOST_OBJECT_POINTS} points, got {rows.shape[1]}")
+    instance, number = whole_numbers(rows, "instance")[0], whole_numbers(rows, "class_id")[0]
+    flags = whole_numbers(rows, "flags")[0].astype(np.uint16)
     if (np.diff(instance) < 0).any():  # ours come in order
         order = np.argsort(instance, kind="stable")
-        rows, instance = rows[:, order], instance[order]
+        rows, instance, number, flags = rows[:, order], instance[order], number[order], flags[order]
     starts = np.flatnonzero(np.diff(instance)) + 1
-    if not (rows["z"] > 0).all():
+    if not (rows["z"] >= limits.LEAST_RANGE).all():
         raise ValueError(f"objects: expected points in front of the camera, got one at z = {rows['z'].min()} m")
-    clouds = [_object(part, names) for part in np.split(rows, starts, axis=1) if part.size]
+    if len(starts) > limits.MOST_OBJECTS:
+        raise ValueError(f"objects: expected at most {limits.MOST_OBJECTS} objects, got {len(starts) + 1}")
+    bounds = [0, *starts.tolist(), rows.shape[1]]
+    parts = [slice(first, last) for first, last in itertools.pairwise(bounds) if last > first]
+    clouds = [
+        _object(rows[:, part], int(instance[part.start]), _label_of(int(number[part.start]), names), flags[part])
+        for part in parts
+    ]
     support = next((cloud for cloud in clouds if cloud.instance == 0), None)
     return tuple(cloud for cloud in clouds if cloud.instance > 0), support
 
 
-def _object(rows: Array, names: Mapping[int, str]) -> ObjectCloud:
-    first = rows[0, 0]
-    number = int(first["class_id"])
+def _label_of(number: int, names: Mapping[int, str]) -> str:
+    return SUPPORT_LABEL if number == SUPPORT_ID else names.get(number, str(number))
+
+
+def _object(rows: Array, instance: int, label: str, flags: Array) -> ObjectCloud:
+    score, density = columns(rows[:, :1], "score", "density")[0, 0].tolist()
     colours = _colours(rows)
     return ObjectCloud(
-        label=SUPPORT_LABEL if number == SUPPORT_ID else names.get(number, str(number)),
-        score=float(first["score"]),
-        instance=int(first["instance"]),
+        label=label,
+        score=score,
+        instance=instance,
         xyz=columns(rows, "x", "y", "z")[0],
         normals=columns(rows, "normal_x", "normal_y", "normal_z")[0],
         rgb=None if colours is None else colours[0],
-        flags=rows["flags"][0].astype(np.uint16),
-        density=float(first["density"]),
+        flags=flags,
+        density=density,
     )
 
 
 def view(message: Any, camera_info: Any) -> View:
     """The reduced frame: an organised cloud whose rgb, if it has one, is grey."""
+    if int(message.width) * int(message.height) > limits.MOST_VIEW_PIXELS:
+        size = f"{message.width} × {message.height}"
+        raise ValueError(f"view: expected at most {limits.MOST_VIEW_PIXELS} pixels, got {size}")
     cloud = point_cloud(message)
     grey = None if cloud.rgb is None else np.ascontiguousarray(cloud.rgb[..., 0])
     return View(xyz=cloud.xyz, grey=grey, intrinsics=intrinsics(camera_info))
@@ -304,7 +368,7 @@ def gravity(message: Any) -> tuple[Array | None, float]:
 def split_gravity(vector: Array) -> tuple[Array | None, float]:
     """The direction and the confidence of a gravity vector whose length is the confidence."""
     confidence = float(np.linalg.norm(vector))
-    return (None, 0.0) if not confidence > 1e-9 else (vector / confidence, min(confidence, 1.0))
+    return (vector / confidence, min(confidence, 1.0)) if 1e-9 < confidence < np.inf else (None, 0.0)
 
 
 def frame(

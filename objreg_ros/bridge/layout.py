@@ -13,10 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from objreg_ros import limits
+
 Array = NDArray[Any]
 
 SUPPORT_ID = 65535  # class_id of the support surface, which is no class
 SUPPORT_LABEL = "support"
+MOST_WHOLE = 65535  # of the numbers of the tables, which are u2
 
 DETECTIONS = np.dtype(
     [
@@ -70,7 +73,8 @@ def table(cloud: Any, *required: str) -> Array:
     """The records of a PointCloud2, (height, width) with one named column a field; a view of ``cloud.data``.
 
     Packed colours (``rgb``, ``rgba``) come as unsigned integers whatever the type that carries them. ValueError for a
-    field that is ``required`` and missing, for fields that leave the record and for data that are cut off.
+    field that is ``required`` and missing or holds several values, for fields that leave the record and for data that
+    are cut off.
     """
     layout = record_layout(cloud)
     missing = [name for name in required if name not in (layout.names or ())]
@@ -78,6 +82,7 @@ def table(cloud: Any, *required: str) -> Array:
         raise ValueError(
             f"cloud: expected the fields {', '.join(required)}, got {', '.join(layout.names or ('none',))}"
         )
+    _require_single_values(layout, *required, *PACKED)
     height, width, row = int(cloud.height), int(cloud.width), int(cloud.row_step)
     if height * width == 0:
         return np.empty((height, width), layout)
@@ -91,9 +96,19 @@ def table(cloud: Any, *required: str) -> Array:
     return np.ndarray((height, width), layout, buffer=data, strides=(row, layout.itemsize))
 
 
+def _require_single_values(layout: np.dtype[Any], *names: str) -> None:
+    several = [name for name in names if name in (layout.names or ()) and layout[name].shape]
+    if several:
+        raise ValueError(f"cloud: expected a count of 1 of field {several[0]!r}, got {layout[several[0]].shape[0]}")
+
+
 def record_layout(cloud: Any) -> np.dtype[Any]:
     """The structured dtype of one record of a PointCloud2; ValueError if it cannot be one."""
     step, order = int(cloud.point_step), ">" if cloud.is_bigendian else "<"
+    if not 0 < step <= limits.MOST_RECORD:
+        raise ValueError(f"cloud: expected a point_step of 1 to {limits.MOST_RECORD} bytes, got {step}")
+    if len(cloud.fields) > limits.MOST_FIELDS:
+        raise ValueError(f"cloud: expected at most {limits.MOST_FIELDS} fields, got {len(cloud.fields)}")
     names, kinds, offsets = [], [], []
     for field in cloud.fields:
         kind = _field_kind(field, order)
@@ -107,16 +122,18 @@ def record_layout(cloud: Any) -> np.dtype[Any]:
         names.append(field.name)
         kinds.append(kind)
         offsets.append(int(field.offset))
-    if step <= 0:
-        raise ValueError(f"cloud: expected a point_step above 0, got {step}")
     return np.dtype({"names": names, "formats": kinds, "offsets": offsets, "itemsize": step})  # type: ignore[call-overload, no-any-return]
 
 
 def _field_kind(field: Any, order: str) -> np.dtype[Any]:
     if field.datatype not in FORMATS:
         raise ValueError(f"cloud: expected a datatype 1..8 of field {field.name!r}, got {field.datatype}")
+    if not field.name or len(field.name) > limits.MOST_NAME:
+        raise ValueError(f"cloud: expected a field's name of 1 to {limits.MOST_NAME} characters, got {len(field.name)}")
     packed = field.name in PACKED and FORMATS[field.datatype] in ("f4", "u4", "i4")
     kind = np.dtype(order + ("u4" if packed else FORMATS[field.datatype]))
+    if field.count * kind.itemsize > limits.MOST_RECORD:
+        raise ValueError(f"cloud: expected field {field.name!r} within a record, got a count of {field.count}")
     return kind if field.count <= 1 else np.dtype((kind, (int(field.count),)))
 
 
@@ -126,7 +143,18 @@ def columns(records: Array, *names: str) -> Array:
         first = records[names[0]]
         shape, strides = (*first.shape, len(names)), (*first.strides, first.itemsize)
         return np.array(np.lib.stride_tricks.as_strided(first, shape, strides))
-    return np.stack([records[name] for name in names], axis=-1, dtype=np.float32, casting="same_kind")
+    with np.errstate(over="ignore"):  # of float64: infinity is no number of a point either
+        return np.stack([records[name] for name in names], axis=-1, dtype=np.float32, casting="same_kind")
+
+
+def whole_numbers(records: Array, name: str) -> Array:
+    """A column of a table as int64; ValueError unless it holds integers of 16 bits without a sign."""
+    column = records[name]
+    if column.dtype.kind not in "iu":
+        raise ValueError(f"cloud: expected whole numbers in field {name!r}, got {column.dtype}")
+    if column.size and not (int(column.min()) >= 0 and int(column.max()) <= MOST_WHOLE):
+        raise ValueError(f"cloud: expected 0 to {MOST_WHOLE} in field {name!r}, got {column.min()} to {column.max()}")
+    return column.astype(np.int64)
 
 
 def _side_by_side(layout: np.dtype[Any], names: tuple[str, ...]) -> bool:

@@ -38,9 +38,17 @@ class MatchingDoor(Door):
         self.create_timer(ALONE_S, self._look_after, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def begin(self, streams: Sequence[Stream]) -> None:
-        """Start matching; what was fed to streams that are not among these is forgotten."""
+        """Start matching; what was fed to streams that are not among these is forgotten.
+
+        Where streams were matched before, those frames end by what has come, and latched values stay.
+        """
+        before = self._sync
+        if before is not None:
+            self._hand_over(before.flush())
         self._reference = streams[0].name
         self._sync = Synchroniser(streams, self._unmatched)
+        for name, payload in (before.latched if before is not None else {}).items():
+            self.feed(name, 0, payload)
         for _, *item in sorted(chain(*self._early.values()), key=lambda early: early[0]):
             self.feed(*item)
         self._early.clear()

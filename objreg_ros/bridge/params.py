@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from objreg_ros import limits
 from objreg_ros.params import Params, param
 
 
@@ -15,4 +16,21 @@ class DoorParams(Params):
     reliable: bool = param(
         False, "ask cameras and odometry for reliable delivery; a best-effort publisher then does not match"
     )
-    silence: float = param(5.0, "an input that is silent for this long is reported", unit="s", ge=0.1)
+    silence: float = param(
+        5.0,
+        "an input that is silent for this long is reported, and may come by another of its topics",
+        unit="s",
+        ge=0.1,
+    )
+    max_megapixels: float = param(
+        limits.MOST_PIXELS_OF_PICTURE * 1e-6,
+        "a picture of more is refused before it is decoded",
+        unit="megapixels",
+        ge=0.01,
+        le=limits.MOST_PIXELS * 1e-6,
+    )
+
+    @property
+    def most_pixels(self) -> int:
+        """`max_megapixels` as a number of pixels."""
+        return round(1e6 * self.max_megapixels)

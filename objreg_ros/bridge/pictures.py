@@ -1,13 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The pixels of Image and CompressedImage messages, raw and compressed, as colour or as depth."""
+"""The pixels of Image and CompressedImage messages, raw and compressed, as colour or as depth.
+
+How many there are is read off the message or off the header of its file, before any is decoded.
+"""
 
 from __future__ import annotations
 
+import io
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
+
+from objreg_ros import limits
 
 Array = NDArray[Any]
 
@@ -31,26 +38,33 @@ AS_STORED = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION  # depth knows noth
 COMPRESSED_DEPTH_HEADER = 12  # compressed_depth_image_transport: an enum and two floats before the PNG
 
 
-def colour_pixels(message: Any) -> Array:
-    """(H, W, 3) uint8 RGB of an Image or CompressedImage; ValueError for an encoding that is no colour."""
+def colour_pixels(message: Any, most_pixels: int = limits.MOST_PIXELS_OF_PICTURE) -> Array:
+    """(H, W, 3) uint8 RGB of an Image or CompressedImage.
+
+    ValueError for an encoding that is no colour, and for more than so many pixels.
+    """
     if hasattr(message, "format"):
+        require_picture(message.data, ("JPEG", "PNG"), most_pixels)
         return _decoded(message.data, AS_STORED, cv2.COLOR_BGR2RGB, "a jpeg or png")
     if message.encoding not in COLOUR:
         raise ValueError(f"image: expected an encoding of {', '.join(COLOUR)}, got {message.encoding!r}")
     dtype, channels, conversion = COLOUR[message.encoding]
-    pixels = _pixels(message, dtype, channels)
+    pixels = _pixels(message, dtype, channels, most_pixels)
     if dtype == "u2":
         pixels = (pixels >> 8).astype(np.uint8)
     return pixels.copy() if conversion is None else cv2.cvtColor(pixels, conversion)
 
 
-def depth_metres(message: Any) -> Array:
-    """(H, W) float32 metres, 0 where there is none, of a depth Image or a compressedDepth CompressedImage."""
+def depth_metres(message: Any, most_pixels: int = limits.MOST_PIXELS_OF_PICTURE) -> Array:
+    """(H, W) float32 metres, 0 where there is none, of a depth Image or a compressedDepth CompressedImage.
+
+    ValueError for an encoding that is no depth, and for more than so many pixels.
+    """
     if hasattr(message, "format"):
-        return _compressed_depth(message)
+        return _compressed_depth(message, most_pixels)
     if message.encoding not in DEPTH:
         raise ValueError(f"depth: expected an encoding of {', '.join(DEPTH)}, got {message.encoding!r}")
-    pixels = _pixels(message, DEPTH[message.encoding], 1)
+    pixels = _pixels(message, DEPTH[message.encoding], 1, most_pixels)
     return _metres(pixels) if pixels.dtype == np.uint16 else _measured(pixels.astype(np.float32))
 
 
@@ -60,13 +74,33 @@ def unpack_rgb(packed: Array) -> Array:
     return cv2.cvtColor(bgra, cv2.COLOR_BGRA2RGB).reshape(*packed.shape, 3)
 
 
-def _pixels(message: Any, dtype: str, channels: int) -> Array:
+def require_picture(data: Any, formats: tuple[str, ...], most_pixels: int) -> None:
+    """ValueError unless ``data`` begins as a picture of one of Pillow's ``formats``, of at most so many pixels."""
+    wanted = " or ".join(name.lower() for name in formats)
+    try:
+        with Image.open(io.BytesIO(data), formats=formats) as picture:
+            width, height = picture.size
+    except Image.DecompressionBombError as error:  # Pillow has a limit of its own, of some 180 megapixels
+        raise ValueError(f"compressed image: expected at most {most_pixels} pixels, got more: {error}") from error
+    except (OSError, SyntaxError, ValueError, EOFError) as error:
+        got = f"{len(data)} bytes that do not begin so"
+        raise ValueError(f"compressed image: expected {wanted}, got {got}") from error
+    _require_size(width, height, most_pixels)
+
+
+def _require_size(width: int, height: int, most_pixels: int) -> None:
+    if height <= 0 or width <= 0:
+        raise ValueError(f"image: expected pixels, got {width} × {height}")
+    if width * height > most_pixels:
+        raise ValueError(f"image: expected at most {most_pixels} pixels, got {width} × {height}")
+
+
+def _pixels(message: Any, dtype: str, channels: int, most_pixels: int) -> Array:
     """(H, W) or (H, W, channels) in native byte order; contiguous; a view of the message where it can be."""
     kind = np.dtype((">" if message.is_bigendian else "<") + dtype)
     height, width, step = int(message.height), int(message.width), int(message.step)
     line = width * channels * kind.itemsize
-    if height <= 0 or width <= 0:
-        raise ValueError(f"image: expected pixels, got {width} × {height}")
+    _require_size(width, height, most_pixels)
     step = step if height > 1 else max(step, line)
     if step < line:
         raise ValueError(f"image: expected a step of at least {line} bytes for {message.encoding}, got {step}")
@@ -85,36 +119,40 @@ def _metres(pixels: Array) -> Array:
 
 
 def _measured(metres: Array) -> Array:
-    """Floating depth with 0 where it is NaN, infinite or not in front of the camera."""
-    metres[~(np.isfinite(metres) & (metres > 0))] = 0
+    """Floating depth with 0 where it is NaN, not in front of the camera, or farther than anything is measured."""
+    metres[~((metres > 0) & (metres <= limits.MOST_DEPTH))] = 0
     return metres
 
 
 def _decoded(data: Any, flags: int, conversion: int | None, expected: str) -> Array:
     buffer = np.frombuffer(data, np.uint8)
     try:
-        pixels = cv2.imdecode(buffer, flags) if buffer.size else None
-    except (cv2.error, MemoryError) as error:  # where the header tells of more pixels than OpenCV takes
+        pixels = cv2.imdecode(buffer, flags)
+    except (cv2.error, MemoryError) as error:
         got = f"{buffer.size} bytes that OpenCV refuses: {' '.join(str(error).split())}"
-        raise ValueError(f"compressed image: expected {expected} of at most 2^30 pixels, got {got}") from error
+        raise ValueError(f"compressed image: expected {expected}, got {got}") from error
     if pixels is None:
         raise ValueError(f"compressed image: expected {expected}, got {buffer.size} bytes that do not decode")
     return np.asarray(pixels if conversion is None else cv2.cvtColor(pixels, conversion))
 
 
-def _compressed_depth(message: Any) -> Array:
+def _compressed_depth(message: Any, most_pixels: int) -> Array:
     """PNG of 16-bit millimetres, or of quantised inverse depth with its two constants (compressedDepth of 32FC1)."""
     data = np.frombuffer(message.data, np.uint8)
     if "compressedDepth" not in message.format:
-        pixels = _decoded(data, cv2.IMREAD_UNCHANGED, None, "a 16-bit png")
-        return _metres(_one_channel(pixels))
-    pixels = _one_channel(_decoded(data[COMPRESSED_DEPTH_HEADER:], cv2.IMREAD_UNCHANGED, None, "compressedDepth png"))
+        return _metres(_depth_png(data, "a 16-bit png", most_pixels))
+    pixels = _depth_png(data[COMPRESSED_DEPTH_HEADER:], "compressedDepth png", most_pixels)
     if not message.format.startswith("32FC1"):
         return _metres(pixels)
     a, b = data[4:COMPRESSED_DEPTH_HEADER].view("<f4")
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(all="ignore"):
         metres = (np.float32(a) / (pixels.astype(np.float32) - np.float32(b))).astype(np.float32)
     return _measured(np.where(pixels == 0, np.float32(0), metres))
+
+
+def _depth_png(data: Array, expected: str, most_pixels: int) -> Array:
+    require_picture(data.tobytes(), ("PNG",), most_pixels)
+    return _one_channel(_decoded(data, cv2.IMREAD_UNCHANGED, None, expected))
 
 
 def _one_channel(pixels: Array) -> Array:

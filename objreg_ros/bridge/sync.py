@@ -258,6 +258,11 @@ class Synchroniser:
         return found
 
     @property
+    def latched(self) -> dict[str, Any]:
+        """The last value of every latched stream that has spoken."""
+        return {name: queue.latched for name, queue in self.queues.items() if queue.latched is not None}
+
+    @property
     def received(self) -> int:
         """How many items have come, of all streams."""
         return sum(queue.received for queue in self.queues.values())

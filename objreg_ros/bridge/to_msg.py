@@ -22,7 +22,8 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
 from std_msgs.msg import Header, String
 
-from objreg_ros.bridge.layout import DETECTIONS, LANDMARKS, OBJECTS, SUPPORT_ID, VIEW, fields_of
+from objreg_ros import limits
+from objreg_ros.bridge.layout import DETECTIONS, LANDMARKS, MOST_WHOLE, OBJECTS, SUPPORT_ID, VIEW, fields_of
 from objreg_ros.data import (
     ColourImage,
     DepthImage,
@@ -48,7 +49,9 @@ Labels = Mapping[int, str]
 
 
 def stamp(stamp_ns: int) -> Time:
-    """Integer nanoseconds as a Time."""
+    """Integer nanoseconds as a Time; ValueError for what its 32 bits of seconds do not hold."""
+    if not limits.LEAST_STAMP_NS <= stamp_ns <= limits.MOST_STAMP_NS:
+        raise ValueError(f"stamp: expected seconds of 32 bits, got {stamp_ns} ns")
     sec, nanosec = divmod(stamp_ns, 1_000_000_000)
     return Time(sec=sec, nanosec=nanosec)
 
@@ -173,12 +176,21 @@ def _table(records: Array, stamp_ns: int, frame_id: str) -> PointCloud2:
 
 
 def labels(names: Labels) -> String:
-    """The label table, JSON ``{"id": "name"}``."""
+    """The label table, JSON ``{"id": "name"}``; ValueError for an id that the tables cannot carry."""
+    most = max(names, default=0)
+    if most > limits.MOST_CLASS_ID:
+        raise ValueError(f"labels: expected ids of at most {limits.MOST_CLASS_ID}, got {most}")
     return String(data=json.dumps({str(number): name for number, name in names.items()}))
 
 
 def detections_table(detections: Detections, names: Labels) -> PointCloud2:
-    """Detections as a typed table, one record a box; ValueError for a label that ``names`` does not hold."""
+    """Detections as a typed table, one record a box; ValueError for a label that ``names`` does not hold.
+
+    And for a picture whose size does not fit into 16 bits.
+    """
+    size = detections.image_hw
+    if max(size) > MOST_WHOLE:
+        raise ValueError(f"detections: expected a picture of at most {MOST_WHOLE} pixels a side, got {size}")
     records = np.zeros((1, len(detections)), DETECTIONS)
     for column, name in enumerate(("x_min", "y_min", "x_max", "y_max")):
         records[name] = detections.xyxy[:, column]

@@ -13,6 +13,7 @@ from objreg_ros import share
 from objreg_ros.bridge import from_msg, qos, to_msg
 from objreg_ros.bridge.door import Door
 from objreg_ros.bridge.spin import run
+from objreg_ros.data import ColourImage
 from objreg_ros.detector.mobilenet_ssd import Detector
 from objreg_ros.detector.params import DetectorParams
 
@@ -31,7 +32,7 @@ class DetectorNode(Door):
         self._array = self.create_publisher(to_msg.Detection2DArray, "detections", qos.room()) if self._vision else None
         self._labels = self.create_publisher(String, "labels", qos.latched())
         self._labels.publish(to_msg.labels(self._names))
-        self.listen_to_first("image", IMAGES, self._hear, self.sensor())
+        self.listen_to_first("image", IMAGES, self._decode, self._hear, self.sensor())
 
     @property
     def _vision(self) -> bool:
@@ -41,6 +42,9 @@ class DetectorNode(Door):
         """Live parameters hold from the next image on."""
         self._detector.params = self.settings.of(DetectorParams)
 
+    def _decode(self, _: str, message: Any) -> ColourImage:
+        return from_msg.image(message, self.most_pixels)
+
     def _hear(self, _: str, message: Any) -> None:
         stamp_ns = from_msg.stamp_ns(message)
         self.accept(stamp_ns)
@@ -48,7 +52,7 @@ class DetectorNode(Door):
 
     def compute(self, stamp_ns: int, payload: Any) -> bool:
         """One image."""
-        image = self.read("image", from_msg.image, payload)
+        image = self.read("image", from_msg.image, payload, self.most_pixels)
         with self.ledger.timed("detect"):
             detections = self._detector.detect(image)
         self._table.publish(to_msg.detections_table(detections, self._names))

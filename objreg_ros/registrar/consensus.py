@@ -15,6 +15,7 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.projection import FAST
 
 MOST_PAIRS = 6000  # of matches that agree, each of which gives a pose to weigh
 ASIDE = 1e-8  # the square of 0.1 mm: a baseline that is no farther aside of its direction fixes no pose with it
@@ -204,7 +205,7 @@ def _poses(P, Q, N, M, up_p, up_q, upright, pairs):  # type: ignore[no-untyped-d
     return T
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _support(P, Q, weights, T, tolerance):  # type: ignore[no-untyped-def]
     """The weight of the matches, columns (3, M) float32, that each pose (K, 4, 4) float32 brings together.
 

@@ -15,7 +15,7 @@ from objreg_ros.data import Array
 from objreg_ros.registrar.icp import add_normal_equations, move, normal_equations, solve
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
-from objreg_ros.registrar.projection import INDEX, between, lands, nearest, project
+from objreg_ros.registrar.projection import FAST, INDEX, between, lands, nearest, project
 from objreg_ros.registrar.visibility import SHADELESS
 
 STEPS = 8  # a level
@@ -74,7 +74,7 @@ def _invert(T, back):  # type: ignore[no-untyped-def]
             back[i, 3] -= T[j, i] * T[j, 3]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _add_grey(asked, T, image, T_target_source, backwards, sigma, slops, H, g):  # type: ignore[no-untyped-def]
     """Add the errors of grey of ``asked`` points, moved by ``T`` into ``image``; to be stepped is T_target_source.
 
@@ -103,7 +103,7 @@ def _add_grey(asked, T, image, T_target_source, backwards, sigma, slops, H, g): 
     add_normal_equations(J, error, weight, H, g)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _met(us, vs, zs, shades, image, slops):  # type: ignore[no-untyped-def]
     """Which of the projected points the image meets at their depth, on a surface of both: (n,) indices."""
     near, far, _, _ = image
@@ -121,7 +121,7 @@ def _met(us, vs, zs, shades, image, slops):  # type: ignore[no-untyped-def]
     return met[:n]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True, inline="always")
+@numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
 def _turned(T, a, b, c):  # type: ignore[no-untyped-def]
     return (
         T[0, 0] * a + T[0, 1] * b + T[0, 2] * c,

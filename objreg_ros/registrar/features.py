@@ -12,9 +12,11 @@ import numba
 import numpy as np
 
 from objreg_ros.data import Array
+from objreg_ros.registrar.projection import FAST
 
 BINS = 11
 CROWD = 256  # most neighbours of a point
+MOST_CELLS = 4_000_000  # of the grid of neighbours
 FAR = 1e30  # a squared distance beyond all
 
 
@@ -38,8 +40,7 @@ def describe(xyz: Array, normals: Array, radius: float) -> Features:
     normals = np.ascontiguousarray(normals[usable], np.float32)
     if len(xyz) == 0:
         return _features(xyz, normals, np.zeros((0, 3 * BINS), np.float32))
-    order, first, low, shape = _cells(xyz, radius)
-    histograms, crowd = _histograms(xyz, normals, order, first, low, shape, np.float32(radius))
+    histograms, crowd = _histograms(xyz, normals, *_cells(xyz, radius), np.float32(radius))
     kept = crowd >= 5
     return _features(xyz[kept], normals[kept], histograms[kept])
 
@@ -90,7 +91,7 @@ def match(source: Features, target: Features, limit: int) -> tuple[Array, Array,
     return a[best], b[best], rank[best] / max(1e-9, float(rank.max()))
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _nearest(a, b):  # type: ignore[no-untyped-def]
     """The nearest partner of each of N and each of M histograms, ``a (N, K)`` and ``b (K, M)``, in one pass.
 
@@ -117,23 +118,28 @@ def _nearest(a, b):  # type: ignore[no-untyped-def]
     return forward, backward, (ahead, behind)
 
 
-def _cells(xyz: Array, size: float) -> tuple[Array, Array, Array, Array]:
-    """A sorted grid of cells with edge ``size``: (order, first point of each cell, low corner, cells per axis)."""
-    low = xyz.min(axis=0)
+def _cells(xyz: Array, size: float) -> tuple[Array, Array, Array, Array, np.float32]:
+    """A sorted grid of cells: (order, first point of each cell, low corner, cells per axis, edge of a cell).
+
+    The edge is ``size``, and more where points lie so far apart that there would be too many cells.
+    """
+    low, extent = xyz.min(axis=0), np.ptp(xyz, axis=0).astype(float)
+    while np.prod(extent / size + 1.0) > MOST_CELLS:
+        size *= 1.25
     cell = ((xyz - low) / np.float32(size)).astype(np.int64)
     shape = cell.max(axis=0) + 1
     key = (cell[:, 0] * shape[1] + cell[:, 1]) * shape[2] + cell[:, 2]
     order = np.argsort(key, kind="stable")
-    return order, np.searchsorted(key[order], np.arange(np.prod(shape) + 1)), low, shape
+    return order, np.searchsorted(key[order], np.arange(np.prod(shape) + 1)), low, shape, np.float32(size)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
-def _neighbours(xyz, i, order, first, low, shape, radius, found, squared):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
+def _neighbours(xyz, i, order, first, low, shape, cell, radius, found, squared):  # type: ignore[no-untyped-def]
     """Fill ``found`` and ``squared`` with the points within ``radius`` of point i but itself; returns how many."""
     n = 0
-    a0 = int((xyz[i, 0] - low[0]) / radius)
-    b0 = int((xyz[i, 1] - low[1]) / radius)
-    c0 = int((xyz[i, 2] - low[2]) / radius)
+    a0 = int((xyz[i, 0] - low[0]) / cell)
+    b0 = int((xyz[i, 1] - low[1]) / cell)
+    c0 = int((xyz[i, 2] - low[2]) / cell)
     for a in range(max(0, a0 - 1), min(shape[0], a0 + 2)):
         for b in range(max(0, b0 - 1), min(shape[1], b0 + 2)):
             row = (a * shape[1] + b) * shape[2]
@@ -147,7 +153,7 @@ def _neighbours(xyz, i, order, first, low, shape, radius, found, squared):  # ty
     return n
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True, inline="always")
+@numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
 def _bins(p, n, q, m, distance):  # type: ignore[no-untyped-def]
     """The bins (of 11 each) of the three Darboux angles of two oriented points, the same from either side.
 
@@ -172,15 +178,15 @@ def _bins(p, n, q, m, distance):  # type: ignore[no-untyped-def]
     )
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
-def _histograms(xyz, normals, order, first, low, shape, radius):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
+def _histograms(xyz, normals, order, first, low, shape, cell, radius):  # type: ignore[no-untyped-def]
     """FPFH (N, 33), each of the three parts summing to 100, and the number of neighbours (N,)."""
     n = len(xyz)
     found, squared = np.empty((n, CROWD), np.int32), np.empty((n, CROWD), np.float32)
     simple = np.zeros((n, 3 * BINS), np.float32)
     crowd = np.zeros(n, np.int64)
     for i in range(n):
-        crowd[i] = _neighbours(xyz, i, order, first, low, shape, radius, found[i], squared[i])
+        crowd[i] = _neighbours(xyz, i, order, first, low, shape, cell, radius, found[i], squared[i])
     for i in range(n):
         for s in range(crowd[i]):
             j = found[i, s]
@@ -202,7 +208,7 @@ def _histograms(xyz, normals, order, first, low, shape, radius):  # type: ignore
     return _weighted(simple, found, squared, crowd), crowd
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _weighted(simple, found, squared, crowd):  # type: ignore[no-untyped-def]
     """Each histogram with those of its neighbours, the near ones most."""
     fast = np.zeros_like(simple)

@@ -14,7 +14,7 @@ import numba
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.registrar.projection import INDEX, moved
+from objreg_ros.registrar.projection import FAST, INDEX, moved
 
 MOST_CELLS = 4_000_000
 FACING = 0.6  # cosine between the normals of a pair, at least
@@ -86,7 +86,7 @@ def fit(xyz: Array, normals: Array, surface: Surface, T: Array, reach: float) ->
     return Fit(H, float(weight), int(count), rmse, max(0.05, float(np.sqrt(spread))))
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _closest(xyz, low, cell, shape, reach):  # type: ignore[no-untyped-def]
     """Fill the grid: every point claims the cells around it that no other point is closer to."""
     closest = np.full((shape[0], shape[1], shape[2]), -1, np.int32)
@@ -111,7 +111,7 @@ def _closest(xyz, low, cell, shape, reach):  # type: ignore[no-untyped-def]
     return closest
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def normal_equations(P, N, Q, M, closest, low, cell, T, reach, H, g):  # type: ignore[no-untyped-def]
     """Fill H (6, 6) and g (6,) of the step [t r] at pose T; returns pairs, their weight, error and spread."""
     _, at, J, residual, weight = pair(P, N, Q, M, closest, low, cell, T, reach)
@@ -130,7 +130,7 @@ def normal_equations(P, N, Q, M, closest, low, cell, T, reach, H, g):  # type: i
     return len(weight), total, squared, max(0.0, spread)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def pair(P, N, Q, M, closest, low, cell, T, reach):  # type: ignore[no-untyped-def]
     """The points P that T brings within ``reach`` m of the point closest to them, of a normal that is compatible.
 
@@ -164,7 +164,7 @@ def pair(P, N, Q, M, closest, low, cell, T, reach):  # type: ignore[no-untyped-d
     return met[:n], at[:, :n], J[:, :n], residual[:n], weight[:n]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _partners(x, y, z, closest, low, cell):  # type: ignore[no-untyped-def]
     """Which of the places (N,) have a closest point in their cell of the grid, and which that is: (n,) indices each."""
     met, partner, n = np.empty(len(x), INDEX), np.empty(len(x), INDEX), 0
@@ -180,7 +180,7 @@ def _partners(x, y, z, closest, low, cell):  # type: ignore[no-untyped-def]
     return met[:n], partner[:n]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def add_normal_equations(J, error, weight, H, g):  # type: ignore[no-untyped-def]
     """Add to H (6, 6) and g (6,) those of errors (n,) with a weight and a Jacobian (6, n)."""
     weighed = np.empty(len(error))

@@ -16,6 +16,7 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.registrar.descriptor import SIZE
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.projection import FAST
 from objreg_ros.registrar.sighting import Sighting
 
 LANES = 64
@@ -133,7 +134,7 @@ def _best(  # type: ignore[no-untyped-def]
     return best
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _compare(descriptors, half_norms, descriptor, out):  # type: ignore[no-untyped-def]
     """The likeness of every object of a tile, into ``out``; the largest comes back."""
     for lane in range(LANES):

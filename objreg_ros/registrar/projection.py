@@ -12,11 +12,12 @@ import numba
 import numpy as np
 
 LEAST_DEPTH = 0.1  # m: nearer points are taken for points behind the camera
+FAST = {"reassoc", "contract", "arcp", "nsz", "afn"}  # fast arithmetic that still knows NaN: it is in no picture
 INDEX = np.uint32
 ONE = INDEX(1)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def moved(points, T):  # type: ignore[no-untyped-def]
     """The x, y and z (N,) of ``points (N, 3)`` moved by ``T (4, 4)``."""
     xx, xy, xz, x0 = T[0, 0], T[0, 1], T[0, 2], T[0, 3]
@@ -31,7 +32,7 @@ def moved(points, T):  # type: ignore[no-untyped-def]
     return x, y, z
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def project(points, T, camera):  # type: ignore[no-untyped-def]
     """The pixels u, v and the depths z (N,) of ``points (N, 3)`` moved by ``T (4, 4)``; for `lands` to sort out."""
     fx, fy, cx, cy = camera[0], camera[1], camera[2], camera[3]
@@ -43,19 +44,19 @@ def project(points, T, camera):  # type: ignore[no-untyped-def]
     return u, v, z
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True, inline="always")
+@numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
 def lands(u, v, z, image):  # type: ignore[no-untyped-def]
     """Whether a point at a depth is before the camera and between four pixels of an ``image (h, w)``."""
     return (z >= LEAST_DEPTH) & (u >= 0.0) & (v >= 0.0) & (u <= image.shape[1] - 1.001) & (v <= image.shape[0] - 1.001)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True, inline="always")
+@numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
 def nearest(u, v):  # type: ignore[no-untyped-def]
     """The row and the column of the pixel that a place in the image is in."""
     return INDEX(v + 0.5), INDEX(u + 0.5)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True, inline="always")
+@numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
 def between(image, u, v):  # type: ignore[no-untyped-def]
     """The bilinear value of an ``image (h, w)`` at a place between four pixels, and its slopes along u and v."""
     left, top = INDEX(u), INDEX(v)
@@ -65,7 +66,7 @@ def between(image, u, v):  # type: ignore[no-untyped-def]
     return value, (1.0 - b) * (q - p) + b * (s - r), (1.0 - a) * (r - p) + a * (s - q)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True, inline="always")
+@numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
 def spread(image, u, v, value):  # type: ignore[no-untyped-def]
     """Add a value, and its weight of 1, to the four pixels of an ``image (h, w, 2)`` about a place."""
     left, top = INDEX(u), INDEX(v)
@@ -76,7 +77,7 @@ def spread(image, u, v, value):  # type: ignore[no-untyped-def]
     _drop(image, top + ONE, left + ONE, b * a, value)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True, inline="always")
+@numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
 def _drop(image, row, column, weight, value):  # type: ignore[no-untyped-def]
     image[row, column, 0] += weight * value
     image[row, column, 1] += weight

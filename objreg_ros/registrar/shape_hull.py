@@ -13,6 +13,7 @@ import numba
 import numpy as np
 
 from objreg_ros.registrar.icp import solve
+from objreg_ros.registrar.projection import FAST
 from objreg_ros.registrar.shape_score import slack_at
 from objreg_ros.registrar.silhouette import BESIDE, INSIDE
 
@@ -22,7 +23,7 @@ BEFORE = 0.2  # weight of a point before the surface: it may as well belong besi
 DAMPING = (1.5, 30.0, 30.0)  # of yaw and the shifts: a few points that float move the shape by little
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def clear(source, target, motion, most, rounds):  # type: ignore[no-untyped-def]
     """Move ``motion (yaw, x, y, rise)`` in place, but for its rise, to where the first ``most`` points float least.
 
@@ -58,7 +59,7 @@ def clear(source, target, motion, most, rounds):  # type: ignore[no-untyped-def]
     return best
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _step(A, g, motion):  # type: ignore[no-untyped-def]
     """Move ``motion`` by the damped step of its normal equations; whether that was worth it."""
     A[1, 0], A[2, 0], A[2, 1] = A[0, 1], A[0, 2], A[1, 2]
@@ -71,7 +72,7 @@ def _step(A, g, motion):  # type: ignore[no-untyped-def]
     return abs(g[0]) > 1e-3 or abs(g[1]) + abs(g[2]) > 1e-3
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _pushes(P, most, R, t, seen, level, lever, A, g):  # type: ignore[no-untyped-def]
     """Add to the normal equations (A, g) of (yaw, x, y) what heals the points that float; returns how far they do.
 
@@ -90,10 +91,11 @@ def _pushes(P, most, R, t, seen, level, lever, A, g):  # type: ignore[no-untyped
         x = (R[0, 0] * a + R[0, 1] * b + R[0, 2] * c + t[0]) / z
         y = (R[1, 0] * a + R[1, 1] * b + R[1, 2] * c + t[1]) / z
         u, v = fx * x + cx, fy * y + cy
-        du, dv = min(max(u, 0.0), w - 1.0) - u, min(max(v, 0.0), h - 1.0) - v
+        at_u, at_v = min(max(u, 0.0), w - 1.0), min(max(v, 0.0), h - 1.0)
+        du, dv = at_u - u, at_v - v
         if (du > 0.0 and edges[0]) or (dv > 0.0 and edges[1]) or (du < -1.0 and edges[2]) or (dv < -1.0 and edges[3]):
             continue  # beyond the picture
-        row, column = int(v + dv), int(u + du)
+        row, column = int(at_v), int(at_u)
         on, d = mask[row, column], depth[row, column]
         beyond = abs(du) + abs(dv) > 1.0
         if on == INSIDE and not beyond:  # before the surface?

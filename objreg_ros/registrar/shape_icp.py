@@ -7,13 +7,14 @@ import numba
 import numpy as np
 
 from objreg_ros.registrar.icp import solve
+from objreg_ros.registrar.projection import FAST
 
 COMPATIBLE = 0.5  # cosine between the normals of a pair
 LARGEST_TURN = 0.3  # rad in one step
 POINTWISE = 0.005  # weight of point-to-point error beside it: holds what slides along a plane
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def settle(P, N, most, surface, motion, reach, last_reach, iterations):  # type: ignore[no-untyped-def]
     """Move ``motion (yaw, x, y, rise)`` in place, but for its rise, to the surface; returns how many pairs it found.
 

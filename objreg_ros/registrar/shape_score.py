@@ -13,7 +13,7 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.projection import INDEX, LEAST_DEPTH, project
+from objreg_ros.registrar.projection import FAST, INDEX, LEAST_DEPTH, project
 from objreg_ros.registrar.shape import Shape
 from objreg_ros.registrar.silhouette import INSIDE, RIM
 
@@ -52,13 +52,13 @@ def alike(source: Shape, target: Shape, motion: Array, params: RegistrarParams, 
     return float(climb(source.sight, target.sight, motion.copy(), extent, weights_of(params), most, steps, STEPS))
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def slack_at(z):  # type: ignore[no-untyped-def]
     """How far two depths of one surface may differ at a depth z, m."""
     return FLOOR + GROWTH * (z - KNEE) * (z - KNEE)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def tally(P, N, S, most, T, depth, mask, grey, camera, extent, out):  # type: ignore[no-untyped-def]
     """Add to ``out (10,)`` what a silhouette says of the first ``most`` points under T (3, 4), camera from points."""
     height, width = depth.shape
@@ -93,7 +93,7 @@ def tally(P, N, S, most, T, depth, mask, grey, camera, extent, out):  # type: ig
     return len(us)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True, inline="always")
+@numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
 def _faces(T, normal, x, y):  # type: ignore[no-untyped-def]
     """Whether a normal that is turned by T looks back along the ray (x, y, 1)."""
     a, b, c = normal[0], normal[1], normal[2]
@@ -102,7 +102,7 @@ def _faces(T, normal, x, y):  # type: ignore[no-untyped-def]
     return along_x * x + along_y * y + T[2, 0] * a + T[2, 1] * b + T[2, 2] * c < 0.0
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def likeness(out, n, weights):  # type: ignore[no-untyped-def]
     """The score of a tally of n points; `weights_of` says what the weights are."""
     violated, hidden, residual, grey, expected, noise = weights
@@ -116,7 +116,7 @@ def likeness(out, n, weights):  # type: ignore[no-untyped-def]
     return (out[INLIERS] * (1.0 + painted) - against) / n
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def ask(source, target, motion, extent, most, out):  # type: ignore[no-untyped-def]
     """Fill ``out`` with what both cameras say of a motion (yaw, x, y, rise); returns how many points were asked."""
     P, N, S, Rs, os, depth_s, mask_s, grey_s, camera_s, _, _ = source
@@ -138,7 +138,7 @@ def ask(source, target, motion, extent, most, out):  # type: ignore[no-untyped-d
     return n + tally(Q, M, G, most, T, depth_s, mask_s, grey_s, camera_s, extent, out)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def two_way(source, target, motion, extent, weights, most):  # type: ignore[no-untyped-def]
     """The score of a motion (yaw, x, y, rise), asked of both cameras."""
     out = np.empty(COUNTS)
@@ -146,7 +146,7 @@ def two_way(source, target, motion, extent, weights, most):  # type: ignore[no-u
     return likeness(out, n, weights)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def climb(source, target, motion, extent, weights, most, steps, rounds):  # type: ignore[no-untyped-def]
     """Improve ``motion`` in place by single ``steps (4,)`` that raise the score; they halve where none does.
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.projection import FAST
 from objreg_ros.registrar.shape import Shape, upright_motion, upright_pose
 from objreg_ros.registrar.shape_hull import clear
 from objreg_ros.registrar.shape_icp import settle
@@ -85,7 +86,7 @@ def _finished(
     return [Fitting(T, score) for T, score in zip(poses, worth[order].tolist(), strict=True)]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _started(source, target, grid, starts, extent, weights, glance, reach, cleared):  # type: ignore[no-untyped-def]
     """Each start brought to where it floats least, and from there to its basin: (motions (K, 4), scores (K,)).
 
@@ -103,7 +104,7 @@ def _started(source, target, grid, starts, extent, weights, glance, reach, clear
     return motions, scores
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _better(source, target, trial, motion, score, extent, weights, most):  # type: ignore[no-untyped-def]
     """The higher of two scores, and in ``motion`` what has it: itself, or ``trial``."""
     found = two_way(source, target, trial, extent, weights, most)
@@ -113,7 +114,7 @@ def _better(source, target, trial, motion, score, extent, weights, most):  # typ
     return found
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _finish(  # type: ignore[no-untyped-def]
     source, target, grid, motions, scores, extent, weights, numbers, margin, reach
 ):

@@ -16,7 +16,7 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.geometry import inverse
 from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.projection import lands, nearest, project, spread
+from objreg_ros.registrar.projection import FAST, lands, nearest, project, spread
 from objreg_ros.registrar.visibility import (
     SHADED,
     SHADELESS,
@@ -54,7 +54,7 @@ def compare(asked: Sight, seen: Sight, T_seen_asked: Array, params: RegistrarPar
     return np.asarray(_sums(cv2.GaussianBlur(laid, (0, 0), SMOOTH), seen.grey.detail, window))
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _laid(points, greys, T, near, far, camera, slops):  # type: ignore[no-untyped-def]
     """The grey of ``points`` moved by ``T`` where an image agrees with their depth, spread over four pixels each.
 
@@ -95,7 +95,7 @@ def _sums(laid, detail, window):  # type: ignore[no-untyped-def]
     return out
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _greys(laid, detail):  # type: ignore[no-untyped-def]
     """Where both have a grey, 1 or 0 (h, w) float32; and their greys there, 0 elsewhere."""
     both, theirs, ours = np.empty_like(detail), np.empty_like(detail), np.empty_like(detail)
@@ -116,7 +116,7 @@ def _mirrored(place, size):  # type: ignore[no-untyped-def]
     return max(0, min(abs(place), 2 * size - 2 - place, size - 1))
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _add_row(both, theirs, ours, row, sign, columns, half):  # type: ignore[no-untyped-def]
     """Add a row of the images to the sums (5, w + window) over the window's rows, of each column."""
     for column in range(both.shape[1]):
@@ -155,7 +155,7 @@ def _run(columns, window, sums):  # type: ignore[no-untyped-def]
         bb += columns[4, enters] - columns[4, k]
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _compare_row(both, theirs, ours, sums, out):  # type: ignore[no-untyped-def]
     """Add the pixels of a row to the sums ``out (10,)``, given those of the windows about them."""
     shaded = sum_a = sum_b = sum_aa = sum_bb = sum_ab = 0.0
@@ -180,7 +180,7 @@ def _compare_row(both, theirs, ours, sums, out):  # type: ignore[no-untyped-def]
     out[SUM_AB] += sum_ab
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _contrast(mean, mean_square):  # type: ignore[no-untyped-def]
     """What a difference from the mean is measured by: the standard deviation, and what is noise at least."""
     return np.sqrt(max(mean_square - mean * mean, 0.0)) + CONTRAST

@@ -15,7 +15,7 @@ import numba
 import numpy as np
 
 from objreg_ros.data import Array, Intrinsics, View
-from objreg_ros.registrar.projection import between, lands, nearest, project
+from objreg_ros.registrar.projection import FAST, between, lands, nearest, project
 
 # What `count` counts, in the order of its result.
 SEEN, INLIERS, VIOLATIONS, OCCLUDED, SHADED, SUM_A, SUM_B, SUM_AA, SUM_BB, SUM_AB = range(10)
@@ -150,7 +150,7 @@ def band_pass(grey: Array, fine: float, slow: float) -> Array:
     return np.asarray(detail / max(LEAST_CONTRAST, float(detail.std())), np.float32)
 
 
-@numba.njit(cache=True, fastmath=True, nogil=True)
+@numba.njit(cache=True, fastmath=FAST, nogil=True)
 def count(points, shades, T, near, far, detail, camera, tolerance, growth):  # type: ignore[no-untyped-def]
     """Count what the view (near, far, detail, camera) says of ``points`` moved by ``T (4, 4)``.
 

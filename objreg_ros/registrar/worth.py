@@ -15,6 +15,7 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.prepared import Prepared
+from objreg_ros.registrar.projection import FAST
 from objreg_ros.registrar.shape import Shape
 from objreg_ros.registrar.shape_score import two_way, weights_of
 from objreg_ros.registrar.verify import rated_quickly
@@ -54,7 +55,7 @@ def _image(sight: Sight) -> tuple[Any, ...]:
     return sight.points, sight.shades, (sight.near, sight.far, sight.detail, sight.camera)
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _worths(views, source, target, motions, extent, weights, most):  # type: ignore[no-untyped-def]
     found = np.empty(len(motions))
     for k in range(len(motions)):
@@ -62,7 +63,7 @@ def _worths(views, source, target, motions, extent, weights, most):  # type: ign
     return found
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _climbed(views, source, target, motion, turns, extent, weights, most):  # type: ignore[no-untyped-def]
     best, trial = -np.inf, motion.copy()
     for turn in turns:
@@ -89,14 +90,14 @@ def _climbed(views, source, target, motion, turns, extent, weights, most):  # ty
     return motion
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _worth(views, source, target, motion, extent, weights, most):  # type: ignore[no-untyped-def]
     """What the views like, and the weighed likeness of the objects, -1 to 1."""
     alike = two_way(source, target, motion, extent, weights[:-2], most)
     return _liked(views, source, target, motion, weights[-1], most) + weights[-2] * max(-1.0, min(1.0, alike))
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _liked(views, source, target, motion, violated, most):  # type: ignore[no-untyped-def]
     """V of an upright motion, less what is in seen free space once more: an upright pose has no tilt to excuse it."""
     (points, shades, image), (others, their_shades, their_image), slops, textured = views
@@ -110,7 +111,7 @@ def _liked(views, source, target, motion, violated, most):  # type: ignore[no-un
     return rated_quickly(forward, backward, textured, asked) - violated * floating
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _poses(source, target, motion):  # type: ignore[no-untyped-def]
     """The pose (4, 4) of the source's camera in the target's under an upright motion, and its inverse."""
     R_source, origin, R_target, other_origin = source[3], source[4], target[3], target[4]

@@ -12,6 +12,7 @@ from objreg_ros.data import Array, DepthImage, PointFlag
 from objreg_ros.segmenter.boxes import Box
 from objreg_ros.segmenter.surface import EXACT, MIN_COSINE, Surface
 
+FAR = np.float32(65.0)  # m: the step of depth that is no edge grows beyond all there
 EDGE = int(PointFlag.EDGE)
 UNKNOWN_COSINE = np.float32(0.7)  # of a surface whose normal is not known
 MIN_NEIGHBOURS = 2  # of 8; a pixel with fewer in its object is an outlier
@@ -129,7 +130,7 @@ def _mark(depth, box, grid, cols, jump, mask):  # type: ignore[no-untyped-def]
         found, doubtful = 0, 0
         for u in range(n):
             z = row[u]
-            known = z > 0
+            known = (z > 0) & (z < FAR)
             agrees = (abs(cell[u] - z) < jump[0] + jump[1] * z * z) & (cell[u] > 0) & known
             marks[u] = own[u] if agrees else 0
             found += own[u] if agrees else 0

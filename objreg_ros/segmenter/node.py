@@ -20,7 +20,7 @@ from objreg_ros.bridge import from_msg, qos, to_msg
 from objreg_ros.bridge.matching import MatchingDoor
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.sync import Match, Need, Stream
-from objreg_ros.data import Array, DepthImage, Detections, Frame
+from objreg_ros.data import Array, ColourImage, DepthImage, Detections, Frame, PointCloud
 from objreg_ros.segmenter.doubts import range_doubt, registration_doubt
 from objreg_ros.segmenter.organise import organise
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
@@ -43,6 +43,7 @@ class SegmenterNode(MatchingDoor):
         self._segmenter = Segmenter(self.settings.of(SegmenterParams))
         self._segmenter.warm()
         self._camera_info: Any = None
+        self._source: str | None = None  # the topic that depth comes by
         self._objects = self.create_publisher(PointCloud2, "objects", qos.room())
         self._view = self.create_publisher(PointCloud2, "view", qos.room())
         self._view_info = self.create_publisher(CameraInfo, "view/camera_info", qos.room())
@@ -54,13 +55,18 @@ class SegmenterNode(MatchingDoor):
         self.listen(CameraInfo, "camera_info", self._hear_camera, self.sensor(), watched="camera_info")
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._look = self.create_timer(LOOK_S, self._look_for_kept_camera, clock=steady)
-        if self._inputs.colour and self._inputs.source != "points":
-            self.listen_to_first("image", IMAGES, self._hear_image, self.sensor())
-        self.listen_to_first("depth", SOURCES[self._inputs.source], self._hear_depth, self.sensor())
+        if self._inputs.source != "points":
+            self._listen_for_colour()
+        sources = SOURCES[self._inputs.source]
+        self.listen_to_first("depth", sources, self._decode_depth, self._hear_depth, self.sensor())
         if self._inputs.level_odom:
             self.listen(Odometry, "odom", self._hear_odom, self.sensor(qos.ODOMETRY))
         self.listen(PointCloud2, "detections_table", self._hear_detections, qos.room(), watched="detections_table")
         self.expect("detections_table", "detections_table")
+
+    def _listen_for_colour(self) -> None:
+        if self._inputs.colour:
+            self.listen_to_first("image", IMAGES, self._decode_image, self._hear_image, self.sensor())
 
     def _look_for_kept_camera(self) -> None:
         """Get what a driver that publishes its camera once keeps for who comes late, unless it came in time.
@@ -100,28 +106,48 @@ class SegmenterNode(MatchingDoor):
         if odometry is not None:
             self.feed("odom", odometry.stamp_ns, odometry)
 
+    def _decode_image(self, _: str, message: Any) -> ColourImage:
+        return from_msg.image(message, self.most_pixels)
+
+    def _decode_depth(self, topic: str, message: Any) -> Array | PointCloud:
+        return from_msg.depth(message, self.most_pixels) if topic in DEPTH else from_msg.point_cloud(message)
+
     def _hear_depth(self, topic: str, message: Any) -> None:
-        if not self.begun:
+        stamp_ns = from_msg.stamp_ns(message)
+        if self.taken("depth") != topic:
+            self._turn_away(stamp_ns, topic, message)
+            return
+        if topic != self._source:
             self._choose(topic)
-        self.feed("depth", from_msg.stamp_ns(message), message)
+        self.feed("depth", stamp_ns, message)
+
+    def _turn_away(self, stamp_ns: int, topic: str, message: Any) -> None:
+        """Book a message that does not decode, and so does not tell where depth comes from."""
+        self.accept(stamp_ns)
+        name = "depth" if topic in DEPTH else "points"
+        self.conclude(stamp_ns, lambda: self.read(name, self._decode_depth, topic, message) is not None)
 
     def _hear_detections(self, message: Any) -> None:
         self.feed("detections", from_msg.stamp_ns(message), message)
 
     def _choose(self, topic: str) -> None:
-        """Depth has spoken: now it is known what goes with it."""
+        """Depth has spoken, or comes by another topic now: it is known what goes with it."""
         slop_ns = round(self._inputs.slop * 1e9)
         streams = [Stream("depth"), Stream("detections", slop_ns=slop_ns), Stream("labels", Need.LATCHED)]
         if self._inputs.level_odom:
             streams.append(Stream("odom", Need.OPTIONAL, slop_ns, ODOM_DEPTH, enclosing=True))
         if topic in DEPTH:
+            if self._source in POINTS:
+                self._listen_for_colour()
             streams.append(Stream("camera_info", Need.LATCHED))
             streams.append(Stream("image", Need.OPTIONAL, slop_ns))
             if self._camera_info is None:
                 self.expect("camera_info", "camera_info")
         else:
             self.hang_up("image")  # a cloud brings its own colour
+            self.watch.forget("camera_info")  # and may do without a camera
         self.get_logger().info(f"depth comes from {self.resolve_topic_name(topic)}")
+        self._source = topic
         self.begin(streams)
 
     # Compute
@@ -159,9 +185,10 @@ class SegmenterNode(MatchingDoor):
 
     def _depth(self, match: Match) -> DepthImage:
         if "camera_info" in match.payloads:
-            return self.read("depth", from_msg.depth_image, match["depth"], match["camera_info"], match["image"])
+            messages = match["depth"], match["camera_info"], match["image"]
+            return self.read("depth", from_msg.depth_image, *messages, self.most_pixels)
         cloud = self.read("points", from_msg.point_cloud, match["depth"])
-        camera = self.read("camera_info", from_msg.camera_of_cloud, self._camera_info, cloud)
+        camera = self.read("camera_info", from_msg.camera_of_cloud, self._camera_info, cloud, self.most_pixels)
         with self.ledger.timed("organise"):
             return organise(cloud, camera)
 

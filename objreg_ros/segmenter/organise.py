@@ -177,6 +177,8 @@ def _pixels(points: Array, camera: Intrinsics) -> tuple[Array, Array]:
 
 def _is_filled(index: Array, z: Array, camera: Intrinsics) -> bool:
     """Whether enough of the nearest points, where a cloud thinned by volume is thinnest, have points beside them."""
+    if len(index) == 0:
+        return False
     seen = np.zeros((camera.height + 1) * camera.width + 1, np.bool_)
     seen[index] = True
     some = slice(None, None, max(1, len(index) // SAMPLE))

@@ -4,6 +4,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -16,6 +17,7 @@ from std_srvs.srv import Trigger
 
 from objreg_ros.bridge import qos
 from objreg_ros.bridge.door import Door, DroppedError
+from objreg_ros.bridge.log import ThrottledLog
 
 
 @pytest.fixture
@@ -38,10 +40,84 @@ def refuse(message: Any) -> None:
     raise ValueError(f"expected better than {message!r}")
 
 
+WORDS = {"quiet": String, "loud": String}
+
+
+def decode(_: str, message: Any) -> str:
+    if message.data == "bug":
+        raise IndexError("nobody expected this")
+    if message.data == "junk":
+        raise ValueError("expected a word, got junk")
+    return message.data
+
+
+class AbsurdError(Exception):
+    """What no decoder should raise."""
+
+
+def stumble(message: Any) -> None:
+    raise AbsurdError("nobody expected this")
+
+
+@pytest.fixture
+def said(door: Door) -> list[str]:
+    """What the log of the door is told, warnings and errors."""
+    lines: list[str] = []
+    door.throttled = ThrottledLog(lines.append)
+    door.get_logger = lambda: SimpleNamespace(error=lines.append)  # type: ignore[method-assign]
+    return lines
+
+
 def test_a_message_that_breaks_its_contract_is_dropped_by_the_name_of_its_topic(door: Door) -> None:
     with pytest.raises(DroppedError, match="expected better than 'x'") as dropped:
         door.read("image", refuse, "x")
     assert dropped.value.reason == "malformed_image"
+
+
+def test_what_no_decoder_should_raise_drops_the_message_by_the_name_of_the_exception(
+    door: Door, said: list[str]
+) -> None:
+    for _ in range(3):
+        with pytest.raises(DroppedError, match="nobody expected this") as dropped:
+            door.read("image", stumble, "x")
+        assert dropped.value.reason == "malformed_image (AbsurdError)"
+        assert door.read_aside("labels", stumble, "x") is None
+    assert door._ignored == {"malformed labels (AbsurdError)": 3}
+    bugs = [line for line in said if "please report it" in line]
+    assert len(bugs) == 2 and all("Traceback" in line and "def stumble" not in line for line in bugs)
+
+
+def test_a_bug_in_the_work_on_a_frame_is_counted_by_its_name_told_once_and_the_node_lives(
+    door: Door, said: list[str]
+) -> None:
+    for stamp_ns in (5, 6):
+        door.accept(stamp_ns)
+        door.conclude(stamp_ns, lambda: stumble(None) is None)
+    assert door.ledger.balance().dropped == {"bug (AbsurdError)": 2} and not door.failure.done()
+    assert len([line for line in said if "please report it" in line]) == 1
+
+
+@pytest.mark.parametrize(
+    ("error", "counted"),
+    [(ValueError("a stamp"), "malformed word"), (SystemError("a bug"), "malformed word (SystemError)")],
+)
+def test_a_message_that_breaks_where_it_is_heard_is_counted_and_the_next_one_is_heard(
+    door: Door, error: Exception, counted: str
+) -> None:
+    heard: list[str] = []
+
+    def hear(message: Any) -> None:
+        if message.data == "bad":
+            raise error
+        heard.append(message.data)
+
+    door.listen(String, "word", hear, qos.room())
+    word = door.create_publisher(String, "word", qos.room())
+    spin_until(door, [] if word.get_subscription_count() == 0 else [1], 1)
+    for data in ("bad", "good"):
+        word.publish(String(data=data))
+    spin_until(door, heard, 1)
+    assert heard == ["good"] and door._ignored == {counted: 1}
 
 
 @pytest.mark.parametrize("error", [ValueError("too far"), OSError("the disk is full")])
@@ -61,9 +137,7 @@ def test_a_message_aside_that_breaks_its_contract_is_nothing(door: Door) -> None
 
 def test_of_topics_that_carry_the_same_the_first_that_speaks_is_kept_and_the_others_are_closed(door: Door) -> None:
     heard: list[tuple[str, str]] = []
-    door.listen_to_first(
-        "words", {"quiet": String, "loud": String}, lambda topic, m: heard.append((topic, m.data)), qos.room()
-    )
+    door.listen_to_first("words", WORDS, decode, lambda topic, m: heard.append((topic, m.data)), qos.room())
     loud, quiet = (door.create_publisher(String, topic, qos.room()) for topic in ("loud", "quiet"))
     spin_until(door, [] if loud.get_subscription_count() == 0 else [1], 1)
     loud.publish(String(data="one"))
@@ -73,11 +147,34 @@ def test_of_topics_that_carry_the_same_the_first_that_speaks_is_kept_and_the_oth
     quiet.publish(String(data="two"))
     loud.publish(String(data="three"))
     spin_until(door, heard, 2)
-    assert heard[1:] == [("loud", "three")]
+    assert heard[1:] == [("loud", "three")] and door.taken("words") == "loud"
+
+
+def test_a_message_that_does_not_decode_closes_no_topic(door: Door) -> None:
+    heard: list[str] = []
+    door.listen_to_first("words", WORDS, decode, lambda topic, m: heard.append(m.data), qos.room())
+    loud, quiet = (door.create_publisher(String, topic, qos.room()) for topic in ("loud", "quiet"))
+    spin_until(door, [] if quiet.get_subscription_count() == 0 else [1], 1)
+    for publisher, word in ((loud, "junk"), (loud, "bug"), (quiet, "one")):
+        publisher.publish(String(data=word))
+        spin_until(door, heard, len(heard) + 1)
+    assert heard == ["junk", "bug", "one"] and door.taken("words") == "quiet"
+    assert door.count_subscribers("/loud") == 0
+
+
+def test_the_other_topics_are_opened_again_once_the_one_that_was_taken_is_silent(door: Door) -> None:
+    door.listen_to_first("words", WORDS, decode, lambda *_: None, qos.room())
+    choice = door._choices["words"]
+    choice.hear("loud", String(data="one"))
+    assert door.count_subscribers("/quiet") == 0
+    choice._clock = lambda: time.monotonic() + 5.0
+    door._report()
+    assert door.taken("words") is None
+    assert door.count_subscribers("/quiet") == door.count_subscribers("/loud") == 1
 
 
 def test_an_input_that_is_hung_up_has_no_subscriptions_and_hears_nothing_more(door: Door) -> None:
-    door.listen_to_first("words", {"quiet": String, "loud": String}, lambda *_: None, qos.room())
+    door.listen_to_first("words", WORDS, decode, lambda *_: None, qos.room())
     assert door.count_subscribers("/quiet") == door.count_subscribers("/loud") == 1
     door.hang_up("words")
     door.hang_up("never opened")

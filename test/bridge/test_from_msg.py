@@ -181,7 +181,7 @@ def test_a_missing_field_is_named() -> None:
     ("change", "complaint"),
     [
         ({"point_step": 8}, "within point_step 8"),
-        ({"point_step": 0}, "within point_step 0"),
+        ({"point_step": 0}, "expected a point_step of 1 to 65536 bytes, got 0"),
         ({"row_step": 4}, "row_step of at least"),
         ({"height": 2**32 - 1}, "truncated"),
         ({"width": 2**31}, "row_step of at least"),
@@ -253,6 +253,41 @@ def test_a_frame_without_a_moment_is_refused(name: str) -> None:
         from_msg.moment(name)
 
 
+@pytest.mark.parametrize(
+    "name", ["camera@" + "9" * 4000 + ".000000000", "camera@9999999999.000000000", "camera@2147483648.000000000"]
+)
+def test_a_moment_that_no_stamp_can_hold_is_refused(name: str) -> None:
+    with pytest.raises(ValueError, match="expected"):
+        from_msg.moment(name)
+    message = messages.odometry(frame_id="camera@12.000000034")
+    message.child_frame_id = name
+    with pytest.raises(ValueError, match="expected"):
+        from_msg.loop_closure(message)
+
+
+@pytest.mark.parametrize(
+    ("sec", "nanosec", "complaint"),
+    [(2**31, 0, "seconds of 32 bits, got 2147483648"), (5, 10**9, "nanoseconds below 1000000000, got 1000000000")],
+)
+def test_a_stamp_that_no_message_can_carry_is_refused(sec: int, nanosec: int, complaint: str) -> None:
+    with pytest.raises(ValueError, match=complaint):
+        from_msg.stamp_ns(SimpleNamespace(sec=sec, nanosec=nanosec))
+
+
+def test_the_first_and_the_last_stamp_there_is_are_stamps() -> None:
+    assert from_msg.stamp_ns(SimpleNamespace(sec=-(2**31), nanosec=0)) == -(2**31) * 10**9
+    assert from_msg.moment("camera@2147483647.999999999") == ("camera", 2**31 * 10**9 - 1)
+
+
+def test_a_name_beyond_all_sense_is_refused() -> None:
+    with pytest.raises(ValueError, match="child_frame_id: expected at most 1000 characters, got 1001"):
+        message = messages.odometry()
+        message.child_frame_id = "x" * 1001
+        from_msg.odometry(message)
+    with pytest.raises(ValueError, match="frame_id: expected at most 1000 characters, got 2000"):
+        from_msg.odometry(messages.odometry(frame_id="y" * 2000))
+
+
 def test_a_frame_may_have_an_at_sign_in_its_name() -> None:
     assert from_msg.moment("robot@home/camera@0.000000007") == ("robot@home/camera", 7)
 
@@ -269,10 +304,23 @@ def test_labels_are_json() -> None:
     assert from_msg.labels(SimpleNamespace(data=json.dumps({"3": "cup"}))) == {3: "cup"}
 
 
-@pytest.mark.parametrize("text", ["", "cup", "[1]", '{"a": "cup"}', pytest.param("[" * 100_000, id="deep")])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "", "cup", "[1]", '{"a": "cup"}', '{"70000": "cup", "0": "cup"}', '{"65535": "cup"}', '{"-1": "cup"}',
+        '{"0": 5}', '{"0": ["cup"]}', '{"0": "\\ud800"}', '{"1e400": "cup"}',
+        pytest.param("[" * 100_000, id="deep"), pytest.param('{"0": "' + "x" * 1001 + '"}', id="long"),
+        pytest.param('{"' + "9" * 5000 + '": "cup"}', id="many digits"),
+    ],
+)  # fmt: skip
 def test_labels_of_another_shape_are_refused(text: str) -> None:
     with pytest.raises(ValueError, match="labels: expected JSON"):
         from_msg.labels(SimpleNamespace(data=text))
+
+
+def test_a_table_of_labels_beyond_all_sense_is_refused_unread() -> None:
+    with pytest.raises(ValueError, match="labels: expected at most 4000000 characters, got 5000000"):
+        from_msg.labels(SimpleNamespace(data="x" * 5_000_000))
 
 
 def test_a_table_of_detections_comes_best_first() -> None:
@@ -294,6 +342,38 @@ def test_an_empty_table_is_no_detection_of_the_size_at_hand() -> None:
     assert len(found) == 0 and found.image_hw == (48, 64)
 
 
+def retyped(rows: np.ndarray, **kinds: str) -> SimpleNamespace:
+    """The message of rows of which some fields have other types."""
+    layout = np.dtype([(name, kinds.get(name, rows.dtype[name].str)) for name in rows.dtype.names or ()])
+    return messages.cloud(np.atleast_2d(rows.astype(layout)))
+
+
+@pytest.mark.parametrize("field", ["image_height", "image_width", "class_id"])
+def test_a_size_or_class_that_is_no_whole_number_is_refused(field: str) -> None:
+    rows = np.array([(1, 2, 30, 40, 0.5, 3, 64, 48)], DETECTIONS)
+    message = retyped(rows.astype([(n, "<f4" if n == field else DETECTIONS[n].str) for n in DETECTIONS.names or ()]))
+    with pytest.raises(ValueError, match=f"expected whole numbers in field '{field}', got float32"):
+        from_msg.detections(message, {})
+
+
+def test_a_size_beyond_16_bits_is_refused() -> None:
+    message = retyped(np.array([(1, 2, 30, 40, 0.5, 3, 64, 48)], DETECTIONS), image_width="<u4")
+    message.data = bytearray(message.data)
+    np.ndarray(1, "<u4", message.data, 22)[:] = 2642833074
+    with pytest.raises(ValueError, match="expected 0 to 65535 in field 'image_width', got 2642833074"):
+        from_msg.detections(message, {})
+
+
+def test_more_boxes_than_a_picture_has_things_are_refused() -> None:
+    with pytest.raises(ValueError, match="detections: expected at most 1000 boxes, got 1001"):
+        from_msg.detections(messages.own_table(np.zeros(1001, DETECTIONS)), {})
+
+
+def test_a_depth_beyond_all_measure_is_none() -> None:
+    message = messages.image(np.array([[1.5, 1e30], [np.inf, 100001.0]], np.float32), "32FC1")
+    assert from_msg.depth(message).tolist() == [[1.5, 0.0], [0.0, 0.0]]
+
+
 def object_rows() -> np.ndarray:
     rows = np.zeros(5, OBJECTS)
     rows["instance"] = [2, 0, 1, 2, 1]
@@ -312,7 +392,7 @@ def test_objects_come_in_order_with_the_support_apart() -> None:
     assert (clouds[1].score, clouds[1].density, clouds[1].flags.tolist()) == (0.5, 1000.0, [5, 5])
 
 
-@pytest.mark.parametrize("z", [0.0, -1.0, np.nan])
+@pytest.mark.parametrize("z", [0.0, -1.0, 1e-40, np.nan])
 def test_a_point_that_no_camera_sees_is_refused(z: float) -> None:
     rows = object_rows()
     rows["z"][2] = z
@@ -328,6 +408,43 @@ def test_an_object_whose_numbers_mean_nothing_is_refused(field: str, value: floa
     rows[field] = value
     with pytest.raises(ValueError, match=f"expected a .*{field} of .*got {value}"):
         from_msg.objects(messages.own_table(rows), {})
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "complaint"),
+    [
+        ("x", 3e38, "points of 'cup' within 1000 m"),
+        ("normal_x", 1e30, "normals of 'cup' of length 1"),
+        ("density", 1e20, "a density of 'cup'"),
+    ],
+)
+def test_a_number_beyond_all_measure_ends_in_a_refusal(field: str, value: float, complaint: str) -> None:
+    rows = object_rows()
+    rows[field][0] = value
+    with pytest.raises(ValueError, match=f"expected {complaint}"):
+        from_msg.objects(messages.own_table(rows), {3: "cup"})
+
+
+def test_more_objects_than_a_frame_has_are_refused() -> None:
+    rows = np.repeat(object_rows()[:1], 700)
+    rows["instance"] = np.arange(700)
+    with pytest.raises(ValueError, match="objects: expected at most 500 objects, got 700"):
+        from_msg.objects(messages.own_table(rows), {})
+
+
+def test_a_view_of_more_pixels_than_any_is_refused() -> None:
+    message, info = view_messages()
+    message.width = message.height = 5000
+    with pytest.raises(ValueError, match="view: expected at most 4000000 pixels, got 5000 × 5000"):
+        from_msg.view(message, info)
+
+
+def test_a_camera_of_more_pixels_than_any_picture_projects_no_cloud() -> None:
+    cloud = from_msg.point_cloud(messages.cloud(np.ones((1, 9), [("x", "<f4"), ("y", "<f4"), ("z", "<f4")])))
+    for size in (20_000, 1_000_000):
+        info = messages.camera_info([500.0, 0, size / 2, 0, 500, size / 2, 0, 0, 1], size, size)
+        with pytest.raises(ValueError, match="expected at most"):
+            from_msg.camera_of_cloud(info, cloud)
 
 
 def test_no_objects_are_no_objects() -> None:

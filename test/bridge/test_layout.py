@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from objreg_ros.bridge.layout import DETECTIONS, OBJECTS, VIEW, columns, fields_of, table
+from objreg_ros.bridge.layout import DETECTIONS, OBJECTS, VIEW, columns, fields_of, table, whole_numbers
 
 from . import messages
 
@@ -32,6 +34,52 @@ def test_a_field_of_several_values_is_a_column_of_arrays() -> None:
     message.fields = message.fields[:1]
     message.fields[0].count = 3
     assert table(message)["histogram"].shape == (1, 2, 3)
+
+
+def test_a_column_that_is_needed_has_one_value_a_point() -> None:
+    message = messages.own_table(np.zeros(4, DETECTIONS))
+    message.fields[5].count = 2
+    with pytest.raises(ValueError, match="expected a count of 1 of field 'class_id', got 2"):
+        table(message, "class_id")
+    message = messages.own_table(np.zeros(4, VIEW))
+    message.fields[2].count = 2  # over rgb: what it holds is not asked for
+    message.fields[3].count, message.point_step = 2, 20
+    with pytest.raises(ValueError, match="expected a count of 1 of field 'rgb', got 2"):
+        table(message, "x")
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"point_step": 2**32 - 1}, "expected a point_step of 1 to 65536 bytes, got 4294967295"),
+        ({"fields": [SimpleNamespace(name=str(k), offset=0, datatype=2, count=1) for k in range(300)]}, "at most 200"),
+        ({"fields": [SimpleNamespace(name="x", offset=0, datatype=7, count=2**32 - 1)]}, "got a count of 4294967295"),
+        ({"fields": [SimpleNamespace(name="", offset=0, datatype=7, count=1)]}, "a field's name of 1 to 1000"),
+    ],
+)
+def test_a_layout_beyond_all_sense_is_refused_before_memory_is_taken(changes: dict, complaint: str) -> None:
+    message = messages.own_table(np.zeros(4, VIEW))
+    for name, value in changes.items():
+        setattr(message, name, value)
+    with pytest.raises(ValueError, match=complaint):
+        table(message)
+
+
+@pytest.mark.parametrize("kind", ["i1", "u1", "i2", "u2", "i4", "u4"])
+def test_whole_numbers_may_be_of_any_integer_type(kind: str) -> None:
+    records = np.array([[(3,), (100,)]], [("n", kind)])
+    numbers = whole_numbers(records, "n")
+    assert numbers.dtype == np.int64 and numbers.tolist() == [[3, 100]]
+    assert whole_numbers(records[:, :0], "n").shape == (1, 0)
+
+
+@pytest.mark.parametrize(
+    ("value", "kind", "complaint"),
+    [(np.inf, "f4", "whole numbers in field 'n', got float32"), (-1, "i2", "got -1 to -1"), (65536, "u4", "got 65536")],
+)
+def test_what_is_no_whole_number_of_16_bits_is_refused(value: float, kind: str, complaint: str) -> None:
+    with pytest.raises(ValueError, match=complaint):
+        whole_numbers(np.array([[(value,)]], [("n", kind)]), "n")
 
 
 def test_a_single_row_may_leave_its_row_step_out() -> None:

@@ -173,12 +173,24 @@ def test_what_the_work_refuses_is_dropped_with_its_reason(door: Pairs, error: Ex
     assert door.ledger.balance().dropped == {reason: 1} and not door.failure.done()
 
 
-def test_a_bug_in_the_work_ends_the_node(door: Pairs) -> None:
+def test_a_bug_in_the_work_drops_the_frame_by_its_name_and_the_node_goes_on(door: Pairs) -> None:
     door.begin([Stream("a"), Stream("b")])
     door.feed("b", 5, TypeError("a bug"))
     door.feed("a", 5, "a5")
     door.wait()
-    assert isinstance(door.failure.exception(), TypeError)
+    assert door.ledger.balance().dropped == {"bug (TypeError)": 1} and not door.failure.done()
+
+
+def test_streams_may_be_matched_anew_and_keep_what_is_latched(door: Pairs) -> None:
+    door.begin([Stream("a"), Stream("b"), Stream("c", Need.LATCHED), Stream("d", Need.LATCHED)])
+    door.feed("c", 0, "c0")
+    door.feed("a", 5, "a5")
+    door.begin([Stream("b"), Stream("c", Need.LATCHED)])
+    assert door.ledger.balance().dropped == {"unmatched": 1}
+    door.feed("b", 6, "b6")
+    door.worker.close()
+    assert door.ledger.balance().received == 2
+    assert door.extra_diagnostics() == {"c received": 1}
 
 
 def test_diagnostics_tell_what_the_other_streams_brought(door: Pairs) -> None:

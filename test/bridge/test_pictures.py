@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import array
 import struct
+import tracemalloc
 import zlib
 
 import cv2
@@ -112,10 +113,22 @@ def test_a_jpeg_is_taken_as_it_is_stored_however_it_is_to_be_held() -> None:
     assert colour_pixels(messages.compressed(tagged, "jpeg")).shape == (40, 60, 3)
 
 
-@pytest.mark.parametrize("data", [b"", b"\xff\xd8\xff\xe0 no jpeg"])
-def test_a_broken_compressed_image_is_refused(data: bytes) -> None:
-    with pytest.raises(ValueError, match="do not decode"):
+@pytest.mark.parametrize("data", [b"", b"\xff\xd8\xff\xe0 no jpeg", b"BM" + bytes(200), b"\0\0\1\0" * 9])
+def test_what_does_not_begin_as_a_jpeg_or_png_is_refused(data: bytes) -> None:
+    with pytest.raises(ValueError, match=f"expected jpeg or png, got {len(data)} bytes that do not begin so"):
         colour_pixels(messages.compressed(data, "jpeg"))
+
+
+def test_a_picture_of_another_kind_is_refused_though_opencv_would_take_it() -> None:
+    data = cv2.imencode(".bmp", flat(10, 30, 200))[1].tobytes()
+    assert cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR) is not None
+    with pytest.raises(ValueError, match="expected jpeg or png"):
+        colour_pixels(messages.compressed(data, "bgr8; bmp compressed"))
+
+
+def test_a_picture_that_begins_well_and_does_not_go_on_is_refused() -> None:
+    with pytest.raises(ValueError, match="expected a jpeg or png, got 60 bytes that do not decode"):
+        colour_pixels(messages.compressed(png_that_claims(64, 64, 8, 2)[:60], "png"))
 
 
 def png_that_claims(width: int, height: int, bits: int, colour: int) -> bytes:
@@ -141,13 +154,38 @@ CLAIMS = {"jpeg": jpeg_that_claims(65500, 65500), "png": png_that_claims(60000, 
 
 @pytest.mark.parametrize("data", CLAIMS.values(), ids=CLAIMS)
 def test_a_header_that_claims_too_many_pixels_is_refused(data: bytes) -> None:
-    with pytest.raises(ValueError, match=r"expected a jpeg or png of at most 2\^30 pixels, got \d+ bytes"):
+    with pytest.raises(ValueError, match="expected at most 50000000 pixels, got "):
         colour_pixels(messages.compressed(data, "jpeg"))
+
+
+@pytest.mark.parametrize("kind", [".jpg", ".png"])
+def test_how_many_pixels_a_picture_may_have_is_up_to_who_asks(kind: str) -> None:
+    message = messages.compressed(cv2.imencode(kind, np.zeros((40, 60, 3), np.uint8))[1].tobytes(), kind)
+    assert colour_pixels(message, 2400).shape == (40, 60, 3)
+    with pytest.raises(ValueError, match="expected at most 2399 pixels, got 60 × 40"):
+        colour_pixels(message, 2399)
+
+
+def test_a_raw_picture_has_the_same_limit() -> None:
+    message = messages.image(np.zeros((4, 6), np.uint16), "16UC1")
+    assert depth_metres(message, 24).shape == (4, 6)
+    with pytest.raises(ValueError, match="expected at most 23 pixels, got 6 × 4"):
+        depth_metres(message, 23)
+
+
+def test_a_picture_bomb_is_refused_before_memory_is_taken_for_it() -> None:
+    tracemalloc.start()
+    for bits, colour in ((8, 2), (16, 2)):
+        with pytest.raises(ValueError, match="expected at most 50000000 pixels, got"):
+            colour_pixels(messages.compressed(png_that_claims(30000, 30000, bits, colour), "png"))
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 1_000_000
 
 
 def test_compressed_depth_that_claims_too_many_pixels_is_refused() -> None:
     data = bytes(12) + png_that_claims(60000, 60000, 16, 0)
-    with pytest.raises(ValueError, match=r"expected compressedDepth png of at most 2\^30 pixels"):
+    with pytest.raises(ValueError, match="expected at most 50000000 pixels, got"):
         depth_metres(messages.compressed(data, "16UC1; compressedDepth png"))
 
 

@@ -39,12 +39,14 @@ RNG = np.random.default_rng(4)
 def cloud_of(label: str, instance: int, count: int, coloured: bool = True) -> ObjectCloud:
     xyz = RNG.normal(size=(count, 3)).astype(np.float32)
     xyz[:, 2] = 1 + np.abs(xyz[:, 2])
+    normals = RNG.normal(size=(count, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     return ObjectCloud(
         label=label,
         score=float(np.float32(0.75)),
         instance=instance,
         xyz=xyz,
-        normals=RNG.normal(size=(count, 3)).astype(np.float32),
+        normals=normals.astype(np.float32),
         rgb=RNG.integers(0, 256, (count, 3), dtype=np.uint8) if coloured else None,
         flags=np.full(count, PointFlag.EDGE | PointFlag.CUT_BY_BOX, np.uint16),
         density=float(np.float32(12345.5)),
@@ -296,3 +298,23 @@ def test_a_receipt_tells_the_node_the_frame_and_what_became_of_it() -> None:
     published, dropped = to_msg.finished("segmenter", STAMP), to_msg.finished("segmenter", STAMP, "unmatched")
     assert (published.frame_id, dropped.frame_id) == ("segmenter published", "segmenter dropped unmatched")
     assert from_msg.stamp_ns(published) == STAMP
+
+
+@pytest.mark.parametrize("stamp_ns", [-(2**31) * 10**9 - 1, 2**31 * 10**9])
+def test_a_stamp_beyond_32_bits_of_seconds_is_refused_and_not_cut(stamp_ns: int) -> None:
+    with pytest.raises(ValueError, match=f"expected seconds of 32 bits, got {stamp_ns} ns"):
+        to_msg.stamp(stamp_ns)
+
+
+def test_labels_of_ids_that_the_tables_cannot_carry_are_refused() -> None:
+    with pytest.raises(ValueError, match="labels: expected ids of at most 65534, got 70000"):
+        to_msg.labels({0: "cup", 70000: "tv"})
+    assert json.loads(to_msg.labels({65534: "cup"}).data) == {"65534": "cup"}
+
+
+def test_a_picture_that_is_too_long_for_the_table_is_refused() -> None:
+    none = Detections(
+        xyxy=np.zeros((0, 4), np.float32), score=np.zeros(0, np.float32), label=(), image_hw=(2, 65536), stamp_ns=5
+    )
+    with pytest.raises(ValueError, match=r"expected a picture of at most 65535 pixels a side, got \(2, 65536\)"):
+        to_msg.detections_table(none, NAMES)

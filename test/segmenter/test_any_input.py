@@ -28,7 +28,8 @@ def relief(height: int, width: int, seed: int, holes: float) -> np.ndarray:
     depth += rng.normal(0, 0.003, depth.shape)
     depth[rng.random(depth.shape) < holes] = 0
     nonsense = rng.random(depth.shape) < 0.02
-    depth[nonsense] = rng.choice([np.inf, -1.0, 65.535, 65535.0, 1e-9], nonsense.sum())
+    depth[nonsense] = rng.choice([65.535, 65535.0, 1e-9], nonsense.sum())
+    depth[depth < 0] = 0
     return depth.astype(np.float32)
 
 
