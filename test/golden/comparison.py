@@ -25,6 +25,7 @@ def differences(stored: Results, now: Results, exact: bool = False) -> list[str]
 
     Not ``exact``: the same frames, accepts and refusals of the same moments for the same reasons, constraints by the
     same objects, their poses within `MOST_DEGREES` and `MOST_METRES`, their covariances within `MOST_OF_COVARIANCE`.
+    The pose of a refusal need not be the same: one that nothing holds comes out a degree off on another processor.
     """
     found = [
         f"{name}: {stored[name]} became {now[name]}" for name in ("frames", "dropped") if stored[name] != now[name]
