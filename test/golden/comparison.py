@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What differs between two results of one recording: to the last digit, or beyond what another processor may change."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from objreg_ros.geometry import pose_error
+
+MOST_DEGREES = 0.01
+MOST_METRES = 1e-4
+MOST_OF_COVARIANCE = 0.01
+"""Of a covariance: how far an entry may be off, in standard deviations of its row times that of its column."""
+
+Results = dict[str, Any]
+Row = dict[str, Any]
+
+
+def differences(stored: Results, now: Results, exact: bool = False) -> list[str]:
+    """One line for every difference of two `runs.results`; none where they agree.
+
+    Not ``exact``: the same frames, accepts and refusals of the same moments for the same reasons, constraints by the
+    same objects, their poses within `MOST_DEGREES` and `MOST_METRES`, their covariances within `MOST_OF_COVARIANCE`.
+    The pose of a refusal need not be the same: one that nothing holds comes out a degree off on another processor.
+    """
+    found = [
+        f"{name}: {stored[name]} became {now[name]}" for name in ("frames", "dropped") if stored[name] != now[name]
+    ]
+    before, after = verdicts(stored), verdicts(now)
+    found += [f"{_moments(pair)}: {_said(before.get(pair))} became {_said(after.get(pair))}"
+              for pair in sorted(before.keys() | after.keys()) if before.get(pair) != after.get(pair)]  # fmt: skip
+    found += _numbers(stored, now, exact)
+    if exact and not found and _text(stored) != _text(now):
+        found.append("the order of constraints or refusals is another")
+    return found
+
+
+def verdicts(results: Results) -> dict[tuple[int, int], list[str]]:
+    """What was said of every pair of moments, from and to in ns: ``accepted``, or the reasons of its refusals."""
+    said: dict[tuple[int, int], list[str]] = {}
+    for row in results["constraints"]:
+        said.setdefault(_pair(row), []).append("accepted")
+    for row in results["refusals"]:
+        said.setdefault(_pair(row), []).append(row["reason"])
+    return {pair: sorted(words) for pair, words in said.items()}
+
+
+def _numbers(stored: Results, now: Results, exact: bool) -> Iterator[str]:
+    """What differs in constraints, and where it is exact in refusals, that are in both."""
+    for kind in ("constraints", "refusals") if exact else ("constraints",):
+        known = {_key(row): row for row in stored[kind]}
+        for row in now[kind]:
+            if _key(row) in known:
+                of = exactly if exact else beyond_tolerance
+                yield from (f"{_moments(_pair(row))}: {line}" for line in of(known[_key(row)], row))
+
+
+def exactly(stored: Row, now: Row) -> Iterator[str]:
+    """The fields of a constraint or a refusal that are not the same to the last digit."""
+    for name in sorted(stored.keys() | now.keys()):
+        before, after = stored.get(name), now.get(name)
+        if _text(before) != _text(after):
+            yield f"{name}: {_difference(name, before, after)}"
+
+
+def beyond_tolerance(stored: Row, now: Row) -> Iterator[str]:
+    """What of a constraint is farther off than another processor may bring it."""
+    if stored["labels"] != now["labels"]:
+        yield f"labels: {stored['labels']} became {now['labels']}"
+    degrees, metres = _apart(stored["T_from_to"], now["T_from_to"])
+    if not (degrees <= MOST_DEGREES and metres <= MOST_METRES):
+        yield f"T_from_to: off by {degrees:.4f}° and {1e3 * metres:.3f} mm"
+    share = _off(stored["covariance"], now["covariance"])
+    if not share <= MOST_OF_COVARIANCE:
+        yield f"covariance: off by {100 * share:.2f} %"
+
+
+def _difference(name: str, before: Any, after: Any) -> str:
+    if name == "T_from_to" and before and after:
+        return "off by {:.2g}° and {:.2g} m".format(*_apart(before, after))
+    if name == "covariance":
+        return f"off by {100 * _off(before, after):.2g} %"
+    if name == "evidence":
+        keys = [key for key in sorted(before.keys() | after.keys()) if _text(before.get(key)) != _text(after.get(key))]
+        return ", ".join(f"{key} {before.get(key)} became {after.get(key)}" for key in keys) or "in another order"
+    return f"{before} became {after}"
+
+
+def _apart(stored: list[list[float]], now: list[list[float]]) -> tuple[float, float]:
+    """How far two poses are from each other: in degrees and in metres."""
+    degrees, centimetres = pose_error(np.array(now), np.array(stored))
+    return degrees, centimetres / 100.0
+
+
+def _off(stored: list[list[float]], now: list[list[float]]) -> float:
+    """The farthest that an entry of a covariance is off, in deviations of its row times that of its column."""
+    before, after = np.array(stored), np.array(now)
+    deviations = np.sqrt(np.diag(before))
+    return float(np.abs((after - before) / np.outer(deviations, deviations)).max())
+
+
+def _pair(row: Row) -> tuple[int, int]:
+    return row["from_ns"], row["to_ns"]
+
+
+def _key(row: Row) -> tuple[int, int, str]:
+    return (*_pair(row), row.get("reason", "accepted"))
+
+
+def _moments(pair: tuple[int, int]) -> str:
+    return f"{pair[0]} to {pair[1]} ns"
+
+
+def _said(words: list[str] | None) -> str:
+    return " and ".join(words) if words else "untried"
+
+
+def _text(value: Any) -> str:
+    return json.dumps(value)  # in which a NaN is like another

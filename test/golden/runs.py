@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The recordings of the golden results, and what they give today from stored detections."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from objreg_ros.cli.simulate import camera_of, sensors_of
+from objreg_ros.data import ColourImage, Detections, Rejected
+from objreg_ros.offline import Detects, Rooms, Run, run_offline
+from objreg_ros.recording import open_recording
+from objreg_ros.recording.inputs import choose_inputs
+from objreg_ros.registrar.export import constraint
+from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.registrar import Registrar
+from objreg_ros.segmenter.organise import organise
+from objreg_ros.segmenter.params import SegmenterParams
+from objreg_ros.segmenter.segment import Segmenter
+from objreg_ros.simulation.write import simulate
+
+FOLDER = Path(__file__).resolve().parent
+NO_MODEL_SAW_IT = "expected stored detections of the picture at {} ns, got none; record anew: python {}"
+Progress = Callable[[int], object]
+
+
+class Told(NamedTuple):
+    """What is simulated; its detections were those of the embedded model."""
+
+    scenario: str
+    seed: int
+    frames: int
+    stress: bool = False
+    camera: str = "qvga"
+
+
+class Real(NamedTuple):
+    """How much is taken of a recording in shared/data; its detections were those of the COCO model in shared/models."""
+
+    folder: str
+    frames: int
+
+
+Source = Told | Real
+SOURCES: dict[str, Source] = {
+    "redkitchen_a": Real("redkitchen_a", 136),
+    "loop": Told("loop", 1, 36),
+    "opposite": Told("opposite", 121, 36),
+    "look-alikes": Told("look-alikes", 82, 36),
+    "moved": Told("moved", 125, 36),
+    "stress": Told("moved", 128, 36, stress=True),
+}
+
+
+@dataclass(frozen=True)
+class Stored:
+    """In the detector's stead: what a model saw in each picture, by the picture's stamp."""
+
+    seen: dict[int, Detections]
+
+    def detect(self, image: ColourImage) -> Detections:
+        """What was stored of the picture; KeyError where nothing was."""
+        if image.stamp_ns not in self.seen:
+            raise KeyError(NO_MODEL_SAW_IT.format(image.stamp_ns, FOLDER / "record.py"))
+        return self.seen[image.stamp_ns]
+
+
+class Remembered:
+    """A detector that remembers what it saw."""
+
+    def __init__(self, detector: Detects) -> None:
+        self._detector = detector
+        self.seen: dict[int, Detections] = {}
+
+    def detect(self, image: ColourImage) -> Detections:
+        """As the detector says."""
+        self.seen[image.stamp_ns] = self._detector.detect(image)
+        return self.seen[image.stamp_ns]
+
+
+def simulated(told: Told, folder: Path, progress: Progress = lambda done: None) -> Path:
+    """The recording, written into a new folder."""
+    sensors = sensors_of(camera_of(told.camera, None), told.stress, ())
+    simulate(folder, told.scenario, told.seed, told.frames, sensors=sensors, progress=progress)
+    return folder
+
+
+def run(path: Path, detector: Detects, frames: int, progress: Progress = lambda done: None) -> Run:
+    """The first frames of a recording through the three rooms, with default parameters."""
+    registrar = Registrar(RegistrarParams())
+    try:
+        with open_recording(path) as recording:
+            inputs = choose_inputs(recording.topics)
+            rooms = Rooms(detector, Segmenter(SegmenterParams()), registrar, organise)
+            records = recording.records(set(inputs.chosen().values()))
+            return run_offline(records, rooms, inputs, max_frames=frames, on_frame=progress)
+    finally:
+        registrar.close()
+
+
+def results(run: Run) -> dict[str, Any]:
+    """What is held fast of a run, as JSON: every constraint and refusal with all its numbers."""
+    told = {
+        "frames": run.frames,
+        "dropped": dict(sorted(run.dropped.items())),
+        "constraints": [constraint(closure) for closure in run.closures],
+        "refusals": [refusal(rejected) for rejected in run.refusals],
+    }
+    return json.loads(json.dumps(told))  # as it is read from a file
+
+
+def refusal(rejected: Rejected) -> dict[str, Any]:
+    """A refused candidate as JSON, its pose with all digits."""
+    pose = None if rejected.T_from_to is None else rejected.T_from_to.tolist()
+    moments = {"from_ns": rejected.from_ns, "to_ns": rejected.to_ns}
+    return {"reason": rejected.reason.value, **moments, "T_from_to": pose, "detail": rejected.detail}
