@@ -15,7 +15,6 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
@@ -24,9 +23,11 @@ from std_msgs.msg import Header
 
 from objreg_ros.bridge import qos, to_msg
 from objreg_ros.bridge.diagnostics import CONNECTED, diagnostic
+from objreg_ros.bridge.drops import Drops
 from objreg_ros.bridge.ledger import Ledger
 from objreg_ros.bridge.log import ThrottledLog
 from objreg_ros.bridge.missed import Missed
+from objreg_ros.bridge.overridable import OverridableNode
 from objreg_ros.bridge.parameters import Parameters
 from objreg_ros.bridge.params import DoorParams
 from objreg_ros.bridge.watch import Watch
@@ -42,7 +43,7 @@ class DroppedError(Exception):
         self.reason = reason
 
 
-class Door(Node):
+class Door(OverridableNode):
     """A node with declared parameters, one worker, books, diagnostics at 1 Hz and a receipt for every frame.
 
     A subclass listens, calls `accept` once for each frame, and hands it to ``worker`` as (stamp_ns, payload) when it is
@@ -62,6 +63,7 @@ class Door(Node):
         self.failure: Future = Future()
         self.throttled = ThrottledLog(self.get_logger().warning)
         self.watch = Watch(self.count_publishers, self.settings.of(DoorParams).silence)
+        self._drops = Drops(self.settings.of(DoorParams).silence)
         self.worker: Worker[tuple[int, Any]] = Worker(self._work, self._overtaken, self.fail)
         self._finished = self.create_publisher(Header, "finished", qos.room(depth=1000))
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", qos.room())
@@ -149,6 +151,7 @@ class Door(Node):
     def drop(self, stamp_ns: int, reason: str, text: str = "") -> None:
         """The frame ends here: counted by reason, receipted, and logged (throttled) if there is a ``text``."""
         self.ledger.drop(stamp_ns, reason)
+        self._drops.drop("frames", reason, text)
         if text:
             self.throttled.warn(reason, f"frame dropped, {reason.replace('_', ' ')}: {text}")
         self._finished.publish(to_msg.finished(self.get_name(), stamp_ns, reason))
@@ -164,11 +167,14 @@ class Door(Node):
     def read_aside(self, topic: str, decode: Callable[..., Any], message: Any) -> Any:
         """The word of a message that is no frame by itself; None, counted and logged, if it breaks its contract."""
         try:
-            return decode(message)
+            word = decode(message)
         except ValueError as error:
             self._ignored[f"malformed {topic}"] += 1
+            self._drops.drop(topic, "malformed", str(error))
             self.throttled.warn(f"malformed_{topic}", f"{topic} ignored: {error}")
             return None
+        self._drops.let_through(topic)
+        return word
 
     def conclude(self, stamp_ns: int, work: Callable[[], bool]) -> None:
         """Do the last work on a frame and settle it in the books."""
@@ -181,6 +187,7 @@ class Door(Node):
         else:
             if done:
                 self.ledger.publish(stamp_ns)
+                self._drops.let_through("frames")
                 self._finished.publish(to_msg.finished(self.get_name(), stamp_ns))
 
     def _work(self, job: tuple[int, Any]) -> None:
@@ -232,7 +239,8 @@ class Door(Node):
         name = self.get_fully_qualified_name()
         connected = {f"{CONNECTED}{topic}": count for topic, count in sorted(self.connected.items())}
         extra = {**connected, **self._ignored, **self.extra_diagnostics()}
-        self._diagnostics.publish(diagnostic(name, stamp, balance, rate, silent, extra))
+        troubles = (*silent.values(), *self._drops.lasting().values())
+        self._diagnostics.publish(diagnostic(name, stamp, balance, rate, troubles, extra))
 
     def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> SetParametersResult:
         """As rclpy, but refused in the words of `Params`, and with 1 good for 1.0."""

@@ -15,4 +15,6 @@ class DoorParams(Params):
     reliable: bool = param(
         False, "ask cameras and odometry for reliable delivery; a best-effort publisher then does not match"
     )
-    silence: float = param(5.0, "an input that is silent for this long is reported", unit="s", ge=0.1)
+    silence: float = param(
+        5.0, "an input that is silent, or of which everything is dropped, for this long is reported", unit="s", ge=0.1
+    )
