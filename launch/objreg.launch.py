@@ -2,7 +2,7 @@
 """The nodes: ``ros2 launch objreg_ros objreg.launch.py image:=/kinect/rgb points:=/kinect/points``.
 
 Every argument is optional; ``mapper:=true`` starts the reference mapper beside the three rooms. No parameter's default
-is repeated here; what is not said is as in the code.
+is repeated here; what is not said is as in the code. In a namespace, /tf and /tf_static are those of the namespace.
 """
 
 import sys
@@ -32,6 +32,7 @@ REMAPPED = {  # what the nodes listen to → the argument that says where it is,
     "camera_info": ("camera_info", ""),
     "odom": ("odom", ""),
 }
+TF = [("/tf", "tf"), ("/tf_static", "tf_static")]  # robots in namespaces of their own have frames of the same names
 
 OPTIONS = {
     "params_file": "YAML of parameters, in the form of config/objreg.yaml",
@@ -60,7 +61,7 @@ def _nodes(context: LaunchContext) -> list[Node]:
             name=room,
             namespace=said["namespace"],
             parameters=_parameters(room, said),
-            remappings=_remappings(said),
+            remappings=[*TF, *_remappings(said)],
             output="screen",
         )
         for room in _rooms(said)

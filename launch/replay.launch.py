@@ -65,7 +65,7 @@ def _command(said: dict[str, str]) -> list[str]:
     command += ["--source", said["source"]] if said["source"] else []
     command += ["--lossless"] if _is_true(said["lossless"]) else []
     command += ["--clock"] if _is_true(said["use_sim_time"]) else []
-    rules = [("__ns", f"/{said['namespace'].strip('/')}")] if said["namespace"] else []
+    rules = [("__ns", f"/{said['namespace'].strip('/')}"), *NODES["TF"]] if said["namespace"] else []
     rules += NODES["_remappings"](said)
     words = [word for name, topic in rules for word in ("-r", f"{name}:={topic}")]
     return [*command, "--", "--ros-args", *words] if words else command

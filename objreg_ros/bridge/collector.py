@@ -20,7 +20,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from objreg_ros.bridge import from_msg, qos
-from objreg_ros.bridge.diagnostics import REFUSAL, REJECTED, balance_of, refusal_of
+from objreg_ros.bridge.diagnostics import REJECTED, balance_of, refusal_of
 from objreg_ros.bridge.ledger import Balance
 from objreg_ros.data import Detections, LoopClosure, ObjectCloud, Rejected
 
@@ -54,6 +54,7 @@ class Collector(Node):
 
     def _listen(self) -> None:
         self.create_subscription(DiagnosticArray, "/diagnostics", self._hear_books, qos.room(depth=100))
+        self.create_subscription(DiagnosticArray, "refusals", self._hear_refusals, qos.room(depth=qos.REFUSALS))
         self.create_subscription(Odometry, "constraints", self._hear_constraint, qos.latched(qos.KEPT_CONSTRAINTS))
         self.create_subscription(String, "labels", self._hear_labels, qos.latched())
         self.create_subscription(PointCloud2, "detections_table", self._hear_detections, qos.room())
@@ -81,12 +82,13 @@ class Collector(Node):
 
     def _hear_books(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            if status.hardware_id == "objreg_ros" and status.name.endswith(REFUSAL):
-                self.refusals.append(refusal_of(status))
-            elif status.hardware_id == "objreg_ros":
+            if status.hardware_id == "objreg_ros":
                 self.books[status.name.removesuffix(": frames")] = balance_of(status)
                 refused = {v.key: int(v.value) for v in status.values if v.key.startswith(REJECTED)}
                 self.rejected.update({key.removeprefix(REJECTED): count for key, count in refused.items()})
+
+    def _hear_refusals(self, message: DiagnosticArray) -> None:
+        self.refusals += map(refusal_of, message.status)
 
     def _hear_constraint(self, message: Any) -> None:
         self.closures.append(from_msg.loop_closure(message))

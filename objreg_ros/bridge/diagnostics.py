@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 import numpy as np
 from builtin_interfaces.msg import Time
@@ -18,7 +18,6 @@ DROPPED = "dropped: "
 LOST = "lost in transport: "
 LATENCY = "latency "
 REJECTED = "rejected: "
-REFUSAL = ": refusal"  # behind the name of a node
 CONNECTED = "connected: "
 
 
@@ -27,14 +26,14 @@ def diagnostic(
     now: Time,
     balance: Balance,
     rate_hz: float,
-    silent: Mapping[str, str],
+    troubles: Collection[str],
     extra: Mapping[str, object],
 ) -> DiagnosticArray:
-    """One status: counts, rate, latencies per stage and what the node adds; a warning names the silent inputs."""
+    """One status: counts, rate, latencies per stage and what the node adds; with ``troubles`` a warning of them."""
     status = DiagnosticStatus(
-        level=DiagnosticStatus.WARN if silent else DiagnosticStatus.OK,
+        level=DiagnosticStatus.WARN if troubles else DiagnosticStatus.OK,
         name=f"{node}: frames",
-        message="; ".join(silent.values()) or f"{rate_hz:.1f} frames/s",
+        message="; ".join(troubles) or f"{rate_hz:.1f} frames/s",
         hardware_id="objreg_ros",
         values=[KeyValue(key=key, value=str(value)) for key, value in {**_counts(balance, rate_hz), **extra}.items()],
     )
@@ -51,7 +50,7 @@ def _refusal(node: str, rejected: Rejected) -> DiagnosticStatus:
     values = {"from [ns]": rejected.from_ns, "to [ns]": rejected.to_ns, "T_from_to": json.dumps(pose)}
     return DiagnosticStatus(
         level=DiagnosticStatus.OK,
-        name=f"{node}{REFUSAL}",
+        name=f"{node}: refusal",
         message=f"{rejected.reason.value}: {rejected.detail}",
         hardware_id="objreg_ros",
         values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],

@@ -16,7 +16,6 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
@@ -26,9 +25,11 @@ from std_msgs.msg import Header
 from objreg_ros.bridge import qos, to_msg
 from objreg_ros.bridge.choice import Choice
 from objreg_ros.bridge.diagnostics import CONNECTED, diagnostic
+from objreg_ros.bridge.drops import Drops
 from objreg_ros.bridge.ledger import Ledger
 from objreg_ros.bridge.log import ThrottledLog
 from objreg_ros.bridge.missed import Missed
+from objreg_ros.bridge.overridable import OverridableNode
 from objreg_ros.bridge.parameters import Parameters
 from objreg_ros.bridge.params import DoorParams
 from objreg_ros.bridge.watch import Watch
@@ -44,7 +45,7 @@ class DroppedError(Exception):
         self.reason = reason
 
 
-class Door(Node):
+class Door(OverridableNode):
     """A node with declared parameters, one worker, books, diagnostics at 1 Hz and a receipt for every frame.
 
     A subclass listens, calls `accept` once for each frame, and hands it to ``worker`` as (stamp_ns, payload) when it is
@@ -66,6 +67,7 @@ class Door(Node):
         self.most_pixels = self.settings.of(DoorParams).most_pixels
         self.throttled = ThrottledLog(self.get_logger().warning)
         self.watch = Watch(self.count_publishers, self.settings.of(DoorParams).silence)
+        self._drops = Drops(self.settings.of(DoorParams).silence)
         self.worker: Worker[tuple[int, Any]] = Worker(self._work, self._overtaken, self.fail)
         self._finished = self.create_publisher(Header, "finished", qos.room(depth=1000))
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", qos.room())
@@ -108,19 +110,24 @@ class Door(Node):
 
     def _pass(self, topic: str, heard: Callable[[Any], None], message: Any) -> None:
         """Hand a message on. None ends the node: what breaks its contract already here is counted, and logged."""
+        whole = f"messages of {topic}"
         try:
             heard(message)
-        except ValueError as error:
-            self._ignore(topic, str(error))
         except Exception as error:
-            self._ignore(self._bug(topic, error), str(error))
+            self._ignore(topic, error, whole)
+        else:
+            self._drops.let_through(whole)
 
-    def _ignore(self, what: str, text: str) -> None:
-        self._ignored[f"malformed {what}"] += 1
-        self.throttled.warn(f"malformed_{what}", f"{what} ignored: {text}")
+    def _ignore(self, topic: str, error: Exception, part: str) -> None:
+        """Count and log what is no frame by itself and breaks its contract; ``part`` is whose drops are watched."""
+        self._ignored[self._named(f"malformed {topic}", error)] += 1
+        self._drops.drop(part, "malformed", str(error))
+        self.throttled.warn(f"malformed_{topic}", f"{topic} ignored: {error}")
 
-    def _bug(self, reason: str, error: Exception) -> str:
-        """The reason with the name of an exception that nobody expected; the first of a kind is logged whole."""
+    def _named(self, reason: str, error: Exception) -> str:
+        """The reason; with the name of the exception if it is no ValueError, which the log then tells once, whole."""
+        if isinstance(error, ValueError):
+            return reason
         named = f"{reason} ({type(error).__name__})"
         if named not in self._bugs:
             self._bugs.add(named)
@@ -192,6 +199,7 @@ class Door(Node):
     def drop(self, stamp_ns: int, reason: str, text: str = "") -> None:
         """The frame ends here: counted by reason, receipted, and logged (throttled) if there is a ``text``."""
         self.ledger.drop(stamp_ns, reason)
+        self._drops.drop("frames", reason, text)
         if text:
             self.throttled.warn(reason, f"frame dropped, {reason.replace('_', ' ')}: {text}")
         self._finished.publish(to_msg.finished(self.get_name(), stamp_ns, reason))
@@ -204,20 +212,18 @@ class Door(Node):
         try:
             with self.ledger.timed("decode"):
                 return decode(*messages)
-        except ValueError as error:
-            raise DroppedError(f"malformed_{topic}", str(error)) from error
         except Exception as error:
-            raise DroppedError(self._bug(f"malformed_{topic}", error), str(error)) from error
+            raise DroppedError(self._named(f"malformed_{topic}", error), str(error)) from error
 
     def read_aside(self, topic: str, decode: Callable[..., Any], message: Any) -> Any:
         """The word of a message that is no frame by itself; None, counted and logged, if it breaks its contract."""
         try:
-            return decode(message)
-        except ValueError as error:
-            self._ignore(topic, str(error))
+            word = decode(message)
         except Exception as error:
-            self._ignore(self._bug(topic, error), str(error))
-        return None
+            self._ignore(topic, error, topic)
+            return None
+        self._drops.let_through(topic)
+        return word
 
     def conclude(self, stamp_ns: int, work: Callable[[], bool]) -> None:
         """Do the last work on a frame and settle it in the books; what nobody expected drops it as a ``bug``."""
@@ -228,10 +234,11 @@ class Door(Node):
         except (ValueError, OSError) as error:
             self.drop(stamp_ns, "refused", str(error))
         except Exception as error:
-            self.drop(stamp_ns, self._bug("bug", error), str(error))
+            self.drop(stamp_ns, self._named("bug", error), str(error))
         else:
             if done:
                 self.ledger.publish(stamp_ns)
+                self._drops.let_through("frames")
                 self._finished.publish(to_msg.finished(self.get_name(), stamp_ns))
 
     def _work(self, job: tuple[int, Any]) -> None:
@@ -285,7 +292,8 @@ class Door(Node):
         name = self.get_fully_qualified_name()
         connected = {f"{CONNECTED}{topic}": count for topic, count in sorted(self.connected.items())}
         extra = {**connected, **self._ignored, **self.extra_diagnostics()}
-        self._diagnostics.publish(diagnostic(name, stamp, balance, rate, silent, extra))
+        troubles = (*silent.values(), *self._drops.lasting().values())
+        self._diagnostics.publish(diagnostic(name, stamp, balance, rate, troubles, extra))
 
     def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> SetParametersResult:
         """As rclpy, but refused in the words of `Params`, and with 1 good for 1.0."""

@@ -18,7 +18,8 @@ class DoorParams(Params):
     )
     silence: float = param(
         5.0,
-        "an input that is silent for this long is reported, and may come by another of its topics",
+        "an input that is silent, or of which everything is dropped, for this long is reported; one that is silent may "
+        "come by another of its topics",
         unit="s",
         ge=0.1,
     )

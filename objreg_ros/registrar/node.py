@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The door of the registrar: ``objects``, ``view``, ``view/camera_info``, ``gravity``, ``labels`` and ``odom`` in;
-``constraints``, ``transforms``, ``landmarks`` and ``markers`` out."""
+``constraints``, ``refusals``, ``transforms``, ``landmarks`` and ``markers`` out."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TransformStamped, Vector3Stamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, PointCloud2
@@ -64,6 +65,7 @@ class RegistrarNode(MatchingDoor):
 
     def _announce(self) -> None:
         self._constraints = self.create_publisher(Odometry, "constraints", qos.latched(qos.KEPT_CONSTRAINTS))
+        self._refusals = self.create_publisher(DiagnosticArray, "refusals", qos.room(qos.REFUSALS))
         self._transforms = self.create_publisher(TransformStamped, "transforms", qos.room(depth=100))
         self._landmarks = self.create_publisher(PointCloud2, "landmarks", qos.room(depth=100))
         self._markers = self.create_publisher(MarkerArray, "markers", qos.latched())
@@ -162,7 +164,7 @@ class RegistrarNode(MatchingDoor):
         self._last_refusals.update((refusal.reason.value, refusal.detail) for refusal in outcome.rejected)
         if outcome.rejected:
             node, now = self.get_fully_qualified_name(), self.get_clock().now().to_msg()
-            self._diagnostics.publish(refusals(node, now, outcome.rejected))
+            self._refusals.publish(refusals(node, now, outcome.rejected))
         self._counts = dict(self._registrar.counts())
         if outcome.keyframe_ns is not None:
             seen = outcome.observations, outcome.keyframe_ns, outcome.frame_id

@@ -18,6 +18,7 @@ from std_msgs.msg import String
 
 from objreg_ros.bridge import from_msg, qos, to_msg
 from objreg_ros.bridge.matching import MatchingDoor
+from objreg_ros.bridge.overridable import FIXED
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.sync import Match, Need, Stream
 from objreg_ros.data import Array, ColourImage, DepthImage, Detections, Frame, PointCloud
@@ -80,7 +81,8 @@ class SegmenterNode(MatchingDoor):
         if any(publisher.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for publisher in publishers):
             self._look.cancel()
             quiet = SubscriptionEventCallbacks(use_default_callbacks=False)
-            self.create_subscription(CameraInfo, "camera_info", self._hear_camera, qos.latched(), event_callbacks=quiet)
+            options = {"event_callbacks": quiet, "qos_overriding_options": FIXED}  # overrides are of the one above
+            self.create_subscription(CameraInfo, "camera_info", self._hear_camera, qos.latched(), **options)
 
     def adopt(self) -> None:
         """Live parameters hold from the next frame on."""

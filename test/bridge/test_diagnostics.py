@@ -23,23 +23,24 @@ BOOKS = Balance(
 )
 
 
-def status(silent: dict[str, str]) -> DiagnosticStatus:
-    return diagnostic("/detector", Time(sec=4), BOOKS, 29.97, silent, {"stored keyframes": 7}).status[0]
+def status(*troubles: str) -> DiagnosticStatus:
+    return diagnostic("/detector", Time(sec=4), BOOKS, 29.97, troubles, {"stored keyframes": 7}).status[0]
 
 
 def test_the_books_survive_the_way_over_the_wire() -> None:
-    assert balance_of(status({})) == BOOKS
+    assert balance_of(status()) == BOOKS
 
 
 def test_what_a_node_adds_is_shown() -> None:
-    values = {pair.key: pair.value for pair in status({}).values}
+    values = {pair.key: pair.value for pair in status().values}
     assert values["stored keyframes"] == "7" and values["rate [Hz]"] == "29.97"
 
 
-def test_a_silent_input_makes_a_warning_that_names_it() -> None:
-    assert status({}).level == DiagnosticStatus.OK and status({}).message == "30.0 frames/s"
-    warned = status({"image": "nothing on /image for 5 s"})
-    assert warned.level == DiagnosticStatus.WARN and warned.message == "nothing on /image for 5 s"
+def test_what_is_wrong_makes_a_warning_that_names_all_of_it() -> None:
+    assert status().level == DiagnosticStatus.OK and status().message == "30.0 frames/s"
+    warned = status("nothing on /image for 5 s", "odom: everything was dropped")
+    assert warned.level == DiagnosticStatus.WARN
+    assert warned.message == "nothing on /image for 5 s; odom: everything was dropped"
 
 
 def test_a_refusal_comes_back_with_its_reason_its_numbers_and_its_pose() -> None:

@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,11 +12,13 @@ import pytest
 pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 
 import rclpy
+from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from objreg_ros.bridge import qos
 from objreg_ros.bridge.door import Door, DroppedError
+from objreg_ros.bridge.drops import Drops
 from objreg_ros.bridge.log import ThrottledLog
 
 
@@ -128,6 +130,72 @@ def test_what_breaks_on_one_frame_is_counted_and_the_node_lives(door: Door, erro
     door.accept(5)
     door.conclude(5, work)
     assert door.ledger.balance().dropped == {"refused": 1} and not door.failure.done()
+
+
+class Clock:
+    """A clock that is set by hand."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def told(door: Door, monkeypatch: pytest.MonkeyPatch) -> Callable[[float], DiagnosticStatus]:
+    """The status that a door reports at a time by the clock of its drops."""
+    clock = Clock()
+    door._drops = Drops(period_s=5.0, clock=clock)
+    told: list[Any] = []
+    monkeypatch.setattr(door._diagnostics, "publish", told.append)
+
+    def report(now: float) -> DiagnosticStatus:
+        clock.now = now
+        door._report()
+        return told[-1].status[0]
+
+    return report
+
+
+def test_thirty_of_thirty_malformed_frames_are_a_warning_with_the_reason(
+    door: Door, told: Callable[[float], DiagnosticStatus]
+) -> None:
+    for stamp_ns in range(30):
+        told(stamp_ns * 0.2)
+        door.accept(stamp_ns)
+        door.conclude(stamp_ns, lambda: bool(door.read("image", refuse, "x")))
+    warned = told(6.0)
+    assert warned.level == DiagnosticStatus.WARN
+    assert "30 as malformed image (expected better than 'x')" in warned.message
+    door.accept(30)
+    door.conclude(30, lambda: True)
+    assert told(17.0).level == DiagnosticStatus.OK
+
+
+def test_an_input_beside_the_frames_of_which_everything_is_malformed_is_a_warning(
+    door: Door, told: Callable[[float], DiagnosticStatus]
+) -> None:
+    for second in range(7):
+        told(second)
+        door.read_aside("odom", refuse, "x")
+        door.read_aside("labels", refuse if second else str.upper, "x")
+    assert told(6.0).message.startswith("odom: everything was dropped for 6 s, 7 as malformed")
+    door.read_aside("odom", str.upper, "x")
+    door.read_aside("labels", str.upper, "x")
+    assert told(17.0).level == DiagnosticStatus.OK
+
+
+def test_frames_that_newer_ones_overtake_are_no_trouble_where_some_get_through(
+    door: Door, told: Callable[[float], DiagnosticStatus]
+) -> None:
+    for stamp_ns in range(100):
+        told(stamp_ns * 0.2)
+        door.accept(stamp_ns)
+        if stamp_ns % 20 == 0:
+            door.conclude(stamp_ns, lambda: True)
+        else:
+            door._overtaken((stamp_ns, None))
+        assert told(stamp_ns * 0.2).level == DiagnosticStatus.OK
 
 
 def test_a_message_aside_that_breaks_its_contract_is_nothing(door: Door) -> None:

@@ -18,6 +18,8 @@ pytest.importorskip("rclpy", reason="ROS 2 is not installed")
 import rclpy
 from std_srvs.srv import Trigger
 
+from objreg_ros.bridge.diagnostics import refusal_of
+from objreg_ros.data import Reason, Rejected
 from objreg_ros.registrar.keyframes import Stretch
 from objreg_ros.registrar.node import RegistrarNode
 from objreg_ros.registrar.registrar import Outcome
@@ -77,6 +79,23 @@ def test_a_store_that_is_locked_refuses_a_reset_and_keeps_what_waits(make: Makin
     assert node._registrar.counts()["keyframes"] == 1
     answer, _ = call(node, "reset")
     assert answer.success and node._registrar.counts()["keyframes"] == 0
+    node.close()
+
+
+def test_refusals_have_a_topic_of_their_own_and_their_counts_are_in_the_diagnostics(
+    make: Making, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node, told, status = make(), [], []
+    monkeypatch.setattr(node._refusals, "publish", told.append)
+    monkeypatch.setattr(node._diagnostics, "publish", status.append)
+    turned_down = Rejected(reason=Reason.NO_CANDIDATE, from_ns=5, to_ns=9, detail="none of 3")
+    node._publish(Outcome(rejected=(turned_down,)))
+    assert node._refusals.topic_name == "/test_node/refusals" and status == []
+    (message,) = told
+    assert [refusal_of(one).detail for one in message.status] == ["none of 3"]
+    node._report()
+    values = {pair.key: pair.value for pair in status[0].status[0].values}
+    assert values["rejected: no_candidate"] == "1"
     node.close()
 
 

@@ -20,7 +20,7 @@ from rclpy.node import Node
 from std_msgs.msg import Header
 
 from objreg_ros.bridge import from_msg, profile, qos
-from objreg_ros.bridge.diagnostics import CONNECTED, REFUSAL, balance_of
+from objreg_ros.bridge.diagnostics import CONNECTED, balance_of
 from objreg_ros.bridge.ledger import Balance
 
 START_S = 600.0  # a first start compiles kernels, on a machine that may be busy
@@ -45,6 +45,7 @@ class Graph:
         self.heard: defaultdict[str, list[Any]] = defaultdict(list)
         self.books: dict[str, Balance] = {}
         self.connected: dict[str, dict[str, int]] = {}
+        self.status: dict[str, DiagnosticStatus] = {}  # of each node, the last
         self.node.create_subscription(DiagnosticArray, "/diagnostics", self._take_books, qos.room())
 
     # Processes
@@ -141,9 +142,8 @@ class Graph:
 
     def _take_books(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            if status.name.endswith(REFUSAL):
-                continue
             name = status.name.removesuffix(": frames")
+            self.status[name] = status
             self.books[name], self.connected[name] = balance_of(status), _connected_of(status)
 
     def _logs(self) -> str:

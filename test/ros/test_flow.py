@@ -7,12 +7,14 @@ import os
 from pathlib import Path
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Vector3Stamped
 from sensor_msgs.msg import CameraInfo, PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
 from objreg_ros.bridge import from_msg, qos
+from objreg_ros.bridge.diagnostics import refusal_of
 from objreg_ros.bridge.layout import table
 
 from .graph import ANSWER_S, REPOSITORY, START_S, Graph
@@ -43,6 +45,7 @@ def running(graph: Graph, tiny_model: Path) -> Graph:
         graph.hear(kind, topic)
     for topic in ("detections_table", "landmarks"):
         graph.hear(PointCloud2, topic)
+    graph.hear(DiagnosticArray, "refusals")
     return graph
 
 
@@ -108,6 +111,8 @@ def test_the_registrar_ends_its_keyframe_to_save_and_forgets_on_demand(running: 
     assert not saved and "got one in memory only" in why
     running.wait_for(lambda: bool(running.heard["landmarks"]), what="the objects of the keyframe that was saved")
     assert all((table(message, "object_id")["object_id"] >= 1).all() for message in running.heard["landmarks"])
+    running.wait_for(lambda: bool(running.heard["refusals"]), what="why the two runs of the clock are not tied")
+    assert all(refusal_of(status).detail for message in running.heard["refusals"] for status in message.status)
     assert call(running, Trigger, "registrar/reset") == (True, "forgot every keyframe")
 
 

@@ -86,12 +86,25 @@ def test_what_is_said_goes_over_the_users_file_to_the_node_that_it_is_for(
     assert parameters("registrar", given) == ["my.yaml", {"reliable": True}]
 
 
+def test_every_node_has_the_transforms_of_its_namespace(
+    repository: Path, said: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = launch_file(repository)
+    context = LaunchContext()
+    context.launch_configurations.update({**said, "mapper": "true", "odom": "/wheels"})
+    made: list[dict[str, Any]] = []
+    monkeypatch.setitem(file["_nodes"].__globals__, "Node", lambda **options: made.append(options))
+    file["_nodes"](context)
+    rules = [("/tf", "tf"), ("/tf_static", "tf_static"), ("odom", "/wheels")]
+    assert [node["remappings"] for node in made] == [rules] * 4
+
+
 def test_without_arguments_the_player_plays_as_it_is(replayed: Callable[..., list[str]]) -> None:
     assert replayed() == ["my_bag"]
 
 
 def test_the_player_publishes_where_the_nodes_listen(replayed: Callable[..., list[str]]) -> None:
-    rules = ["__ns:=/robot", "points:=/kinect/points", "odom:=/wheels"]
+    rules = ["__ns:=/robot", "/tf:=tf", "/tf_static:=tf_static", "points:=/kinect/points", "odom:=/wheels"]
     words = replayed(namespace="robot", points="/kinect/points", odom="/wheels")
     assert words == ["my_bag", "--", "--ros-args", *(word for rule in rules for word in ("-r", rule))]
 

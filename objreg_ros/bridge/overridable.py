@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A node of which every topic's QoS can be changed by parameters, as in rclcpp.
+
+``qos_overrides./image.subscription.reliability`` (or ``.publisher``; ``history``, ``depth``, ``reliability``) holds
+for a topic by its full name, after remapping. rclpy leaves it to every single topic to ask for that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import copy
+from typing import Any
+
+from rclpy.exceptions import ParameterException
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import InvalidQosOverridesError, QosCallbackResult, QoSOverridingOptions
+from rclpy.subscription import Subscription
+
+MADE_FIRST = "/parameter_events"  # rclpy publishes it before a node can have parameters
+FIXED = QoSOverridingOptions(())  # of a topic whose QoS is what it is opened for
+
+
+class OverridableNode(Node):
+    """ValueError where a topic is opened with an override that is no QoS."""
+
+    def create_publisher(self, msg_type: Any, topic: str, qos_profile: QoSProfile | int, **options: Any) -> Publisher:
+        """As rclpy's, with overrides."""
+        if topic == MADE_FIRST:
+            return super().create_publisher(msg_type, topic, qos_profile, **options)
+        return _overridden(super().create_publisher, msg_type, topic, qos_profile, options)
+
+    def create_subscription(
+        self, msg_type: Any, topic: str, callback: Callable[[Any], None], qos_profile: QoSProfile | int, **options: Any
+    ) -> Subscription:
+        """As rclpy's, with overrides."""
+
+        def create(kind: Any, name: str, profile: QoSProfile | int, **more: Any) -> Subscription:
+            return Node.create_subscription(self, kind, name, callback, profile, **more)
+
+        return _overridden(create, msg_type, topic, qos_profile, options)
+
+
+def _overridden(
+    create: Callable[..., Any], kind: Any, topic: str, profile: QoSProfile | int, options: dict[str, Any]
+) -> Any:
+    options.setdefault("qos_overriding_options", QoSOverridingOptions.with_default_policies(callback=_judge))
+    try:
+        return create(kind, topic, copy(profile), **options)  # rclpy writes overrides into the profile
+    except (ParameterException, InvalidQosOverridesError) as error:
+        raise ValueError(f"qos_overrides of {topic}: {error}") from error
+    except RuntimeError as error:
+        if "QoS override" not in str(error):
+            raise
+        raise ValueError(f"qos_overrides of {topic}: {error}") from error
+
+
+def _judge(profile: QoSProfile) -> QosCallbackResult:
+    """Refuse what rclpy takes and DDS does not."""
+    known = profile.history != HistoryPolicy.UNKNOWN and profile.reliability != ReliabilityPolicy.UNKNOWN
+    if known and profile.depth >= 0:
+        return QosCallbackResult(successful=True)
+    got = f"{profile.history.name}, {profile.reliability.name} and {profile.depth}".lower()
+    return QosCallbackResult(
+        successful=False, reason=f"expected a known history and reliability and a depth of 0 or more, got {got}"
+    )
