@@ -353,3 +353,18 @@ def test_the_correction_is_of_the_frame_that_odometry_is_in(outside: Outside) ->
     broadcaster = outside.door._broadcaster = Broadcaster(outside.door)
     outside.door._hear_odometry(to_msg.odometry(replace(odometry(BENT)[0], frame_id="world")))
     assert [(m.header.frame_id, m.child_frame_id) for m in broadcaster.sent] == [("map", "world")]
+
+
+@pytest.mark.parametrize("publish_tf", [True, False])
+def test_the_correction_is_broadcast_unless_that_is_switched_off(
+    publish_tf: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("objreg_ros.mapper.node.TransformBroadcaster", Broadcaster)
+    rclpy.init(args=["--ros-args", "-p", f"publish_tf:={publish_tf}".lower()], domain_id=100 + os.getpid() % 100)
+    door = MapperNode()
+    try:
+        door._hear_odometry(to_msg.odometry(odometry(BENT)[0]))
+        assert (door._broadcaster is not None) == publish_tf
+    finally:
+        door.close()
+        rclpy.try_shutdown()
