@@ -58,6 +58,16 @@ def wandering(T_motion: Array, sigmas: tuple[float, float]) -> Array:
     return np.diag(way * np.repeat(np.square(sigmas) / 3, 3))
 
 
+def floored(covariance: Array, sigmas: tuple[float, float]) -> Array:
+    """The covariance (6, 6), raised in every direction in which it claims less than ``sigmas`` m and rad."""
+    least = np.repeat(sigmas, 3)
+    spread = np.outer(least, least)
+    values, vectors = np.linalg.eigh(covariance / spread)
+    if values.min() >= 1.0:
+        return covariance
+    return spread * ((vectors * np.maximum(values, 1.0)) @ vectors.T)
+
+
 def unseen(seconds: float, max_speed: float) -> Array:
     """The covariance (6, 6) of a motion of which nothing was told for so long: to anywhere that a body gets, any turn.
 

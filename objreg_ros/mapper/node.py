@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +16,14 @@ from nav_msgs.msg import Path as PathMsg
 from std_srvs.srv import SetBool, Trigger
 
 from objreg_ros.bridge import from_msg, qos, to_msg
-from objreg_ros.bridge.course import Course
-from objreg_ros.bridge.door import Door
+from objreg_ros.bridge.door import Door, DroppedError
 from objreg_ros.bridge.spin import run
 from objreg_ros.data import JUMP_NS, LoopClosure, Odometry
 from objreg_ros.mapper.adapters.g2o import graph_text
 from objreg_ros.mapper.optimisation import load
 from objreg_ros.mapper.params import MapperNodeParams, MapperParams
-from objreg_ros.mapper.pose_graph import PoseGraph, Summary
+from objreg_ros.mapper.pose_graph import ImplausibleError, PoseGraph, Summary
+from objreg_ros.mapper.restart import Anew, Restart
 
 try:
     from tf2_ros import TransformBroadcaster
@@ -46,11 +47,13 @@ class MapperNode(Door):
         self._enabled, self._odom_frame = True, "odom"
         self._odometry_count = self._passed_over_count = 0
         self._ended_ns = 0  # the last moment of the run of the clock before this one
-        self._course: Course[Odometry] = Course(self._pass_over)
+        self._riding: list[tuple[int, LoopClosure | None]] = []  # jobs that the next solution settles too
+        self._restart = self._watch_odometry()
         self._begin()
         self._path = self.create_publisher(PathMsg, "path", qos.latched())
         self._correction = self.create_publisher(TransformStamped, "correction", qos.latched())
-        self._broadcaster = None if TransformBroadcaster is None else TransformBroadcaster(self)
+        broadcasts = self._inputs.publish_tf and TransformBroadcaster is not None
+        self._broadcaster = TransformBroadcaster(self) if broadcasts else None
         self._serve()
         self.listen(OdometryMsg, "odom", self._hear_odometry, self.sensor(qos.ODOMETRY), watched="odom")
         self.listen(OdometryMsg, "constraints", self._hear_constraint, qos.latched(qos.KEPT_CONSTRAINTS))
@@ -80,12 +83,25 @@ class MapperNode(Door):
         odometry = self.read_aside("odom", from_msg.odometry, message)
         if odometry is None:
             return
-        for _, admitted in self._course.admit(odometry.stamp_ns, odometry):
-            if self._advances(admitted):
-                self._follow(admitted)
+        course = self._restart.admit(odometry)
+        if course.anew is not None:
+            self._begin_elsewhere(course.anew, course.poses[0].stamp_ns)
+        for admitted in course.poses:
+            self._follow(admitted)
 
-    def _pass_over(self, stamp_ns: int, odometry: Odometry) -> None:
+    def _watch_odometry(self) -> Restart:
+        return Restart(self.settings.of(MapperParams).max_speed, self._pass_over)
+
+    def _pass_over(self, odometry: Odometry) -> None:
+        """Count a pose that was wrong; say so of one that leapt, and not of one that came again or late."""
         self._passed_over_count += 1
+        known = self._graph.odometry.stamps_ns
+        if known and odometry.stamp_ns > known[-1]:
+            self.throttled.warn(
+                "odometry_leap",
+                "odometry passed over: it leapt faster than max_speed, or to its origin, and came back; "
+                "is there more than one publisher on odom?",
+            )
 
     def _follow(self, odometry: Odometry) -> None:
         self._odometry_count += 1
@@ -97,33 +113,18 @@ class MapperNode(Door):
         self._publish_correction(odometry.stamp_ns)
         self._tie_what_waits()
 
-    def _advances(self, odometry: Odometry) -> bool:
-        """Whether time goes on; a jump back of the clock (a looped bag, a simulation begun anew) starts a new map.
+    def _begin_elsewhere(self, anew: Anew, stamp_ns: int) -> None:
+        """A new map: time jumped back (a looped bag, a simulation begun anew), or odometry was started again elsewhere.
 
-        So does odometry that begins anew elsewhere, as it does where what makes it is started again: nothing says where
-        that is on the map. An odometry that comes again, or late, is passed over and counted: the map has the later one
-        already. So is one whose stamp is alone in a time of its own.
+        Nothing says where that is on the map.
         """
-        known = self._graph.odometry.stamps_ns
-        if not known:
-            return True
-        if odometry.stamp_ns > known[-1]:
-            if self._graph.leaps(odometry):
-                self.throttled.warn(
-                    "odometry_leap",
-                    "odometry leapt faster than max_speed, or to its origin: a new map; "
-                    "is there more than one publisher on odom?",
-                )
-                self._start_anew("odometry_leap")
-            return True
-        back_ns = known[-1] - odometry.stamp_ns
-        if back_ns < JUMP_NS:
-            self._passed_over_count += 1
-            return False
-        self.get_logger().warning(f"time jumped back by {back_ns / 1e9:.3f} s: a new map")
-        self._ended_ns = known[-1]
-        self._start_anew("time_jump")
-        return True
+        if anew is Anew.TIME:
+            self._ended_ns = self._graph.odometry.stamps_ns[-1]
+            back_s = 1e-9 * (self._ended_ns - stamp_ns)
+            self.get_logger().warning(f"time jumped back by {back_s:.3f} s: a new map")
+        else:
+            self.throttled.warn("new_map", "odometry leapt faster than max_speed, or to its origin: a new map")
+        self._start_anew(anew.value)
 
     # Constraints
 
@@ -145,17 +146,19 @@ class MapperNode(Door):
         for closure in waiting:
             try:
                 self._tie(closure)
+            except ImplausibleError as error:
+                self.drop(closure.to_ns, "implausible", f"{_named(closure)}: {error}")
             except ValueError as error:
                 self.drop(closure.to_ns, "two_clocks", str(error))
         while len(self._waiting) > MOST_WAITING:
             self.drop(self._waiting.pop(0).to_ns, "queue_full", "no odometry covers the moments of the constraint")
 
     def _tie(self, closure: LoopClosure) -> None:
-        """Into the graph, or back to what waits; ValueError if it cannot be of one run of the clock."""
+        """Into the graph, or back to what waits; ValueError if it is implausible or not of one run of the clock."""
         with self._graph_lock:
             tied = self._graph.add_closure(closure)
         if tied:
-            self.worker.put((closure.to_ns, None))
+            self.worker.put((closure.to_ns, closure))
         elif self._graph.in_gap(closure):
             self.drop(closure.to_ns, "odometry_gap", "no odometry came around a moment of the constraint")
         elif self._came_too_early(closure):
@@ -177,22 +180,28 @@ class MapperNode(Door):
         known = self._graph.odometry.stamps_ns
         return bool(known) and known[-1] + JUMP_NS < closure.to_ns <= self._ended_ns
 
-    def _overtaken(self, job: tuple[int, Any]) -> None:
-        self.conclude(job[0], lambda: True)  # the newer job solves the graph with this constraint in it
-
-    def compute(self, stamp_ns: int, payload: None) -> bool:
-        """Solve the graph as it is now."""
+    def _overtaken(self, job: tuple[int, LoopClosure | None]) -> None:
         with self._graph_lock:
+            self._riding.append(job)  # the newer job solves the graph with this constraint in it
+
+    def compute(self, stamp_ns: int, payload: LoopClosure | None) -> bool:
+        """Solve the graph as it is now, and settle every constraint that came until now."""
+        with self._graph_lock:
+            riding, self._riding = self._riding, []
             graph, problem = self._graph, self._graph.problem()
         with self.ledger.timed("optimise"):
             solution = problem.solve()
+        unsolvable: tuple[LoopClosure, ...] = ()
         with self._graph_lock:
             if graph is self._graph:
                 self._summary = graph.adopt(problem, solution)
+                unsolvable = self._summary.unsolvable
+        for stamp, closure in riding:
+            self.conclude(stamp, partial(_settle, closure, unsolvable))
         self._publish_path(stamp_ns)
         # The topic alone: TF is sent with odometry only, for its time must not go back.
         self._correction.publish(self._correction_message(stamp_ns))
-        return True
+        return _settle(payload, unsolvable)
 
     # Publish
 
@@ -226,6 +235,7 @@ class MapperNode(Door):
     # Services
 
     def _reset(self, _: Any, response: Any) -> Any:
+        self._restart = self._watch_odometry()
         self._start_anew("reset")
         response.success, response.message = True, "started a new map"
         return response
@@ -247,6 +257,17 @@ class MapperNode(Door):
         self._enabled = request.data
         response.success, response.message = True, "enabled" if request.data else "constraints are dropped as disabled"
         return response
+
+
+def _settle(closure: LoopClosure | None, unsolvable: Sequence[LoopClosure]) -> bool:
+    """True; `DroppedError` where the map cannot be solved with the constraint."""
+    if any(closure is failed for failed in unsolvable):
+        raise DroppedError("unsolvable", f"{_named(closure)}: the map has no solution with it, and goes on without it")
+    return True
+
+
+def _named(closure: LoopClosure | None) -> str:
+    return "" if closure is None else f"the constraint from {closure.from_ns} to {closure.to_ns} ns"
 
 
 def main() -> int:

@@ -41,10 +41,14 @@ class Edge(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """The poses of the nodes in the map, and for every edge whether it was ``kept``."""
+    """The poses of the nodes in the map, and for every edge whether it was ``kept``.
+
+    ``unsolvable`` are the numbers of the edges with which there is no solution; they were left out.
+    """
 
     poses: tuple[Array, ...]
     kept: tuple[bool, ...]
+    unsolvable: tuple[int, ...] = ()
 
 
 def optimise(poses: Sequence[Array], edges: Sequence[Edge], max_residual: float) -> Solution:
@@ -53,14 +57,37 @@ def optimise(poses: Sequence[Array], edges: Sequence[Edge], max_residual: float)
     The certain edges have to connect all nodes. An uncertain edge whose residual stays above ``max_residual`` standard
     deviations is pruned: it has no influence on the poses that come back.
     """
-    wanted = max_residual**2
     kept = np.ones(len(edges), bool)
-    for mu in _stages(poses, edges, wanted):
+    for mu in _stages(poses, edges, max_residual**2):
         poses, weights = _optimise_once(poses, edges, mu)
         kept = weights >= PRUNED
+    return _without_pruned(poses, edges, kept, max_residual)
+
+
+def optimise_gradually(poses: Sequence[Array], stages: Sequence[Sequence[Edge]], max_residual: float) -> Solution:
+    """As `optimise` of the edges of the last stage, led there by the same edges with more doubt in them.
+
+    Where a closure counts as known no better than odometry has drifted, a true one is near enough from the beginning
+    and a false one is not: no lie gets to bend the map before it is known as one.
+    """
+    kept = np.ones(len(stages[-1]), bool)
+    for edges in stages:
+        poses, weights = _optimise_once(poses, edges, max_residual**2)
+        kept = weights >= PRUNED
+    return _without_pruned(poses, stages[-1], kept, max_residual)
+
+
+def misfit(poses: Sequence[Array], edges: Sequence[Edge], max_residual: float) -> float:
+    """The squared residuals of all edges, those of uncertain ones up to the limit: what a solution makes least."""
+    each = ((squared_residual(poses, edge), edge.uncertain) for edge in edges)
+    return sum(min(squared, max_residual**2) if uncertain else squared for squared, uncertain in each)
+
+
+def _without_pruned(poses: Sequence[Array], edges: Sequence[Edge], kept: Array, max_residual: float) -> Solution:
+    """The solution by the edges that are kept alone."""
     if not kept.all():
         survivors = [edge for edge, keep in zip(edges, kept, strict=True) if keep]
-        poses, _ = _optimise_once(poses, survivors, wanted)
+        poses, _ = _optimise_once(poses, survivors, max_residual**2)
     return Solution(tuple(poses), tuple(bool(keep) for keep in kept))
 
 

@@ -31,6 +31,15 @@ class MapperParams(Params):
     steady_heading: float = param(1.0, "error of heading that every metre adds alike, one sigma", "deg/m", ge=0.0)
     steady_distance: float = param(0.02, "error of position that every metre adds alike, one sigma", "m/m", ge=0.0)
     max_speed: float = param(5.0, "odometry that leaps faster than this has begun anew: a new map", "m/s", ge=0.1)
+    min_sigma_translation: float = param(
+        0.005, "a constraint that claims to know its position better is believed no better than this", "m", ge=1e-4
+    )
+    min_sigma_rotation: float = param(
+        0.1, "a constraint that claims to know its rotation better is believed no better than this", "deg", ge=1e-3
+    )
+    max_stretch: float = param(
+        1.5, "a constraint over more than so many times the way of odometry, and a metre, is implausible", ge=1.0
+    )
     max_residual: float = param(
         5.0, "a constraint farther than this from all the others is pruned", "standard deviations", ge=1.0
     )
@@ -39,6 +48,11 @@ class MapperParams(Params):
     def odometry_sigmas(self) -> tuple[float, float]:
         """How odometry wanders in m and rad, after one metre or one radian."""
         return self.odometry_translation_error, float(np.radians(self.odometry_rotation_error))
+
+    @property
+    def least_sigmas(self) -> tuple[float, float]:
+        """The least that a constraint is believed to err, in m and rad."""
+        return self.min_sigma_translation, float(np.radians(self.min_sigma_rotation))
 
     @property
     def steady(self) -> Steady:
@@ -54,6 +68,7 @@ class MapperNodeParams(Params):
     T_base_camera: tuple[float, ...] = param(
         (), "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: the odometry is the camera's"
     )
+    publish_tf: bool = param(True, "whether the correction is broadcast on /tf, where tf2_ros is installed")
     graph_path: str = param("objreg_map.g2o", "where ~/save writes the pose graph")
 
     def __post_init__(self) -> None:

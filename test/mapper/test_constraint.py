@@ -12,6 +12,7 @@ from objreg_ros.mapper.constraint import (
     Constraint,
     between_keyframes,
     compensated,
+    floored,
     inverted,
     local_information,
     open3d_information,
@@ -139,3 +140,11 @@ def test_a_closure_outside_odometry_is_refused_with_the_span() -> None:
     closure = LoopClosure(from_ns=0, to_ns=5, T_from_to=np.eye(4), covariance=np.eye(6), labels=())
     with pytest.raises(ValueError, match="expected a stamp within 5 to 5 ns, got 0 ns"):
         between_keyframes(closure, odometry, 5, 5, np.eye(4))
+
+
+def test_a_claim_is_raised_to_the_floor_in_the_directions_below_it_and_else_left_alone() -> None:
+    honest = np.diag([1e-4] * 3 + [1e-4] * 3)
+    assert floored(honest, (0.005, 0.001)) is honest
+    bold = np.diag([1e-12, 1e-2, 1e-12, 1e-12, 1e-2, 1e-30])
+    raised = np.diag([25e-6, 1e-2, 25e-6, 1e-6, 1e-2, 1e-6])
+    np.testing.assert_allclose(floored(bold, (0.005, 0.001)), raised, atol=1e-15)

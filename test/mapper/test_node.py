@@ -145,8 +145,11 @@ def test_odometry_that_begins_anew_elsewhere_starts_a_new_map(outside: Outside) 
     outside.drive(BENT[:40])
     keyframes = outside.door.extra_diagnostics()["keyframes"]
     away = pose(np.eye(3), np.array([3.0, 0.0, 0.0]))
-    outside.odom.publish(to_msg.odometry(replace(odometry(BENT)[40], T_odom_body=away @ BENT[40])))
-    outside.wait(lambda: outside.door.extra_diagnostics()["keyframes"] == 1)
+    for word in odometry(BENT)[41:44]:
+        outside.odom.publish(to_msg.odometry(replace(word, T_odom_body=away @ word.T_odom_body)))
+    outside.wait(lambda: outside.door.extra_diagnostics()["odometry"] == 43)
+    assert outside.door._graph.odometry.stamps_ns[0] == odometry(BENT)[41].stamp_ns  # none of the new ones is lost
+    assert outside.door._graph.keyframes.stamps_ns[0] == odometry(BENT)[41].stamp_ns
     assert keyframes > 3
 
 
@@ -156,7 +159,9 @@ def test_two_publishers_of_odometry_do_not_fill_the_log(outside: Outside, monkey
     monkeypatch.setattr(outside.door, "get_logger", lambda: log)
     monkeypatch.setattr(outside.door, "throttled", ThrottledLog(log.warning))
     away = pose(np.eye(3), np.array([3.0, 0.0, 0.0]))
-    outside.drive([away @ T if k % 2 else T for k, T in enumerate(BENT[:20])])
+    for word in odometry([away @ T if k % 2 else T for k, T in enumerate(BENT[:20])]):
+        outside.door._hear_odometry(to_msg.odometry(word))
+    assert outside.door.extra_diagnostics()["odometry"] == 10
     assert len(said) == 1 and "more than one publisher" in said[0]
 
 
@@ -195,7 +200,7 @@ def test_what_was_solved_when_a_reset_came_is_of_no_map(outside: Outside, monkey
 def test_a_jump_back_in_time_starts_a_new_map(outside: Outside) -> None:
     outside.drive(BENT[:40])
     keyframes = outside.door.extra_diagnostics()["keyframes"]
-    for again in odometry(BENT)[:2]:
+    for again in odometry(BENT)[:3]:
         outside.odom.publish(to_msg.odometry(again))
     outside.wait(lambda: outside.door.extra_diagnostics()["keyframes"] == 1)
     assert keyframes > 3
@@ -212,7 +217,7 @@ def test_odometry_that_comes_late_is_passed_over_and_counted_and_leaves_the_map(
     outside.wait(lambda: door.extra_diagnostics()["odometry passed over"] == 2)
     assert (door.extra_diagnostics()["keyframes"], door.extra_diagnostics()["odometry"]) == (keyframes, len(BENT))
     np.testing.assert_array_equal(door._graph.T_map_odom, correction)
-    for steps_back in (45, 44):  # seconds: the clock was set back, as the next one follows
+    for steps_back in (45, 44, 43):  # seconds: the clock was set back, as the next two follow
         assert door.extra_diagnostics()["keyframes"] == keyframes
         outside.odom.publish(to_msg.odometry(odometry(BENT)[-steps_back]))
     outside.wait(lambda: door.extra_diagnostics()["keyframes"] == 1)
@@ -228,12 +233,51 @@ def test_one_odometry_with_a_wrong_stamp_leaves_the_map(outside: Outside) -> Non
     assert door.extra_diagnostics()["odometry passed over"] == 2 and door.extra_diagnostics()["keyframes"] > 1
 
 
+def test_one_pose_that_leaps_and_two_stale_ones_leave_the_map(outside: Outside) -> None:
+    door, walk = outside.door, odometry(BENT)
+    outside.drive(BENT[:60])
+    keyframes = door.extra_diagnostics()["keyframes"]
+    away = pose(np.eye(3), np.array([30.0, 0.0, 0.0]))
+    outlier = replace(walk[60], T_odom_body=away @ walk[60].T_odom_body)
+    for word in (outlier, walk[61], walk[5], walk[6], walk[62]):
+        outside.odom.publish(to_msg.odometry(word))
+    outside.wait(lambda: door.extra_diagnostics()["odometry"] == 62)
+    assert door.extra_diagnostics()["odometry passed over"] == 3
+    assert door.extra_diagnostics()["keyframes"] >= keyframes and door._graph.keyframes.stamps_ns[0] == 0
+
+
+def test_a_constraint_that_no_body_can_have_gone_is_dropped_as_implausible(outside: Outside) -> None:
+    outside.drive(BENT)
+    far = [closure(TRUE, 10, 90, pose(np.eye(3), np.array([x, 0.0, 0.0]))) for x in (50.0, 1e9)]
+    outside.send([*ROUND_TRIP, *far])
+    outside.wait(lambda: outside.door.ledger.balance().dropped == {"implausible": 2} and outside.settled())
+    assert outside.door.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP)
+
+
+def test_a_constraint_that_makes_solutions_fail_is_dropped_and_the_map_goes_on(
+    outside: Outside, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    best, poison = Problem._best, closure(TRUE, 10, 90)
+
+    def fail(problem: Problem) -> Solution:
+        if any(tie.closure is not None and tie.closure.to_ns == poison.to_ns for tie in problem.ties):
+            raise RuntimeError("indeterminate")
+        return best(problem)
+
+    monkeypatch.setattr(Problem, "_best", fail)
+    outside.drive(BENT)
+    outside.send([ROUND_TRIP[0], poison, *ROUND_TRIP[1:]])
+    outside.wait(lambda: outside.door.ledger.balance().dropped == {"unsolvable": 1} and outside.settled())
+    assert outside.door.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP)
+    assert outside.door.ledger.balance().published == len(ROUND_TRIP)
+
+
 def test_constraints_that_wait_do_not_outlive_a_jump_back_in_time_or_a_reset(outside: Outside) -> None:
     door, ahead = outside.door, [closure(TRUE, 10, 90), closure(TRUE, 12, 92)]
     outside.drive(BENT[:40])
     outside.send(ahead[:1])
     outside.wait(lambda: door.extra_diagnostics()["constraints without odometry"] == 1)
-    for again in odometry(BENT)[:2]:
+    for again in odometry(BENT)[:3]:
         outside.odom.publish(to_msg.odometry(again))
     outside.wait(lambda: door.ledger.balance().dropped == {"time_jump": 1})
     outside.send(ahead[1:])
@@ -245,7 +289,7 @@ def test_constraints_that_wait_do_not_outlive_a_jump_back_in_time_or_a_reset(out
 
 def test_a_constraint_that_was_found_before_time_jumped_back_is_not_tied_after_it(outside: Outside) -> None:
     outside.drive(BENT[:60])
-    for again in odometry(BENT)[:2]:
+    for again in odometry(BENT)[:3]:
         outside.odom.publish(to_msg.odometry(again))
     outside.wait(lambda: outside.door.extra_diagnostics()["keyframes"] == 1)
     outside.send([closure(TRUE, 5, 58), closure(TRUE, 0, 8)])
@@ -309,3 +353,18 @@ def test_the_correction_is_of_the_frame_that_odometry_is_in(outside: Outside) ->
     broadcaster = outside.door._broadcaster = Broadcaster(outside.door)
     outside.door._hear_odometry(to_msg.odometry(replace(odometry(BENT)[0], frame_id="world")))
     assert [(m.header.frame_id, m.child_frame_id) for m in broadcaster.sent] == [("map", "world")]
+
+
+@pytest.mark.parametrize("publish_tf", [True, False])
+def test_the_correction_is_broadcast_unless_that_is_switched_off(
+    publish_tf: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("objreg_ros.mapper.node.TransformBroadcaster", Broadcaster)
+    rclpy.init(args=["--ros-args", "-p", f"publish_tf:={publish_tf}".lower()], domain_id=100 + os.getpid() % 100)
+    door = MapperNode()
+    try:
+        door._hear_odometry(to_msg.odometry(odometry(BENT)[0]))
+        assert (door._broadcaster is not None) == publish_tf
+    finally:
+        door.close()
+        rclpy.try_shutdown()

@@ -13,7 +13,7 @@ from objreg_ros.data import Array, LoopClosure, Odometry
 from objreg_ros.geometry import interpolate, inverse, pose, pose_error, rotation_from_vector
 from objreg_ros.mapper.optimisation import Solution
 from objreg_ros.mapper.params import MapperParams
-from objreg_ros.mapper.pose_graph import PoseGraph
+from objreg_ros.mapper.pose_graph import PoseGraph, Problem
 from objreg_ros.mapper.sparse import TOLERANCE_DEG, TOLERANCE_M
 from objreg_ros.mapper.steady import Steady
 from objreg_ros.mapper.trajectory import Trajectory
@@ -319,3 +319,22 @@ def test_closures_that_are_a_little_wrong_one_way_are_no_evidence_of_a_steady_er
     plain.optimise()
     wary.optimise()
     assert distances(corrected(wary), corrected(plain)).max() < 1e-9
+
+
+def test_closures_that_make_solutions_fail_are_left_out_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    best, poison = Problem._best, [closure(TRUE, 10, 90), closure(TRUE, 12, 92)]
+    moments = {word.to_ns for word in poison}
+
+    def fail(problem: Problem) -> Solution:
+        solution = best(problem)
+        if moments & {tie.closure.to_ns for tie in problem.ties if tie.closure is not None}:
+            return solution._replace(poses=tuple(np.nan * T for T in solution.poses))
+        return solution
+
+    monkeypatch.setattr(Problem, "_best", fail)
+    clean, dirty = mapped(RIGHT), mapped([RIGHT[0], *poison, *RIGHT[1:]])
+    clean.optimise()
+    summary = dirty.optimise()
+    assert summary.unsolvable == tuple(poison) and len(summary.kept) == len(RIGHT)
+    assert distances(corrected(dirty), corrected(clean)).max() < 1e-9
+    assert dirty.optimise().unsolvable == ()
