@@ -9,9 +9,9 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from objreg_ros.registrar.books import MOST_IDS, Books
+from objreg_ros.registrar.books import MOST_IDS, Books, read_books
 from objreg_ros.registrar.seal import sealed, sealed_keyframe, sealed_object
-from objreg_ros.registrar.store_file import bear, read_only_uri
+from objreg_ros.registrar.store_file import bear, check, read_only_uri
 
 LAST = 4  # the last version without checksums
 SCHEMA = """
@@ -57,6 +57,9 @@ def renewed(path: Path, beside: Path) -> None:
     """Write what the older store at ``path`` says into an empty file. ValueError if it cannot be understood."""
     with closing(sqlite3.connect(beside)) as target:
         renew(path, target)
+        target.row_factory = sqlite3.Row
+        read_books(target)
+    check(beside)
     with closing(sqlite3.connect(path)) as old:  # a log that stays behind would be taken for the new file's
         old.execute("PRAGMA journal_mode = DELETE").fetchall()
 
