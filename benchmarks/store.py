@@ -33,10 +33,13 @@ from frame_cost import frame_costs, table_frames
 from tqdm import tqdm
 
 from objreg_ros.data import Intrinsics, ObjectCloud, View
+from objreg_ros.registrar.books import Books
 from objreg_ros.registrar.descriptor import SIZE
 from objreg_ros.registrar.keyframe import Context, Keyframe, KeyObject
 from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registrar.renewal import insert
 from objreg_ros.registrar.retrieve import Index
+from objreg_ros.registrar.seal import sealed_keyframe, sealed_object
 from objreg_ros.registrar.sighting import Sighting, sightings_of
 from objreg_ros.registrar.store import Store
 
@@ -164,26 +167,29 @@ def _fill(path: Path, objects: int, draw: np.random.Generator, points: int) -> N
         for number in range(1, made + 1):
             keyframe = make_keyframe(number, draw, points)
             store.add(keyframe, [_landmark(s, i) for i, s in enumerate(sightings_of(keyframe))])
-        connection = store._connection
-        names = [row[1] for row in connection.execute("PRAGMA table_info(keyframe)")]
-        changed = {"id": "id + :shift", "stamp_ns": "stamp_ns + :shift * 1000000000"}
-        copies = ", ".join(changed.get(name, name) for name in names)
         for shift in range(made, keyframes, made):
-            with connection as transaction:
-                transaction.execute(
-                    f"INSERT INTO keyframe SELECT {copies} FROM keyframe WHERE id <= {made}", {"shift": shift}
-                )
-                _copy_objects(transaction, shift, made, draw)
+            with store._changing() as (transaction, books):
+                _copy_keyframes(transaction, books, shift, made)
+                _copy_objects(transaction, books, shift, made, draw)
 
 
-def _copy_objects(transaction: Any, shift: int, made: int, draw: np.random.Generator) -> None:
+def _copy_keyframes(transaction: Any, books: Books, shift: int, made: int) -> None:
+    for found in transaction.execute("SELECT * FROM keyframe WHERE id <= ?", (made,)).fetchall():
+        moment = {"id": found["id"] + shift, "stamp_ns": found["stamp_ns"] + shift * 10**9}
+        row = sealed_keyframe({**found, **moment})
+        insert(transaction, "keyframe", row)
+        books.enter("keyframe", row)
+
+
+def _copy_objects(transaction: Any, books: Books, shift: int, made: int, draw: np.random.Generator) -> None:
     rows = [dict(row) for row in transaction.execute("SELECT * FROM object WHERE keyframe <= ?", (made,))]
     for row in rows:
         descriptor = np.frombuffer(row["descriptor"], np.float32) + draw.normal(0, 0.3, SIZE).astype(np.float32)
         landmark = row["landmark"] + shift // VIEWS * PER_KEYFRAME
-        row.update(id=None, keyframe=row["keyframe"] + shift, landmark=landmark, descriptor=descriptor.tobytes())
-    marks = ", ".join(f":{name}" for name in rows[0])
-    transaction.executemany(f"INSERT INTO object VALUES ({marks})", rows)
+        row.update(keyframe=row["keyframe"] + shift, landmark=landmark, descriptor=descriptor.tobytes())
+        copy = sealed_object({**row, "id": books.next("object")})
+        insert(transaction, "object", copy)
+        books.enter("object", copy)
 
 
 def _landmark(sighting: Sighting, number: int) -> Sighting:

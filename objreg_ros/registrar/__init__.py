@@ -7,8 +7,9 @@ The way of a frame, file by file:
 the verb                `registrar`: `track` for every frame, `search` for every keyframe, `process` for both
 frames to keyframes     `keyframes` (when one ends), `tracking` (motion without odometry), `fusion`, `odometry`,
                         `plumb` (gravity as all of them tell it)
-what is remembered      `keyframe`, `sighting`, `landmarks`; in `store` through `codec`, a `store_file` under a `claim`;
-                        seen by `survey`, `export`
+what is remembered      `keyframe`, `sighting`, `landmarks`; in `store` through `codec`, a `store_file` under a `claim`,
+                        each row with its `seal`, counted in the `books`; older ones by `renewal`; seen by `survey`,
+                        `export`
 which to try            `retrieve`, by `likest` objects: `descriptor` and `labels`
 poses from chains       `engine` finishes the `shortlist` of the `hypotheses`, fed by `prepared`: `features` and
                         `consensus` on the context, `scene_search` (`shape`, `silhouette`, `shape_search`, `shape_hull`,

@@ -165,12 +165,21 @@ class RegistrarNode(MatchingDoor):
         if outcome.rejected:
             node, now = self.get_fully_qualified_name(), self.get_clock().now().to_msg()
             self._refusals.publish(refusals(node, now, outcome.rejected))
-        self._counts = dict(self._registrar.counts())
+        forgotten, self._counts = self._counts["forgotten"], dict(self._registrar.counts())
+        if self._counts["forgotten"] > forgotten:
+            self._say_full()
         if outcome.keyframe_ns is not None:
             seen = outcome.observations, outcome.keyframe_ns, outcome.frame_id
             self._landmarks.publish(to_msg.landmarks(*seen, self._names))
             self._scene.settle(outcome.keyframe_ns, outcome.closures, outcome.rejected)
             self._show(outcome.keyframe_ns)
+
+    def _say_full(self) -> None:
+        self.throttled.warn(
+            "forgotten",
+            f"the store is full: it keeps {self._counts['keyframes']} keyframes (max_keyframes), and has forgotten the "
+            f"oldest {self._counts['forgotten']}; places that only they show are not recognised any more",
+        )
 
     def _show(self, stamp_ns: int) -> None:
         objects = [(known.landmark, known.label, known.position) for known in self._registrar.landmarks_here]
@@ -178,11 +187,12 @@ class RegistrarNode(MatchingDoor):
 
     def extra_diagnostics(self) -> Mapping[str, object]:
         """What is stored, accepted and refused by reason, the last refusal of each, and what moved last."""
-        stored = {f"stored {what}": count for what, count in self._counts.items()}
+        stored = {f"stored {what}": count for what, count in self._counts.items() if what != "forgotten"}
         refused = {f"{REJECTED}{reason}": count for reason, count in sorted(self._refused.items())}
         counts = {
             "constraints": self._accepted,
             "stored unsearched": self._unsearched,
+            "forgotten keyframes": self._counts["forgotten"],
             "frames without odometry": self._without_odometry,
         }
         last = {f"last rejected: {reason}": detail for reason, detail in sorted(self._last_refusals.items())}

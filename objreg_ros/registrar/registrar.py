@@ -101,7 +101,10 @@ class Registrar:
             return self._landmarks.recent(self._session, RECENT)
 
     def counts(self) -> dict[str, int]:
-        """How many ``keyframes``, ``objects``, ``landmarks``, ``sessions`` and ``closures`` the store holds."""
+        """How many ``keyframes``, ``objects``, ``landmarks``, ``sessions`` and ``closures`` the store holds.
+
+        And how many keyframes were ``forgotten`` because there were more than ``max_keyframes``.
+        """
         with self._lock:
             return self._store.counts()
 
@@ -277,9 +280,10 @@ class Registrar:
 
     def _forget_surplus(self, named: Sequence[Sighting]) -> None:
         spare = self._landmarks.surplus(sighting.landmark for sighting in named)
-        spare += [k for k in self._store.beyond(self.params.max_keyframes) if k not in spare]
+        beyond = [k for k in self._store.beyond(self.params.max_keyframes) if k not in spare]
+        spare += beyond
         if spare:
-            self._store.remove(spare)
+            self._store.remove(spare, forgotten=len(beyond))
             self._index.remove(spare)
             self._landmarks.forget(spare)
 

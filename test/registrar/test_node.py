@@ -151,6 +151,19 @@ def test_frames_of_two_cameras_are_told_with_what_to_do(make: Making) -> None:
     node.close()
 
 
+def test_a_full_store_says_what_goes(make: Making, monkeypatch: pytest.MonkeyPatch) -> None:
+    node, said = make(), []
+    node.throttled._write = said.append
+    full = {**node._registrar.counts(), "keyframes": 2, "forgotten": 3}
+    monkeypatch.setattr(node._registrar, "counts", lambda: full)
+    for _ in range(2):
+        node._tell(Outcome())
+    (line,) = said
+    assert "keeps 2 keyframes (max_keyframes), and has forgotten the oldest 3" in line
+    assert node.extra_diagnostics()["forgotten keyframes"] == 3
+    node.close()
+
+
 def with_two_to_store(node: RegistrarNode) -> RegistrarNode:
     """The node with a keyframe that waits for its search, and another in hand."""
     node._registrar.track(frame(0, CUP))

@@ -130,7 +130,7 @@ def test_a_search_without_time_refuses_as_over_budget_and_remembers_the_keyframe
 def test_the_oldest_keyframe_goes_when_there_are_too_many() -> None:
     registrar = Registrar(PARAMS.replaced(max_keyframes=2))
     _run(registrar, *(_frame(10 * i, pose, True) for i, pose in enumerate((HERE, AWAY, BESIDE))))
-    assert registrar.counts()["keyframes"] == 2
+    assert (registrar.counts()["keyframes"], registrar.counts()["forgotten"]) == (2, 1)
     closures, _ = _run(registrar, _frame(60, HERE, True))
     assert all(c.from_ns > 0 for c in closures)
 
@@ -292,7 +292,7 @@ def test_a_place_of_before_a_restart_closes_a_loop_where_the_clock_went_on(tmp_p
 
 
 def test_a_surplus_that_cannot_be_forgotten_now_takes_nothing_away(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*_: object) -> None:
+    def refuse(*_: object, **__: object) -> None:
         raise StoreError("the disk is full")
 
     registrar = Registrar(replace(PARAMS, max_keyframes=1))

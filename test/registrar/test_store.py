@@ -21,6 +21,8 @@ import pytest
 from objreg_ros.data import LoopClosure
 from objreg_ros.geometry import rotation_from_vector
 from objreg_ros.registrar import store as store_module
+from objreg_ros.registrar.books import MOST_IDS
+from objreg_ros.registrar.codec import pack
 from objreg_ros.registrar.landmarks import Merge
 from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
@@ -140,7 +142,7 @@ def test_what_the_database_refuses_later_is_a_store_error_too(tmp_path: Path) ->
     store = Store(tmp_path / "place.db")
     number = _add(store)
     store.close()
-    for refused in (store.clear, store.counts, store.next_keyframe, lambda: store.remove([number])):
+    for refused in (store.clear, store.counts, lambda: store.remove([number])):
         with pytest.raises(StoreError, match=r"place\.db: cannot"):
             refused()
 
@@ -379,25 +381,45 @@ def test_a_damaged_blob_is_reported_when_it_is_read(tmp_path: Path) -> None:
 
 
 NAN = np.full(16, np.nan)
-DAMAGED_OBJECTS = {
-    "descriptor": (b"\0" * 40, "descriptor: expected 108 bytes, got 40 bytes"),
-    "position": (NAN[:3].tobytes(), "position, .*: expected finite numbers, got .nan, nan, nan, "),
-    "camera": (b"\0", "camera: expected 24 bytes, got 1 bytes"),
-    "R_landmark_session": (NAN[:9].tobytes(), ".*R_landmark_session: expected finite numbers"),
-    "label": (b"\xff", "label: expected text, got"),
+DAMAGED_OBJECTS: dict[str, object] = {
+    "descriptor": b"\0" * 40,
+    "position": NAN[:3].tobytes(),
+    "camera": b"\0",
+    "label": b"\xff",
+    "score": 0.25,
+    "R_landmark_session": NAN[:9].tobytes(),
+    "landmark": 7,
+    "instance": "one",
+    "density": 2e4,
+    "cloud_crc": 5,
 }
-DAMAGED_KEYFRAMES = {
-    "camera": ('{"f": 1}', "camera: expected fx fy cx cy width height as JSON, got"),
-    "gravity": (NAN[:3].tobytes(), "gravity: expected finite numbers"),
-    "T_odom_camera": (NAN.tobytes(), "T_odom_camera: expected a rigid motion"),
+DAMAGED_KEYFRAMES: dict[str, object] = {
+    "camera": '{"f": 1}',
+    "gravity": NAN[:3].tobytes(),
+    "T_odom_camera": NAN.tobytes(),
+    "turned": 3.0,
+    "frame_id": "other",
+    "gravity_confidence": 0.5,
+    "view": b"\0",
+    "context": b"",
+    "whole": 7,
 }
+DAMAGED_HEADS: dict[str, object] = {"session": 3, "stamp_ns": 5, "travelled": 1.0, "by_odometry": 2, "seal": 1}
+DAMAGED_CLOSURES: dict[str, object] = {
+    "from_ns": 9,
+    "labels": '["cap"]',
+    "T_from_to": NAN.tobytes(),
+    "to_frame_id": "x",
+}
+CLOSURE = LoopClosure(from_ns=1, to_ns=2, T_from_to=np.eye(4), covariance=np.eye(6), labels=("cup",))
 
 
 def _damaged(path: Path, table: str, column: str, value: object) -> bytes:
     """A store with two keyframes, the first of which holds ``value``; what the file holds."""
     store = Store(path)
     for seconds in (0.0, 5.0):
-        _add(store, seconds)
+        written = keyframe(store.next_keyframe(), seconds)
+        store.add(written, sightings_of(written), [CLOSURE])
     with store._connection as transaction:
         transaction.execute(f"UPDATE {table} SET {column} = ? WHERE id = 1", (value,))
     store.close()
@@ -406,23 +428,154 @@ def _damaged(path: Path, table: str, column: str, value: object) -> bytes:
 
 @pytest.mark.parametrize("column", DAMAGED_OBJECTS)
 def test_a_damaged_object_is_named_with_its_file_and_nothing_is_touched(tmp_path: Path, column: str) -> None:
-    path, (value, expected) = tmp_path / "place.db", DAMAGED_OBJECTS[column]
-    before = _damaged(path, "object", column, value)
+    path = tmp_path / "place.db"
+    before = _damaged(path, "object", column, DAMAGED_OBJECTS[column])
+    whose = "one" if column == "instance" else "1"
     for _ in range(2):  # the first is in nobody's way
-        with pytest.raises(StoreError, match=rf"place\.db: .*object 1 of keyframe 1: {expected}.* or another path"):
+        expected = rf"place\.db: .*object '?{whose}'? of keyframe 1: expected the checksum .* or another path"
+        with pytest.raises(StoreError, match=expected):
             Registrar(RegistrarParams(store=str(path)))
     assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["place.db"]
 
 
 @pytest.mark.parametrize("column", DAMAGED_KEYFRAMES)
 def test_a_damaged_keyframe_is_reported_when_it_is_read_and_the_others_are_not(tmp_path: Path, column: str) -> None:
-    path, (value, expected) = tmp_path / "place.db", DAMAGED_KEYFRAMES[column]
-    _damaged(path, "keyframe", column, value)
+    path = tmp_path / "place.db"
+    _damaged(path, "keyframe", column, DAMAGED_KEYFRAMES[column])
     store = Store(path)
-    with pytest.raises(StoreError, match=rf"place\.db: cannot read keyframe 1: {expected}"):
+    with pytest.raises(StoreError, match=r"place\.db: cannot read keyframe 1: .* it is damaged"):
         store.keyframe(1)
     assert store.keyframe(2).labels == ("cup",)
     store.close()
+
+
+@pytest.mark.parametrize("column", DAMAGED_HEADS)
+def test_what_sightings_say_of_a_damaged_keyframe_is_refused_at_the_opening(tmp_path: Path, column: str) -> None:
+    path = tmp_path / "place.db"
+    before = _damaged(path, "keyframe", column, DAMAGED_HEADS[column])
+    with pytest.raises(StoreError, match=r"place\.db: cannot open: .*damaged.* or another path"):
+        Store(path)
+    assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["place.db"]
+
+
+def test_the_points_of_an_object_are_those_that_were_written_with_it(tmp_path: Path) -> None:
+    path = tmp_path / "place.db"
+    _damaged(path, "object", "cloud", pack(*[np.zeros((3, 3), np.float32)] * 2, None, np.zeros(3, np.uint16)))
+    with closing(Store(path)) as store:
+        with pytest.raises(StoreError, match=r"keyframe 1: the points of object 1: .* it is damaged"):
+            store.keyframe(1)
+        assert len(list(store.sightings())) == 2
+
+
+@pytest.mark.parametrize("column", DAMAGED_CLOSURES)
+def test_a_damaged_closure_is_refused_in_one_line(tmp_path: Path, column: str) -> None:
+    path = tmp_path / "place.db"
+    _damaged(path, "closure", column, DAMAGED_CLOSURES[column])
+    with closing(Store(path)) as store, pytest.raises(StoreError, match=r"place\.db: .* closure 1: .* damaged$"):
+        list(store.closures())
+
+
+CHANGES = {
+    "no object": "DELETE FROM object WHERE id = 1",
+    "no closure": "DELETE FROM closure WHERE id = 2",
+    "no keyframe": "DELETE FROM object WHERE keyframe = 1; DELETE FROM keyframe WHERE id = 1",
+    "an object twice": "INSERT INTO object SELECT 9, keyframe, instance, landmark, label, score, extent, sightings,"
+    " density, position, camera, R_landmark_session, descriptor, cloud_crc, seal, cloud FROM object WHERE id = 1",
+    "no books": "DELETE FROM books",
+    "other books": "UPDATE books SET landmark = 0, keyframe = 'many'",
+    "a trigger": "CREATE TRIGGER t AFTER INSERT ON keyframe BEGIN DELETE FROM object; END",
+    "a view": "CREATE VIEW v AS SELECT * FROM keyframe",
+    "a table": "CREATE TABLE t (a)",
+    "a column": "ALTER TABLE closure ADD COLUMN more TEXT",
+    "no index": "DROP INDEX object_of_keyframe",
+    "no version": "PRAGMA user_version = 0",
+}
+
+
+@pytest.mark.parametrize("what", CHANGES)
+def test_what_no_registrar_wrote_is_refused_in_one_line_and_left_untouched(tmp_path: Path, what: str) -> None:
+    path = tmp_path / "place.db"
+    _damaged(path, "keyframe", "id", 1)
+    with closing(sqlite3.connect(path)) as connection:
+        connection.executescript(CHANGES[what])
+    before = path.read_bytes()
+    for read_only in (False, True):
+        with pytest.raises(StoreError, match=r"^[^\n]*place\.db: [^\n]*expected [^\n]* it was left as it is[^\n]*$"):
+            Store(path, read_only=read_only)
+    assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["place.db"]
+
+
+@pytest.mark.parametrize("what", ["keyframe", "landmark", "object", "closure"])
+def test_ids_that_are_used_up_are_a_store_error(what: str) -> None:
+    store = Store()
+    setattr(store._books, what, MOST_IDS[what])
+    written = keyframe(1)
+    with pytest.raises(StoreError, match=f"expected ids of {what}s up to .*: they are used up"):
+        if what in ("keyframe", "landmark"):
+            getattr(store, f"next_{what}")()
+        store.add(written, sightings_of(written), [CLOSURE])
+
+
+def test_the_file_shrinks_by_steps_where_many_keyframes_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store_module, "SPARE", 20)
+    monkeypatch.setattr(store_module, "STEP", 100)
+    path = tmp_path / "place.db"
+    with closing(Store(path)) as store:
+        numbers = [_add(store, float(k)) for k in range(12)]
+        full = path.stat().st_size
+        store.remove(numbers[:10], forgotten=10)
+        assert full - 102 * 4096 <= path.stat().st_size <= full - 98 * 4096
+        for _ in range(20):
+            store.remove([])
+        assert path.stat().st_size < full / 3 and store.counts()["forgotten"] == 10
+        assert [store.keyframe(k).keyframe_id for k in store.keyframe_ids()] == numbers[10:]
+    with closing(Store(path)) as store:
+        assert store.counts()["forgotten"] == 10
+        store.clear()
+        assert path.stat().st_size < full / 6
+
+
+def test_nothing_hangs_on_the_log_alone(tmp_path: Path) -> None:
+    with closing(Store(tmp_path / "place.db")) as store:
+        _add(store)
+        shutil.copy(tmp_path / "place.db", tmp_path / "alone.db")
+    with closing(Store(tmp_path / "alone.db")) as alone:
+        assert alone.keyframe(1).labels == ("cup",)
+
+
+def test_a_second_writer_is_refused_by_a_hard_link_and_beside_whatever_was_deleted(tmp_path: Path) -> None:
+    path, link = tmp_path / "place.db", tmp_path / "elsewhere" / "link.db"
+    store = Store(path)
+    link.parent.mkdir()
+    link.hardlink_to(path)
+    for beside in tmp_path.glob("*.lock"):
+        beside.unlink()
+    for name in (path, link):
+        with pytest.raises(StoreError, match="in use by another registrar"):
+            Store(name)
+    assert _add(store) == 1
+    store.close()
+
+
+@pytest.mark.parametrize("log", [False, True])
+def test_a_flipped_bit_is_harmless_or_one_line(tmp_path: Path, repository: Path, log: bool) -> None:
+    path = tmp_path / "place.db"
+    with closing(Store(path)) as store:
+        for k in range(3):
+            written = keyframe(k + 1, 10.0 * k, (box("cup", (0, 0, 1)), box("book", (0.5, 0, 1), instance=2)))
+            store.add(written, sightings_of(written), [CLOSURE])
+        if log:
+            (tmp_path / "killed").mkdir()
+            for name in ("place.db", "place.db-wal"):
+                shutil.copy(tmp_path / name, tmp_path / "killed" / name)
+            path = tmp_path / "killed" / "place.db"
+    sys.path.append(str(repository / "benchmarks"))
+    try:
+        from store_flips import flip_store
+    finally:
+        sys.path.pop()
+    counts, faults = flip_store(path, 60, tmp_path / "copies", random.randrange(2**32))
+    assert not faults and sum(counts.values()) == 60
 
 
 def test_two_processes_killed_at_any_moment_lose_nothing_acknowledged(tmp_path: Path, repository: Path) -> None:

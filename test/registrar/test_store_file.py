@@ -1,63 +1,47 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The file of a store: what is older is renewed, what is foreign, newer or damaged is left alone."""
+"""The file of a store: what is foreign, newer or damaged is left alone."""
 
 from __future__ import annotations
 
+import os
 import shutil
 import sqlite3
+import subprocess
+import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from objreg_ros.data import LoopClosure
-from objreg_ros.registrar.plumb import DOUBT, ONE_VIEW
 from objreg_ros.registrar.sighting import sightings_of
 from objreg_ros.registrar.store import Store
 from objreg_ros.registrar.store_file import SCHEMA_VERSION, StoreError
 
-from .samples import keyframe, moved
+from .samples import keyframe
+
+DATA = Path(__file__).parent / "data" / "store_v4.db"  # of an older version
+CHILD = """
+import resource, sys
+from objreg_ros.registrar.store import Store
+resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192))
+import signal
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+try:
+    Store(sys.argv[1])
+except OSError as error:
+    print(type(error).__name__, error)
+"""
 
 
-def test_a_store_of_the_first_version_is_read_as_it_is_and_renewed_when_it_is_written(tmp_path: Path) -> None:
-    path = tmp_path / "place.db"
-    store = Store(path)
-    closure = LoopClosure(from_ns=1, to_ns=2, T_from_to=moved(0.3), covariance=np.eye(6), labels=("cup",))
-    written = keyframe(1)
-    store.add(written, sightings_of(written), [closure])
-    store._connection.executescript(
-        "ALTER TABLE closure DROP COLUMN from_frame_id;"
-        "ALTER TABLE closure RENAME COLUMN to_frame_id TO frame_id; DROP TABLE highest; PRAGMA user_version = 1;"
+@pytest.mark.parametrize("old", [False, True])
+def test_a_full_disk_leaves_nothing_half_made(tmp_path: Path, repository: Path, old: bool) -> None:
+    path = Path(shutil.copy(DATA, tmp_path / "place.db")) if old else tmp_path / "place.db"
+    environment = {**os.environ, "PYTHONPATH": str(repository)}
+    said = subprocess.run(
+        [sys.executable, "-c", CHILD, str(path)], env=environment, capture_output=True, text=True, check=True
     )
-    store.close()
-    for read_only in (True, False, True):
-        opened = Store(path, read_only=read_only)
-        (back,) = opened.closures()
-        assert (back.from_frame_id, back.to_frame_id, opened.keyframe(1).labels) == ("camera", "camera", ("cup",))
-        opened.close()
-    with sqlite3.connect(path) as connection:
-        assert connection.execute("PRAGMA user_version").fetchone() == (SCHEMA_VERSION,)
-
-
-def test_gravity_of_the_second_version_is_that_of_one_view(tmp_path: Path) -> None:
-    path, written = tmp_path / "place.db", keyframe(1)
-    store = Store(path)
-    store.add(written, sightings_of(written))
-    store._connection.executescript("DROP TABLE highest; PRAGMA user_version = 2;")
-    store.close()
-    for _ in range(2):  # once and for all
-        opened = Store(path)
-        assert opened.keyframe(1).gravity_confidence == pytest.approx(ONE_VIEW * written.gravity_confidence**DOUBT)
-        opened.close()
-
-
-def test_landmarks_of_the_third_version_keep_their_ids(tmp_path: Path) -> None:
-    path, written = tmp_path / "place.db", keyframe(1)
-    store = Store(path)
-    store.add(written, [sightings_of(written)[0].of_landmark(7, np.eye(3))])
-    store._connection.executescript("DROP TABLE highest; PRAGMA user_version = 3;")
-    store.close()
-    assert Store(path).next_landmark() == 8
+    assert said.stdout.startswith(f"StoreError {path}: cannot open: ") and len(said.stdout.splitlines()) == 1
+    assert [p.name for p in tmp_path.iterdir()] == ([path.name] if old else [])
+    assert not old or path.read_bytes() == DATA.read_bytes()
 
 
 def test_a_place_where_no_store_can_be_made_is_a_store_error(tmp_path: Path) -> None:
