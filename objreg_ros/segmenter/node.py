@@ -17,6 +17,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from std_msgs.msg import String
 
 from objreg_ros.bridge import from_msg, qos, to_msg
+from objreg_ros.bridge.lifetime import await_kernels
 from objreg_ros.bridge.matching import MatchingDoor
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.sync import Match, Need, Stream
@@ -41,7 +42,7 @@ class SegmenterNode(MatchingDoor):
         super().__init__("segmenter", SegmenterParams, SegmenterNodeParams)
         self._inputs = self.settings.of(SegmenterNodeParams)
         self._segmenter = Segmenter(self.settings.of(SegmenterParams))
-        self._segmenter.warm()
+        await_kernels(self._segmenter.warm, self.get_logger().info)
         self._camera_info: Any = None
         self._objects = self.create_publisher(PointCloud2, "objects", qos.room())
         self._view = self.create_publisher(PointCloud2, "view", qos.room())
