@@ -95,10 +95,9 @@ def await_kernels(prepare: Callable[[], object], say: Callable[[str], object], t
             done.set_result(None)
 
     say("loading the kernels; a first start compiles them, which takes minutes on a slow or busy machine")
-    thread, begun = threading.Thread(target=work, name="kernels", daemon=True), time.monotonic()
-    thread.start()
-    told = 1
+    thread, begun, told = threading.Thread(target=work, name="kernels", daemon=True), time.monotonic(), 1
     try:
+        thread.start()
         while not done.done():
             thread.join(LOOK_S)
             lasted_s = time.monotonic() - begun

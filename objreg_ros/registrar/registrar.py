@@ -7,6 +7,8 @@ threads, each in one. `Registrar.process` is both in a row: the same frames alwa
 
 from __future__ import annotations
 
+import os
+import sys
 import threading
 import time
 from collections import deque
@@ -93,6 +95,7 @@ class Registrar:
         self._engine = PaperEngine(params) if params.method == "paper" else Engine(params)
         self._store = Store(params.store)
         self._lock = threading.RLock()
+        self._pools: dict[int, ThreadPoolExecutor] = {}
         try:
             self._start(self._store.next_session())
         except BaseException:  # a damaged store: others may have it
@@ -161,8 +164,7 @@ class Registrar:
             self._session = keyframe.session
             unnamed = self._follow(stretch.clock, keyframe)
             sightings = sightings_of(keyframe)
-            with ThreadPoolExecutor(self.params.threads, "register") as pool:  # as nice as the thread that searches
-                accepted, rejected = self._try_places(keyframe, sightings, _Search(keyframe, pool, budget))
+            accepted, rejected = self._try_places(keyframe, sightings, _Search(keyframe, self._pool(), budget))
             try:
                 closures, named = self._remember(keyframe, sightings, accepted)
             except StoreError:
@@ -195,7 +197,16 @@ class Registrar:
     def close(self) -> None:
         """Let go of the store."""
         with self._lock:
+            for pool in self._pools.values():
+                pool.shutdown()
             self._store.close()
+
+    def _pool(self) -> ThreadPoolExecutor:
+        """The threads that try places for this one: as nice as it is, and kept, since each new one costs memory."""
+        nice = os.getpriority(os.PRIO_PROCESS, threading.get_native_id()) if sys.platform == "linux" else 0
+        if nice not in self._pools:
+            self._pools[nice] = ThreadPoolExecutor(self.params.threads, "register")
+        return self._pools[nice]
 
     def _follow(self, clock: Clock, keyframe: Keyframe) -> tuple[Rejected, ...]:
         """Where the clock began anew, leave out what an earlier run of it saw unless that was over by then.
