@@ -5,7 +5,10 @@ from __future__ import annotations
 
 import re
 import signal
-from collections.abc import Iterator, Sequence
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from contextlib import contextmanager
 
 import rclpy
@@ -16,6 +19,8 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 REFUSED = rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsError
 SOURCE_LINE = re.compile(r",? at /\S+:\d+")  # of rcl's own code, in what it says
 SIGNALS = signal.SIGINT, signal.SIGTERM
+TELL_S = 5.0  # between two lines of a work that goes on
+LOOK_S = 0.1  # a signal is heard by then
 
 
 class FirstSignal:
@@ -68,3 +73,37 @@ def shutdown_as_interrupt() -> Iterator[None]:
         if rclpy.ok():
             raise
         raise KeyboardInterrupt from error
+
+
+class Abandoned(KeyboardInterrupt):
+    """A signal came while a thread was at work that nobody can stop."""
+
+
+def await_kernels(prepare: Callable[[], object], say: Callable[[str], object], tell_s: float = TELL_S) -> None:
+    """Let ``prepare`` load the kernels of a room, or compile them, in a thread of its own; say so, and that it goes on.
+
+    A signal is heard at once: what it interrupts raises `Abandoned`. What ``prepare`` raises is raised.
+    """
+    done: Future[None] = Future()
+
+    def work() -> None:
+        try:
+            prepare()
+        except BaseException as error:
+            done.set_exception(error)
+        else:
+            done.set_result(None)
+
+    say("loading the kernels; a first start compiles them, which takes minutes on a slow or busy machine")
+    thread, begun, told = threading.Thread(target=work, name="kernels", daemon=True), time.monotonic(), 1
+    try:
+        thread.start()
+        while not done.done():
+            thread.join(LOOK_S)
+            lasted_s = time.monotonic() - begun
+            if lasted_s >= told * tell_s and not done.done():
+                say(f"still loading or compiling kernels, for {lasted_s:.0f} s now; Ctrl-C ends this at once")
+                told = int(lasted_s / tell_s) + 1
+    except KeyboardInterrupt as signalled:
+        raise Abandoned from signalled
+    done.result()

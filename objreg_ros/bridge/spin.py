@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import sys
 from collections.abc import Callable, Sequence
 
@@ -12,14 +13,15 @@ from rclpy.executors import SingleThreadedExecutor
 
 from objreg_ros.bridge import profile
 from objreg_ros.bridge.door import Door
-from objreg_ros.bridge.lifetime import FirstSignal, begin, hear_first_signal, shutdown_as_interrupt
+from objreg_ros.bridge.lifetime import Abandoned, FirstSignal, begin, hear_first_signal, shutdown_as_interrupt
 
 
 def run(make: Callable[[], Door], args: Sequence[str] | None = None) -> int:
     """Run one node until SIGINT or SIGTERM; the exit status.
 
     What ROS or the node refuses at start, and what cannot be written at the end (ValueError, OSError), is one line on
-    stderr and status 1. A bug propagates. For the main thread of a process that ends with it: signals stay unheard.
+    stderr and status 1. A bug propagates. A signal while kernels compile ends the process here.
+    For the main thread of a process that ends with it: signals stay unheard.
     """
     first_signal = hear_first_signal()
     transport = profile.apply()
@@ -30,6 +32,9 @@ def run(make: Callable[[], Door], args: Sequence[str] | None = None) -> int:
     try:
         with shutdown_as_interrupt():
             return _serve(make, transport, first_signal)
+    except Abandoned:
+        rclpy.try_shutdown()
+        return _leave()
     except KeyboardInterrupt:  # before there was a node
         return 0
     finally:
@@ -41,6 +46,13 @@ def run(make: Callable[[], Door], args: Sequence[str] | None = None) -> int:
 def _refuse(error: Exception) -> int:
     print(" ".join(str(error).split()), file=sys.stderr)
     return 1
+
+
+def _leave() -> int:
+    """End the process with status 0 and without Python's own end, which waits for every thread that compiles."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(0)
 
 
 def _settle() -> None:

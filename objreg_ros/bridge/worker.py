@@ -6,18 +6,20 @@ from __future__ import annotations
 import os
 import sys
 import threading
+import time
 from collections import deque
-from collections.abc import Callable
-from typing import Generic, TypeVar
+from collections.abc import Callable, Iterable
+from typing import Generic, NamedTuple, TypeVar
 
 Job = TypeVar("Job")
+
+PRESSED_S = 30.0  # after a job was overtaken the next ones do not give way for so long
 
 
 class Worker(Generic[Job]):
     """Runs ``work`` on the newest job. A job that a newer one overtakes goes to ``replaced`` instead.
 
-    What ``work`` raises ends the worker and goes to ``failed``: a bug is not to be survived in silence. ``nice`` is how
-    far the thread, and all that it starts, gives way to others for the processor (0 to 19; where threads have that).
+    What ``work`` raises ends the worker and goes to ``failed``: a bug is not to be survived in silence.
     """
 
     def __init__(
@@ -25,9 +27,8 @@ class Worker(Generic[Job]):
         work: Callable[[Job], None],
         replaced: Callable[[Job], None],
         failed: Callable[[BaseException], None],
-        nice: int = 0,
     ) -> None:
-        self._work, self._replaced, self._failed, self._nice = work, replaced, failed, nice
+        self._work, self._replaced, self._failed = work, replaced, failed
         self._ready = threading.Condition()
         self._next: Job | None = None
         self._open = True
@@ -56,61 +57,168 @@ class Worker(Generic[Job]):
             job, self._next = self._next, None
             return job if self._open else None
 
-    def _give_way(self) -> None:
-        if self._nice and sys.platform == "linux":  # elsewhere niceness is a process's
-            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), self._nice)
-
     def _run(self) -> None:
         try:
-            self._give_way()
             while (job := self._take()) is not None:
                 self._work(job)
         except BaseException as error:
             self._failed(error)
 
 
-class Backlog(Worker[Job]):
-    """Runs ``work`` on the newest job, and before it ``settle`` on each that it overtook, the oldest first."""
+class Limit(NamedTuple):
+    """How many jobs may wait, of how many bytes together, and how many seconds before the work in hand is hurried."""
+
+    jobs: int
+    nbytes: int
+    patience_s: float
+
+
+class _Waiting(NamedTuple, Generic[Job]):
+    job: Job
+    nbytes: int
+    since: float
+
+
+class Backlog(Generic[Job]):
+    """Runs ``work`` on the newest job, and before it ``settle`` on each that it overtook, the oldest first.
+
+    Memory is bounded: who puts a job beyond the ``limit`` waits until there is room, and the work in hand is `hurried`
+    meanwhile. ``nbytes_of`` says how large a job is; one that is larger than the limit waits alone.
+
+    ``nice`` is how far the thread, and all that it starts, gives way to others for the processor (0 to 19; where
+    threads have that). Nobody may take niceness back, and a nice thread never runs on a processor that others fill. So
+    there are two threads, one at a time: the nice one as long as no job is overtaken, the other one from when a job is
+    until none was for `PRESSED_S`.
+
+    What ``work`` or ``settle`` raises closes the backlog and goes to ``failed``.
+    """
 
     def __init__(
         self,
         work: Callable[[Job], None],
         settle: Callable[[Job], None],
         failed: Callable[[BaseException], None],
+        limit: Limit,
+        nbytes_of: Callable[[Job], int],
         nice: int = 0,
     ) -> None:
-        self._waiting: deque[Job] = deque()
-        self._busy = False
-        self._newest, self._settle = work, settle
-        super().__init__(self._by_age, settle, failed, nice)
+        self._work, self._settle, self._failed = work, settle, failed
+        self._limit, self._nbytes_of, self._nice = limit, nbytes_of, nice
+        self._changed = threading.Condition()
+        self._waiting: deque[_Waiting[Job]] = deque()
+        self._nbytes = 0  # of all that wait
+        self._busy, self._open = False, True
+        self._overtaken_at = -PRESSED_S
+        self._pressed = False  # as of the last `put`
+        self._threads = [
+            threading.Thread(target=self._run, args=(pressed,), name="backlog", daemon=True)
+            for pressed in (False, True)
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    def __len__(self) -> int:
+        """How many jobs wait."""
+        return len(self._waiting)
 
     def put(self, job: Job) -> None:
-        """Hand over a job; never waits."""
-        with self._ready:
-            self._waiting.append(job)
-            self._ready.notify_all()
+        """Hand over a job; waits while the limit is reached, unless the backlog is closed."""
+        nbytes = self._nbytes_of(job)
+        with self._changed:
+            self._changed.wait_for(lambda: not self._open or self._has_room(nbytes))
+            now = time.monotonic()
+            if self._waiting:
+                self._overtaken_at = now
+            self._pressed = now - self._overtaken_at < PRESSED_S
+            self._waiting.append(_Waiting(job, nbytes, now))
+            self._nbytes += nbytes
+            self._changed.notify_all()
+
+    def hurried(self) -> bool:
+        """Whether the work in hand is to end soon: it is closed, or jobs are overtaken and the next has waited enough.
+
+        Or there is no room for more. To be asked by ``work``.
+        """
+        with self._changed:
+            if not self._open:
+                return True
+            if not self._pressed or not self._waiting:
+                return False
+            waited_s = time.monotonic() - self._waiting[0].since
+            return waited_s >= self._limit.patience_s or not self._has_room(self._waiting[-1].nbytes)
 
     def rest(self) -> list[Job]:
         """Take back every job that has not begun, the oldest first."""
-        with self._ready:
-            waiting = list(self._waiting)
+        with self._changed:
+            jobs = [waiting.job for waiting in self._waiting]
             self._waiting.clear()
-        return waiting
+            self._nbytes = 0
+            self._changed.notify_all()
+        return jobs
+
+    def give_back(self, jobs: Iterable[Job]) -> None:
+        """What `rest` took, before all that came since; never waits."""
+        now = time.monotonic()
+        with self._changed:
+            back = [_Waiting(job, self._nbytes_of(job), now) for job in jobs]
+            self._waiting.extendleft(reversed(back))
+            self._nbytes += sum(waiting.nbytes for waiting in back)
+            self._changed.notify_all()
 
     def drain(self) -> None:
-        """Wait until every job is done, or the worker is closed."""
-        with self._ready:
-            self._ready.wait_for(lambda: not (self._waiting or self._busy) or not self._open)
+        """Wait until every job is done, or the backlog is closed."""
+        with self._changed:
+            self._changed.wait_for(lambda: not (self._waiting or self._busy) or not self._open)
 
-    def _take(self) -> Job | None:
+    def shut(self) -> None:
+        """Begin no job any more, hurry the one in hand, let nobody wait; does not wait for it."""
+        with self._changed:
+            self._open = False
+            self._changed.notify_all()
+
+    def close(self) -> None:
+        """Finish the job in hand, leave those that wait, end the threads."""
+        self.shut()
+        for thread in self._threads:
+            if thread is not threading.current_thread():
+                thread.join()
+
+    def _has_room(self, nbytes: int) -> bool:
+        if not self._waiting:
+            return True
+        return len(self._waiting) < self._limit.jobs and self._nbytes + nbytes <= self._limit.nbytes
+
+    def _take(self, pressed: bool) -> Job | None:
         """The oldest job; with those behind it still in the queue, so that none is lost whatever this one raises."""
-        with self._ready:
-            self._ready.wait_for(lambda: self._waiting or not self._open)
-            self._busy = self._open
-            return self._waiting.popleft() if self._open else None
+        with self._changed:
+            mine = lambda: self._waiting and not self._busy and self._pressed is pressed  # noqa: E731
+            self._changed.wait_for(lambda: not self._open or mine())
+            if not self._open:
+                return None
+            self._busy = True
+            job, nbytes, _ = self._waiting.popleft()
+            self._nbytes -= nbytes
+            self._changed.notify_all()
+            return job
 
-    def _by_age(self, job: Job) -> None:
-        (self._settle if self._waiting else self._newest)(job)
-        with self._ready:
+    def _run(self, pressed: bool) -> None:
+        try:
+            if not pressed:
+                give_way(self._nice)
+            while (job := self._take(pressed)) is not None:
+                (self._settle if self._waiting else self._work)(job)
+                self._finish()
+        except BaseException as error:
+            self.shut()
+            self._failed(error)
+
+    def _finish(self) -> None:
+        with self._changed:
             self._busy = False
-            self._ready.notify_all()
+            self._changed.notify_all()
+
+
+def give_way(nice: int) -> None:
+    """Let this thread, and all that it starts from now on, give way to others (0 to 19; where threads have that)."""
+    if nice and sys.platform == "linux":  # elsewhere niceness is a process's
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), nice)

@@ -54,11 +54,23 @@ class Stretch:
     travelled: float = 0.0
     turned: float = 0.0
 
+    @property
+    def nbytes(self) -> int:
+        """The memory of its frames: their views and clouds."""
+        return sum(map(_nbytes, self.frames))
+
     @classmethod
     def of(cls, frame: Frame) -> Stretch:
         """One frame by itself."""
         still = np.eye(4)
         return cls(frames=(alone(frame),), T_first_frame=(still,), T_session_first=still, session=0)
+
+
+def _nbytes(frame: Frame) -> int:
+    clouds = frame.objects if frame.support is None else (*frame.objects, frame.support)
+    arrays = [frame.view.xyz, frame.view.grey]
+    arrays += [array for cloud in clouds for array in (cloud.xyz, cloud.normals, cloud.rgb, cloud.flags)]
+    return sum(array.nbytes for array in arrays if array is not None)
 
 
 def alone(frame: Frame) -> Frame:

@@ -6,10 +6,11 @@ from __future__ import annotations
 
 import sys
 import threading
+import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from typing import Any
+from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TransformStamped, Vector3Stamped
@@ -22,11 +23,12 @@ from visualization_msgs.msg import MarkerArray
 from objreg_ros.bridge import from_msg, qos, to_msg
 from objreg_ros.bridge.diagnostics import REJECTED, refusals
 from objreg_ros.bridge.door import DroppedError
+from objreg_ros.bridge.lifetime import await_kernels
 from objreg_ros.bridge.markers import Scene
 from objreg_ros.bridge.matching import MatchingDoor
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.sync import Match, Need, Stream
-from objreg_ros.bridge.worker import Backlog
+from objreg_ros.bridge.worker import Backlog, Limit
 from objreg_ros.data import Frame
 from objreg_ros.registrar.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.registrar.registrar import Outcome, Registrar, Stretch
@@ -35,18 +37,27 @@ from objreg_ros.registrar.warm import warm
 GIVING_WAY = 10  # niceness of the search: the next image must not wait for it
 
 
+class Job(NamedTuple):
+    """A keyframe that waits for its search, and since when, by `time.monotonic`."""
+
+    stamp_ns: int
+    stretch: Stretch
+    since: float
+
+
 class RegistrarNode(MatchingDoor):
     """Follows every frame; searches, in a second worker, for the places that a keyframe shows again.
 
     A frame that completes a keyframe is in the books until its search is over. A keyframe that a newer one overtakes is
-    stored without a search: nothing that was seen is lost.
+    stored without a search: nothing that was seen is lost. A search that newer ones wait for is cut short, and no frame
+    is followed while too many wait.
     """
 
     def __init__(self) -> None:
         super().__init__("registrar", RegistrarParams, RegistrarNodeParams)
         inputs = self.settings.of(RegistrarNodeParams)
         self._T_base_camera, self._seconds = inputs.mounting, inputs.limit
-        warm(self.settings.of(RegistrarParams))
+        await_kernels(lambda: warm(self.settings.of(RegistrarParams)), self.get_logger().info)
         self._registrar = Registrar(self.settings.of(RegistrarParams))
         self._tracking, self._telling = threading.Lock(), threading.Lock()
         self._enabled = True
@@ -58,7 +69,10 @@ class RegistrarNode(MatchingDoor):
         self._last_moved: dict[str, float] = {}  # m by label, of the last closure that found any
         self._names: Mapping[int, str] = {}
         self._scene, self._odom_frame = Scene(), "odom"
-        self.searcher: Backlog[tuple[int, Stretch]] = Backlog(self._search, self._keep, self.fail, GIVING_WAY)
+        limit = Limit(inputs.waiting_keyframes, inputs.waiting_megabytes * 1_000_000, inputs.patience)
+        self.searcher: Backlog[Job] = Backlog(
+            self._search, self._keep, self.fail, limit, lambda job: job.stretch.nbytes, GIVING_WAY
+        )
         self._announce()
         self._serve()
         self._listen(round(inputs.odom_slop * 1e9))
@@ -111,10 +125,11 @@ class RegistrarNode(MatchingDoor):
         frame = self._frame(payload)
         self._watch_camera(frame.frame_id)
         self._scene.see(frame)
-        with self._tracking, self.ledger.timed("track"):
-            stretch = self._registrar.track(frame)
-        if stretch is not None:
-            self.searcher.put((stamp_ns, stretch))
+        with self._tracking:  # until it waits: none that a service ends comes before it
+            with self.ledger.timed("track"):
+                stretch = self._registrar.track(frame)
+            if stretch is not None:
+                self.searcher.put(Job(stamp_ns, stretch, time.monotonic()))
         return stretch is None
 
     def _frame(self, match: Match) -> Frame:
@@ -135,17 +150,19 @@ class RegistrarNode(MatchingDoor):
             )
         self._camera = frame_id
 
-    def _search(self, job: tuple[int, Stretch]) -> None:
-        self.conclude(job[0], lambda: self._find(job[1], "search", self._seconds))
+    def _search(self, job: Job) -> None:
+        self.ledger.spend("wait", time.monotonic() - job.since)
+        self.conclude(job.stamp_ns, lambda: self._find(job.stretch, "search", self._seconds))
 
-    def _keep(self, job: tuple[int, Stretch]) -> None:
+    def _keep(self, job: Job) -> None:
         """Store a keyframe without a search: a newer one waits."""
         self._unsearched += 1
-        self.conclude(job[0], lambda: self._find(job[1], "keep", 0.0))
+        self.throttled.warn("unsearched", "a keyframe was stored without a search: a newer one came before its turn")
+        self.conclude(job.stamp_ns, lambda: self._find(job.stretch, "keep", 0.0))
 
     def _find(self, stretch: Stretch, stage: str, seconds: float) -> bool:
         with self.ledger.timed(stage):
-            outcome = self._registrar.search(stretch, seconds)
+            outcome = self._registrar.search(stretch, seconds, self.searcher.hurried)
         self._publish(outcome)
         return True
 
@@ -193,6 +210,7 @@ class RegistrarNode(MatchingDoor):
             "constraints": self._accepted,
             "stored unsearched": self._unsearched,
             "forgotten keyframes": self._counts["forgotten"],
+            "waiting keyframes": len(self.searcher),
             "frames without odometry": self._without_odometry,
         }
         last = {f"last rejected: {reason}": detail for reason, detail in sorted(self._last_refusals.items())}
@@ -214,11 +232,10 @@ class RegistrarNode(MatchingDoor):
                 self._registrar.reset()
                 self._counts = dict(self._registrar.counts())
             except OSError as error:
-                for job in waiting:
-                    self.searcher.put(job)
+                self.searcher.give_back(waiting)
                 return False, str(error)
-        for stamp_ns, _ in waiting:
-            self.drop(stamp_ns, "reset")
+        for job in waiting:
+            self.drop(job.stamp_ns, "reset")
         with self._telling:
             self._scene.clear()
         return True, "forgot every keyframe"
@@ -238,7 +255,7 @@ class RegistrarNode(MatchingDoor):
                 self.searcher.drain()
                 stretch = self._registrar.end()
                 if stretch is not None:
-                    self._publish(self._registrar.search(stretch, self._seconds))
+                    self._publish(self._registrar.search(stretch, self._seconds, self.searcher.hurried))
             return True, self._registrar.save()
         except (ValueError, OSError) as error:
             return False, str(error)
@@ -249,7 +266,8 @@ class RegistrarNode(MatchingDoor):
         return response
 
     def close(self) -> None:
-        """End both workers, store what they had not come to, let go of the store."""
+        """End both workers, the search in hand early, store what they had not come to, let go of the store."""
+        self.searcher.shut()
         self.end_aside()
         self.worker.close()
         self.searcher.close()
@@ -261,7 +279,7 @@ class RegistrarNode(MatchingDoor):
     def _store_the_rest(self) -> None:
         """Store the keyframes that were not searched for; of those that cannot be the log says how many and why."""
         lost: list[str] = []
-        for stretch in (*(job[1] for job in self.searcher.rest()), self._registrar.end()):
+        for stretch in (*(job.stretch for job in self.searcher.rest()), self._registrar.end()):
             if stretch is not None:
                 try:
                     self._registrar.search(stretch, 0.0)

@@ -416,6 +416,16 @@ class RegistrarNodeParams(Params):
         (), "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: the odometry is the camera's"
     )
     search_seconds: float = param(0.0, "longest search for one keyframe; 0: as long as it takes", "s", ge=0.0)
+    patience: float = param(
+        1.0,
+        "how long a newer keyframe waits before the search in hand is cut short, where some were overtaken of late",
+        "s",
+        ge=0.0,
+    )
+    waiting_keyframes: int = param(
+        8, "most keyframes that wait for a search; no frame is followed while so many do", ge=1
+    )
+    waiting_megabytes: int = param(200, "most memory of the keyframes that wait for a search", "MB", ge=1)
 
     def __post_init__(self) -> None:
         super().__post_init__()

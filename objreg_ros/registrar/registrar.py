@@ -7,6 +7,8 @@ threads, each in one. `Registrar.process` is both in a row: the same frames alwa
 
 from __future__ import annotations
 
+import os
+import sys
 import threading
 import time
 from collections import deque
@@ -14,6 +16,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -58,6 +61,28 @@ class _Accepted:
     candidate: Candidate
 
 
+class _Budget(NamedTuple):
+    """Until when new places are tried: a time of `time.monotonic`, or until ``hurried`` says so."""
+
+    deadline: float
+    hurried: Callable[[], bool]
+
+    def over(self) -> str:
+        """Why no more place is tried; empty while there is time."""
+        late = time.monotonic() - self.deadline
+        if late > 0:
+            return f"{1e3 * late:.0f} ms after the end of the search"
+        return "cut short: newer keyframes wait, or the node ends" if self.hurried() else ""
+
+
+class _Search(NamedTuple):
+    """The keyframe that places are sought for, the threads that try them, and how long."""
+
+    keyframe: Keyframe
+    pool: ThreadPoolExecutor
+    budget: _Budget
+
+
 _Try = tuple[Place, Callable[[], _Accepted | Rejected] | None]
 """A place that is being tried, and what waits for its verdict."""
 
@@ -70,7 +95,7 @@ class Registrar:
         self._engine = PaperEngine(params) if params.method == "paper" else Engine(params)
         self._store = Store(params.store)
         self._lock = threading.RLock()
-        self._pool = ThreadPoolExecutor(params.threads, "register")
+        self._pools: dict[int, ThreadPoolExecutor] = {}
         try:
             self._start(self._store.next_session())
         except BaseException:  # a damaged store: others may have it
@@ -126,14 +151,15 @@ class Registrar:
         """Follow the camera; returns the stretch of frames that became a keyframe with this one, mostly None."""
         return self._keyframer.add(frame)
 
-    def search(self, stretch: Stretch, seconds: float = np.inf) -> Outcome:
+    def search(self, stretch: Stretch, seconds: float = np.inf, hurried: Callable[[], bool] = lambda: False) -> Outcome:
         """Make a keyframe of the stretch, look for places that it shows again, and remember it.
 
-        The likeliest places come first; those that are not reached within ``seconds`` are refused as over budget: with
-        none the keyframe is only stored. Without a limit the outcome depends on the frames alone. StoreError where it
-        cannot be stored; then it closes nothing. Of a stretch that a `reset` overtook nothing comes.
+        The likeliest places come first; those that are not begun within ``seconds``, or before ``hurried``, are refused
+        as over budget: with no time the keyframe is only stored. Without a limit the outcome depends on the frames
+        alone. Keyframes are numbered as they come here: in the order of their frames. StoreError where one cannot be
+        stored; then it closes nothing. Of a stretch that a `reset` overtook nothing comes.
         """
-        deadline = time.monotonic() + seconds
+        budget = _Budget(time.monotonic() + seconds, hurried)
         with self._lock:
             if stretch.session < self._first_session:  # `reset` came first
                 return Outcome()
@@ -141,7 +167,7 @@ class Registrar:
             self._session = keyframe.session
             unnamed = self._follow(stretch.clock, keyframe)
             sightings = sightings_of(keyframe)
-            accepted, rejected = self._try_places(keyframe, sightings, deadline)
+            accepted, rejected = self._try_places(keyframe, sightings, _Search(keyframe, self._pool(), budget))
             try:
                 closures, named = self._remember(keyframe, sightings, accepted)
             except StoreError:
@@ -174,8 +200,16 @@ class Registrar:
     def close(self) -> None:
         """Let go of the store."""
         with self._lock:
-            self._pool.shutdown()
+            for pool in self._pools.values():
+                pool.shutdown()
             self._store.close()
+
+    def _pool(self) -> ThreadPoolExecutor:
+        """The threads that try places for this one: as nice as it is, and kept, since each new one costs memory."""
+        nice = os.getpriority(os.PRIO_PROCESS, threading.get_native_id()) if sys.platform == "linux" else 0
+        if nice not in self._pools:
+            self._pools[nice] = ThreadPoolExecutor(self.params.threads, "register")
+        return self._pools[nice]
 
     def _follow(self, clock: Clock, keyframe: Keyframe) -> tuple[Rejected, ...]:
         """Where the clock began anew, leave out what an earlier run of it saw unless that was over by then.
@@ -191,7 +225,7 @@ class Registrar:
         return () if last < 0 else (_rejected(keyframe.stamp_ns, keyframe, refusal),)
 
     def _try_places(
-        self, keyframe: Keyframe, sightings: Sequence[Sighting], deadline: float
+        self, keyframe: Keyframe, sightings: Sequence[Sighting], search: _Search
     ) -> tuple[list[_Accepted], tuple[Rejected, ...]]:
         """Try the stored keyframes that may show the same place, the likeliest first."""
         accepted: list[_Accepted] = []
@@ -202,7 +236,7 @@ class Registrar:
             rejected.append(_rejected(keyframe.stamp_ns, keyframe, refusal))
         tries, trying = self.params.candidates, deque[_Try]()
         while len(accepted) < self.params.closures:
-            self._begin(keyframe, places, trying, tries, self.params.closures - len(accepted), deadline)
+            self._begin(search, places, trying, tries, self.params.closures - len(accepted))
             if not trying:
                 break
             place, ask = trying.popleft()
@@ -219,9 +253,7 @@ class Registrar:
                 rejected.append(verdict)
         return accepted, tuple(rejected)
 
-    def _begin(
-        self, keyframe: Keyframe, places: deque[Place], trying: deque[_Try], tries: int, wanted: int, deadline: float
-    ) -> None:
+    def _begin(self, search: _Search, places: deque[Place], trying: deque[_Try], tries: int, wanted: int) -> None:
         """Begin to try the next places: as many at once as there are threads, and never more than ``tries``.
 
         While some are being tried, no more than would be ``wanted`` if all of them were accepted. What would say what
@@ -232,15 +264,15 @@ class Registrar:
         most = min(tries, self.params.threads if busy == 0 else min(wanted, self.params.threads))
         while places and busy < most:
             place = places.popleft()
-            redundant = self._thinning.redundant(place.stamp_ns, keyframe.stamp_ns)
-            trying.append((place, None if redundant else self._try_place(keyframe, place, deadline)))
+            redundant = self._thinning.redundant(place.stamp_ns, search.keyframe.stamp_ns)
+            trying.append((place, None if redundant else self._try_place(search, place)))
             busy += not redundant
 
-    def _try_place(self, keyframe: Keyframe, place: Place, deadline: float) -> Callable[[], _Accepted | Rejected]:
+    def _try_place(self, search: _Search, place: Place) -> Callable[[], _Accepted | Rejected]:
         """Begin to register a place in a thread of its own; what comes back waits for the verdict."""
-        late = time.monotonic() - deadline
-        if late > 0:
-            refusal = Reason.OVER_BUDGET, f"{1e3 * late:.0f} ms after the end of the search"
+        keyframe, over = search.keyframe, search.budget.over()
+        if over:
+            refusal = Reason.OVER_BUDGET, over
             return lambda: _rejected(place.stamp_ns, keyframe, refusal)
         try:
             target = self._store.keyframe(place.keyframe_id)
@@ -250,7 +282,7 @@ class Registrar:
         self._engine.prepare(keyframe)
         prior = expect(keyframe, target, self.params)
         start = prior.T_target_source if prior is not None and prior.tight(self.params) else None
-        proposed = self._pool.submit(self._engine.propose, keyframe, target, start)
+        proposed = search.pool.submit(self._engine.propose, keyframe, target, start)
 
         def verdict() -> _Accepted | Rejected:
             answer = judge(proposed.result(), self.params, prior)

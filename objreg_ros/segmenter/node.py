@@ -17,6 +17,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from std_msgs.msg import String
 
 from objreg_ros.bridge import from_msg, qos, to_msg
+from objreg_ros.bridge.lifetime import await_kernels
 from objreg_ros.bridge.matching import MatchingDoor
 from objreg_ros.bridge.overridable import FIXED
 from objreg_ros.bridge.spin import run
@@ -42,7 +43,7 @@ class SegmenterNode(MatchingDoor):
         super().__init__("segmenter", SegmenterParams, SegmenterNodeParams)
         self._inputs = self.settings.of(SegmenterNodeParams)
         self._segmenter = Segmenter(self.settings.of(SegmenterParams))
-        self._segmenter.warm()
+        await_kernels(self._segmenter.warm, self.get_logger().info)
         self._camera_info: Any = None
         self._source: str | None = None  # the topic that depth comes by
         self._objects = self.create_publisher(PointCloud2, "objects", qos.room())

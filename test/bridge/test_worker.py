@@ -8,9 +8,10 @@ from collections.abc import Callable
 
 import pytest
 
-from objreg_ros.bridge.worker import Backlog, Worker
+from objreg_ros.bridge.worker import Backlog, Limit, Worker, give_way
 
 PATIENCE = 10.0  # seconds; a test that gets there has failed
+ROOMY = Limit(jobs=100, nbytes=10**9, patience_s=100.0)
 
 
 class Bench:
@@ -86,7 +87,7 @@ def test_closing_leaves_the_job_that_waits_undone() -> None:
 class Overtaken:
     """A backlog that holds its first job until ``go``, while 2, 3 and 4 overtake each other behind it."""
 
-    def __init__(self, settle: Callable[[int], object] | None = None) -> None:
+    def __init__(self, settle: Callable[[int], object] | None = None, limit: Limit = ROOMY) -> None:
         self.go, self.over = threading.Event(), threading.Event()
         self.done: list[tuple[str, int]] = []
         begun = threading.Event()
@@ -99,7 +100,7 @@ class Overtaken:
                 self.over.set()
 
         noted: Callable[[int], object] = lambda job: self.done.append(("settle", job))  # noqa: E731
-        self.backlog: Backlog[int] = Backlog(work, settle or noted, lambda error: self.over.set())
+        self.backlog: Backlog[int] = Backlog(work, settle or noted, lambda error: self.over.set(), limit, lambda job: 1)
         self.backlog.put(1)
         assert begun.wait(PATIENCE)
         for job in (2, 3, 4):
@@ -145,24 +146,119 @@ def test_a_backlog_that_breaks_off_gives_back_all_that_it_did_not_begin() -> Non
     assert held.backlog.rest() == [3, 4]
 
 
+def test_what_was_taken_back_and_is_given_back_comes_before_what_came_since() -> None:
+    held = Overtaken()
+    taken = held.backlog.rest()
+    held.backlog.put(5)
+    held.backlog.give_back(taken)
+    assert len(held.backlog) == 4 and held.backlog.rest() == [2, 3, 4, 5]
+    held.go.set()
+    held.backlog.close()
+
+
+@pytest.mark.parametrize("limit", [Limit(3, 10**9, 100.0), Limit(100, 3, 100.0)], ids=["by count", "by bytes"])
+def test_who_puts_a_job_beyond_the_limit_waits_until_there_is_room(limit: Limit) -> None:
+    held, put = Overtaken(limit=limit), threading.Event()
+    assert held.backlog.hurried()  # it is full
+    putting = threading.Thread(target=lambda: (held.backlog.put(5), put.set()))
+    putting.start()
+    assert not put.wait(0.1) and len(held.backlog) == 3
+    held.go.set()
+    assert put.wait(PATIENCE)
+    held.backlog.drain()
+    held.backlog.close()
+    assert [job for _, job in held.done] == [1, 2, 3, 4, 5]
+
+
+def test_a_job_that_is_larger_than_the_limit_waits_alone() -> None:
+    done: list[str] = []
+    backlog: Backlog[str] = Backlog(done.append, done.append, print, Limit(10, 2, 100.0), len)
+    for job in ("large", "larger"):
+        backlog.put(job)
+    backlog.drain()
+    backlog.close()
+    assert done == ["large", "larger"]
+
+
+def test_nobody_waits_for_room_in_a_backlog_that_is_shut() -> None:
+    held = Overtaken(limit=Limit(3, 10**9, 100.0))
+    putting = threading.Thread(target=held.backlog.put, args=(5,))
+    putting.start()
+    held.backlog.shut()
+    putting.join(PATIENCE)
+    assert not putting.is_alive() and held.backlog.hurried() and held.backlog.rest() == [2, 3, 4, 5]
+    held.go.set()
+    held.backlog.close()
+    assert held.done == [("work", 1)]
+
+
+def test_work_is_hurried_when_what_was_overtaken_has_waited_enough() -> None:
+    for patience_s, is_hurried in ((100.0, False), (0.0, True)):
+        held = Overtaken(limit=ROOMY._replace(patience_s=patience_s))
+        assert held.backlog.hurried() is is_hurried
+        held.go.set()
+        held.backlog.close()
+
+
+def test_work_is_not_hurried_by_one_job_that_overtook_none() -> None:
+    """As in a lossless replay, whose outcome depends on no time."""
+    begun, go, asked = threading.Event(), threading.Event(), list[bool]()
+
+    def work(job: int) -> None:
+        begun.set()
+        assert go.wait(PATIENCE)
+        asked.append(backlog.hurried())
+
+    backlog: Backlog[int] = Backlog(work, work, print, Limit(1, 1, 0.0), lambda job: 1)
+    backlog.put(1)
+    assert begun.wait(PATIENCE)
+    backlog.put(2)
+    go.set()
+    backlog.drain()
+    backlog.close()
+    assert asked == [False, False]
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="threads have no niceness of their own")
-def test_a_nice_worker_and_the_threads_that_it_starts_give_way() -> None:
+def test_once_a_job_was_overtaken_the_next_ones_do_not_give_way() -> None:
+    seen: list[tuple[int, int]] = []
+    begun, go = threading.Event(), threading.Event()
+
+    def work(job: int) -> None:
+        seen.append((job, os.getpriority(os.PRIO_PROCESS, threading.get_native_id())))
+        begun.set()
+        assert go.wait(PATIENCE)
+
+    backlog: Backlog[int] = Backlog(work, work, print, ROOMY, lambda job: 1, nice=19)
+    backlog.put(1)
+    assert begun.wait(PATIENCE)
+    backlog.put(2)
+    backlog.put(3)
+    go.set()
+    backlog.drain()
+    backlog.put(4)  # a moment later: still pressed
+    backlog.drain()
+    backlog.close()
+    plain = os.getpriority(os.PRIO_PROCESS, threading.get_native_id())
+    assert seen == [(1, 19), (2, plain), (3, plain), (4, plain)] and plain < 19
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="threads have no niceness of their own")
+def test_a_thread_that_gives_way_and_those_that_it_starts_are_nice() -> None:
     seen: list[int] = []
-    done = threading.Event()
 
     def note() -> None:
         seen.append(os.getpriority(os.PRIO_PROCESS, threading.get_native_id()))
 
-    def work(_: str) -> None:
+    def work() -> None:
+        give_way(19)
         note()
         helper = threading.Thread(target=note)
         helper.start()
         helper.join()
-        done.set()
 
-    worker = Worker(work, lambda _: None, lambda _: None, nice=19)
-    worker.put("job")
-    assert done.wait(PATIENCE)
-    worker.close()
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
     assert seen == [19, 19]
     assert os.getpriority(os.PRIO_PROCESS, threading.get_native_id()) < 19

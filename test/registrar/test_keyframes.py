@@ -196,3 +196,13 @@ def test_gravity_turns_with_the_camera() -> None:
             T = stretch.T_session_first @ T_first_frame
             assert item.gravity is not None
             np.testing.assert_allclose(item.gravity, inverse(T)[:3, :3] @ [0.0, 1.0, 0.0], atol=1e-9)
+
+
+def test_a_stretch_tells_how_much_memory_its_frames_hold() -> None:
+    seen = frame(0.0, CUP)
+    assert seen.view.grey is not None
+    (cup,) = CUP
+    of_cup = cup.xyz.nbytes + cup.normals.nbytes + cup.flags.nbytes + (0 if cup.rgb is None else cup.rgb.nbytes)
+    one = seen.view.xyz.nbytes + seen.view.grey.nbytes + of_cup
+    assert Stretch.of(seen).nbytes == one
+    assert Stretch.of(replace(seen, support=cup)).nbytes == one + of_cup

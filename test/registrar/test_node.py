@@ -21,7 +21,7 @@ from std_srvs.srv import Trigger
 from objreg_ros.bridge.diagnostics import refusal_of
 from objreg_ros.data import Reason, Rejected
 from objreg_ros.registrar.keyframes import Stretch
-from objreg_ros.registrar.node import RegistrarNode
+from objreg_ros.registrar.node import Job, RegistrarNode
 from objreg_ros.registrar.registrar import Outcome
 from objreg_ros.registrar.store import Store
 
@@ -123,10 +123,10 @@ def test_the_keyframe_that_a_save_ends_comes_after_those_that_wait(
     node, stored = make(), []
     search = node._registrar.search
 
-    def slow(stretch: Stretch, seconds: float) -> Outcome:
+    def slow(stretch: Stretch, seconds: float, hurried: Callable[[], bool]) -> Outcome:
         time.sleep(0.2)
         stored.append(stretch.frames[0].stamp_ns // SECOND)
-        return search(stretch, seconds)
+        return search(stretch, seconds, hurried)
 
     monkeypatch.setattr(node._registrar, "search", slow)
     for seconds in (0, 10):
@@ -134,7 +134,7 @@ def test_the_keyframe_that_a_save_ends_comes_after_those_that_wait(
         stretch = node._registrar.end()
         assert stretch is not None
         node.accept(seconds * SECOND)
-        node.searcher.put((seconds * SECOND, stretch))
+        node.searcher.put(Job(seconds * SECOND, stretch, time.monotonic()))
     node._registrar.track(frame(20, CUP))
     answer, _ = call(node, "save")
     assert answer.success and stored == [0, 10, 20]
@@ -170,7 +170,7 @@ def with_two_to_store(node: RegistrarNode) -> RegistrarNode:
     waiting = node._registrar.end()
     assert waiting is not None
     node.searcher.close()
-    node.searcher.put((0, waiting))
+    node.searcher.put(Job(0, waiting, time.monotonic()))
     node._registrar.track(frame(30, CUP))
     return node
 
@@ -206,4 +206,67 @@ def test_a_keyframe_that_cannot_be_stored_is_not_in_the_way_of_the_next(
     node.close()
     stored = Store(tmp_path / "place.db", read_only=True)
     assert [stored.keyframe(k).stamp_ns for k in stored.keyframe_ids()] == [30_000_000_000]
+    stored.close()
+
+
+def stretch_at(node: RegistrarNode, seconds: int) -> Stretch:
+    node._registrar.track(frame(seconds, CUP))
+    stretch = node._registrar.end()
+    assert stretch is not None
+    node.accept(seconds * SECOND)
+    return stretch
+
+
+def test_keyframes_that_wait_behind_a_long_search_are_bounded_and_stored_in_the_order_of_their_stamps(
+    make: Making, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node, said = make(), list[str]()
+    node.throttled._write = said.append
+    waiting, begun = list[int](), threading.Event()
+    try_places = node._registrar._try_places
+
+    def try_for_long(*arguments: Any) -> Any:
+        begun.set()
+        search = arguments[2]
+        while search.budget.deadline > time.monotonic() and not search.budget.hurried():
+            time.sleep(0.005)
+        return try_places(*arguments)
+
+    monkeypatch.setattr(node._registrar, "_try_places", try_for_long)
+    for k in range(30):
+        node.searcher.put(Job(10 * k * SECOND, stretch_at(node, 10 * k), time.monotonic()))
+        waiting.append(len(node.searcher))
+        assert begun.wait(10.0)
+    node.close()
+    stored = Store(tmp_path / "place.db", read_only=True)
+    assert [stored.keyframe(k).stamp_ns for k in stored.keyframe_ids()] == [10 * k * SECOND for k in range(30)]
+    stored.close()
+    assert max(waiting) <= 8 and node._unsearched > 0
+    assert any("stored without a search" in line for line in said)
+
+
+def test_a_node_ends_at_once_in_the_middle_of_a_search_and_stores_everything(
+    make: Making, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node, begun, hurried = make(), threading.Event(), list[bool]()
+    search = node._registrar.search
+
+    def search_for_ever(stretch: Stretch, seconds: float, hurry: Callable[[], bool] = lambda: False) -> Outcome:
+        begun.set()
+        deadline = time.monotonic() + 20.0
+        while seconds and not hurry() and time.monotonic() < deadline:
+            time.sleep(0.005)
+        hurried.append(hurry())
+        return search(stretch, seconds, hurry)
+
+    monkeypatch.setattr(node._registrar, "search", search_for_ever)
+    node.searcher.put(Job(0, stretch_at(node, 0), time.monotonic()))
+    assert begun.wait(10.0)
+    for k in (10, 20):
+        node.searcher.put(Job(k * SECOND, stretch_at(node, k), time.monotonic()))
+    node._registrar.track(frame(30, CUP))
+    node.close()
+    assert hurried[0]
+    stored = Store(tmp_path / "place.db", read_only=True)
+    assert [stored.keyframe(k).stamp_ns // SECOND for k in stored.keyframe_ids()] == [0, 10, 20, 30]
     stored.close()

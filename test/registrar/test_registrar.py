@@ -127,6 +127,23 @@ def test_a_search_without_time_refuses_as_over_budget_and_remembers_the_keyframe
     assert registrar.counts()["keyframes"] == 2
 
 
+def test_a_search_that_is_hurried_tries_no_further_place_and_remembers_the_keyframe() -> None:
+    frames = [_frame(3.0 * k, T, True) for k, T in enumerate((HERE, AWAY, BESIDE, HERE))]
+    last = _frame(60.0, BESIDE, True)
+    for most in (0, 1):
+        registrar = Registrar(PARAMS.replaced(threads=1, closures=4))
+        _run(registrar, *frames)
+        registrar.track(last)
+        stretch = registrar.end()
+        assert stretch is not None
+        asked: list[None] = []
+        outcome = registrar.search(stretch, hurried=lambda: asked.append(None) or len(asked) > most)  # noqa: B023
+        tried = [r for r in outcome.rejected if r.reason not in (Reason.OVER_BUDGET, Reason.REDUNDANT)]
+        assert len(outcome.closures) + len(tried) == most
+        assert any(r.reason is Reason.OVER_BUDGET and "cut short" in r.detail for r in outcome.rejected)
+        assert outcome.keyframe_ns == last.stamp_ns and registrar.counts()["keyframes"] == 5
+
+
 def test_the_oldest_keyframe_goes_when_there_are_too_many() -> None:
     registrar = Registrar(PARAMS.replaced(max_keyframes=2))
     _run(registrar, *(_frame(10 * i, pose, True) for i, pose in enumerate((HERE, AWAY, BESIDE))))
