@@ -82,6 +82,11 @@ def find_source(what: str, sha256: str = "") -> Source:
     file = PurePosixPath(parts.path).name
     if parts.scheme not in ("http", "https") or not file.endswith(".onnx"):
         raise ValueError(f"model: expected {', '.join(MODELS)}, or the http(s) URL of an .onnx file, got {what!r}")
+    if parts.scheme == "http" and not sha256:
+        raise ValueError(
+            f"model: expected https, or --sha256 with the checksum of the file, got {what!r} without one: "
+            "over http anybody on the way can change the file; ask its maker for the checksum"
+        )
     return Source(file, (what,), sha256.lower())
 
 
