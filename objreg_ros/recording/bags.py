@@ -28,7 +28,7 @@ from rosbags.rosbag2 import ReaderError as Rosbag2Error
 from rosbags.serde import SerdeError
 from rosbags.typesys.store import Typestore
 
-from objreg_ros.recording.messages import difference, serialise, standard_types
+from objreg_ros.recording.messages import READ, difference, misfit, serialise, standard_types
 from objreg_ros.recording.record import Record, Recording, Topic
 from objreg_ros.recording.text import SETTINGS_BYTES, require_regular
 from objreg_ros.recording.unpacking import UnpackingError, bound_unpacking, require_room
@@ -73,11 +73,14 @@ class BagRecording(Recording):
         self.path = path
         _require_readable(path)
         with _broken_means_value_error(path):
+            require_room(path)
             self._reader = AnyReader([path], default_typestore=standard_types())
             self._reader.open()
         self.kind = _kind(path)
         self._connections, self.notes = _one_type_each(self._reader.connections)
         self.topics = _topics(self._connections)
+        told = {kind: misfit(kind, self._types()) for kind in READ if kind in self._types().fielddefs}
+        self._misfits = {kind: why for kind, why in told.items() if why}
         spans = any(topic.count for topic in self.topics.values())
         self.start_ns, self.end_ns = (self._reader.start_time, self._reader.end_time) if spans else (0, 0)
         if not -END_OF_TIME_NS <= self.start_ns <= self.end_ns <= END_OF_TIME_NS:
@@ -121,6 +124,8 @@ class BagRecording(Recording):
 
     def _record(self, connection: Any, stamp_ns: int, raw: bytes) -> Record:
         def decode() -> Any:
+            if connection.msgtype in self._misfits:
+                raise _broken_bag(self.path, self._misfits[connection.msgtype])
             with _broken_means_value_error(self.path):
                 return self._reader.deserialize(raw, connection.msgtype)
 
@@ -212,7 +217,7 @@ def _broken_bag(path: Path, got: str) -> ValueError:
 
 
 def _require_readable(path: Path) -> None:
-    """ValueError for what the library would wait for, or unpack, without end."""
+    """ValueError for what the library would wait for, or read, without end."""
     if not path.is_dir():
         require_regular(path)
         return
@@ -220,7 +225,6 @@ def _require_readable(path: Path) -> None:
         size = require_regular(file)
         if file.name == METADATA and size > METADATA_BYTES:
             raise ValueError(f"{file}: expected at most {METADATA_BYTES} bytes of metadata, got {size}; reindex it")
-    require_room(path)
 
 
 def _denial(error: BaseException | None) -> PermissionError | None:

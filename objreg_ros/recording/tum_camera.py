@@ -64,9 +64,10 @@ def _default(width: int, height: int) -> dict[str, float]:
 
 def _told(file: Path) -> dict[str, Any]:
     """What the file says, by key. A key without a value says nothing."""
+    text = read_text(file, SETTINGS_BYTES)
     try:
-        values = yaml.safe_load(read_text(file, SETTINGS_BYTES))
-    except (yaml.YAMLError, RecursionError) as error:
+        values = yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise ValueError(f"{file}: expected YAML, got: {' '.join(str(error).split())}") from error
     if not isinstance(values, dict):
         raise ValueError(f"{file}: expected a mapping like fx: 525.0, got {type(values).__name__}")

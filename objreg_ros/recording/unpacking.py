@@ -130,13 +130,13 @@ def _too_much(packed: int) -> UnpackingError:
     )
 
 
-def require_room(folder: Path) -> None:
+def require_room(bag: Path) -> None:
     """`UnpackingError` where compressed files of a rosbag2, unpacked into the temporary folder, become too much.
 
-    The sizes are read off the frames: nothing is unpacked.
+    Only those of a folder are unpacked there. The sizes are read off the frames: nothing is unpacked.
     """
     packed, unpacked = 0, 0
-    for file in sorted(file for file in folder.iterdir() if file.is_file()):
+    for file in sorted(file for file in bag.iterdir() if file.is_file()) if bag.is_dir() else ():
         if size := zstd_bound(file):
             packed, unpacked = packed + file.stat().st_size, unpacked + size
     if not unpacked:
