@@ -13,11 +13,11 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import mounting
-from objreg_ros.recording.text import read_text
 from objreg_ros.recording import Recording
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.opening import open_recording
 from objreg_ros.recording.poses import pose_of
+from objreg_ros.recording.text import read_text
 from objreg_ros.report.form import require_form
 from objreg_ros.report.page import page
 from objreg_ros.report.pictures import Album

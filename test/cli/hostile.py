@@ -31,7 +31,7 @@ def late(*_):
 
 signal.signal(signal.SIGALRM, late)
 told = {}
-for name, words in json.loads(sys.argv[1]).items():
+for name, words in json.load(sys.stdin).items():
     out, err, code = io.StringIO(), io.StringIO(), 0
     signal.alarm(60)
     try:
@@ -49,8 +49,10 @@ print("TOLD" + json.dumps(told))
 
 def call_each(calls: Mapping[str, list[str]], cwd: Path) -> dict[str, tuple[object, str]]:
     """By the name of a call its exit status (or its traceback) and what it said on stderr."""
-    words = [sys.executable, "-c", CALLS, json.dumps(calls)]
-    told = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE_S, cwd=cwd, check=False)
+    words = [sys.executable, "-c", CALLS]
+    told = subprocess.run(
+        words, input=json.dumps(calls), capture_output=True, text=True, timeout=PATIENCE_S, cwd=cwd, check=False
+    )
     assert "TOLD" in told.stdout, told.stderr[-3000:]
     return {name: (code, err) for name, (code, err) in json.loads(told.stdout.partition("TOLD")[2]).items()}
 
