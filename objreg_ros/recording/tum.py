@@ -66,7 +66,7 @@ class TumRecording(Recording):
     def __init__(self, path: Path) -> None:
         self.path = path
         pairs, self.notes = _pairs(path)
-        self._camera = self._read_camera([path / colour for _, colour, _, _ in pairs])
+        self._camera = self._read_camera(list(dict.fromkeys(colour for _, colour, _, _ in pairs)))
         moments = [m for pair in pairs for m in self._moments(*pair)] + self._ground_truth()
         order = list(TYPES)
         self._sequence = sorted(moments, key=lambda m: (m.stamp_ns, order.index(m.topic)))
@@ -88,12 +88,12 @@ class TumRecording(Recording):
         info = partial(messages.camera_info, camera.intrinsics, depth_ns, CAMERA_FRAME, camera.distortion)
         return [
             Moment(depth_ns, CAMERA_INFO, info),
-            Moment(colour_ns, IMAGE, partial(_colour_message, self.path / colour, colour_ns)),
-            Moment(depth_ns, DEPTH, partial(_depth_message, self.path / depth, depth_ns, camera.depth_scale)),
+            Moment(colour_ns, IMAGE, partial(_colour_message, self.path, colour, colour_ns)),
+            Moment(depth_ns, DEPTH, partial(_depth_message, self.path, depth, depth_ns, camera.depth_scale)),
         ]
 
-    def _read_camera(self, pictures: Sequence[Path]) -> TumCamera:
-        height, width = _first_size(pictures)
+    def _read_camera(self, pictures: Sequence[str]) -> TumCamera:
+        height, width = _first_size(self.path, pictures)
         camera = read_camera(self.path / "camera.yaml", width, height)
         self.notes += camera.notes
         return camera
@@ -236,12 +236,14 @@ def _stamp(text: str, file: Path) -> int:
     raise ValueError(f"{file}: expected a time in seconds (or 19 digits of nanoseconds), got {text!r}")
 
 
-def _first_size(files: Sequence[Path]) -> tuple[int, ...]:
+def _first_size(folder: Path, names: Sequence[str]) -> tuple[int, ...]:
     """Height and width of the first picture that decodes; ValueError where none does."""
-    for file in dict.fromkeys(files):
+    for name in names:
         with suppress(ValueError):
-            return _read_picture(file, COLOUR).shape[:2]
-    raise ValueError(f"{files[0]}: expected a picture, got {len(files)} that do not decode; check the download")
+            return _read_picture(folder / name, COLOUR).shape[:2]
+    raise ValueError(
+        f"{folder / names[0]}: expected a picture, got {len(names)} that do not decode; check the download"
+    )
 
 
 def _read_picture(file: Path, flags: int) -> Array:
@@ -256,16 +258,18 @@ def _read_picture(file: Path, flags: int) -> Array:
     return np.asarray(pixels)
 
 
-def _colour_message(file: Path, stamp_ns: int) -> Any:
-    rgb = cv2.cvtColor(_read_picture(file, COLOUR), cv2.COLOR_BGR2RGB)
+def _colour_message(folder: Path, name: str, stamp_ns: int) -> Any:
+    rgb = cv2.cvtColor(_read_picture(folder / name, COLOUR), cv2.COLOR_BGR2RGB)
     return messages.image(rgb, "rgb8", stamp_ns, CAMERA_FRAME)
 
 
-def _depth_message(file: Path, stamp_ns: int, scale: float) -> Any:
+def _depth_message(folder: Path, name: str, stamp_ns: int, scale: float) -> Any:
     """16UC1 where the steps are millimetres, else 32FC1 metres."""
-    pixels = _read_picture(file, cv2.IMREAD_UNCHANGED)
+    pixels = _read_picture(folder / name, cv2.IMREAD_UNCHANGED)
     if pixels.dtype != np.uint16 or pixels.ndim != 2:
-        raise ValueError(f"{file}: expected a 16-bit picture of one channel, got {pixels.dtype} {pixels.shape}")
+        raise ValueError(
+            f"{folder / name}: expected a 16-bit picture of one channel, got {pixels.dtype} {pixels.shape}"
+        )
     if scale == MILLIMETRES:
         return messages.image(pixels, "16UC1", stamp_ns, CAMERA_FRAME)
     metres = np.where(pixels == np.iinfo(np.uint16).max, np.float32(0), pixels / np.float32(scale)).astype(np.float32)
