@@ -75,7 +75,7 @@ def main(*arguments: Any) -> None:
         error.show()
         sys.exit(error.exit_code)
     except (OSError, ValueError) as error:
-        click.echo(f"objreg: {error}", err=True)
+        click.echo(f"objreg: {' '.join(str(error).split())}", err=True)
         sys.exit(BROKEN)
     except (KeyboardInterrupt, click.Abort):
         sys.exit(INTERRUPTED)

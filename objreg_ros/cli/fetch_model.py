@@ -21,6 +21,7 @@ from objreg_ros.detector.runtime import Runtime
 
 TIMEOUT_S = 30.0
 CHUNK = 1 << 16
+MOST_BYTES = 1 << 32  # twice what a file of ONNX can be
 
 ZOO = "validated/vision/object_detection_segmentation/ssd-mobilenetv1/model"
 MIRRORS = (
@@ -82,6 +83,11 @@ def find_source(what: str, sha256: str = "") -> Source:
     file = PurePosixPath(parts.path).name
     if parts.scheme not in ("http", "https") or not file.endswith(".onnx"):
         raise ValueError(f"model: expected {', '.join(MODELS)}, or the http(s) URL of an .onnx file, got {what!r}")
+    if parts.scheme == "http" and not sha256:
+        raise ValueError(
+            f"model: expected https, or --sha256 with the checksum of the file, got {what!r} without one: "
+            "over http anybody on the way can change the file; ask its maker for the checksum"
+        )
     return Source(file, (what,), sha256.lower())
 
 
@@ -95,7 +101,7 @@ def fetch(source: Source, path: Path) -> None:
     failures = []
     for url in source.urls:
         try:
-            download(url, part)
+            download(url, part, bool(source.sha256))
             break
         except (OSError, HTTPException) as error:
             failures.append(f"{url}: {getattr(error, 'reason', None) or error}")
@@ -109,8 +115,11 @@ def fetch(source: Source, path: Path) -> None:
     os.replace(part, path)
 
 
-def download(url: str, part: Path) -> None:
-    """Append to ``part`` what is missing of ``url``; OSError or HTTPException when the connection fails."""
+def download(url: str, part: Path, checked: bool) -> None:
+    """Append to ``part`` what is missing of ``url``; OSError or HTTPException when the connection fails.
+
+    ValueError where it leads to plain http and will not be ``checked``, and where it does not end.
+    """
     have = part.stat().st_size if part.is_file() else 0
     request = urllib.request.Request(url, headers={"Range": f"bytes={have}-"} if have else {})
     try:
@@ -119,9 +128,19 @@ def download(url: str, part: Path) -> None:
         if error.code != 416:
             raise
         part.unlink()  # more than there is: the file has changed, or it was complete and somebody else's
-        return download(url, part)
+        return download(url, part, checked)
     with response:
+        if not checked:
+            require_https(response.url)
         _receive(response, part, have if response.status == 206 else 0)
+
+
+def require_https(url: str) -> None:
+    """ValueError for the address of an answer that anybody on its way could have changed."""
+    if urlsplit(url).scheme != "https":
+        raise ValueError(
+            f"model: expected https all the way, or --sha256 with the checksum of the file, got {url} without one"
+        )
 
 
 def _receive(response: HTTPResponse, part: Path, have: int) -> None:
@@ -132,6 +151,9 @@ def _receive(response: HTTPResponse, part: Path, have: int) -> None:
     )
     with bar, part.open("ab" if have else "wb") as file:
         while chunk := response.read(CHUNK):
+            if file.tell() + len(chunk) > MOST_BYTES:
+                part.unlink()
+                raise ValueError(f"{part.stem}: expected a model of at most {MOST_BYTES} bytes, got more; is it one?")
             file.write(chunk)
             bar.update(len(chunk))
         arrived = file.tell() - have

@@ -22,7 +22,7 @@ remap = click.option(
 params = click.option(
     "--params",
     "params_file",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=click.Path(path_type=Path),
     help="ROS 2 parameter file, like config/objreg.yaml.",
 )
 change = click.option("--set", "changes", multiple=True, metavar="NODE.NAME=VALUE", help="Change one parameter.")

@@ -15,6 +15,7 @@ from objreg_ros.bridge.params import DoorParams
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.mapper.params import MapperNodeParams, MapperParams
 from objreg_ros.params import Declaration, Params
+from objreg_ros.recording.text import SETTINGS_BYTES, read_text
 from objreg_ros.registrar.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 
@@ -103,8 +104,8 @@ def ros_argument(name: str, value: Any) -> str:
 def _sections(file: Path) -> dict[str, dict[str, Any]]:
     """The parameters under each name of a node, in the order of the file: the last word holds, as in ROS."""
     try:
-        sections = dict(_titled(dict(yaml.safe_load(file.read_text()) or {}), ""))
-    except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
+        sections = dict(_titled(dict(yaml.safe_load(read_text(file, SETTINGS_BYTES)) or {}), ""))
+    except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
         raise ValueError(f"{file}: expected a ROS 2 parameter file (node: {KEY}: name: value), got: {error}") from error
     for_all = {name for title, section in sections.items() if _node_of(title) == ALL for name in section}
     unknown = sorted(for_all - set(EVERYWHERE).union(*map(_known, NODES)))
@@ -165,7 +166,7 @@ def _value(declaration: Declaration, text: str) -> Any:
         return _value_one(declaration, text)
     try:
         items = yaml.load(text if text.strip().startswith("[") else f"[{text}]", Loader=yaml.BaseLoader)
-    except yaml.YAMLError:
+    except (yaml.YAMLError, RecursionError):
         return text
     return [_value_one(declaration, item) for item in items]
 
@@ -176,5 +177,5 @@ def _value_one(declaration: Declaration, text: Any) -> Any:
         return text
     try:
         return float(text) if declaration.kind is float else yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError):
+    except (yaml.YAMLError, ValueError, RecursionError):
         return text

@@ -216,17 +216,29 @@ def _first_class(inputs: tuple[Port, ...], names: tuple[str, ...]) -> int:
 def _priors(metadata: Mapping[str, str]) -> Array:
     try:
         raw = np.frombuffer(base64.b64decode(metadata["objreg.priors"], validate=True), "<f4")
-        return raw.reshape(-1, 4).astype(np.float32)
+        priors = raw.reshape(-1, 4).astype(np.float32)
     except (KeyError, ValueError) as error:
         raise ValueError(f"objreg.priors: expected base64 of float32 [A,4], got {error!r}") from error
+    bad = ~(np.isfinite(priors).all(axis=1) & (priors[:, 2:] > 0).all(axis=1))
+    if bad.any():
+        first = int(bad.argmax())
+        raise ValueError(
+            "objreg.priors: expected finite cx cy w h with w and h above 0, got "
+            f"{bad.sum()} of {len(priors)} that are not, the first {priors[first].tolist()} in row {first}; "
+            "export the model again"
+        )
+    return priors
 
 
 def _variances(metadata: Mapping[str, str]) -> Array:
     text = metadata.get("objreg.variances", "[0.1, 0.1, 0.2, 0.2]")
     try:
-        return np.asarray(json.loads(text), np.float32).reshape(4)
-    except (ValueError, TypeError) as error:
-        raise ValueError(f"objreg.variances: expected a list of 4 numbers, got {text!r}") from error
+        variances = np.asarray(json.loads(text), np.float32).reshape(4)
+    except (ValueError, TypeError, RecursionError, OverflowError) as error:
+        raise ValueError(f"objreg.variances: expected a list of 4 numbers, got {text[:80]!r}") from error
+    if not (np.isfinite(variances) & (variances >= 0)).all():
+        raise ValueError(f"objreg.variances: expected 4 finite numbers that are not negative, got {text[:80]!r}")
+    return variances
 
 
 def _shapes(probe: Mapping[str, Array]) -> str:

@@ -10,6 +10,9 @@ from pathlib import Path
 UNNAMED = "???"
 """What a label file writes for the background and for a class without a name."""
 
+FILE_BYTES = 1 << 24
+"""The longest file of labels that is read."""
+
 METADATA_KEY = "objreg.labels"
 
 
@@ -34,6 +37,9 @@ def find_labels(model_path: Path, labels_path: Path | None, metadata: Mapping[st
 
 def read_labels(path: Path) -> tuple[str, ...]:
     """The labels of a text file, one a line. A first line ``???`` stands for the background and is left out."""
+    if path.exists() and (not path.is_file() or path.stat().st_size > FILE_BYTES):
+        got = f"{path.stat().st_size} bytes" if path.is_file() else "a folder, pipe or device"
+        raise ValueError(f"labels {path}: expected a file of one label a line, at most {FILE_BYTES} bytes, got {got}")
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
@@ -50,7 +56,7 @@ def read_labels(path: Path) -> tuple[str, ...]:
 def _labels_of_metadata(text: str) -> tuple[str, ...]:
     try:
         labels = json.loads(text)
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise ValueError(f"{METADATA_KEY}: expected a JSON list of names, got {text[:80]!r}") from error
     if not isinstance(labels, list) or not labels or not all(isinstance(name, str) and name for name in labels):
         raise ValueError(f"{METADATA_KEY}: expected a JSON list of names, got {text[:80]!r}")

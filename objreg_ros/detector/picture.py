@@ -14,6 +14,9 @@ from objreg_ros.data import Array
 from objreg_ros.detector.runtime import Port
 
 MEAN, SCALE = 127.5, 1 / 127.5
+MOST_PIXELS = 50_000_000
+"""The largest picture of a model: what a camera's is made to fit takes memory, and so does the test picture."""
+
 EXPECTED = "expected one input, uint8 [1, H, W, 3], or float32 [1, H, W, 3] or [1, 3, H, W]"
 
 
@@ -40,6 +43,7 @@ class Picture:
         if batch not in (1, None) or not (channels_first or last in (3, None)):
             raise ValueError(f"input of the model: {EXPECTED}, got {got}")
         height, width = (size[1], last) if channels_first else size
+        _require_size(height, width, got)
         mean, scale = (_numbers(metadata, f"objreg.{key}", usual) for key, usual in (("mean", MEAN), ("scale", SCALE)))
         return cls(height, width, channels_first, floating, mean, scale)
 
@@ -57,9 +61,22 @@ class Picture:
         return np.ascontiguousarray((rgb.transpose(2, 0, 1) if self.channels_first else rgb)[None])
 
 
+def _require_size(height: int | None, width: int | None, got: str) -> None:
+    """ValueError for a picture that takes too much memory, before it is taken. A side of None or 0 is open."""
+    sides = (height or 1, width or 1)
+    if min(sides) < 0 or sides[0] * sides[1] > MOST_PIXELS:
+        raise ValueError(
+            f"input of the model: expected a picture of at most {MOST_PIXELS} pixels, got {got}; "
+            "export the model for smaller pictures"
+        )
+
+
 def _numbers(metadata: Mapping[str, str], key: str, usual: float) -> Array:
     """One number or three, of a metadata entry."""
     try:
-        return np.broadcast_to(np.asarray(json.loads(metadata.get(key, str(usual))), np.float32), (3,))
-    except (ValueError, TypeError) as error:
-        raise ValueError(f"{key}: expected a number or a list of three, got {metadata[key]!r}") from error
+        numbers = np.broadcast_to(np.asarray(json.loads(metadata.get(key, str(usual))), np.float32), (3,))
+    except (ValueError, TypeError, RecursionError, OverflowError) as error:
+        raise ValueError(f"{key}: expected a number or a list of three, got {metadata[key][:80]!r}") from error
+    if not np.isfinite(numbers).all():
+        raise ValueError(f"{key}: expected finite numbers, got {metadata[key][:80]!r}")
+    return numbers

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import errno
 import struct
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator
@@ -27,8 +28,14 @@ from rosbags.rosbag2 import ReaderError as Rosbag2Error
 from rosbags.serde import SerdeError
 from rosbags.typesys.store import Typestore
 
-from objreg_ros.recording.messages import difference, serialise, standard_types
+from objreg_ros.recording.messages import READ, difference, misfit, serialise, standard_types
 from objreg_ros.recording.record import Record, Recording, Topic
+from objreg_ros.recording.text import SETTINGS_BYTES, require_regular
+from objreg_ros.recording.unpacking import UnpackingError, bound_unpacking, require_room
+
+METADATA = "metadata.yaml"
+METADATA_BYTES = 16 * SETTINGS_BYTES  # it has a line for every file and every topic
+END_OF_TIME_NS = 2**63
 
 # What the library lets through when the bytes of a file are not what they should be.
 BROKEN = (
@@ -42,8 +49,11 @@ BROKEN = (
     KeyError,
     IndexError,
     TypeError,
-    UnicodeDecodeError,
-    RuntimeError,  # lz4
+    ValueError,
+    AttributeError,
+    RuntimeError,  # lz4, and nested too deeply
+    MemoryError,  # sizes that lie
+    OverflowError,
 )
 # The packages whose own errors say the same, by name: which of them `rosbags` reads with hangs on its version.
 DECODERS = {"apsw", "sqlite3", "backports", "compression", "zstandard"}
@@ -53,20 +63,29 @@ REPAIR = {
     ".db3": "`sqlite3 old.db3 .recover | sqlite3 new.db3` saves what is readable, `ros2 bag reindex` its metadata",
 }
 
+bound_unpacking()
+
 
 class BagRecording(Recording):
     """A rosbag1 file, a rosbag2 folder or a single rosbag2 file."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        _require_readable(path)
         with _broken_means_value_error(path):
+            require_room(path)
             self._reader = AnyReader([path], default_typestore=standard_types())
             self._reader.open()
         self.kind = _kind(path)
         self._connections, self.notes = _one_type_each(self._reader.connections)
         self.topics = _topics(self._connections)
+        told = {kind: misfit(kind, self._types()) for kind in READ if kind in self._types().fielddefs}
+        self._misfits = {kind: why for kind, why in told.items() if why}
         spans = any(topic.count for topic in self.topics.values())
         self.start_ns, self.end_ns = (self._reader.start_time, self._reader.end_time) if spans else (0, 0)
+        if not -END_OF_TIME_NS <= self.start_ns <= self.end_ns <= END_OF_TIME_NS:
+            self.close()
+            raise _broken_bag(path, f"records from {self.start_ns} to {self.end_ns} ns")
 
     def records(
         self, topics: Collection[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
@@ -105,6 +124,8 @@ class BagRecording(Recording):
 
     def _record(self, connection: Any, stamp_ns: int, raw: bytes) -> Record:
         def decode() -> Any:
+            if connection.msgtype in self._misfits:
+                raise _broken_bag(self.path, self._misfits[connection.msgtype])
             with _broken_means_value_error(self.path):
                 return self._reader.deserialize(raw, connection.msgtype)
 
@@ -176,10 +197,34 @@ def _broken_means_value_error(path: Path) -> Iterator[None]:
             raise
         if (denied := _denial(error)) is not None:
             raise PermissionError(f"{path}: expected permission to read it, got: {denied.strerror}") from error
-        said = " ".join(str(error).split()).rstrip(".") or type(error).__name__
-        suffix = path.suffix if path.is_file() else next((f.suffix for f in path.iterdir() if f.suffix in REPAIR), "")
-        repair = REPAIR.get(suffix, "record it again or check the copy")
-        raise ValueError(f"{path}: expected a whole bag, got: {said}; truncated or corrupt? {repair}") from error
+        if isinstance(error, UnpackingError):
+            raise ValueError(f"{path}: {error}") from error
+        raise _broken_bag(path, _said(error)) from error
+
+
+def _said(error: Exception) -> str:
+    """An error in one line; with its name where it is none of those that were made to be read."""
+    said, name = " ".join(str(error).split()).rstrip("."), type(error).__name__
+    if not said or isinstance(error, (LookupError, MemoryError, OverflowError, RecursionError, AttributeError)):
+        return f"{name}: {said}".rstrip(": ")
+    return said
+
+
+def _broken_bag(path: Path, got: str) -> ValueError:
+    suffix = path.suffix if path.is_file() else next((f.suffix for f in path.iterdir() if f.suffix in REPAIR), "")
+    repair = REPAIR.get(suffix, "record it again or check the copy")
+    return ValueError(f"{path}: expected a whole bag, got: {got}; truncated or corrupt? {repair}")
+
+
+def _require_readable(path: Path) -> None:
+    """ValueError for what the library would wait for, or read, without end."""
+    if not path.is_dir():
+        require_regular(path)
+        return
+    for file in sorted(file for file in path.iterdir() if not file.is_dir() and file.exists()):
+        size = require_regular(file)
+        if file.name == METADATA and size > METADATA_BYTES:
+            raise ValueError(f"{file}: expected at most {METADATA_BYTES} bytes of metadata, got {size}; reindex it")
 
 
 def _denial(error: BaseException | None) -> PermissionError | None:
@@ -191,4 +236,5 @@ def _denial(error: BaseException | None) -> PermissionError | None:
 
 def _says_broken(error: Exception) -> bool:
     of_bz2 = type(error) is OSError and error.errno is None  # those of the system have a number
-    return isinstance(error, BROKEN) or of_bz2 or type(error).__module__.partition(".")[0] in DECODERS
+    beyond = isinstance(error, OSError) and error.errno == errno.EINVAL  # a place that no file has
+    return isinstance(error, BROKEN) or of_bz2 or beyond or type(error).__module__.partition(".")[0] in DECODERS

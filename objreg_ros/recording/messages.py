@@ -23,6 +23,15 @@ Array = NDArray[Any]
 
 MISSING = object()
 PADDING = "structure_needs_at_least_one_member"  # what some definitions say of a type without fields
+READ = tuple(
+    f"{package}/msg/{name}"
+    for package, names in (
+        ("sensor_msgs", ("Image", "CompressedImage", "PointCloud2", "CameraInfo")),
+        ("geometry_msgs", ("PoseStamped", "PoseWithCovarianceStamped", "TransformStamped")),
+        ("nav_msgs", ("Odometry",)),
+    )
+    for name in names
+)  # the types whose fields are read here, and not only passed on
 CDR_PREFIX = 4  # bytes before the fields; the second says the byte order
 
 
@@ -90,6 +99,31 @@ def difference(msgtype: str, types: Typestore) -> str:
         return f"{msgtype} has other fields than in ROS 2 Jazzy: {', '.join(odd) or 'their order'}"
     inner = (_inner_type(field) for field in here.values())
     return next((why for kind in inner if kind and (why := difference(kind, types))), "")
+
+
+def misfit(msgtype: str, types: Typestore) -> str:
+    """Why a message of a type, as ``types`` know it, cannot be read by our names, in words; empty if it can.
+
+    What ROS 1 says more, and in capitals, is no obstacle, nor is another type of number.
+    """
+    ours = standard_types().fielddefs[msgtype][1]
+    there = dict(types.fielddefs.get(msgtype, (None, ours))[1])
+    for name, field in ours:
+        told = there.get(name, there.get(name.upper()))
+        if told is None or _form(told) != _form(field):
+            return f"a definition of {msgtype} {'without' if told is None else 'with another'} {name}"
+        inner = _inner_type(field)
+        if inner and (why := misfit(inner, types)):
+            return why
+    return ""
+
+
+def _form(field: Any) -> Any:
+    """What a reader can do with a field: take it as a number, as text, as a message of a type or as a list of them."""
+    kind, of = field
+    if kind is Nodetype.BASE:
+        return "text" if "string" in of[0] else "number"
+    return (_form(of[0]), of[1] if kind is Nodetype.ARRAY else 0) if kind is not Nodetype.NAME else of
 
 
 def _named_fields(fields: Iterable[tuple[str, Any]]) -> dict[str, Any]:

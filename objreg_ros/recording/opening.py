@@ -7,6 +7,7 @@ from pathlib import Path
 
 from objreg_ros.recording.bags import BagRecording
 from objreg_ros.recording.record import Recording
+from objreg_ros.recording.text import require_regular
 from objreg_ros.recording.tum import TumRecording
 
 EXPECTED = (
@@ -23,6 +24,7 @@ def open_recording(path: Path | str) -> Recording:
         raise FileNotFoundError(f"{place}: no such file or folder; {EXPECTED}")
     if place.is_dir():
         return _open_folder(place)
+    require_regular(place)
     if place.suffix not in BAG_FILES:
         raise ValueError(f"{place}: {EXPECTED}, got a file {place.suffix or 'without a suffix'}")
     return BagRecording(place)

@@ -9,10 +9,11 @@ for the Evaluation of RGB-D SLAM Systems" (2012).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+import stat
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import suppress
 from decimal import Decimal
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,7 +25,7 @@ from objreg_ros.geometry import is_rigid, pose, rotation_from_quaternion
 from objreg_ros.recording import messages
 from objreg_ros.recording.poses import passed_over
 from objreg_ros.recording.record import Record, Recording, Topic
-from objreg_ros.recording.text import read_text
+from objreg_ros.recording.text import read_text, require_regular
 from objreg_ros.recording.tum_camera import TumCamera, read_camera
 
 Array = NDArray[Any]
@@ -65,7 +66,7 @@ class TumRecording(Recording):
     def __init__(self, path: Path) -> None:
         self.path = path
         pairs, self.notes = _pairs(path)
-        self._camera = self._read_camera([path / colour for _, colour, _, _ in pairs])
+        self._camera = self._read_camera(list(dict.fromkeys(colour for _, colour, _, _ in pairs)))
         moments = [m for pair in pairs for m in self._moments(*pair)] + self._ground_truth()
         order = list(TYPES)
         self._sequence = sorted(moments, key=lambda m: (m.stamp_ns, order.index(m.topic)))
@@ -87,12 +88,12 @@ class TumRecording(Recording):
         info = partial(messages.camera_info, camera.intrinsics, depth_ns, CAMERA_FRAME, camera.distortion)
         return [
             Moment(depth_ns, CAMERA_INFO, info),
-            Moment(colour_ns, IMAGE, partial(_colour_message, self.path / colour, colour_ns)),
-            Moment(depth_ns, DEPTH, partial(_depth_message, self.path / depth, depth_ns, camera.depth_scale)),
+            Moment(colour_ns, IMAGE, partial(_colour_message, self.path, colour, colour_ns)),
+            Moment(depth_ns, DEPTH, partial(_depth_message, self.path, depth, depth_ns, camera.depth_scale)),
         ]
 
-    def _read_camera(self, pictures: Sequence[Path]) -> TumCamera:
-        height, width = _first_size(pictures)
+    def _read_camera(self, pictures: Sequence[str]) -> TumCamera:
+        height, width = _first_size(self.path, pictures)
         camera = read_camera(self.path / "camera.yaml", width, height)
         self.notes += camera.notes
         return camera
@@ -115,12 +116,28 @@ def _pairs(folder: Path) -> tuple[list[Pair], list[str]]:
         colour, depth = _pictures(folder, "rgb"), _pictures(folder, "depth")
         pairs = _associate(colour, depth)
         notes = _unpaired(len(pairs), len(colour), len(depth)) + _strangers(folder)
-    missing = next((name for _, c, _, d in pairs for name in (c, d) if not (folder / name).exists()), None)
-    if missing:
-        raise FileNotFoundError(f"{folder}: expected the picture {missing} that its list names, got no such file")
+    _require_pictures(folder, dict.fromkeys(name for _, c, _, d in pairs for name in (c, d)))
     if not pairs:
         raise FileNotFoundError(f"{folder}: expected colour and depth pictures within 20 ms of each other, got none")
     return pairs, notes
+
+
+def _require_pictures(folder: Path, names: Iterable[str]) -> None:
+    """FileNotFoundError where a picture is missing; ValueError where one lies outside of the folder or is no file."""
+    real = cache(partial(Path.resolve, strict=True))  # of the folders, which are few
+    for name in names:
+        file = folder / name
+        try:
+            kind = file.lstat().st_mode
+            place = real(file) if stat.S_ISLNK(kind) or file.name == ".." else real(file.parent) / file.name
+            inside = place.is_relative_to(real(folder))
+        except (FileNotFoundError, NotADirectoryError, RuntimeError) as error:  # a loop of links is a RuntimeError
+            told = f"expected the picture {name} that its list names, got no such file"
+            raise FileNotFoundError(f"{folder}: {told}") from error
+        if not inside:
+            raise ValueError(f"{folder}: expected pictures inside of this folder, got {name} at {place}; copy it there")
+        if not stat.S_ISREG(kind):
+            require_regular(file)
 
 
 def _unpaired(pairs: int, colour: int, depth: int) -> list[str]:
@@ -164,9 +181,11 @@ def _associate(colour: list[Picture], depth: list[Picture]) -> list[Pair]:
     depth_ns = np.array([stamp for stamp, _ in depth], np.int64)
     near = [(abs(stamp - int(d)), i, j) for i, (stamp, _) in enumerate(colour) for j, d in _around(depth_ns, stamp)]
     pairs: dict[int, int] = {}
+    taken: set[int] = set()
     for _, i, j in sorted(n for n in near if n[0] <= ASSOCIATION_NS):
-        if i not in pairs and j not in pairs.values():
+        if i not in pairs and j not in taken:
             pairs[i] = j
+            taken.add(j)
     return [(*colour[i], *depth[j]) for i, j in sorted(pairs.items())]
 
 
@@ -217,31 +236,40 @@ def _stamp(text: str, file: Path) -> int:
     raise ValueError(f"{file}: expected a time in seconds (or 19 digits of nanoseconds), got {text!r}")
 
 
-def _first_size(files: Sequence[Path]) -> tuple[int, ...]:
+def _first_size(folder: Path, names: Sequence[str]) -> tuple[int, ...]:
     """Height and width of the first picture that decodes; ValueError where none does."""
-    for file in files:
+    for name in names:
         with suppress(ValueError):
-            return _read_picture(file, COLOUR).shape[:2]
-    raise ValueError(f"{files[0]}: expected a picture, got {len(files)} that do not decode; check the download")
+            return _read_picture(folder / name, COLOUR).shape[:2]
+    raise ValueError(
+        f"{folder / names[0]}: expected a picture, got {len(names)} that do not decode; check the download"
+    )
 
 
 def _read_picture(file: Path, flags: int) -> Array:
-    pixels = cv2.imread(str(file), flags)
+    require_regular(file)
+    try:
+        pixels = cv2.imread(str(file), flags)
+    except (cv2.error, MemoryError) as error:
+        said = " ".join(str(error).split())
+        raise ValueError(f"{file}: expected a picture, got what OpenCV refuses: {said}; check the download") from error
     if pixels is None:
         raise ValueError(f"{file}: expected a picture, got a file that does not decode; check the download")
     return np.asarray(pixels)
 
 
-def _colour_message(file: Path, stamp_ns: int) -> Any:
-    rgb = cv2.cvtColor(_read_picture(file, COLOUR), cv2.COLOR_BGR2RGB)
+def _colour_message(folder: Path, name: str, stamp_ns: int) -> Any:
+    rgb = cv2.cvtColor(_read_picture(folder / name, COLOUR), cv2.COLOR_BGR2RGB)
     return messages.image(rgb, "rgb8", stamp_ns, CAMERA_FRAME)
 
 
-def _depth_message(file: Path, stamp_ns: int, scale: float) -> Any:
+def _depth_message(folder: Path, name: str, stamp_ns: int, scale: float) -> Any:
     """16UC1 where the steps are millimetres, else 32FC1 metres."""
-    pixels = _read_picture(file, cv2.IMREAD_UNCHANGED)
+    pixels = _read_picture(folder / name, cv2.IMREAD_UNCHANGED)
     if pixels.dtype != np.uint16 or pixels.ndim != 2:
-        raise ValueError(f"{file}: expected a 16-bit picture of one channel, got {pixels.dtype} {pixels.shape}")
+        raise ValueError(
+            f"{folder / name}: expected a 16-bit picture of one channel, got {pixels.dtype} {pixels.shape}"
+        )
     if scale == MILLIMETRES:
         return messages.image(pixels, "16UC1", stamp_ns, CAMERA_FRAME)
     metres = np.where(pixels == np.iinfo(np.uint16).max, np.float32(0), pixels / np.float32(scale)).astype(np.float32)

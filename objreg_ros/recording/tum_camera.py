@@ -15,7 +15,7 @@ from typing import Any
 import yaml
 
 from objreg_ros.data import Intrinsics
-from objreg_ros.recording.text import read_text
+from objreg_ros.recording.text import SETTINGS_BYTES, read_text
 
 FOCAL_PX, FOCAL_WIDTH = 525.0, 640  # the default camera's focal length, and of which width of a picture it is
 DEPTH_SCALE = 5000.0  # steps of depth in a metre
@@ -64,10 +64,11 @@ def _default(width: int, height: int) -> dict[str, float]:
 
 def _told(file: Path) -> dict[str, Any]:
     """What the file says, by key. A key without a value says nothing."""
+    text = read_text(file, SETTINGS_BYTES)
     try:
-        values = yaml.safe_load(read_text(file))
-    except yaml.YAMLError as error:
-        raise ValueError(f"{file}: expected YAML, got: {error}") from error
+        values = yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise ValueError(f"{file}: expected YAML, got: {' '.join(str(error).split())}") from error
     if not isinstance(values, dict):
         raise ValueError(f"{file}: expected a mapping like fx: 525.0, got {type(values).__name__}")
     told = {str(key): value for key, value in values.items() if value is not None}

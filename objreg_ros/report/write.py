@@ -17,6 +17,7 @@ from objreg_ros.recording import Recording
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.opening import open_recording
 from objreg_ros.recording.poses import pose_of
+from objreg_ros.recording.text import read_text
 from objreg_ros.report.form import require_form
 from objreg_ros.report.page import page
 from objreg_ros.report.pictures import Album
@@ -104,8 +105,8 @@ def _of_nodes(summary: Mapping[str, Any]) -> dict[str, Any]:
 
 def _read(file: Path) -> Mapping[str, Any]:
     try:
-        summary = json.loads(file.read_text(encoding="utf-8"))
-    except ValueError as error:
+        summary = json.loads(read_text(file))
+    except (ValueError, RecursionError) as error:
         raise ValueError(f"{file}: expected the JSON of `objreg offline --json`, got: {error}") from error
     if not isinstance(summary, dict) or "constraints" not in summary:
         raise ValueError(f"{file}: expected the JSON of `objreg offline --json`, got JSON without constraints")

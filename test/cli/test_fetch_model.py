@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
+from hashlib import sha256
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
@@ -134,7 +135,7 @@ def test_a_wrong_checksum_is_refused_and_nothing_is_left(server: Server, content
 def test_a_web_page_is_no_model(server: Server, tmp_path: Path) -> None:
     server.content = b"<html>Please log in</html>"
     with pytest.raises(ValueError, match="expected an ONNX file"):
-        fetch(Source("some.onnx", (server.url,)), tmp_path / "some.onnx")
+        fetch(Source("some.onnx", (server.url,), sha256(server.content).hexdigest()), tmp_path / "some.onnx")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -158,7 +159,7 @@ def test_offline_the_error_says_what_was_tried_and_what_to_do(tmp_path: Path) ->
 def test_a_missing_page_is_named_with_its_status(server: Server, tmp_path: Path) -> None:
     server.status = 404
     with pytest.raises(ValueError, match=r"some\.onnx: Not Found"):
-        fetch(Source("some.onnx", (server.url,)), tmp_path / "some.onnx")
+        fetch(Source("some.onnx", (server.url,), "00"), tmp_path / "some.onnx")
 
 
 @pytest.mark.parametrize("what", ["unheard-of", "ftp://host/a.onnx", "https://host/page.html", "file:///etc/a.onnx"])
@@ -171,10 +172,11 @@ def test_the_command_puts_the_model_where_the_detector_looks_for_it(
     server: Server, content: bytes, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
-    first = CliRunner().invoke(command, [server.url])
+    words = [server.url, "--sha256", source(server, content, tmp_path).sha256]
+    first = CliRunner().invoke(command, words)
     assert first.exit_code == 0 and "--model some.onnx" in first.output
     assert share.model("some.onnx").read_bytes() == content
-    again = CliRunner().invoke(command, [server.url])
+    again = CliRunner().invoke(command, words)
     assert "already there" in again.output and len(server.asked) == 1
 
 
@@ -188,3 +190,37 @@ def test_a_named_model_brings_its_labels(
     assert result.exit_code == 0, result.output
     lines = (tmp_path / "here" / "some.txt").read_text().splitlines()
     assert lines[:2] == ["???", "person"] and len(lines) == 91
+
+
+def test_plain_http_is_taken_with_a_checksum_only() -> None:
+    url = "http://host/a.onnx"
+    with pytest.raises(
+        ValueError, match=r"expected https, or --sha256 with the checksum .*, got 'http://host/a\.onnx'"
+    ):
+        find_source(url)
+    assert find_source(url, "AB").sha256 == "ab" and find_source("https://host/a.onnx").sha256 == ""
+
+
+def test_an_address_that_leads_on_to_plain_http_is_refused_without_a_checksum(
+    server: Server, content: bytes, tmp_path: Path
+) -> None:
+    with pytest.raises(ValueError, match=r"expected https all the way, or --sha256.*got http://127"):
+        fetch(Source("some.onnx", (server.url,)), tmp_path / "some.onnx")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_checksum_that_was_found_is_said_where_none_was_asked_for(
+    server: Server, content: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(fetch_model, "require_https", lambda *_: None)
+    fetch(Source("some.onnx", (server.url,)), tmp_path / "some.onnx")
+    assert f"SHA-256 {checksum(tmp_path / 'some.onnx')}" in capsys.readouterr().out
+
+
+def test_a_download_without_end_is_ended(
+    server: Server, content: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fetch_model, "MOST_BYTES", 70_000)
+    with pytest.raises(ValueError, match=r"some\.onnx: expected a model of at most 70000 bytes, got more"):
+        fetch(source(server, content, tmp_path), tmp_path / "some.onnx")
+    assert [file.name for file in tmp_path.iterdir()] == ["reference"]

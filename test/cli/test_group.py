@@ -76,3 +76,25 @@ def test_sigterm_ends_what_was_begun_and_says_so_by_its_status(
 
 def test_the_group_is_a_click_group() -> None:
     assert isinstance(group, click.Group)
+
+
+def test_an_error_of_many_lines_is_told_in_one(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(**_: object) -> None:
+        raise ValueError("expected this,\n  got\tthat")
+
+    monkeypatch.setattr(group, "main", fail)
+    with pytest.raises(SystemExit) as end:
+        main("offline")
+    assert end.value.code == 1 and capsys.readouterr().err == "objreg: expected this, got that\n"
+
+
+@pytest.mark.parametrize("bug", [MemoryError, RecursionError, OverflowError, TypeError])
+def test_a_bug_shows_its_traceback(bug: type[Exception], monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(**_: object) -> None:
+        raise bug
+
+    monkeypatch.setattr(group, "main", fail)
+    with pytest.raises(bug):
+        main("offline")

@@ -131,6 +131,10 @@ def test_other_outputs_are_refused_with_expected_and_got(outputs: Mapping[str, n
         tf(outputs)
 
 
+def encoded(priors: list[list[float]]) -> str:
+    return raw_metadata(np.array(priors), [])["objreg.priors"]
+
+
 def raw(heads: Mapping[str, np.ndarray], metadata: Mapping[str, str], labels: int = 2) -> RawSsd:
     ports = tuple(Port(name, "float", (None,)) for name in heads)
     contract = recognise((Port("x", "uint8", (1, 30, 40, 3)),), ports, metadata, heads, labels, "auto")
@@ -185,13 +189,23 @@ def test_fewer_labels_than_classes_are_refused() -> None:
         {"objreg.contract": "ssd_raw/9"},
         {"objreg.priors": "no base64!"},
         {"objreg.priors": "AAAA"},
+        {"objreg.priors": encoded([[0.5, 0.5, np.nan, 0.2], [0.5, 0.5, 0.2, 0.2]])},
+        {"objreg.priors": encoded([[0.5, 0.5, 0.2, 0.2], [np.inf, 0.5, 0.2, 0.2]])},
+        {"objreg.priors": encoded([[0.5, 0.5, 0.2, 0.2], [0.5, 0.5, 0.0, 0.2]])},
         {"objreg.variances": "[1, 2]"},
+        {"objreg.variances": "[0.1, 0.1, NaN, 0.2]"},
+        {"objreg.variances": "[0.1, 0.1, 0.2, Infinity]"},
+        {"objreg.variances": "[0.1, 0.1, 0.2, 1e300]"},
+        {"objreg.variances": "[0.1, 0.1, 0.2, -0.2]"},
+        {"objreg.variances": f"[0.1, 0.1, 0.2, 1{'0' * 400}]"},
+        {"objreg.variances": "[" * 100_000},
     ],
 )
 def test_metadata_of_another_kind_are_refused(changed: dict[str, str]) -> None:
     key = next(iter(changed))
-    with pytest.raises(ValueError, match=f"{key}: expected|expected {key}"):
+    with pytest.raises(ValueError, match=f"{key}: expected|expected {key}") as refusal:
         raw(HEADS, raw_metadata(PRIORS, ["a", "b"]) | changed)
+    assert len(str(refusal.value)) < 400 and "got" in str(refusal.value)
 
 
 def test_raw_heads_without_metadata_are_refused() -> None:

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 
+from objreg_ros.detector import labels
 from objreg_ros.detector.labels import find_labels, read_labels
 
 
@@ -39,7 +41,7 @@ def test_no_labels_at_all_are_refused_with_the_places_that_were_searched(tmp_pat
         find_labels(tmp_path / "m.onnx", None, {})
 
 
-@pytest.mark.parametrize("text", ["not json", "{}", "[]", "[1]", '[""]'])
+@pytest.mark.parametrize("text", ["not json", "{}", "[]", "[1]", '[""]', "[" * 100_000, "9" * 5000])
 def test_labels_that_are_no_list_of_names_are_refused(text: str, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="expected a JSON list of names"):
         find_labels(tmp_path / "m.onnx", None, {"objreg.labels": text})
@@ -53,3 +55,17 @@ def test_a_file_that_is_no_list_of_names_is_refused(content: bytes, tmp_path: Pa
         read_labels(path)
     with pytest.raises(ValueError, match="one label a line"):
         read_labels(tmp_path / "absent.txt")
+
+
+def test_what_is_no_file_of_labels_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.txt")
+    for path in (tmp_path / "pipe.txt", Path("/dev/zero"), tmp_path):
+        with pytest.raises(ValueError, match=r"expected a file of one label a line, .* got a folder, pipe or device"):
+            read_labels(path)
+
+
+def test_a_file_that_is_too_long_for_labels_is_refused_unread(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "labels.txt").write_text("person")
+    monkeypatch.setattr(labels, "FILE_BYTES", 5)
+    with pytest.raises(ValueError, match="one label a line, at most 5 bytes, got 6 bytes"):
+        read_labels(tmp_path / "labels.txt")

@@ -58,3 +58,16 @@ def test_an_input_that_is_no_picture_is_refused_with_expected_and_got(inputs: tu
 def test_a_mean_that_is_no_number_is_refused() -> None:
     with pytest.raises(ValueError, match=r"objreg.mean: expected a number or a list of three"):
         Picture.of((Port("x", "float", (1, 30, 40, 3)),), {"objreg.mean": "[1, 2]"})
+
+
+@pytest.mark.parametrize("size", [(100_000, 100_000), (50_000_001, None), (None, 1 << 40), (-1, 300)])
+def test_a_picture_that_takes_too_much_memory_is_refused_before_it_is_taken(size: tuple[int | None, ...]) -> None:
+    with pytest.raises(ValueError, match=r"expected a picture of at most 50000000 pixels, got x uint8 .* smaller"):
+        Picture.of((Port("x", "uint8", (1, *size, 3)),), {})
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, "NaN", "[1, 2, Infinity]", "1e300", "1" + "0" * 400])
+def test_a_scale_that_no_picture_has_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match=r"objreg.scale: expected") as refusal:
+        Picture.of((Port("x", "float", (1, 30, 40, 3)),), {"objreg.scale": text})
+    assert len(str(refusal.value)) < 200

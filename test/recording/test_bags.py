@@ -10,10 +10,10 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability
 from rosbags.rosbag1 import Writer as Rosbag1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from objreg_ros.bridge import from_msg
-from objreg_ros.recording import Record, messages, open_recording, write_rosbag2
+from objreg_ros.recording import Record, bags, messages, open_recording, write_rosbag2
 from objreg_ros.recording.messages import standard_types
 
 from .folders import CAMERA, humble_bag, records, robot_bag
@@ -309,3 +309,57 @@ def test_an_empty_bag_has_no_topics(tmp_path: Path) -> None:
     with open_recording(tmp_path / "bag") as recording:
         assert recording.topics == {} and recording.seconds == 0 and list(recording.records()) == []
     shutil.rmtree(tmp_path / "bag")
+
+
+@pytest.mark.parametrize(("at", "value"), [(13, 0x40), (16, 0x40), (16, 0xFF)])
+def test_a_size_that_no_memory_holds_is_a_broken_bag(at: int, value: int, tmp_path: Path) -> None:
+    write_rosbag2(tmp_path / "bag", records())
+    (file,) = (tmp_path / "bag").glob("*.mcap")
+    content = bytearray(file.read_bytes())
+    content[at] = value
+    file.write_bytes(content)
+    with pytest.raises(ValueError, match=r"expected a whole bag, got: .*; truncated or corrupt\? `mcap recover`"):
+        open_recording(file)
+
+
+def test_metadata_that_nest_without_end_are_a_broken_bag(bag: Path) -> None:
+    (bag / "metadata.yaml").write_text("rosbag2_bagfile_information: " + "[" * 5000)
+    with pytest.raises(ValueError, match="expected a whole bag, got: RecursionError"):
+        open_recording(bag)
+
+
+def test_metadata_that_are_too_long_are_refused_unread(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bags, "METADATA_BYTES", 100)
+    with pytest.raises(ValueError, match=r"metadata\.yaml: expected at most 100 bytes of metadata, got \d+"):
+        open_recording(bag)
+
+
+def test_times_that_no_clock_has_are_a_broken_bag(tmp_path: Path) -> None:
+    write_rosbag2(tmp_path / "bag", records())
+    file, content = tmp_path / "bag/metadata.yaml", (tmp_path / "bag/metadata.yaml").read_text()
+    file.write_text(content.replace("nanoseconds_since_epoch: 1000000000", f"nanoseconds_since_epoch: {10**30}"))
+    with pytest.raises(ValueError, match="expected a whole bag, got: records from 1000"):
+        open_recording(tmp_path / "bag")
+
+
+@pytest.mark.parametrize(
+    ("definition", "got"),
+    [
+        ("std_msgs/Header header", "without height"),
+        ("std_msgs/Header header\nstring height", "with another height"),
+    ],
+)
+def test_messages_whose_definition_in_the_bag_lacks_what_is_read_are_broken(
+    definition: str, got: str, tmp_path: Path
+) -> None:
+    kind, types = "sensor_msgs/msg/Image", get_typestore(Stores.EMPTY)
+    parts = (f"{definition}\n{'=' * 80}\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n"
+             f"{'=' * 80}\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n")  # fmt: skip
+    types.register(get_types_from_msg(parts, kind))
+    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        writer.write(writer.add_connection("/image", kind, typestore=types), 5, b"\0\1\0\0" + bytes(40))
+    with (
+        open_recording(tmp_path / "bag") as recording,
+        pytest.raises(ValueError, match=rf"{got}; truncated or corrupt"),
+    ):
+        _ = next(recording.records()).message

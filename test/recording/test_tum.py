@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import os
+import signal
+import zlib
 from pathlib import Path
 
 import cv2
@@ -9,6 +12,7 @@ import pytest
 
 from objreg_ros.bridge import from_msg
 from objreg_ros.recording import open_recording
+from objreg_ros.recording.tum import ASSOCIATION_NS, Picture, _associate
 
 from .folders import numbered_folder, tum_folder
 
@@ -207,3 +211,93 @@ def test_a_real_folder_has_its_frames_and_its_truth(shared: Path) -> None:
     first = {r.topic: r.message for r in recording.records(end_ns=1)}
     assert 0.5 < np.median(from_msg.depth(first["/depth/image"])) < 4
     assert from_msg.odometry(first["/ground_truth"]).T_odom_body[0, 3] == pytest.approx(-0.316542)
+
+
+def outside(folder: Path) -> Path:
+    """A picture beside the folder."""
+    picture = folder.parent / "secret.png"
+    cv2.imwrite(str(picture), np.zeros((48, 64, 3), np.uint8))
+    return picture
+
+
+@pytest.mark.parametrize(
+    "name", ["../secret.png", "{}", "rgb/../../secret.png", "rgb/link.png", "linked/secret.png", ".."]
+)
+def test_a_list_does_not_reach_out_of_its_folder(name: str, tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path / "tum")
+    secret = outside(folder)
+    (folder / "rgb/link.png").symlink_to(secret)
+    (folder / "linked").symlink_to(tmp_path)
+    (folder / "associations.txt").write_text(f"0.0 {name.format(secret)} 0.0 depth/0.000000.png")
+    with pytest.raises(ValueError, match=r"tum: expected pictures inside of this folder, got .* copy it there"):
+        open_recording(folder)
+
+
+def test_links_within_the_folder_and_to_the_folder_are_followed(tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path / "tum")
+    (folder / "other").symlink_to(folder / "rgb")
+    (folder / "other/link.png").symlink_to("0.000000.png")
+    (folder / "associations.txt").write_text("0.0 other/link.png 0.0 rgb/../depth/0.000000.png")
+    (tmp_path / "alias").symlink_to(folder)
+    for place in (folder, tmp_path / "alias"):
+        assert next(open_recording(place).records(["/image"])).message.width == 64
+
+
+@pytest.mark.parametrize("name", ["rgb/loop.png", "rgb/0.000000.png/x", "rgb/dangling.png"])
+def test_links_and_names_that_lead_nowhere_are_missing(name: str, tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path)
+    (folder / "rgb/loop.png").symlink_to("loop.png")
+    (folder / "rgb/dangling.png").symlink_to("nowhere.png")
+    (folder / "associations.txt").write_text(f"0.0 {name} 0.0 depth/0.000000.png")
+    with pytest.raises(OSError, match=r"expected the picture|symbolic links"):
+        open_recording(folder)
+
+
+@pytest.mark.parametrize("file", ["rgb/0.000000.png", "associations.txt", "groundtruth.txt", "camera.yaml"])
+def test_a_pipe_in_a_folder_is_not_waited_for(file: str, tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path)
+    (folder / file).unlink()
+    os.mkfifo(folder / file)
+    with pytest.raises(ValueError, match=rf"{file}: expected a regular file, got a pipe"):
+        open_recording(folder)
+
+
+def test_a_picture_that_opencv_refuses_is_named(tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path)
+    file = folder / "depth/0.100000.png"
+    content = bytearray(file.read_bytes())
+    content[16:24] = b"\0\0\xff\xff" * 2  # the size in the header
+    content[29:33] = zlib.crc32(content[12:29]).to_bytes(4, "big")
+    file.write_bytes(content)
+    with pytest.raises(ValueError, match=r"0\.100000\.png: expected a picture, got"):
+        _ = [record.message for record in open_recording(folder).records(["/depth/image"])]
+
+
+def greedy(colour: list[Picture], depth: list[Picture]) -> list[tuple[int, int]]:
+    """The stamps of the pairs as the benchmark makes them, in the plainest way."""
+    near = sorted((abs(c - d), c, d) for c, _ in colour for d, _ in depth if abs(c - d) <= ASSOCIATION_NS)
+    pairs: dict[int, int] = {}
+    for _, c, d in near:
+        if c not in pairs and d not in pairs.values():
+            pairs[c] = d
+    return sorted(pairs.items())
+
+
+def test_pairs_are_those_of_the_plain_way(tmp_path: Path) -> None:
+    random = np.random.default_rng(0)
+    for _ in range(20):
+        step = 45_000_000  # so that a picture has at most two neighbours in reach
+        colour, depth = ([(int(i * step + random.integers(0, step // 2)), f"{i}") for i in range(30)] for _ in range(2))
+        assert [(c, d) for c, _, d, _ in _associate(colour, depth)] == greedy(colour, depth)
+
+
+def test_the_work_for_a_list_grows_as_the_list() -> None:
+    count = 100_000
+    pictures = [(i * 33_000_000, str(i)) for i in range(count)]
+    before = signal.signal(signal.SIGALRM, lambda *_: pytest.fail("the pairs of a long list do not end"))
+    signal.alarm(60)
+    try:
+        assert len(_associate(pictures, pictures)) == count
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)

@@ -65,3 +65,10 @@ def test_distortion_that_is_no_list_of_numbers_is_refused(value: str, tmp_path: 
 def test_a_depth_scale_that_divides_nothing_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"depth_scale 0\.0, which is none above 0"):
         camera(tmp_path, "fx: 500\ndepth_scale: 0")
+
+
+@pytest.mark.parametrize("text", ["fx: " + "[" * 5000, "fx: " + "9" * 5000, "fx: 2020-99-99", "fx: [\n- a\n b: ]"])
+def test_yaml_that_nests_or_says_what_no_reader_takes_is_refused_in_one_line(text: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"camera\.yaml: expected YAML, got: ") as refusal:
+        camera(tmp_path, text)
+    assert "\n" not in str(refusal.value)
