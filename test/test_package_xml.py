@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every key of package.xml leads to something that Ubuntu 24.04 (noble) with Jazzy can install.
 
-The table was checked by hand against rosdistro at 8468e88: `rosdep/python.yaml` for the system's packages and pip's,
-`jazzy/distribution.yaml` for ROS's, which must be released there. rosdep's lists name no releases of Ubuntu for most
-keys (`ubuntu: [python3-numba]`), so that the package is in noble was looked up with Ubuntu: the versions are noble's.
-To add a key, look it up in both, then write it here.
+Every key was looked up in rosdistro at 8468e88: `rosdep/python.yaml` for the system's packages and pip's, and
+`jazzy/distribution.yaml` for ROS's, where it must be released. A rosdep key seldom says in which Ubuntu its package is
+(`ubuntu: [python3-numba]`, which noble has not), so look at packages.ubuntu.com/noble too. The versions in the table
+are those that noble is known by, not read from its archive: the workflow for Ubuntu 24.04, which installs them, is the
+proof.
+To add a key, look it up in all of these, then write it here.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ RELEASED_IN_JAZZY = {
     "builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "launch", "launch_ros", "nav_msgs", "rcl_interfaces",
     "rclpy", "rosgraph_msgs", "sensor_msgs", "std_msgs", "std_srvs", "tf2_ros_py", "vision_msgs", "visualization_msgs",
 }  # fmt: skip
-IN_NOBLE = {  # key → (package of Ubuntu, or of PyPI by pip; the oldest version that will do is in setup.py)
+IN_NOBLE = {  # key → what it leads to: a package of Ubuntu with its version, or one of PyPI
     "python3-click": "python3-click 8.1.6",
     "python3-hypothesis": "python3-hypothesis 6.98.15",
     "python3-matplotlib": "python3-matplotlib 3.6.3",
