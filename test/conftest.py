@@ -1,9 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fixtures for every test."""
+"""Fixtures for every test, what becomes of a file whose imports are absent, and the count of what ran.
+
+No file skips as it is imported: launch_testing's plugin, which comes with every ROS, turns one such skip into a skip of
+the whole session.
+"""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -13,6 +19,12 @@ from hypothesis import settings
 settings.register_profile("desk", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "desk")
+
+RUN_AT_LEAST = 1500  # of more than twice as many; without ROS, onnx, torch and recordings it is still fewer that skip
+OPTIONAL = {"rclpy", "launch_ros", "onnx", "torch"}
+if find_spec("rclpy") is None:  # messages are a part of ROS; beside an rclpy, a missing one is an error
+    OPTIONAL |= {f"{name}_msgs" for name in ("diagnostic", "geometry", "nav", "sensor", "std", "visualization")}
+    OPTIONAL |= {"builtin_interfaces", "rcl_interfaces", "rosgraph_msgs", "std_srvs"}
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 
@@ -30,3 +42,65 @@ def shared() -> Path:
     if not (folder / "data").is_dir():
         pytest.skip(f"no recordings at {folder}; set OBJREG_SHARED to the folder that holds data/ and models/")
     return folder
+
+
+class Absence(pytest.Item):
+    """Stands for the tests of a file that need what is not installed: one skip with its reason."""
+
+    def runtest(self) -> None:
+        pytest.skip(self.name)
+
+    def reportinfo(self) -> tuple[Path, None, str]:
+        return self.path, None, self.name
+
+
+class File(pytest.Module):
+    """A file of tests, which need not be able to import what is optional."""
+
+    def collect(self) -> Iterable[pytest.Item | pytest.Collector]:
+        try:
+            return super().collect()
+        except self.CollectError as error:
+            missing = error.__cause__
+            if not isinstance(missing, ModuleNotFoundError) or missing.name not in OPTIONAL:
+                raise
+        return [Absence.from_parent(self.parent, name=f"{self.path.name} needs {missing.name}, which is not installed")]
+
+
+@pytest.hookimpl(tryfirst=True)  # before launch_testing's, which imports every file by itself
+def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector) -> pytest.Module | None:
+    return None if module_path.name == "__init__.py" else File.from_parent(parent, path=module_path)
+
+
+class Count:
+    """Fails a session of the whole suite in which hardly a test ran, and says so."""
+
+    def __init__(self) -> None:
+        self.ran = 0
+        self.too_few = False
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        self.ran += report.when == "call" and not report.skipped
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        ended_well = session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
+        self.too_few = ended_well and is_whole(session.config) and self.ran < RUN_AT_LEAST
+        if self.too_few:
+            session.exitstatus = pytest.ExitCode.USAGE_ERROR  # colcon takes "no tests" for success
+
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        if self.too_few:
+            terminalreporter.write_line(f"expected {RUN_AT_LEAST} tests or more to run, got {self.ran}", red=True)
+
+
+def is_whole(config: pytest.Config) -> bool:
+    """Whether every test is asked for: no path, no choice among the tests."""
+    chosen = ("keyword", "markexpr", "deselect", "ignore", "ignore_glob", "lf", "stepwise", "collectonly")
+    return config.args_source == config.ArgsSource.TESTPATHS and not any(
+        config.getoption(name, None) for name in chosen
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.pluginmanager.register(Count(), "count")

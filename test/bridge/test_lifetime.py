@@ -3,13 +3,10 @@
 
 from __future__ import annotations
 
-import pytest
-
-pytest.importorskip("rclpy", reason="ROS 2 is not installed")
-
 import _thread
 import threading
 
+import pytest
 import rclpy
 from rclpy.executors import ExternalShutdownException
 

@@ -3,9 +3,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-pytest.importorskip("rclpy", reason="the messages of ROS 2 are not installed")
-
 from visualization_msgs.msg import Marker
 
 from objreg_ros.bridge.markers import GOLD, WHITE, Scene

@@ -10,9 +10,6 @@ from collections.abc import Callable, Iterator
 from functools import partial
 
 import pytest
-
-pytest.importorskip("rclpy", reason="ROS 2 is not installed")
-
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node

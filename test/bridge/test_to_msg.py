@@ -9,8 +9,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-pytest.importorskip("rclpy", reason="the messages of ROS 2 are not installed")
-
 from objreg_ros.bridge import from_msg, to_msg
 from objreg_ros.bridge.layout import OBJECTS, SUPPORT_ID, table
 from objreg_ros.data import (

@@ -10,14 +10,13 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import numpy as np
+import onnx
 import pytest
 from click.testing import CliRunner
 
 from objreg_ros import share
 from objreg_ros.cli import fetch_model
 from objreg_ros.cli.fetch_model import Source, checksum, command, fetch, find_source
-
-onnx = pytest.importorskip("onnx", reason="the model to fetch is made with onnx")
 
 
 class Server(ThreadingHTTPServer):

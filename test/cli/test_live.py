@@ -11,8 +11,6 @@ from typing import Any, Self
 import numpy as np
 import pytest
 
-pytest.importorskip("rclpy", reason="ROS 2 is not installed")
-
 from objreg_ros.bridge.ledger import Balance
 from objreg_ros.cli.live import ROOMS, Live, Setup, private_environment, run_live
 from objreg_ros.data import LoopClosure, Reason, Rejected

@@ -7,11 +7,8 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 
-import pytest
-
-pytest.importorskip("rclpy", reason="ROS 2 is not installed")
-
 import click
+import pytest
 from click.testing import CliRunner, Result
 from rclpy.executors import ExternalShutdownException
 from recording.folders import STEP_NS, humble_bag, noetic_bag, records, robot_bag, tum_folder

@@ -10,9 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
-
-onnx = pytest.importorskip("onnx", reason="the tiny models are made with onnx")
+import onnx
 
 TFLITE = ("TFLite_Detection_PostProcess", "TFLite_Detection_PostProcess:1", "TFLite_Detection_PostProcess:2",
           "TFLite_Detection_PostProcess:3")  # fmt: skip

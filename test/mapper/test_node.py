@@ -13,24 +13,22 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rclpy
+from geometry_msgs.msg import TransformStamped
+from nav_msgs.msg import Odometry as OdometryMsg
+from nav_msgs.msg import Path as PathMsg
+from rclpy.executors import SingleThreadedExecutor
+from std_srvs.srv import SetBool, Trigger
 
-rclpy = pytest.importorskip("rclpy", reason="the door needs ROS 2")
+from objreg_ros.bridge import from_msg, qos, to_msg
+from objreg_ros.bridge.log import ThrottledLog
+from objreg_ros.data import LoopClosure
+from objreg_ros.geometry import pose, rotation_from_vector
+from objreg_ros.mapper.node import MapperNode
+from objreg_ros.mapper.optimisation import Solution
+from objreg_ros.mapper.pose_graph import Problem
 
-from geometry_msgs.msg import TransformStamped  # noqa: E402
-from nav_msgs.msg import Odometry as OdometryMsg  # noqa: E402
-from nav_msgs.msg import Path as PathMsg  # noqa: E402
-from rclpy.executors import SingleThreadedExecutor  # noqa: E402
-from std_srvs.srv import SetBool, Trigger  # noqa: E402
-
-from objreg_ros.bridge import from_msg, qos, to_msg  # noqa: E402
-from objreg_ros.bridge.log import ThrottledLog  # noqa: E402
-from objreg_ros.data import LoopClosure  # noqa: E402
-from objreg_ros.geometry import pose, rotation_from_vector  # noqa: E402
-from objreg_ros.mapper.node import MapperNode  # noqa: E402
-from objreg_ros.mapper.optimisation import Solution  # noqa: E402
-from objreg_ros.mapper.pose_graph import Problem  # noqa: E402
-
-from .bent import SECOND, bent, closure, odometry, square  # noqa: E402
+from .bent import SECOND, bent, closure, odometry, square
 
 TRUE = square(laps=2)
 BENT = bent(TRUE)

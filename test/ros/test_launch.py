@@ -11,10 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import launch_ros  # noqa: F401  (the folder launch/ of the checkout would pass for launch)
 import pytest
-
-pytest.importorskip("launch_ros", reason="launch and launch_ros are not installed")
-
 from recording.folders import tum_folder
 
 from launch import LaunchContext

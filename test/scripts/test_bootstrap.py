@@ -12,44 +12,85 @@ import pytest
 
 PYTHON = """#!/bin/bash
 case "$1 $2" in
-  "-V "*) echo Python 3.12.0 ;;
-  "-c import rclpy") exit 1 ;;
-  "-m pip") echo "${@: -1}" >> "$NOTES" ;;
+  "-V "*) echo Python ${PYTHON_VERSION:-3.12.0} ;;
+  "-c import rclpy") [[ -n "${ROS_DISTRO:-}" ]] ;;
+  "-m pip") shift 6; echo "$*" >> "$NOTES" ;;
 esac
 """
+BUILD = "--require-hashes --requirement requirements/build.lock"
+LOCKED = "--require-hashes --no-build-isolation --requirement requirements/python3.12.lock"
+TESTING = f"{LOCKED} --requirement requirements/python3.12-test.lock"
+ITSELF = "--no-build-isolation --no-deps --editable ."
 
 
 @pytest.fixture
 def checkout(repository: Path, tmp_path: Path) -> Path:
     """A checkout whose environment is there and empty."""
-    for name in ("scripts/bootstrap", "setup.py"):
+    for name in ("scripts/bootstrap", "setup.py", "config/constraints.txt", *locks(repository)):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copy(repository / name, tmp_path / name)
     python = tmp_path / ".venv" / "bin" / "python"
     python.parent.mkdir(parents=True)
     python.write_text(PYTHON)
     python.chmod(0o755)
+    uname = tmp_path / "bin" / "uname"
+    uname.parent.mkdir()
+    uname.write_text('#!/bin/bash\necho "${SYSTEM:-Linux x86_64}"\n')
+    uname.chmod(0o755)
     return tmp_path
 
 
-def bootstrap(checkout: Path, *words: str) -> list[str]:
+def locks(repository: Path) -> list[str]:
+    return [str(path.relative_to(repository)) for path in (repository / "requirements").glob("*.lock")]
+
+
+def bootstrap(checkout: Path, *words: str, **variables: str) -> list[str]:
     """What pip is asked to install."""
+    return heard(checkout, *words, **variables)[0]
+
+
+def heard(checkout: Path, *words: str, **variables: str) -> tuple[list[str], str]:
+    """What pip is asked to install, and what the script says."""
     notes = checkout / "notes"
     notes.write_text("")
-    environment = {**os.environ, "PYTHON": str(checkout / ".venv/bin/python"), "NOTES": str(notes)}
-    subprocess.run([checkout / "scripts/bootstrap", *words], env=environment, check=True, capture_output=True)
-    return notes.read_text().split()
+    environment = {name: value for name, value in os.environ.items() if name != "ROS_DISTRO"}
+    environment |= {"PYTHON": str(checkout / ".venv/bin/python"), "NOTES": str(notes)}
+    environment |= {"PATH": f"{checkout / 'bin'}:{os.environ['PATH']}", **variables}
+    said = subprocess.run(
+        [checkout / "scripts/bootstrap", *words], env=environment, check=True, capture_output=True, text=True
+    )
+    return notes.read_text().splitlines(), said.stderr
 
 
 def test_what_is_there_is_not_installed_again(checkout: Path) -> None:
-    assert bootstrap(checkout) == [".[ros]"]
+    assert bootstrap(checkout) == [BUILD, LOCKED, ITSELF]
     assert bootstrap(checkout) == []
-    assert bootstrap(checkout, "--test") == [".[test,ros]"]
+    assert bootstrap(checkout, "--test") == [BUILD, TESTING, ITSELF]
     assert bootstrap(checkout, "--test") == bootstrap(checkout) == []
 
 
-def test_what_another_setup_asked_for_is_not_taken_as_installed(checkout: Path) -> None:
+@pytest.mark.parametrize("changed", ["setup.py", "requirements/python3.12.lock"])
+def test_what_another_setup_or_lock_asked_for_is_not_taken_as_installed(checkout: Path, changed: str) -> None:
     bootstrap(checkout, "--test")
-    (checkout / "setup.py").write_text("# it asks for more now\n")
-    assert bootstrap(checkout) == [".[ros]"]
-    assert bootstrap(checkout, "--test") == [".[test,ros]"]
+    (checkout / changed).write_text("# it asks for more now\n")
+    assert bootstrap(checkout) == [BUILD, LOCKED, ITSELF]
+    assert bootstrap(checkout, "--test") == [BUILD, TESTING, ITSELF]
+
+
+@pytest.mark.parametrize(
+    ("variables", "wanted", "reason"),
+    [
+        ({"PYTHON_VERSION": "3.13.0"}, "--editable .[ros]", "no lock fits Python 3.13.0 on Linux x86_64"),
+        ({"SYSTEM": "Linux aarch64"}, "--editable .[ros]", "no lock fits Python 3.12.0 on Linux aarch64"),
+        (
+            {"ROS_DISTRO": "jazzy"},
+            "--editable . --constraint config/constraints.txt",
+            "no lock fits Python 3.12.0 beside a sourced ROS",
+        ),
+    ],
+)
+def test_where_no_lock_fits_pip_chooses_and_the_script_says_so(
+    checkout: Path, variables: dict[str, str], wanted: str, reason: str
+) -> None:
+    asked, said = heard(checkout, **variables)
+    assert asked == [wanted] and reason in said

@@ -11,17 +11,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2
+from std_msgs.msg import String
 
-rclpy = pytest.importorskip("rclpy", reason="the door needs ROS 2")
-
-from rclpy.executors import SingleThreadedExecutor  # noqa: E402
-from sensor_msgs.msg import CameraInfo, Image, PointCloud2  # noqa: E402
-from std_msgs.msg import String  # noqa: E402
-
-from objreg_ros.bridge import qos, to_msg  # noqa: E402
-from objreg_ros.data import DepthImage, Detections, Intrinsics  # noqa: E402
-from objreg_ros.segmenter.node import LOOK_S, SegmenterNode  # noqa: E402
-from objreg_ros.segmenter.segment import Segmenter  # noqa: E402
+from objreg_ros.bridge import qos, to_msg
+from objreg_ros.data import DepthImage, Detections, Intrinsics
+from objreg_ros.segmenter.node import LOOK_S, SegmenterNode
+from objreg_ros.segmenter.segment import Segmenter
 
 CAMERA = Intrinsics(fx=300.0, fy=300.0, cx=160.0, cy=120.0, width=320, height=240)
 NAMES = {0: "cup"}

@@ -4,11 +4,10 @@
 from __future__ import annotations
 
 import pytest
+import torch
 
-torch = pytest.importorskip("torch", reason="training needs torch")
-
-from training.embedded import Embedded, FromPixels, GroupedStem, centred, enlarged  # noqa: E402
-from training.network import MobileNetSsd, Residual, convolution  # noqa: E402
+from training.embedded import Embedded, FromPixels, GroupedStem, centred, enlarged
+from training.network import MobileNetSsd, Residual, convolution
 
 
 def restless(network: torch.nn.Module) -> torch.nn.Module:

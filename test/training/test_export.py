@@ -6,17 +6,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pytest
+import onnx  # noqa: F401  (the export needs it)
+import torch
 
-torch = pytest.importorskip("torch", reason="training needs torch")
-pytest.importorskip("onnx", reason="the export needs onnx")
-
-from objreg_ros.data import ColourImage  # noqa: E402
-from objreg_ros.detector.mobilenet_ssd import Detector  # noqa: E402
-from objreg_ros.detector.params import DetectorParams  # noqa: E402
-from training.export import export  # noqa: E402
-from training.labels import LABELS  # noqa: E402
-from training.network import MobileNetSsd  # noqa: E402
+from objreg_ros.data import ColourImage
+from objreg_ros.detector.mobilenet_ssd import Detector
+from objreg_ros.detector.params import DetectorParams
+from training.export import export
+from training.labels import LABELS
+from training.network import MobileNetSsd
 
 
 def test_a_network_that_sees_one_thing_is_exported_and_seen_by_the_detector(tmp_path: Path) -> None:

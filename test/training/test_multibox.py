@@ -5,12 +5,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import torch
 
-torch = pytest.importorskip("torch", reason="training needs torch")
-
-from objreg_ros.detector import boxes as detector_boxes  # noqa: E402
-from training.labels import LABELS  # noqa: E402
-from training.multibox import (  # noqa: E402
+from objreg_ros.detector import boxes as detector_boxes
+from training.labels import LABELS
+from training.multibox import (
     ANSWERS,
     DIFFICULT,
     WANTED,
@@ -20,7 +19,7 @@ from training.multibox import (  # noqa: E402
     decode,
     generalised_iou,
 )
-from training.priors import INPUT_HW, VARIANCES, make_priors  # noqa: E402
+from training.priors import INPUT_HW, VARIANCES, make_priors
 
 CLASSES = 9
 PRIORS = torch.from_numpy(make_priors()) * torch.tensor([INPUT_HW[1], INPUT_HW[0]] * 2)

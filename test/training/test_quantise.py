@@ -6,16 +6,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import onnx
+import onnxruntime
 import pytest
+import torch
 
-torch = pytest.importorskip("torch", reason="training needs torch")
-onnx = pytest.importorskip("onnx", reason="the export needs onnx")
-onnxruntime = pytest.importorskip("onnxruntime")
-
-from training.export import OPSET, export  # noqa: E402
-from training.labels import LABELS  # noqa: E402
-from training.network import MobileNetSsd  # noqa: E402
-from training.priors import INPUT_HW  # noqa: E402
+from training.export import OPSET, export
+from training.labels import LABELS
+from training.network import MobileNetSsd
+from training.priors import INPUT_HW
 
 
 @pytest.fixture(scope="module")

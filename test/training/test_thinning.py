@@ -4,12 +4,10 @@
 from __future__ import annotations
 
 import pytest
+import torch
+from torch.nn import functional
 
-torch = pytest.importorskip("torch", reason="training needs torch")
-
-from torch.nn import functional  # noqa: E402
-
-from training.thinning import ThinningConvolution, by_input  # noqa: E402
+from training.thinning import ThinningConvolution, by_input
 
 
 @pytest.mark.parametrize(("height", "width"), [(12, 16), (15, 20), (8, 9), (1, 2)])

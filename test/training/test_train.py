@@ -6,13 +6,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import torch
 
-torch = pytest.importorskip("torch", reason="training needs torch")
-
-from training import train  # noqa: E402
-from training.multibox import WANTED  # noqa: E402
-from training.priors import INPUT_HW  # noqa: E402
-from training.train import Training, learning_rate, parse, recipe  # noqa: E402
+from training import train
+from training.multibox import WANTED
+from training.priors import INPUT_HW
+from training.train import Training, learning_rate, parse, recipe
 
 
 def batch(left: float = 40.0) -> tuple[torch.Tensor, torch.Tensor]:

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every key of package.xml leads to something that Ubuntu 24.04 (noble) with Jazzy can install.
+
+Every key was looked up in rosdistro at 8468e88: `rosdep/python.yaml` for the system's packages and pip's, and
+`jazzy/distribution.yaml` for ROS's, where it must be released. A rosdep key seldom says in which Ubuntu its package is
+(`ubuntu: [python3-numba]`, which noble has not), so look at packages.ubuntu.com/noble too. The versions in the table
+are those that noble is known by, not read from its archive: the workflow for Ubuntu 24.04, which installs them, is the
+proof.
+To add a key, look it up in all of these, then write it here.
+"""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+RELEASED_IN_JAZZY = {
+    "builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "launch", "launch_ros", "nav_msgs", "rcl_interfaces",
+    "rclpy", "rosgraph_msgs", "sensor_msgs", "std_msgs", "std_srvs", "tf2_ros_py", "vision_msgs", "visualization_msgs",
+}  # fmt: skip
+IN_NOBLE = {  # key → what it leads to: a package of Ubuntu with its version, or one of PyPI
+    "python3-click": "python3-click 8.1.6",
+    "python3-hypothesis": "python3-hypothesis 6.98.15",
+    "python3-matplotlib": "python3-matplotlib 3.6.3",
+    "python3-numpy": "python3-numpy 1.26.4",
+    "python3-onnxruntime-pip": "pip: onnxruntime",
+    "python3-open3d-pip": "pip: open3d",
+    "python3-opencv": "python3-opencv 4.6.0",
+    "python3-pytest": "python3-pytest 7.4.4",
+    "python3-rosbags-pip": "pip: rosbags",
+    "python3-scipy": "python3-scipy 1.11.4",
+    "python3-tqdm": "python3-tqdm 4.66.2",
+    "python3-yaml": "python3-yaml 6.0.1",
+}
+BY_REQUIREMENTS = {"numba"}  # requirements/robot.txt: noble has no python3-numba, and rosdep no key of pip's for it
+OTHER_NAMES = {"opencv-python-headless": "opencv", "pyyaml": "yaml"}
+
+
+def keys(repository: Path) -> list[str]:
+    root = ElementTree.parse(repository / "package.xml").getroot()
+    return [element.text or "" for element in root if element.tag.endswith("depend")]
+
+
+def required(repository: Path) -> dict[str, str]:
+    """The packages that setup.py asks for, each with its oldest version."""
+    (wanted,) = [
+        ast.literal_eval(node.value)
+        for node in ast.walk(ast.parse((repository / "setup.py").read_text()))
+        if isinstance(node, ast.keyword) and node.arg == "install_requires"
+    ]
+    return {name: oldest for name, _, oldest in (line.partition(">=") for line in wanted) if name != "setuptools"}
+
+
+def version(text: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in text.split("."))
+
+
+def test_no_key_is_named_that_nobody_has_looked_up_and_none_twice(repository: Path) -> None:
+    named = keys(repository)
+    assert sorted(named) == sorted(RELEASED_IN_JAZZY | set(IN_NOBLE))
+
+
+def test_whatever_setup_py_asks_for_comes_with_a_robot_too(repository: Path) -> None:
+    by_requirements = (repository / "requirements/robot.txt").read_text()
+    for name in required(repository):
+        key = f"python3-{OTHER_NAMES.get(name, name)}"
+        assert key in IN_NOBLE or f"{key}-pip" in IN_NOBLE or f"\n{name}>=" in by_requirements, name
+
+
+@pytest.mark.parametrize("key", [key for key, package in IN_NOBLE.items() if not package.startswith("pip: ")])
+def test_nobles_version_is_one_that_setup_py_takes(repository: Path, key: str) -> None:
+    oldest = {f"python3-{OTHER_NAMES.get(name, name)}": text for name, text in required(repository).items()}
+    assert version(IN_NOBLE[key].split()[1]) >= version(oldest.get(key, "0"))
+
+
+def test_what_requirements_bring_is_what_setup_py_asks_for(repository: Path) -> None:
+    lines = (repository / "requirements/robot.txt").read_text().splitlines()
+    assert {line for line in lines if not line.startswith("#")} == {
+        f"{name}>={required(repository)[name]}" for name in BY_REQUIREMENTS
+    }
