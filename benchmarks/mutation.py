@@ -234,6 +234,12 @@ def _field(draw: random.Random, cloud: Any) -> None:
     setattr(field, name, value)
 
 
+def _counted(draw: random.Random, cloud: Any) -> None:
+    """A field of several numbers."""
+    if cloud.fields:
+        draw.choice(cloud.fields).count = draw.choice((0, 2, 3, 4, 2**32 - 1))
+
+
 def _fields(draw: random.Random, cloud: Any) -> None:
     """Fields missing, twice, in another order, or many."""
     fields = list(cloud.fields)
@@ -292,7 +298,7 @@ def _crc(data: bytes) -> bytes:
 Recipe = Callable[[random.Random, Any], None]
 
 RECIPES: dict[type, tuple[Recipe, ...]] = {
-    PointCloud2: (_column, _column, _column, _retyped, _field, _fields, _shape),
+    PointCloud2: (_column, _column, _column, _retyped, _field, _counted, _fields, _shape),
     Image: (_encoding, _shape),
     CameraInfo: (_huge_camera,),
     CompressedImage: (_format, _claimed_size, _claimed_size),
