@@ -30,6 +30,7 @@ TARGETS = {"live detector": 1.0, "live segmenter": 1.0, "live registrar": 1.0, "
 BATCH = 40
 THROUGH_S = 30.0  # within which a good frame comes through again, on a machine that is busy
 PACE_S = 0.01
+START_S = 600.0  # a first start compiles kernels
 STEP_NS = good.SECOND // 10
 GOOD = 0.3  # of the frames in a batch
 DOMAIN = 48
@@ -113,17 +114,19 @@ class _Siege:
     def _start(self) -> None:
         """Start the node and see a good frame through."""
         self.graph.start(f"/{self.name}", self.name, *self._options)
-        self._sent = 0
-        for topic, message in self.room.before().items():
-            self.graph.publish(topic, message)
-        for topic, message in self.room.frame(self._now_ns).items():
-            self.graph.publish(topic, message)
-        self._sees_good(self.graph_patience())
+        for topic, message in {**self.room.before(), **self.room.frame(self._now_ns)}.items():
+            self._connect(topic, message)
+        self._sees_good(START_S)
 
-    @staticmethod
-    def graph_patience() -> float:
-        """For the first frame: kernels may be compiled."""
-        return 600.0
+    def _connect(self, topic: str, message: Any) -> None:
+        """Wait until the node listens to a topic."""
+        from objreg_ros.bridge import qos
+
+        if topic not in self.graph.publishers:
+            profile = qos.latched() if topic in ("labels", "constraints") else qos.room()
+            self.graph.publishers[topic] = self.graph.node.create_publisher(type(message), topic, profile)
+        publisher = self.graph.publishers[topic]
+        self.graph.wait_for(lambda: publisher.get_subscription_count() > 0, START_S, f"{self.name} on {topic}")
 
     def close(self) -> None:
         """End everything."""
@@ -205,8 +208,6 @@ class _Siege:
 
     def _restart(self) -> None:
         self.graph.stop(f"/{self.name}", 9)
-        self.graph.connected.clear()
-        self.graph.publishers.clear()
         self._start()
 
     def _last_words(self) -> str:
