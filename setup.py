@@ -43,6 +43,7 @@ setup(
         "onnxruntime>=1.17",
         "open3d>=0.18",
         "opencv-python-headless>=4.6",
+        "pillow>=9.4",
         "pyyaml>=6",
         "rosbags>=0.11",
         "scipy>=1.11",

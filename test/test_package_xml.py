@@ -29,6 +29,7 @@ IN_NOBLE = {  # key → what it leads to: a package of Ubuntu with its version, 
     "python3-onnxruntime-pip": "pip: onnxruntime",
     "python3-open3d-pip": "pip: open3d",
     "python3-opencv": "python3-opencv 4.6.0",
+    "python3-pil": "python3-pil 10.2.0",
     "python3-pytest": "python3-pytest 7.4.4",
     "python3-rosbags-pip": "pip: rosbags",
     "python3-scipy": "python3-scipy 1.11.4",
@@ -36,7 +37,7 @@ IN_NOBLE = {  # key → what it leads to: a package of Ubuntu with its version, 
     "python3-yaml": "python3-yaml 6.0.1",
 }
 BY_REQUIREMENTS = {"numba"}  # requirements/robot.txt: noble has no python3-numba, and rosdep no key of pip's for it
-OTHER_NAMES = {"opencv-python-headless": "opencv", "pyyaml": "yaml"}
+OTHER_NAMES = {"opencv-python-headless": "opencv", "pillow": "pil", "pyyaml": "yaml"}
 
 
 def keys(repository: Path) -> list[str]:

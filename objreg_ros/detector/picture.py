@@ -10,13 +10,11 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
+from objreg_ros import limits
 from objreg_ros.data import Array
 from objreg_ros.detector.runtime import Port
 
 MEAN, SCALE = 127.5, 1 / 127.5
-MOST_PIXELS = 50_000_000
-"""The largest picture of a model: what a camera's is made to fit takes memory, and so does the test picture."""
-
 EXPECTED = "expected one input, uint8 [1, H, W, 3], or float32 [1, H, W, 3] or [1, 3, H, W]"
 
 
@@ -64,9 +62,10 @@ class Picture:
 def _require_size(height: int | None, width: int | None, got: str) -> None:
     """ValueError for a picture that takes too much memory, before it is taken. A side of None or 0 is open."""
     sides = (height or 1, width or 1)
-    if min(sides) < 0 or sides[0] * sides[1] > MOST_PIXELS:
+    most = limits.MOST_PIXELS_OF_PICTURE  # what a camera's is made to fit takes memory, and so does the test picture
+    if min(sides) < 0 or sides[0] * sides[1] > most:
         raise ValueError(
-            f"input of the model: expected a picture of at most {MOST_PIXELS} pixels, got {got}; "
+            f"input of the model: expected a picture of at most {most} pixels, got {got}; "
             "export the model for smaller pictures"
         )
 

@@ -21,6 +21,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from objreg_ros import limits
+from objreg_ros.bridge.pictures import require_picture
 from objreg_ros.geometry import is_rigid, pose, rotation_from_quaternion
 from objreg_ros.recording import messages
 from objreg_ros.recording.poses import passed_over
@@ -44,6 +46,7 @@ MOST_NAMED = 5  # files in a note
 END_OF_TIME_S = 2**31  # what the stamp of a message holds, until 2038
 MILLIMETRES = 1000.0
 COLOUR = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION  # depth is not turned either
+PICTURES = ("PNG", "JPEG", "BMP", "TIFF", "PPM", "WEBP")  # as Pillow calls what OpenCV reads of
 PICTURE_FILES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp")
 
 Picture = tuple[int, str]  # stamp, file
@@ -248,8 +251,12 @@ def _first_size(folder: Path, names: Sequence[str]) -> tuple[int, ...]:
 
 def _read_picture(file: Path, flags: int) -> Array:
     require_regular(file)
+    data = file.read_bytes()
     try:
-        pixels = cv2.imread(str(file), flags)
+        require_picture(data, PICTURES, limits.MOST_PIXELS_OF_PICTURE)
+        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+    except ValueError as error:
+        raise ValueError(f"{file}: {error}; check the download") from error
     except (cv2.error, MemoryError) as error:
         said = " ".join(str(error).split())
         raise ValueError(f"{file}: expected a picture, got what OpenCV refuses: {said}; check the download") from error

@@ -5,9 +5,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-
-pytest.importorskip("rclpy", reason="ROS 2 is not installed")
-
 import rclpy
 from rclpy.qos import QoSProfile
 from std_msgs.msg import String
