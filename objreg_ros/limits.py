@@ -18,6 +18,7 @@ MOST_FIELDS = 200  # of one point of a cloud
 MOST_DETECTIONS = 1000  # boxes of one image
 MOST_OBJECTS = 500  # objects of one frame
 
+MOST_SIDE = 65535  # pixels of a picture: a table of detections has 16 bits for it
 MOST_PIXELS_OF_PICTURE = 50_000_000  # unless a parameter says otherwise
 MOST_PIXELS = 500_000_000  # of a camera, whatever the parameter says
 MOST_VIEW_PIXELS = 4_000_000  # of a reduced view, which has some 20 000

@@ -35,6 +35,7 @@ COLOUR: dict[str, tuple[str, int, int | None]] = {
 }
 DEPTH = {"16UC1": "u2", "mono16": "u2", "32FC1": "f4"}
 AS_STORED = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION  # depth knows nothing of how a jpeg is to be held
+PNG, CHUNK = b"\x89PNG\r\n\x1a\n", 12  # how a png begins, and the bytes of a chunk beside its data
 COMPRESSED_DEPTH_HEADER = 12  # compressed_depth_image_transport: an enum and two floats before the PNG
 
 
@@ -86,11 +87,24 @@ def require_picture(data: Any, formats: tuple[str, ...], most_pixels: int) -> No
         got = f"{len(data)} bytes that do not begin so"
         raise ValueError(f"compressed image: expected {wanted}, got {got}") from error
     _require_size(width, height, most_pixels)
+    if bytes(data[:4]) == PNG[:4]:
+        _require_whole_chunks(memoryview(data))
+
+
+def _require_whole_chunks(png: memoryview) -> None:
+    """ValueError for a PNG one of whose chunks says that it is longer than the file: OpenCV takes memory for it."""
+    at = len(PNG)
+    while at + CHUNK <= len(png):
+        at += CHUNK + int.from_bytes(png[at : at + 4], "big")
+    if at > len(png):
+        raise ValueError(f"compressed image: expected a png of {at} bytes, got {len(png)}; truncated?")
 
 
 def _require_size(width: int, height: int, most_pixels: int) -> None:
     if height <= 0 or width <= 0:
         raise ValueError(f"image: expected pixels, got {width} × {height}")
+    if max(width, height) > limits.MOST_SIDE:
+        raise ValueError(f"image: expected at most {limits.MOST_SIDE} pixels a side, got {width} × {height}")
     if width * height > most_pixels:
         raise ValueError(f"image: expected at most {most_pixels} pixels, got {width} × {height}")
 

@@ -32,10 +32,10 @@ class MapperParams(Params):
     steady_distance: float = param(0.02, "error of position that every metre adds alike, one sigma", "m/m", ge=0.0)
     max_speed: float = param(5.0, "odometry that leaps faster than this has begun anew: a new map", "m/s", ge=0.1)
     min_sigma_translation: float = param(
-        0.005, "a constraint that claims to know its position better is believed no better than this", "m", ge=1e-4
+        0.001, "a constraint that claims to know its position better is believed no better than this", "m", ge=1e-4
     )
     min_sigma_rotation: float = param(
-        0.1, "a constraint that claims to know its rotation better is believed no better than this", "deg", ge=1e-3
+        0.025, "a constraint that claims to know its rotation better is believed no better than this", "deg", ge=1e-3
     )
     max_stretch: float = param(
         1.5, "a constraint over more than so many times the way of odometry, and a metre, is implausible", ge=1.0

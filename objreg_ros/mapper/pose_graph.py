@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from objreg_ros.data import Array, LoopClosure, Odometry
-from objreg_ros.geometry import inverse, leaps, rotation_angle
+from objreg_ros.geometry import inverse, rotation_angle
 from objreg_ros.mapper.constraint import (
     Constraint,
     between_keyframes,
@@ -244,13 +244,6 @@ class PoseGraph:
     def in_gap(self, closure: LoopClosure) -> bool:
         """Whether a moment of the closure lies in a gap of the odometry."""
         return self.odometry.in_gap(closure.from_ns) or self.odometry.in_gap(closure.to_ns)
-
-    def leaps(self, odometry: Odometry) -> bool:
-        """Whether odometry has begun anew: no body moves so from the newest pose to this later one."""
-        if not len(self.odometry):
-            return False
-        seconds = 1e-9 * (odometry.stamp_ns - self.odometry.stamps_ns[-1])
-        return leaps(self.odometry.poses[-1], odometry.T_odom_body, seconds, self.params.max_speed, np.eye(4))
 
     def optimise(self) -> Summary:
         """Solve and adopt in one go."""

@@ -23,7 +23,7 @@ class Anew(Enum):
     PLACE = "odometry_leap"
 
 
-class Course(NamedTuple):
+class Admitted(NamedTuple):
     """The poses that may be taken in now, and why they begin a new map, if they do."""
 
     poses: tuple[Odometry, ...] = ()
@@ -41,7 +41,7 @@ class Restart:
         self._held: list[Odometry] = []
         self._newest: Odometry | None = None
 
-    def admit(self, odometry: Odometry) -> Course:
+    def admit(self, odometry: Odometry) -> Admitted:
         """What becomes of the next pose."""
         if self._newest is None:
             return self._take((odometry,))
@@ -53,24 +53,24 @@ class Restart:
             return self._take((odometry,))
         if 0 <= self._newest.stamp_ns - odometry.stamp_ns < JUMP_NS:
             self._on_wrong(odometry)
-            return Course()
+            return Admitted()
         self._let_go()
         self._held.append(odometry)
-        return Course()
+        return Admitted()
 
-    def _take(self, poses: tuple[Odometry, ...], anew: Anew | None = None) -> Course:
+    def _take(self, poses: tuple[Odometry, ...], anew: Anew | None = None) -> Admitted:
         self._newest = poses[-1]
-        return Course(poses, anew)
+        return Admitted(poses, anew)
 
     def _let_go(self) -> None:
         held, self._held = self._held, []
         for odometry in held:
             self._on_wrong(odometry)
 
-    def _several(self, newest: Odometry) -> Course:
+    def _several(self, newest: Odometry) -> Admitted:
         """Nothing yet, or a new session with all that is held. The old one goes on where but time went ahead."""
         if len(self._held) < AGREEING:
-            return Course()
+            return Admitted()
         held, self._held = tuple(self._held), []
         if held[0].stamp_ns <= newest.stamp_ns:
             return self._take(held, Anew.TIME)

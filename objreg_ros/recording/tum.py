@@ -256,7 +256,7 @@ def _read_picture(file: Path, flags: int) -> Array:
         require_picture(data, PICTURES, limits.MOST_PIXELS_OF_PICTURE)
         pixels = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
     except ValueError as error:
-        raise ValueError(f"{file}: {error}; check the download") from error
+        raise ValueError(f"{file}: expected a picture, got a refusal: {error}; check the download") from error
     except (cv2.error, MemoryError) as error:
         said = " ".join(str(error).split())
         raise ValueError(f"{file}: expected a picture, got what OpenCV refuses: {said}; check the download") from error

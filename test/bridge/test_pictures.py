@@ -127,8 +127,18 @@ def test_a_picture_of_another_kind_is_refused_though_opencv_would_take_it() -> N
 
 
 def test_a_picture_that_begins_well_and_does_not_go_on_is_refused() -> None:
-    with pytest.raises(ValueError, match="expected a jpeg or png, got 60 bytes that do not decode"):
-        colour_pixels(messages.compressed(png_that_claims(64, 64, 8, 2)[:60], "png"))
+    whole = png_that_claims(64, 64, 8, 2)
+    with pytest.raises(ValueError, match="expected a jpeg or png, got 69 bytes that do not decode"):
+        colour_pixels(messages.compressed(whole, "png"))
+    with pytest.raises(ValueError, match=r"expected a png of \d+ bytes, got 50; truncated"):
+        colour_pixels(messages.compressed(whole[:50], "png"))
+
+
+def test_a_chunk_that_claims_gigabytes_is_refused_before_memory_is_taken_for_it() -> None:
+    data = bytearray(cv2.imencode(".png", flat(10, 30, 200))[1].tobytes())
+    data[33:37] = (0x7FFFFFFF).to_bytes(4, "big")  # the length of IDAT
+    with pytest.raises(ValueError, match="expected a png of 2147483"):
+        colour_pixels(messages.compressed(bytes(data), "png"))
 
 
 def png_that_claims(width: int, height: int, bits: int, colour: int) -> bytes:
@@ -171,6 +181,11 @@ def test_a_raw_picture_has_the_same_limit() -> None:
     assert depth_metres(message, 24).shape == (4, 6)
     with pytest.raises(ValueError, match="expected at most 23 pixels, got 6 × 4"):
         depth_metres(message, 23)
+
+
+def test_a_row_of_more_pixels_than_a_table_can_tell_is_refused() -> None:
+    with pytest.raises(ValueError, match="expected at most 65535 pixels a side, got 70000 × 2"):
+        colour_pixels(messages.compressed(png_that_claims(70_000, 2, 8, 2), "png"))
 
 
 def test_a_picture_bomb_is_refused_before_memory_is_taken_for_it() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from objreg_ros.data import Odometry
 from objreg_ros.geometry import pose
-from objreg_ros.mapper.restart import Anew, Course, Restart
+from objreg_ros.mapper.restart import Admitted, Anew, Restart
 
 SECOND = 1_000_000_000
 
@@ -16,7 +16,7 @@ def at(seconds: float, x: float) -> Odometry:
     return Odometry(T_odom_body=pose(np.eye(3), np.array([x, 0.0, 0.0])), stamp_ns=int(seconds * SECOND))
 
 
-def fed(*words: Odometry) -> tuple[list[Course], list[Odometry]]:
+def fed(*words: Odometry) -> tuple[list[Admitted], list[Odometry]]:
     wrong: list[Odometry] = []
     restart = Restart(5.0, wrong.append)
     return [restart.admit(word) for word in words], wrong
@@ -34,7 +34,7 @@ def test_one_pose_that_leaps_and_comes_back_is_wrong() -> None:
 def test_two_stale_ones_are_wrong() -> None:
     stale, on = [at(3.0, 1.0), at(3.1, 1.1)], at(10.2, 4.2)
     courses, wrong = fed(*BEFORE, *stale, on)
-    assert courses[-1] == Course((on,)) and wrong == stale
+    assert courses[-1] == Admitted((on,)) and wrong == stale
 
 
 def test_three_that_agree_begin_anew_and_none_of_them_is_lost() -> None:
@@ -43,13 +43,13 @@ def test_three_that_agree_begin_anew_and_none_of_them_is_lost() -> None:
         (Anew.TIME, (at(1.0, 0.0), at(1.1, 0.1), at(1.2, 0.2))),
     ):
         courses, wrong = fed(*BEFORE, *words)
-        assert courses[-1] == Course(words, anew) and not wrong
+        assert courses[-1] == Admitted(words, anew) and not wrong
 
 
 def test_a_robot_that_is_back_at_its_origin_after_a_silence_begins_anew_though_it_drives_off_at_once() -> None:
     words = (at(30.0, 0.0), at(30.1, 0.05), at(30.2, 0.1))
     courses, wrong = fed(*BEFORE, *words)
-    assert courses[-1] == Course(words, Anew.PLACE) and not wrong
+    assert courses[-1] == Admitted(words, Anew.PLACE) and not wrong
 
 
 def test_three_that_disagree_among_themselves_begin_nothing() -> None:
@@ -60,10 +60,10 @@ def test_three_that_disagree_among_themselves_begin_nothing() -> None:
 def test_time_that_goes_far_ahead_goes_on_with_the_map() -> None:
     words = (at(100.0, 4.2), at(100.1, 4.3), at(100.2, 4.4))
     courses, _ = fed(*BEFORE, *words)
-    assert courses[-1] == Course(words)
+    assert courses[-1] == Admitted(words)
 
 
 def test_one_that_comes_late_is_wrong_alone() -> None:
     late = at(10.05, 4.05)
     courses, wrong = fed(*BEFORE, late)
-    assert courses[-1] == Course() and wrong == [late]
+    assert courses[-1] == Admitted() and wrong == [late]

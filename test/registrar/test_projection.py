@@ -3,6 +3,12 @@
 
 from __future__ import annotations
 
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -50,3 +56,15 @@ def test_what_is_spread_over_four_pixels_is_all_there_and_about_its_place() -> N
     assert image.sum(axis=(0, 1)) == pytest.approx((8.0, 1.0))
     assert image[1, 2] == pytest.approx((3.0, 0.375)) and image[2, 3] == pytest.approx((1.0, 0.125))
     assert (image[..., 1] @ np.arange(5)).sum() == pytest.approx(2.25)
+
+
+@pytest.mark.slow
+def test_no_frame_that_passes_the_checks_of_a_word_has_a_kernel_look_beside_an_array(
+    repository: Path, tmp_path: Path
+) -> None:
+    checked = {"NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(repository)}
+    attack = [sys.executable, str(repository / "test/registrar/hostile.py"), "20"]
+    done = subprocess.run(attack, env=os.environ | checked, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-3000:]
+    frames, refused, tried = map(int, re.findall(r"\d+", done.stdout))
+    assert frames >= 40 and refused < frames / 2 and tried >= 20, done.stdout
