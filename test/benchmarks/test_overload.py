@@ -37,3 +37,9 @@ def test_a_recording_is_played_over_and_over_with_stamps_that_go_on(overload: Mo
 def test_growth_is_that_after_the_warm_up(overload: ModuleType) -> None:
     samples = [(float(k), 0.0, 1000.0 * min(k, 10) + k) for k in range(100)]
     assert overload.slope_mb_per_hour(samples, 10.0) == pytest.approx(3600.0)
+
+
+def test_the_books_of_a_node_account_for_every_frame_or_say_how_many_not() -> None:
+    told = {"received": "10", "published": "6", "waiting": "1", "dropped: late": "2", "dropped: unmatched": "1"}
+    assert overload.unaccounted(told) == 0
+    assert overload.unaccounted(told | {"received": "12"}) == 2
