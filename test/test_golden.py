@@ -36,7 +36,7 @@ def test_a_real_recording_gives_what_it_gave(name: str, shared: Path) -> None:
 def require_the_same(name: str, path: Path) -> None:
     golden = files.read(name)
     now = runs.results(runs.run(path, runs.Stored(golden.detections), runs.SOURCES[name].frames))
-    found = differences(golden.results, now)
+    found = differences(golden.results, now, real=isinstance(runs.SOURCES[name], runs.Real))
     assert not found, f"{name} gives something else; test/golden/record.py records anew:\n" + "\n".join(found)
 
 
@@ -111,6 +111,14 @@ def test_a_pose_or_covariance_that_is_farther_off_differs(
 ) -> None:
     (line,) = differences(results, changed(results, **change))
     assert said in line
+
+
+def test_a_real_pose_may_be_off_within_its_own_deviation_and_no_farther(results: dict[str, Any]) -> None:
+    variances = np.diag(np.array(results["constraints"][0]["covariance"]))
+    metres, degrees = np.sqrt(variances[:3].sum()), np.degrees(np.sqrt(variances[3:].sum()))
+    assert differences(results, changed(results, 0.9 * metres, 0.9 * degrees, 1.25), real=True) == []
+    for change in ({"metres": 1.1 * metres}, {"degrees": 1.1 * degrees}, {"scale": 1.35}):
+        assert len(differences(results, changed(results, **change), real=True)) == 1
 
 
 def test_another_verdict_on_a_pair_differs(results: dict[str, Any]) -> None:
