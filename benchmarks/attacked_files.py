@@ -29,10 +29,10 @@ from trials import Attempt, Target, WrongAnswerError
 from objreg_ros.data import ColourImage, LoopClosure
 from objreg_ros.detector.mobilenet_ssd import Detector
 from objreg_ros.detector.params import DetectorParams
+from objreg_ros.memory.sighting import sightings_of
+from objreg_ros.memory.store import Store
 from objreg_ros.recording.opening import open_recording
 from objreg_ros.recording.writer import write_rosbag2
-from objreg_ros.registrar.sighting import sightings_of
-from objreg_ros.registrar.store import Store
 
 TESTS = Path(__file__).resolve().parents[1] / "test"
 KEYFRAMES = 3

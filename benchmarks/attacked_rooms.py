@@ -40,9 +40,9 @@ from objreg_ros.detector.mobilenet_ssd import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.mapper.optimisation import load
 from objreg_ros.mapper.pose_graph import PoseGraph
-from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
+from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.segmenter.doubts import range_doubt, registration_doubt
 from objreg_ros.segmenter.organise import organise
 from objreg_ros.segmenter.params import SegmenterParams

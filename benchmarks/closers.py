@@ -16,10 +16,10 @@ from sources import Source
 from objreg_ros.data import UNTRIED, Array, Frame, LoopClosure, Odometry
 from objreg_ros.geometry import inverse, rotation_angle
 from objreg_ros.mapper.pose_graph import PoseGraph
-from objreg_ros.registrar.export import constraint
-from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Outcome, Registrar
 from objreg_ros.registrar.warm import warm
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.report.export import constraint
 from objreg_ros.report.revisits import Revisit, Seen, recall_by_view_change, revisits
 from objreg_ros.report.trajectory_error import absolute_trajectory_error
 from objreg_ros.truth import FALSE, LOOSE, Truth, within

@@ -30,9 +30,9 @@ from sources import detector_of, read_source
 
 from objreg_ros.cli.simulate import camera_of, sensors_of
 from objreg_ros.data import UNTRIED, LoopClosure, Rejected
-from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
+from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.simulation.camera import CAMERAS
 from objreg_ros.simulation.scenarios import SCENARIOS
 from objreg_ros.simulation.write import simulate

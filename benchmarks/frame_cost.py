@@ -19,9 +19,9 @@ from sources import TRUE_BOXES, detector_of, read_source
 from tables import table_story
 
 from objreg_ros.data import Frame
-from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
+from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.simulation.write import write_story
 
 FRAMES = 180

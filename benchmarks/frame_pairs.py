@@ -14,11 +14,12 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import inverse, rotation_angle, transform
-from objreg_ros.registrar.keyframe import Keyframe
-from objreg_ros.registrar.labels import LabelGroups
-from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.verify import look
-from objreg_ros.registrar.visibility import INLIERS, Sight, prepare_sight
+from objreg_ros.registration.keyframe import Keyframe
+from objreg_ros.registration.labels import LabelGroups
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.prepare.views import Sight, prepare_sight
+from objreg_ros.registration.score.free_space import INLIERS
+from objreg_ros.registration.score.view_score import look
 
 BINS = ((0, 10), (10, 20), (20, 30), (30, 45), (45, 180))  # degrees of view change
 APART_NS = 2_000_000_000

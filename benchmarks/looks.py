@@ -14,9 +14,9 @@ from paper import UP, Stage, keyframe
 
 from objreg_ros.data import Array, DepthImage, Detections, Frame
 from objreg_ros.geometry import pose
-from objreg_ros.registrar.keyframe import Keyframe
-from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.prepared import Prepared, prepare
+from objreg_ros.registration.keyframe import Keyframe
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.prepare.prepared import Prepared, prepare
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.simulation import furniture

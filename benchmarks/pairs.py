@@ -28,14 +28,14 @@ from sources import Source, detector_of, read_source
 
 from objreg_ros.data import Array, Frame, Reason
 from objreg_ros.geometry import back_project, pose_error
-from objreg_ros.registrar.candidate import Candidate
-from objreg_ros.registrar.engine import Engine
-from objreg_ros.registrar.fusion import fuse
-from objreg_ros.registrar.gate import judge
-from objreg_ros.registrar.keyframe import Keyframe
-from objreg_ros.registrar.keyframes import Keyframer, Stretch
-from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.verify import verify
+from objreg_ros.keyframes.fusion import fuse
+from objreg_ros.keyframes.keyframer import Keyframer, Stretch
+from objreg_ros.registration.candidate import Candidate
+from objreg_ros.registration.engine import Engine
+from objreg_ros.registration.gate.verdict import judge
+from objreg_ros.registration.keyframe import Keyframe
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.score.view_score import verify
 
 QUICK = {"wanted": 15, "names": ("paper", "orb_pnp")}
 GICP_VOXEL = 0.03  # m, of the whole frames that finish a peer's pose

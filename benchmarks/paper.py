@@ -29,16 +29,16 @@ from sources import SIMULATED
 
 from objreg_ros.data import Array, DepthImage, Detections, Frame
 from objreg_ros.geometry import inverse, pose, rotation_from_vector, transform
-from objreg_ros.registrar.candidate import Candidate
-from objreg_ros.registrar.engine import Engine
-from objreg_ros.registrar.fusion import fuse
-from objreg_ros.registrar.gate import judge
-from objreg_ros.registrar.keyframe import Keyframe
-from objreg_ros.registrar.keyframes import Stretch
-from objreg_ros.registrar.paper import register
-from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.prepared import Prepared, prepare
-from objreg_ros.registrar.scene_search import from_shapes
+from objreg_ros.keyframes.fusion import fuse
+from objreg_ros.keyframes.keyframer import Stretch
+from objreg_ros.registration.candidate import Candidate
+from objreg_ros.registration.engine import Engine
+from objreg_ros.registration.gate.verdict import judge
+from objreg_ros.registration.keyframe import Keyframe
+from objreg_ros.registration.paper import register
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.prepare.prepared import Prepared, prepare
+from objreg_ros.registration.propose.object_poses import from_shapes
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.simulation import furniture

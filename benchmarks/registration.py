@@ -45,14 +45,14 @@ from sources import SIMULATED
 
 from objreg_ros.data import DepthImage, Detections
 from objreg_ros.geometry import inverse, pose_error, transform
-from objreg_ros.registrar.candidate import Candidate
-from objreg_ros.registrar.covariance import covariance_of
-from objreg_ros.registrar.engine import Engine
-from objreg_ros.registrar.gate import judge
-from objreg_ros.registrar.hypotheses import Hypothesis
-from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.scene_search import from_shapes
 from objreg_ros.registrar.warm import drawn
+from objreg_ros.registration.candidate import Candidate
+from objreg_ros.registration.certainty.covariance import covariance_of
+from objreg_ros.registration.engine import Engine
+from objreg_ros.registration.gate.verdict import judge
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.propose.hypotheses import Hypothesis
+from objreg_ros.registration.propose.object_poses import from_shapes
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.simulation.camera import KINECT

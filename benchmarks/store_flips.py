@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from objreg_ros.registrar.store import Store, StoreError
+from objreg_ros.memory.store import Store, StoreError
 
 LOG = "-wal"
 Said = dict[str, Any]

@@ -34,8 +34,8 @@ from objreg_ros.data import (
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.record import Record
-from objreg_ros.registrar.export import constraint
-from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.report.export import constraint
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.truth import Truth, summarise
 

@@ -21,7 +21,7 @@ from objreg_ros.data import ColourImage, Intrinsics
 from objreg_ros.offline import constraint_with_error, refusal
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
-from objreg_ros.registrar.params import RegistrarNodeParams
+from objreg_ros.registration.params import RegistrarNodeParams
 from objreg_ros.report.live_pictures import draw_sight, draw_way
 from objreg_ros.report.write import write_report
 from objreg_ros.segmenter.params import SegmenterNodeParams

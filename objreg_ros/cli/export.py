@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
-from objreg_ros.registrar.export import export
+from objreg_ros.report.export import export
 
 
 @click.command()

@@ -10,12 +10,12 @@ from pathlib import Path
 import click
 
 from objreg_ros.cli import options
+from objreg_ros.memory.store_file import is_store
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import GRAPH_TOPICS, Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.summary import describe_topics, warnings
-from objreg_ros.registrar.store_file import is_store
-from objreg_ros.registrar.survey import describe, draw, survey
 from objreg_ros.report.live_pictures import write_picture
+from objreg_ros.report.store_summary import describe, draw, survey
 from objreg_ros.truth import Truth
 
 

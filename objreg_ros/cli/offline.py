@@ -18,7 +18,7 @@ from objreg_ros.offline import Run, Timing, build_rooms, run_offline
 from objreg_ros.recording import Record, Recording, open_recording
 from objreg_ros.recording.drift import ODOM, with_drifting_odometry
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
-from objreg_ros.registrar.params import RegistrarNodeParams, RegistrarParams
+from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_ros.truth import Truth
 

@@ -16,7 +16,7 @@ from objreg_ros.detector.params import DetectorParams
 from objreg_ros.mapper.params import MapperNodeParams, MapperParams
 from objreg_ros.params import Declaration, Params
 from objreg_ros.recording.text import SETTINGS_BYTES, read_text
-from objreg_ros.registrar.params import RegistrarNodeParams, RegistrarParams
+from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 
 Kind = TypeVar("Kind", bound=Params)

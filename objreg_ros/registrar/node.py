@@ -30,9 +30,9 @@ from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.sync import Match, Need, Stream
 from objreg_ros.bridge.worker import Backlog, Limit
 from objreg_ros.data import Frame
-from objreg_ros.registrar.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.registrar.registrar import Outcome, Registrar, Stretch
 from objreg_ros.registrar.warm import warm
+from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 
 GIVING_WAY = 10  # niceness of the search: the next image must not wait for it
 

@@ -22,21 +22,21 @@ import numpy as np
 
 from objreg_ros.data import Array, Frame, LoopClosure, ObjectMatch, Observation, Reason, Rejected
 from objreg_ros.geometry import transform
-from objreg_ros.registrar.candidate import Candidate
-from objreg_ros.registrar.covariance import covariance_of
-from objreg_ros.registrar.engine import Engine
-from objreg_ros.registrar.fusion import fuse
-from objreg_ros.registrar.gate import Refusal, judge
-from objreg_ros.registrar.keyframe import Keyframe
-from objreg_ros.registrar.keyframes import Clock, Keyframer, Stretch
-from objreg_ros.registrar.landmarks import Landmark, Landmarks, Link
-from objreg_ros.registrar.odometry import expect
-from objreg_ros.registrar.paper import PaperEngine
-from objreg_ros.registrar.params import RegistrarParams
-from objreg_ros.registrar.retrieve import Index, Place
-from objreg_ros.registrar.sighting import Sighting, sightings_of
-from objreg_ros.registrar.store import Store, StoreError
-from objreg_ros.registrar.thinning import Thinning
+from objreg_ros.keyframes.fusion import fuse
+from objreg_ros.keyframes.keyframer import Clock, Keyframer, Stretch
+from objreg_ros.memory.landmarks import Landmark, Landmarks, Link
+from objreg_ros.memory.retrieval import Index, Place
+from objreg_ros.memory.sighting import Sighting, sightings_of
+from objreg_ros.memory.store import Store, StoreError
+from objreg_ros.memory.thinning import Thinning
+from objreg_ros.registration.candidate import Candidate
+from objreg_ros.registration.certainty.covariance import covariance_of
+from objreg_ros.registration.engine import Engine
+from objreg_ros.registration.gate.verdict import Refusal, judge
+from objreg_ros.registration.keyframe import Keyframe
+from objreg_ros.registration.paper import PaperEngine
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.propose.prior import expect
 
 RECENT = 500  # landmarks that are told of after every keyframe
 

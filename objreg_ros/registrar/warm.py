@@ -7,8 +7,8 @@ import numpy as np
 
 from objreg_ros.data import Array, Frame, Intrinsics, ObjectCloud, View
 from objreg_ros.geometry import back_project
-from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
+from objreg_ros.registration.params import RegistrarParams
 
 CAMERA = Intrinsics(fx=131.25, fy=131.25, cx=79.5, cy=59.5, width=160, height=120)
 GAP_S = 1.0  # beyond the least gap between two moments of a constraint

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from objreg_ros.cli import export, inspect
-from objreg_ros.registrar.store import Store
+from objreg_ros.memory.store import Store
 
 
 def test_a_store_is_described_and_drawn(tmp_path: Path) -> None:

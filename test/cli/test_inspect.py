@@ -10,9 +10,9 @@ from recording.folders import lost, tum_folder
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from objreg_ros.cli.inspect import columns, command
+from objreg_ros.memory.store import Store
 from objreg_ros.recording import Record, messages, write_rosbag2
 from objreg_ros.recording.messages import standard_types
-from objreg_ros.registrar.store import Store
 
 
 def test_a_recording_is_told_with_its_inputs_and_its_truth(tmp_path: Path) -> None:

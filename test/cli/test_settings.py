@@ -7,7 +7,7 @@ import pytest
 
 from objreg_ros.cli.settings import NODES, Settings, names_of, parse_change, read_settings, ros_argument, tell_ignored
 from objreg_ros.detector.params import DetectorParams
-from objreg_ros.registrar.params import RegistrarNodeParams, RegistrarParams
+from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 
 

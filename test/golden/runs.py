@@ -14,9 +14,9 @@ from objreg_ros.data import ColourImage, Detections, Rejected
 from objreg_ros.offline import Detects, Rooms, Run, run_offline
 from objreg_ros.recording import open_recording
 from objreg_ros.recording.inputs import choose_inputs
-from objreg_ros.registrar.export import constraint
-from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.report.export import constraint
 from objreg_ros.segmenter.organise import organise
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter

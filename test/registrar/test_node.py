@@ -13,16 +13,15 @@ from typing import Any
 
 import pytest
 import rclpy
+from registration.samples import SECOND, box, frame
 from std_srvs.srv import Trigger
 
 from objreg_ros.bridge.diagnostics import refusal_of
 from objreg_ros.data import Reason, Rejected
-from objreg_ros.registrar.keyframes import Stretch
+from objreg_ros.keyframes.keyframer import Stretch
+from objreg_ros.memory.store import Store
 from objreg_ros.registrar.node import Job, RegistrarNode
 from objreg_ros.registrar.registrar import Outcome
-from objreg_ros.registrar.store import Store
-
-from .samples import SECOND, box, frame
 
 CUP = (box("cup", (0, 0, 1)),)
 Making = Callable[[], RegistrarNode]

@@ -11,17 +11,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from registration import rooms
+from registration.samples import SECOND, box, candidate, keyframe
 
 from objreg_ros.data import Array, Frame, LoopClosure, Reason, Rejected
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
-from objreg_ros.registrar.candidate import ObjectPair
-from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.memory.sighting import sightings_of
+from objreg_ros.memory.store import StoreError
 from objreg_ros.registrar.registrar import Registrar, closure_of
-from objreg_ros.registrar.sighting import sightings_of
-from objreg_ros.registrar.store import StoreError
-
-from . import rooms
-from .samples import SECOND, box, candidate, keyframe
+from objreg_ros.registration.candidate import ObjectPair
+from objreg_ros.registration.params import RegistrarParams
 
 PARAMS = RegistrarParams()
 HERE = rooms.look_at((0.2, 0.0, 1.3), (1.8, 0.0, 0.75))

@@ -11,20 +11,20 @@ import subprocess
 import sys
 from pathlib import Path
 
+from registration.rooms import keyframe, seen_from
+
 from objreg_ros import registrar as room
 from objreg_ros.data import Frame
-from objreg_ros.registrar.params import RegistrarParams
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
-
-from .rooms import keyframe, seen_from
+from objreg_ros.registration.params import RegistrarParams
 
 ROOT = Path(__file__).parents[2]
 # In a process of its own: what other tests have compiled says nothing of `warm`.
 FRESH = """
 import json
 from registrar.test_warm import kernels, real_run
-from objreg_ros.registrar.params import RegistrarParams
+from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registrar.warm import warm
 warm(RegistrarParams())
 before = kernels()

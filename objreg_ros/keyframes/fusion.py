@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From a stretch to a keyframe: objects seen from several frames become one cloud each, views become context."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from objreg_ros.data import Array, Frame, ObjectCloud, PointFlag
+from objreg_ros.geometry import inverse, rigid, rotate, transform
+from objreg_ros.keyframes.keyframer import Stretch
+from objreg_ros.registration.keyframe import Context, Keyframe, KeyObject, bounding_box
+from objreg_ros.registration.labels import LabelGroups
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.prepare.normals import view_normals
+from objreg_ros.registration.prepare.voxels import _keys, thin
+
+CUT = np.uint16(PointFlag.CUT_BY_IMAGE | PointFlag.CUT_BY_BOX)
+SPARE = 3  # points of each sighting for each one that is kept of the object
+CENTRE_SPREAD = 0.05  # m: how far the middle of one small object wanders between neighbouring frames
+
+
+def fuse(stretch: Stretch, params: RegistrarParams) -> Keyframe:
+    """The keyframe of a stretch, in the camera frame of its reference frame; its id is 0 until a store gives one."""
+    chosen = reference_index(stretch.frames)
+    reference = stretch.frames[chosen]
+    T_reference_first = inverse(stretch.T_first_frame[chosen])
+    motions = [T_reference_first @ T for T in stretch.T_first_frame]
+    objects = fuse_objects(stretch.frames, motions, params)
+    return Keyframe(
+        keyframe_id=0,
+        session=stretch.session,
+        stamp_ns=reference.stamp_ns,
+        frame_id=reference.frame_id,
+        objects=objects,
+        context=fuse_context(stretch.frames, motions, objects, params),
+        view=reference.view,
+        gravity=reference.gravity,
+        gravity_confidence=reference.gravity_confidence,
+        T_odom_camera=rigid(stretch.T_session_first @ stretch.T_first_frame[chosen]),
+        by_odometry=stretch.by_odometry,
+        travelled=stretch.travelled,
+        turned=stretch.turned,
+    )
+
+
+def reference_index(frames: Sequence[Frame]) -> int:
+    """The frame that shows most: objects first, then how sharp its grey is. The earliest of equals."""
+    worth = [(len(f.objects), _sharpness(f.view.grey)) for f in frames]
+    return max(range(len(frames)), key=lambda i: (*worth[i], -i))
+
+
+def fuse_objects(
+    frames: Sequence[Frame], T_reference_frame: Sequence[Array], params: RegistrarParams
+) -> tuple[KeyObject, ...]:
+    """Every object once: the same label group at the same place is the same object, seen from several sides.
+
+    One without points is nowhere, and is passed over.
+    """
+    groups = LabelGroups(params.label_groups)
+    tracks: list[_Track] = []
+    for frame, T in zip(frames, T_reference_frame, strict=True):
+        free = list(tracks)
+        for item in (item for item in frame.objects if len(item)):
+            sighting = _moved(item, T, most=SPARE * params.object_points)
+            track = _nearest(sighting, free, groups)
+            if track is None:
+                tracks.append(_Track([sighting]))
+            else:
+                free.remove(track)
+                track.sightings.append(sighting)
+    return tuple(track.fused(number, params) for number, track in enumerate(tracks, start=1))
+
+
+def fuse_context(
+    frames: Sequence[Frame], T_reference_frame: Sequence[Array], objects: Sequence[KeyObject], params: RegistrarParams
+) -> Context:
+    """What the views saw within the context's radius of any object, thinned to voxels, with the mean normals."""
+    seen = [_surface(frame, T, params.context_range) for frame, T in zip(frames, T_reference_frame, strict=True)]
+    points, normals = (np.concatenate(part) for part in zip(*seen, strict=True))
+    xyz, directions = thin(points, normals, params.context_voxel)
+    near = _near(xyz, [item.centroid for item in objects], params.context_radius)
+    return Context(xyz=xyz[near], normals=directions[near])
+
+
+def _surface(frame: Frame, T_reference_frame: Array, reach: float) -> tuple[Array, Array]:
+    """Points and normals of a view, every second one each way: four frames make up for it."""
+    xyz, normals = frame.view.xyz[::2, ::2], view_normals(frame.view.xyz)[::2, ::2]
+    known = (normals[..., 2] != 0) & (xyz[..., 2] < reach)
+    return transform(T_reference_frame, xyz[known]), rotate(T_reference_frame, normals[known])
+
+
+@dataclass(slots=True, eq=False)
+class _Track:
+    """The sightings of one object, all in the reference frame."""
+
+    sightings: list[ObjectCloud] = field(default_factory=list)
+
+    def fused(self, instance: int, params: RegistrarParams) -> KeyObject:
+        best = max(self.sightings, key=lambda s: s.score)
+        whole = [s for s in self.sightings if not (s.has(PointFlag.CUT_BY_IMAGE) or s.has(PointFlag.CUT_BY_BOX))]
+        kept = whole or self.sightings
+        votes: Counter[str] = Counter()
+        for sighting in self.sightings:
+            votes[sighting.label] += round(1000 * sighting.score)
+        label = max(votes, key=lambda name: (votes[name], name))
+        return KeyObject(cloud=_merge(kept, label, best, instance, params), sightings=len(self.sightings))
+
+
+def _merge(
+    sightings: Sequence[ObjectCloud], label: str, best: ObjectCloud, instance: int, params: RegistrarParams
+) -> ObjectCloud:
+    """The first point of each voxel, and of those every so many: a point keeps its own colour, normal and flags."""
+    xyz = np.concatenate([s.xyz for s in sightings])
+    first = np.unique(_keys(xyz, params.object_voxel), return_index=True)[1]
+    first = first[:: 1 + (len(first) - 1) // params.object_points]
+    coloured = [s.rgb for s in sightings if s.rgb is not None]
+    return ObjectCloud(
+        label=label,
+        score=best.score,
+        instance=instance,
+        xyz=xyz[first],
+        normals=np.concatenate([s.normals for s in sightings])[first],
+        rgb=np.concatenate(coloured)[first] if len(coloured) == len(sightings) else None,
+        flags=np.concatenate([s.flags for s in sightings])[first],
+        density=best.density,
+    )
+
+
+def _nearest(item: ObjectCloud, tracks: Sequence[_Track], groups: LabelGroups) -> _Track | None:
+    middle, extent = bounding_box(item.xyz)
+    best, best_distance = None, np.inf
+    for track in tracks:
+        last = track.sightings[-1]
+        if groups.of(last.label) != groups.of(item.label):
+            continue
+        last_middle, last_extent = bounding_box(last.xyz)
+        distance = float(np.linalg.norm(middle - last_middle))
+        if distance < min(best_distance, CENTRE_SPREAD + 0.25 * min(extent, last_extent)):
+            best, best_distance = track, distance
+    return best
+
+
+def _moved(item: ObjectCloud, T: Array, most: int) -> ObjectCloud:
+    """The cloud in another frame; of more than ``most`` points every so many."""
+    every = slice(None, None, 1 + (len(item) - 1) // most)
+    return ObjectCloud(
+        label=item.label,
+        score=item.score,
+        instance=item.instance,
+        xyz=transform(T, item.xyz[every]),
+        normals=rotate(T, item.normals[every]),
+        rgb=None if item.rgb is None else item.rgb[every],
+        flags=item.flags[every],
+        density=item.density,
+    )
+
+
+def _near(points: Array, centres: Sequence[Array], radius: float) -> Array:
+    near = np.zeros(len(points), bool)
+    for centre in centres:
+        near |= np.square(points - centre.astype(np.float32)).sum(axis=1) < radius**2
+    return near
+
+
+def _sharpness(grey: Array | None) -> float:
+    """The mean squared difference of neighbours: blur by motion takes it away."""
+    if grey is None:
+        return 0.0
+    pixels = grey.astype(np.float32)
+    return float(np.square(np.diff(pixels, axis=0)).mean() + np.square(np.diff(pixels, axis=1)).mean())

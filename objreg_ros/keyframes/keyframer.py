@@ -1,0 +1,293 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From a stream of frames to stretches: the few frames, close in time, that become one keyframe.
+
+This is the part that runs on every frame, so it only tracks and collects; `fusion` makes a keyframe of a stretch. A
+stretch ends when the camera has moved or enough time has passed, and is dropped when it shows nothing new: a camera
+that rests makes one keyframe, not one a second.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from objreg_ros.data import JUMP_NS, Array, Frame
+from objreg_ros.geometry import inverse, leaps, rigid, rotation_angle
+from objreg_ros.keyframes.gravity_filter import PlumbLine
+from objreg_ros.keyframes.odometry import Way
+from objreg_ros.keyframes.tracking import Surface, surface_of, view_motion
+from objreg_ros.registration.params import RegistrarParams
+
+SILENCE_S = 5.0  # odometry may have begun anew in it without a leap
+UNSET_NS = 0  # the stamp of a camera that starts before the simulated clock does: no clock began then
+
+
+class Clock(NamedTuple):
+    """A run of the clock: time has only grown since ``began_ns``, and ``session`` was the first in it.
+
+    It ends where time goes back: a looped bag, a simulation that begins anew, another start of the node.
+    """
+
+    began_ns: int
+    session: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Stretch:
+    """Frames of one moment: ``T_first_frame`` maps the camera of each frame into that of the first.
+
+    ``T_session_first`` is the pose of the first camera in the frame of its session: the odometry's, or our own
+    tracking's where odometry had a gap or there is none; ``by_odometry`` says which. ``session`` counts and changes
+    where the track was lost; ``clock`` is the run of the clock that it is in. By then the camera had gone ``travelled``
+    m in it and turned ``turned`` degrees.
+    """
+
+    frames: tuple[Frame, ...]
+    T_first_frame: tuple[Array, ...]
+    T_session_first: Array
+    session: int
+    clock: Clock = Clock(0, 0)
+    by_odometry: bool = False
+    travelled: float = 0.0
+    turned: float = 0.0
+
+    @property
+    def nbytes(self) -> int:
+        """The memory of its frames: their views and clouds."""
+        return sum(map(_nbytes, self.frames))
+
+    @classmethod
+    def of(cls, frame: Frame) -> Stretch:
+        """One frame by itself."""
+        still = np.eye(4)
+        return cls(frames=(alone(frame),), T_first_frame=(still,), T_session_first=still, session=0)
+
+
+def _nbytes(frame: Frame) -> int:
+    clouds = frame.objects if frame.support is None else (*frame.objects, frame.support)
+    arrays = [frame.view.xyz, frame.view.grey]
+    arrays += [array for cloud in clouds for array in (cloud.xyz, cloud.normals, cloud.rgb, cloud.flags)]
+    return sum(array.nbytes for array in arrays if array is not None)
+
+
+def alone(frame: Frame) -> Frame:
+    """The frame with the weight that gravity has which no other view confirms."""
+    return _felt(PlumbLine(1.0, 1.0), np.eye(4), frame)
+
+
+def _felt(line: PlumbLine, T_session_frame: Array, frame: Frame) -> Frame:
+    gravity, weight = line.feel(T_session_frame, frame.gravity, frame.gravity_confidence)
+    return replace(frame, gravity=gravity, gravity_confidence=weight)
+
+
+@dataclass(slots=True, eq=False)
+class _Session:
+    """A run of frames whose poses are known in one frame: the odometry's, or that of our own tracking."""
+
+    number: int
+    clock: Clock
+    in_odometry: bool
+    way: Way
+    plumb: PlumbLine
+    first: Frame  # of the last stretch
+    last_ns: int  # of the last frame that was followed
+    T_odom_first: Array  # of its first camera, where there is odometry
+    odometry: tuple[int, Array] | None = None  # the last that it had: stamp in ns, T_odom_camera
+
+    def leaps(self, frame: Frame, max_speed: float) -> bool:
+        """Whether odometry has begun anew: no camera moves so fast."""
+        if self.odometry is None or frame.T_odom_camera is None:
+            return False
+        last_ns, T_odom_last = self.odometry
+        seconds = 1e-9 * (frame.stamp_ns - last_ns)
+        return leaps(T_odom_last, frame.T_odom_camera, seconds, max_speed, self.T_odom_first)
+
+    def silent_s(self, frame: Frame) -> float:
+        """For how many seconds there was no frame before this one."""
+        return 1e-9 * (frame.stamp_ns - self.last_ns)
+
+    def lose(self, seconds: float, max_speed: float) -> None:
+        """After a long silence nobody knows the way there, nor which way things fall."""
+        self.way.lose(seconds, max_speed)
+        self.plumb.forget()
+
+    def follow(self, frame: Frame) -> None:
+        """Go on to a frame."""
+        self.last_ns = frame.stamp_ns
+        if frame.T_odom_camera is not None:
+            self.odometry = frame.stamp_ns, frame.T_odom_camera
+
+    def goes_on(self, frame: Frame) -> bool:
+        """Whether a later frame may belong to it: of the same camera, and with odometry only if the session has it."""
+        return frame.frame_id == self.first.frame_id and (self.in_odometry or frame.T_odom_camera is None)
+
+
+def _levelled(session: _Session, frame: Frame) -> Frame:
+    """The frame with gravity as all views of the session tell it, or its own where odometry does not carry that.
+
+    Our own tracking slips unnoticed, and what it carries then is wrong.
+    """
+    return alone(frame) if frame.T_odom_camera is None else _felt(session.plumb, frame.T_odom_camera, frame)
+
+
+@dataclass(slots=True, eq=False)
+class _Open:
+    """The stretch that is being collected."""
+
+    session: _Session
+    first: Frame
+    surface: Surface
+    T_session_first: Array
+    frames: list[Frame] = field(default_factory=list)
+    motions: list[Array] = field(default_factory=list)
+    T_first_last: Array = field(default_factory=lambda: np.eye(4))
+
+    @property
+    def by_odometry(self) -> bool:
+        return self.first.T_odom_camera is not None
+
+
+class Keyframer:
+    """Collects frames into stretches. ``add`` returns the stretch that a frame ended, or None.
+
+    Sessions count from ``next_session`` on.
+    """
+
+    def __init__(self, params: RegistrarParams, next_session: int = 0) -> None:
+        self._params = params
+        self.next_session = next_session
+        self._clock = Clock(0, next_session)
+        self._last_ns: int | None = None  # of the last frame
+        self._open: _Open | None = None
+        self._session: _Session | None = None
+        self._last: tuple[int, Array, Counter[str]] | None = None  # session, pose and labels of the last stretch
+
+    def add(self, frame: Frame) -> Stretch | None:
+        """Track the frame and collect it. A lost track, odometry that leaps or a clock that does begins a new session.
+
+        One that is not later than the last, but by no jump, is passed over.
+        """
+        last_ns, session = self._last_ns, self._session
+        if last_ns is not None and 0 <= last_ns - frame.stamp_ns < JUMP_NS:
+            return None
+        self._last_ns = frame.stamp_ns
+        if last_ns is None or frame.stamp_ns < last_ns or (last_ns == UNSET_NS and frame.stamp_ns > JUMP_NS):
+            self._clock = Clock(frame.stamp_ns, self.next_session)
+            return self._start(frame)
+        if session is None or not session.goes_on(frame) or session.leaps(frame, self._params.max_speed):
+            return self._start(frame)
+        T_session_frame = self._follow(frame)
+        if T_session_frame is None:
+            return None if self._may_come_back(session, frame) else self._start(frame)
+        silent_s = session.silent_s(frame)
+        ended = self._end() if silent_s > SILENCE_S or self._is_over(frame, T_session_frame) else None
+        if silent_s > SILENCE_S:
+            session.lose(silent_s, self._params.max_speed)
+        session.follow(frame)
+        frame = _levelled(session, frame)
+        if self._open is None:
+            self._begin(session, frame, T_session_frame)
+        else:
+            self._collect(self._open, frame, inverse(self._open.T_session_first) @ T_session_frame)
+        return ended
+
+    def finish(self) -> Stretch | None:
+        """End the stretch that is being collected: None if there is none or it shows nothing new.
+
+        The session goes on with the next frame where odometry says where that is; else it begins another.
+        """
+        return self._end()
+
+    def _start(self, frame: Frame) -> Stretch | None:
+        """End what is being collected, and start another session with this frame."""
+        ended = self._end()
+        T_session_frame = np.eye(4) if frame.T_odom_camera is None else frame.T_odom_camera
+        self._session = _Session(
+            number=self.next_session,
+            clock=self._clock,
+            in_odometry=frame.T_odom_camera is not None,
+            way=Way(T_session_frame),
+            plumb=PlumbLine(self._params.gravity_metres, self._params.gravity_degrees),
+            first=frame,
+            last_ns=frame.stamp_ns,
+            T_odom_first=T_session_frame,
+        )
+        self._session.follow(frame)
+        self.next_session += 1
+        self._begin(self._session, _levelled(self._session, frame), T_session_frame)
+        return ended
+
+    def _begin(self, session: _Session, frame: Frame, T_session_frame: Array) -> None:
+        """Begin a stretch with this frame. The way there counts whether or not it becomes a keyframe."""
+        session.first = frame
+        session.way.go(T_session_frame)
+        self._open = _Open(session, frame, surface_of(frame.view), T_session_frame)
+        self._collect(self._open, frame, np.eye(4))
+
+    def _end(self) -> Stretch | None:
+        stretch, self._open = self._open, None
+        if stretch is None or not stretch.frames:
+            return None
+        labels: Counter[str] = Counter()
+        for frame in stretch.frames:
+            labels |= Counter(item.label for item in frame.objects if len(item))
+        if labels.total() < self._params.keyframe_min_objects or not self._is_news(stretch, labels):
+            return None
+        self._last = (stretch.session.number, stretch.T_session_first, labels)
+        return Stretch(
+            frames=tuple(stretch.frames),
+            T_first_frame=tuple(stretch.motions),
+            T_session_first=stretch.T_session_first,
+            session=stretch.session.number,
+            clock=stretch.session.clock,
+            by_odometry=stretch.by_odometry,
+            travelled=stretch.session.way.travelled,
+            turned=stretch.session.way.turned,
+        )
+
+    def _follow(self, frame: Frame) -> Array | None:
+        """The pose of a frame in its session, in a gap of the odometry by the views; None if the track is lost."""
+        if frame.T_odom_camera is not None or self._open is None:
+            return frame.T_odom_camera
+        T_first_frame = view_motion(frame.view, self._open.surface, self._open.T_first_last)
+        return None if T_first_frame is None else rigid(self._open.T_session_first @ T_first_frame)
+
+    def _may_come_back(self, session: _Session, frame: Frame) -> bool:
+        """Whether odometry is only a moment late: such a frame is passed over."""
+        return session.in_odometry and 1e-9 * (frame.stamp_ns - session.last_ns) < self._params.keyframe_seconds
+
+    def _collect(self, stretch: _Open, frame: Frame, T_first_frame: Array) -> None:
+        stretch.T_first_last = T_first_frame
+        if not frame.objects or len(stretch.frames) >= self._params.keyframe_frames:
+            return
+        share = 1.0 / self._params.keyframe_frames
+        if not stretch.frames or self._moved(inverse(stretch.motions[-1]) @ T_first_frame, share):
+            stretch.frames.append(frame)
+            stretch.motions.append(T_first_frame)
+
+    def _is_over(self, frame: Frame, T_session_frame: Array) -> bool:
+        """Whether the frame is of another moment, or odometry is back: it tells no motion from a pose of our own."""
+        stretch = self._open
+        if stretch is None:
+            return False
+        lasted = 1e-9 * (frame.stamp_ns - stretch.first.stamp_ns)
+        back = frame.T_odom_camera is not None and stretch.session.in_odometry and not stretch.by_odometry
+        moved = self._moved(inverse(stretch.T_session_first) @ T_session_frame, 1.0)
+        return back or moved or lasted > self._params.keyframe_seconds
+
+    def _is_news(self, stretch: _Open, labels: Counter[str]) -> bool:
+        if self._last is None or self._last[0] != stretch.session.number:
+            return True
+        _, T_session_last, known = self._last
+        return bool(labels - known) or self._moved(inverse(T_session_last) @ stretch.T_session_first, 0.5)
+
+    def _moved(self, T: Array, share: float) -> bool:
+        """Whether a motion exceeds ``share`` of what ends a keyframe."""
+        turned = np.degrees(rotation_angle(T[:3, :3]))
+        params = self._params
+        return bool(
+            np.linalg.norm(T[:3, 3]) > share * params.keyframe_translation or turned > share * params.keyframe_rotation
+        )

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The motion between two moments from their views, for frames that come without odometry.
+
+The views are aligned densely: projective data association and point-to-plane error (Newcombe et al., "KinectFusion",
+2011) together with the error of the grey (Steinbrücker et al., "Real-time visual odometry from dense RGB-D images",
+2011), which holds where geometry alone slides along a plane. Robust weights (Huber) against what moved by itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import float64, njit
+
+from objreg_ros.data import Array, View
+from objreg_ros.geometry import pose, rotation_from_vector
+from objreg_ros.registration.prepare.normals import view_normals
+
+COARSE_TO_FINE = ((3, 0.20, 6), (2, 0.06, 10))  # stride in pixels, largest distance of a pair in metres, iterations
+GREY_SIGMA = 10.0  # grey levels: noise, vignetting and the residue of exposure
+DEPTH_SIGMA = (0.002, 0.003)  # m: at the camera, and its growth with squared depth
+HUBER = 1.3  # standard deviations beyond which an error counts linearly
+LEAST_SHARE = 0.5  # of the pixels that land in the other view; less is another scene or a lost track
+LEAST_PAIRS = 200
+SETTLED = 1e-4  # length of a last step, metres and radians
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Surface:
+    """A view made ready to be aligned to: points, normals, grey and its slope, all (h, w, ...) float32."""
+
+    xyz: Array
+    normals: Array
+    grey: Array
+    slope: Array
+    camera: Array  # fx fy cx cy
+    has_grey: bool
+
+
+def surface_of(view: View) -> Surface:
+    """The view with its normals (0 0 0 where unknown) and the slope of its grey (0 without grey)."""
+    shape = view.xyz.shape[:2]
+    grey = np.zeros(shape, np.float32) if view.grey is None else view.grey.astype(np.float32)
+    k = view.intrinsics
+    return Surface(
+        xyz=np.ascontiguousarray(view.xyz),
+        normals=view_normals(view.xyz),
+        grey=grey,
+        slope=np.stack((np.gradient(grey, axis=1), np.gradient(grey, axis=0)), axis=-1),
+        camera=np.array([k.fx, k.fy, k.cx, k.cy]),
+        has_grey=view.grey is not None,
+    )
+
+
+def view_motion(source: View, target: Surface, T_target_source: Array | None = None) -> Array | None:
+    """``T_target_source`` of two overlapping views from a guess (rest, if None); None where it does not settle.
+
+    Made for neighbouring frames: it starts from the guess and finds motions of a few pixels.
+    """
+    T = np.eye(4) if T_target_source is None else T_target_source.astype(float)
+    share = exposure = 0.0
+    for stride, reach, iterations in COARSE_TO_FINE:
+        xyz, grey = _thin(source, stride)
+        grey_weight = 1.0 / GREY_SIGMA if target.has_grey and source.grey is not None else 0.0
+        for _ in range(iterations):
+            H, g, pairs, seen, brighter = _normal_equations(
+                xyz, grey, T, target.xyz, target.normals, target.grey, target.slope, target.camera,
+                reach, grey_weight, exposure,
+            )  # fmt: skip
+            if pairs < LEAST_PAIRS:
+                return None
+            share, exposure = pairs / seen, exposure + brighter
+            H = np.triu(H) + np.triu(H, 1).T
+            step = -np.linalg.solve(H + 1e-6 * np.trace(H) * np.eye(6), g)
+            T = pose(rotation_from_vector(step[3:]), step[:3]) @ T
+            if np.abs(step).max() < SETTLED:
+                break
+    return T if share >= LEAST_SHARE else None
+
+
+def _thin(view: View, stride: int) -> tuple[Array, Array]:
+    xyz = view.xyz[::stride, ::stride].reshape(-1, 3)
+    known = np.isfinite(xyz[:, 2])
+    grey = np.zeros(len(xyz), np.uint8) if view.grey is None else view.grey[::stride, ::stride].reshape(-1)
+    return np.ascontiguousarray(xyz[known]), grey[known].astype(np.float32)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _huber(scaled: float) -> float:
+    size = abs(scaled)
+    return 1.0 if size < HUBER else HUBER / size
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _add(H, g, x, y, z, a, b, c, error, weight):  # type: ignore[no-untyped-def]
+    """Add an error with the gradient (a, b, c) at the point (x, y, z) that moves; the upper triangle of H only."""
+    J = (a, b, c, y * c - z * b, z * a - x * c, x * b - y * a)
+    for i in range(6):
+        weighted = weight * J[i]
+        g[i] += weighted * error
+        for j in range(i, 6):
+            H[i, j] += weighted * J[j]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _normal_equations(xyz, grey, T, target_xyz, normals, target_grey, slope, camera, reach, grey_weight, exposure):  # type: ignore[no-untyped-def]
+    """The upper triangle of ``J^T W J`` and ``J^T W e`` of a step that multiplies from the left.
+
+    With them the number of pairs, of pixels that could have been one, and how much brighter the target is.
+    """
+    H, g = np.zeros((6, 6)), np.zeros(6)
+    height, width = target_grey.shape
+    fx, fy, cx, cy = camera[0], camera[1], camera[2], camera[3]
+    pairs, seen, brightness, weights = 0, 0, 0.0, 0.0
+    for k in range(len(xyz)):
+        x = T[0, 0] * xyz[k, 0] + T[0, 1] * xyz[k, 1] + T[0, 2] * xyz[k, 2] + T[0, 3]
+        y = T[1, 0] * xyz[k, 0] + T[1, 1] * xyz[k, 1] + T[1, 2] * xyz[k, 2] + T[1, 3]
+        z = T[2, 0] * xyz[k, 0] + T[2, 1] * xyz[k, 1] + T[2, 2] * xyz[k, 2] + T[2, 3]
+        u, v = fx * x / z + cx, fy * y / z + cy
+        if z < 0.1 or u < 0.0 or v < 0.0 or u > width - 1.0 or v > height - 1.0:
+            continue
+        i, j = int(v + 0.5), int(u + 0.5)
+        nx, ny, nz = float64(normals[i, j, 0]), float64(normals[i, j, 1]), float64(normals[i, j, 2])
+        if nx == 0.0 and ny == 0.0 and nz == 0.0:
+            continue
+        seen += 1
+        distance = (x - target_xyz[i, j, 0]) * nx + (y - target_xyz[i, j, 1]) * ny + (z - target_xyz[i, j, 2]) * nz
+        if abs(distance) > reach:
+            continue
+        pairs += 1
+        precision = 1.0 / (DEPTH_SIGMA[0] + DEPTH_SIGMA[1] * z * z)
+        _add(H, g, x, y, z, nx, ny, nz, distance, precision * precision * _huber(distance * precision))
+        if grey_weight > 0.0:
+            a, b = float64(slope[i, j, 0]), float64(slope[i, j, 1])
+            error = target_grey[i, j] + a * (u - j) + b * (v - i) - grey[k] - exposure
+            weight = grey_weight * grey_weight * _huber(error * grey_weight)
+            a, b = a * fx / z, b * fy / z
+            _add(H, g, x, y, z, a, b, -(a * x + b * y) / z, error, weight)
+            brightness += weight * error
+            weights += weight
+    return H, g, pairs, max(seen, 1), brightness / max(weights, 1e-12)

@@ -1,0 +1,269 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Keyframes, sightings and closures as rows of the store, and back. Arrays become self-describing blobs.
+
+A row is sealed when it is made, and is not looked into before its seal is found whole (see `seal`).
+"""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from objreg_ros.data import Array, Intrinsics, LoopClosure, ObjectCloud, View
+from objreg_ros.geometry import back_project, is_rigid
+from objreg_ros.memory.checksum import (
+    require_keyframe,
+    require_light,
+    require_object,
+    require_sealed,
+    sealed,
+    sealed_keyframe,
+    sealed_object,
+)
+from objreg_ros.memory.descriptor import SIZE
+from objreg_ros.memory.sighting import Sighting
+from objreg_ros.registration.keyframe import Context, Keyframe, KeyObject
+
+Row = dict[str, Any]
+PLACES = {"position": 3, "camera": 3, "R_landmark_session": 9}  # doubles in the columns of a sighting
+
+
+def pack(*arrays: Array | None) -> bytes:
+    """Arrays, some of them None, as one blob: a line of JSON with dtypes and shapes, then the bytes.
+
+    In zlib's container for its checksum, but not deflated: float points do not shrink, and it would cost 20 ms.
+    """
+    header = [None if a is None else [a.dtype.str, list(a.shape)] for a in arrays]
+    body = b"".join(np.ascontiguousarray(a).tobytes() for a in arrays if a is not None)
+    return zlib.compress(json.dumps(header).encode() + b"\n" + body, level=0)
+
+
+def unpack(blob: bytes) -> tuple[Any, ...]:
+    """The arrays of `pack`; ValueError if the blob is damaged."""
+    try:
+        header, body = zlib.decompress(blob).split(b"\n", 1)
+        arrays: list[Array | None] = []
+        offset = 0
+        for entry in json.loads(header):
+            if entry is None:
+                arrays.append(None)
+                continue
+            dtype, shape = np.dtype(entry[0]), tuple(entry[1])
+            array = np.frombuffer(body, dtype, int(np.prod(shape)), offset).reshape(shape)
+            offset += array.nbytes
+            arrays.append(array)
+    except (zlib.error, ValueError, TypeError, IndexError, RecursionError, OverflowError) as error:
+        raise ValueError(f"expected a packed blob, got {len(blob)} damaged bytes ({error})") from error
+    return tuple(arrays)
+
+
+def keyframe_row(keyframe: Keyframe) -> Row:
+    """The columns of a keyframe."""
+    view = keyframe.view
+    camera = {name: getattr(view.intrinsics, name) for name in Intrinsics.__slots__}  # type: ignore[attr-defined]
+    row = {
+        "id": int(keyframe.keyframe_id),
+        "session": int(keyframe.session),
+        "stamp_ns": int(keyframe.stamp_ns),
+        "frame_id": keyframe.frame_id,
+        "travelled": _real(keyframe.travelled),
+        "turned": _real(keyframe.turned),
+        "T_odom_camera": _bytes(keyframe.T_odom_camera),
+        "by_odometry": int(keyframe.by_odometry),
+        "gravity": _bytes(keyframe.gravity),
+        "gravity_confidence": _real(keyframe.gravity_confidence),
+        "camera": json.dumps(camera),
+        "view": pack(view.xyz[..., 2], view.grey),
+        "context": pack(keyframe.context.xyz, keyframe.context.normals),
+    }
+    return sealed_keyframe(row)
+
+
+def object_row(number: int, item: KeyObject, sighting: Sighting) -> Row:
+    """The columns of one object of a keyframe, under its number in the store."""
+    cloud = item.cloud
+    row = {
+        "id": int(number),
+        "keyframe": int(sighting.keyframe_id),
+        "instance": int(cloud.instance),
+        "landmark": int(sighting.landmark),
+        "label": cloud.label,
+        "score": _real(cloud.score),
+        "extent": _real(sighting.extent),
+        "sightings": int(item.sightings),
+        "density": _real(cloud.density),
+        "position": _bytes(sighting.position),
+        "camera": _bytes(sighting.camera),
+        "R_landmark_session": _bytes(sighting.R_landmark_session),
+        "descriptor": sighting.descriptor.astype(np.float32).tobytes(),
+        "cloud": pack(cloud.xyz, cloud.normals, cloud.rgb, cloud.flags),
+    }
+    return sealed_object(row)
+
+
+def closure_row(number: int, closure: LoopClosure) -> Row:
+    """The columns of a closure, under its number in the store."""
+    row = {
+        "id": int(number),
+        "from_ns": int(closure.from_ns),
+        "to_ns": int(closure.to_ns),
+        "from_frame_id": closure.from_frame_id,
+        "to_frame_id": closure.to_frame_id,
+        "T_from_to": _bytes(closure.T_from_to),
+        "covariance": _bytes(closure.covariance),
+        "labels": json.dumps(closure.labels),
+        "evidence": json.dumps(closure.evidence),
+    }
+    return sealed("closure", row)
+
+
+def closure_from_row(row: Mapping[str, Any]) -> LoopClosure:
+    """A closure from its row, without the registrations of its objects. ValueError if it is damaged."""
+    require_sealed(f"closure {row['id']}", "closure", row)
+    try:
+        labels, evidence = tuple(map(str, json.loads(row["labels"]))), dict(json.loads(row["evidence"]))
+    except (TypeError, ValueError, RecursionError) as error:
+        raise ValueError(f"closure {row['id']}: expected labels and evidence as JSON, got others ({error})") from error
+    return LoopClosure(
+        from_ns=row["from_ns"],
+        to_ns=row["to_ns"],
+        from_frame_id=row["from_frame_id"],
+        to_frame_id=row["to_frame_id"],
+        T_from_to=np.frombuffer(_bytes_of(row, "T_from_to", 128)).reshape(4, 4),
+        covariance=np.frombuffer(_bytes_of(row, "covariance", 288)).reshape(6, 6),
+        labels=labels,
+        evidence=evidence,
+    )
+
+
+def keyframe_from_rows(row: Mapping[str, Any], objects: Sequence[Mapping[str, Any]]) -> Keyframe:
+    """A keyframe from its row and the rows of its objects. ValueError if anything of it is damaged."""
+    require_keyframe(row)
+    for item in objects:
+        require_object(item)
+    camera = _camera(row["camera"])
+    depth, grey = _unpacked(row, "view", 2)
+    xyz = back_project(depth, camera.fx, camera.fy, camera.cx, camera.cy)
+    context_xyz, context_normals = _unpacked(row, "context", 2)
+    return Keyframe(
+        keyframe_id=row["id"],
+        session=row["session"],
+        stamp_ns=row["stamp_ns"],
+        frame_id=row["frame_id"],
+        objects=tuple(_object(item) for item in objects),
+        context=Context(xyz=context_xyz, normals=context_normals),
+        view=View(xyz=xyz, grey=grey, intrinsics=camera),
+        gravity=_gravity(row),
+        gravity_confidence=row["gravity_confidence"],
+        T_odom_camera=_pose(row),
+        by_odometry=bool(row["by_odometry"]),
+        travelled=row["travelled"],
+        turned=row["turned"],
+    )
+
+
+def sighting_from_row(row: Mapping[str, Any], head: Mapping[str, Any]) -> Sighting:
+    """A sighting from the row of its object and the head of its keyframe. ValueError if it is damaged."""
+    require_light(row)
+    try:
+        return _sighting(row, head)
+    except ValueError as error:
+        raise ValueError(f"object {row['instance']} of keyframe {row['keyframe']}: {error}") from error
+
+
+def _sighting(row: Mapping[str, Any], head: Mapping[str, Any]) -> Sighting:
+    if not isinstance(row["label"], str):
+        raise ValueError(f"label: expected text, got {row['label']!r}")
+    places = b"".join(_bytes_of(row, name, 8 * count) for name, count in PLACES.items())  # looked at in one go
+    numbers = _finite(", ".join(PLACES), np.frombuffer(places))
+    descriptor = np.frombuffer(_bytes_of(row, "descriptor", 4 * SIZE), np.float32)
+    return Sighting(
+        keyframe_id=row["keyframe"],
+        session=head["session"],
+        stamp_ns=head["stamp_ns"],
+        instance=row["instance"],
+        label=row["label"],
+        score=row["score"],
+        extent=row["extent"],
+        descriptor=_finite("descriptor", descriptor),
+        position=numbers[:3],
+        camera=numbers[3:6],
+        travelled=head["travelled"],
+        by_odometry=bool(head["by_odometry"]),
+        landmark=row["landmark"],
+        R_landmark_session=numbers[6:].reshape(3, 3),
+    )
+
+
+def _object(row: Mapping[str, Any]) -> KeyObject:
+    xyz, normals, rgb, flags = _unpacked(row, "cloud", 4)
+    cloud = ObjectCloud(
+        label=row["label"],
+        score=row["score"],
+        instance=row["instance"],
+        xyz=xyz,
+        normals=normals,
+        rgb=rgb,
+        flags=flags,
+        density=row["density"],
+    )
+    return KeyObject(cloud=cloud, sightings=row["sightings"])
+
+
+def _unpacked(row: Mapping[str, Any], name: str, arrays: int) -> tuple[Any, ...]:
+    found = unpack(row[name])
+    if len(found) != arrays:
+        raise ValueError(f"{name}: expected {arrays} arrays, got {len(found)}")
+    return found
+
+
+def _real(number: float) -> float:
+    """As the database gives it back: a double, and no -0.0."""
+    return float(number) + 0.0
+
+
+def _bytes(array: Array | None) -> bytes | None:
+    return None if array is None else np.ascontiguousarray(array, float).tobytes()
+
+
+def _bytes_of(row: Mapping[str, Any], name: str, size: int) -> bytes:
+    blob = row[name]
+    if not isinstance(blob, bytes) or len(blob) != size:
+        got = f"{len(blob)} bytes" if isinstance(blob, bytes) else repr(blob)
+        raise ValueError(f"{name}: expected {size} bytes, got {got}")
+    return blob
+
+
+def _finite(name: str, numbers: Array) -> Array:
+    if not np.isfinite(numbers).all():
+        raise ValueError(f"{name}: expected finite numbers, got {numbers.tolist()}")
+    return numbers
+
+
+def _camera(text: str) -> Intrinsics:
+    try:
+        return Intrinsics(**json.loads(text))
+    except (TypeError, ValueError, RecursionError) as error:
+        raise ValueError(f"camera: expected fx fy cx cy width height as JSON, got {text!r} ({error})") from error
+
+
+def _gravity(row: Mapping[str, Any]) -> Array | None:
+    if row["gravity"] is None:
+        return None
+    gravity = _finite("gravity", np.frombuffer(_bytes_of(row, "gravity", 24)))
+    if abs(np.linalg.norm(gravity) - 1.0) > 1e-4:
+        raise ValueError(f"gravity: expected a direction of length 1, got {gravity.tolist()}")
+    return gravity
+
+
+def _pose(row: Mapping[str, Any]) -> Array | None:
+    if row["T_odom_camera"] is None:
+        return None
+    T = np.frombuffer(_bytes_of(row, "T_odom_camera", 128)).reshape(4, 4)
+    if not is_rigid(T, 1e-4):
+        raise ValueError(f"T_odom_camera: expected a rigid motion, got {T.tolist()}")
+    return T

@@ -1,0 +1,263 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Objects of the place with ids that stay: the same cup has the same id in every keyframe and session.
+
+Two sightings are the same landmark where they are at the same place in the same session, or where a closure put them
+upon each other. When a closure shows that two landmarks are one, the older id stays, and its axes. A closure's word
+counts for more than a place, which drifts with the session; and two that one keyframe shows together are never one.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping, Sequence, Set
+from dataclasses import dataclass, field
+from itertools import islice, product
+from math import prod
+
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.memory.sighting import Sighting
+from objreg_ros.registration.labels import LabelGroups
+from objreg_ros.registration.params import RegistrarParams
+
+MIDDLE_WANDERS = 0.2  # of the extent
+CELL = 0.5  # m, edge of the cells that know which landmarks are there
+
+Cell = tuple[int, str, int, int, int]  # session, label group, and where
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Landmark:
+    """A known object: ``position (3,)`` m in the frame of the ``session`` that saw it last, at ``stamp_ns``."""
+
+    landmark: int
+    label: str
+    position: Array
+    session: int
+    stamp_ns: int
+    sightings: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Link:
+    """A closure's word that object ``index`` of the new keyframe is the stored sighting ``of``.
+
+    ``R_there_here (3, 3)`` turns the axes of the new keyframe's session into those of the stored one's.
+    """
+
+    index: int
+    of: Sighting
+    R_there_here: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Merge:
+    """What became of a landmark that turned out to be ``into``, an older one.
+
+    ``R_into_old (3, 3)`` turns the axes of the one that is gone into those of the one that stays.
+    """
+
+    into: int
+    R_into_old: Array
+
+
+@dataclass(slots=True, eq=False)
+class _Known:
+    """What is kept of one landmark: its latest sighting, votes for its label, and from where each keyframe saw it."""
+
+    last: Sighting
+    votes: Counter[str] = field(default_factory=Counter)
+    views: dict[int, Array] = field(default_factory=dict)
+
+
+class Landmarks:
+    """All known objects. Deterministic: the same sightings in the same order give the same ids.
+
+    ``first`` is the id of the first new one. What a keyframe costs here does not grow with the number of landmarks.
+    """
+
+    def __init__(self, params: RegistrarParams, sightings: Iterable[Sighting] = (), first: int = 1) -> None:
+        self._params = params
+        self._groups = LabelGroups(params.label_groups)
+        self._known: dict[int, _Known] = {}  # the one seen last comes last
+        self._there: defaultdict[Cell, set[int]] = defaultdict(set)
+        self._shown: defaultdict[int, set[int]] = defaultdict(set)  # the landmarks of each keyframe
+        self._next = first
+        self.add(sightings)
+
+    def __len__(self) -> int:
+        return len(self._known)
+
+    def known(self) -> tuple[Landmark, ...]:
+        """Every landmark, the oldest first."""
+        return tuple(_landmark(number, known) for number, known in sorted(self._known.items()))
+
+    def recent(self, session: int | None, most: int) -> tuple[Landmark, ...]:
+        """Of the ``most`` landmarks that were seen last those of this session, the oldest first."""
+        last = sorted(islice(reversed(self._known), most))
+        return tuple(_landmark(n, self._known[n]) for n in last if self._known[n].last.session == session)
+
+    def assign(
+        self, sightings: Sequence[Sighting], links: Sequence[Link] = ()
+    ) -> tuple[tuple[Sighting, ...], dict[int, Merge]]:
+        """The sightings of a new keyframe with their landmarks, and which landmarks turned out to be which older.
+
+        A landmark is one object of a keyframe at most: of two that closures put upon it the first has it.
+        """
+        merged: dict[int, Merge] = {}
+        named: list[Sighting] = []
+        taken: set[int] = set()
+        for index, sighting in enumerate(sightings):
+            axes = self._axes(index, sighting, links, taken)
+            if not axes:
+                named.append(sighting.of_landmark(self._next, np.eye(3)))
+                self._next += 1
+                continue
+            oldest = min(axes)
+            merged |= {n: Merge(into=oldest, R_into_old=axes[oldest] @ R.T) for n, R in axes.items() if n != oldest}
+            taken |= axes.keys()
+            named.append(sighting.of_landmark(oldest, axes[oldest]))
+        return tuple(named), merged
+
+    def add(self, sightings: Iterable[Sighting], merged: Mapping[int, Merge] | None = None) -> None:
+        """Take in sightings that have their landmarks, after merging the landmarks that turned out to be one."""
+        for old, merge in (merged or {}).items():
+            self._merge(old, merge)
+        for sighting in sightings:
+            number = sighting.landmark
+            known = self._known[number] = self._known.pop(number, _Known(sighting))
+            self._leave(known.last, number)
+            self._there[self._cell(sighting)].add(number)
+            known.last = sighting
+            known.votes[sighting.label] += round(1000 * sighting.score)
+            known.views[sighting.keyframe_id] = sighting.viewpoint
+            self._shown[sighting.keyframe_id].add(number)
+            self._next = max(self._next, number + 1)
+
+    def surplus(self, landmarks: Iterable[int]) -> list[int]:
+        """Keyframes of these landmarks that show each of their objects from where better spread keyframes do too."""
+        spare = {number: self._spare(self._known[number]) for number in set(landmarks) if number in self._known}
+        spared = set().union(*spare.values()) if spare else set()
+        return sorted(k for k in spared if all(k in spare.get(number, ()) for number in self._shown[k]))
+
+    def forget(self, keyframe_ids: Iterable[int]) -> None:
+        """Forget from where these keyframes saw their objects, and the landmarks that no other keyframe shows."""
+        for keyframe_id in keyframe_ids:
+            for number in self._shown.pop(keyframe_id, ()):
+                known = self._known[number]
+                del known.views[keyframe_id]
+                if not known.views:
+                    self._leave(known.last, number)
+                    del self._known[number]
+
+    def _leave(self, sighting: Sighting, number: int) -> None:
+        """A landmark is no longer where it was seen so."""
+        cell = self._cell(sighting)
+        self._there[cell].discard(number)
+        if not self._there[cell]:
+            del self._there[cell]
+
+    def _same_place(self, sighting: Sighting, taken: set[int]) -> int:
+        """The landmark that this session saw last at this place, 0 if there is none."""
+        best, best_distance = 0, np.inf
+        for number in sorted(self._near(sighting) - taken):
+            last = self._known[number].last
+            distance = float(np.linalg.norm(sighting.position - last.position))
+            if distance < min(best_distance, self._reach(sighting, last)):
+                best, best_distance = number, distance
+        return best
+
+    def _near(self, sighting: Sighting) -> set[int]:
+        """The landmarks of the sighting's session and label group that may be within reach of it.
+
+        A thing may be so large that fewer cells are known than it reaches.
+        """
+        reach = 2.0 * self._params.landmark_radius + MIDDLE_WANDERS * sighting.extent  # the largest that it can be
+        low, high = (np.floor((sighting.position + side * reach) / CELL).astype(int) for side in (-1, 1))
+        session, group, *_ = self._cell(sighting)
+        spans = [range(a, b + 1) for a, b in zip(low.tolist(), high.tolist(), strict=True)]
+        if prod(map(len, spans)) > len(self._there):
+            return set().union(*(there for cell, there in self._there.items() if cell[:2] == (session, group)))
+        return set().union(*(self._there.get((session, group, x, y, z), ()) for x, y, z in product(*spans)))
+
+    def _cell(self, sighting: Sighting) -> Cell:
+        x, y, z = np.floor(sighting.position / CELL).astype(int).tolist()
+        return sighting.session, self._groups.of(sighting.label), x, y, z
+
+    def _reach(self, sighting: Sighting, last: Sighting) -> float:
+        """How far apart two sightings of one object may be: the middle of a large one wanders with the side seen."""
+        params = self._params
+        drift = params.odometry_drift * abs(sighting.travelled - last.travelled)
+        wander = MIDDLE_WANDERS * min(sighting.extent, last.extent)
+        return params.landmark_radius + wander + min(drift, params.landmark_radius)
+
+    def _axes(self, index: int, sighting: Sighting, links: Sequence[Link], taken: Set[int]) -> dict[int, Array]:
+        """The landmarks that an object of a new keyframe is, each with what turns the session's axes into its own.
+
+        Those that closures claim for it come first. The place adds one only if no closure claims that for another
+        object, and of two that some keyframe shows together only the first is believed.
+        """
+        found: dict[int, Array] = {}
+        for link in links:
+            number = link.of.landmark
+            if link.index == index and number not in taken and not self._shown_beside(number, found):
+                found.setdefault(number, link.of.R_landmark_session @ link.R_there_here)
+        claimed = {link.of.landmark for link in links if link.index != index}
+        here = self._same_place(sighting, claimed | taken)
+        if here and here not in found and not self._shown_beside(here, found):
+            found[here] = self._known[here].last.R_landmark_session
+        return found
+
+    def _shown_beside(self, number: int, others: Iterable[int]) -> bool:
+        """Whether some keyframe shows a landmark together with another one of ``others``."""
+        mine = self._known[number].views.keys() if number in self._known else frozenset()
+        return any(
+            other != number and other in self._known and not mine.isdisjoint(self._known[other].views)
+            for other in others
+        )
+
+    def _merge(self, old: int, merge: Merge) -> None:
+        gone, new = self._known.pop(old, None), merge.into
+        if gone is None:
+            return
+        self._leave(gone.last, old)
+        gone.last = gone.last.of_landmark(new, merge.R_into_old @ gone.last.R_landmark_session)
+        gone.views = {keyframe_id: merge.R_into_old @ view for keyframe_id, view in gone.views.items()}
+        known = self._known.setdefault(new, gone)
+        self._there[self._cell(known.last)].add(new)
+        for keyframe_id in gone.views:
+            self._shown[keyframe_id] = self._shown[keyframe_id] - {old} | {new}
+        if known is not gone:
+            known.votes.update(gone.votes)
+            known.views.update(gone.views)
+
+    def _spare(self, known: _Known) -> set[int]:
+        """The keyframes that are left when the most diverse viewpoints are taken one after the other."""
+        limit = self._params.max_views
+        if len(known.views) <= limit:
+            return set()
+        keys = sorted(known.views)
+        points = np.array([known.views[k] for k in keys])
+        directions = points / np.maximum(np.linalg.norm(points, axis=1, keepdims=True), 1e-9)
+        chosen = [len(keys) - 1]  # the newest stays: it shows the place as it is
+        distance = np.full(len(keys), np.inf)
+        while len(chosen) < limit:
+            last = chosen[-1]
+            step = np.linalg.norm(directions - directions[last], axis=1)
+            step += 0.5 * np.abs(np.linalg.norm(points, axis=1) - np.linalg.norm(points[last]))
+            distance = np.minimum(distance, step)
+            distance[chosen] = -1.0
+            chosen.append(int(distance.argmax()))
+        return set(keys) - {keys[i] for i in chosen}
+
+
+def _landmark(number: int, known: _Known) -> Landmark:
+    return Landmark(
+        landmark=number,
+        label=max(known.votes, key=lambda label: (known.votes[label], label)),
+        position=known.last.position,
+        session=known.last.session,
+        stamp_ns=known.last.stamp_ns,
+        sightings=len(known.views),
+    )

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The file of a store: how it is made, and how it is told from others."""
+
+from __future__ import annotations
+
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+from objreg_ros.memory.books import Books
+from objreg_ros.memory.claim import StoreError, read_header
+
+MAGIC = b"SQLite format 3\0"
+APPLICATION_ID = 0x4F424A52  # "OBJR" at byte 68 of the file
+SCHEMA_VERSION = 5  # at byte 60
+SCHEMA = """
+CREATE TABLE keyframe (
+  id INTEGER PRIMARY KEY, session INTEGER NOT NULL, stamp_ns INTEGER NOT NULL, frame_id TEXT NOT NULL,
+  travelled REAL NOT NULL, turned REAL NOT NULL, T_odom_camera BLOB, by_odometry INTEGER NOT NULL,
+  gravity BLOB, gravity_confidence REAL NOT NULL,
+  camera TEXT NOT NULL, seal INTEGER NOT NULL, whole INTEGER NOT NULL, view BLOB NOT NULL, context BLOB NOT NULL);
+CREATE TABLE object (
+  id INTEGER PRIMARY KEY, keyframe INTEGER NOT NULL REFERENCES keyframe ON DELETE CASCADE,
+  instance INTEGER NOT NULL, landmark INTEGER NOT NULL, label TEXT NOT NULL, score REAL NOT NULL,
+  extent REAL NOT NULL, sightings INTEGER NOT NULL, density REAL NOT NULL, position BLOB NOT NULL, camera BLOB NOT NULL,
+  R_landmark_session BLOB NOT NULL, descriptor BLOB NOT NULL, cloud_crc INTEGER NOT NULL, seal INTEGER NOT NULL,
+  cloud BLOB NOT NULL);
+CREATE INDEX object_of_keyframe ON object (keyframe);
+CREATE INDEX object_of_landmark ON object (landmark);
+CREATE TABLE closure (
+  id INTEGER PRIMARY KEY, from_ns INTEGER NOT NULL, to_ns INTEGER NOT NULL,
+  from_frame_id TEXT NOT NULL, to_frame_id TEXT NOT NULL,
+  T_from_to BLOB NOT NULL, covariance BLOB NOT NULL, labels TEXT NOT NULL, evidence TEXT NOT NULL,
+  seal INTEGER NOT NULL);
+CREATE TABLE books (
+  id INTEGER PRIMARY KEY, keyframe INTEGER NOT NULL, object INTEGER NOT NULL, closure INTEGER NOT NULL,
+  landmark INTEGER NOT NULL, keyframe_rows INTEGER NOT NULL, object_rows INTEGER NOT NULL,
+  closure_rows INTEGER NOT NULL, keyframe_seals INTEGER NOT NULL, object_seals INTEGER NOT NULL,
+  closure_seals INTEGER NOT NULL, forgotten INTEGER NOT NULL, seal INTEGER NOT NULL);
+"""
+
+
+def is_store(path: str | Path) -> bool:
+    """Whether the file at ``path`` bears the mark of a store, of any version and in any state."""
+    if not Path(path).is_file():
+        return False
+    header = read_header(Path(path))
+    return header.startswith(MAGIC) and int.from_bytes(header[68:72], "big") == APPLICATION_ID
+
+
+def require_place(path: Path, read_only: bool) -> None:
+    """StoreError unless there is a file at ``path``, or one can be made and may be."""
+    if path.is_file():
+        return
+    if read_only:
+        raise StoreError(f"{path}: expected a store of objreg_ros, got no file")
+    if path.exists() or not path.parent.is_dir():
+        raise StoreError(f"{path}: expected a file in an existing folder, got none; make the folder, or use another")
+
+
+def create(path: Path) -> None:
+    """An empty store in an empty file."""
+    with closing(sqlite3.connect(path)) as connection:
+        bear(connection)
+
+
+def bear(connection: sqlite3.Connection) -> None:
+    """Make a store of an empty database."""
+    connection.executescript(
+        f"PRAGMA auto_vacuum = INCREMENTAL; PRAGMA application_id = {APPLICATION_ID};"
+        f"BEGIN; PRAGMA user_version = {SCHEMA_VERSION}; {SCHEMA} COMMIT;"
+    )
+    with connection as transaction:
+        Books().write(transaction)
+
+
+def check(path: Path) -> int:
+    """The version of a store; StoreError unless the file is whole and of a version that is known. It is only read."""
+    header = read_header(path)
+    if len(header) < 100 or not header.startswith(MAGIC):
+        raise StoreError(f"{path}: expected a store of objreg_ros, got a file of another kind; it was left as it is")
+    if not is_store(path):
+        raise StoreError(f"{path}: expected a store of objreg_ros, got another SQLite database; it was left as it is")
+    _refuse_version(path, int.from_bytes(header[60:64], "big"))
+    version, found = _look_through(path)
+    if not found or version:  # what could be read of it says more than the header
+        _refuse_version(path, version)
+    if found:
+        raise StoreError(f"{path}: expected an intact store, got: {found}; it was left as it is. Use another path")
+    return version
+
+
+def _refuse_version(path: Path, version: int) -> None:
+    if version > SCHEMA_VERSION:
+        raise StoreError(
+            f"{path}: expected schema version {SCHEMA_VERSION} or older, got {version}; it was left as it is. "
+            "Use the newer objreg_ros that wrote it, or another path"
+        )
+    if version < 1:
+        raise StoreError(
+            f"{path}: expected schema version 1 to {SCHEMA_VERSION}, got {version}; it was left as it is. "
+            "Use another path"
+        )
+
+
+def read_only_uri(path: Path) -> str:
+    """Without a log beside it the file is all there is, and no helper files are made to read it."""
+    mode = "mode=ro" if path.with_name(path.name + "-wal").exists() else "mode=ro&immutable=1"
+    return f"{path.resolve().as_uri()}?{mode}"
+
+
+def _look_through(path: Path) -> tuple[int, str]:
+    """The version of a database, 0 where it cannot be read, and what is wrong with it, empty if nothing.
+
+    With what a log beside it says: the program that wrote it may have been killed before that came into the file. It is
+    opened for reading only.
+    """
+    try:
+        with closing(sqlite3.connect(read_only_uri(path), uri=True)) as connection:
+            version = int(connection.execute("PRAGMA user_version").fetchone()[0])
+            found = str(connection.execute("PRAGMA integrity_check(1)").fetchone()[0])
+            if found == "ok" and version == SCHEMA_VERSION:
+                found = _foreign(connection)
+    except sqlite3.DatabaseError as error:
+        return 0, " ".join(str(error).split())
+    return version, "" if found == "ok" else " ".join(found.split())
+
+
+def _foreign(connection: sqlite3.Connection) -> str:
+    """What is in a database of this version that `bear` does not make, or the other way round; "ok" if nothing is."""
+    with closing(sqlite3.connect(":memory:")) as model:
+        bear(model)
+        wanted, got = _parts(model), _parts(connection)
+    for kind, name, *_ in sorted(wanted ^ got, key=str):
+        whose = "one that no store has" if not any(part[:2] == (kind, name) for part in wanted) else "another or none"
+        return f"the {kind} {name}: {whose}"
+    return "ok"
+
+
+def _parts(connection: sqlite3.Connection) -> set[tuple[object, ...]]:
+    return {tuple(row) for row in connection.execute("SELECT type, name, tbl_name, sql FROM sqlite_master")}

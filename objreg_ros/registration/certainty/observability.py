@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How far a pose may slide where the surfaces let it: as far as the views like it no less.
+
+Two views of a table from opposite sides share little but its top, on which one can be pushed along the other. What
+stands on it resists, with too few points to count as surface; yet a pose that was pushed is seen to be worse. So a pose
+is pushed, and where both ways are clearly worse it is held by the views, to a third of the push. Where its position is
+known badly all the same, the views are asked for a better one about it, and then whether they resist it all around.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.geometry import transform
+from objreg_ros.registration.align.photometric_icp import finish
+from objreg_ros.registration.certainty.perturbation import Stand, pushed, square, turned_about
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.prepare.prepared import Prepared
+from objreg_ros.registration.score.comparison import gain, liked
+from objreg_ros.registration.score.object_matches import explain
+from objreg_ros.registration.score.photometric import texture
+from objreg_ros.registration.score.view_score import rank, verify
+
+HELD = 1.0 / 3.0  # of a push that is clearly resisted: one sigma of a pose that the views hold
+AROUND = 8  # ways in which a pose is pushed to see whether it is resisted
+CLEARLY = 0.02  # gain for which a pose is left for another
+HOPE = 0.3  # of V, what grey may add to a pose by finishing it
+
+
+def resisted(
+    source: Prepared, target: Prepared, T_target_source: Array, slack: Array, extent: float, params: RegistrarParams
+) -> tuple[Array, Array]:
+    """Which of the ``slack`` directions (K, 6) are free, and the motions (L, 6) of one sigma along those that are held.
+
+    Directions and motions [t r] are of the source camera's pose in the target's axes. ``extent`` m is the lever that
+    makes a turn of what was seen comparable to a shift. All are free where the views do not like the pose itself.
+    """
+    free, held = [], []
+    lever = transform(T_target_source, source.middle) - T_target_source[:3, 3]
+    stand = _stand(source, target, T_target_source, params) if len(slack) else None
+    for direction in slack:
+        unit = direction / _length(direction, lever, extent)
+        reach = None if stand is None else _reach(stand, unit, params)
+        if reach is None:
+            free.append(direction)
+        else:
+            held.append(HELD * reach * unit)
+    return np.reshape(free, (-1, 6)), np.reshape(held, (-1, 6))
+
+
+def _stand(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> Stand | None:
+    """Where a pose stands that the views like as the gate wants it; None for any other."""
+    seen = verify(source.sight, target.sight, T_target_source, params)
+    return Stand(source, target, T_target_source, params) if seen.score >= params.min_score else None
+
+
+def resistance(source: Prepared, target: Prepared, T_target_source: Array, C: Array, params: RegistrarParams) -> float:
+    """How much less the views like the pose, at least, when it is pushed any way where it is known least.
+
+    ``C (6, 6)`` [t r] is its covariance in the target's axes. In the plane in which it is largest the pose is pushed
+    all around as far as the last of ``params.pushes``, the way that its errors go: a camera that looks at one far thing
+    goes sideways and turns to keep looking at it.
+    """
+    angles = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
+    pushes = params.pushes[-1] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return Stand(source, target, T_target_source, params).least_fall(pushes @ weakest(C))
+
+
+def weakest(C: Array) -> Array:
+    """The motions (2, 6) [t r] of 1 m along the directions in which a position of covariance (6, 6) is known least."""
+    values, vectors = np.linalg.eigh(C[:3, :3])
+    return np.asarray((C[:, :3] @ vectors[:, 1:] / values[1:]).T)
+
+
+def preferred(
+    source: Prepared, target: Prepared, T_target_source: Array, C: Array, params: RegistrarParams
+) -> Array | None:
+    """A pose that views and objects like better where one of covariance ``C (6, 6)`` could as well be, or None.
+
+    Far away a shift looks like a turn, and what repeats itself looks alike on either side of the truth: a pose may come
+    to rest beside it. So the views are asked all over the plane in which the position is known least, and what they
+    like there, aside from the pose itself, is finished by grey; and so is the pose turned about the objects, which is
+    taken as it is too, as grey leads astray where it says little. The objects have a say as far as the grey leaves
+    doubt (`liking`), as views of little in common like a wrong pose a hair better. Nothing is preferred without grey,
+    nor to a pose beyond what grey may mend.
+    """
+    if not (source.sight.textured and target.sight.textured):
+        return None
+    explained, _ = explain(source, target, T_target_source, params)
+    own = liked(source, target, T_target_source, explained, params)
+    if own.seen.score < params.min_score - 2.0 * HOPE:
+        return None
+    poses = pushed(T_target_source, square(params.search_step, params.search_steps) @ weakest(C))
+    V = rank(source.sight, target.sight, poses, params, params.quick_sample).astype(np.float32)
+    best, liking = None, own
+    peaks = poses[_peaks(V, 2 * params.search_steps + 1)[: params.searched]]
+    turned = _turned(source, target, T_target_source, params)
+    for T in (*turned, *(finish(source, target, start, params)[0] for start in (*peaks, *turned))):
+        found = liked(source, target, T, explained, params)
+        if gain(found, own, params) > CLEARLY and gain(found, liking, params) > 0.0:
+            best, liking = T, found
+    return best
+
+
+def _turned(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> list[Array]:
+    """The pose turned about the vertical through the objects, both ways; nothing where that is unknown."""
+    if target.up is None or len(source.centroids) == 0:
+        return []
+    middle = transform(T_target_source, source.centroids.mean(axis=0))
+    turns = np.radians([way * turn for turn in params.search_turns for way in (-1, 1)])
+    return list(turned_about(T_target_source, middle, target.up, turns))
+
+
+def _peaks(V: Array, width: int) -> list[int]:
+    """The places in a square of scores, row by row, that no neighbour exceeds, best first; hopeful, not its middle."""
+    square, middle = V.reshape(width, width), width // 2
+    peaks = (square >= cv2.dilate(square, np.ones((3, 3), np.uint8))) & (square >= square[middle, middle] - HOPE)
+    peaks[middle - 1 : middle + 2, middle - 1 : middle + 2] = False
+    return [int(k) for k in np.argsort(-V, kind="stable") if peaks.ravel()[k]]
+
+
+def steadied(source: Prepared, target: Prepared, T_target_source: Array, C: Array, params: RegistrarParams) -> Array:
+    """The information (6, 6) that the views add to a pose of covariance ``C (6, 6)``.
+
+    What two views of a table share may hold next to nothing across it by its shape, and everything by its print. So
+    the position is pushed where it is known least, and where the views clearly resist it is held there; then where it
+    is known least after that. Nothing is added for grey that hardly correlates.
+    """
+    known, added = np.linalg.inv(C), np.zeros((6, 6))
+    if not (source.sight.textured and target.sight.textured):
+        return added
+    if texture(source.sight, target.sight, T_target_source, params) < params.steadying_texture:
+        return added
+    stand, left = Stand(source, target, T_target_source, params), np.eye(3)
+    for _ in range(3):  # every way once: the views say the same of it again
+        spread = np.linalg.inv(known + added)
+        values, vectors = np.linalg.eigh(left @ spread[:3, :3] @ left)
+        if values[-1] <= params.doubtful_sigma**2:
+            break
+        across = vectors[:, -1]
+        reach = _clear(stand, spread[:, :3] @ across / values[-1], params)
+        if reach is None or reach > params.steadying_push:
+            break
+        added[:3, :3] += np.outer(across, across) / (HELD * reach) ** 2
+        left -= np.outer(across, across)
+    return added
+
+
+def _clear(stand: Stand, motion: Array, params: RegistrarParams) -> float | None:
+    """The least push in m along a motion that the views like clearly less, either way, between those that are tried.
+
+    None where there is none.
+    """
+    last_push, last_drop = 0.0, 0.0
+    for push in params.pushes:
+        drop = stand.fall(push * motion)
+        if drop >= params.rival_margin:
+            between = (last_push, push) if last_push > 0.0 else (push, push)
+            return float(np.interp(params.rival_margin, (last_drop, drop), between))
+        last_push, last_drop = push, max(0.0, drop)
+    return None
+
+
+def _length(direction: Array, lever: Array, extent: float) -> float:
+    """How far what was seen moves, m, when its camera goes along a unit direction: its middle, and its rim about it."""
+    shift, turn = direction[:3] + np.cross(direction[3:], lever), direction[3:]
+    return float(np.hypot(np.linalg.norm(shift), np.linalg.norm(turn) * extent))
+
+
+def _reach(stand: Stand, unit: Array, params: RegistrarParams) -> float | None:
+    """The least push in m that the views like clearly less, either way; None where there is none."""
+    return next((push for push in params.pushes if stand.fall(push * unit) >= params.rival_margin), None)

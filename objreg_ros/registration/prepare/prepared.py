@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A keyframe made ready for registration, once: its sight, its surface, its features."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.registration.kernels.closest_points import Surface, prepare_surface
+from objreg_ros.registration.keyframe import Keyframe
+from objreg_ros.registration.labels import LabelGroups
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.prepare.fpfh import Features, describe, salient
+from objreg_ros.registration.prepare.normals import view_normals
+from objreg_ros.registration.prepare.views import Sight, halved, own_pixels, prepare_sight
+from objreg_ros.registration.prepare.voxels import thin
+from objreg_ros.registration.shapes.shape import Shape, prepare_shape
+from objreg_ros.registration.shapes.symmetry import tells_yaw
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Prepared:
+    """All that was seen, thinned: ``sight`` and, at half its size, ``coarse`` to look with.
+
+    ``surface`` to be aligned to, ``xyz`` and ``normals (M, 3)`` to align with; ``up (3,)`` is against gravity, or None,
+    and ``up_weight`` 0..1 how much was seen that tells it; ``groups`` the confusable group of each object,
+    ``centroids (K, 3)`` their middles and ``extents (K,)`` m, ``shapes`` what is laid upon others and ``yaw_known``
+    whether that tells a turn; ``own`` is where the view shows each (h, w) bool; ``scene`` is all of them as one shape;
+    ``middle (3,)`` that of everything: where poses are compared.
+    """
+
+    keyframe: Keyframe
+    sight: Sight
+    coarse: Sight
+    surface: Surface
+    features: Features
+    xyz: Array
+    normals: Array
+    up: Array | None
+    up_weight: float
+    groups: tuple[str, ...]
+    yaw_known: tuple[bool, ...]
+    shapes: tuple[Shape | None, ...]
+    own: tuple[Array, ...]
+    scene: Shape | None
+    centroids: Array
+    extents: Array
+    middle: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Pair:
+    """Two keyframes made ready to be registered."""
+
+    source: Prepared
+    target: Prepared
+
+
+def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
+    """Everything about one keyframe that does not depend on its partner.
+
+    Surface and features are made beside the rest: they take as long as all of it, and let go of the interpreter.
+    """
+    fine = thin(*seen(keyframe, params), params.surface_voxel)
+    coarse = thin(*fine, params.feature_voxel)
+    things = thin(*of_objects(keyframe), params.thing_voxel)
+    groups = LabelGroups(params.label_groups)
+    up = None if keyframe.gravity is None else -np.asarray(keyframe.gravity, float)
+    seeing = params.context_range, params.detail_sigma, params.seed
+    with ThreadPoolExecutor(1, "prepare") as beside:
+        surface = beside.submit(prepare_surface, *joined(fine, things), params.grid_cell, params.grid_reach)
+        features = beside.submit(describe, *coarse, params.feature_radius)
+        shapes = tuple(
+            prepare_shape(keyframe, [i], params.shape_points, params.seed) for i in range(len(keyframe.objects))
+        )
+        sight = prepare_sight(keyframe.view, *seeing)
+        return Prepared(
+            keyframe=keyframe,
+            sight=sight,
+            coarse=prepare_sight(halved(keyframe.view), *seeing),
+            **_shuffled(*joined(coarse, sampled(things, params.thing_points, params.seed)), params.seed),
+            up=up,
+            up_weight=keyframe.gravity_confidence,
+            groups=tuple(groups.of(label) for label in keyframe.labels),
+            yaw_known=tuple(
+                tells_yaw(item.cloud, up, shape, params) for item, shape in zip(keyframe.objects, shapes, strict=True)
+            ),
+            shapes=shapes,
+            own=tuple(own_pixels(item, sight) for item in keyframe.objects),
+            scene=prepare_shape(keyframe, range(len(keyframe.objects)), params.scene_points, params.seed),
+            centroids=np.array([item.centroid for item in keyframe.objects]).reshape(-1, 3),
+            extents=np.array([item.extent for item in keyframe.objects]),
+            middle=np.asarray(coarse[0].mean(axis=0) if len(coarse[0]) else np.zeros(3), float),
+            surface=surface.result(),
+            features=salient(features.result(), params.feature_points),
+        )
+
+
+def seen(keyframe: Keyframe, params: RegistrarParams) -> tuple[Array, Array]:
+    """Points (N, 3) and normals (N, 3) of the whole view and of the context beyond it.
+
+    The whole view, not only what is near the objects: walls and furniture hold a pose that a table would let slide.
+    """
+    view, normals = keyframe.view.xyz, view_normals(keyframe.view.xyz)
+    known = normals.any(axis=-1) & (view[..., 2] < params.context_range)
+    context = keyframe.context
+    return np.concatenate([view[known], context.xyz]), np.concatenate([normals[known], context.normals])
+
+
+def of_objects(keyframe: Keyframe) -> tuple[Array, Array]:
+    """Points (N, 3) and normals (N, 3) of all objects: finer than the view, so that what is small counts too."""
+    clouds = [item.cloud for item in keyframe.objects]
+    nothing = np.zeros((0, 3), np.float32)
+    return (
+        np.concatenate([nothing, *(cloud.xyz for cloud in clouds)]),
+        np.concatenate([nothing, *(cloud.normals for cloud in clouds)]),
+    )
+
+
+def joined(*parts: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Oriented points of several parts as one."""
+    return np.concatenate([xyz for xyz, _ in parts]), np.concatenate([normals for _, normals in parts])
+
+
+def sampled(part: tuple[Array, Array], most: int, seed: int) -> tuple[Array, Array]:
+    """At most so many of the oriented points, drawn evenly."""
+    chosen = np.random.default_rng(seed).permutation(len(part[0]))[:most]
+    return part[0][chosen], part[1][chosen]
+
+
+def _shuffled(xyz: Array, normals: Array, seed: int) -> dict[str, Array]:
+    """The points that have a normal, in a fixed random order: the first n are a fair sample."""
+    order = np.random.default_rng(seed).permutation(np.flatnonzero(normals.any(axis=1)))
+    return {"xyz": np.ascontiguousarray(xyz[order]), "normals": np.ascontiguousarray(normals[order])}
+
+
+class Pantry:
+    """The last ``size`` keyframes that were made ready; for several threads."""
+
+    def __init__(self, params: RegistrarParams, size: int = 32) -> None:
+        self._params = params
+        self._size = size
+        self._lock = threading.Lock()
+        self._shelf: OrderedDict[int, Prepared] = OrderedDict()
+
+    def get(self, keyframe: Keyframe) -> Prepared:
+        """The keyframe made ready, now or before; the entry holds it, so its id stays its own."""
+        with self._lock:
+            prepared = self._shelf.get(id(keyframe))
+        if prepared is None:
+            prepared = prepare(keyframe, self._params)
+        with self._lock:
+            self._shelf[id(keyframe)] = prepared
+            self._shelf.move_to_end(id(keyframe))
+            while len(self._shelf) > self._size:
+                self._shelf.popitem(last=False)
+        return prepared

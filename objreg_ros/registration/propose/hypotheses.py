@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where a pose may come from: the chains and what they propose.
+
+Each is independent of the others but for the middles of objects, from which their shapes are looked for too: where
+these two agree the gate counts one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.geometry import pose, rotation_between, rotation_from_vector
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.prepare.fpfh import match
+from objreg_ros.registration.prepare.prepared import Prepared
+from objreg_ros.registration.propose.pose_voting import Matches, poses
+from objreg_ros.registration.score.view_score import rank
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Hypothesis:
+    """A pose to be refined: who proposed it, and what it was worth to its proposer."""
+
+    T_target_source: Array
+    chain: str
+    worth: float
+
+
+def from_features(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Hypothesis]:
+    """Poses from matched local features of the contexts."""
+    a, b, weights = match(source.features, target.features, params.feature_matches)
+    matches = Matches(
+        source=source.features.xyz[a].astype(float),
+        target=target.features.xyz[b].astype(float),
+        source_normals=source.features.normals[a].astype(float),
+        target_normals=target.features.normals[b].astype(float),
+        weights=weights,
+    )
+    found = poses(matches, source.up, target.up, 1.5 * params.feature_voxel, 0.3, params.seeds_per_chain)
+    return [Hypothesis(T_target_source=T, chain="features", worth=worth) for T, worth in found]
+
+
+def from_centroids(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Hypothesis]:
+    """Poses from the middles of object pairs and triples; every assignment among look-alikes is tried."""
+    pairs = look_alikes(source, target)
+    if len(pairs) < 2 or source.up is None or target.up is None:
+        return []
+    a, b = np.array(pairs).T
+    unknown = np.zeros((len(a), 3))
+    matches = Matches(
+        source=source.centroids[a],
+        target=target.centroids[b],
+        source_normals=unknown,
+        target_normals=unknown,
+        weights=np.ones(len(a)),
+    )
+    found = poses(matches, source.up, target.up, params.centroid_tolerance, 0.15, params.seeds_per_chain)
+    return [Hypothesis(T_target_source=T, chain="centroids", worth=worth) for T, worth in found]
+
+
+def from_objects(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Hypothesis]:
+    """Poses that lay one object upon one of its kind and turn about gravity, every yaw; those the views like best."""
+    if source.up is None or target.up is None:
+        return []
+    i, j = np.array(look_alikes(source, target), int).reshape(-1, 2).T
+    yaws = np.linspace(0.0, 2.0 * np.pi, params.yaw_steps, endpoint=False)
+    R = rotation_from_vector(yaws[:, None] * target.up) @ rotation_between(source.up, target.up)
+    moved = np.einsum("kab,ib->ika", R, source.centroids[i])
+    T = pose(R, target.centroids[j][:, None] - moved).reshape(-1, 4, 4)
+    worth = rank(source.sight, target.sight, T, params, params.glance)
+    best = np.argsort(-worth, kind="stable")[: params.seeds_per_object_chain]
+    return [Hypothesis(T_target_source=T[k], chain="objects", worth=float(worth[k])) for k in best]
+
+
+def look_alikes(source: Prepared, target: Prepared) -> list[tuple[int, int]]:
+    """Indices of all objects of source and target that a detector may call by one name."""
+    return [(i, j) for i, a in enumerate(source.groups) for j, b in enumerate(target.groups) if a == b]
+
+
+def from_prior(T_target_source: Array | None) -> list[Hypothesis]:
+    """The pose that odometry expects, where it expects one."""
+    return [] if T_target_source is None else [Hypothesis(T_target_source=T_target_source, chain="odometry", worth=1.0)]

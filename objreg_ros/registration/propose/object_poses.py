@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The registration of objects upon objects of their kind: one alone by its shape, several together as one shape.
+
+What each pair of look-alikes and the middles of all propose is judged by all objects as one, so that a can, whose own
+shape tells no yaw, gets it from where the others stand.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.geometry import transform
+from objreg_ros.registration.align.batch_icp import align
+from objreg_ros.registration.candidate import ObjectPair
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.prepare.prepared import Prepared
+from objreg_ros.registration.propose.fine_search import Scrutiny
+from objreg_ros.registration.propose.hypotheses import Hypothesis, from_centroids, look_alikes
+from objreg_ros.registration.score.total_score import Worth
+from objreg_ros.registration.shapes.shape import Shape, turned_half, upright_motion, upright_pose
+from objreg_ros.registration.shapes.upright_search import Fitting, glance, improve, register_shapes
+
+EACH = 2  # poses that each pair of objects proposes
+THICK = (0.0, 0.5, 1.0)  # of the usual depth of an object of its size: how far its back may lie behind its front
+
+
+def from_shapes(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Hypothesis]:
+    """Poses that lay objects upon those of their kind, those that objects and views like best first.
+
+    Upright as the objects stand; the best also drawn to all that was seen, or climbed to what both like best, where
+    that is worth more: far views of a thin thing share nothing of it, and its room still tells where it is. A lone
+    object whose best pose is liked little even so is looked at more closely.
+    """
+    pairs = shape_pairs(source, target)
+    alone = len(pairs) == 1
+    found = register_shapes(*pairs[0], params) if alone else register_scenes(source, target, params)
+    if not found:
+        return []
+    a, b = pairs[0] if alone else (source.scene, target.scene)
+    assert a is not None and b is not None
+    scale = Worth(source, target, a, b, params)
+    motions = upright_motion(a, b, np.array([fit.T_target_source for fit in found]))
+    worth = scale.of(motions)
+    best = np.argsort(-worth, kind="stable")[: params.drawn]
+    best = best[worth[best] >= worth[best[0]] - params.shape_margin]
+    motions[best], worth[best] = _improved(source, target, a, b, motions[best], scale, params)
+    order = np.argsort(-worth, kind="stable")
+    if alone and worth[order[0]] < params.scrutiny_worth and source.sight.textured and target.sight.textured:
+        closer = Scrutiny(source, target, a, b, params).improved(motions[order])
+        motions, worth = np.concatenate([closer[0], motions]), np.concatenate([closer[1], worth])
+        order = np.argsort(-worth, kind="stable")
+    best_first = zip(upright_pose(a, b, motions[order]), worth[order].tolist(), strict=True)
+    return [Hypothesis(T_target_source=T, chain="objects", worth=value) for T, value in best_first]
+
+
+def half_turned(
+    source: Prepared, target: Prepared, pair: ObjectPair, T_target_source: Array, params: RegistrarParams
+) -> Array | None:
+    """The pose (4, 4) with a ``pair`` of objects turned half about their middle, where views and they like that best.
+
+    Front and back of a screen look alike, and the true pose, in which they share nothing, is liked less than the one
+    that lays them upon each other. Who has to tell them apart needs both. None where an object has no shape.
+    """
+    a, b = source.shapes[pair.source], target.shapes[pair.target]
+    if a is None or b is None:
+        return None
+    through = params.shape_offset * (a.extent + b.extent) * np.array(THICK)
+    turned = turned_half(upright_motion(a, b, T_target_source), through)
+    motions, worth = _improved(source, target, a, b, turned, Worth(source, target, a, b, params), params)
+    return upright_pose(a, b, motions[np.argmax(worth)])
+
+
+def _improved(
+    source: Prepared, target: Prepared, a: Shape, b: Shape, motions: Array, scale: Worth, params: RegistrarParams
+) -> tuple[Array, Array]:
+    """Upright motions (K, 4) drawn to the room, then climbed, each where it is worth more; and what they are worth."""
+    best, worth = motions.copy(), scale.of(motions)
+    for better in (partial(_drawn, source, target, a, b, params=params), scale.climbed):
+        tried = np.array([better(motion) for motion in best])
+        after = scale.of(tried)
+        gain = after > worth
+        best[gain], worth[gain] = tried[gain], after[gain]
+    return best, worth
+
+
+def _drawn(source: Prepared, target: Prepared, a: Shape, b: Shape, motion: Array, params: RegistrarParams) -> Array:
+    """An upright motion drawn to the whole surface by a few points; as it was where the objects would be left."""
+    _, reach, last = params.reaches
+    few, surface, T = slice(params.drawing_points), target.surface, upright_pose(a, b, motion)
+    (drawn,), _, _ = align(source.xyz[few], source.normals[few], surface, T[None], reach, last, params.drawing_rounds)
+    gone = np.linalg.norm(transform(drawn, a.foot) - transform(T, a.foot)) > params.drawing_reach
+    return motion if gone else upright_motion(a, b, drawn)
+
+
+def register_scenes(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Fitting]:
+    """The best distinct poses of all objects of ``source`` upon those of ``target``, best first; empty without any."""
+    if source.scene is None or target.scene is None:
+        return []
+    pairs = shape_pairs(source, target)
+    if not pairs:
+        return []
+    seeds = [hypothesis.T_target_source for hypothesis in from_centroids(source, target, params)[: params.scene_seeds]]
+    for a, b in pairs:
+        seeds += glance(a, b, EACH, params)
+    feet_a, feet_b = (np.array([shape.foot for shape in shapes]) for shapes in zip(*pairs, strict=True))
+    up = pairs[0][1].R_upright_camera[2]
+    levelled = _levelled(feet_a, feet_b, up, np.array(seeds), params.centroid_tolerance)
+    return improve(source.scene, target.scene, levelled, params)
+
+
+def shape_pairs(source: Prepared, target: Prepared) -> list[tuple[Shape, Shape]]:
+    """The shapes of all objects that a detector may call by one name."""
+    pairs = ((source.shapes[i], target.shapes[j]) for i, j in look_alikes(source, target))
+    return [(a, b) for a, b in pairs if a is not None and b is not None]
+
+
+def _levelled(feet_source: Array, feet_target: Array, up: Array, T_target_source: Array, tolerance: float) -> Array:
+    """The poses (K, 4, 4) raised or lowered so that the objects that each brings together stand at the same height.
+
+    What an object stands on is known to a millimetre, its middle to centimetres. Feet (P, 3) of P pairs that may be
+    one object, ``up (3,)`` in the target's frame.
+    """
+    R, t = T_target_source[:, :3, :3], T_target_source[:, None, :3, 3]
+    gaps = feet_target - (feet_source @ R.transpose(0, 2, 1) + t)
+    near = np.linalg.norm(gaps, axis=2) < 2.0 * tolerance
+    rises = np.sort(np.where(near, gaps @ up, np.inf), axis=1)
+    T, some, count = T_target_source.copy(), near.any(axis=1), near.sum(axis=1)
+    rises, count = rises[some], count[some]
+    rows = np.arange(len(rises))
+    T[some, :3, 3] += 0.5 * (rises[rows, (count - 1) // 2] + rises[rows, count // 2])[:, None] * up
+    return T

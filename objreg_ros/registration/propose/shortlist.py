@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From all that the chains propose to the few hypotheses that are worth finishing.
+
+Hypotheses are drawn to the surface by ever more points, and those go on that the views like best. Yet shape alone may
+draw a right one away: where depth is warped, two views of a wall or of a table's top fit as well a decimetre beside the
+truth. So what was proposed about the best is looked at once more where it was proposed, held there by grey.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.registration.align.batch_icp import align, settle
+from objreg_ros.registration.align.photometric_icp import finish
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.prepare.prepared import Pair
+from objreg_ros.registration.propose.evidence import agreement, gravity_error_deg
+from objreg_ros.registration.propose.fine_search import liked_closely
+from objreg_ros.registration.propose.hypotheses import (
+    Hypothesis,
+    from_centroids,
+    from_features,
+    from_objects,
+    from_prior,
+)
+from objreg_ros.registration.propose.object_poses import from_shapes
+from objreg_ros.registration.propose.pose_voting import distinct, near
+from objreg_ros.registration.score.object_matches import explain, likeness
+from objreg_ros.registration.score.view_score import WORST, looks, rank, rate
+
+APART = (np.radians(4.0), 0.04)  # rad and m: hypotheses are distinct beyond before they are settled
+ALIKE = (np.radians(0.5), 0.01)  # and after
+BASIN = (np.radians(5.0), 0.10)  # and when they have come to their basins
+ABOUT = (np.radians(30.0), 0.5)  # rad and m: how far shape may have drawn the best from where they were proposed
+ANCHORED = 2  # hypotheses about each of the best that grey holds where they were proposed
+TILTED = 1.5  # times the error of gravity that the gate allows: what is not refined
+
+
+class Shortlist(NamedTuple):
+    """What is worth finishing, the ``best`` first, and ``seeds``: all that may agree with it.
+
+    What grey held where it was proposed agrees as it was proposed: it was chosen for being near, and drawn nearer.
+    """
+
+    best: tuple[Hypothesis, ...]
+    seeds: tuple[Hypothesis, ...]
+
+
+def shortlist(pair: Pair, T_target_source_prior: Array | None, params: RegistrarParams) -> Shortlist:
+    """The hypotheses of all chains that views and objects like best; empty when no chain proposed any.
+
+    ``T_target_source_prior (4, 4)`` is a pose to start from too, or None.
+    """
+    chains, shapes = _proposed(pair, T_target_source_prior, params), _upright(pair, params)
+    drawn = [seed for proposed in chains for seed in _drawn_best(pair, proposed, params)]
+    seeds = _settled(pair, drawn + shapes, params) + _rated(pair, shapes, params)
+    if not seeds:
+        return Shortlist((), ())
+    best = _best(pair, seeds, params)
+    about = _about(pair, best, [seed for proposed in chains for seed in proposed], params)
+    anchored = _anchored(pair, about, params)
+    return Shortlist(tuple(_best(pair, best + anchored, params)), (*seeds, *about))
+
+
+def _proposed(pair: Pair, prior: Array | None, params: RegistrarParams) -> list[list[Hypothesis]]:
+    """What each chain proposes."""
+    source, target = pair.source, pair.target
+    return [
+        from_prior(prior),
+        from_centroids(source, target, params),
+        from_objects(source, target, params),
+        from_features(source, target, params),
+    ]
+
+
+def _upright(pair: Pair, params: RegistrarParams) -> list[Hypothesis]:
+    """The distinct hypotheses of the objects' shapes: they are in their basins already."""
+    found = from_shapes(pair.source, pair.target, params)
+    worth = np.array([seed.worth for seed in found])
+    return [found[k] for k in distinct(_poses(found), worth, pair.source.middle, params.refined_per_chain, *APART)]
+
+
+def _drawn_best(pair: Pair, proposed: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
+    """The hypotheses of one chain, brought to their basins, that look best from both views, distinct.
+
+    All are brought near by a few points; what looks hopeless or has become another goes no farther.
+    """
+    if not proposed:
+        return []
+    middle = pair.source.middle
+    points, iterations, sample = params.first_look
+    T, V = _drawn(pair, _poses(proposed), points, iterations, sample, params)
+    close = distinct(T, V, middle, params.near_per_chain, *APART)
+    T, V = _drawn(pair, T[close], params.quick_points, params.iterations, params.quick_sample, params)
+    chosen = distinct(T, V, middle, params.refined_per_chain, *BASIN)
+    return [replace(proposed[close[k]], T_target_source=T[k]) for k in chosen]
+
+
+def _drawn(
+    pair: Pair, T: Array, points: int, iterations: int, sample: int, params: RegistrarParams
+) -> tuple[Array, Array]:
+    """Poses (K, 4, 4) drawn to the surface by the first so many ``points``, and V of a ``sample`` a side."""
+    source, target = pair.source, pair.target
+    wide, narrow, _ = params.reaches
+    moved, _, _ = align(source.xyz[:points], source.normals[:points], target.surface, T, wide, narrow, iterations)
+    return moved, rank(source.sight, target.sight, moved, params, sample)
+
+
+def _settled(pair: Pair, seeds: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
+    """The hypotheses where the shape alone brings them, each with its worth for the views and the objects."""
+    if not seeds:
+        return []
+    T, firm = settle(pair.source, pair.target, _poses(seeds), params)
+    settled = [replace(seed, T_target_source=pose) for seed, pose in zip(seeds, T, strict=True)]
+    return _rated(pair, _hopeful(pair, settled, firm, params), params)
+
+
+def _hopeful(pair: Pair, seeds: list[Hypothesis], firm: Array, params: RegistrarParams) -> list[Hypothesis]:
+    """The hypotheses that enough points hold and that keep gravity; all of them where none does.
+
+    Two views of nothing in common may look alike by chance: V sees what little meets, and that is not refused.
+    """
+    good = [seed for seed, held in zip(seeds, firm, strict=True) if held and _keeps_gravity(pair, seed, params)]
+    return good or seeds
+
+
+def _keeps_gravity(pair: Pair, seed: Hypothesis, params: RegistrarParams) -> bool:
+    """Whether a hypothesis, once finished, may keep gravity as the gate wants it; True where that is unknown."""
+    error = gravity_error_deg(pair.source, pair.target, seed.T_target_source)
+    return error is None or error <= TILTED * params.max_gravity_error
+
+
+def _rated(pair: Pair, seeds: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
+    """The hypotheses with their worth for the views and the objects; of those that are one pose the best has it."""
+    source, target = pair.source, pair.target
+    T = _poses(seeds)
+    forward, backward = looks(source.sight, target.sight, T, params, params.grey_points)
+    V = rate(source.sight, target.sight, forward, backward, params.grey_points)
+    apart = distinct(T, V, source.middle, len(seeds), *ALIKE)
+    ways = forward[apart], backward[apart]
+    sharp = liked_closely(source, target, T[apart], ways, params, params.grey_points)
+    rated = [replace(seed, worth=WORST) for seed in seeds]
+    for k, v in zip(apart, sharp, strict=True):
+        seed = seeds[k]
+        explained, moved = explain(source, target, seed.T_target_source, params)
+        same = likeness(source, target, explained, seed.T_target_source, params)
+        rated[k] = replace(seed, worth=float(v) + agreement(explained, moved, same, params))
+    return rated
+
+
+def _best(pair: Pair, seeds: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
+    """The distinct hypotheses of most worth that are worth finishing, best first."""
+    worth = np.array([seed.worth for seed in seeds])
+    apart = np.radians(params.agreement_rotation), params.agreement_translation
+    best = distinct(_poses(seeds), worth, pair.source.middle, params.finished, *apart)
+    return [seeds[k] for k in best if worth[k] >= worth.max() - params.finished_margin]
+
+
+def _about(pair: Pair, best: list[Hypothesis], proposed: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
+    """What was proposed about the best and looks best as it was proposed; nothing without grey to hold it there."""
+    source, target = pair.source, pair.target
+    if not proposed or not (source.sight.textured and target.sight.textured):
+        return []
+    T = _poses(proposed)
+    V = rank(source.sight, target.sight, T, params, params.quick_sample)
+    chosen: dict[int, Hypothesis] = {}
+    for found in best:
+        close = np.flatnonzero(near(T, found.T_target_source, source.middle, *ABOUT))
+        chosen |= {k: proposed[k] for k in close[distinct(T[close], V[close], source.middle, ANCHORED, *APART)]}
+    return list(chosen.values())
+
+
+def _anchored(pair: Pair, proposed: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
+    """Hypotheses that grey finishes where they were proposed, each with its worth; those that keep gravity."""
+    source, target = pair.source, pair.target
+    finished = (finish(source, target, seed.T_target_source, params)[0] for seed in proposed)
+    anchored = [replace(seed, T_target_source=T) for seed, T in zip(proposed, finished, strict=True)]
+    return _rated(pair, [seed for seed in anchored if _keeps_gravity(pair, seed, params)], params)
+
+
+def _poses(seeds: list[Hypothesis]) -> Array:
+    """The poses (K, 4, 4) of hypotheses."""
+    return np.array([seed.T_target_source for seed in seeds]).reshape(-1, 4, 4)

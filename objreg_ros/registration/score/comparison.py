@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which of two poses near each other views and objects like more.
+
+The likeness of an object tells its front from its back, but not half a degree: whether a thin leg falls beside its
+pixels is chance. Grey that both views see much of tells where exactly a pose is, and grey that they see little of does
+not. So the objects have a say as far as the grey leaves doubt.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from objreg_ros.data import Array
+from objreg_ros.registration.candidate import Verification
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.prepare.prepared import Prepared
+from objreg_ros.registration.score.object_matches import Pairs, likeness
+from objreg_ros.registration.score.view_score import verify
+
+
+class Liking(NamedTuple):
+    """What the views say of a pose, and how alike the explained objects look under it.
+
+    ``likeness`` is -1 to 1, and 0 where no explained object has a shape.
+    """
+
+    seen: Verification
+    likeness: float
+
+
+def liked(
+    source: Prepared, target: Prepared, T_target_source: Array, explained: Pairs, params: RegistrarParams
+) -> Liking:
+    """What the views, by ``grey_points`` a side, and the ``explained`` objects say of a pose (4, 4)."""
+    seen = verify(source.sight, target.sight, T_target_source, params, params.grey_points)
+    return Liking(seen, likeness(source, target, explained, T_target_source, params) or 0.0)
+
+
+def gain(other: Liking, own: Liking, params: RegistrarParams) -> float:
+    """How much more another pose is worth than one's own, in units of V; below 0 where it is worth less.
+
+    Both are of the same explained objects. The surer grey speaks for both, so that one gains what the other loses.
+    """
+    doubt = min(_doubt(liking.seen, params) for liking in (other, own))
+    more_alike = other.likeness - own.likeness
+    return other.seen.score - own.seen.score + params.likeness_weight * doubt * more_alike
+
+
+def _doubt(seen: Verification, params: RegistrarParams) -> float:
+    """How little the grey says of where exactly a pose is: 0 where it says all, 1 where objects may say as much.
+
+    The log likelihood of jointly Gaussian greys that correlate by r over n points, -n/2 log(1 - r^2), changes by
+    n r / (1 - r^2) with r. The n points are those that lie on a surface of both.
+    """
+    r, n = min(max(seen.texture or 0.0, 0.0), 1.0), seen.inliers * seen.tested
+    known, enough = n * r, params.telling_grey * (1.0 - r**2)
+    return enough / known if known > enough else 1.0

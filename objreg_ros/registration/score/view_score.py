@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The whole-view check of a pose: free space both ways, and correlation of the high-passed grey.
+
+Fit error, ICP fitness and object-only scores all accept wrong poses, because a small patch fits in many places. The
+whole view does not: what one camera saw to be empty, the other must not fill.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.geometry import inverse
+from objreg_ros.registration.candidate import Verification
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.prepare.views import Sight
+from objreg_ros.registration.score.free_space import INLIERS, OCCLUDED, SEEN, VIOLATIONS, correlation, count, count_many
+from objreg_ros.registration.score.photometric import NARROW, compare, texture
+
+NO_TEXTURE = 0.2  # what stands in for the texture of a view without grey: less than a right pose usually has
+WORST = -3.0  # V where there is nothing to look at
+FIRMLY = 2.0  # tolerances that leave no doubt
+NEUTRAL = 0.65  # what a wrong pose at its best reaches
+
+
+def verify(
+    source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams, sample: int | None = None
+) -> Verification:
+    """Look at ``T_target_source`` from both views; ``sample`` limits the points that are asked on either side.
+
+    Without it the grey is compared in the same image (`texture`), with it in the images' own bands, which is quicker.
+    A pose under which the views do not meet comes back with ``tested`` 0 and the lowest score.
+    """
+    ways = (
+        look(source, target, T_target_source, params, sample),
+        look(target, source, inverse(T_target_source), params, sample),
+    )
+    if min(way[SEEN] for way in ways) < 1:
+        return Verification(inliers=0.0, violations=1.0, occluded=0.0, texture=None, tested=0, score=WORST)
+    grey = _grey(source, target, T_target_source, params, None if sample is None else ways[0] + ways[1])
+    return Verification(
+        inliers=float(min(way[INLIERS] / way[SEEN] for way in ways)),
+        violations=float(max(way[VIOLATIONS] / way[SEEN] for way in ways)),
+        occluded=float(max(way[OCCLUDED] / way[SEEN] for way in ways)),
+        texture=grey,
+        tested=int(ways[0][SEEN] + ways[1][SEEN]),
+        score=float(rated(ways[0], ways[1], NO_TEXTURE if grey is None else grey, _asked(source, target, sample))),
+    )
+
+
+def _grey(source: Sight, target: Sight, T: Array, params: RegistrarParams, counts: Array | None) -> float | None:
+    """How the grey correlates, by ``counts`` where there are some; None for a view without grey."""
+    if not (source.textured and target.textured):
+        return None
+    return texture(source, target, T, params) if counts is None else float(correlation(counts))
+
+
+def rank(source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams, sample: int) -> Array:
+    """V of many poses (K, 4, 4) at once, from the first ``sample`` points a side; -3 where the views do not meet."""
+    return rate(source, target, *looks(source, target, T_target_source, params, sample), sample)
+
+
+def looks(
+    source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams, sample: int
+) -> tuple[Array, Array]:
+    """`look` at many poses (K, 4, 4), forward and backward: (K, 10) each."""
+    slops = params.depth_tolerance, params.depth_tolerance_growth
+    forward = count_many(source.points[:sample], source.shades[:sample], T_target_source, *_image(target), *slops)
+    back = inverses(T_target_source)
+    return forward, count_many(target.points[:sample], target.shades[:sample], back, *_image(source), *slops)
+
+
+def rate(source: Sight, target: Sight, forward: Array, backward: Array, sample: int) -> Array:
+    """V (K,) of what `looks` counted, with the grey of each image's own band."""
+    textured = source.textured and target.textured
+    return np.asarray(_rated_many(forward, backward, textured, _asked(source, target, sample)))
+
+
+def rate_sharply(
+    source: Sight,
+    target: Sight,
+    T_target_source: Array,
+    ways: tuple[Array, Array],
+    params: RegistrarParams,
+    sample: int,
+) -> float:
+    """V of one pose (4, 4) with all of the source's grey laid into the target's image: slower, and it falls by more.
+
+    ``ways`` are what `looks` counted there, (10,) each. Grey one way, as the other says much the same; for poses near
+    each other, which tell a push from none. Both views must have grey.
+    """
+    grey = correlation(compare(source, target, T_target_source, params, NARROW))
+    return float(rated(*ways, grey, _asked(source, target, sample)))
+
+
+def _asked(source: Sight, target: Sight, sample: int | None) -> int:
+    """How many points are asked, both ways."""
+    return sum(min(len(sight.points), sample or len(sight.points)) for sight in (source, target))
+
+
+def look(source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams, sample: int | None) -> Array:
+    """What the target view says of the source's points; the counts of `visibility.count`."""
+    slops = params.depth_tolerance, params.depth_tolerance_growth
+    return np.asarray(count(source.points[:sample], source.shades[:sample], T_target_source, *_image(target), *slops))
+
+
+def floating(source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams) -> float:
+    """The share of tested pixels that float beyond doubt, the worse way's: 1 where the views do not meet.
+
+    In front of everything that the other view saw in a wide window, by more than twice the tolerance: edges are ragged
+    and a right pose is a little off, but a thing that is not there is larger than that.
+    """
+    ways = (source, target, T_target_source), (target, source, inverse(T_target_source))
+    return max(_floating(asked, seen, T, params) for asked, seen, T in ways)
+
+
+def _floating(asked: Sight, seen: Sight, T: Array, params: RegistrarParams) -> float:
+    slops = FIRMLY * params.depth_tolerance, FIRMLY * params.depth_tolerance_growth
+    counts = count(asked.points, asked.shades, T, seen.front, seen.far, seen.detail, seen.camera, *slops)
+    tested = look(asked, seen, T, params, None)[SEEN]
+    return float(counts[VIOLATIONS] / tested) if tested >= 1 else 1.0
+
+
+def _image(sight: Sight) -> tuple[Array, Array, Array, tuple[float, float, float, float]]:
+    return sight.near, sight.far, sight.detail, sight.camera
+
+
+@numba.njit(cache=True, nogil=True)
+def rated(forward, backward, grey, asked):  # type: ignore[no-untyped-def]
+    """V of the counts (10,) of both ways, of which ``asked`` points were asked, and of the correlation of ``grey``.
+
+    V is made of the worse way's inliers and violations, the texture and the share of all points that could be tested.
+    Weights rounded from a logistic fit on real frames; a view without grey counts as a weak match.
+    """
+    seen_a, seen_b = forward[SEEN], backward[SEEN]
+    if min(seen_a, seen_b) < 1.0:
+        return WORST
+    inliers = min(forward[INLIERS] / seen_a, backward[INLIERS] / seen_b)
+    violations = max(forward[VIOLATIONS] / seen_a, backward[VIOLATIONS] / seen_b)
+    share = max((seen_a + seen_b) / asked, 1e-3)
+    return grey + inliers - 3.0 * violations + 0.5 * np.log10(share) - NEUTRAL
+
+
+@numba.njit(cache=True, nogil=True)
+def rated_quickly(forward, backward, textured, asked):  # type: ignore[no-untyped-def]
+    """V with the grey of each image's own band."""
+    grey = correlation(forward + backward) if textured else NO_TEXTURE
+    return rated(forward, backward, grey, asked)
+
+
+@numba.njit(cache=True, nogil=True)
+def _rated_many(forward, backward, textured, asked):  # type: ignore[no-untyped-def]
+    """V (K,) of many counts (K, 10)."""
+    V = np.empty(len(forward))
+    for k in range(len(V)):
+        V[k] = rated_quickly(forward[k], backward[k], textured, asked)
+    return V
+
+
+def inverses(T: Array) -> Array:
+    """The inverse motions of poses (K, 4, 4)."""
+    out = np.zeros_like(T)
+    out[:, :3, :3] = T[:, :3, :3].transpose(0, 2, 1)
+    out[:, :3, 3] = -np.einsum("kij,kj->ki", out[:, :3, :3], T[:, :3, 3])
+    out[:, 3, 3] = 1.0
+    return out

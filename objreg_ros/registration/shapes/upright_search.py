@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The registration of one shape upon another: every yaw, out of seen free space, to its basin, the best climbed."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.registration.kernels.projection import FAST
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.shapes.shape import Shape, upright_motion, upright_pose
+from objreg_ros.registration.shapes.silhouette_score import climb, two_way, weights_of
+from objreg_ros.registration.shapes.upright_icp import settle
+from objreg_ros.registration.shapes.visual_hull import clear
+
+SAME_TURN = 0.12  # rad within which two motions are one
+SAME_SHIFT = 0.015  # m
+ALIKE_TURN, CROWD = 0.5, 2  # rad within which motions turn alike, and how many of them are refined
+CLIMB = (0.05, 0.012, 0.012, 0.0)  # rad and m: the first steps of a climb; a shape keeps its height
+WIDEST_REACH = 0.07  # m within which a point finds a partner at first
+CLEARED, CLEARED_AT_A_GLANCE, CLEARED_AT_LAST = (100, 6), (50, 4), (200, 5)  # points a side and steps out of free space
+
+
+class Fitting(NamedTuple):
+    """A pose of one shape upon another and what both silhouettes say of it; a higher score is better."""
+
+    T_target_source: Array
+    score: float
+
+
+def register_shapes(source: Shape, target: Shape, params: RegistrarParams) -> list[Fitting]:
+    """The best distinct poses of ``source`` upon ``target``, both upright on what they stand on, best first."""
+    motions, scores = _begun(source, target, params.shape_yaws, CLEARED, params.shape_glance, params)
+    return _finished(source, target, motions, scores, 0.5 * _reach(source, target), params)
+
+
+def glance(source: Shape, target: Shape, most: int, params: RegistrarParams) -> list[Array]:
+    """The poses of ``source`` upon ``target`` that look best at first, at most so many: a tenth of a registration."""
+    motions, scores = _begun(source, target, params.glance_yaws, CLEARED_AT_A_GLANCE, params.glance, params)
+    return list(upright_pose(source, target, motions[np.argsort(-scores, kind="stable")[:most]]))
+
+
+def _begun(
+    source: Shape, target: Shape, yaws: int, cleared: tuple[int, int], sample: int, params: RegistrarParams
+) -> tuple[Array, Array]:
+    extent = 0.5 * (source.extent + target.extent)
+    starts = _starts(yaws, params.shape_offset * extent)
+    settling = extent, weights_of(params), sample, _reach(source, target)
+    return _started(source.sight, target.sight, target.surface.grid, starts, *settling, cleared)
+
+
+def _reach(source: Shape, target: Shape) -> float:
+    return min(WIDEST_REACH, 0.25 * (source.extent + target.extent))
+
+
+def improve(source: Shape, target: Shape, poses: Array, params: RegistrarParams) -> list[Fitting]:
+    """Poses (K, 4, 4) of ``source`` near ``target``, made upright and brought to where both silhouettes like them best.
+
+    The best distinct ones come back, best first.
+    """
+    motions = upright_motion(source, target, poses)
+    extent = 0.5 * (source.extent + target.extent)
+    settling = extent, weights_of(params), params.shape_glance, WIDEST_REACH
+    moved, scores = _started(source.sight, target.sight, target.surface.grid, motions, *settling, CLEARED)
+    return _finished(source, target, moved, scores, 0.5 * WIDEST_REACH, params)
+
+
+def _starts(yaws: int, deeper: float) -> Array:
+    """Motions (K, 4) of every yaw; both cameras look along x, and the unseen middle lies so much deeper, in m."""
+    yaw = 2.0 * np.pi * np.arange(yaws) / yaws
+    return np.stack([yaw, deeper - np.cos(yaw) * deeper, -np.sin(yaw) * deeper, np.zeros_like(yaw)], axis=1)
+
+
+def _finished(
+    source: Shape, target: Shape, motions: Array, scores: Array, reach: float, params: RegistrarParams
+) -> list[Fitting]:
+    extent = 0.5 * (source.extent + target.extent)
+    numbers, margin = (params.shape_kept, params.shape_climbed, params.shape_rounds), params.shape_margin
+    sights = source.sight, target.sight, target.surface.grid
+    found, worth = _finish(*sights, motions, scores, extent, weights_of(params), numbers, margin, reach)
+    order = np.argsort(-worth, kind="stable")
+    poses = upright_pose(source, target, found[order])
+    return [Fitting(T, score) for T, score in zip(poses, worth[order].tolist(), strict=True)]
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
+def _started(source, target, grid, starts, extent, weights, glance, reach, cleared):  # type: ignore[no-untyped-def]
+    """Each start brought to where it floats least, and from there to its basin: (motions (K, 4), scores (K,)).
+
+    The latter only where both silhouettes like it: opposite sides of an object have next to no surface in common, and
+    would be drawn together.
+    """
+    motions, scores = starts.copy(), np.empty(len(starts))
+    trial = np.empty(4)
+    for k in range(len(starts)):
+        clear(source, target, motions[k], *cleared)
+        scores[k] = two_way(source, target, motions[k], extent, weights, glance)
+        trial[:] = motions[k]
+        settle(source[0], source[1], glance, grid, trial, reach, 0.4 * reach, 8)
+        scores[k] = _better(source, target, trial, motions[k], scores[k], extent, weights, glance)
+    return motions, scores
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
+def _better(source, target, trial, motion, score, extent, weights, most):  # type: ignore[no-untyped-def]
+    """The higher of two scores, and in ``motion`` what has it: itself, or ``trial``."""
+    found = two_way(source, target, trial, extent, weights, most)
+    if found < score:
+        return score
+    motion[:] = trial
+    return found
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
+def _finish(  # type: ignore[no-untyped-def]
+    source, target, grid, motions, scores, extent, weights, numbers, margin, reach
+):
+    """The best distinct motions, refined with every point, the first of them climbed: (motions, scores).
+
+    What is below the best by more than ``margin`` is not climbed.
+    """
+    kept, climbed, rounds = numbers
+    P, N = source[0], source[1]
+    every, cell = len(P), grid[4]
+    best, n, trial = np.empty((kept, 4)), 0, np.empty(4)
+    order = np.empty(len(scores), np.int64)
+    _rank(scores, order)
+    for start in order:
+        if n < kept and not _known(motions[start], best, n) and _crowd(motions[start], best, n) < CROWD:
+            best[n] = motions[start]
+            n += 1
+    best, worth = best[:n], np.empty(n)
+    for k in range(n):
+        worth[k] = two_way(source, target, best[k], extent, weights, every)
+        trial[:] = best[k]
+        clear(source, target, trial, *CLEARED_AT_LAST)
+        worth[k] = _better(source, target, trial, best[k], worth[k], extent, weights, every)
+        trial[:] = best[k]
+        settle(P, N, every, grid, trial, reach, max(1.5 * cell, 0.008), 12)
+        worth[k] = _better(source, target, trial, best[k], worth[k], extent, weights, every)
+    _rank(worth, order)
+    top = worth[order[0]] if n else 0.0
+    for k in order[: min(n, climbed)]:
+        if worth[k] < top - margin:
+            break
+        worth[k] = climb(source, target, best[k], extent, weights, every, np.array(CLIMB), rounds)
+        trial[:] = best[k]
+        settle(P, N, every, grid, trial, max(1.5 * cell, 0.010), max(1.2 * cell, 0.006), 8)
+        worth[k] = _better(source, target, trial, best[k], worth[k], extent, weights, every)
+    return best, worth
+
+
+@numba.njit(cache=True, nogil=True)
+def _crowd(motion, others, n):  # type: ignore[no-untyped-def]
+    """How many others turn about as far: what looks much the same after half a turn keeps room for both."""
+    count = 0
+    for k in range(n):
+        turn = (motion[0] - others[k, 0] + np.pi) % (2.0 * np.pi) - np.pi
+        if abs(turn) < ALIKE_TURN:
+            count += 1
+    return count
+
+
+@numba.njit(cache=True, nogil=True)
+def _rank(scores, order):  # type: ignore[no-untyped-def]
+    """Fill ``order`` with the indices of scores, the highest first, by insertion: they are few."""
+    for k in range(len(scores)):
+        at = k
+        while at > 0 and scores[order[at - 1]] < scores[k]:
+            order[at] = order[at - 1]
+            at -= 1
+        order[at] = k
+
+
+@numba.njit(cache=True, nogil=True)
+def _known(motion, others, n):  # type: ignore[no-untyped-def]
+    for k in range(n):
+        turn = (motion[0] - others[k, 0] + np.pi) % (2.0 * np.pi) - np.pi
+        shift = abs(motion[1] - others[k, 1]) + abs(motion[2] - others[k, 2])
+        if abs(turn) < SAME_TURN and shift < SAME_SHIFT:
+            return True
+    return False

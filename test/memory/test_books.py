@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The books: what is missing is noticed, and ids end."""
+
+from __future__ import annotations
+
+import sqlite3
+
+import pytest
+
+from objreg_ros.memory.books import MOST_IDS, Books, read_books
+from objreg_ros.memory.store_file import bear
+
+
+def _store() -> sqlite3.Connection:
+    connection = sqlite3.connect(":memory:")
+    connection.row_factory = sqlite3.Row
+    bear(connection)
+    return connection
+
+
+def test_books_come_back_as_they_were_written() -> None:
+    connection, books = _store(), Books(keyframe=7, landmark=9, forgotten=3)
+    books.write(connection)
+    assert read_books(connection) == books and books.next("landmark") == 10
+
+
+def test_books_that_do_not_agree_with_the_rows_are_refused() -> None:
+    connection, books = _store(), Books()
+    books.enter("closure", {"id": 4, "seal": 17})
+    books.write(connection)
+    with pytest.raises(ValueError, match="expected 1 closures with checksums of 17 in all, got 0 with 0"):
+        read_books(connection)
+
+
+def test_books_that_were_changed_are_refused() -> None:
+    connection = _store()
+    connection.execute("UPDATE books SET landmark = 5")
+    with pytest.raises(ValueError, match=r"the books: expected the checksum .* damaged"):
+        read_books(connection)
+
+
+@pytest.mark.parametrize("what", MOST_IDS)
+def test_ids_end(what: str) -> None:
+    books = Books(**{what: MOST_IDS[what]})
+    with pytest.raises(ValueError, match=f"expected ids of {what}s up to .* used up"):
+        books.next(what)

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Retrieval: which stored keyframes a new one is compared with."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from registration.samples import box, keyframe, moved
+
+from objreg_ros.data import ObjectCloud
+from objreg_ros.memory.retrieval import Index, _tally, _turns
+from objreg_ros.memory.sighting import Sighting, sightings_of
+from objreg_ros.registration.params import RegistrarParams
+
+PARAMS = RegistrarParams(min_gap=2.0, candidates=3, thin_seconds=1.0)
+
+
+def _seen(
+    number: int, seconds: float, *objects: ObjectCloud, session: int = 0, x: float = 0.0, by_odometry: bool = True
+) -> list[Sighting]:
+    shown = keyframe(number, seconds, objects, session, moved(x))
+    return list(sightings_of(replace(shown, travelled=seconds, by_odometry=by_odometry)))
+
+
+def _index(*keyframes: list[Sighting], params: RegistrarParams = PARAMS) -> Index:
+    index = Index(params)
+    for sightings in keyframes:
+        index.add(sightings)
+    return index
+
+
+CUP, BOOK, CHAIR = box("cup", (0, 0, 1)), box("book", (0.3, 0, 1), 0.2), box("chair", (0, 0, 2), 0.6)
+
+
+def test_a_place_with_the_same_objects_comes_first() -> None:
+    index = _index(_seen(1, 0, CHAIR), _seen(2, 10, CUP, BOOK), _seen(3, 20, BOOK))
+    found = [place.keyframe_id for place in index.query(_seen(9, 100, CUP, BOOK))]
+    assert found == [2, 3]
+
+
+def test_an_empty_index_and_a_keyframe_of_unknown_objects_find_nothing() -> None:
+    assert _index().query(_seen(9, 100, CUP)) == []
+    assert _index(_seen(1, 0, CHAIR)).query(_seen(9, 100, CUP)) == []
+
+
+def test_confusable_labels_find_each_other() -> None:
+    index = _index(_seen(1, 0, CUP))
+    assert [place.keyframe_id for place in index.query(_seen(9, 100, box("mouse", (0, 0, 1))))] == [1]
+
+
+def test_what_was_seen_a_moment_ago_is_no_loop() -> None:
+    index = _index(_seen(1, 0, CUP), _seen(2, 9.5, CUP))
+    assert [place.keyframe_id for place in index.query(_seen(9, 10, CUP))] == [1]
+
+
+def test_odometry_takes_out_what_cannot_be_there_in_the_same_session_only() -> None:
+    params = PARAMS.replaced(odometry_radius=1.0, odometry_drift=0.1)
+    index = _index(_seen(1, 0, CUP, x=8.0), _seen(2, 10, CUP, session=1, x=8.0), params=params)
+    assert [place.keyframe_id for place in index.query(_seen(9, 30, CUP))] == [2]
+    wide = _index(_seen(1, 0, CUP, x=8.0), params=params.replaced(odometry_drift=1.0))
+    assert [place.keyframe_id for place in wide.query(_seen(9, 30, CUP))] == [1]
+
+
+@pytest.mark.parametrize("told", [(False, False), (True, False), (False, True)])
+def test_our_own_tracking_takes_out_nothing(told: tuple[bool, bool]) -> None:
+    params = PARAMS.replaced(odometry_radius=1.0, odometry_drift=0.1)
+    index = _index(_seen(1, 0, CUP, x=8.0, by_odometry=told[0]), params=params)
+    assert [place.keyframe_id for place in index.query(_seen(9, 30, CUP, by_odometry=told[1]))] == [1]
+
+
+def test_an_object_of_another_size_or_colour_gets_a_lower_vote() -> None:
+    index = _index(_seen(1, 0, box("box", (0, 0, 1), 0.4)), _seen(2, 10, box("box", (0, 0, 1), 0.1)))
+    ranked = index.query(_seen(9, 100, box("box", (0, 0, 1), 0.1)))
+    assert [place.keyframe_id for place in ranked] == [2, 1] and ranked[0].votes > 2 * ranked[1].votes
+
+
+def test_an_object_votes_once_for_a_keyframe_by_the_likest_that_it_shows_and_all_votes_add_up() -> None:
+    numbers, ballots = np.array([7, 3, 7, 3, 7]), np.array([0, 0, 0, 1, 1])
+    first, votes = _tally(numbers, ballots, np.array([0.9, 0.8, 0.5, 0.4, 0.1]))
+    assert first.tolist() == [1, 0] and votes == pytest.approx([1.2, 1.0])
+
+
+def test_what_is_near_another_place_takes_no_turn_of_its_pass() -> None:
+    near = np.eye(3, dtype=bool)
+    near[0, 1] = near[1, 0] = True
+    assert _turns(near, np.ones((3, 3), bool)).tolist() == [0, 3, 1]
+
+
+def test_neighbours_of_a_chosen_keyframe_give_way_to_other_moments() -> None:
+    index = _index(_seen(1, 0.0, CUP), _seen(2, 0.1, CUP), _seen(3, 0.2, CUP), _seen(4, 10, CUP))
+    assert [place.keyframe_id for place in index.query(_seen(9, 100, CUP))] == [1, 4, 2, 3]
+
+
+def test_passes_by_here_take_turns_and_this_one_comes_last() -> None:
+    params = PARAMS.replaced(min_gap=0.5, odometry_radius=99.0)
+    index = _index(*(_seen(k, float(k), CUP) for k in (1, 2, 50, 51, 99)), params=params)
+    assert [place.keyframe_id for place in index.query(_seen(100, 100, CUP))] == [1, 50, 99, 2, 51]
+
+
+def test_a_removed_keyframe_is_not_found_again() -> None:
+    index = _index(_seen(1, 0, CUP), _seen(2, 10, CUP, BOOK))
+    index.remove([2])
+    assert len(index) == 1 and [place.keyframe_id for place in index.query(_seen(9, 100, CUP, BOOK))] == [1]
+
+
+def test_many_objects_give_the_same_answer_in_any_growth_of_the_index() -> None:
+    draw = np.random.default_rng(0)
+    sizes = draw.uniform(0.05, 0.5, 300)
+    many = [_seen(i, 10.0 * i, box("box", (0, 0, 1), float(size))) for i, size in enumerate(sizes)]
+    index = _index(*many, params=PARAMS.replaced(candidates=1))
+    wanted = int(np.argmin(np.abs(sizes - 0.3)))
+    assert index.query(_seen(999, 1e5, box("box", (0, 0, 1), float(sizes[wanted]))))[0].keyframe_id == wanted

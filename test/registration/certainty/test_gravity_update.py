@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What gravity tells of a pose."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from objreg_ros.geometry import pose, pose_error, rotation_angle, rotation_from_vector, skew
+from objreg_ros.registration.certainty.gravity_update import levelling
+from objreg_ros.registration.params import RegistrarParams
+
+PARAMS = RegistrarParams()
+UP = np.array([0.0, -0.8, -0.6])
+TRUE = pose(rotation_from_vector(0.9 * UP), np.array([0.8, 0.1, 0.3]))  # it turns about gravity
+MIDDLE = np.array([0.0, 0.5, 2.5])  # of what was seen, in the target's camera
+TILT = np.radians(1.5)
+
+
+def seen(up: np.ndarray | None, weight: float = 1.0) -> Any:
+    return SimpleNamespace(up=up, up_weight=weight)
+
+
+def tilted_about_what_was_seen() -> np.ndarray:
+    """The true pose with an error that surfaces hardly see: turned about their middle by `TILT`."""
+    turn = rotation_from_vector(TILT * np.array([1.0, 0.0, 0.0]))
+    return pose(turn, MIDDLE - turn @ MIDDLE) @ TRUE
+
+
+def spread() -> np.ndarray:
+    """The covariance of a pose that may be turned about the middle of what was seen by 2 degrees, 1 mm beside."""
+    lever = np.eye(6)
+    lever[:3, 3:] = skew(MIDDLE - TRUE[:3, 3])
+    return lever @ np.diag([1e-6] * 3 + [np.radians(2.0) ** 2] * 3) @ lever.T
+
+
+def test_a_tilted_pose_is_levelled_and_brought_back_with_its_position() -> None:
+    found = levelling(seen(UP), seen(UP), tilted_about_what_was_seen(), spread(), PARAMS)
+    assert found is not None
+    before, after = (pose_error(T, TRUE) for T in (tilted_about_what_was_seen(), found.T))
+    assert before[1] > 5.0
+    assert after[0] < 0.3 * before[0] and after[1] < 0.3 * before[1]
+
+
+def test_a_pose_that_is_known_stays() -> None:
+    sure = np.diag([1e-6] * 3 + [np.radians(0.05) ** 2] * 3)
+    found = levelling(seen(UP), seen(UP), tilted_about_what_was_seen(), sure, PARAMS)
+    assert found is not None
+    assert pose_error(found.T, tilted_about_what_was_seen())[0] < 0.03 * np.degrees(TILT)
+
+
+def test_gravity_that_one_view_told_hardly_counts() -> None:
+    much, little = (
+        levelling(seen(UP, weight), seen(UP, weight), tilted_about_what_was_seen(), spread(), PARAMS)
+        for weight in (1.0, 0.05)
+    )
+    assert much is not None and little is not None
+    moved = [rotation_angle(found.T[:3, :3] @ tilted_about_what_was_seen()[:3, :3].T) for found in (much, little)]
+    assert moved[1] < 0.5 * moved[0]
+
+
+def test_gravity_says_nothing_of_a_turn_about_itself() -> None:
+    found = levelling(seen(UP), seen(UP), TRUE, spread(), PARAMS)
+    assert found is not None
+    about = np.concatenate([np.zeros(3), UP])
+    assert about @ found.information @ about == pytest.approx(0.0, abs=1e-9)
+    across = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
+    assert across @ found.information @ across == pytest.approx(0.5 / np.radians(PARAMS.gravity_noise) ** 2)
+
+
+@pytest.mark.parametrize("weights", [(0.2, 1.0), (1.0, 0.2)])
+def test_what_is_told_is_as_doubtful_as_both_gravities_together(weights: tuple[float, float]) -> None:
+    found = levelling(*(seen(UP, weight) for weight in weights), TRUE, spread(), PARAMS)
+    assert found is not None
+    across = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
+    doubt = (1.0 / 0.2 + 1.0 / 1.0) * np.radians(PARAMS.gravity_noise) ** 2
+    assert across @ found.information @ across == pytest.approx(1.0 / doubt)
+
+
+@pytest.mark.parametrize("weights", [(0.0, 1.0), (1.0, 0.0)])
+def test_gravity_without_weight_tells_nothing(weights: tuple[float, float]) -> None:
+    assert levelling(*(seen(UP, weight) for weight in weights), TRUE, spread(), PARAMS) is None
+
+
+@pytest.mark.parametrize("unknown", ["source", "target"])
+def test_without_gravity_nothing_is_told(unknown: str) -> None:
+    views = [seen(None if unknown == name else UP) for name in ("source", "target")]
+    assert levelling(*views, TRUE, spread(), PARAMS) is None

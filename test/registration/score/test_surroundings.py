@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A slab before a painted wall: what the views say of where it stands, and what they say without it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from objreg_ros.data import Array, View
+from objreg_ros.geometry import back_project
+from objreg_ros.registration.keyframe import KeyObject
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.prepare.views import Sight, own_pixels, pixels_of, prepare_sight
+from objreg_ros.registration.score.surroundings import verify_surroundings, without
+from objreg_ros.registration.score.view_score import verify
+from registration.samples import CAMERA, cloud, moved, scene_view
+
+PARAMS = RegistrarParams()
+FROM, TO = -0.15, 0.2  # m: the slab went
+
+
+def room(slab_x: float, width: float = 0.9) -> tuple[Sight, KeyObject, Array]:
+    """A view of the wall with the slab at ``slab_x``, 1 m away; the slab, and the pixels that show it."""
+    view = scene_view()
+    ray = back_project(np.ones((120, 160)), CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy)
+    x, y = ray[..., 0] - slab_x, ray[..., 1]
+    shown = (abs(x) < 0.5 * width) & (abs(y) < 0.35 * width)
+    print_of_slab = 128 + 90 * np.sin(40 * x) * np.sin(35 * y)
+    print_of_wall = 128 + 600 * cv2.GaussianBlur(np.random.default_rng(5).normal(size=shown.shape), (0, 0), 2.0)
+    grey = np.clip(np.where(shown, print_of_slab, print_of_wall), 0, 255).astype(np.uint8)
+    xyz = np.where(shown[..., None], ray, view.xyz).astype(np.float32)
+    sight = prepare_sight(View(xyz=xyz, grey=grey, intrinsics=CAMERA), PARAMS.context_range, PARAMS.detail_sigma)
+    return sight, KeyObject(cloud=cloud("monitor", xyz[shown])), shown
+
+
+@pytest.fixture(scope="module")
+def rooms() -> tuple[Sight, Sight, tuple[Array, Array]]:
+    """Before and after the slab went, and where each view shows it."""
+    (before, there, _), (after, here, _) = room(FROM), room(TO)
+    return before, after, (own_pixels(there, before), own_pixels(here, after))
+
+
+def test_an_object_is_found_where_a_view_shows_it_with_its_rim_and_no_more() -> None:
+    sight, item, shown = room(0.1)
+    own = own_pixels(item, sight)
+    assert own[shown].all() and own.sum() < 1.15 * shown.sum()
+
+
+def test_what_stands_before_or_behind_an_object_is_not_it() -> None:
+    sight, item, shown = room(0.1)
+    for gone in (-0.2, 0.2):
+        moved_away = KeyObject(cloud=cloud("monitor", item.cloud.xyz * np.float32(1.0 + gone)))
+        assert not own_pixels(moved_away, sight)[shown & (sight.near == sight.far)].any()
+
+
+def test_an_object_that_moved_outvotes_the_room_and_is_outvoted_once_it_is_left_out(rooms) -> None:
+    before, after, own = rooms
+    with_the_slab, with_the_room = moved(TO - FROM), np.eye(4)
+    assert verify(before, after, with_the_slab, PARAMS).score > verify(before, after, with_the_room, PARAMS).score
+    false, true = (verify_surroundings(before, after, own, T, PARAMS) for T in (with_the_slab, with_the_room))
+    assert false is not None and true is not None and true.score > false.score + 0.5
+    assert true.texture is not None and true.texture > 0.9
+    assert false.texture is not None and false.texture < PARAMS.min_texture
+
+
+def test_a_small_object_outvotes_nothing_and_is_not_left_out(rooms) -> None:
+    _, after, own = rooms
+    (small, item, _), (same, again, _) = room(FROM, 0.2), room(TO, 0.2)
+    few = own_pixels(item, small), own_pixels(again, same)
+    assert verify_surroundings(small, same, few, np.eye(4), PARAMS) is None
+    assert verify_surroundings(small, after, (few[0], own[1]), np.eye(4), PARAMS) is not None  # much of one is enough
+
+
+def test_nothing_is_measured_where_an_object_was_left_out_and_the_rest_is_as_it_was(rooms) -> None:
+    before, _, (own, _) = rooms
+    rest = without(before, own)
+    assert not rest.near[own].any() and not rest.far[own].any()
+    assert np.array_equal(rest.near[~own], before.near[~own])
+    for points in (rest.points, rest.grey.points):
+        assert len(points) and not own[pixels_of(points, before)].any()
+    assert [len(band.shades) for band in rest.bands] == [len(rest.points)] * len(rest.bands)
+    assert len(rest.grey.shades) == len(rest.grey.points)
+    left = ~own[pixels_of(before.points, before)]
+    assert np.array_equal(rest.points, before.points[left]) and np.array_equal(rest.shades, before.shades[left])
+    assert own[pixels_of(before.points, before)].any()
+
+
+def test_views_without_grey_are_asked_for_their_depth_alone(rooms) -> None:
+    before, after, own = rooms
+    blind = replace(before, textured=False)
+    found = verify_surroundings(blind, after, own, np.eye(4), PARAMS)
+    assert found is not None and found.texture is None and found.inliers > 0.95
+
+
+def test_a_camera_that_is_not_that_of_its_points_breaks_nothing(rooms) -> None:
+    before, after, own = rooms
+    for wrong in (0.5, 2.0):
+        other = replace(before, intrinsics=replace(CAMERA, fx=wrong * CAMERA.fx, cx=0.2 * CAMERA.cx))
+        assert len(without(other, own[0]).points) < len(other.points)
+        assert verify_surroundings(other, after, own, np.eye(4), PARAMS) is not None

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of what an upright pose of objects is worth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from objreg_ros.geometry import inverse, pose_error
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.prepare.prepared import prepare
+from objreg_ros.registration.score.total_score import Worth, _poses
+from objreg_ros.registration.score.view_score import rank
+from objreg_ros.registration.shapes.shape import upright_motion, upright_pose
+from objreg_ros.registration.shapes.silhouette_score import alike
+from registration.drawn_shapes import BOX, from_side, keyframe
+
+PARAMS = RegistrarParams()
+TRUTH = inverse(from_side(0.0)) @ from_side(30.0)
+
+
+@pytest.fixture(scope="module")
+def pair():
+    things = {"box": BOX, "can": (0.02, 0.15)}
+    return tuple(prepare(keyframe(from_side(a), things, seed=1), PARAMS) for a in (30.0, 0.0))
+
+
+def test_the_kernel_and_the_shapes_mean_the_same_pose(pair) -> None:
+    a, b = (each.scene for each in pair)
+    motion = np.array([0.4, 0.03, -0.02, 0.01])
+    T, back = _poses(a.sight, b.sight, motion)
+    assert np.allclose(T, upright_pose(a, b, motion)) and np.allclose(T @ back, np.eye(4))
+
+
+def test_worth_is_what_the_views_like_and_how_alike_the_objects_look(pair) -> None:
+    source, target = pair
+    a, b = source.scene, target.scene
+    motion = upright_motion(a, b, TRUTH)
+    params = PARAMS.replaced(upright_violations=0.0, quick_sample=10**6)
+    V = rank(source.sight, target.sight, upright_pose(a, b, motion)[None], params, params.quick_sample)[0]
+    same = np.clip(alike(a, b, motion, params), -1.0, 1.0)
+    assert Worth(source, target, a, b, params).of(motion[None])[0] == pytest.approx(V + same)
+
+
+def test_seen_free_space_costs_more_than_in_the_views_verdict(pair) -> None:
+    source, target = pair
+    off = upright_motion(source.scene, target.scene, TRUTH) + np.array([0.0, 0.1, 0.0, 0.0])
+    strict, lax = (
+        Worth(source, target, source.scene, target.scene, PARAMS.replaced(upright_violations=weight)).of(off[None])[0]
+        for weight in (5.0, 0.0)
+    )
+    assert strict < lax
+
+
+@pytest.mark.parametrize("off", [(0.25, 0.02, 0.0, 0.0), (-0.4, 0.0, 0.02, 0.0), (0.1, 0.02, -0.01, 0.0)])
+def test_a_climb_comes_back_from_far_away(pair, off: tuple) -> None:
+    source, target = pair
+    a, b = source.scene, target.scene
+    start = upright_motion(a, b, TRUTH) + np.array(off)
+    degrees, _ = pose_error(upright_pose(a, b, Worth(source, target, a, b, PARAMS).climbed(start)), TRUTH)
+    assert degrees < 2.0
+
+
+def test_a_climb_leaves_its_start_as_it_was(pair) -> None:
+    source, target = pair
+    start = upright_motion(source.scene, target.scene, TRUTH) + np.array([0.2, 0.0, 0.0, 0.0])
+    kept = start.copy()
+    Worth(source, target, source.scene, target.scene, PARAMS).climbed(start)
+    assert np.array_equal(start, kept)

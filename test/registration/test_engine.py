@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of the pose engine on a room whose poses are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from objreg_ros.data import View
+from objreg_ros.geometry import inverse, pose_error, rotation_from_vector
+from objreg_ros.registration import engine as engine_module
+from objreg_ros.registration.candidate import ObjectPair
+from objreg_ros.registration.certainty.covariance import spread_of
+from objreg_ros.registration.engine import Engine, held
+from objreg_ros.registration.keyframe import Context, Keyframe
+from objreg_ros.registration.params import RegistrarParams
+from registration.rooms import ROOM, keyframe, seen_from
+from registration.samples import candidate, moved
+
+PARAMS = RegistrarParams()
+
+
+@pytest.fixture(scope="module")
+def engine() -> Engine:
+    return Engine(PARAMS)
+
+
+@pytest.mark.parametrize("angle", [-35.0, 10.0, 30.0])
+def test_a_place_seen_again_is_found_and_believed(engine: Engine, angle: float) -> None:
+    source, target = keyframe(seen_from(0.0), seed=1), keyframe(seen_from(angle), seed=2)
+    best = engine.propose(source, target)[0]
+    rotation, distance = pose_error(best.T_target_source, inverse(seen_from(angle)) @ seen_from(0.0))
+    assert rotation < 1.0 and distance < 2.0
+    assert best.verification.score > 0.3
+    assert best.gravity_error_deg is not None and best.gravity_error_deg < 1.0
+
+
+def test_the_other_way_round_is_the_inverse(engine: Engine) -> None:
+    source, target = keyframe(seen_from(0.0), seed=1), keyframe(seen_from(20.0), seed=2)
+    best = engine.propose(target, source)[0]
+    rotation, distance = pose_error(best.T_target_source, inverse(seen_from(0.0)) @ seen_from(20.0))
+    assert rotation < 1.0 and distance < 2.0
+
+
+def test_a_pose_is_brought_to_where_gravity_is_kept_as_far_as_that_is_known() -> None:
+    source, target = keyframe(seen_from(0.0), seed=1), keyframe(seen_from(20.0), seed=2)
+    tilt = rotation_from_vector(np.radians([1.0, 0.0, 0.0]))
+    tilted = replace(source, gravity=tilt @ source.gravity, gravity_confidence=1.0)
+    errors, spreads = [], []
+    for noise in (0.01, 10.0):
+        best = Engine(PARAMS.replaced(gravity_noise=noise)).propose(tilted, replace(target, gravity_confidence=1.0))[0]
+        errors.append(gravity_error(best.T_target_source, tilted, target))
+        spreads.append(np.linalg.inv(best.alignment.information)[3:, 3:].trace())
+    assert errors[0] < 0.1 and errors[1] > 0.8
+    assert spreads[0] < spreads[1]
+
+
+def test_what_is_told_besides_makes_the_whole_covariance_smaller_and_leaves_a_covariance_of_the_warp(
+    engine: Engine,
+) -> None:
+    warp, added = np.diag([0.04, 0.01, 0.0, 0.0, 0.0, 0.02]), np.diag([100.0, 0.0, 0.0, 0.0, 400.0, 0.0])
+    doubtful = candidate(information=1e3 * np.eye(6), warp=warp)
+    alone = spread_of(doubtful.alignment, PARAMS)
+    informed = engine._informed(doubtful, added)
+    assert np.array_equal(informed.alignment.information, doubtful.alignment.information + added)
+    whole = np.linalg.inv(np.linalg.inv(alone) + added) + informed.warp
+    np.testing.assert_allclose(whole, np.linalg.inv(np.linalg.inv(alone + warp) + added), atol=1e-12)
+    assert np.linalg.eigvalsh(informed.warp).min() > -1e-12
+
+
+def test_a_pose_is_steadied_where_it_was_pushed_and_does_not_slide(
+    engine: Engine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(engine_module, "steadied", lambda *_: 100.0 * np.eye(6))
+    pair: Any = SimpleNamespace(source=None, target=None)
+    for one, more in (
+        (candidate(resistance=0.3), 100.0),
+        (candidate(resistance=None), 0.0),
+        (candidate(resistance=0.3, slack=np.eye(6)[:1]), 0.0),
+    ):
+        added = engine._steadied(pair, one).alignment.information - one.alignment.information
+        np.testing.assert_allclose(added, more * np.eye(6), atol=1e-9)
+
+
+def test_what_else_a_lone_objects_pose_could_be_is_a_rival_unless_it_comes_to_one_that_is_known(
+    engine: Engine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known = [candidate(moved(x), explained=(ObjectPair(0, 0, "cup"),)) for x in (0.0, 1.0)]
+    others = {0.0: [moved(0.5), moved(0.1)], 1.0: [moved(-0.1), moved(1.5)]}
+    monkeypatch.setattr(engine_module, "alternatives", lambda s, t, one, p: others[one.T_target_source[0, 3]])
+    monkeypatch.setattr(engine_module, "refine", lambda s, t, T, p: candidate(T).alignment)
+    monkeypatch.setattr(engine, "_gathered", lambda pair, found, chains: (found.T_target_source[0, 3], chains))
+    pair: Any = SimpleNamespace(source=SimpleNamespace(middle=np.zeros(3)), target=None)
+    assert engine._rivals(pair, known) == [(0.5, ("objects",)), (1.5, ("objects",))]
+    assert engine._rivals(pair, []) == []
+
+
+@pytest.mark.parametrize(("yaw_known", "likeness", "left"), [(True, 1.0, 0), (False, 1.0, 1), (True, -1.0, 1)])
+def test_an_object_that_tells_its_yaw_and_looks_alike_takes_away_the_slack(
+    engine: Engine, monkeypatch: pytest.MonkeyPatch, yaw_known: bool, likeness: float, left: int
+) -> None:
+    one = candidate(yaw_known=yaw_known, likeness=likeness, slack=np.eye(6)[:1])
+    monkeypatch.setattr(engine_module, "gather", lambda *_: one)
+    pair: Any = SimpleNamespace(source=None, target=None)
+    assert len(engine._gathered(pair, one.alignment, ("objects",)).alignment.slack) == left
+
+
+def test_a_pose_that_one_chain_came_to_does_not_become_two_chains_by_what_is_found_about_it() -> None:
+    lone = tuple(box for box in ROOM if box[0] not in ("book", "cup", "keyboard"))
+    source, target = keyframe(seen_from(0.0), lone, seed=1), keyframe(seen_from(20.0), lone, seed=2)
+    with_search, without = (
+        Engine(PARAMS.replaced(searched_around=n)).propose(source, target) for n in (PARAMS.searched_around, 0)
+    )
+    assert with_search[0].agreeing_chains == without[0].agreeing_chains
+    assert np.array_equal(with_search[0].T_target_source, without[0].T_target_source)
+
+
+def test_the_rivals_of_promising_candidates_are_ranked_with_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    engine, asked = Engine(PARAMS), []
+    rival = candidate(moved(0.0, 0.0, 3.0), score=9.0)
+    monkeypatch.setattr(engine, "_rivals", lambda pair, promising: asked.extend(promising) or [rival])
+    monkeypatch.setattr(engine, "_pushed", lambda pair, one: one)
+    monkeypatch.setattr(engine, "_levelled", lambda pair, one: one)
+    found = engine.propose(keyframe(seen_from(0.0), seed=1), keyframe(seen_from(20.0), seed=2))
+    assert np.array_equal(found[0].T_target_source, rival.T_target_source) and len(found) > 1
+    least = max(PARAMS.min_score, max(one.verification.score for one in asked) - PARAMS.rival_margin)
+    assert asked and all(one.verification.score >= least for one in asked)
+    assert found[0].margin < 9.0  # another one is known
+
+
+def test_what_is_held_has_no_slack_at_all() -> None:
+    assert held(candidate(slack=np.eye(6)[:2]).alignment).slack.shape == (0, 6)
+
+
+def gravity_error(T_target_source: np.ndarray, source: Keyframe, target: Keyframe) -> float:
+    assert source.gravity is not None and target.gravity is not None
+    return float(np.degrees(np.arccos(np.clip(T_target_source[:3, :3] @ source.gravity @ target.gravity, -1.0, 1.0))))
+
+
+def test_objects_that_stand_still_are_explained(engine: Engine) -> None:
+    best = engine.propose(keyframe(seen_from(0.0), seed=1), keyframe(seen_from(20.0), seed=2))[0]
+    assert {pair.label for pair in best.explained} >= {"book", "cup", "bottle"}
+    assert best.moved == ()
+
+
+def test_an_object_that_moved_is_reported_and_outvoted(engine: Engine) -> None:
+    changed = tuple(("bottle", (1.5, 0.6, 0.72), (1.58, 0.68, 1.0)) if box[0] == "bottle" else box for box in ROOM)
+    best = engine.propose(keyframe(seen_from(0.0), seed=1), keyframe(seen_from(15.0), changed, seed=2))[0]
+    rotation, distance = pose_error(best.T_target_source, inverse(seen_from(15.0)) @ seen_from(0.0))
+    assert rotation < 1.0 and distance < 2.0
+    assert [pair.label for pair in best.moved] == ["bottle"]
+
+
+def test_a_prior_is_a_chain_of_its_own(engine: Engine) -> None:
+    source, target = keyframe(seen_from(0.0), seed=1), keyframe(seen_from(15.0), seed=2)
+    truth = inverse(seen_from(15.0)) @ seen_from(0.0)
+    best = engine.propose(source, target, truth)[0]
+    assert "odometry" in best.agreeing_chains and len(best.agreeing_chains) >= 2
+
+
+def test_the_same_keyframes_give_the_same_candidates() -> None:
+    source, target = keyframe(seen_from(0.0), seed=1), keyframe(seen_from(25.0), seed=2)
+    first, second = (Engine(RegistrarParams()).propose(source, target) for _ in range(2))
+    assert len(first) == len(second)
+    for a, b in zip(first, second, strict=True):
+        assert np.array_equal(a.T_target_source, b.T_target_source)
+        assert a.verification == b.verification
+
+
+def test_without_gravity_and_grey_there_is_still_a_pose(engine: Engine) -> None:
+    source = keyframe(seen_from(0.0), seed=1, gravity=False, grey=False)
+    target = keyframe(seen_from(15.0), seed=2, gravity=False, grey=False)
+    best = engine.propose(source, target)[0]
+    rotation, distance = pose_error(best.T_target_source, inverse(seen_from(15.0)) @ seen_from(0.0))
+    assert rotation < 1.5 and distance < 3.0
+    assert best.verification.texture is None and best.gravity_error_deg is None
+
+
+def test_an_empty_keyframe_proposes_nothing(engine: Engine) -> None:
+    full = keyframe(seen_from(0.0))
+    nothing = np.zeros((0, 3), np.float32)
+    dark = View(xyz=np.full_like(full.view.xyz, np.nan), grey=None, intrinsics=full.view.intrinsics)
+    empty = replace(full, objects=(), context=Context(xyz=nothing, normals=nothing), view=dark)
+    assert engine.propose(full, empty) == () == engine.propose(empty, full)
+
+
+def test_what_is_small_counts_too(engine: Engine) -> None:
+    prepared = engine._pantry.get(keyframe(seen_from(0.0), seed=1))
+    cup = next(item.cloud.xyz for item in prepared.keyframe.objects if item.label == "cup")
+    near = np.linalg.norm(prepared.xyz[:, None] - cup[None, ::4], axis=-1).min(axis=1) < 0.02
+    assert near.sum() >= 5

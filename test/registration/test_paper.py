@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The founding method: exact where it can be, honest where it cannot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector, skew, transform
+from objreg_ros.registration.certainty.covariance import spread_of
+from objreg_ros.registration.paper import LEAST_PAIRS, PaperEngine, _correspond, register
+from objreg_ros.registration.params import RegistrarParams
+from registration import rooms
+
+PARAMS = RegistrarParams(method="paper")
+
+
+def _corner() -> np.ndarray:
+    """Points on three faces of a box: no motion leaves them upon themselves."""
+    u, v = np.random.default_rng(0).uniform(0.0, 0.2, (2, 900))
+    faces = [np.stack([u, 0.7 * v, 0 * u], 1), np.stack([u, 0 * u, v], 1), np.stack([0 * u, 0.6 * u, 0.8 * v], 1)]
+    return np.add(np.concatenate(faces), (0.1, -0.05, 1.0))
+
+
+@pytest.mark.parametrize("angle", [0.05, -0.1])
+def test_a_small_motion_of_the_same_points_is_found_exactly(angle: float) -> None:
+    T = pose(rotation_from_vector(np.array([0.0, angle, 0.02])), np.array([0.01, -0.01, 0.005]))
+    about = pose(np.eye(3), np.array([0.1, 0.0, 1.0]))
+    T = about @ T @ inverse(about)
+    source = _corner()
+    found = register(source, transform(T, source), np.eye(4), PARAMS)
+    assert found is not None and found.converged
+    rotation, distance = pose_error(found.T_target_source, T)
+    assert rotation < 0.1 and distance < 0.1 and found.rmse < 1e-3
+
+
+def test_a_start_from_the_truth_stays_there_and_its_covariance_is_valid() -> None:
+    T = pose(rotation_from_vector(np.array([0.0, 2.0, 0.0])), np.array([1.0, 0.0, 2.0]))
+    found = register(_corner(), transform(T, _corner()), T, PARAMS)
+    assert found is not None and np.allclose(found.T_target_source, T, atol=1e-9)
+    assert np.linalg.eigvalsh(spread_of(found, PARAMS)).min() > 0
+
+
+def test_the_information_is_that_of_a_step_about_the_camera_of_every_point() -> None:
+    T = pose(rotation_from_vector(np.array([0.3, 2.0, -0.5])), np.array([1.0, 0.0, 2.0]))
+    found = register(_corner(), transform(T, _corner()), T, PARAMS)
+    J = np.concatenate([np.hstack([np.eye(3), -skew(T[:3, :3] @ point)]) for point in _corner()])
+    assert found is not None and np.allclose(found.information * 1e-8, J.T @ J, atol=1e-6 * len(J))
+
+
+def test_fewer_than_six_pairs_give_nothing() -> None:
+    points = _corner()[::200]
+    for count in (LEAST_PAIRS - 1, LEAST_PAIRS):
+        found = register(points[:count], points[:count], np.eye(4), PARAMS)
+        assert (found is None) is (count < LEAST_PAIRS)
+
+
+def test_of_the_points_that_share_a_partner_the_closest_has_it() -> None:
+    tree = cKDTree([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    pairs = _correspond(tree, np.array([[0.02, 0, 0], [0.01, 0, 0], [1.0, 0, 0], [0.0, 0.5, 0]]), 0.1)
+    assert pairs.source.tolist() == [1, 2] and pairs.target.tolist() == [0, 1]
+    assert pairs.distance == pytest.approx([0.01, 0.0])
+
+
+def test_the_middle_of_what_was_aligned_is_that_of_the_points_in_the_target_frame() -> None:
+    xyz = _corner()
+    found = register(xyz, xyz, np.eye(4), PARAMS)
+    assert found is not None and np.allclose(found.middle, xyz.mean(axis=0))
+
+
+def test_points_out_of_reach_of_each_other_give_nothing() -> None:
+    assert register(_corner(), np.add(_corner(), 5.0), np.eye(4), PARAMS) is None
+
+
+def test_correspondences_are_one_to_one() -> None:
+    source = np.array(
+        [[0, 0, 1], [0.001, 0, 1], [0.002, 0, 1]] + [[0.1 * i, 0.1 * i * i, 1] for i in range(1, 9)], float
+    )
+    target = source[2:]
+    found = register(source, target, np.eye(4), PARAMS.replaced(paper_distance=0.05))
+    assert found is not None and found.inliers == len(target)
+
+
+def test_it_proposes_one_pose_for_each_pair_of_one_label_with_the_evidence_of_the_views() -> None:
+    source, target = (rooms.keyframe(rooms.seen_from(angle)) for angle in (2.0, 0.0))
+    source, target = replace(source, keyframe_id=1), replace(target, keyframe_id=2)
+    found = PaperEngine(PARAMS).propose(source, target)
+    assert 1 <= len(found) <= len(target.objects)
+    assert {candidate.chain for candidate in found} == {"paper"}
+    scores = [candidate.verification.score for candidate in found]
+    assert scores == sorted(scores, reverse=True)

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The survey of a store."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from registration.samples import box, keyframe, moved
+
+from objreg_ros.memory.landmarks import Landmarks
+from objreg_ros.memory.sighting import sightings_of
+from objreg_ros.memory.store import Store, StoreError
+from objreg_ros.memory.store_file import is_store
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.report.store_summary import PANEL, describe, draw, survey
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    """A store with two sessions of a cup and a book."""
+    store, landmarks = Store(tmp_path / "place.db"), Landmarks(RegistrarParams())
+    objects = (box("cup", (0, 0, 1)), box("book", (0.5, 0, 1), instance=2))
+    for number, session in ((1, 0), (2, 0), (3, 1)):
+        taken = keyframe(number, 10.0 * number, objects, session, moved(0.0))
+        named, merged = landmarks.assign(sightings_of(taken))
+        store.add(taken, named, (), merged)
+        landmarks.add(named, merged)
+    store.close()
+    return tmp_path / "place.db"
+
+
+def test_a_survey_counts_labels_sessions_and_landmarks(place: Path) -> None:
+    found = survey(place)
+    assert found.labels == {"cup": 3, "book": 3} and found.counts["landmarks"] == 4
+    assert [(s["session"], s["keyframes"]) for s in found.sessions] == [(0, 2), (1, 1)]
+    assert [(known.label, known.sightings) for known in found.landmarks][:2] == [("cup", 2), ("book", 2)]
+
+
+def test_a_description_names_what_is_there(place: Path) -> None:
+    text = describe(place)
+    assert "3 keyframes" in text and "cup 3" in text and "session 0: 2 keyframes, 4 objects in 10.0 s" in text
+
+
+def test_a_picture_has_a_panel_for_each_session(place: Path) -> None:
+    picture = draw(survey(place))
+    assert picture.shape == (PANEL, 2 * PANEL, 3) and picture.dtype == np.uint8
+    assert (picture[:, :PANEL] != 255).any() and (picture[:, PANEL:] != 255).any()
+
+
+def test_a_store_is_told_from_other_files(place: Path, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("no store")
+    assert is_store(place)
+    assert not is_store(tmp_path / "notes.txt") and not is_store(tmp_path) and not is_store(tmp_path / "nothing")
+
+
+def test_an_empty_store_has_a_description_and_a_picture(tmp_path: Path) -> None:
+    Store(tmp_path / "empty.db").close()
+    assert "0 keyframes" in describe(tmp_path / "empty.db")
+    assert draw(survey(tmp_path / "empty.db")).shape == (PANEL, PANEL, 3)
+
+
+def test_what_is_no_store_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(StoreError):
+        describe(tmp_path / "nothing.db")
