@@ -90,7 +90,9 @@ def allowed(importer: str, imported: str) -> bool:
     if room == "simulation":
         return below(imported, "simulation", "recording", "data", "geometry", "params")
     if room in HOUSE:
-        return below(imported, *ROOMS, "registration", "keyframes", "memory", *CORE, *HOUSE, *FREE_BRIDGE, "recording") and not imported.endswith(".node")
+        return below(
+            imported, *ROOMS, "registration", "keyframes", "memory", *CORE, *HOUSE, *FREE_BRIDGE, "recording"
+        ) and not imported.endswith(".node")
     return False
 
 

@@ -1,1 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Frames to keyframes: the `keyframer` says when one ends.
+
+`tracking` is motion without odometry, `odometry` the way that was gone with it, `gravity_filter` gravity as all frames
+tell it; `fusion` makes one keyframe of the frames.
+"""

@@ -6,6 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+
 from .hostile import call_each, good_folder, hostile_files, hostile_recordings
 
 

@@ -11,7 +11,6 @@ from objreg_ros.geometry import inverse, transform
 from objreg_ros.keyframes.fusion import fuse, fuse_objects, reference_index
 from objreg_ros.keyframes.keyframer import Stretch
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.registration.prepare.voxels import thin
 
 PARAMS = RegistrarParams()
 
@@ -53,14 +52,6 @@ def test_a_sighting_cut_by_the_image_gives_way_to_a_whole_one() -> None:
 def test_the_reference_is_the_frame_that_shows_most() -> None:
     few, more = frame(0, (box("cup", (0, 0, 1)),)), frame(0.1, (box("cup", (0, 0, 1)), box("book", (0.4, 0, 1))))
     assert reference_index((few, more, more)) == 1
-
-
-def test_thinning_gives_the_mean_of_each_voxel_with_normals_of_length_1() -> None:
-    xyz = np.float32([[0.01, 0.01, 1.01], [0.03, 0.01, 1.01], [0.26, 0.01, 1.01]])
-    normals = np.float32([[0, 0, -1], [0, -1, 0], [1, 0, 0]])
-    mean, direction = thin(xyz, normals, 0.05)
-    assert np.allclose(mean, [[0.02, 0.01, 1.01], [0.26, 0.01, 1.01]])
-    assert np.allclose(direction, [[0, -(0.5**0.5), -(0.5**0.5)], [1, 0, 0]])
 
 
 def test_the_keyframe_is_in_the_camera_frame_of_its_reference() -> None:

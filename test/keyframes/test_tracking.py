@@ -12,7 +12,6 @@ from registration.samples import CAMERA, moved, scene_view
 from objreg_ros.data import View
 from objreg_ros.geometry import pose, pose_error, rotation_from_vector
 from objreg_ros.keyframes.tracking import surface_of, view_motion
-from objreg_ros.registration.prepare.normals import view_normals
 
 MOTIONS = [
     pose(rotation_from_vector(np.array([0.0, 0.02, 0.0])), np.array([0.02, 0.0, 0.01])),
@@ -88,12 +87,3 @@ def test_two_views_of_different_scenes_have_no_motion() -> None:
     nothing = View(xyz=np.full((120, 160, 3), np.nan, np.float32), grey=None, intrinsics=CAMERA)
     assert view_motion(scene_view(), surface_of(nothing)) is None
     assert view_motion(nothing, surface_of(scene_view())) is None
-
-
-def test_normals_face_the_camera_and_are_unknown_beside_a_jump() -> None:
-    xyz = scene_view().xyz.copy()
-    xyz[:, :80] *= 0.5
-    normals = view_normals(xyz)
-    assert np.allclose(np.linalg.norm(normals[10:50, 100:150], axis=-1), 1, atol=1e-5)
-    assert (normals * xyz).sum(axis=-1).max() <= 0
-    assert not normals[:, 79:81].any()

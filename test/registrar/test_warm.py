@@ -13,7 +13,7 @@ from pathlib import Path
 
 from registration.rooms import keyframe, seen_from
 
-from objreg_ros import registrar as room
+from objreg_ros import keyframes, memory, registration
 from objreg_ros.data import Frame
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
@@ -34,16 +34,13 @@ print(json.dumps([before, kernels()]))
 
 
 def kernels() -> dict[str, list[str]]:
-    """The signatures that each compiled function of the room has been called with from Python."""
+    """The signatures that each compiled function of the registrar's folders has been called with from Python."""
     found = {}
-    for module in pkgutil.iter_modules(room.__path__):
-        if module.name == "node":
-            continue
-        names = vars(importlib.import_module(f"objreg_ros.registrar.{module.name}"))
-        own = {name: value for name, value in names.items() if getattr(value, "__module__", "").endswith(module.name)}
-        for name, value in own.items():
-            if hasattr(value, "signatures"):
-                found[f"{module.name}.{name}"] = sorted(map(str, value.signatures))
+    for room in (keyframes, memory, registration):
+        for module in pkgutil.walk_packages(room.__path__, f"{room.__name__}."):
+            for name, value in vars(importlib.import_module(module.name)).items():
+                if getattr(value, "__module__", "") == module.name and hasattr(value, "signatures"):
+                    found[f"{module.name}.{name}"] = sorted(map(str, value.signatures))
     return found
 
 

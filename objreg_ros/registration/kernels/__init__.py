@@ -1,1 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Compiled loops: `projection` of points into a camera, `closest_points` of a surface, `least_squares`."""

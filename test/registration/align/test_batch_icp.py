@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
-from objreg_ros.registration.align.batch_icp import align, fit, pair
+from objreg_ros.registration.align.batch_icp import align, pair
 from objreg_ros.registration.kernels.closest_points import prepare_surface
 from registration.rooms import keyframe, seen_from
 
@@ -56,19 +56,3 @@ def test_nothing_pairs_out_of_reach(scene) -> None:
     away = pose(np.eye(3), np.array([30.0, 0.0, 0.0]))
     index, at, J, residual, weight = pair(*scene[:2], *scene[2].grid, away, 0.05)
     assert [part.shape for part in (index, at, J, residual, weight)] == [(0,), (3, 0), (6, 0), (0,), (0,)]
-
-
-def test_the_grid_names_the_closest_point() -> None:
-    xyz = np.random.default_rng(0).uniform(0, 1, (300, 3)).astype(np.float32)
-    surface = prepare_surface(xyz, np.tile(np.float32([0, 0, 1]), (300, 1)), 0.05, 0.2)
-    cells = np.argwhere(surface.closest >= 0)[::50]
-    centres = surface.low + (cells + 0.5) * surface.cell
-    distances = np.linalg.norm(centres[:, None] - xyz[None], axis=2)
-    named = surface.closest[tuple(cells.T)]
-    assert np.allclose(distances[np.arange(len(cells)), named], distances.min(axis=1), atol=1e-4)
-
-
-def test_a_surface_without_normals_is_empty_and_fits_nothing(scene) -> None:
-    empty = prepare_surface(scene[0], np.zeros_like(scene[0]), 0.05, 0.2)
-    assert len(empty) == 0
-    assert fit(scene[0], scene[1], empty, np.eye(4), 0.1).inliers == 0

@@ -63,7 +63,7 @@ def test_no_frame_that_passes_the_checks_of_a_word_has_a_kernel_look_beside_an_a
     repository: Path, tmp_path: Path
 ) -> None:
     checked = {"NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(repository)}
-    attack = [sys.executable, str(repository / "test/registrar/hostile.py"), "20"]
+    attack = [sys.executable, str(repository / "test/registration/hostile.py"), "20"]
     done = subprocess.run(attack, env=os.environ | checked, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-3000:]
     frames, refused, tried = map(int, re.findall(r"\d+", done.stdout))

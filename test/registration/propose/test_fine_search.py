@@ -17,8 +17,8 @@ from objreg_ros.registration.propose.fine_search import ALONG, Scrutiny, liked_c
 from objreg_ros.registration.score.view_score import WORST, looks, verify
 from objreg_ros.registration.shapes.shape import upright_motion, upright_pose
 from objreg_ros.registration.shapes.silhouette_score import alike
-from registration.rooms import shade
 from registration.drawn_shapes import ELL, error, from_side, keyframe
+from registration.rooms import shade
 
 PARAMS = RegistrarParams()
 ANGLE = 110.0

@@ -43,19 +43,6 @@ def rooms() -> tuple[Sight, Sight, tuple[Array, Array]]:
     return before, after, (own_pixels(there, before), own_pixels(here, after))
 
 
-def test_an_object_is_found_where_a_view_shows_it_with_its_rim_and_no_more() -> None:
-    sight, item, shown = room(0.1)
-    own = own_pixels(item, sight)
-    assert own[shown].all() and own.sum() < 1.15 * shown.sum()
-
-
-def test_what_stands_before_or_behind_an_object_is_not_it() -> None:
-    sight, item, shown = room(0.1)
-    for gone in (-0.2, 0.2):
-        moved_away = KeyObject(cloud=cloud("monitor", item.cloud.xyz * np.float32(1.0 + gone)))
-        assert not own_pixels(moved_away, sight)[shown & (sight.near == sight.far)].any()
-
-
 def test_an_object_that_moved_outvotes_the_room_and_is_outvoted_once_it_is_left_out(rooms) -> None:
     before, after, own = rooms
     with_the_slab, with_the_room = moved(TO - FROM), np.eye(4)
