@@ -42,7 +42,7 @@ UPDATE closure SET from_frame_id = to_frame_id;
 """,
     2: """
 UPDATE keyframe SET gravity_confidence = 0.02 * gravity_confidence * gravity_confidence * gravity_confidence;
-""",  # it was that of one view: see `plumb`
+""",  # it was that of one view: see `gravity_filter`
     3: """
 CREATE TABLE highest (landmark INTEGER NOT NULL);
 INSERT INTO highest SELECT COALESCE(MAX(landmark), 0) FROM object;

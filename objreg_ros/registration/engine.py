@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pose engine: hypotheses from independent chains, refined on the context, verified on the views, best first.
 
-It returns evidence and decides nothing; `gate.py` decides.
+It returns evidence and decides nothing; `gate` decides.
 """
 
 from __future__ import annotations

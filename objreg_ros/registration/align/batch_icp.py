@@ -2,7 +2,7 @@
 """A fast, robust point-to-plane ICP for many hypotheses: the closest point is looked up in a grid, not searched.
 
 Chen and Medioni, "Object modelling by registration of multiple range images" (1992), with a shrinking Tukey weight and
-compatible normals. It brings a hypothesis to its basin in under a millisecond; `refine.py` finishes the best few.
+compatible normals. It brings a hypothesis to its basin in under a millisecond; `refinement` finishes the best few.
 """
 
 from __future__ import annotations

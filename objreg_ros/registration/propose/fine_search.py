@@ -2,7 +2,7 @@
 """A closer look at upright poses of one object upon another, where the first look leaves doubt.
 
 Two sides of a thing share next to none of its surface. What it stands on tells where it is, by grey that is laid from
-one view into the other's image (`texture`): a measure so sharp that it has to be asked near the truth, and several
+one view into the other's image (`photometric`): a measure so sharp that it has to be asked near the truth, and several
 times as dear as `worth`. So it is asked of views at half size, about the poses that were found: farther and nearer
 along either line of sight, since it is the thickness of the thing that is not known, and turned half, since many a
 front looks like its back.
