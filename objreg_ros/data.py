@@ -283,6 +283,8 @@ class View:
         _hold(self, "xyz", np.float32, ("h", "w", 3), sizes)
         if self.grey is not None:
             _hold(self, "grey", np.uint8, ("h", "w"), sizes)
+        size = self.intrinsics.width, self.intrinsics.height
+        _require(self, size[0] * size[1] <= limits.MOST_VIEW_PIXELS, f"at most {limits.MOST_VIEW_PIXELS} pixels", size)
         _require_reach(self, self.xyz, "points")
 
 

@@ -223,3 +223,9 @@ def test_a_view_may_have_points_that_were_not_measured() -> None:
 def test_a_camera_of_more_pixels_than_any_picture_is_refused() -> None:
     with pytest.raises(ValueError, match=r"expected at most 500000000 pixels, got \(1000000, 1000000\)"):
         data.Intrinsics(fx=500.0, fy=500.0, cx=0.0, cy=0.0, width=10**6, height=10**6)
+
+
+def test_a_view_that_no_registrar_would_take_is_refused_where_it_is_made() -> None:
+    camera = data.Intrinsics(fx=50.0, fy=50.0, cx=40.0, cy=30000.0, width=80, height=60000)
+    with pytest.raises(ValueError, match=r"View: expected at most 4000000 pixels, got \(80, 60000\)"):
+        data.View(xyz=np.zeros((60000, 80, 3), np.float32), grey=None, intrinsics=camera)
