@@ -83,8 +83,8 @@ def preferred(
     to rest beside it. So the views are asked all over the plane in which the position is known least, and what they
     like there, aside from the pose itself, is finished by grey; and so is the pose turned about the objects, which is
     taken as it is too, as grey leads astray where it says little. The objects have a say as far as the grey leaves
-    doubt (`comparison`), as views of little in common like a wrong pose a hair better. Nothing is preferred without grey,
-    nor to a pose beyond what grey may mend.
+    doubt (`comparison`), as views of little in common like a wrong pose a hair better. Nothing is preferred without
+    grey, nor to a pose beyond what grey may mend.
     """
     if not (source.sight.textured and target.sight.textured):
         return None

@@ -51,9 +51,9 @@ def refine(source: Prepared, target: Prepared, T_target_source: Array, params: R
 def _finished(source: Prepared, target: Prepared, T: Array, params: RegistrarParams) -> tuple[Array, Array]:
     """The pose after grey had its say, and what grey adds to its information: nothing where it does not correlate.
 
-    Again while views and objects like it clearly better (`comparison`), since each round sees more of the other view; the
-    pose as it was, where they like it less: views that share little may like a pose a hair better that is centimetres
-    off, and the objects then look less alike.
+    Again while views and objects like it clearly better (`comparison`), since each round sees more of the other view;
+    the pose as it was, where they like it less: views that share little may like a pose a hair better that is
+    centimetres off, and the objects then look less alike.
     """
     held = np.zeros((6, 6))
     if not (source.sight.textured and target.sight.textured):

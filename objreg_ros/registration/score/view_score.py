@@ -29,7 +29,7 @@ def verify(
 ) -> Verification:
     """Look at ``T_target_source`` from both views; ``sample`` limits the points that are asked on either side.
 
-    Without it the grey is compared in the same image (`photometric`), with it in the images' own bands, which is quicker.
+    Without it the grey is compared in the same image (`photometric`), with it in the images' own bands: quicker.
     A pose under which the views do not meet comes back with ``tested`` 0 and the lowest score.
     """
     ways = (
