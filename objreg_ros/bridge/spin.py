@@ -87,7 +87,10 @@ def _spin(door: Door, executor: SingleThreadedExecutor, transport: str) -> None:
             door.get_logger().info(transport)
             _settle()
             executor.add_node(door)
-            executor.spin_until_future_complete(door.failure)
+            # Not `spin_until_future_complete`: it keeps a callback of every round for ever, 100 MB an hour. What broke
+            # a worker is seen with the next round, at the latest that of the diagnostics.
+            while rclpy.ok() and not door.failure.done():
+                executor.spin_once()
     except KeyboardInterrupt:
         return
     if rclpy.ok() and door.failure.done():

@@ -213,12 +213,26 @@ def test_what_ros_says_because_it_was_just_shut_down_is_no_bug(is_down: bool, mo
             rclpy.shutdown()
         raise rclpy_implementation.RCLError("failed to initialize wait set: the given context is not valid")
 
-    monkeypatch.setattr(SingleThreadedExecutor, "spin_until_future_complete", break_off)
+    monkeypatch.setattr(SingleThreadedExecutor, "spin_once", break_off)
     if is_down:
         assert run(Short, []) == 0 and ended_well()
     else:
         with pytest.raises(rclpy_implementation.RCLError):
             run(Short, [])
+
+
+def test_what_a_node_hears_leaves_nothing_behind() -> None:
+    counts: list[int] = []
+
+    class Counting(Short):
+        def end(self) -> None:
+            gc.collect()
+            counts.append(len(gc.get_objects()))
+            if len(counts) == 60:
+                super().end()
+
+    assert run(Counting, []) == 0
+    assert counts[-1] - counts[20] < 40, "a callback a round stays"
 
 
 def test_the_arguments_reach_ros() -> None:
