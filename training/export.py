@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Write a trained network as the ONNX file that `objreg_ros.detector` runs (ARCHITECTURE.md, section 8).
+"""Write a trained network as the ONNX file that `objreg_ros.detector` runs (docs/models-contract.md).
 
 python -m training.export CHECKPOINT models/objreg_ssd.onnx --calibration DATA
 """
