@@ -68,9 +68,9 @@ def is_possible(candidate: Candidate, params: RegistrarParams) -> bool:
 
 
 def refuse(
-    candidate: Candidate, params: RegistrarParams, prior: Prior | None = None, rivals: Sequence[Candidate] = ()
+    candidate: Candidate, params: RegistrarParams, prior: Prior | None = None, possible: Sequence[Candidate] = ()
 ) -> Refusal | None:
-    """The first check that refuses a candidate, with its numbers; None if none does. ``rivals`` are possible poses."""
+    """The first check that refuses a candidate, with its numbers; None if none does. ``possible`` poses compete."""
     one, limits = candidate, limits_of(params)
     fit, seen, T = one.alignment, one.verification, one.T_target_source
     found, labels = objects.objects_of(one, limits.objects), [pair.label for pair in one.explained]
@@ -87,7 +87,7 @@ def refuse(
         or lone_object.check_overlap(seen.tested, found.lone, limits.lone_object)
         or surroundings.check(one.surroundings, seen, labels, found, limits.surroundings)
         or objects.check_matched(found.matched)
-        or _check_competing(one, lead(one, rivals, params), limits)
+        or _check_competing(one, lead(one, possible, params), limits)
         or lone_object.check_firm(seen.score, one.resistance, one.yaw_known, found.lone, limits.lone_object)
         or observability.check_directions(len(fit.slack))
         or _check_position(one, spread_of(fit, params) + one.warp, found.uncertain, limits.observability)

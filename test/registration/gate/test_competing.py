@@ -34,7 +34,7 @@ def test_a_lone_object_is_asked_for_a_margin_and_for_confirmation() -> None:
 def test_a_lone_object_whose_pose_has_a_rival_is_refused_whichever_chains_agree() -> None:
     for chains in (("objects",), ("features", "objects")):
         one = lone(agreeing_chains=chains)
-        refusal = refuse(one, PARAMS, rivals=[rival(one, 0.05)])
+        refusal = refuse(one, PARAMS, possible=[rival(one, 0.05)])
         assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
 
 
@@ -43,8 +43,8 @@ def test_several_objects_whose_pose_has_a_rival_that_is_worth_as_much_are_refuse
     assert len(several.explained) >= PARAMS.min_objects
     score = several.verification.score
     near, far = (candidate(score=score - share * PARAMS.rival_margin) for share in (0.9, 1.1))
-    assert refuse(several, PARAMS, rivals=[several, far]) is None
-    refusal = refuse(several, PARAMS, rivals=[several, near])
+    assert refuse(several, PARAMS, possible=[several, far]) is None
+    refusal = refuse(several, PARAMS, possible=[several, near])
     assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE and "2 objects" in refusal[1]
     impossible = replace(near, gravity_error_deg=2.0 * PARAMS.max_gravity_error)
     assert judge([several, impossible], PARAMS) is several
@@ -52,6 +52,6 @@ def test_several_objects_whose_pose_has_a_rival_that_is_worth_as_much_are_refuse
 
 def test_a_rival_that_hides_more_is_the_rival_that_it_were_if_all_of_that_agreed() -> None:
     one = lone()
-    assert refuse(one, PARAMS, rivals=[rival(one, 0.6)]) is None
-    refusal = refuse(one, PARAMS, rivals=[rival(one, 0.6, occluded=0.5)])
+    assert refuse(one, PARAMS, possible=[rival(one, 0.6)]) is None
+    refusal = refuse(one, PARAMS, possible=[rival(one, 0.6, occluded=0.5)])
     assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE

@@ -129,7 +129,7 @@ def test_a_lone_object_that_is_unmistakable_needs_no_second_chain() -> None:
 @pytest.mark.parametrize("doubt", [{"yaw_known": False}, {"likeness": -0.1}, {"likeness": None}], ids=str)
 def test_chains_that_agree_in_a_plain_room_do_not_speak_for_an_object_that_could_be_another(doubt: dict) -> None:
     doubted = lone(**doubt, margin=0.1, agreeing_chains=("features", "objects"))
-    refusal = refuse(doubted, PARAMS, rivals=[rival(doubted, 0.1)])
+    refusal = refuse(doubted, PARAMS, possible=[rival(doubted, 0.1)])
     assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
     assert refuse(lone(**{**doubt, "texture": 0.6, "margin": 0.6}), PARAMS) is None
 
