@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Candidates of a lone object, and their competing hypotheses."""
+
+from __future__ import annotations
+
+from objreg_ros.registration.candidate import Candidate, ObjectPair
+from objreg_ros.registration.params import RegistrarParams
+from registration.samples import candidate
+
+PARAMS = RegistrarParams()
+CUP = ObjectPair(0, 0, "cup")
+
+
+def lone(**evidence: object) -> Candidate:
+    """A candidate of one object that no second chain confirms, in a plain room."""
+    alone = {"explained": (ObjectPair(0, 0, "cup"),), "agreeing_chains": ("objects",), "texture": 0.4}
+    return candidate(**{**alone, "likeness": 0.6, "yaw_known": True, "margin": 0.4, **evidence})
+
+
+def rival(one: Candidate, behind: float, **evidence: object) -> Candidate:
+    """Another pose of the same object, worth so much less."""
+    return lone(score=one.verification.score - behind, likeness=one.likeness, **evidence)

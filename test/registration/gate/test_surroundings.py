@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the views say without the few objects that fill them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from objreg_ros.data import Reason
+from objreg_ros.registration.candidate import ObjectPair, Verification
+from objreg_ros.registration.gate import overlap, surroundings
+from objreg_ros.registration.gate.objects import Objects
+from objreg_ros.registration.gate.verdict import refuse
+from registration.gate.samples import CUP, PARAMS
+from registration.samples import candidate
+
+LIMITS = surroundings.Limits(
+    overlap=overlap.Limits(600, 0.35), violations=0.07, correlation=0.3, correlation_loss=0.25, share=0.15
+)
+SEEN = Verification(inliers=0.9, violations=0.0, occluded=0.0, texture=0.6, tested=9000, score=0.8)
+LONE = Objects(matched=1, few=True, few_proposers=True, inconsistent=False)
+
+
+@pytest.mark.parametrize(
+    ("around", "reason"),
+    [
+        ({}, None),
+        ({"score": -1.0}, None),
+        ({"tested": 1349}, Reason.LOW_OVERLAP),
+        ({"inliers": 0.3}, Reason.LOW_OVERLAP),
+        ({"violations": 0.08}, Reason.FREE_SPACE),
+        ({"texture": 0.2}, Reason.TEXTURE),
+        ({"texture": 0.34}, Reason.TEXTURE),
+        ({"texture": None}, None),
+    ],
+)
+def test_surroundings_are_asked_for_what_whole_views_are(around: dict[str, float], reason: Reason | None) -> None:
+    refusal = surroundings.check(replace(SEEN, **around), SEEN, ["cup", "book"], LONE, LIMITS)
+    assert (None if refusal is None else refusal[0]) is reason
+    assert refusal is None or refusal[1].startswith("without the cup and the book ")
+
+
+def test_surroundings_that_were_not_looked_at_refuse_nothing() -> None:
+    assert surroundings.check(None, SEEN, [], LONE, LIMITS) is None
+
+
+def test_only_a_lone_object_must_leave_a_share_of_the_views() -> None:
+    around, confirmed = replace(SEEN, tested=1349), LONE._replace(few_proposers=False)
+    assert surroundings.check(around, SEEN, ["cup"], confirmed, LIMITS) is None
+    refusal = surroundings.check(around, SEEN, ["cup"], LONE, LIMITS)
+    assert refusal == (Reason.LOW_OVERLAP, "without the cup 1349 pixels < 0.15 of 9000")
+
+
+@pytest.mark.parametrize(
+    ("around", "reason"),
+    [
+        ({"texture": -0.1}, Reason.TEXTURE),
+        ({"violations": 1.1 * PARAMS.max_violations}, Reason.FREE_SPACE),
+        ({"inliers": 0.5 * PARAMS.min_inliers}, Reason.LOW_OVERLAP),
+        ({"tested": PARAMS.min_tested - 1}, Reason.LOW_OVERLAP),
+        ({"score": -1.0}, None),  # what is little scores little
+        ({}, None),
+    ],
+)
+@pytest.mark.parametrize("explained", [(CUP,), (CUP, ObjectPair(1, 1, "book"))], ids=len)
+def test_what_is_around_few_objects_must_agree_by_itself(
+    around: dict[str, float], reason: Reason | None, explained: tuple[ObjectPair, ...]
+) -> None:
+    few = candidate(explained=explained, margin=1.0, surroundings=replace(candidate().verification, **around))
+    refusal = refuse(few, PARAMS)
+    assert (None if refusal is None else refusal[0]) is reason
+    assert refusal is None or refusal[1].startswith(
+        ("without the cup ", "without the cup and the book ")[len(explained) - 1]
+    )
+
+
+@pytest.mark.parametrize("chains", [("features", "objects"), ("objects",)], ids=len)
+@pytest.mark.parametrize("explained", [(CUP,), (CUP, ObjectPair(1, 1, "book"))], ids=len)
+def test_few_objects_around_which_the_print_agrees_much_less_have_moved(
+    explained: tuple[ObjectPair, ...], chains: tuple[str, ...]
+) -> None:
+    def judged(around: float | None, whole: float | None = 0.6) -> object:
+        seen = replace(candidate().verification, texture=whole)
+        told = {"explained": explained, "agreeing_chains": chains, "margin": 1.0, "yaw_known": True, "likeness": 0.9}
+        surroundings = replace(seen, texture=around)
+        return refuse(candidate(**told, texture=whole, resistance=1.0, surroundings=surroundings), PARAMS)
+
+    assert judged(0.6 - 0.9 * PARAMS.max_fall_around) is None
+    assert judged(0.99) is None
+    assert judged(None) is None and judged(None, None) is None
+    refusal = judged(0.6 - 1.1 * PARAMS.max_fall_around)
+    assert isinstance(refusal, tuple) and refusal[0] is Reason.TEXTURE and "without the cup" in refusal[1]
+
+
+def test_a_lone_object_that_one_chain_proposed_must_leave_something_of_the_views() -> None:
+    seen = candidate().verification
+    for chains, share, accepted in (
+        (("objects",), 0.9, False),
+        (("objects", "odometry"), 0.9, False),
+        (("objects",), 1.1, True),
+        (("features", "objects"), 0.9, True),
+    ):
+        around = replace(seen, tested=round(share * PARAMS.min_surroundings * seen.tested))
+        lone = candidate(
+            explained=(CUP,), margin=1.0, resistance=1.0, agreeing_chains=chains, surroundings=around, yaw_known=True
+        )
+        refusal = refuse(lone, PARAMS)
+        assert (refusal is None) is accepted, (chains, share, refusal)
+        assert refusal is None or (refusal[0] is Reason.LOW_OVERLAP and "without the cup" in refusal[1])

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The view score, and what makes up for a low one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from objreg_ros.data import Reason
+from objreg_ros.registration.candidate import ObjectPair, Verification
+from objreg_ros.registration.gate import view_score
+from objreg_ros.registration.gate.verdict import refuse
+from registration.gate.samples import CUP, PARAMS
+from registration.samples import candidate
+
+LIMITS = view_score.Limits(least=0.1, least_doubtful=0.4, violations=0.02, firm_margin=0.4, silhouette_weight=0.5)
+
+
+@pytest.mark.parametrize(
+    ("violations", "perturbation_margin", "lone", "least"),
+    [
+        (0.9, None, False, 0.1),
+        (0.0, None, True, 0.4),
+        (0.02, 0.0, True, 0.1),
+        (0.03, 0.0, False, 0.4),
+        (0.03, 0.3, False, 0.2),
+        (0.03, 0.5, False, 0.1),
+    ],
+)
+def test_a_margin_under_perturbation_makes_up_for_violations(
+    violations: float, perturbation_margin: float | None, lone: bool, least: float
+) -> None:
+    assert view_score.least_total(violations, perturbation_margin, lone, LIMITS) == pytest.approx(least)
+
+
+def test_silhouettes_add_to_a_view_score_that_is_high_enough_by_itself() -> None:
+    seen = Verification(inliers=0.9, violations=0.0, occluded=0.0, texture=0.6, tested=9000, score=0.2)
+    assert view_score.check(seen, 0.5, None, True, LIMITS) is None
+    for silhouette_score in (0.3, -1.0, None):
+        refusal = view_score.check(seen, silhouette_score, None, True, LIMITS)
+        assert refusal is not None and refusal[1].startswith("score with likeness")
+    low = view_score.check(replace(seen, score=0.09), 1.0, None, True, LIMITS)
+    assert low == (Reason.LOW_OVERLAP, "score 0.09 < 0.10")
+
+
+def test_where_something_floats_the_fall_over_a_push_makes_up_for_a_low_score() -> None:
+    floating = 1.5 * PARAMS.max_violations_doubtful
+    little = {"score": 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful), "margin": 1.0, "violations": floating}
+    lacking = PARAMS.firm_margin - (little["score"] - PARAMS.min_score)
+    for explained, resistance, accepted in (
+        ((CUP,), 0.9 * lacking, False),
+        ((CUP,), 1.1 * lacking, True),
+        ((CUP,), None, True),
+        ((CUP, ObjectPair(1, 1, "book")), 0.9 * lacking, False),
+    ):
+        refusal = refuse(candidate(explained=explained, resistance=resistance, **little), PARAMS)
+        assert (refusal is None) is accepted, (explained, resistance, refusal)
+
+
+def test_a_pose_that_views_like_well_need_not_resist_though_something_floats() -> None:
+    floating = {"violations": 1.5 * PARAMS.max_violations_doubtful, "explained": (CUP, ObjectPair(1, 1, "book"))}
+    liked = candidate(score=1.1 * PARAMS.min_score_doubtful, resistance=1.1 * PARAMS.rival_margin, **floating)
+    assert refuse(liked, PARAMS) is None
+
+
+def test_a_lone_object_that_views_like_little_need_not_resist_a_push_where_next_to_nothing_floats() -> None:
+    little = {"score": 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful), "margin": 1.0, "explained": (CUP,)}
+    soft = candidate(resistance=0.9 * PARAMS.firm_margin, violations=0.5 * PARAMS.max_violations_doubtful, **little)
+    assert refuse(soft, PARAMS) is None
+
+
+def test_a_lone_object_that_views_like_little_needs_two_chains() -> None:
+    little = {"score": 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful), "margin": 1.0, "explained": (CUP,)}
+    for chains in (("objects",), ("centroids", "objects")):  # the objects' poses are looked for from their middles too
+        refusal = refuse(candidate(agreeing_chains=chains, **little), PARAMS)
+        assert refusal is not None and refusal[0] is Reason.LOW_OVERLAP
+    assert refuse(candidate(agreeing_chains=("features", "objects"), **little), PARAMS) is None
+
+
+def test_a_lone_object_of_one_chain_is_refused_where_views_like_too_little_however_alike_it_looks() -> None:
+    firm = {"resistance": PARAMS.min_firmness_alone, "agreeing_chains": ("objects",), "explained": (CUP,)}
+    for score, accepted in ((1.1, True), (0.9, False)):
+        alike = candidate(score=score * PARAMS.min_score, likeness=1.0, margin=1.0, **firm)
+        refusal = refuse(alike, PARAMS)
+        assert (refusal is None) is accepted, (score, refusal)
+        assert refusal is None or refusal[0] is Reason.LOW_OVERLAP
+
+
+def test_a_lone_object_of_one_chain_that_views_like_little_must_resist_a_push() -> None:
+    score = 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful)
+    for resistance, accepted in ((PARAMS.min_firmness_alone, True), (0.0, False), (None, False)):
+        little = {"score": score, "likeness": 0.0, "margin": 1.0, "explained": (CUP,), "agreeing_chains": ("objects",)}
+        refusal = refuse(candidate(resistance=resistance, **little), PARAMS)
+        assert (refusal is None) is accepted, (resistance, refusal)
+
+
+def test_an_object_that_looks_alike_makes_up_for_views_that_like_little() -> None:
+    little = {"score": 0.2, "violations": 1.5 * PARAMS.max_violations_doubtful, "yaw_known": True, "margin": 1.0}
+    little["resistance"] = 0.3 * PARAMS.firm_margin
+    alike, otherwise = (candidate(explained=(CUP,), likeness=likeness, **little) for likeness in (1.0, 0.2))
+    assert refuse(alike, PARAMS) is None
+    refusal = refuse(otherwise, PARAMS)
+    assert refusal is not None and refusal[0] is Reason.LOW_OVERLAP
+
+
+def test_an_object_that_looks_otherwise_takes_nothing_from_what_views_like() -> None:
+    assert refuse(candidate(score=1.1 * PARAMS.min_score, likeness=-1.0), PARAMS) is None
