@@ -18,6 +18,7 @@ from objreg_ros.data import Frame, LoopClosure, Rejected
 Array = NDArray[Any]
 
 RECENT_FRAMES = 1000  # frames whose position is remembered until it is known which is a keyframe
+MOST_PLACES = 20_000  # keyframes whose position is remembered for the edges that end there
 RECENT_CLOSURES, RECENT_REFUSALS = 2000, 100  # edges that are shown
 GREEN, RED, GOLD, WHITE = (0.2, 0.8, 0.3, 1.0), (0.9, 0.2, 0.2, 0.35), (1.0, 0.75, 0.1, 0.9), (1.0, 1.0, 1.0, 1.0)
 
@@ -41,6 +42,8 @@ class Scene:
     def settle(self, keyframe_ns: int, closures: Iterable[LoopClosure], rejected: Iterable[Rejected]) -> None:
         """A frame became a keyframe, with these edges."""
         self._places.update(item for item in tuple(self._recent) if item[0] == keyframe_ns)
+        while len(self._places) > MOST_PLACES:
+            del self._places[next(iter(self._places))]
         self._accepted += [(closure.from_ns, closure.to_ns) for closure in closures]
         self._rejected += [(refusal.from_ns, refusal.to_ns) for refusal in rejected if refusal.from_ns != refusal.to_ns]
 

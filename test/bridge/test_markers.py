@@ -81,3 +81,12 @@ def test_nothing_is_left_of_a_cleared_scene() -> None:
         scene.settle(stamp_ns, [closure(1, 2)], [])
     scene.clear()
     assert ends(scene, "accepted") == []
+
+
+def test_the_places_of_keyframes_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("objreg_ros.bridge.markers.MOST_PLACES", 3)
+    scene = Scene()
+    for stamp_ns in range(1, 7):
+        scene.see(frame(stamp_ns, float(stamp_ns)))
+        scene.settle(stamp_ns, [closure(stamp_ns - 1, stamp_ns)], [])
+    assert ends(scene, "accepted") == [4.0, 5.0, 5.0, 6.0]
