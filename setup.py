@@ -37,7 +37,6 @@ setup(
     install_requires=[
         "setuptools",
         "click>=8.1",
-        "matplotlib>=3.6",
         "numba>=0.59",
         "numpy>=1.26",
         "onnxruntime>=1.17",
@@ -50,6 +49,9 @@ setup(
         "tqdm>=4.64",
     ],
     extras_require={
+        # What only the demo's picture of the way and the figures of benchmarks/ draw with; a robot does without. The
+        # simulator itself needs nothing that a robot has not.
+        "simulation": ["matplotlib>=3.6"],
         # The real ROS 2 Jazzy as wheels, for machines without a ROS installation.
         "ros": ["ros-jazzy-rclpy", "ros-jazzy-common-interfaces", "ros-jazzy-rmw-fastrtps-cpp"],
         "test": ["hypothesis", "mypy", "onnx", "pytest", "ruff", "small_gicp>=1.0"],

@@ -119,6 +119,17 @@ def test_onnxruntime_is_imported_in_one_file_only() -> None:
     assert len(users) == 1, f"onnxruntime is imported in {users}"
 
 
+@pytest.mark.parametrize(
+    ("library", "users"),
+    [
+        ("open3d", {"mapper.optimisation", "registration.paper", "segmenter.paper"}),
+        ("matplotlib", {"report.live_pictures"}),
+    ],
+)
+def test_a_heavy_library_is_imported_only_where_it_is_used(library: str, users: set[str]) -> None:
+    assert {name for name, path in MODULES.items() if library in {i.split(".")[0] for i in imports(path)}} <= users
+
+
 def test_the_law_can_be_broken() -> None:
     assert not allowed("detector.mobilenet_ssd", "segmenter.segment")
     assert not allowed("data", "geometry")

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import ast
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
@@ -45,13 +46,20 @@ def keys(repository: Path) -> list[str]:
     return [element.text or "" for element in root if element.tag.endswith("depend")]
 
 
-def required(repository: Path) -> dict[str, str]:
-    """The packages that setup.py asks for, each with its oldest version."""
-    (wanted,) = [
+def asked(repository: Path, keyword: str) -> Any:
+    """What setup.py says behind a keyword."""
+    (value,) = [
         ast.literal_eval(node.value)
         for node in ast.walk(ast.parse((repository / "setup.py").read_text()))
-        if isinstance(node, ast.keyword) and node.arg == "install_requires"
+        if isinstance(node, ast.keyword) and node.arg == keyword
     ]
+    return value
+
+
+def required(repository: Path, *extras: str) -> dict[str, str]:
+    """The packages that setup.py asks for, those of the extras too, each with its oldest version."""
+    told = asked(repository, "extras_require")
+    wanted = [*asked(repository, "install_requires"), *(line for extra in extras for line in told[extra])]
     return {name: oldest for name, _, oldest in (line.partition(">=") for line in wanted) if name != "setuptools"}
 
 
@@ -73,8 +81,17 @@ def test_whatever_setup_py_asks_for_comes_with_a_robot_too(repository: Path) -> 
 
 @pytest.mark.parametrize("key", [key for key, package in IN_NOBLE.items() if not package.startswith("pip: ")])
 def test_nobles_version_is_one_that_setup_py_takes(repository: Path, key: str) -> None:
-    oldest = {f"python3-{OTHER_NAMES.get(name, name)}": text for name, text in required(repository).items()}
+    oldest = {
+        f"python3-{OTHER_NAMES.get(name, name)}": text for name, text in required(repository, "simulation").items()
+    }
     assert version(IN_NOBLE[key].split()[1]) >= version(oldest.get(key, "0"))
+
+
+def test_a_robot_is_asked_for_nothing_that_only_a_simulation_needs(repository: Path) -> None:
+    root = ElementTree.parse(repository / "package.xml").getroot()
+    on_robot = {element.text for element in root.iter("exec_depend")}
+    only = set(required(repository, "simulation")) - set(required(repository))
+    assert only == {"matplotlib"} and not {f"python3-{name}" for name in only} & on_robot
 
 
 def test_what_requirements_bring_is_what_setup_py_asks_for(repository: Path) -> None:

@@ -1,21 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """The founding method, selectable as ``method: paper``: pairwise point-to-point ICP of objects of one label.
 
-Besl and McKay, "A method for registration of 3-D shapes" (1992): nearest neighbours from a kd-tree, pairs rejected by
-distance and thinned to one-to-one, the motion from the singular value decomposition (Arun et al., "Least-squares
-fitting of two 3-D point sets", 1987), from rest, until it settles. It answers to the same gate as every other method,
-with the same evidence.
+Besl and McKay, "A method for registration of 3-D shapes" (1992), by Open3D: nearest neighbours from a kd-tree, pairs
+rejected by distance, the motion from the singular value decomposition, from rest, until it settles. Open3D does not
+thin pairs to one-to-one, so the evidence does, after the last step. The method answers to the same gate as every other
+method, with the same evidence.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from importlib import import_module
+from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from objreg_ros.data import Alignment, Array
-from objreg_ros.geometry import rigid_fit, transform
+from objreg_ros.geometry import transform
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.engine import merged
 from objreg_ros.registration.keyframe import Keyframe
@@ -24,21 +25,23 @@ from objreg_ros.registration.prepare.prepared import Pantry, Prepared
 from objreg_ros.registration.propose.evidence import gather, resistance_of
 
 LEAST_PAIRS = 6
+FITNESS_TOLERANCE = 1e-6  # share of the points that find a partner: its change that counts as none, Open3D's default
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Pairs:
-    """Indices of the points that correspond, one-to-one, and their distances in m."""
+class _Icp:
+    """A pose, the indices ``pairs (K, 2)`` of source and target under it, and whether a further step changes none."""
 
-    source: Array
-    target: Array
-    distance: Array
+    T_target_source: Array
+    pairs: Array
+    converged: bool
 
 
 class PaperEngine:
     """Proposes a pose for each pair of objects of one label; the counterpart of `Engine`."""
 
     def __init__(self, params: RegistrarParams) -> None:
+        import_module("open3d")  # now and not with the first pair: it takes seconds
         self._params = params
         self._pantry = Pantry(params)
 
@@ -67,40 +70,60 @@ class PaperEngine:
 
 def register(source: Array, target: Array, T_target_source: Array, params: RegistrarParams) -> Alignment | None:
     """Point-to-point ICP of points (N, 3) upon (M, 3) from a start; None where too few points correspond."""
-    tree, T = cKDTree(target), T_target_source
-    error, iterations, converged = np.inf, 0, False
-    while iterations < params.paper_iterations and not converged:
-        pairs = _correspond(tree, transform(T, source.astype(float)), params.paper_distance)
-        if len(pairs.source) < LEAST_PAIRS:
-            return None
-        T = rigid_fit(source[pairs.source].astype(float), target[pairs.target].astype(float))
-        before, error = error, float(np.mean(pairs.distance))
-        converged = abs(before - error) < params.paper_tolerance
-        iterations += 1
+    source, target = source.astype(float), target.astype(float)
+    if min(len(source), len(target)) < LEAST_PAIRS:
+        return None
+    found = _icp(source, target, T_target_source, params)
+    moved = transform(found.T_target_source, source)
+    distance = np.linalg.norm(moved[found.pairs[:, 0]] - target[found.pairs[:, 1]], axis=1)
+    kept = _one_to_one(found.pairs, distance)
+    if len(kept) < LEAST_PAIRS:
+        return None
+    paired, distance = found.pairs[kept, 0], distance[kept]
     return Alignment(
-        T_target_source=T,
-        information=_information(source[pairs.source], T, pairs.distance),
-        inliers=len(pairs.source),
-        overlap=len(pairs.source) / len(source),
-        rmse=float(np.sqrt(np.mean(np.square(pairs.distance)))),
-        converged=converged,
-        middle=transform(T, source.astype(float)).mean(axis=0),
+        T_target_source=found.T_target_source,
+        information=_information(source[paired], found.T_target_source, distance),
+        inliers=len(paired),
+        overlap=len(paired) / len(source),
+        rmse=float(np.sqrt(np.mean(np.square(distance)))),
+        converged=found.converged,
+        middle=moved.mean(axis=0),
     )
 
 
-def _correspond(tree: cKDTree, moved: Array, most: float) -> _Pairs:
-    """The nearest target of each point within ``most`` m; of the points that share a target the closest keeps it."""
-    distance, target = tree.query(moved, distance_upper_bound=most)
-    source = np.flatnonzero(np.isfinite(distance))
-    source = source[np.lexsort((distance[source], target[source]))]
-    _, first = np.unique(target[source], return_index=True)
-    kept = source[first]
-    return _Pairs(source=kept, target=target[kept], distance=distance[kept])
+def _icp(source: Array, target: Array, T_target_source: Array, params: RegistrarParams) -> _Icp:
+    """Open3D's ICP. It does not say whether it settled, so one more step says it."""
+    import open3d as o3d
+
+    registration = o3d.pipelines.registration
+    clouds = [o3d.geometry.PointCloud(o3d.utility.Vector3dVector(xyz)) for xyz in (source, target)]
+
+    def after(start: Array, iterations: int) -> Any:
+        criteria = registration.ICPConvergenceCriteria(FITNESS_TOLERANCE, params.paper_tolerance, iterations)
+        method = registration.TransformationEstimationPointToPoint()
+        return registration.registration_icp(*clouds, params.paper_distance, start, method, criteria)
+
+    last = after(T_target_source, params.paper_iterations)
+    further = after(last.transformation, 1)
+    converged = (
+        abs(further.fitness - last.fitness) < FITNESS_TOLERANCE
+        and abs(further.inlier_rmse - last.inlier_rmse) < params.paper_tolerance
+    )
+    pairs = np.array(last.correspondence_set, int).reshape(-1, 2)
+    return _Icp(
+        T_target_source=np.array(last.transformation), pairs=pairs[np.argsort(pairs[:, 0])], converged=converged
+    )
+
+
+def _one_to_one(pairs: Array, distance: Array) -> Array:
+    """The rows of ``pairs (K, 2)`` that stay: of the points that share a target the closest keeps it."""
+    order = np.lexsort((distance, pairs[:, 1]))
+    return order[np.unique(pairs[order, 1], return_index=True)[1]]
 
 
 def _information(source: Array, T: Array, distance: Array) -> Array:
     """``J^T J / sigma^2`` of the point-to-point errors, for a step [t r] in the target's axes about the camera."""
-    x, y, z = (source.astype(float) @ T[:3, :3].T).T
+    x, y, z = (source @ T[:3, :3].T).T
     J = np.zeros((len(source), 3, 6))
     J[:, :, :3] = np.eye(3)
     J[:, 0, 4], J[:, 0, 5], J[:, 1, 5] = z, -y, x

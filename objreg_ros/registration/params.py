@@ -264,7 +264,7 @@ class RegistrarParams(Params):
     )
     paper_iterations: int = param(100, "most iterations of the founding method", ge=1)
     paper_tolerance: float = param(
-        1e-6, "change of the mean distance that ends the iterations of the founding method", "m", ge=0.0
+        1e-6, "change of the root mean square distance that ends the iterations of the founding method", "m", ge=0.0
     )
 
     # What decides a closure.

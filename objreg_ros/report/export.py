@@ -82,7 +82,10 @@ def _all_or_nothing(folder: Path) -> Iterator[None]:
 
 
 def write_ply(path: Path, xyz: Array, normals: Array, rgb: Array | None) -> Path:
-    """Write points as binary little-endian PLY: x y z as doubles, normals as floats and, if there are any, colours."""
+    """Write points as binary little-endian PLY: x y z as doubles, normals as floats and, if there are any, colours.
+
+    Not by Open3D, which writes no empty cloud and says of a full disk that all is well.
+    """
     fields = [(name, "<f8") for name in ("x", "y", "z")] + [(name, "<f4") for name in ("nx", "ny", "nz")]
     fields += [(name, "u1") for name in ("red", "green", "blue")] if rgb is not None else []
     table = np.zeros(len(xyz), fields)

@@ -67,11 +67,16 @@ def _draw_box(picture: Array, xyxy: Array, name: str) -> None:
 def draw_way(file: Path, truth: Truth, closures: Sequence[LoopClosure]) -> None:
     """Write the camera's way from above with its closures, green where they are true and red where they are false.
 
-    The plane is that of the two directions in which the way extends most. ValueError where the truth has no poses.
+    The plane is that of the two directions in which the way extends most. ValueError where the truth has no poses,
+    ModuleNotFoundError where there is no matplotlib.
     """
     if not truth.poses:
         raise ValueError("expected a recording with ground truth to draw its path")
-    from matplotlib.figure import Figure
+    try:
+        from matplotlib.figure import Figure
+    except ModuleNotFoundError as absent:
+        told = "expected matplotlib to draw the way, found none; pip install 'objreg_ros[simulation]' brings it"
+        raise ModuleNotFoundError(told, name="matplotlib") from absent
 
     positions = np.array([T[:3, 3] for T in truth.poses])
     axes = np.linalg.svd(positions - positions.mean(axis=0), full_matrices=False)[2][:2]

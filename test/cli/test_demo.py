@@ -1,16 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from itertools import permutations
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 from recording.folders import CAMERA, records, tum_folder, uncalibrated
 
-from objreg_ros.cli.demo import Asked, calibrated, camera_of, mounting_of, run, setup_of
+from objreg_ros.cli.demo import Asked, _draw, calibrated, camera_of, mounting_of, run, setup_of
 from objreg_ros.recording import open_recording, write_rosbag2
 from objreg_ros.recording.inputs import Inputs, parse_remaps
+from objreg_ros.truth import Truth
 
 ASKED = Asked(
     recording=None, model=None, labels=None, params_file=None, changes=(), remaps=(), seconds=None, rate=1.0,
@@ -123,3 +128,14 @@ def test_a_recording_that_the_graph_cannot_use_is_refused_before_anything_is_wri
     with pytest.raises(ValueError, match="expected a colour image, got /"):
         run(replace(ASKED, recording=recording, remaps=("image:=",), out=out))
     assert not out.exists()
+
+
+def test_a_picture_that_needs_what_is_not_installed_is_left_out_and_the_demo_says_what_brings_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    live: Any = SimpleNamespace(sight=None, closures=[])
+    source: Any = None  # nothing is read of it where there is no camera_info
+    _draw(tmp_path, live, Truth([(0, np.eye(4)), (1, np.eye(4))]), source, Inputs(image="/a"))
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "did not draw" in line and "pip install 'objreg_ros[simulation]'" in line

@@ -7,11 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector, skew, transform
 from objreg_ros.registration.certainty.covariance import spread_of
-from objreg_ros.registration.paper import LEAST_PAIRS, PaperEngine, _correspond, register
+from objreg_ros.registration.paper import LEAST_PAIRS, PaperEngine, _one_to_one, register
 from objreg_ros.registration.params import RegistrarParams
 from registration import rooms
 
@@ -59,10 +58,21 @@ def test_fewer_than_six_pairs_give_nothing() -> None:
 
 
 def test_of_the_points_that_share_a_partner_the_closest_has_it() -> None:
-    tree = cKDTree([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
-    pairs = _correspond(tree, np.array([[0.02, 0, 0], [0.01, 0, 0], [1.0, 0, 0], [0.0, 0.5, 0]]), 0.1)
-    assert pairs.source.tolist() == [1, 2] and pairs.target.tolist() == [0, 1]
-    assert pairs.distance == pytest.approx([0.01, 0.0])
+    pairs = np.array([[0, 0], [1, 0], [2, 1]])
+    assert _one_to_one(pairs, np.array([0.02, 0.01, 0.0])).tolist() == [1, 2]
+
+
+def test_iterations_that_end_too_early_are_not_called_converged() -> None:
+    about = pose(rotation_from_vector(np.array([0.0, 0.1, 0.02])), np.array([-0.1, 0.0, 0.02]))
+    few = register(_corner(), transform(about, _corner()), np.eye(4), PARAMS.replaced(paper_iterations=2))
+    enough = register(_corner(), transform(about, _corner()), np.eye(4), PARAMS)
+    assert few is not None and enough is not None and (few.converged, enough.converged) == (False, True)
+
+
+def test_the_same_clouds_give_the_same_pose_to_the_last_bit() -> None:
+    target = np.add(_corner()[::2], (0.02, 0.01, 0.0))
+    poses = [register(_corner(), target, np.eye(4), PARAMS) for _ in range(8)]
+    assert len({found.T_target_source.tobytes() for found in poses if found is not None}) == 1
 
 
 def test_the_middle_of_what_was_aligned_is_that_of_the_points_in_the_target_frame() -> None:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import cv2
@@ -75,3 +76,11 @@ def test_a_closure_is_green_where_it_is_true_and_red_where_it_is_false(
 def test_a_way_without_truth_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="ground truth"):
         draw_way(tmp_path / "way.png", Truth([]), [])
+
+
+def test_where_there_is_no_matplotlib_the_error_says_what_brings_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    with pytest.raises(ModuleNotFoundError, match=r"pip install 'objreg_ros\[simulation\]'"):
+        draw_way(tmp_path / "way.png", Truth([(0, np.eye(4)), (1, np.eye(4))]), [])

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 
 from objreg_ros.data import DepthImage
@@ -51,3 +53,12 @@ def test_a_lone_point_far_from_the_others_stays() -> None:
     depth = wall_with((100, 100, 0.95))
     depth[400, 500] = 1.4
     np.testing.assert_allclose(depths_kept(depth), (0.95, 1.4))
+
+
+def test_the_same_box_gives_the_same_points_on_whichever_thread_it_is_cut() -> None:
+    rng = np.random.default_rng(5)
+    depth = wall_with((100, 100, 0.95), (200, 100, 1.02))[:240] + rng.normal(0.0, 0.006, (240, CAMERA.width))
+    depth = np.concatenate([depth, np.repeat(np.linspace(1.2, 0.9, 240)[:, None], CAMERA.width, axis=1)])
+    with ThreadPoolExecutor(2) as pool:
+        kept = list(pool.map(lambda _: depths_kept(depth).tobytes(), range(6)))
+    assert len(set(kept)) == 1
