@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -238,3 +239,8 @@ def test_the_public_names_are_there_and_no_other() -> None:
     assert set(objreg_ros.__all__) <= set(dir(objreg_ros))
     with pytest.raises(AttributeError, match="no attribute 'regsiter'"):
         objreg_ros.regsiter  # noqa: B018
+
+
+def test_the_package_says_that_it_is_typed(repository: Path) -> None:
+    assert (repository / "objreg_ros" / "py.typed").is_file()
+    assert "py.typed" in (repository / "setup.py").read_text(encoding="utf-8")

@@ -51,16 +51,21 @@ class Engine:
 
         ``T_target_source_prior (4, 4)`` is what odometry expects, given only where it is tight enough to start from.
         """
+        # prepare/: each keyframe once
         pair = Pair(source=self._pantry.get(source), target=self._pantry.get(target))
         if min(len(pair.source.xyz), len(pair.target.xyz)) < self._params.min_points:
             return ()
+        # propose/: what is worth finishing, of all that the chains propose
         best, seeds = self._shortlist(pair, T_target_source_prior, self._params)
         if not best:
             return ()
+        # align/ and score/: each is refined, and its evidence gathered
         candidates = merged([self._judge(pair, seed, seeds) for seed in best], pair.source.middle, self._params)
+        # propose/: what else a lone object's pose could be, refined and scored alike
         rivals = self._rivals(pair, [one for one in candidates if self._promises(one, candidates[0])])
         if rivals:
             candidates = merged([*candidates, *rivals], pair.source.middle, self._params)
+        # certainty/: how the views resist a push, and what gravity tells
         pushed = (self._pushed(pair, one) if self._promises(one, candidates[0]) else one for one in candidates)
         return tuple(self._levelled(pair, one) for one in pushed)
 
