@@ -29,14 +29,15 @@ from objreg_ros.memory.retrieval import Index, Place
 from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.memory.thinning import Thinning
+from objreg_ros.registration import align, method_of
+from objreg_ros.registration.api import Gate, Method
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.certainty.covariance import covariance_of
-from objreg_ros.registration.engine import Engine
 from objreg_ros.registration.gate.verdict import Refusal, judge
 from objreg_ros.registration.keyframe import Keyframe
-from objreg_ros.registration.paper import PaperEngine
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.propose.prior import expect
+from objreg_ros.registration.result import Registration, evidence_of
 
 RECENT = 500  # landmarks that are told of after every keyframe
 
@@ -88,11 +89,15 @@ _Try = tuple[Place, Callable[[], _Accepted | Rejected] | None]
 
 
 class Registrar:
-    """Finds the loops. Holds the store at ``params.store`` until `close`; StoreError (an OSError) if that is bad."""
+    """Finds the loops. Holds the store at ``params.store`` until `close`; StoreError (an OSError) if that is bad.
 
-    def __init__(self, params: RegistrarParams) -> None:
+    ``method`` finds poses between two keyframes and ``gate`` accepts or refuses them (`registration.api`); they are
+    those of ``params`` and `judge` where None. Both are called from several threads.
+    """
+
+    def __init__(self, params: RegistrarParams, method: Method | None = None, gate: Gate | None = None) -> None:
         self.params = params
-        self._engine = PaperEngine(params) if params.method == "paper" else Engine(params)
+        self._method, self._gate = method or method_of(params), gate or judge
         self._store = Store(params.store)
         self._lock = threading.RLock()
         self._pools: dict[int, ThreadPoolExecutor] = {}
@@ -279,19 +284,10 @@ class Registrar:
         except StoreError as error:
             refusal = Reason.UNREADABLE, str(error)
             return lambda: _rejected(place.stamp_ns, keyframe, refusal)
-        self._engine.prepare(keyframe)
+        self._method.prepare(keyframe)
         prior = expect(keyframe, target, self.params)
-        start = prior.T_target_source if prior is not None and prior.tight(self.params) else None
-        proposed = search.pool.submit(self._engine.propose, keyframe, target, start)
-
-        def verdict() -> _Accepted | Rejected:
-            answer = judge(proposed.result(), self.params, prior)
-            if isinstance(answer, Candidate):
-                return _Accepted(target=target, candidate=answer)
-            best = next((candidate.T_target_source for candidate in proposed.result()), None)
-            return _rejected(place.stamp_ns, keyframe, answer, best)
-
-        return verdict
+        registered = search.pool.submit(align, keyframe, target, prior, self.params, self._method, self._gate)
+        return lambda: _verdict(keyframe, target, registered.result())
 
     def _remember(
         self, keyframe: Keyframe, sightings: Sequence[Sighting], accepted: Sequence[_Accepted]
@@ -345,7 +341,7 @@ def closure_of(
         covariance=covariance_of(candidate, params),
         labels=tuple(dict.fromkeys(match.label for match in matches)) or tuple(dict.fromkeys(keyframe.labels)),
         matches=matches,
-        evidence=_evidence(candidate) | _moved(keyframe, item),
+        evidence=evidence_of(candidate) | _moved(keyframe, item),
         from_frame_id=item.target.frame_id,
         to_frame_id=keyframe.frame_id,
     )
@@ -364,28 +360,14 @@ def _rejected(from_ns: int, keyframe: Keyframe, refusal: Refusal, T_from_to: Arr
     return Rejected(reason=reason, from_ns=from_ns, to_ns=keyframe.stamp_ns, detail=detail, T_from_to=T_from_to)
 
 
-def _evidence(candidate: Candidate) -> dict[str, float]:
-    """The numbers of the verification, for whoever wants to look at a closure."""
-    seen, aligned = candidate.verification, candidate.alignment
-    numbers: dict[str, float | None] = {
-        "score": seen.score,
-        "inliers": seen.inliers,
-        "violations": seen.violations,
-        "floating": candidate.floating,
-        "occluded": seen.occluded,
-        "texture": seen.texture,
-        "tested": seen.tested,
-        "overlap": aligned.overlap,
-        "rmse": aligned.rmse,
-        "chains": len(candidate.agreeing_chains),
-        "explained": len(candidate.explained),
-        "moved": len(candidate.moved),
-        "gravity_error_deg": candidate.gravity_error_deg,
-        "resistance": candidate.resistance,
-        "score_of_surroundings": None if candidate.surroundings is None else candidate.surroundings.score,
-        "yaw_known": candidate.yaw_known,
-    }
-    return {name: float(number) for name, number in numbers.items() if number is not None}
+def _verdict(keyframe: Keyframe, target: Keyframe, registration: Registration) -> _Accepted | Rejected:
+    candidate, reason = registration.candidate, registration.reason
+    if reason is None and candidate is not None:
+        return _Accepted(target=target, candidate=candidate)
+    if reason is None:
+        raise ValueError("gate: expected a reason with each refusal, got None")
+    best = None if candidate is None else candidate.T_target_source
+    return _rejected(target.stamp_ns, keyframe, (reason, registration.detail), best)
 
 
 def _moved(keyframe: Keyframe, item: _Accepted) -> dict[str, float]:

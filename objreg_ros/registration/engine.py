@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from objreg_ros.data import Alignment, Array
+from objreg_ros.registration.api import Proposer, Scorer
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.certainty.covariance import covariance_of, spread_of, worst_translation
 from objreg_ros.registration.certainty.degeneracy import warp
@@ -29,10 +30,14 @@ from objreg_ros.registration.propose.shortlist import shortlist
 
 
 class Engine:
-    """Registers keyframes. Deterministic: the same keyframes and parameters give the same candidates."""
+    """Registers keyframes. Deterministic: the same keyframes and parameters give the same candidates.
 
-    def __init__(self, params: RegistrarParams) -> None:
+    ``propose`` and ``score`` may be one's own: `registration.api`.
+    """
+
+    def __init__(self, params: RegistrarParams, propose: Proposer = shortlist, score: Scorer = gather) -> None:
         self._params = params
+        self._shortlist, self._score = propose, score
         self._pantry = Pantry(params)
 
     def prepare(self, keyframe: Keyframe) -> None:
@@ -46,16 +51,21 @@ class Engine:
 
         ``T_target_source_prior (4, 4)`` is what odometry expects, given only where it is tight enough to start from.
         """
+        # prepare/: each keyframe once
         pair = Pair(source=self._pantry.get(source), target=self._pantry.get(target))
         if min(len(pair.source.xyz), len(pair.target.xyz)) < self._params.min_points:
             return ()
-        best, seeds = shortlist(pair, T_target_source_prior, self._params)
+        # propose/: what is worth finishing, of all that the chains propose
+        best, seeds = self._shortlist(pair, T_target_source_prior, self._params)
         if not best:
             return ()
+        # align/ and score/: each is refined, and its evidence gathered
         candidates = merged([self._judge(pair, seed, seeds) for seed in best], pair.source.middle, self._params)
+        # propose/: what else a lone object's pose could be, refined and scored alike
         rivals = self._rivals(pair, [one for one in candidates if self._promises(one, candidates[0])])
         if rivals:
             candidates = merged([*candidates, *rivals], pair.source.middle, self._params)
+        # certainty/: how the views resist a push, and what gravity tells
         pushed = (self._pushed(pair, one) if self._promises(one, candidates[0]) else one for one in candidates)
         return tuple(self._levelled(pair, one) for one in pushed)
 
@@ -71,7 +81,7 @@ class Engine:
 
     def _gathered(self, pair: Pair, alignment: Alignment, chains: Sequence[str]) -> Candidate:
         """The candidate of an alignment, without slack where an object holds it."""
-        candidate = gather(pair.source, pair.target, alignment, chains, self._params)
+        candidate = self._score(pair.source, pair.target, alignment, chains, self._params)
         return replace(candidate, alignment=held(alignment)) if is_held(candidate, self._params) else candidate
 
     def _rivals(self, pair: Pair, candidates: Sequence[Candidate]) -> list[Candidate]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from objreg_ros.data import Array, DepthImage, PointFlag
 from objreg_ros.segmenter.boxes import Box
 from objreg_ros.segmenter.components import split
@@ -58,6 +60,26 @@ def isolate(image: DepthImage, box: Box, ground: Ground, params: SegmenterParams
     pixels = extract(image, box, around, chosen, jump)
     flags = PointFlag(0) if supported else PointFlag.UNSUPPORTED
     flags |= whole_flags(image, pixels, around, chosen, here)
+    return Isolated(pixels, flags, Cells(chosen, crop, grid.step))
+
+
+def cut_out(image: DepthImage, box: Box, mask: Array, ground: Ground, params: SegmenterParams) -> Isolated:
+    """What ``mask (H, W) bool`` of the picture covers within ``box``, taken at its word but for what is not measured.
+
+    A pixel belongs to the mask by its cell, and by its depth: what the mask's edge takes of the background is left out
+    as far as it is another cell's.
+    """
+    jump = (params.jump, params.jump_z2)
+    grid = _grid(box, ground, params.margin)
+    crop = _expanded(_cells(box, grid), params.margin, grid)
+    around, (left, top, right, bottom) = grid.crop(crop), crop
+    rows, columns = (
+        np.minimum(np.arange(first, end) * grid.step + grid.step // 2, size - 1)
+        for first, end, size in zip((top, left), (bottom, right), mask.shape, strict=True)
+    )
+    chosen = mask[np.ix_(rows, columns)] & (around.depth > 0)
+    pixels = extract(image, box, around, chosen, jump)
+    flags = whole_flags(image, pixels, around, chosen, (0, 0, right - left, bottom - top))
     return Isolated(pixels, flags, Cells(chosen, crop, grid.step))
 
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
@@ -15,7 +15,7 @@ from objreg_ros.segmenter import boxes, paper
 from objreg_ros.segmenter.boxes import Box
 from objreg_ros.segmenter.extract import Pixels, cell_points, colours
 from objreg_ros.segmenter.gravity import camera_up, estimate_up, known_normals
-from objreg_ros.segmenter.isolate import Isolated, isolate, mark
+from objreg_ros.segmenter.isolate import Isolated, cut_out, isolate, mark
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.support import Ground, find_supports
 from objreg_ros.segmenter.surface import Surface, cell_size, reduce
@@ -56,21 +56,30 @@ class Segmenter:
             )
             self.segment(asked, image)
 
-    def segment(self, detections: Detections, depth: DepthImage, gravity: Array | None = None) -> Frame:
+    def segment(
+        self,
+        detections: Detections,
+        depth: DepthImage,
+        gravity: Array | None = None,
+        masks: Sequence[Array | None] | None = None,
+    ) -> Frame:
         """The objects of one moment, in the order of their boxes; stamp and frame_id are those of ``depth``.
 
         Boxes of a picture of another size are scaled by ``detections.image_hw`` to the depth image, which must show
         the same field of view. ``gravity (3,)`` is the way things fall in the camera frame where an odometry or an IMU
         knows it; it is then handed on with confidence 1, else it is estimated from the frame. A box without an object
         of `min_points` gives none; instances count the objects from 1. ``T_odom_camera`` is None.
+
+        ``masks`` has for each box a mask (H, W) bool of the depth image, or None: what it covers is the object, instead
+        of what stands in the box. ValueError for masks of another number, type or shape.
         """
-        params = self.params
+        params, outlines = self.params, _outlines(masks, len(detections), depth)
         depth = _plain(depth)
         seen = (depth, step_for(depth.depth.shape[1], params.view_step), params.z_min, params.limits[0])
         view = self._beside.submit(reduced_view, *seen)
         ground = self._ground(depth, gravity)
         taken = np.zeros(ground.surface.depth.shape, np.bool_)
-        found = self._cut_all(depth, boxes.pixel_boxes(detections, *depth.depth.shape), ground)
+        found = self._cut_all(depth, boxes.pixel_boxes(detections, *depth.depth.shape), outlines, ground)
         objects: list[ObjectCloud] = []
         for k in sorted(found):
             cut = found[k]
@@ -90,16 +99,20 @@ class Segmenter:
             frame_id=depth.frame_id,
         )
 
-    def _cut_all(self, depth: DepthImage, asked: list[Box], ground: Ground) -> dict[int, Isolated]:
+    def _cut_all(
+        self, depth: DepthImage, asked: list[Box], outlines: Sequence[Array | None], ground: Ground
+    ) -> dict[int, Isolated]:
         """What each box that is not empty shows, by its number; about half of the pixels on a second thread."""
         first, second = boxes.halves(asked)
-        beside = {k: self._beside.submit(self._cut, depth, asked[k], ground) for k in second}
-        found = {k: self._cut(depth, asked[k], ground) for k in first}
+        beside = {k: self._beside.submit(self._cut, depth, asked[k], outlines[k], ground) for k in second}
+        found = {k: self._cut(depth, asked[k], outlines[k], ground) for k in first}
         for k in reversed(second):
-            found[k] = _result(beside[k], self._cut, depth, asked[k], ground)
+            found[k] = _result(beside[k], self._cut, depth, asked[k], outlines[k], ground)
         return found
 
-    def _cut(self, depth: DepthImage, box: Box, ground: Ground) -> Isolated:
+    def _cut(self, depth: DepthImage, box: Box, outline: Array | None, ground: Ground) -> Isolated:
+        if outline is not None:
+            return cut_out(depth, box, outline, ground, self.params)
         if self.params.preset == "paper":
             return Isolated(paper.cut(depth, box, self.params), PointFlag(0), None)
         return isolate(depth, box, ground, self.params)
@@ -113,6 +126,18 @@ class Segmenter:
         up, confidence = _up(coarse, gravity, params)
         supports = [] if up is None else find_supports(coarse, depth.intrinsics, up, params.support_area, jump)
         return Ground(up, confidence, supports, surface, coarse)
+
+
+def _outlines(masks: Sequence[Array | None] | None, count: int, depth: DepthImage) -> Sequence[Array | None]:
+    """A mask or None for each box; ValueError for another number or another shape."""
+    if masks is None:
+        return [None] * count
+    if len(masks) != count:
+        raise ValueError(f"masks: expected one or None for each of {count} boxes, got {len(masks)}")
+    for mask in masks:
+        if mask is not None and (mask.dtype != np.bool_ or mask.shape != depth.depth.shape):
+            raise ValueError(f"mask: expected bool of shape {depth.depth.shape}, got {mask.dtype} of {mask.shape}")
+    return masks
 
 
 def _result(beside: Future[Any], work: Callable[..., Any], *inputs: Any) -> Any:

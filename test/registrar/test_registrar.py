@@ -20,6 +20,7 @@ from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import StoreError
 from objreg_ros.registrar.registrar import Registrar, closure_of
 from objreg_ros.registration.candidate import ObjectPair
+from objreg_ros.registration.engine import Engine
 from objreg_ros.registration.params import RegistrarParams
 
 PARAMS = RegistrarParams()
@@ -179,8 +180,8 @@ def test_the_number_of_threads_changes_no_closure() -> None:
 def test_no_try_is_added_that_would_not_be_wanted_if_all_were_accepted() -> None:
     registrar = Registrar(RegistrarParams(closures=2, threads=2, thin_seconds=0.1))
     _run(registrar, *(_frame(3.0 * k, T, True) for k, T in enumerate((HERE, AWAY, BESIDE, AWAY, HERE, AWAY))))
-    tried, propose = [], registrar._engine.propose
-    registrar._engine.propose = lambda *pair: tried.append(pair) or propose(*pair)  # type: ignore[method-assign]
+    tried, propose = [], registrar._method.propose
+    registrar._method.propose = lambda *pair: tried.append(pair) or propose(*pair)  # type: ignore[method-assign]
     closures, _ = _run(registrar, _frame(30.0, HERE, True))
     assert len(closures) == len(tried) == 2
 
@@ -318,3 +319,21 @@ def test_a_surplus_that_cannot_be_forgotten_now_takes_nothing_away(monkeypatch: 
     monkeypatch.undo()
     _run(registrar, _frame(60, AWAY))
     assert registrar.counts()["keyframes"] == 1
+
+
+def test_a_gate_of_ones_own_decides_and_a_method_of_ones_own_is_asked() -> None:
+    class Counting(Engine):
+        asked = 0
+
+        def propose(self, *pair: object) -> tuple:
+            Counting.asked += 1
+            return super().propose(*pair)  # type: ignore[arg-type]
+
+    def never(candidates: object, params: object, prior: object = None) -> tuple[Reason, str]:
+        return Reason.MOVED, "never"
+
+    ours, _ = _run(Registrar(PARAMS, method=Counting(PARAMS)), _frame(0, HERE), _frame(30, BESIDE))
+    assert ours and Counting.asked > 0
+    closures, rejected = _run(Registrar(PARAMS, gate=never), _frame(0, HERE), _frame(30, BESIDE))
+    assert not closures
+    assert any(one.reason == Reason.MOVED and one.T_from_to is not None for one in rejected)

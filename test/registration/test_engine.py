@@ -18,6 +18,7 @@ from objreg_ros.registration.certainty.covariance import spread_of
 from objreg_ros.registration.engine import Engine, held
 from objreg_ros.registration.keyframe import Context, Keyframe
 from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.propose.shortlist import Shortlist
 from registration.rooms import ROOM, keyframe, seen_from
 from registration.samples import candidate, moved
 
@@ -101,12 +102,23 @@ def test_what_else_a_lone_objects_pose_could_be_is_a_rival_unless_it_comes_to_on
 
 @pytest.mark.parametrize(("yaw_known", "likeness", "left"), [(True, 1.0, 0), (False, 1.0, 1), (True, -1.0, 1)])
 def test_an_object_that_tells_its_yaw_and_looks_alike_takes_away_the_slack(
-    engine: Engine, monkeypatch: pytest.MonkeyPatch, yaw_known: bool, likeness: float, left: int
+    yaw_known: bool, likeness: float, left: int
 ) -> None:
     one = candidate(yaw_known=yaw_known, likeness=likeness, slack=np.eye(6)[:1])
-    monkeypatch.setattr(engine_module, "gather", lambda *_: one)
+    engine = Engine(PARAMS, score=lambda *_: one)
     pair: Any = SimpleNamespace(source=None, target=None)
     assert len(engine._gathered(pair, one.alignment, ("objects",)).alignment.slack) == left
+
+
+def test_a_proposer_of_ones_own_is_asked_instead_of_ours() -> None:
+    asked: list[object] = []
+
+    def none(pair: object, prior: object, params: object) -> Shortlist:
+        asked.append(prior)
+        return Shortlist((), ())
+
+    pair = keyframe(seen_from(0.0), seed=1), keyframe(seen_from(20.0), seed=2)
+    assert Engine(PARAMS, propose=none).propose(*pair) == () and asked == [None]
 
 
 def test_a_pose_that_one_chain_came_to_does_not_become_two_chains_by_what_is_found_about_it() -> None:

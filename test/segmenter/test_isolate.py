@@ -10,7 +10,7 @@ import pytest
 
 from objreg_ros.data import DepthImage, PointFlag
 from objreg_ros.segmenter.boxes import Box, pixel_boxes
-from objreg_ros.segmenter.isolate import Cells, Isolated, isolate, mark
+from objreg_ros.segmenter.isolate import Cells, Isolated, cut_out, isolate, mark
 from objreg_ros.segmenter.params import SegmenterParams
 
 from .scenes import CAMERA, Scene, two_boxes
@@ -136,3 +136,32 @@ def test_the_cells_of_an_object_are_marked_on_the_grid_of_the_supports_and_no_ma
     else:
         coarse[5:7, 8] = True  # rows 9 to 12 and columns 16 and 17 of the fine grid
     np.testing.assert_array_equal(taken[::2, ::2], coarse)
+
+
+def masked(scene: Scene, mask: np.ndarray, box: Box) -> Isolated:
+    image = scene.image(NOISE)
+    return cut_out(image, box, mask, scene.ground(image), PARAMS)
+
+
+def test_what_a_mask_covers_is_the_object_whatever_stands_there(boxes: Scene) -> None:
+    table = np.zeros(boxes.owner.shape, bool)
+    table[300:360, 280:360] = True
+    table &= boxes.owner == 1
+    found = masked(boxes, table, (280, 300, 360, 360))
+    seen = boxes.pixels(found.pixels.xyz)
+    assert (seen & table).sum() > 0.95 * table.sum() and (seen & ~table).sum() < 0.05 * table.sum()
+
+
+def test_a_mask_that_spills_over_an_edge_takes_little_of_what_is_behind(boxes: Scene) -> None:
+    own = boxes.owner == 2
+    found = masked(boxes, own, pixel_box(boxes, 2))
+    assert boxes.iou(found.pixels.xyz, 2) > 0.95
+    assert found.cells is not None and PointFlag.CUT_BY_BOX not in found.flags
+
+
+@pytest.mark.parametrize("size", [(481, 640), (482, 641), (483, 643)])
+def test_a_mask_of_a_picture_whose_size_is_no_multiple_of_a_cell_fits_its_grid(size: tuple[int, int]) -> None:
+    height, width = size
+    scene = Scene(replace(CAMERA, width=width, height=height)).plane().box((-0.3, 0.0, 0), (0.3, 0.3, 0.25))
+    mask = np.ones(size, bool)
+    assert len(masked(scene, mask, (0, 0, width, height)).pixels) > 0.9 * (scene.owner > 0).sum()

@@ -158,3 +158,28 @@ def test_warming_up_changes_nothing() -> None:
     segmenter.warm()
     scene = two_boxes()
     assert len(segmenter.segment(scene.detections(scene.box_of(2)), scene.image(NOISE)).objects) == 1
+
+
+def test_a_mask_takes_the_place_of_what_stands_in_its_box_and_none_leaves_a_box_as_it_is() -> None:
+    scene = two_boxes()
+    asked, image = scene.detections(scene.box_of(2), scene.box_of(3)), scene.image(NOISE)
+    half = scene.owner == 2
+    half[:, : int(np.flatnonzero(half.any(axis=0)).mean())] = False
+    frame = Segmenter().segment(asked, image, masks=[half, None])
+    assert len(frame.objects) == 2
+    assert 0.4 * (scene.owner == 2).sum() < len(frame.objects[0]) < 0.6 * (scene.owner == 2).sum()
+    np.testing.assert_array_equal(frame.objects[1].xyz, Segmenter().segment(asked, image).objects[1].xyz)
+
+
+@pytest.mark.parametrize(
+    ("masks", "message"),
+    [
+        ([], "masks: expected one or None for each of 1 boxes, got 0"),
+        ([np.ones((480, 640), np.uint8)], r"mask: expected bool of shape \(480, 640\), got uint8"),
+        ([np.ones((240, 320), bool)], r"mask: expected bool of shape \(480, 640\), got bool of \(240, 320\)"),
+    ],
+)
+def test_masks_of_another_number_type_or_shape_are_refused(masks: list[np.ndarray], message: str) -> None:
+    scene = two_boxes()
+    with pytest.raises(ValueError, match=message):
+        Segmenter().segment(scene.detections(scene.box_of(2)), scene.image(), masks=masks)

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Two RGB-D pictures of a simulated room: the pose between their cameras, or why there is none."""
+
+import numpy as np
+
+from objreg_ros import Camera, register
+from objreg_ros.geometry import inverse, pose_error
+from objreg_ros.simulation.render import Rendering, render
+from objreg_ros.simulation.scenarios import make_story
+
+
+def main() -> None:
+    """Register what is seen from one place and from a little beside it."""
+    story = make_story("orbit", seed=7, frames=120)
+    first, second = (picture(story, k) for k in (0, 8))
+    seen = first.intrinsics
+    camera = Camera(seen.fx, seen.fy, seen.cx, seen.cy)
+    result = register(first.rgb, first.depth, second.rgb, second.depth, camera)
+    for name, number in result.evidence.items():
+        print(f"{name:>22} {number:.3f}")
+    if result.T_1_2 is None:
+        print(f"refused: {result.reason}, {result.detail}")
+        return
+    degrees, cm = pose_error(result.T_1_2, inverse(first.T_world_camera) @ second.T_world_camera)
+    print(f"accepted: moved by {np.round(result.T_1_2[:3, 3], 3)} m")
+    print(f"standard deviations {np.sqrt(np.diag(result.covariance)).round(4)} m and rad")
+    print(f"off by {degrees:.2f} deg and {cm:.1f} cm")
+
+
+def picture(story, k: int) -> Rendering:
+    """Frame ``k`` of the story, as the simulated camera sees it."""
+    return render(story.scenes[int(story.scene_of[k])], story.T_world_camera[k], seed=k, threads=2)
+
+
+if __name__ == "__main__":
+    main()

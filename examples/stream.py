@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A stream of frames with a memory: the registrar says when the camera is back where it was."""
+
+from objreg_ros import Camera, segment
+from objreg_ros.registrar.registrar import Registrar
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.simulation.render import render
+from objreg_ros.simulation.scenarios import make_story
+
+RATE = 2  # frames in a second of a slow camera
+
+
+def main() -> None:
+    """Go there and back again without odometry, and print what the registrar closes and refuses."""
+    story = make_story("orbit", seed=7, frames=120)
+    registrar = Registrar(RegistrarParams(store=""))  # in memory; a file name remembers over restarts
+    there = list(range(0, 25, 4))
+    for n, k in enumerate(there + there[::-1]):
+        seen = render(story.scenes[int(story.scene_of[k])], story.T_world_camera[k], seed=n, threads=2)
+        camera = Camera(seen.intrinsics.fx, seen.intrinsics.fy, seen.intrinsics.cx, seen.intrinsics.cy)
+        frame = segment(seen.rgb, seen.depth, camera, stamp_ns=n * 1_000_000_000 // RATE)
+        tell(registrar.process(frame))
+    tell(registrar.finish())
+    print(registrar.counts())
+    registrar.close()
+
+
+def tell(outcome) -> None:
+    """Print what became of a frame."""
+    for closure in outcome.closures:
+        moments = f"{1e-9 * closure.from_ns:.1f} s and {1e-9 * closure.to_ns:.1f} s"
+        print(f"closed {moments} by {', '.join(closure.labels)}: {closure.T_from_to[:3, 3].round(3)} m")
+    for refusal in outcome.rejected:
+        print(f"refused at {1e-9 * refusal.to_ns:.1f} s: {refusal.reason.value}, {refusal.detail}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `align` gives: a pose with its covariance, or no pose; the reason and the evidence either way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from objreg_ros.data import Array, Reason
+from objreg_ros.geometry import skew
+from objreg_ros.registration.candidate import Candidate
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Registration:
+    """Two keyframes, or two pictures, laid upon each other: the first is the target, the second the source.
+
+    ``T_target_source (4, 4) float64`` maps points of the source's camera into the target's, in metres: ``p_1 = T_1_2 @
+    p_2``. ``covariance (6, 6) float64`` is of ``[tx ty tz rx ry rz]`` in the axes of the target's camera, m and rad, in
+    the order of ROS. Both are None where ``accepted`` is False: then ``reason`` says why and ``detail`` with which
+    numbers; else these are None and empty. ``evidence`` are named numbers of the candidate that was accepted, or of the
+    best one that was refused; empty where no pose was proposed. ``candidate`` is that candidate, None without one: the
+    pose of a refused one is for a look at it and nothing else.
+    """
+
+    accepted: bool
+    T_target_source: Array | None = None
+    covariance: Array | None = None
+    reason: Reason | None = None
+    detail: str = ""
+    evidence: dict[str, float] = field(default_factory=dict)
+    candidate: Candidate | None = None
+
+    @property
+    def T_1_2(self) -> Array | None:
+        """``T_target_source``: maps points of camera 2 into camera 1; None where the registration was refused."""
+        return self.T_target_source
+
+    def between(self, T_first_target: Array, T_source_second: Array) -> Registration:
+        """The same between two other cameras, of which the poses beside the target's and the source's are known.
+
+        A refusal stays as it is. ``candidate`` stays that of target and source.
+        """
+        T, C = self.T_target_source, self.covariance
+        if T is None or C is None:
+            return self
+        arm = T[:3, :3] @ T_source_second[:3, 3]  # from the source's camera to the second, which a turn swings
+        R, swung = T_first_target[:3, :3], np.eye(6)
+        swung[:3, 3:] = -skew(arm)
+        turned = np.kron(np.eye(2), R)
+        J = turned @ swung
+        return replace(self, T_target_source=T_first_target @ T @ T_source_second, covariance=J @ C @ J.T)
+
+
+def evidence_of(candidate: Candidate) -> dict[str, float]:
+    """The numbers of the verification, for whoever wants to look at a pose."""
+    seen, aligned = candidate.verification, candidate.alignment
+    numbers: dict[str, float | None] = {
+        "score": seen.score,
+        "inliers": seen.inliers,
+        "violations": seen.violations,
+        "floating": candidate.floating,
+        "occluded": seen.occluded,
+        "texture": seen.texture,
+        "tested": seen.tested,
+        "overlap": aligned.overlap,
+        "rmse": aligned.rmse,
+        "chains": len(candidate.agreeing_chains),
+        "explained": len(candidate.explained),
+        "moved": len(candidate.moved),
+        "gravity_error_deg": candidate.gravity_error_deg,
+        "resistance": candidate.resistance,
+        "score_of_surroundings": None if candidate.surroundings is None else candidate.surroundings.score,
+        "yaw_known": candidate.yaw_known,
+    }
+    return {name: float(number) for name, number in numbers.items() if number is not None}

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The word that a registration gives."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from objreg_ros.data import Reason
+from objreg_ros.geometry import inverse, pose, rotation_from_vector, vector_from_rotation
+from objreg_ros.registration.result import Registration, evidence_of
+from registration.samples import candidate
+
+
+def motion(seed: int, scale: float = 1.0) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    return pose(rotation_from_vector(scale * rng.normal(size=3)), scale * rng.normal(size=3))
+
+
+def test_a_refusal_has_no_pose_between_any_cameras() -> None:
+    refused = Registration(accepted=False, reason=Reason.SLACK, detail="1 of 6", candidate=candidate())
+    assert refused.T_1_2 is None and refused.covariance is None
+    assert refused.between(motion(1), motion(2)) is refused
+
+
+def test_between_other_cameras_the_covariance_is_that_of_many_disturbed_poses() -> None:
+    T, before, behind = motion(1), motion(2), motion(3)
+    sigma = 1e-3 * np.array([1.0, 2.0, 3.0, 0.5, 1.5, 1.0])
+    moved = Registration(accepted=True, T_target_source=T, covariance=np.diag(sigma**2)).between(before, behind)
+    assert moved.T_1_2 is not None and moved.covariance is not None
+    np.testing.assert_allclose(moved.T_1_2, before @ T @ behind)
+    errors = []
+    for error in np.random.default_rng(0).normal(size=(4000, 6)) * sigma:
+        disturbed = pose(rotation_from_vector(error[3:]) @ T[:3, :3], T[:3, 3] + error[:3])
+        found = before @ disturbed @ behind
+        turn = vector_from_rotation(found[:3, :3] @ inverse(moved.T_1_2)[:3, :3])
+        errors.append([*(found[:3, 3] - moved.T_1_2[:3, 3]), *turn])
+    np.testing.assert_allclose(np.cov(np.array(errors).T), moved.covariance, rtol=0.1, atol=4e-7)
+
+
+def test_evidence_leaves_out_what_is_not_known() -> None:
+    assert "texture" not in evidence_of(candidate(texture=None))
+    assert evidence_of(candidate(score=0.5))["score"] == 0.5
