@@ -11,7 +11,7 @@ import pytest
 
 ROOMS = (
     *("registrar", "memory", "keyframes", "registration"),
-    *(f"registration.{name}" for name in ("kernels", "shapes", "prepare", "score", "align", "certainty", "propose")),
+    *(f"registration.{name}" for name in ("kernels", "shapes", "prepare", "score", "refine", "certainty", "propose")),
     "registration.gate",
 )
 VERBS = {"track", "search", "process"}

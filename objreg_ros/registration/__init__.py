@@ -8,7 +8,7 @@ kernels     where points land and which is the closest: compiled loops that all 
 shapes      one object upon another: silhouettes and their score, symmetry, the upright search
 prepare     what is computed once a keyframe
 score       how well a pose fits: free space, photometric, object matches, surroundings
-align       refinement of many poses and of one: point to plane, then grey
+refine      refinement of many poses and of one: point to plane, then grey
 certainty   how well a pose is known: covariance, degenerate directions, perturbations, gravity
 propose     hypotheses, the shortlist of them, their end and their evidence, competing ones
 gate        the only place that says yes
@@ -21,8 +21,6 @@ exchanged. `engine` calls the steps in order; `paper` is the founding method.
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
-
-import objreg_ros.registration.align as _folder  # noqa: F401  # bound here first: the function below takes the name
 
 if TYPE_CHECKING:
     from objreg_ros.registration.api import Gate, Method

@@ -59,7 +59,7 @@ class Engine:
         best, seeds = self._shortlist(pair, T_target_source_prior, self._params)
         if not best:
             return ()
-        # align/ and score/: each is refined, and its evidence gathered
+        # refine/ and score/: each is refined, and its evidence gathered
         candidates = merged([self._judge(pair, seed, seeds) for seed in best], pair.source.middle, self._params)
         # propose/: what else a lone object's pose could be, refined and scored alike
         rivals = self._rivals(pair, [one for one in candidates if self._promises(one, candidates[0])])

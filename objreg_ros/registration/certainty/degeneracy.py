@@ -7,10 +7,10 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import skew
-from objreg_ros.registration.align.batch_icp import Fit
 from objreg_ros.registration.certainty.sandwich import warped
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared
+from objreg_ros.registration.refine.batch_icp import Fit
 
 
 def about_camera(H: Array, T_target_source: Array) -> Array:

@@ -14,10 +14,10 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import transform
-from objreg_ros.registration.align.photometric_icp import finish
 from objreg_ros.registration.certainty.perturbation import Stand, pushed, square, turned_about
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared
+from objreg_ros.registration.refine.photometric_icp import finish
 from objreg_ros.registration.score.comparison import gain, liked
 from objreg_ros.registration.score.object_matches import explain
 from objreg_ros.registration.score.photometric import texture

@@ -16,9 +16,9 @@ from __future__ import annotations
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.registration.align.batch_icp import pair
 from objreg_ros.registration.kernels.closest_points import Surface
 from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.refine.batch_icp import pair
 
 NEAR = 0.4  # m, where the noise of depth is least
 FREEDOMS = 6

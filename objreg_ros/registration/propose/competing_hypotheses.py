@@ -11,7 +11,6 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import transform
-from objreg_ros.registration.align.photometric_icp import finish
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.certainty.perturbation import square, turned_about
 from objreg_ros.registration.params import RegistrarParams
@@ -19,6 +18,7 @@ from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.registration.propose.evidence import unhidden
 from objreg_ros.registration.propose.object_poses import half_turned
 from objreg_ros.registration.propose.pose_voting import distinct, near
+from objreg_ros.registration.refine.photometric_icp import finish
 from objreg_ros.registration.score.view_score import rank, verify
 
 HOPELESS = 2.0  # times the violations that the gate allows: what is not refined any more

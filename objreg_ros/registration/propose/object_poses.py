@@ -13,12 +13,12 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import transform
-from objreg_ros.registration.align.batch_icp import align
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.registration.propose.fine_search import Scrutiny
 from objreg_ros.registration.propose.hypotheses import Hypothesis, from_centroids, look_alikes
+from objreg_ros.registration.refine.batch_icp import align
 from objreg_ros.registration.score.total_score import Worth
 from objreg_ros.registration.shapes.shape import Shape, turned_half, upright_motion, upright_pose
 from objreg_ros.registration.shapes.upright_search import Fitting, glance, improve, register_shapes

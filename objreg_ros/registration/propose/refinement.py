@@ -12,13 +12,13 @@ import numpy as np
 
 from objreg_ros.data import Alignment, Array
 from objreg_ros.geometry import transform
-from objreg_ros.registration.align.batch_icp import fit
-from objreg_ros.registration.align.photometric_icp import finish
 from objreg_ros.registration.certainty.degeneracy import about_camera, slack
 from objreg_ros.registration.certainty.observability import resisted
 from objreg_ros.registration.certainty.sandwich import information
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared
+from objreg_ros.registration.refine.batch_icp import fit
+from objreg_ros.registration.refine.photometric_icp import finish
 from objreg_ros.registration.score.comparison import gain, liked
 from objreg_ros.registration.score.object_matches import explain
 

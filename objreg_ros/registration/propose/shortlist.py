@@ -14,8 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.registration.align.batch_icp import align, settle
-from objreg_ros.registration.align.photometric_icp import finish
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Pair
 from objreg_ros.registration.propose.evidence import agreement, gravity_error_deg
@@ -29,6 +27,8 @@ from objreg_ros.registration.propose.hypotheses import (
 )
 from objreg_ros.registration.propose.object_poses import from_shapes
 from objreg_ros.registration.propose.pose_voting import distinct, near
+from objreg_ros.registration.refine.batch_icp import align, settle
+from objreg_ros.registration.refine.photometric_icp import finish
 from objreg_ros.registration.score.object_matches import explain, likeness
 from objreg_ros.registration.score.view_score import WORST, looks, rank, rate
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse
-from objreg_ros.registration.align.batch_icp import fit
 from objreg_ros.registration.kernels.closest_points import prepare_surface
+from objreg_ros.registration.refine.batch_icp import fit
 from registration.rooms import keyframe, seen_from
 
 TRUTH = inverse(seen_from(15.0)) @ seen_from(0.0)

@@ -12,12 +12,12 @@ import numba
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.registration.align.batch_icp import normal_equations
 from objreg_ros.registration.kernels.least_squares import add_normal_equations, move, solve
 from objreg_ros.registration.kernels.projection import FAST, INDEX, between, lands, nearest, project
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.registration.prepare.views import SHADELESS
+from objreg_ros.registration.refine.batch_icp import normal_equations
 
 STEPS = 8  # a level
 SETTLED = 2e-4  # length of a last step, metres and radians

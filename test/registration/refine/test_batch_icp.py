@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
-from objreg_ros.registration.align.batch_icp import align, pair
 from objreg_ros.registration.kernels.closest_points import prepare_surface
+from objreg_ros.registration.refine.batch_icp import align, pair
 from registration.rooms import keyframe, seen_from
 
 OFF = [
