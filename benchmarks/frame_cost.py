@@ -61,9 +61,9 @@ def _pass(store: Path, frames: Sequence[Frame]) -> dict[str, float]:
     with closing(Registrar(RegistrarParams(store=str(store)))) as registrar:
         for frame in frames:
             began = time.perf_counter()
-            stretch = registrar.track(frame)
+            window = registrar.track(frame)
             tracked = time.perf_counter()
-            outcome = registrar.search(stretch) if stretch is not None else None
+            outcome = registrar.search(window) if window is not None else None
             track, search = track + tracked - began, search + time.perf_counter() - tracked
             if outcome is not None:
                 keyframes, closures = keyframes + 1, closures + len(outcome.closures)

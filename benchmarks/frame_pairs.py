@@ -19,7 +19,7 @@ from objreg_ros.registration.labels import LabelGroups
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.views import Sight, prepare_sight
 from objreg_ros.registration.score.free_space import INLIERS
-from objreg_ros.registration.score.view_score import look
+from objreg_ros.registration.score.view_score import count_visibility
 
 BINS = ((0, 10), (10, 20), (20, 30), (30, 45), (45, 180))  # degrees of view change
 APART_NS = 2_000_000_000
@@ -73,7 +73,7 @@ class Truths:
         """Whether the two views see next to nothing of each other."""
         a, b, T = self.sight(pair.source), self.sight(pair.target), pair.T_target_source
         shares = [
-            look(x, y, M, self._params, 2000)[INLIERS] / max(1, min(2000, len(x.points)))
+            count_visibility(x, y, M, self._params, 2000)[INLIERS] / max(1, min(2000, len(x.points)))
             for x, y, M in ((a, b, T), (b, a, inverse(T)))
         ]
         return max(shares) < NO_OVERLAP

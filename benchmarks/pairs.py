@@ -29,7 +29,7 @@ from sources import Source, detector_of, read_source
 from objreg_ros.data import Array, Frame, Reason
 from objreg_ros.geometry import back_project, pose_error
 from objreg_ros.keyframes.fusion import fuse
-from objreg_ros.keyframes.keyframer import Keyframer, Stretch
+from objreg_ros.keyframes.keyframer import FrameWindow, Keyframer
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.engine import Engine
 from objreg_ros.registration.gate.verdict import judge
@@ -44,8 +44,8 @@ GICP_VOXEL = 0.03  # m, of the whole frames that finish a peer's pose
 def fused(frames: Sequence[Frame], params: RegistrarParams) -> list[Keyframe]:
     """The keyframes that the registrar would make of a recording."""
     keyframer = Keyframer(params)
-    stretches = [keyframer.add(frame) for frame in frames] + [keyframer.finish()]
-    return [fuse(stretch, params) for stretch in stretches if stretch is not None]
+    windows = [keyframer.add(frame) for frame in frames] + [keyframer.finish()]
+    return [fuse(window, params) for window in windows if window is not None]
 
 
 class Ours:
@@ -166,7 +166,7 @@ def methods_of(
 def compare(source: Source, params: RegistrarParams, options: dict[str, Any]) -> dict[str, Any]:
     """All methods over the same pairs of one recording."""
     frames = [frame for frame in source.frames if source.truth.at(frame.stamp_ns) is not None]
-    makes = fused(frames, params) if options["keyframes"] else [fuse(Stretch.of(frame), params) for frame in frames]
+    makes = fused(frames, params) if options["keyframes"] else [fuse(FrameWindow.of(frame), params) for frame in frames]
     keyframes = [keyframe for keyframe in makes if keyframe.objects]
     poses = [source.truth.at(keyframe.stamp_ns) for keyframe in keyframes]
     truths = Truths(keyframes, [T for T in poses if T is not None], params)

@@ -30,7 +30,7 @@ from sources import SIMULATED
 from objreg_ros.data import Array, DepthImage, Detections, Frame
 from objreg_ros.geometry import inverse, pose, rotation_from_vector, transform
 from objreg_ros.keyframes.fusion import fuse
-from objreg_ros.keyframes.keyframer import Stretch
+from objreg_ros.keyframes.keyframer import FrameWindow
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.engine import Engine
 from objreg_ros.registration.gate.verdict import judge
@@ -143,7 +143,7 @@ def shoot(stage: Stage, T_world_camera: Array, seed: int, preset: str) -> Frame:
 
 def keyframe(frame: Frame, params: RegistrarParams) -> Keyframe:
     """A keyframe of a single frame."""
-    return fuse(Stretch.of(frame), params)
+    return fuse(FrameWindow.of(frame), params)
 
 
 def closest(source: Array, target: Array, T_target_source: Array) -> float:
@@ -182,7 +182,7 @@ def ready(key: Keyframe, params: RegistrarParams) -> Prepared:
     prepared = prepare(key, params)
     for shape in (*prepared.shapes, prepared.scene):
         if shape is not None:
-            shape.surface, shape.sight  # noqa: B018
+            shape.surface, shape.kernel_arrays  # noqa: B018
     return prepared
 
 

@@ -103,7 +103,7 @@ class Bench:
             T = row.pop("T_engine")
             row["engine_error"] = NOTHING if T is None else stage.error(T, first.T_world_camera, second.T_world_camera)
             row["error"] = object_error(stage, first, second, row.pop("found"))
-            best = max(stored, key=lambda one: worth_of(laid(second, one, self.params)[0]))
+            best = max(stored, key=lambda one: score_of(laid(second, one, self.params)[0]))
             row["stored_error"] = object_error(stage, best, second, laid(second, best, self.params)[0])
             row["yaw_unknown"] = yaw_unknown(second, self.params)
             rows.append(row | {"label": label, "angle": angle})
@@ -256,9 +256,9 @@ def laid(source: Shot, target: Shot, params: RegistrarParams) -> tuple[Hypothesi
     return (found[0] if found else None), 1e3 * (time.perf_counter() - start)
 
 
-def worth_of(found: Hypothesis | None) -> float:
+def score_of(found: Hypothesis | None) -> float:
     """What a pose is worth; less than any for none."""
-    return -np.inf if found is None else found.worth
+    return -np.inf if found is None else found.score
 
 
 def object_error(stage: Stage, first: Shot, second: Shot, found: Hypothesis | None) -> tuple[float, float]:

@@ -61,9 +61,9 @@ def run(frames: Sequence[Frame], params: RegistrarParams) -> dict[str, Any]:
         registrar = Registrar(params)
         for frame in frames:
             track = lambda: registrar.track(frame)  # noqa: B023, E731
-            stretch = clock.timed("track", track) if stage == "search" else track()
-            if stretch is not None:
-                outcome = clock.timed(stage, lambda: registrar.search(stretch, seconds))  # noqa: B023
+            window = clock.timed("track", track) if stage == "search" else track()
+            if window is not None:
+                outcome = clock.timed(stage, lambda: registrar.search(window, seconds))  # noqa: B023
                 closures += len(outcome.closures)
         registrar.close()
     return {"closures": closures, "stages": clock.figures()}

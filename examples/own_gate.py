@@ -18,9 +18,9 @@ def several(
 ) -> Candidate | Refusal:
     """What our gate accepts, if at least ``LEAST`` objects lie upon themselves."""
     verdict = judge(candidates, params, prior)
-    if not isinstance(verdict, Candidate) or len(verdict.explained) >= LEAST:
+    if not isinstance(verdict, Candidate) or len(verdict.matched) >= LEAST:
         return verdict
-    return Reason.FEW_OBJECTS, f"{len(verdict.explained)} objects < {LEAST}"
+    return Reason.FEW_OBJECTS, f"{len(verdict.matched)} objects < {LEAST}"
 
 
 LEAST = 50

@@ -335,10 +335,10 @@ class Alignment:
     """A registration and its evidence.
 
     ``information (6, 6) float64`` of the error ``[tx ty tz rx ry rz]`` in the target frame; ``inliers`` how many source
-    points found a partner; ``overlap`` their share 0..1; ``rmse`` m of the inliers; ``slack (K, 6) float64`` unit
-    directions of the same tangent space that the data leave open, K may be 0; ``held (L, 6) float64`` motions of one
-    sigma along directions that only the look of the whole holds; ``middle (3,) float64`` m is that of what was aligned,
-    in the target frame.
+    points found a partner; ``overlap`` their share 0..1; ``rmse`` m of the inliers; ``degenerate (K, 6) float64`` unit
+    directions of the same tangent space that the data leave open, K may be 0; ``regularised (L, 6) float64`` motions of
+    one sigma along directions that only the look of the whole holds; ``middle (3,) float64`` m is that of what was
+    aligned, in the target frame.
     """
 
     T_target_source: Array
@@ -347,13 +347,18 @@ class Alignment:
     overlap: float
     rmse: float
     converged: bool
-    slack: Array = field(default_factory=lambda: np.zeros((0, 6)))
-    held: Array = field(default_factory=lambda: np.zeros((0, 6)))
+    degenerate: Array = field(default_factory=lambda: np.zeros((0, 6)))
+    regularised: Array = field(default_factory=lambda: np.zeros((0, 6)))
     middle: Array = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
         _hold_pose(self, "T_target_source")
-        for name, shape in (("middle", (3,)), ("information", (6, 6)), ("slack", (None, 6)), ("held", (None, 6))):
+        for name, shape in (
+            ("middle", (3,)),
+            ("information", (6, 6)),
+            ("degenerate", (None, 6)),
+            ("regularised", (None, 6)),
+        ):
             _hold(self, name, np.float64, shape, {})
 
 

@@ -21,7 +21,7 @@ from objreg_ros.detector.mobilenet_ssd import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import inverse
 from objreg_ros.keyframes.fusion import fuse, reference_index
-from objreg_ros.keyframes.keyframer import Stretch, alone
+from objreg_ros.keyframes.keyframer import FrameWindow, alone
 from objreg_ros.registration import align
 from objreg_ros.registration.api import Gate, Method
 from objreg_ros.registration.keyframe import Keyframe
@@ -283,8 +283,8 @@ def _fused(frames: Sequence[Frame], name: str, params: RegistrarParams) -> tuple
         lacking = f"got {len(frames) - len(known)} of {len(frames)} without"
         raise ValueError(f"{name}: expected T_odom_camera of every frame where there are several, {lacking}")
     motions = tuple(inverse(known[0]) @ T for T in known) if known else (np.eye(4),)
-    stretch = Stretch(frames=tuple(map(alone, frames)), T_first_frame=motions, T_session_first=np.eye(4), session=0)
-    return fuse(stretch, params), motions[reference_index(frames)]
+    window = FrameWindow(frames=tuple(map(alone, frames)), T_first_frame=motions, T_session_first=np.eye(4), session=0)
+    return fuse(window, params), motions[reference_index(frames)]
 
 
 def _two(detections: tuple[Found, Found] | None) -> tuple[Found | None, Found | None]:

@@ -142,7 +142,7 @@ NOT_SYMMETRIC = np.eye(6) + np.eye(6, k=1)
         (closure, {"covariance": NOT_SYMMETRIC}, "expected a finite, symmetric covariance"),
         (closure, {"covariance": np.full((6, 6), np.nan)}, "expected a finite, symmetric covariance"),
         (closure, {"covariance": np.eye(3)}, "LoopClosure.covariance: expected float64 of shape (6, 6)"),
-        (alignment, {"slack": np.zeros((1, 3))}, "Alignment.slack: expected float64 of shape (any, 6)"),
+        (alignment, {"degenerate": np.zeros((1, 3))}, "Alignment.degenerate: expected float64 of shape (any, 6)"),
         (depth_image, {"depth": floats(64, 48)}, "DepthImage.depth: expected float32 of shape (H, W)"),
         (depth_image, {"rgb": np.zeros((24, 32, 3), np.uint8)}, "DepthImage.rgb: expected uint8 of shape (H, W, 3)"),
         (point_cloud, {"rgb": np.zeros((7, 1, 3), np.uint8)}, "PointCloud.rgb: expected uint8 of shape (H, W, 3)"),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From a stretch to a keyframe: objects seen from several frames become one cloud each, views become context."""
+"""From a frame window to a keyframe: objects seen from several frames become one cloud each, views become context."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from objreg_ros.data import Array, Frame, ObjectCloud, PointFlag
 from objreg_ros.geometry import inverse, rigid, rotate, transform
-from objreg_ros.keyframes.keyframer import Stretch
+from objreg_ros.keyframes.keyframer import FrameWindow
 from objreg_ros.registration.keyframe import Context, Keyframe, KeyObject, bounding_box
 from objreg_ros.registration.labels import LabelGroups
 from objreg_ros.registration.params import RegistrarParams
@@ -23,34 +23,34 @@ SPARE = 3  # points of each sighting for each one that is kept of the object
 CENTRE_SPREAD = 0.05  # m: how far the middle of one small object wanders between neighbouring frames
 
 
-def fuse(stretch: Stretch, params: RegistrarParams) -> Keyframe:
-    """The keyframe of a stretch, in the camera frame of its reference frame; its id is 0 until a store gives one."""
-    chosen = reference_index(stretch.frames)
-    reference = stretch.frames[chosen]
-    T_reference_first = inverse(stretch.T_first_frame[chosen])
-    motions = [T_reference_first @ T for T in stretch.T_first_frame]
-    objects = fuse_objects(stretch.frames, motions, params)
+def fuse(window: FrameWindow, params: RegistrarParams) -> Keyframe:
+    """The keyframe of a frame window, in the camera frame of its reference; its id is 0 until a store gives one."""
+    chosen = reference_index(window.frames)
+    reference = window.frames[chosen]
+    T_reference_first = inverse(window.T_first_frame[chosen])
+    motions = [T_reference_first @ T for T in window.T_first_frame]
+    objects = fuse_objects(window.frames, motions, params)
     return Keyframe(
         keyframe_id=0,
-        session=stretch.session,
+        session=window.session,
         stamp_ns=reference.stamp_ns,
         frame_id=reference.frame_id,
         objects=objects,
-        context=fuse_context(stretch.frames, motions, objects, params),
+        context=fuse_context(window.frames, motions, objects, params),
         view=reference.view,
         gravity=reference.gravity,
         gravity_confidence=reference.gravity_confidence,
-        T_odom_camera=rigid(stretch.T_session_first @ stretch.T_first_frame[chosen]),
-        by_odometry=stretch.by_odometry,
-        travelled=stretch.travelled,
-        turned=stretch.turned,
+        T_odom_camera=rigid(window.T_session_first @ window.T_first_frame[chosen]),
+        by_odometry=window.by_odometry,
+        travelled=window.travelled,
+        turned=window.turned,
     )
 
 
 def reference_index(frames: Sequence[Frame]) -> int:
     """The frame that shows most: objects first, then how sharp its grey is. The earliest of equals."""
-    worth = [(len(f.objects), _sharpness(f.view.grey)) for f in frames]
-    return max(range(len(frames)), key=lambda i: (*worth[i], -i))
+    ranks = [(len(f.objects), _sharpness(f.view.grey)) for f in frames]
+    return max(range(len(frames)), key=lambda i: (*ranks[i], -i))
 
 
 def fuse_objects(

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.keyframes.odometry import Way
+from objreg_ros.keyframes.odometry import TravelledPath
 
 ONE_VIEW = 0.02  # weight of what a single view tells, beside 1 of many from around
 AT_REST_M, AT_REST_DEG = 0.01, 0.5  # what odometry may jitter by while the camera rests
@@ -20,7 +20,7 @@ DOUBT = 3  # power of a view's own confidence: 0.96 err by 0.7 degrees, below 0.
 
 
 @dataclass(slots=True, eq=False)
-class PlumbLine:
+class GravityFilter:
     """The mean of gravity over a session, forgotten over ``metres`` and ``degrees`` of motion.
 
     Views are weighed by the motion between them: what one view errs by the next one errs by too, and a camera that
@@ -29,18 +29,18 @@ class PlumbLine:
 
     metres: float
     degrees: float
-    _falls: Array = field(default_factory=lambda: np.zeros(3))  # in the session's frame, times its weight
-    _way: Way | None = None
+    _gravity_sum: Array = field(default_factory=lambda: np.zeros(3))  # in the session's frame, times its weight
+    _path: TravelledPath | None = None
 
-    def feel(self, T_session_camera: Array, gravity: Array | None, confidence: float) -> tuple[Array | None, float]:
+    def update(self, T_session_camera: Array, gravity: Array | None, confidence: float) -> tuple[Array | None, float]:
         """Go to a pose and take in what its view tells, None for nothing.
 
         Returns gravity (3,) of length 1 in the camera frame and its weight 0..1; (None, 0.0) where nothing told it yet.
         """
         kept = self._go(T_session_camera)
         told = np.zeros(3) if gravity is None else confidence**DOUBT * (T_session_camera[:3, :3] @ gravity)
-        self._falls = kept * self._falls + (1.0 - kept) * told
-        falls = self._falls + ONE_VIEW * told
+        self._gravity_sum = kept * self._gravity_sum + (1.0 - kept) * told
+        falls = self._gravity_sum + ONE_VIEW * told
         weight = float(np.linalg.norm(falls))
         if weight < 1e-6:
             return None, 0.0
@@ -48,13 +48,13 @@ class PlumbLine:
 
     def forget(self) -> None:
         """Begin again: nothing carries over to where the camera is now."""
-        self._falls, self._way = np.zeros(3), None
+        self._gravity_sum, self._path = np.zeros(3), None
 
     def _go(self, T_session_camera: Array) -> float:
         """What is kept of all that was told, after going on to a pose; all of it where that is as good as at rest."""
-        way = self._way = self._way or Way(T_session_camera)
-        if way.is_near(T_session_camera, AT_REST_M, AT_REST_DEG):
+        path = self._path = self._path or TravelledPath(T_session_camera)
+        if path.is_near(T_session_camera, AT_REST_M, AT_REST_DEG):
             return 1.0
-        travelled, turned = way.travelled, way.turned
-        way.go(T_session_camera)
-        return float(np.exp((travelled - way.travelled) / self.metres + (turned - way.turned) / self.degrees))
+        travelled, turned = path.travelled, path.turned
+        path.go(T_session_camera)
+        return float(np.exp((travelled - path.travelled) / self.metres + (turned - path.turned) / self.degrees))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From a stream of frames to stretches: the few frames, close in time, that become one keyframe.
+"""From a stream of frames to frame windows: the few frames, close in time, that become one keyframe.
 
-This is the part that runs on every frame, so it only tracks and collects; `fusion` makes a keyframe of a stretch. A
-stretch ends when the camera has moved or enough time has passed, and is dropped when it shows nothing new: a camera
-that rests makes one keyframe, not one a second.
+This is the part that runs on every frame, so it only tracks and collects; `fusion` makes a keyframe of a frame window.
+A frame window ends when the camera has moved or enough time has passed, and is dropped when it shows nothing new: a
+camera that rests makes one keyframe, not one a second.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ import numpy as np
 
 from objreg_ros.data import JUMP_NS, Array, Frame
 from objreg_ros.geometry import inverse, leaps, rigid, rotation_angle
-from objreg_ros.keyframes.gravity_filter import PlumbLine
-from objreg_ros.keyframes.odometry import Way
-from objreg_ros.keyframes.tracking import Surface, surface_of, view_motion
+from objreg_ros.keyframes.gravity_filter import GravityFilter
+from objreg_ros.keyframes.odometry import TravelledPath
+from objreg_ros.keyframes.tracking import TrackedSurface, tracked_surface, view_motion
 from objreg_ros.registration.params import RegistrarParams
 
 SILENCE_S = 5.0  # odometry may have begun anew in it without a leap
@@ -36,7 +36,7 @@ class Clock(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Stretch:
+class FrameWindow:
     """Frames of one moment: ``T_first_frame`` maps the camera of each frame into that of the first.
 
     ``T_session_first`` is the pose of the first camera in the frame of its session: the odometry's, or our own
@@ -60,7 +60,7 @@ class Stretch:
         return sum(map(_nbytes, self.frames))
 
     @classmethod
-    def of(cls, frame: Frame) -> Stretch:
+    def of(cls, frame: Frame) -> FrameWindow:
         """One frame by itself."""
         still = np.eye(4)
         return cls(frames=(alone(frame),), T_first_frame=(still,), T_session_first=still, session=0)
@@ -75,11 +75,11 @@ def _nbytes(frame: Frame) -> int:
 
 def alone(frame: Frame) -> Frame:
     """The frame with the weight that gravity has which no other view confirms."""
-    return _felt(PlumbLine(1.0, 1.0), np.eye(4), frame)
+    return _with_gravity_of(GravityFilter(1.0, 1.0), np.eye(4), frame)
 
 
-def _felt(line: PlumbLine, T_session_frame: Array, frame: Frame) -> Frame:
-    gravity, weight = line.feel(T_session_frame, frame.gravity, frame.gravity_confidence)
+def _with_gravity_of(gravity_filter: GravityFilter, T_session_frame: Array, frame: Frame) -> Frame:
+    gravity, weight = gravity_filter.update(T_session_frame, frame.gravity, frame.gravity_confidence)
     return replace(frame, gravity=gravity, gravity_confidence=weight)
 
 
@@ -90,9 +90,9 @@ class _Session:
     number: int
     clock: Clock
     in_odometry: bool
-    way: Way
-    plumb: PlumbLine
-    first: Frame  # of the last stretch
+    path: TravelledPath
+    gravity_filter: GravityFilter
+    first: Frame  # of the last frame window
     last_ns: int  # of the last frame that was followed
     T_odom_first: Array  # of its first camera, where there is odometry
     odometry: tuple[int, Array] | None = None  # the last that it had: stamp in ns, T_odom_camera
@@ -111,8 +111,8 @@ class _Session:
 
     def lose(self, seconds: float, max_speed: float) -> None:
         """After a long silence nobody knows the way there, nor which way things fall."""
-        self.way.lose(seconds, max_speed)
-        self.plumb.forget()
+        self.path.lose(seconds, max_speed)
+        self.gravity_filter.forget()
 
     def follow(self, frame: Frame) -> None:
         """Go on to a frame."""
@@ -125,21 +125,25 @@ class _Session:
         return frame.frame_id == self.first.frame_id and (self.in_odometry or frame.T_odom_camera is None)
 
 
-def _levelled(session: _Session, frame: Frame) -> Frame:
+def _with_session_gravity(session: _Session, frame: Frame) -> Frame:
     """The frame with gravity as all views of the session tell it, or its own where odometry does not carry that.
 
     Our own tracking slips unnoticed, and what it carries then is wrong.
     """
-    return alone(frame) if frame.T_odom_camera is None else _felt(session.plumb, frame.T_odom_camera, frame)
+    return (
+        alone(frame)
+        if frame.T_odom_camera is None
+        else _with_gravity_of(session.gravity_filter, frame.T_odom_camera, frame)
+    )
 
 
 @dataclass(slots=True, eq=False)
 class _Open:
-    """The stretch that is being collected."""
+    """The frame window that is being collected."""
 
     session: _Session
     first: Frame
-    surface: Surface
+    surface: TrackedSurface
     T_session_first: Array
     frames: list[Frame] = field(default_factory=list)
     motions: list[Array] = field(default_factory=list)
@@ -151,7 +155,7 @@ class _Open:
 
 
 class Keyframer:
-    """Collects frames into stretches. ``add`` returns the stretch that a frame ended, or None.
+    """Collects frames into frame windows. ``add`` returns the frame window that a frame ended, or None.
 
     Sessions count from ``next_session`` on.
     """
@@ -163,9 +167,9 @@ class Keyframer:
         self._last_ns: int | None = None  # of the last frame
         self._open: _Open | None = None
         self._session: _Session | None = None
-        self._last: tuple[int, Array, Counter[str]] | None = None  # session, pose and labels of the last stretch
+        self._last: tuple[int, Array, Counter[str]] | None = None  # session, pose and labels of the last frame window
 
-    def add(self, frame: Frame) -> Stretch | None:
+    def add(self, frame: Frame) -> FrameWindow | None:
         """Track the frame and collect it. A lost track, odometry that leaps or a clock that does begins a new session.
 
         One that is not later than the last, but by no jump, is passed over.
@@ -187,21 +191,21 @@ class Keyframer:
         if silent_s > SILENCE_S:
             session.lose(silent_s, self._params.max_speed)
         session.follow(frame)
-        frame = _levelled(session, frame)
+        frame = _with_session_gravity(session, frame)
         if self._open is None:
             self._begin(session, frame, T_session_frame)
         else:
             self._collect(self._open, frame, inverse(self._open.T_session_first) @ T_session_frame)
         return ended
 
-    def finish(self) -> Stretch | None:
-        """End the stretch that is being collected: None if there is none or it shows nothing new.
+    def finish(self) -> FrameWindow | None:
+        """End the frame window that is being collected: None if there is none or it shows nothing new.
 
         The session goes on with the next frame where odometry says where that is; else it begins another.
         """
         return self._end()
 
-    def _start(self, frame: Frame) -> Stretch | None:
+    def _start(self, frame: Frame) -> FrameWindow | None:
         """End what is being collected, and start another session with this frame."""
         ended = self._end()
         T_session_frame = np.eye(4) if frame.T_odom_camera is None else frame.T_odom_camera
@@ -209,43 +213,43 @@ class Keyframer:
             number=self.next_session,
             clock=self._clock,
             in_odometry=frame.T_odom_camera is not None,
-            way=Way(T_session_frame),
-            plumb=PlumbLine(self._params.gravity_metres, self._params.gravity_degrees),
+            path=TravelledPath(T_session_frame),
+            gravity_filter=GravityFilter(self._params.gravity_metres, self._params.gravity_degrees),
             first=frame,
             last_ns=frame.stamp_ns,
             T_odom_first=T_session_frame,
         )
         self._session.follow(frame)
         self.next_session += 1
-        self._begin(self._session, _levelled(self._session, frame), T_session_frame)
+        self._begin(self._session, _with_session_gravity(self._session, frame), T_session_frame)
         return ended
 
     def _begin(self, session: _Session, frame: Frame, T_session_frame: Array) -> None:
-        """Begin a stretch with this frame. The way there counts whether or not it becomes a keyframe."""
+        """Begin a frame window with this frame. The way there counts whether or not it becomes a keyframe."""
         session.first = frame
-        session.way.go(T_session_frame)
-        self._open = _Open(session, frame, surface_of(frame.view), T_session_frame)
+        session.path.go(T_session_frame)
+        self._open = _Open(session, frame, tracked_surface(frame.view), T_session_frame)
         self._collect(self._open, frame, np.eye(4))
 
-    def _end(self) -> Stretch | None:
-        stretch, self._open = self._open, None
-        if stretch is None or not stretch.frames:
+    def _end(self) -> FrameWindow | None:
+        window, self._open = self._open, None
+        if window is None or not window.frames:
             return None
         labels: Counter[str] = Counter()
-        for frame in stretch.frames:
+        for frame in window.frames:
             labels |= Counter(item.label for item in frame.objects if len(item))
-        if labels.total() < self._params.keyframe_min_objects or not self._is_news(stretch, labels):
+        if labels.total() < self._params.keyframe_min_objects or not self._is_news(window, labels):
             return None
-        self._last = (stretch.session.number, stretch.T_session_first, labels)
-        return Stretch(
-            frames=tuple(stretch.frames),
-            T_first_frame=tuple(stretch.motions),
-            T_session_first=stretch.T_session_first,
-            session=stretch.session.number,
-            clock=stretch.session.clock,
-            by_odometry=stretch.by_odometry,
-            travelled=stretch.session.way.travelled,
-            turned=stretch.session.way.turned,
+        self._last = (window.session.number, window.T_session_first, labels)
+        return FrameWindow(
+            frames=tuple(window.frames),
+            T_first_frame=tuple(window.motions),
+            T_session_first=window.T_session_first,
+            session=window.session.number,
+            clock=window.session.clock,
+            by_odometry=window.by_odometry,
+            travelled=window.session.path.travelled,
+            turned=window.session.path.turned,
         )
 
     def _follow(self, frame: Frame) -> Array | None:
@@ -259,30 +263,30 @@ class Keyframer:
         """Whether odometry is only a moment late: such a frame is passed over."""
         return session.in_odometry and 1e-9 * (frame.stamp_ns - session.last_ns) < self._params.keyframe_seconds
 
-    def _collect(self, stretch: _Open, frame: Frame, T_first_frame: Array) -> None:
-        stretch.T_first_last = T_first_frame
-        if not frame.objects or len(stretch.frames) >= self._params.keyframe_frames:
+    def _collect(self, window: _Open, frame: Frame, T_first_frame: Array) -> None:
+        window.T_first_last = T_first_frame
+        if not frame.objects or len(window.frames) >= self._params.keyframe_frames:
             return
         share = 1.0 / self._params.keyframe_frames
-        if not stretch.frames or self._moved(inverse(stretch.motions[-1]) @ T_first_frame, share):
-            stretch.frames.append(frame)
-            stretch.motions.append(T_first_frame)
+        if not window.frames or self._moved(inverse(window.motions[-1]) @ T_first_frame, share):
+            window.frames.append(frame)
+            window.motions.append(T_first_frame)
 
     def _is_over(self, frame: Frame, T_session_frame: Array) -> bool:
         """Whether the frame is of another moment, or odometry is back: it tells no motion from a pose of our own."""
-        stretch = self._open
-        if stretch is None:
+        window = self._open
+        if window is None:
             return False
-        lasted = 1e-9 * (frame.stamp_ns - stretch.first.stamp_ns)
-        back = frame.T_odom_camera is not None and stretch.session.in_odometry and not stretch.by_odometry
-        moved = self._moved(inverse(stretch.T_session_first) @ T_session_frame, 1.0)
+        lasted = 1e-9 * (frame.stamp_ns - window.first.stamp_ns)
+        back = frame.T_odom_camera is not None and window.session.in_odometry and not window.by_odometry
+        moved = self._moved(inverse(window.T_session_first) @ T_session_frame, 1.0)
         return back or moved or lasted > self._params.keyframe_seconds
 
-    def _is_news(self, stretch: _Open, labels: Counter[str]) -> bool:
-        if self._last is None or self._last[0] != stretch.session.number:
+    def _is_news(self, window: _Open, labels: Counter[str]) -> bool:
+        if self._last is None or self._last[0] != window.session.number:
             return True
         _, T_session_last, known = self._last
-        return bool(labels - known) or self._moved(inverse(T_session_last) @ stretch.T_session_first, 0.5)
+        return bool(labels - known) or self._moved(inverse(T_session_last) @ window.T_session_first, 0.5)
 
     def _moved(self, T: Array, share: float) -> bool:
         """Whether a motion exceeds ``share`` of what ends a keyframe."""

@@ -27,7 +27,7 @@ SETTLED = 1e-4  # length of a last step, metres and radians
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Surface:
+class TrackedSurface:
     """A view made ready to be aligned to: points, normals, grey and its slope, all (h, w, ...) float32."""
 
     xyz: Array
@@ -38,12 +38,12 @@ class Surface:
     has_grey: bool
 
 
-def surface_of(view: View) -> Surface:
+def tracked_surface(view: View) -> TrackedSurface:
     """The view with its normals (0 0 0 where unknown) and the slope of its grey (0 without grey)."""
     shape = view.xyz.shape[:2]
     grey = np.zeros(shape, np.float32) if view.grey is None else view.grey.astype(np.float32)
     k = view.intrinsics
-    return Surface(
+    return TrackedSurface(
         xyz=np.ascontiguousarray(view.xyz),
         normals=view_normals(view.xyz),
         grey=grey,
@@ -53,7 +53,7 @@ def surface_of(view: View) -> Surface:
     )
 
 
-def view_motion(source: View, target: Surface, T_target_source: Array | None = None) -> Array | None:
+def view_motion(source: View, target: TrackedSurface, T_target_source: Array | None = None) -> Array | None:
     """``T_target_source`` of two overlapping views from a guess (rest, if None); None where it does not settle.
 
     Made for neighbouring frames: it starts from the guess and finds motions of a few pixels.

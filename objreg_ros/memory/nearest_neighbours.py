@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The stored objects of one label group, and the scan that finds the likest of them.
+"""The stored objects of one label group, and the scan that finds the nearest of them.
 
 A scan is exact: it compares every descriptor of the group, and looks at the other columns of an object only where it is
-among the likest so far. Descriptors lie by dimension in tiles of `LANES` objects, so that the processor compares many
+among the nearest so far. Descriptors lie by dimension in tiles of `LANES` objects, so that the processor compares many
 at once: 1e5 of them take about a third of a millisecond.
 """
 
@@ -59,24 +59,24 @@ class Block:
         self._half_norms[i // LANES, i % LANES] = NOWHERE
         self._free.append(i)
 
-    def likest(
+    def nearest(
         self, sighting: Sighting, params: RegistrarParams, most: int, margin: float, since: int = 0
     ) -> tuple[Array, Array]:
         """The rows (at most ``most``) that look most like this one, and half their squared distances, (K,) each.
 
-        Left out are those farther away in half the squared distance than the likest by ``margin``, nearer in time than
+        Left out are those farther away in half the squared distance than the nearest by ``margin``, nearer in time than
         the least gap, of sessions before ``since``, and where odometry says that they cannot be here. Among equals the
         older keyframe comes first.
         """
         tiles = -(-self._used // LANES)
         descriptor = np.asarray(sighting.descriptor, np.float32)
         session = sighting.session if sighting.by_odometry else NO_SESSION
-        found, likeness = _likest(  # type: ignore[call-arg]
+        found, similarity = _likest(  # type: ignore[call-arg]
             self._descriptors[:tiles], self._half_norms[:tiles], self.where, self.when, descriptor,
             np.asarray(sighting.position, float), sighting.travelled, sighting.stamp_ns, session,
             round(1e9 * params.min_gap), params.odometry_radius, params.odometry_drift, since, most, margin,
         )  # fmt: skip
-        return found, np.maximum(0.5 * float(descriptor @ descriptor) - likeness, 0.0)
+        return found, np.maximum(0.5 * float(descriptor @ descriptor) - similarity, 0.0)
 
     def _grow(self) -> None:
         self.where = np.concatenate([self.where, np.zeros_like(self.where)])
@@ -90,9 +90,10 @@ def _likest(  # type: ignore[no-untyped-def]
     descriptors, half_norms, where, when, descriptor, position, way, stamp_ns, session, gap_ns, radius, drift, since,
     most, margin,
 ):  # fmt: skip
-    """The rows, the likest first, and their likeness: half the squared distance below half a length.
+    """The rows, the nearest first, and their similarity: half the squared distance below half a length.
 
-    So many tiles have an object that is at least as like as the floor: where odometry lets them, no other need be seen.
+    So many tiles have an object that is at least as similar as the floor: where odometry lets them, no other need be
+    seen.
     """
     likeness, tops = np.empty(half_norms.shape, np.float32), np.empty(len(half_norms), np.float32)
     for tile in range(len(tops)):
@@ -112,7 +113,7 @@ def _likest(  # type: ignore[no-untyped-def]
 def _best(  # type: ignore[no-untyped-def]
     most, floor, likeness, tops, where, when, position, way, stamp_ns, session, gap_ns, radius, drift, since, margin
 ):
-    """The best that are at least as like as the floor, in falling order: likeness, how old, row; none is -inf."""
+    """The best that are at least as similar as the floor, in falling order: similarity, how old, row; none is -inf."""
     best = [(-NOWHERE, 0, 0) for _ in range(most)]  # as a heap: the least is the first
     likest = -NOWHERE
     for tile in range(len(tops)):
@@ -136,7 +137,7 @@ def _best(  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _compare(descriptors, half_norms, descriptor, out):  # type: ignore[no-untyped-def]
-    """The likeness of every object of a tile, into ``out``; the largest comes back."""
+    """The similarity of every object of a tile, into ``out``; the largest comes back."""
     for lane in range(LANES):
         out[lane] = -half_norms[lane]
     for k in range(len(descriptor)):

@@ -23,15 +23,15 @@ from objreg_ros.memory.sighting import Sighting
 from objreg_ros.registration.labels import LabelGroups
 from objreg_ros.registration.params import RegistrarParams
 
-LIKENESS = 0.5  # distance of descriptors at which a vote falls to 0.6
-WORTH_A_VOTE = 8.0  # half the squared distance behind the likest beyond which a vote would be nothing
+VOTE_DISTANCE = 0.5  # distance of descriptors at which a vote falls to 0.6
+VOTE_CUTOFF = 8.0  # half the squared distance behind the nearest beyond which a vote would be nothing
 SHORTLIST = 64  # votes that one object may give
 SPARE = 4  # keyframes that a query names for each one that is tried
 
 EMPTY = Block()
 
 
-class Place(NamedTuple):
+class CandidateKeyframe(NamedTuple):
     """A stored keyframe that may show what a new one shows, with the votes of its objects."""
 
     keyframe_id: int
@@ -62,7 +62,7 @@ class Index:
         for block, row in chain.from_iterable(self._rows.pop(number, ()) for number in keyframe_ids):
             block.remove(row)
 
-    def query(self, sightings: Sequence[Sighting], since: int = 0) -> list[Place]:
+    def query(self, sightings: Sequence[Sighting], since: int = 0) -> list[CandidateKeyframe]:
         """Places of the sessions from ``since`` on for the objects of a new keyframe, the most promising first.
 
         May be empty. There are more than ``candidates``, so that those which turn out to be redundant have successors.
@@ -78,14 +78,14 @@ class Index:
         taken = order[np.concatenate([np.flatnonzero(~here)[:most], np.flatnonzero(here)[:most]])]
         taken = taken[self._spread(where[taken], when[taken])]
         chosen = zip(when[taken].tolist(), votes[taken].tolist(), strict=True)
-        return [Place(number, stamp_ns, vote) for (stamp_ns, _, number, _), vote in chosen]
+        return [CandidateKeyframe(number, stamp_ns, vote) for (stamp_ns, _, number, _), vote in chosen]
 
     def _ballot(self, sighting: Sighting, stored: int, since: int) -> tuple[Array, Array, Array]:
-        """Where and when the objects were seen that look most like this one, the likest first, and their votes."""
+        """Where and when the objects were seen that look most like this one, the nearest first, and their votes."""
         block = self._blocks.get(self._groups.of(sighting.label), EMPTY)
-        rows, halves = block.likest(sighting, self._params, SHORTLIST, WORTH_A_VOTE, since)
+        rows, halves = block.nearest(sighting, self._params, SHORTLIST, VOTE_CUTOFF, since)
         rarity = math.log(2.0 + stored / max(len(block), 1))
-        return block.where[rows], block.when[rows], rarity * np.exp(-halves / LIKENESS**2)
+        return block.where[rows], block.when[rows], rarity * np.exp(-halves / VOTE_DISTANCE**2)
 
     def _spread(self, where: Array, when: Array) -> Array:
         """The order in which to try: the best of each pass by here, then the next best of each, this very pass last.
@@ -108,7 +108,7 @@ class Index:
 
 @numba.njit(cache=True, nogil=True)
 def _tally(keyframe_ids, ballots, votes):  # type: ignore[no-untyped-def]
-    """A row of each keyframe, the oldest first, and its votes: of each ballot the first, its likest object's."""
+    """A row of each keyframe, the oldest first, and its votes: of each ballot the first, its nearest object's."""
     order = np.argsort(keyframe_ids, kind="mergesort")
     first, total, found = np.empty(len(order), np.int64), np.zeros(len(order)), 0
     for k, row in enumerate(order):

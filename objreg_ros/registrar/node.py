@@ -30,7 +30,7 @@ from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.sync import Match, Need, Stream
 from objreg_ros.bridge.worker import Backlog, Limit
 from objreg_ros.data import Frame
-from objreg_ros.registrar.registrar import Outcome, Registrar, Stretch
+from objreg_ros.registrar.registrar import FrameWindow, Outcome, Registrar
 from objreg_ros.registrar.warm import warm
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 
@@ -41,7 +41,7 @@ class Job(NamedTuple):
     """A keyframe that waits for its search, and since when, by `time.monotonic`."""
 
     stamp_ns: int
-    stretch: Stretch
+    window: FrameWindow
     since: float
 
 
@@ -71,7 +71,7 @@ class RegistrarNode(MatchingDoor):
         self._scene, self._odom_frame = Scene(), "odom"
         limit = Limit(inputs.waiting_keyframes, inputs.waiting_megabytes * 1_000_000, inputs.patience)
         self.searcher: Backlog[Job] = Backlog(
-            self._search, self._keep, self.fail, limit, lambda job: job.stretch.nbytes, GIVING_WAY
+            self._search, self._keep, self.fail, limit, lambda job: job.window.nbytes, GIVING_WAY
         )
         self._announce()
         self._serve()
@@ -127,10 +127,10 @@ class RegistrarNode(MatchingDoor):
         self._scene.see(frame)
         with self._tracking:  # until it waits: none that a service ends comes before it
             with self.ledger.timed("track"):
-                stretch = self._registrar.track(frame)
-            if stretch is not None:
-                self.searcher.put(Job(stamp_ns, stretch, time.monotonic()))
-        return stretch is None
+                window = self._registrar.track(frame)
+            if window is not None:
+                self.searcher.put(Job(stamp_ns, window, time.monotonic()))
+        return window is None
 
     def _frame(self, match: Match) -> Frame:
         odom = match["odom"]
@@ -152,17 +152,17 @@ class RegistrarNode(MatchingDoor):
 
     def _search(self, job: Job) -> None:
         self.ledger.spend("wait", time.monotonic() - job.since)
-        self.conclude(job.stamp_ns, lambda: self._find(job.stretch, "search", self._seconds))
+        self.conclude(job.stamp_ns, lambda: self._find(job.window, "search", self._seconds))
 
     def _keep(self, job: Job) -> None:
         """Store a keyframe without a search: a newer one waits."""
         self._unsearched += 1
         self.throttled.warn("unsearched", "a keyframe was stored without a search: a newer one came before its turn")
-        self.conclude(job.stamp_ns, lambda: self._find(job.stretch, "keep", 0.0))
+        self.conclude(job.stamp_ns, lambda: self._find(job.window, "keep", 0.0))
 
-    def _find(self, stretch: Stretch, stage: str, seconds: float) -> bool:
+    def _find(self, window: FrameWindow, stage: str, seconds: float) -> bool:
         with self.ledger.timed(stage):
-            outcome = self._registrar.search(stretch, seconds, self.searcher.hurried)
+            outcome = self._registrar.search(window, seconds, self.searcher.hurried)
         self._publish(outcome)
         return True
 
@@ -253,9 +253,9 @@ class RegistrarNode(MatchingDoor):
         try:
             with self._tracking:
                 self.searcher.drain()
-                stretch = self._registrar.end()
-                if stretch is not None:
-                    self._publish(self._registrar.search(stretch, self._seconds, self.searcher.hurried))
+                window = self._registrar.end()
+                if window is not None:
+                    self._publish(self._registrar.search(window, self._seconds, self.searcher.hurried))
             return True, self._registrar.save()
         except (ValueError, OSError) as error:
             return False, str(error)
@@ -279,10 +279,10 @@ class RegistrarNode(MatchingDoor):
     def _store_the_rest(self) -> None:
         """Store the keyframes that were not searched for; of those that cannot be the log says how many and why."""
         lost: list[str] = []
-        for stretch in (*(job.stretch for job in self.searcher.rest()), self._registrar.end()):
-            if stretch is not None:
+        for window in (*(job.window for job in self.searcher.rest()), self._registrar.end()):
+            if window is not None:
                 try:
-                    self._registrar.search(stretch, 0.0)
+                    self._registrar.search(window, 0.0)
                 except (ValueError, OSError) as error:
                     lost.append(str(error))
         if lost:

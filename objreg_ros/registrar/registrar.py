@@ -23,9 +23,9 @@ import numpy as np
 from objreg_ros.data import Array, Frame, LoopClosure, ObjectMatch, Observation, Reason, Rejected
 from objreg_ros.geometry import transform
 from objreg_ros.keyframes.fusion import fuse
-from objreg_ros.keyframes.keyframer import Clock, Keyframer, Stretch
+from objreg_ros.keyframes.keyframer import Clock, FrameWindow, Keyframer
 from objreg_ros.memory.landmarks import Landmark, Landmarks, Link
-from objreg_ros.memory.retrieval import Index, Place
+from objreg_ros.memory.retrieval import CandidateKeyframe, Index
 from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.memory.thinning import Thinning
@@ -63,13 +63,13 @@ class _Accepted:
 
 
 class _Budget(NamedTuple):
-    """Until when new places are tried: a time of `time.monotonic`, or until ``hurried`` says so."""
+    """Until when new candidate keyframes are tried: a time of `time.monotonic`, or until ``hurried`` says so."""
 
     deadline: float
     hurried: Callable[[], bool]
 
     def over(self) -> str:
-        """Why no more place is tried; empty while there is time."""
+        """Why no more candidate keyframe is tried; empty while there is time."""
         late = time.monotonic() - self.deadline
         if late > 0:
             return f"{1e3 * late:.0f} ms after the end of the search"
@@ -77,15 +77,15 @@ class _Budget(NamedTuple):
 
 
 class _Search(NamedTuple):
-    """The keyframe that places are sought for, the threads that try them, and how long."""
+    """The keyframe that candidate keyframes are sought for, the threads that try them, and how long."""
 
     keyframe: Keyframe
     pool: ThreadPoolExecutor
     budget: _Budget
 
 
-_Try = tuple[Place, Callable[[], _Accepted | Rejected] | None]
-"""A place that is being tried, and what waits for its verdict."""
+_Try = tuple[CandidateKeyframe, Callable[[], _Accepted | Rejected] | None]
+"""A candidate keyframe that is being tried, and what waits for its verdict."""
 
 
 class Registrar:
@@ -140,39 +140,41 @@ class Registrar:
 
     def process(self, frame: Frame) -> Outcome:
         """Take in one frame: `track`, and `search` when it completed a keyframe."""
-        stretch = self.track(frame)
-        return Outcome() if stretch is None else self.search(stretch)
+        window = self.track(frame)
+        return Outcome() if window is None else self.search(window)
 
     def finish(self) -> Outcome:
         """Search for the keyframe that was still being collected: the end of a recording."""
-        stretch = self.end()
-        return Outcome() if stretch is None else self.search(stretch)
+        window = self.end()
+        return Outcome() if window is None else self.search(window)
 
-    def end(self) -> Stretch | None:
-        """The stretch that was still being collected, None if it shows nothing new."""
+    def end(self) -> FrameWindow | None:
+        """The frame window that was still being collected, None if it shows nothing new."""
         return self._keyframer.finish()
 
-    def track(self, frame: Frame) -> Stretch | None:
-        """Follow the camera; returns the stretch of frames that became a keyframe with this one, mostly None."""
+    def track(self, frame: Frame) -> FrameWindow | None:
+        """Follow the camera; returns the frame window that became a keyframe with this one, mostly None."""
         return self._keyframer.add(frame)
 
-    def search(self, stretch: Stretch, seconds: float = np.inf, hurried: Callable[[], bool] = lambda: False) -> Outcome:
-        """Make a keyframe of the stretch, look for places that it shows again, and remember it.
+    def search(
+        self, window: FrameWindow, seconds: float = np.inf, hurried: Callable[[], bool] = lambda: False
+    ) -> Outcome:
+        """Make a keyframe of the frame window, look for places that it shows again, and remember it.
 
         The likeliest places come first; those that are not begun within ``seconds``, or before ``hurried``, are refused
         as over budget: with no time the keyframe is only stored. Without a limit the outcome depends on the frames
         alone. Keyframes are numbered as they come here: in the order of their frames. StoreError where one cannot be
-        stored; then it closes nothing. Of a stretch that a `reset` overtook nothing comes.
+        stored; then it closes nothing. Of a frame window that a `reset` overtook nothing comes.
         """
         budget = _Budget(time.monotonic() + seconds, hurried)
         with self._lock:
-            if stretch.session < self._first_session:  # `reset` came first
+            if window.session < self._first_session:  # `reset` came first
                 return Outcome()
-            keyframe = fuse(stretch, self.params).numbered(self._store.next_keyframe())
+            keyframe = fuse(window, self.params).numbered(self._store.next_keyframe())
             self._session = keyframe.session
-            unnamed = self._follow(stretch.clock, keyframe)
+            unnamed = self._follow(window.clock, keyframe)
             sightings = sightings_of(keyframe)
-            accepted, rejected = self._try_places(keyframe, sightings, _Search(keyframe, self._pool(), budget))
+            accepted, rejected = self._try_candidates(keyframe, sightings, _Search(keyframe, self._pool(), budget))
             try:
                 closures, named = self._remember(keyframe, sightings, accepted)
             except StoreError:
@@ -210,7 +212,7 @@ class Registrar:
             self._store.close()
 
     def _pool(self) -> ThreadPoolExecutor:
-        """The threads that try places for this one: as nice as it is, and kept, since each new one costs memory."""
+        """The threads that try candidates for this one: as nice as it is, and kept, since each new one costs memory."""
         nice = os.getpriority(os.PRIO_PROCESS, threading.get_native_id()) if sys.platform == "linux" else 0
         if nice not in self._pools:
             self._pools[nice] = ThreadPoolExecutor(self.params.threads, "register")
@@ -229,61 +231,63 @@ class Registrar:
         refusal = Reason.CLOCK, f"the clock began anew at {began}; sessions up to {last} had seen that time before"
         return () if last < 0 else (_rejected(keyframe.stamp_ns, keyframe, refusal),)
 
-    def _try_places(
+    def _try_candidates(
         self, keyframe: Keyframe, sightings: Sequence[Sighting], search: _Search
     ) -> tuple[list[_Accepted], tuple[Rejected, ...]]:
         """Try the stored keyframes that may show the same place, the likeliest first."""
         accepted: list[_Accepted] = []
         rejected: list[Rejected] = []
-        places = deque(self._index.query(sightings, self._since))
-        if not places:
+        queue = deque(self._index.query(sightings, self._since))
+        if not queue:
             refusal = Reason.NO_CANDIDATE, f"none of {len(self._index)} stored objects is alike and may be here"
             rejected.append(_rejected(keyframe.stamp_ns, keyframe, refusal))
         tries, trying = self.params.candidates, deque[_Try]()
         while len(accepted) < self.params.closures:
-            self._begin(search, places, trying, tries, self.params.closures - len(accepted))
+            self._begin(search, queue, trying, tries, self.params.closures - len(accepted))
             if not trying:
                 break
-            place, ask = trying.popleft()
-            if ask is None or self._thinning.redundant(place.stamp_ns, keyframe.stamp_ns):
+            stored, ask = trying.popleft()
+            if ask is None or self._thinning.redundant(stored.stamp_ns, keyframe.stamp_ns):
                 refusal = Reason.REDUNDANT, f"an accepted closure is nearer than {self.params.thin_seconds} s"
-                rejected.append(_rejected(place.stamp_ns, keyframe, refusal))
+                rejected.append(_rejected(stored.stamp_ns, keyframe, refusal))
                 continue
             tries -= 1
             verdict = ask()
             if isinstance(verdict, _Accepted):
-                self._thinning.accept(place.stamp_ns, keyframe.stamp_ns)
+                self._thinning.accept(stored.stamp_ns, keyframe.stamp_ns)
                 accepted.append(verdict)
             else:
                 rejected.append(verdict)
         return accepted, tuple(rejected)
 
-    def _begin(self, search: _Search, places: deque[Place], trying: deque[_Try], tries: int, wanted: int) -> None:
-        """Begin to try the next places: as many at once as there are threads, and never more than ``tries``.
+    def _begin(
+        self, search: _Search, queue: deque[CandidateKeyframe], trying: deque[_Try], tries: int, wanted: int
+    ) -> None:
+        """Begin to try the next candidates: as many at once as there are threads, and never more than ``tries``.
 
         While some are being tried, no more than would be ``wanted`` if all of them were accepted. What would say what
-        is said already is put aside without a try. Verdicts are asked for in the order of the places, so it does not
-        matter which is done first.
+        is said already is put aside without a try. Verdicts are asked for in the order of the candidates, so it does
+        not matter which is done first.
         """
         busy = sum(ask is not None for _, ask in trying)
         most = min(tries, self.params.threads if busy == 0 else min(wanted, self.params.threads))
-        while places and busy < most:
-            place = places.popleft()
-            redundant = self._thinning.redundant(place.stamp_ns, search.keyframe.stamp_ns)
-            trying.append((place, None if redundant else self._try_place(search, place)))
+        while queue and busy < most:
+            stored = queue.popleft()
+            redundant = self._thinning.redundant(stored.stamp_ns, search.keyframe.stamp_ns)
+            trying.append((stored, None if redundant else self._try_candidate(search, stored)))
             busy += not redundant
 
-    def _try_place(self, search: _Search, place: Place) -> Callable[[], _Accepted | Rejected]:
-        """Begin to register a place in a thread of its own; what comes back waits for the verdict."""
+    def _try_candidate(self, search: _Search, stored: CandidateKeyframe) -> Callable[[], _Accepted | Rejected]:
+        """Begin to register a candidate keyframe in a thread of its own; what comes back waits for the verdict."""
         keyframe, over = search.keyframe, search.budget.over()
         if over:
             refusal = Reason.OVER_BUDGET, over
-            return lambda: _rejected(place.stamp_ns, keyframe, refusal)
+            return lambda: _rejected(stored.stamp_ns, keyframe, refusal)
         try:
-            target = self._store.keyframe(place.keyframe_id)
+            target = self._store.keyframe(stored.keyframe_id)
         except StoreError as error:
             refusal = Reason.UNREADABLE, str(error)
-            return lambda: _rejected(place.stamp_ns, keyframe, refusal)
+            return lambda: _rejected(stored.stamp_ns, keyframe, refusal)
         self._method.prepare(keyframe)
         prior = expect(keyframe, target, self.params)
         registered = search.pool.submit(align, keyframe, target, prior, self.params, self._method, self._gate)
@@ -322,7 +326,7 @@ class Registrar:
             Link(
                 index=pair.source, of=stored[item.target.objects[pair.target].cloud.instance], R_there_here=R_there_here
             )
-            for pair in item.candidate.explained
+            for pair in item.candidate.matched
         ]
 
 
@@ -332,7 +336,7 @@ def closure_of(
     """The constraint of an accepted candidate; ``sightings`` are the keyframe's, with their landmarks."""
     candidate = item.candidate
     matches = tuple(
-        ObjectMatch(label=pair.label, object_id=sightings[pair.source].landmark) for pair in candidate.explained
+        ObjectMatch(label=pair.label, object_id=sightings[pair.source].landmark) for pair in candidate.matched
     )
     return LoopClosure(
         from_ns=item.target.stamp_ns,

@@ -33,11 +33,16 @@ class Proposer(Protocol):
 class Scorer(Protocol):
     """What is for and against a pose; `propose.evidence.gather` is ours.
 
-    ``chains`` came to the alignment, the first of them proposed it. A scorer decides nothing.
+    ``proposers`` came to the alignment, the first of them proposed it. A scorer decides nothing.
     """
 
     def __call__(
-        self, source: Prepared, target: Prepared, alignment: Alignment, chains: Iterable[str], params: RegistrarParams
+        self,
+        source: Prepared,
+        target: Prepared,
+        alignment: Alignment,
+        proposers: Iterable[str],
+        params: RegistrarParams,
     ) -> Candidate: ...
 
 

@@ -41,34 +41,35 @@ class Verification:
 class Candidate:
     """One hypothesis after refinement, with its evidence. It decides nothing: the gate does.
 
-    ``chain`` proposed it, ``agreeing_chains`` (``chain`` among them) came to the same pose independently;
-    ``explained`` are the object pairs that lie upon each other under it, ``moved`` those of the same kind that should
-    and do not although both views look there; ``gravity_error_deg`` is the angle between the two gravities under it,
-    None where one is unknown; ``likeness`` is how alike the explained objects look, -1..1, None where that is unknown,
-    and ``likeness_nearby`` that of each a little aside, where it looks most alike: what it is, if not where;
-    ``yaw_known`` says that the shape of one of them tells its yaw; ``margin`` is how much more the candidate is worth
-    than any other. ``resistance`` is how much less the views like the pose pushed to where it would be false,
-    along the directions in which it is known least; None where it is known well enough without. ``surroundings`` is
-    what the views say of it without the objects that it explains; None where those are small in both, and where they
-    are none, or so many that they would not move together. ``warp (6, 6)`` is the covariance [t r] that a warped depth
-    adds to the alignment's. ``floating`` is the share of the tested pixels that float in seen free space beyond doubt.
+    ``proposer`` proposed it, ``agreeing_proposers`` (``proposer`` among them) came to the same pose independently;
+    ``matched`` are the object pairs that lie upon each other under it, ``moved`` those of the same kind that should and
+    do not although both views look there; ``gravity_error_deg`` is the angle between the two gravities under it, None
+    where one is unknown; ``silhouette_score`` is that of the matched objects, -1..1, None where it is unknown, and
+    ``silhouette_score_nearby`` that of each a little aside, where it looks most alike: what it is, if not where;
+    ``yaw_known`` says that the shape of one of them tells its yaw; ``margin_over_competing`` is how much higher the
+    candidate scores than any other. ``perturbation_margin`` is the score margin over the pose perturbed to where it
+    would be false, along the directions in which it is known least; None where it is known well enough without.
+    ``surroundings`` is what the views say of it without the objects that it matches; None where those are small in
+    both, and where they are none, or so many that they would not move together. ``systematic_depth_error (6, 6)`` is
+    the covariance [t r] that it adds to the alignment's. ``certain_violations`` is the share of the tested pixels that
+    float in seen free space beyond doubt.
     """
 
     alignment: Alignment
-    chain: str
-    agreeing_chains: tuple[str, ...]
+    proposer: str
+    agreeing_proposers: tuple[str, ...]
     verification: Verification
-    explained: tuple[ObjectPair, ...] = ()
+    matched: tuple[ObjectPair, ...] = ()
     moved: tuple[ObjectPair, ...] = ()
     gravity_error_deg: float | None = None
-    likeness: float | None = None
-    likeness_nearby: float | None = None
+    silhouette_score: float | None = None
+    silhouette_score_nearby: float | None = None
     yaw_known: bool = False
-    margin: float = 0.0
-    resistance: float | None = None
+    margin_over_competing: float = 0.0
+    perturbation_margin: float | None = None
     surroundings: Verification | None = None
-    floating: float = 1.0
-    warp: Array = field(default_factory=lambda: np.zeros((6, 6)))
+    certain_violations: float = 1.0
+    systematic_depth_error: Array = field(default_factory=lambda: np.zeros((6, 6)))
 
     @property
     def T_target_source(self) -> Array:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The pose engine: hypotheses from independent chains, refined on the context, verified on the views, best first.
+"""The pose engine: hypotheses from independent proposers, refined on the context, verified on the views, best first.
 
 It returns evidence and decides nothing; `gate` decides.
 """
@@ -15,14 +15,20 @@ from objreg_ros.data import Alignment, Array
 from objreg_ros.registration.api import Proposer, Scorer
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.certainty.covariance import covariance_of, spread_of, worst_translation
-from objreg_ros.registration.certainty.degeneracy import warp
-from objreg_ros.registration.certainty.gravity_update import levelling
-from objreg_ros.registration.certainty.observability import preferred, steadied
+from objreg_ros.registration.certainty.degeneracy import systematic_depth_error
+from objreg_ros.registration.certainty.gravity_update import gravity_update
+from objreg_ros.registration.certainty.observability import better_pose, regularising_information
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.registration.prepare.prepared import Pair, Pantry
-from objreg_ros.registration.propose.competing_hypotheses import alternatives
-from objreg_ros.registration.propose.evidence import gather, lead, resistance_of, surroundings_of, worth
+from objreg_ros.registration.prepare.prepared import Pair, PreparedCache
+from objreg_ros.registration.propose.competing_hypotheses import competing_poses
+from objreg_ros.registration.propose.evidence import (
+    gather,
+    margin_over,
+    perturbation_margin_of,
+    rank_score,
+    surroundings_of,
+)
 from objreg_ros.registration.propose.hypotheses import Hypothesis
 from objreg_ros.registration.propose.pose_voting import same_pose
 from objreg_ros.registration.propose.refinement import refine
@@ -38,11 +44,11 @@ class Engine:
     def __init__(self, params: RegistrarParams, propose: Proposer = shortlist, score: Scorer = gather) -> None:
         self._params = params
         self._shortlist, self._score = propose, score
-        self._pantry = Pantry(params)
+        self._cache = PreparedCache(params)
 
     def prepare(self, keyframe: Keyframe) -> None:
         """Make a keyframe ready, before several threads propose poses of it."""
-        self._pantry.get(keyframe)
+        self._cache.get(keyframe)
 
     def propose(
         self, source: Keyframe, target: Keyframe, T_target_source_prior: Array | None = None
@@ -52,101 +58,113 @@ class Engine:
         ``T_target_source_prior (4, 4)`` is what odometry expects, given only where it is tight enough to start from.
         """
         # prepare/: each keyframe once
-        pair = Pair(source=self._pantry.get(source), target=self._pantry.get(target))
+        pair = Pair(source=self._cache.get(source), target=self._cache.get(target))
         if min(len(pair.source.xyz), len(pair.target.xyz)) < self._params.min_points:
             return ()
-        # propose/: what is worth finishing, of all that the chains propose
-        best, seeds = self._shortlist(pair, T_target_source_prior, self._params)
+        # propose/: what is worth finishing, of all that the proposers propose
+        best, hypotheses = self._shortlist(pair, T_target_source_prior, self._params)
         if not best:
             return ()
         # refine/ and score/: each is refined, and its evidence gathered
-        candidates = merged([self._judge(pair, seed, seeds) for seed in best], pair.source.middle, self._params)
+        candidates = merged(
+            [self._judge(pair, hypothesis, hypotheses) for hypothesis in best], pair.source.middle, self._params
+        )
         # propose/: what else a lone object's pose could be, refined and scored alike
-        rivals = self._rivals(pair, [one for one in candidates if self._promises(one, candidates[0])])
-        if rivals:
-            candidates = merged([*candidates, *rivals], pair.source.middle, self._params)
-        # certainty/: how the views resist a push, and what gravity tells
-        pushed = (self._pushed(pair, one) if self._promises(one, candidates[0]) else one for one in candidates)
-        return tuple(self._levelled(pair, one) for one in pushed)
+        competitors = self._competitors(pair, [one for one in candidates if self._promises(one, candidates[0])])
+        if competitors:
+            candidates = merged([*candidates, *competitors], pair.source.middle, self._params)
+        # certainty/: how the views resist a perturbation, and what gravity tells
+        perturbed = (self._perturbed(pair, one) if self._promises(one, candidates[0]) else one for one in candidates)
+        return tuple(self._gravity_updated(pair, one) for one in perturbed)
 
-    def _judge(self, pair: Pair, seed: Hypothesis, seeds: Sequence[Hypothesis]) -> Candidate:
-        """Finish a hypothesis and gather the evidence; ``seeds`` are all that may agree with it."""
+    def _judge(self, pair: Pair, hypothesis: Hypothesis, hypotheses: Sequence[Hypothesis]) -> Candidate:
+        """Finish a hypothesis and gather the evidence; ``hypotheses`` are all that may agree with it."""
         params, source = self._params, pair.source
-        alignment = self._refined(pair, seed.T_target_source)
-        poses = np.array([other.T_target_source for other in seeds])
-        found = seed.T_target_source, alignment.T_target_source
+        alignment = self._refined(pair, hypothesis.T_target_source)
+        poses = np.array([other.T_target_source for other in hypotheses])
+        found = hypothesis.T_target_source, alignment.T_target_source
         same = [same_pose(poses, T_known, source.middle, params) for T_known in found]
-        agreeing = [other.chain for other, agrees in zip(seeds, same[0] | same[1], strict=True) if agrees]
-        return self._gathered(pair, alignment, (seed.chain, *agreeing))
+        agreeing = [other.proposer for other, agrees in zip(hypotheses, same[0] | same[1], strict=True) if agrees]
+        return self._gathered(pair, alignment, (hypothesis.proposer, *agreeing))
 
-    def _gathered(self, pair: Pair, alignment: Alignment, chains: Sequence[str]) -> Candidate:
-        """The candidate of an alignment, without slack where an object holds it."""
-        candidate = self._score(pair.source, pair.target, alignment, chains, self._params)
-        return replace(candidate, alignment=held(alignment)) if is_held(candidate, self._params) else candidate
+    def _gathered(self, pair: Pair, alignment: Alignment, proposers: Sequence[str]) -> Candidate:
+        """The candidate of an alignment, without degenerate directions where an object resolves them."""
+        candidate = self._score(pair.source, pair.target, alignment, proposers, self._params)
+        return (
+            replace(candidate, alignment=without_degeneracy(alignment))
+            if resolves_degeneracy(candidate, self._params)
+            else candidate
+        )
 
-    def _rivals(self, pair: Pair, candidates: Sequence[Candidate]) -> list[Candidate]:
+    def _competitors(self, pair: Pair, candidates: Sequence[Candidate]) -> list[Candidate]:
         """What else lone objects' poses could be, for all that the views say: the gate has to know of it.
 
-        What comes to a candidate's pose is left out: it was looked for from there, and is no chain that agrees.
+        What comes to a candidate's pose is left out: it was looked for from there, and is no proposer that agrees.
         """
         source, target, params = pair.source, pair.target, self._params
-        poses = [T for one in candidates for T in alternatives(source, target, one, params)]
-        known, rivals = np.array([one.T_target_source for one in candidates]), []
+        poses = [T for one in candidates for T in competing_poses(source, target, one, params)]
+        known, competitors = np.array([one.T_target_source for one in candidates]), []
         for alignment in (refine(source, target, T, params) for T in poses):
             if not same_pose(known, alignment.T_target_source, source.middle, params).any():
-                rivals.append(self._gathered(pair, alignment, ("objects",)))
-        return rivals
+                competitors.append(self._gathered(pair, alignment, ("objects",)))
+        return competitors
 
     def _promises(self, candidate: Candidate, best: Candidate) -> bool:
-        """Whether the gate may come to a candidate, so that it is worth pushing."""
+        """Whether the gate may come to a candidate, so that it is worth perturbing."""
         least = max(self._params.min_score, best.verification.score - self._params.rival_margin)
         return candidate.verification.score >= least
 
-    def _pushed(self, pair: Pair, candidate: Candidate) -> Candidate:
-        """The candidate with how the views resist a push, and what they say without the objects that it is of."""
+    def _perturbed(self, pair: Pair, candidate: Candidate) -> Candidate:
+        """The candidate with its score margin under perturbation, and what the views say without its objects."""
         asked = candidate, pair.source, pair.target, self._params
-        told = replace(candidate, resistance=resistance_of(*asked), surroundings=surroundings_of(*asked))
-        return self._steadied(pair, told)
+        told = replace(
+            candidate, perturbation_margin=perturbation_margin_of(*asked), surroundings=surroundings_of(*asked)
+        )
+        return self._regularised(pair, told)
 
-    def _levelled(self, pair: Pair, candidate: Candidate) -> Candidate:
+    def _gravity_updated(self, pair: Pair, candidate: Candidate) -> Candidate:
         """The candidate brought within its covariance to where gravity is kept, and known better by it.
 
-        Its evidence stays that of the pose that the views like.
+        Its evidence stays that of the pose with the best view score.
         """
-        C = covariance_of(candidate, self._params) + candidate.warp
-        step = levelling(pair.source, pair.target, candidate.T_target_source, C, self._params)
+        C = covariance_of(candidate, self._params) + candidate.systematic_depth_error
+        step = gravity_update(pair.source, pair.target, candidate.T_target_source, C, self._params)
         return candidate if step is None else self._informed(brought(candidate, step.T), step.information)
 
     def _refined(self, pair: Pair, T_target_source: Array) -> Alignment:
-        """The refined pose; where that is known badly, the one that the views like best of all that it could be."""
+        """The refined pose; where that is known badly, the one of the best view score of all that it could be."""
         params, source, target = self._params, pair.source, pair.target
         alignment = refine(source, target, T_target_source, params)
-        C = spread_of(alignment, params) + warp(source, target, alignment.T_target_source, params)
+        C = spread_of(alignment, params) + systematic_depth_error(source, target, alignment.T_target_source, params)
         if worst_translation(C) <= params.doubtful_sigma:
             return alignment
-        better = preferred(source, target, alignment.T_target_source, C, params)
+        better = better_pose(source, target, alignment.T_target_source, C, params)
         return alignment if better is None else refine(source, target, better, params)
 
-    def _steadied(self, pair: Pair, candidate: Candidate) -> Candidate:
+    def _regularised(self, pair: Pair, candidate: Candidate) -> Candidate:
         """The candidate with what the views tell of a doubtful position that does not slide freely."""
         alignment, C = candidate.alignment, spread_of(candidate.alignment, self._params)
-        if candidate.resistance is None or len(alignment.slack) > 0:
+        if candidate.perturbation_margin is None or len(alignment.degenerate) > 0:
             return candidate
-        added = steadied(pair.source, pair.target, alignment.T_target_source, C + candidate.warp, self._params)
+        added = regularising_information(
+            pair.source, pair.target, alignment.T_target_source, C + candidate.systematic_depth_error, self._params
+        )
         return self._informed(candidate, added)
 
     def _informed(self, candidate: Candidate, added: Array) -> Candidate:
-        """The candidate with information (6, 6) that neither the residuals nor a warped depth know of."""
+        """The candidate with information (6, 6) that neither the residuals nor a systematic depth error know of."""
         alignment, C = candidate.alignment, spread_of(candidate.alignment, self._params)
         informed = replace(alignment, information=alignment.information + added)
-        whole = np.linalg.inv(np.linalg.inv(C + candidate.warp) + added)
-        return replace(candidate, alignment=informed, warp=whole - np.linalg.inv(np.linalg.inv(C) + added))
+        whole = np.linalg.inv(np.linalg.inv(C + candidate.systematic_depth_error) + added)
+        return replace(
+            candidate, alignment=informed, systematic_depth_error=whole - np.linalg.inv(np.linalg.inv(C) + added)
+        )
 
 
-def is_held(candidate: Candidate, params: RegistrarParams) -> bool:
-    """Whether what the surfaces let slide is held by the outline and the print of an object."""
-    alike = candidate.likeness
-    return candidate.yaw_known and alike is not None and alike >= params.holding_likeness
+def resolves_degeneracy(candidate: Candidate, params: RegistrarParams) -> bool:
+    """Whether what the surfaces leave degenerate is resolved by the outline and the print of an object."""
+    score = candidate.silhouette_score
+    return candidate.yaw_known and score is not None and score >= params.holding_likeness
 
 
 def brought(candidate: Candidate, T_target_source: Array) -> Candidate:
@@ -154,21 +172,21 @@ def brought(candidate: Candidate, T_target_source: Array) -> Candidate:
     return replace(candidate, alignment=replace(candidate.alignment, T_target_source=T_target_source))
 
 
-def held(alignment: Alignment) -> Alignment:
-    """The alignment without its slack."""
-    return replace(alignment, slack=np.zeros((0, 6)))
+def without_degeneracy(alignment: Alignment) -> Alignment:
+    """The alignment without its degenerate directions."""
+    return replace(alignment, degenerate=np.zeros((0, 6)))
 
 
 def merged(candidates: list[Candidate], middle: Array, params: RegistrarParams) -> list[Candidate]:
-    """Distinct candidates, best first; each knows the chains of those that came to its pose."""
-    ranked = sorted(candidates, key=lambda candidate: -worth(candidate, params))
+    """Distinct candidates, best first; each knows the proposers of those that came to its pose."""
+    ranked = sorted(candidates, key=lambda candidate: -rank_score(candidate, params))
     poses = np.array([candidate.T_target_source for candidate in ranked])
     kept: list[Candidate] = []
     known = np.zeros(len(ranked), bool)
     for k, candidate in enumerate(ranked):
         if not known[k]:
             same = same_pose(poses, poses[k], middle, params)
-            chains = {chain for j in np.flatnonzero(same) for chain in ranked[j].agreeing_chains}
-            kept.append(replace(candidate, agreeing_chains=tuple(sorted(chains))))
+            proposers = {proposer for j in np.flatnonzero(same) for proposer in ranked[j].agreeing_proposers}
+            kept.append(replace(candidate, agreeing_proposers=tuple(sorted(proposers))))
             known |= same
-    return [replace(candidate, margin=lead(candidate, kept, params)) for candidate in kept]
+    return [replace(candidate, margin_over_competing=margin_over(candidate, kept, params)) for candidate in kept]

@@ -21,8 +21,8 @@ from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.engine import merged
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.registration.prepare.prepared import Pantry, Prepared
-from objreg_ros.registration.propose.evidence import gather, resistance_of
+from objreg_ros.registration.prepare.prepared import Prepared, PreparedCache
+from objreg_ros.registration.propose.evidence import gather, perturbation_margin_of
 
 LEAST_PAIRS = 6
 FITNESS_TOLERANCE = 1e-6  # share of the points that find a partner: its change that counts as none, Open3D's default
@@ -43,11 +43,11 @@ class PaperEngine:
     def __init__(self, params: RegistrarParams) -> None:
         import_module("open3d")  # now and not with the first pair: it takes seconds
         self._params = params
-        self._pantry = Pantry(params)
+        self._cache = PreparedCache(params)
 
     def prepare(self, keyframe: Keyframe) -> None:
         """Make a keyframe ready, before several threads propose poses of it."""
-        self._pantry.get(keyframe)
+        self._cache.get(keyframe)
 
     def propose(
         self, source: Keyframe, target: Keyframe, T_target_source_prior: Array | None = None
@@ -59,13 +59,13 @@ class PaperEngine:
             for b in target.objects
             if a.label == b.label
         ]
-        pair = self._pantry.get(source), self._pantry.get(target)
+        pair = self._cache.get(source), self._cache.get(target)
         found = [self._candidate(*pair, alignment) for alignment in alignments if alignment is not None]
         return tuple(merged(found, pair[0].middle, self._params))
 
     def _candidate(self, source: Prepared, target: Prepared, alignment: Alignment) -> Candidate:
         candidate = gather(source, target, alignment, ("paper",), self._params)
-        return replace(candidate, resistance=resistance_of(candidate, source, target, self._params))
+        return replace(candidate, perturbation_margin=perturbation_margin_of(candidate, source, target, self._params))
 
 
 def register(source: Array, target: Array, T_target_source: Array, params: RegistrarParams) -> Alignment | None:

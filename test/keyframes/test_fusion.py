@@ -9,7 +9,7 @@ from registration.samples import box, cloud, frame, moved, scene_view
 from objreg_ros.data import PointFlag
 from objreg_ros.geometry import inverse, transform
 from objreg_ros.keyframes.fusion import fuse, fuse_objects, reference_index
-from objreg_ros.keyframes.keyframer import Stretch
+from objreg_ros.keyframes.keyframer import FrameWindow
 from objreg_ros.registration.params import RegistrarParams
 
 PARAMS = RegistrarParams()
@@ -63,10 +63,10 @@ def test_the_keyframe_is_in_the_camera_frame_of_its_reference() -> None:
         tuple(cloud(o.label, transform(inverse(T_first_second), o.xyz)) for o in table),
         view=scene_view(T_first_second),
     )
-    stretch = Stretch(
+    window = FrameWindow(
         frames=(first, second), T_first_frame=(np.eye(4), T_first_second), T_session_first=moved(5.0), session=2
     )
-    fused = fuse(stretch, PARAMS.replaced(context_radius=3.0))
+    fused = fuse(window, PARAMS.replaced(context_radius=3.0))
     assert fused.stamp_ns == second.stamp_ns and fused.session == 2 and fused.labels == ("cup", "book")
     assert np.allclose(fused.objects[0].centroid, (-0.1, 0, 1), atol=0.01)
     assert np.allclose(fused.T_odom_camera, moved(5.1))
@@ -76,10 +76,10 @@ def test_the_keyframe_is_in_the_camera_frame_of_its_reference() -> None:
 
 
 def test_the_context_stays_within_its_radius_of_the_objects() -> None:
-    stretch = Stretch(
+    window = FrameWindow(
         frames=(frame(0, (box("cup", (0, 0, 1.8)),)),), T_first_frame=(np.eye(4),), T_session_first=np.eye(4), session=0
     )
-    context = fuse(stretch, PARAMS.replaced(context_radius=0.5)).context
+    context = fuse(window, PARAMS.replaced(context_radius=0.5)).context
     assert len(context) > 0 and np.linalg.norm(context.xyz - (0, 0, 1.8), axis=1).max() < 0.56
 
 

@@ -11,7 +11,7 @@ from registration.samples import CAMERA, SECOND, box, frame, moved, scene_view
 
 from objreg_ros.data import Frame, View
 from objreg_ros.geometry import inverse, is_rigid, pose, rotation_from_vector
-from objreg_ros.keyframes.keyframer import Clock, Keyframer, Stretch
+from objreg_ros.keyframes.keyframer import Clock, FrameWindow, Keyframer
 from objreg_ros.registration.params import RegistrarParams
 
 PARAMS = RegistrarParams(keyframe_translation=0.1, keyframe_rotation=10.0, keyframe_seconds=1.0, keyframe_frames=4)
@@ -19,9 +19,9 @@ CUP = (box("cup", (0, 0, 1)),)
 DOWN = np.array([0.0, 1.0, 0.0])  # of a camera that is level
 
 
-def _run(keyframer: Keyframer, frames: list[Frame]) -> list[Stretch]:
+def _run(keyframer: Keyframer, frames: list[Frame]) -> list[FrameWindow]:
     ended = [keyframer.add(item) for item in frames] + [keyframer.finish()]
-    return [stretch for stretch in ended if stretch is not None]
+    return [window for window in ended if window is not None]
 
 
 def blind(seconds: float) -> Frame:
@@ -32,17 +32,17 @@ def blind(seconds: float) -> Frame:
 
 def test_a_moving_camera_makes_a_keyframe_each_time_it_has_moved_enough() -> None:
     frames = [frame(0.1 * i, CUP, moved(0.03 * i)) for i in range(13)]
-    stretches = _run(Keyframer(PARAMS), frames)
-    assert [round(s.T_session_first[0, 3], 2) for s in stretches] == [0.0, 0.12, 0.24, 0.36]
-    assert [len(s.frames) for s in stretches] == [4, 4, 4, 1]
-    assert np.allclose(stretches[1].T_first_frame[-1], moved(0.09))
+    windows = _run(Keyframer(PARAMS), frames)
+    assert [round(s.T_session_first[0, 3], 2) for s in windows] == [0.0, 0.12, 0.24, 0.36]
+    assert [len(s.frames) for s in windows] == [4, 4, 4, 1]
+    assert np.allclose(windows[1].T_first_frame[-1], moved(0.09))
 
 
 def test_a_camera_that_rests_makes_one_keyframe_until_something_new_comes() -> None:
     rest = [frame(0.2 * i, CUP, np.eye(4)) for i in range(20)]
     new = [frame(4.0 + 0.2 * i, (*CUP, box("book", (0.5, 0, 1))), np.eye(4)) for i in range(20)]
-    stretches = _run(Keyframer(PARAMS), rest + new)
-    assert [len(s.frames[-1].objects) for s in stretches] == [1, 2]
+    windows = _run(Keyframer(PARAMS), rest + new)
+    assert [len(s.frames[-1].objects) for s in windows] == [1, 2]
 
 
 def test_frames_without_objects_make_no_keyframe() -> None:
@@ -57,16 +57,16 @@ def test_objects_without_points_make_no_keyframe() -> None:
 
 def test_without_odometry_the_views_give_the_motion() -> None:
     frames = [frame(0.1 * i, CUP, None, scene_view(moved(0.03 * i))) for i in range(6)]
-    stretches = _run(Keyframer(PARAMS), frames)
-    assert len(stretches) == 2 and {s.session for s in stretches} == {0}
-    assert np.allclose(stretches[1].T_session_first, moved(0.12), atol=0.005)
+    windows = _run(Keyframer(PARAMS), frames)
+    assert len(windows) == 2 and {s.session for s in windows} == {0}
+    assert np.allclose(windows[1].T_session_first, moved(0.12), atol=0.005)
 
 
 def test_our_own_tracking_stays_rigid_however_long_it_is() -> None:
     keyframer, sway = Keyframer(PARAMS), 0.1 * np.sin(0.2 * np.arange(150))
-    stretches = _run(keyframer, [frame(0.1 * i, CUP, None, scene_view(moved(x))) for i, x in enumerate(sway)])
-    assert {s.session for s in stretches} == {0} and len(stretches) > 10
-    assert all(is_rigid(s.T_session_first, 1e-12) for s in stretches)
+    windows = _run(keyframer, [frame(0.1 * i, CUP, None, scene_view(moved(x))) for i, x in enumerate(sway)])
+    assert {s.session for s in windows} == {0} and len(windows) > 10
+    assert all(is_rigid(s.T_session_first, 1e-12) for s in windows)
 
 
 def test_a_lost_track_and_a_jump_back_in_time_begin_a_new_session() -> None:
@@ -103,9 +103,9 @@ def test_after_a_long_silence_nobody_knows_the_way_there_nor_which_way_things_fa
 
 def test_a_frame_that_comes_late_or_twice_is_passed_over() -> None:
     frames = [frame(t, CUP, moved(0.03 * k)) for k, t in enumerate((5.0, 5.1, 5.0, 4.2, 5.1, 5.2, 5.3, 5.4, 5.5))]
-    stretches = _run(Keyframer(PARAMS), frames)
-    assert {s.session for s in stretches} == {0}
-    stamps = [f.stamp_ns for s in stretches for f in s.frames]
+    windows = _run(Keyframer(PARAMS), frames)
+    assert {s.session for s in windows} == {0}
+    stamps = [f.stamp_ns for s in windows for f in s.frames]
     assert stamps == sorted(set(stamps)) and min(stamps) == 5 * SECOND
 
 
@@ -127,9 +127,9 @@ def test_a_clock_runs_until_time_goes_back() -> None:
 
 
 def test_odometry_that_appears_begins_its_own_session() -> None:
-    stretches = _run(Keyframer(PARAMS), [frame(0.0, CUP), frame(0.1, CUP, moved(7.0)), frame(0.2, CUP, moved(7.5))])
-    assert [s.session for s in stretches] == [0, 1, 1]
-    assert np.allclose(stretches[-1].T_session_first, moved(7.5))
+    windows = _run(Keyframer(PARAMS), [frame(0.0, CUP), frame(0.1, CUP, moved(7.0)), frame(0.2, CUP, moved(7.5))])
+    assert [s.session for s in windows] == [0, 1, 1]
+    assert np.allclose(windows[-1].T_session_first, moved(7.5))
 
 
 def test_a_gap_in_the_odometry_is_bridged_by_the_views() -> None:
@@ -137,19 +137,19 @@ def test_a_gap_in_the_odometry_is_bridged_by_the_views() -> None:
     frames = [
         frame(0.1 * i, CUP, None if i in (2, 4) else poses[i], scene_view(moved(0.03 * i))) for i in range(len(poses))
     ]
-    stretches = _run(Keyframer(PARAMS), frames)
-    assert {s.session for s in stretches} == {0}
-    assert np.allclose(stretches[-1].T_session_first, moved(5.12), atol=0.005)
+    windows = _run(Keyframer(PARAMS), frames)
+    assert {s.session for s in windows} == {0}
+    assert np.allclose(windows[-1].T_session_first, moved(5.12), atol=0.005)
 
 
 def test_a_keyframe_that_begins_in_a_gap_is_of_our_own_tracking_and_ends_where_odometry_comes_back() -> None:
     frames = [frame(0.1 * i, CUP, moved(0.06 * i) if i < 2 else None, scene_view(moved(0.06 * i))) for i in range(5)]
     slipped = [frame(0.1 * i, CUP, moved(0.06 * i + 0.03), scene_view(moved(0.06 * i))) for i in range(5, 8)]
-    stretches = _run(Keyframer(PARAMS), frames + slipped)
-    assert [s.by_odometry for s in stretches] == [True, False, False, True, True]
-    assert {s.session for s in stretches} == {0}
-    assert all(item.T_odom_camera is None for s in stretches if not s.by_odometry for item in s.frames)
-    assert np.allclose(stretches[3].T_session_first, moved(0.33))
+    windows = _run(Keyframer(PARAMS), frames + slipped)
+    assert [s.by_odometry for s in windows] == [True, False, False, True, True]
+    assert {s.session for s in windows} == {0}
+    assert all(item.T_odom_camera is None for s in windows if not s.by_odometry for item in s.frames)
+    assert np.allclose(windows[3].T_session_first, moved(0.33))
 
 
 def test_a_frame_that_neither_odometry_nor_the_views_can_place_is_passed_over_for_a_moment() -> None:
@@ -161,8 +161,8 @@ def test_a_frame_that_neither_odometry_nor_the_views_can_place_is_passed_over_fo
 
 def test_the_session_goes_on_after_what_was_collected_is_asked_for() -> None:
     keyframer = Keyframer(PARAMS)
-    stretches = _run(keyframer, [frame(0.0, CUP, np.eye(4))]) + _run(keyframer, [frame(0.5, CUP, moved(2.0))])
-    assert [s.session for s in stretches] == [0, 0] and stretches[1].travelled == pytest.approx(2.0)
+    windows = _run(keyframer, [frame(0.0, CUP, np.eye(4))]) + _run(keyframer, [frame(0.5, CUP, moved(2.0))])
+    assert [s.session for s in windows] == [0, 0] and windows[1].travelled == pytest.approx(2.0)
     tracked = Keyframer(PARAMS)
     assert [s.session for s in _run(tracked, [frame(0.0, CUP)]) + _run(tracked, [frame(0.1, CUP)])] == [0, 1]
 
@@ -171,8 +171,8 @@ def test_the_way_counts_where_nothing_is_seen_too() -> None:
     there, back = [0.5 * i for i in range(9)], [4.0 - 0.5 * i for i in range(1, 9)]
     book = box("book", (0.5, 0, 1))
     frames = [frame(0.1 * i, (), moved(x)) for i, x in enumerate((there + back)[1:-1], start=1)]
-    stretches = _run(Keyframer(PARAMS), [frame(0.0, CUP, np.eye(4)), *frames, frame(1.8, (*CUP, book), np.eye(4))])
-    assert [round(s.travelled, 3) for s in stretches] == [0.0, 8.0]
+    windows = _run(Keyframer(PARAMS), [frame(0.0, CUP, np.eye(4)), *frames, frame(1.8, (*CUP, book), np.eye(4))])
+    assert [round(s.travelled, 3) for s in windows] == [0.0, 8.0]
 
 
 def test_odometry_carries_what_earlier_views_told_of_gravity_and_our_own_tracking_does_not() -> None:
@@ -190,9 +190,9 @@ def test_odometry_carries_what_earlier_views_told_of_gravity_and_our_own_trackin
 def test_gravity_turns_with_the_camera() -> None:
     turns = [pose(rotation_from_vector(np.radians([5.0 * i, 0.0, 0.0])), np.zeros(3)) for i in range(8)]
     frames = [replace(frame(0.1 * i, CUP, T), gravity=T[:3, :3].T @ [0.0, 1.0, 0.0]) for i, T in enumerate(turns)]
-    for stretch in _run(Keyframer(PARAMS), frames):
-        for item, T_first_frame in zip(stretch.frames, stretch.T_first_frame, strict=True):
-            T = stretch.T_session_first @ T_first_frame
+    for window in _run(Keyframer(PARAMS), frames):
+        for item, T_first_frame in zip(window.frames, window.T_first_frame, strict=True):
+            T = window.T_session_first @ T_first_frame
             assert item.gravity is not None
             np.testing.assert_allclose(item.gravity, inverse(T)[:3, :3] @ [0.0, 1.0, 0.0], atol=1e-9)
 
@@ -203,5 +203,5 @@ def test_a_stretch_tells_how_much_memory_its_frames_hold() -> None:
     (cup,) = CUP
     of_cup = cup.xyz.nbytes + cup.normals.nbytes + cup.flags.nbytes + (0 if cup.rgb is None else cup.rgb.nbytes)
     one = seen.view.xyz.nbytes + seen.view.grey.nbytes + of_cup
-    assert Stretch.of(seen).nbytes == one
-    assert Stretch.of(replace(seen, support=cup)).nbytes == one + of_cup
+    assert FrameWindow.of(seen).nbytes == one
+    assert FrameWindow.of(replace(seen, support=cup)).nbytes == one + of_cup

@@ -8,7 +8,7 @@ import pytest
 from registration.samples import moved
 
 from objreg_ros.geometry import pose, rotation_from_vector
-from objreg_ros.keyframes.odometry import TURNS_DEG_S, Way
+from objreg_ros.keyframes.odometry import TURNS_DEG_S, TravelledPath
 from objreg_ros.registration.params import RegistrarParams
 
 PARAMS = RegistrarParams(
@@ -18,19 +18,22 @@ TURNED = pose(rotation_from_vector(np.radians([0.0, 90.0, 0.0])), np.array([1.0,
 
 
 def test_a_way_adds_up_what_was_gone_and_turned_from_pose_to_pose() -> None:
-    way = Way(np.eye(4))
+    path = TravelledPath(np.eye(4))
     for T in (TURNED, moved(3.0), moved(2.5)):
-        way.go(T)
-    assert way.travelled == pytest.approx(1.0 + 2.0 + 0.5) and way.turned == pytest.approx(90.0 + 90.0)
+        path.go(T)
+    assert path.travelled == pytest.approx(1.0 + 2.0 + 0.5) and path.turned == pytest.approx(90.0 + 90.0)
 
 
 def test_a_way_is_as_long_as_it_may_have_been_while_nothing_was_seen() -> None:
-    way = Way(np.eye(4))
-    way.lose(3.0, 2.0)
-    assert way.travelled == pytest.approx(6.0) and way.turned == pytest.approx(3.0 * TURNS_DEG_S)
+    path = TravelledPath(np.eye(4))
+    path.lose(3.0, 2.0)
+    assert path.travelled == pytest.approx(6.0) and path.turned == pytest.approx(3.0 * TURNS_DEG_S)
 
 
 def test_a_pose_is_near_the_last_one_in_place_and_turn() -> None:
-    way, aside = Way(np.eye(4)), pose(rotation_from_vector(np.radians([0.0, 2.0, 0.0])), np.array([0.1, 0.0, 0.0]))
-    assert way.is_near(aside, 0.11, 2.1)
-    assert not way.is_near(aside, 0.09, 2.1) and not way.is_near(aside, 0.11, 1.9)
+    path, aside = (
+        TravelledPath(np.eye(4)),
+        pose(rotation_from_vector(np.radians([0.0, 2.0, 0.0])), np.array([0.1, 0.0, 0.0])),
+    )
+    assert path.is_near(aside, 0.11, 2.1)
+    assert not path.is_near(aside, 0.09, 2.1) and not path.is_near(aside, 0.11, 1.9)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The scan for the likest objects: its answers are those of looking at every object, one by one."""
+"""The scan for the nearest objects: its answers are those of looking at every object, one by one."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _sighting(number: int, draw: Generator, spread: float = 1.0) -> Sighting:
 
 
 def _brute_force(stored: list[Sighting], row: Sighting) -> list[int]:
-    """The keyframes of the likest, by the book."""
+    """The keyframes of the nearest, by the book."""
     halves = {}
     for other in stored:
         if abs(other.stamp_ns - row.stamp_ns) < 1e9 * PARAMS.min_gap:
@@ -58,7 +58,7 @@ def test_a_scan_finds_what_brute_force_finds(seed: int) -> None:
         stored.append(_sighting(number, draw, 0.1 + 0.1 * (seed % 5)))
         block.append(stored[-1])
     for row in (_sighting(9999, draw) for _ in range(10)):
-        rows, halves = block.likest(row, PARAMS, MOST, MARGIN)
+        rows, halves = block.nearest(row, PARAMS, MOST, MARGIN)
         assert block.when[rows, 2].tolist() == _brute_force(stored, row)
         exact = [0.5 * np.sum((stored[k].descriptor - row.descriptor) ** 2) for k in block.when[rows, 2]]
         assert np.allclose(halves, exact, atol=1e-4)
@@ -76,7 +76,7 @@ def test_rows_that_were_given_up_are_not_found_and_are_used_again(seed: int) -> 
         held[number] = sighting, block.append(sighting)
     assert len(block) == len(held) and len(block.when) < 800
     row = _sighting(9999, draw)
-    rows, _ = block.likest(row, PARAMS, MOST, MARGIN)
+    rows, _ = block.nearest(row, PARAMS, MOST, MARGIN)
     assert block.when[rows, 2].tolist() == _brute_force([sighting for sighting, _ in held.values()], row)
 
 
@@ -87,7 +87,7 @@ def test_among_equals_the_older_keyframe_comes_first() -> None:
     for number in (5, 3, 4, 1, 2):
         block.append(replace(pattern, keyframe_id=number))
     late = replace(pattern, stamp_ns=10**12)
-    rows, halves = block.likest(late, PARAMS, 3, MARGIN)
+    rows, halves = block.nearest(late, PARAMS, 3, MARGIN)
     assert block.when[rows, 2].tolist() == [1, 2, 3] and np.allclose(halves, 0, atol=1e-5)
 
 
@@ -95,4 +95,4 @@ def test_a_block_of_nothing_that_may_be_here_answers_nothing() -> None:
     draw = np.random.default_rng(0)
     block, row = Block(), _sighting(1, draw)
     block.append(row)
-    assert [len(column) for column in block.likest(row, PARAMS, MOST, MARGIN)] == [0, 0]
+    assert [len(column) for column in block.nearest(row, PARAMS, MOST, MARGIN)] == [0, 0]

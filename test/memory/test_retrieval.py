@@ -36,7 +36,7 @@ CUP, BOOK, CHAIR = box("cup", (0, 0, 1)), box("book", (0.3, 0, 1), 0.2), box("ch
 
 def test_a_place_with_the_same_objects_comes_first() -> None:
     index = _index(_seen(1, 0, CHAIR), _seen(2, 10, CUP, BOOK), _seen(3, 20, BOOK))
-    found = [place.keyframe_id for place in index.query(_seen(9, 100, CUP, BOOK))]
+    found = [candidate.keyframe_id for candidate in index.query(_seen(9, 100, CUP, BOOK))]
     assert found == [2, 3]
 
 
@@ -47,33 +47,33 @@ def test_an_empty_index_and_a_keyframe_of_unknown_objects_find_nothing() -> None
 
 def test_confusable_labels_find_each_other() -> None:
     index = _index(_seen(1, 0, CUP))
-    assert [place.keyframe_id for place in index.query(_seen(9, 100, box("mouse", (0, 0, 1))))] == [1]
+    assert [candidate.keyframe_id for candidate in index.query(_seen(9, 100, box("mouse", (0, 0, 1))))] == [1]
 
 
 def test_what_was_seen_a_moment_ago_is_no_loop() -> None:
     index = _index(_seen(1, 0, CUP), _seen(2, 9.5, CUP))
-    assert [place.keyframe_id for place in index.query(_seen(9, 10, CUP))] == [1]
+    assert [candidate.keyframe_id for candidate in index.query(_seen(9, 10, CUP))] == [1]
 
 
 def test_odometry_takes_out_what_cannot_be_there_in_the_same_session_only() -> None:
     params = PARAMS.replaced(odometry_radius=1.0, odometry_drift=0.1)
     index = _index(_seen(1, 0, CUP, x=8.0), _seen(2, 10, CUP, session=1, x=8.0), params=params)
-    assert [place.keyframe_id for place in index.query(_seen(9, 30, CUP))] == [2]
+    assert [candidate.keyframe_id for candidate in index.query(_seen(9, 30, CUP))] == [2]
     wide = _index(_seen(1, 0, CUP, x=8.0), params=params.replaced(odometry_drift=1.0))
-    assert [place.keyframe_id for place in wide.query(_seen(9, 30, CUP))] == [1]
+    assert [candidate.keyframe_id for candidate in wide.query(_seen(9, 30, CUP))] == [1]
 
 
 @pytest.mark.parametrize("told", [(False, False), (True, False), (False, True)])
 def test_our_own_tracking_takes_out_nothing(told: tuple[bool, bool]) -> None:
     params = PARAMS.replaced(odometry_radius=1.0, odometry_drift=0.1)
     index = _index(_seen(1, 0, CUP, x=8.0, by_odometry=told[0]), params=params)
-    assert [place.keyframe_id for place in index.query(_seen(9, 30, CUP, by_odometry=told[1]))] == [1]
+    assert [candidate.keyframe_id for candidate in index.query(_seen(9, 30, CUP, by_odometry=told[1]))] == [1]
 
 
 def test_an_object_of_another_size_or_colour_gets_a_lower_vote() -> None:
     index = _index(_seen(1, 0, box("box", (0, 0, 1), 0.4)), _seen(2, 10, box("box", (0, 0, 1), 0.1)))
     ranked = index.query(_seen(9, 100, box("box", (0, 0, 1), 0.1)))
-    assert [place.keyframe_id for place in ranked] == [2, 1] and ranked[0].votes > 2 * ranked[1].votes
+    assert [candidate.keyframe_id for candidate in ranked] == [2, 1] and ranked[0].votes > 2 * ranked[1].votes
 
 
 def test_an_object_votes_once_for_a_keyframe_by_the_likest_that_it_shows_and_all_votes_add_up() -> None:
@@ -90,19 +90,19 @@ def test_what_is_near_another_place_takes_no_turn_of_its_pass() -> None:
 
 def test_neighbours_of_a_chosen_keyframe_give_way_to_other_moments() -> None:
     index = _index(_seen(1, 0.0, CUP), _seen(2, 0.1, CUP), _seen(3, 0.2, CUP), _seen(4, 10, CUP))
-    assert [place.keyframe_id for place in index.query(_seen(9, 100, CUP))] == [1, 4, 2, 3]
+    assert [candidate.keyframe_id for candidate in index.query(_seen(9, 100, CUP))] == [1, 4, 2, 3]
 
 
 def test_passes_by_here_take_turns_and_this_one_comes_last() -> None:
     params = PARAMS.replaced(min_gap=0.5, odometry_radius=99.0)
     index = _index(*(_seen(k, float(k), CUP) for k in (1, 2, 50, 51, 99)), params=params)
-    assert [place.keyframe_id for place in index.query(_seen(100, 100, CUP))] == [1, 50, 99, 2, 51]
+    assert [candidate.keyframe_id for candidate in index.query(_seen(100, 100, CUP))] == [1, 50, 99, 2, 51]
 
 
 def test_a_removed_keyframe_is_not_found_again() -> None:
     index = _index(_seen(1, 0, CUP), _seen(2, 10, CUP, BOOK))
     index.remove([2])
-    assert len(index) == 1 and [place.keyframe_id for place in index.query(_seen(9, 100, CUP, BOOK))] == [1]
+    assert len(index) == 1 and [candidate.keyframe_id for candidate in index.query(_seen(9, 100, CUP, BOOK))] == [1]
 
 
 def test_many_objects_give_the_same_answer_in_any_growth_of_the_index() -> None:

@@ -18,7 +18,7 @@ from std_srvs.srv import Trigger
 
 from objreg_ros.bridge.diagnostics import refusal_of
 from objreg_ros.data import Reason, Rejected
-from objreg_ros.keyframes.keyframer import Stretch
+from objreg_ros.keyframes.keyframer import FrameWindow
 from objreg_ros.memory.store import Store
 from objreg_ros.registrar.node import Job, RegistrarNode
 from objreg_ros.registrar.registrar import Outcome
@@ -66,9 +66,9 @@ def call(node: RegistrarNode, service: str) -> Any:
 def test_a_store_that_is_locked_refuses_a_reset_and_keeps_what_waits(make: Making, tmp_path: Path) -> None:
     node = make()
     node._registrar.track(frame(0, CUP))
-    stretch = node._registrar.end()
-    assert stretch is not None
-    node._registrar.search(stretch)
+    window = node._registrar.end()
+    assert window is not None
+    node._registrar.search(window)
     with held(tmp_path / "place.db"):
         answer, _ = call(node, "reset")
         assert not answer.success and "place.db: cannot forget everything" in answer.message
@@ -119,18 +119,18 @@ def test_the_keyframe_that_a_save_ends_comes_after_those_that_wait(
     node, stored = make(), []
     search = node._registrar.search
 
-    def slow(stretch: Stretch, seconds: float, hurried: Callable[[], bool]) -> Outcome:
+    def slow(window: FrameWindow, seconds: float, hurried: Callable[[], bool]) -> Outcome:
         time.sleep(0.2)
-        stored.append(stretch.frames[0].stamp_ns // SECOND)
-        return search(stretch, seconds, hurried)
+        stored.append(window.frames[0].stamp_ns // SECOND)
+        return search(window, seconds, hurried)
 
     monkeypatch.setattr(node._registrar, "search", slow)
     for seconds in (0, 10):
         node._registrar.track(frame(seconds, CUP))
-        stretch = node._registrar.end()
-        assert stretch is not None
+        window = node._registrar.end()
+        assert window is not None
         node.accept(seconds * SECOND)
-        node.searcher.put(Job(seconds * SECOND, stretch, time.monotonic()))
+        node.searcher.put(Job(seconds * SECOND, window, time.monotonic()))
     node._registrar.track(frame(20, CUP))
     answer, _ = call(node, "save")
     assert answer.success and stored == [0, 10, 20]
@@ -205,12 +205,12 @@ def test_a_keyframe_that_cannot_be_stored_is_not_in_the_way_of_the_next(
     stored.close()
 
 
-def stretch_at(node: RegistrarNode, seconds: int) -> Stretch:
+def window_at(node: RegistrarNode, seconds: int) -> FrameWindow:
     node._registrar.track(frame(seconds, CUP))
-    stretch = node._registrar.end()
-    assert stretch is not None
+    window = node._registrar.end()
+    assert window is not None
     node.accept(seconds * SECOND)
-    return stretch
+    return window
 
 
 def test_keyframes_that_wait_behind_a_long_search_are_bounded_and_stored_in_the_order_of_their_stamps(
@@ -219,18 +219,18 @@ def test_keyframes_that_wait_behind_a_long_search_are_bounded_and_stored_in_the_
     node, said = make(), list[str]()
     node.throttled._write = said.append
     waiting, begun = list[int](), threading.Event()
-    try_places = node._registrar._try_places
+    try_candidates = node._registrar._try_candidates
 
     def try_for_long(*arguments: Any) -> Any:
         begun.set()
         search = arguments[2]
         while search.budget.deadline > time.monotonic() and not search.budget.hurried():
             time.sleep(0.005)
-        return try_places(*arguments)
+        return try_candidates(*arguments)
 
-    monkeypatch.setattr(node._registrar, "_try_places", try_for_long)
+    monkeypatch.setattr(node._registrar, "_try_candidates", try_for_long)
     for k in range(30):
-        node.searcher.put(Job(10 * k * SECOND, stretch_at(node, 10 * k), time.monotonic()))
+        node.searcher.put(Job(10 * k * SECOND, window_at(node, 10 * k), time.monotonic()))
         waiting.append(len(node.searcher))
         assert begun.wait(10.0)
     node.close()
@@ -247,19 +247,19 @@ def test_a_node_ends_at_once_in_the_middle_of_a_search_and_stores_everything(
     node, begun, hurried = make(), threading.Event(), list[bool]()
     search = node._registrar.search
 
-    def search_for_ever(stretch: Stretch, seconds: float, hurry: Callable[[], bool] = lambda: False) -> Outcome:
+    def search_for_ever(window: FrameWindow, seconds: float, hurry: Callable[[], bool] = lambda: False) -> Outcome:
         begun.set()
         deadline = time.monotonic() + 20.0
         while seconds and not hurry() and time.monotonic() < deadline:
             time.sleep(0.005)
         hurried.append(hurry())
-        return search(stretch, seconds, hurry)
+        return search(window, seconds, hurry)
 
     monkeypatch.setattr(node._registrar, "search", search_for_ever)
-    node.searcher.put(Job(0, stretch_at(node, 0), time.monotonic()))
+    node.searcher.put(Job(0, window_at(node, 0), time.monotonic()))
     assert begun.wait(10.0)
     for k in (10, 20):
-        node.searcher.put(Job(k * SECOND, stretch_at(node, k), time.monotonic()))
+        node.searcher.put(Job(k * SECOND, window_at(node, k), time.monotonic()))
     node._registrar.track(frame(30, CUP))
     node.close()
     assert hurried[0]

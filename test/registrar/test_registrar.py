@@ -120,9 +120,9 @@ def test_a_search_without_time_refuses_as_over_budget_and_remembers_the_keyframe
     registrar = Registrar(PARAMS)
     _run(registrar, _frame(0, HERE))
     assert registrar.track(_frame(30, BESIDE)) is None
-    stretch = registrar.track(_frame(60, AWAY))
-    assert stretch is not None
-    outcome = registrar.search(stretch, seconds=0.0)
+    window = registrar.track(_frame(60, AWAY))
+    assert window is not None
+    outcome = registrar.search(window, seconds=0.0)
     assert [r.reason for r in outcome.rejected] == [Reason.OVER_BUDGET] and outcome.closures == ()
     assert registrar.counts()["keyframes"] == 2
 
@@ -134,10 +134,10 @@ def test_a_search_that_is_hurried_tries_no_further_place_and_remembers_the_keyfr
         registrar = Registrar(PARAMS.replaced(threads=1, closures=4))
         _run(registrar, *frames)
         registrar.track(last)
-        stretch = registrar.end()
-        assert stretch is not None
+        window = registrar.end()
+        assert window is not None
         asked: list[None] = []
-        outcome = registrar.search(stretch, hurried=lambda: asked.append(None) or len(asked) > most)  # noqa: B023
+        outcome = registrar.search(window, hurried=lambda: asked.append(None) or len(asked) > most)  # noqa: B023
         tried = [r for r in outcome.rejected if r.reason not in (Reason.OVER_BUDGET, Reason.REDUNDANT)]
         assert len(outcome.closures) + len(tried) == most
         assert any(r.reason is Reason.OVER_BUDGET and "cut short" in r.detail for r in outcome.rejected)
@@ -205,7 +205,7 @@ def test_a_closure_names_each_label_once_and_the_farthest_of_several_that_moved(
     pairs = [ObjectPair(k, k, "cup") for k in range(4)]
     sightings = [seen.of_landmark(number, np.eye(3)) for number, seen in enumerate(sightings_of(here), 7)]
     accepted: Any = SimpleNamespace(
-        target=replace(there, frame_id="front"), candidate=candidate(explained=pairs[:2], moved=pairs[2:])
+        target=replace(there, frame_id="front"), candidate=candidate(matched=pairs[:2], moved=pairs[2:])
     )
     closure = closure_of(here, sightings, accepted, PARAMS)
     assert closure.labels == ("cup",) and [match.object_id for match in closure.matches] == [7, 8]
@@ -220,7 +220,7 @@ def test_a_link_turns_what_is_here_into_the_frame_of_the_session_there() -> None
     registrar, there = Registrar(PARAMS), keyframe(1, T_odom_camera=there_camera)
     (known,) = sightings_of(there)
     registrar._store.add(there, [known.of_landmark(7, np.eye(3))])
-    accepted: Any = SimpleNamespace(target=there, candidate=candidate(T, explained=(ObjectPair(0, 0, "cup"),)))
+    accepted: Any = SimpleNamespace(target=there, candidate=candidate(T, matched=(ObjectPair(0, 0, "cup"),)))
     (link,) = registrar._links(keyframe(2, 30.0, T_odom_camera=here_camera), accepted)
     assert (link.index, link.of.landmark) == (0, 7)
     np.testing.assert_allclose(
@@ -270,9 +270,9 @@ def refuse(*_: object) -> None:
 def test_a_keyframe_of_before_a_reset_is_not_stored_after_it() -> None:
     registrar = Registrar(PARAMS)
     registrar.track(_frame(0, HERE, True))
-    stretch = registrar.end()
+    window = registrar.end()
     registrar.reset()
-    assert stretch is not None and registrar.search(stretch).keyframe_ns is None
+    assert window is not None and registrar.search(window).keyframe_ns is None
     _run(registrar, _frame(10, HERE, True))
     assert registrar.counts()["keyframes"] == 1
 

@@ -109,17 +109,17 @@ def candidate(T: Array | None = None, **evidence: object) -> Candidate:
         overlap=0.7,
         rmse=0.01,
         converged=bool(evidence.pop("converged", True)),
-        slack=evidence.pop("slack", np.zeros((0, 6))),
-        held=evidence.pop("held", np.zeros((0, 6))),
+        degenerate=evidence.pop("degenerate", np.zeros((0, 6))),
+        regularised=evidence.pop("regularised", np.zeros((0, 6))),
         middle=evidence.pop("middle", np.zeros(3)),
     )
     rest: dict[str, object] = {
-        "chain": "objects",
-        "agreeing_chains": ("features", "objects"),
-        "explained": (ObjectPair(0, 0, "cup"), ObjectPair(1, 1, "book")),
+        "proposer": "objects",
+        "agreeing_proposers": ("features", "objects"),
+        "matched": (ObjectPair(0, 0, "cup"), ObjectPair(1, 1, "book")),
         "gravity_error_deg": 0.5,
-        "floating": 0.0,
-        "likeness_nearby": evidence.get("likeness"),
+        "certain_violations": 0.0,
+        "silhouette_score_nearby": evidence.get("silhouette_score"),
     }
     rest.update(evidence)
     return Candidate(alignment=alignment, verification=Verification(**seen), **rest)

@@ -15,7 +15,7 @@ def bare() -> Candidate:
     """What views say well of, and nothing else is known of."""
     full = candidate()
     return Candidate(
-        alignment=full.alignment, chain="features", agreeing_chains=("features",), verification=full.verification
+        alignment=full.alignment, proposer="features", agreeing_proposers=("features",), verification=full.verification
     )
 
 
@@ -30,15 +30,17 @@ def test_a_candidate_of_which_only_the_views_speak_well_is_refused() -> None:
 
 def test_what_is_not_known_of_a_candidate_does_not_speak_for_it() -> None:
     one = bare()
-    assert one.explained == one.moved == ()
-    assert one.gravity_error_deg is one.likeness is one.likeness_nearby is one.resistance is None
-    assert (one.yaw_known, one.margin, one.floating) == (False, 0.0, 1.0)
+    assert one.matched == one.moved == ()
+    assert (
+        one.gravity_error_deg is one.silhouette_score is one.silhouette_score_nearby is one.perturbation_margin is None
+    )
+    assert (one.yaw_known, one.margin_over_competing, one.certain_violations) == (False, 0.0, 1.0)
 
 
 def test_no_two_candidates_share_the_covariance_that_a_warp_adds() -> None:
     one, other = bare(), bare()
-    one.warp[0, 0] = 1.0
-    assert one.warp.shape == (6, 6) and not other.warp.any()
+    one.systematic_depth_error[0, 0] = 1.0
+    assert one.systematic_depth_error.shape == (6, 6) and not other.systematic_depth_error.any()
 
 
 def test_a_pair_of_objects_names_the_source_first() -> None:

@@ -15,7 +15,7 @@ from objreg_ros.geometry import inverse, pose_error, rotation_from_vector
 from objreg_ros.registration import engine as engine_module
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.certainty.covariance import spread_of
-from objreg_ros.registration.engine import Engine, held
+from objreg_ros.registration.engine import Engine, without_degeneracy
 from objreg_ros.registration.keyframe import Context, Keyframe
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.propose.shortlist import Shortlist
@@ -63,51 +63,54 @@ def test_a_pose_is_brought_to_where_gravity_is_kept_as_far_as_that_is_known() ->
 def test_what_is_told_besides_makes_the_whole_covariance_smaller_and_leaves_a_covariance_of_the_warp(
     engine: Engine,
 ) -> None:
-    warp, added = np.diag([0.04, 0.01, 0.0, 0.0, 0.0, 0.02]), np.diag([100.0, 0.0, 0.0, 0.0, 400.0, 0.0])
-    doubtful = candidate(information=1e3 * np.eye(6), warp=warp)
+    systematic_depth_error, added = (
+        np.diag([0.04, 0.01, 0.0, 0.0, 0.0, 0.02]),
+        np.diag([100.0, 0.0, 0.0, 0.0, 400.0, 0.0]),
+    )
+    doubtful = candidate(information=1e3 * np.eye(6), systematic_depth_error=systematic_depth_error)
     alone = spread_of(doubtful.alignment, PARAMS)
     informed = engine._informed(doubtful, added)
     assert np.array_equal(informed.alignment.information, doubtful.alignment.information + added)
-    whole = np.linalg.inv(np.linalg.inv(alone) + added) + informed.warp
-    np.testing.assert_allclose(whole, np.linalg.inv(np.linalg.inv(alone + warp) + added), atol=1e-12)
-    assert np.linalg.eigvalsh(informed.warp).min() > -1e-12
+    whole = np.linalg.inv(np.linalg.inv(alone) + added) + informed.systematic_depth_error
+    np.testing.assert_allclose(whole, np.linalg.inv(np.linalg.inv(alone + systematic_depth_error) + added), atol=1e-12)
+    assert np.linalg.eigvalsh(informed.systematic_depth_error).min() > -1e-12
 
 
-def test_a_pose_is_steadied_where_it_was_pushed_and_does_not_slide(
+def test_a_pose_is_regularised_where_it_was_perturbed_and_does_not_slide(
     engine: Engine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(engine_module, "steadied", lambda *_: 100.0 * np.eye(6))
+    monkeypatch.setattr(engine_module, "regularising_information", lambda *_: 100.0 * np.eye(6))
     pair: Any = SimpleNamespace(source=None, target=None)
     for one, more in (
-        (candidate(resistance=0.3), 100.0),
-        (candidate(resistance=None), 0.0),
-        (candidate(resistance=0.3, slack=np.eye(6)[:1]), 0.0),
+        (candidate(perturbation_margin=0.3), 100.0),
+        (candidate(perturbation_margin=None), 0.0),
+        (candidate(perturbation_margin=0.3, degenerate=np.eye(6)[:1]), 0.0),
     ):
-        added = engine._steadied(pair, one).alignment.information - one.alignment.information
+        added = engine._regularised(pair, one).alignment.information - one.alignment.information
         np.testing.assert_allclose(added, more * np.eye(6), atol=1e-9)
 
 
-def test_what_else_a_lone_objects_pose_could_be_is_a_rival_unless_it_comes_to_one_that_is_known(
+def test_what_else_a_lone_objects_pose_could_be_is_a_competitor_unless_it_comes_to_one_that_is_known(
     engine: Engine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    known = [candidate(moved(x), explained=(ObjectPair(0, 0, "cup"),)) for x in (0.0, 1.0)]
+    known = [candidate(moved(x), matched=(ObjectPair(0, 0, "cup"),)) for x in (0.0, 1.0)]
     others = {0.0: [moved(0.5), moved(0.1)], 1.0: [moved(-0.1), moved(1.5)]}
-    monkeypatch.setattr(engine_module, "alternatives", lambda s, t, one, p: others[one.T_target_source[0, 3]])
+    monkeypatch.setattr(engine_module, "competing_poses", lambda s, t, one, p: others[one.T_target_source[0, 3]])
     monkeypatch.setattr(engine_module, "refine", lambda s, t, T, p: candidate(T).alignment)
-    monkeypatch.setattr(engine, "_gathered", lambda pair, found, chains: (found.T_target_source[0, 3], chains))
+    monkeypatch.setattr(engine, "_gathered", lambda pair, found, proposers: (found.T_target_source[0, 3], proposers))
     pair: Any = SimpleNamespace(source=SimpleNamespace(middle=np.zeros(3)), target=None)
-    assert engine._rivals(pair, known) == [(0.5, ("objects",)), (1.5, ("objects",))]
-    assert engine._rivals(pair, []) == []
+    assert engine._competitors(pair, known) == [(0.5, ("objects",)), (1.5, ("objects",))]
+    assert engine._competitors(pair, []) == []
 
 
-@pytest.mark.parametrize(("yaw_known", "likeness", "left"), [(True, 1.0, 0), (False, 1.0, 1), (True, -1.0, 1)])
-def test_an_object_that_tells_its_yaw_and_looks_alike_takes_away_the_slack(
-    yaw_known: bool, likeness: float, left: int
+@pytest.mark.parametrize(("yaw_known", "silhouette_score", "left"), [(True, 1.0, 0), (False, 1.0, 1), (True, -1.0, 1)])
+def test_an_object_that_tells_its_yaw_and_looks_alike_takes_away_the_degenerate_direction(
+    yaw_known: bool, silhouette_score: float, left: int
 ) -> None:
-    one = candidate(yaw_known=yaw_known, likeness=likeness, slack=np.eye(6)[:1])
+    one = candidate(yaw_known=yaw_known, silhouette_score=silhouette_score, degenerate=np.eye(6)[:1])
     engine = Engine(PARAMS, score=lambda *_: one)
     pair: Any = SimpleNamespace(source=None, target=None)
-    assert len(engine._gathered(pair, one.alignment, ("objects",)).alignment.slack) == left
+    assert len(engine._gathered(pair, one.alignment, ("objects",)).alignment.degenerate) == left
 
 
 def test_a_proposer_of_ones_own_is_asked_instead_of_ours() -> None:
@@ -121,31 +124,31 @@ def test_a_proposer_of_ones_own_is_asked_instead_of_ours() -> None:
     assert Engine(PARAMS, propose=none).propose(*pair) == () and asked == [None]
 
 
-def test_a_pose_that_one_chain_came_to_does_not_become_two_chains_by_what_is_found_about_it() -> None:
+def test_a_pose_that_one_proposer_came_to_does_not_become_two_proposers_by_what_is_found_about_it() -> None:
     lone = tuple(box for box in ROOM if box[0] not in ("book", "cup", "keyboard"))
     source, target = keyframe(seen_from(0.0), lone, seed=1), keyframe(seen_from(20.0), lone, seed=2)
     with_search, without = (
         Engine(PARAMS.replaced(searched_around=n)).propose(source, target) for n in (PARAMS.searched_around, 0)
     )
-    assert with_search[0].agreeing_chains == without[0].agreeing_chains
+    assert with_search[0].agreeing_proposers == without[0].agreeing_proposers
     assert np.array_equal(with_search[0].T_target_source, without[0].T_target_source)
 
 
-def test_the_rivals_of_promising_candidates_are_ranked_with_them(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_competitors_of_promising_candidates_are_ranked_with_them(monkeypatch: pytest.MonkeyPatch) -> None:
     engine, asked = Engine(PARAMS), []
-    rival = candidate(moved(0.0, 0.0, 3.0), score=9.0)
-    monkeypatch.setattr(engine, "_rivals", lambda pair, promising: asked.extend(promising) or [rival])
-    monkeypatch.setattr(engine, "_pushed", lambda pair, one: one)
-    monkeypatch.setattr(engine, "_levelled", lambda pair, one: one)
+    competitor = candidate(moved(0.0, 0.0, 3.0), score=9.0)
+    monkeypatch.setattr(engine, "_competitors", lambda pair, promising: asked.extend(promising) or [competitor])
+    monkeypatch.setattr(engine, "_perturbed", lambda pair, one: one)
+    monkeypatch.setattr(engine, "_gravity_updated", lambda pair, one: one)
     found = engine.propose(keyframe(seen_from(0.0), seed=1), keyframe(seen_from(20.0), seed=2))
-    assert np.array_equal(found[0].T_target_source, rival.T_target_source) and len(found) > 1
+    assert np.array_equal(found[0].T_target_source, competitor.T_target_source) and len(found) > 1
     least = max(PARAMS.min_score, max(one.verification.score for one in asked) - PARAMS.rival_margin)
     assert asked and all(one.verification.score >= least for one in asked)
-    assert found[0].margin < 9.0  # another one is known
+    assert found[0].margin_over_competing < 9.0  # another one is known
 
 
-def test_what_is_held_has_no_slack_at_all() -> None:
-    assert held(candidate(slack=np.eye(6)[:2]).alignment).slack.shape == (0, 6)
+def test_what_is_held_has_no_degenerate_direction_at_all() -> None:
+    assert without_degeneracy(candidate(degenerate=np.eye(6)[:2]).alignment).degenerate.shape == (0, 6)
 
 
 def gravity_error(T_target_source: np.ndarray, source: Keyframe, target: Keyframe) -> float:
@@ -153,9 +156,9 @@ def gravity_error(T_target_source: np.ndarray, source: Keyframe, target: Keyfram
     return float(np.degrees(np.arccos(np.clip(T_target_source[:3, :3] @ source.gravity @ target.gravity, -1.0, 1.0))))
 
 
-def test_objects_that_stand_still_are_explained(engine: Engine) -> None:
+def test_objects_that_stand_still_are_matched(engine: Engine) -> None:
     best = engine.propose(keyframe(seen_from(0.0), seed=1), keyframe(seen_from(20.0), seed=2))[0]
-    assert {pair.label for pair in best.explained} >= {"book", "cup", "bottle"}
+    assert {pair.label for pair in best.matched} >= {"book", "cup", "bottle"}
     assert best.moved == ()
 
 
@@ -167,11 +170,11 @@ def test_an_object_that_moved_is_reported_and_outvoted(engine: Engine) -> None:
     assert [pair.label for pair in best.moved] == ["bottle"]
 
 
-def test_a_prior_is_a_chain_of_its_own(engine: Engine) -> None:
+def test_a_prior_is_a_proposer_of_its_own(engine: Engine) -> None:
     source, target = keyframe(seen_from(0.0), seed=1), keyframe(seen_from(15.0), seed=2)
     truth = inverse(seen_from(15.0)) @ seen_from(0.0)
     best = engine.propose(source, target, truth)[0]
-    assert "odometry" in best.agreeing_chains and len(best.agreeing_chains) >= 2
+    assert "odometry" in best.agreeing_proposers and len(best.agreeing_proposers) >= 2
 
 
 def test_the_same_keyframes_give_the_same_candidates() -> None:
@@ -201,7 +204,7 @@ def test_an_empty_keyframe_proposes_nothing(engine: Engine) -> None:
 
 
 def test_what_is_small_counts_too(engine: Engine) -> None:
-    prepared = engine._pantry.get(keyframe(seen_from(0.0), seed=1))
+    prepared = engine._cache.get(keyframe(seen_from(0.0), seed=1))
     cup = next(item.cloud.xyz for item in prepared.keyframe.objects if item.label == "cup")
     near = np.linalg.norm(prepared.xyz[:, None] - cup[None, ::4], axis=-1).min(axis=1) < 0.02
     assert near.sum() >= 5

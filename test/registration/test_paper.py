@@ -99,6 +99,6 @@ def test_it_proposes_one_pose_for_each_pair_of_one_label_with_the_evidence_of_th
     source, target = replace(source, keyframe_id=1), replace(target, keyframe_id=2)
     found = PaperEngine(PARAMS).propose(source, target)
     assert 1 <= len(found) <= len(target.objects)
-    assert {candidate.chain for candidate in found} == {"paper"}
+    assert {candidate.proposer for candidate in found} == {"paper"}
     scores = [candidate.verification.score for candidate in found]
     assert scores == sorted(scores, reverse=True)

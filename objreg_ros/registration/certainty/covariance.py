@@ -2,10 +2,10 @@
 """How wrong an accepted pose may be.
 
 The inverse information of a registration is scaled, floored, and opened along directions that the data leave free, each
-by a parameter. The less the views like a pose, and the more its residuals are, the less they know of what is wrong with
-it: so much larger is the scale. What no residual shows comes on top: a camera whose lens or depth is not quite as its
-calibration says measures every motion wrong by a share of it. config/covariance.yaml says how the parameters were
-calibrated.
+by a parameter. The lower the view score of a pose, and the larger its residuals are, the less they know of what is
+wrong with it: so much larger is the scale. What no residual shows comes on top: a camera whose lens or depth is not
+quite as its calibration says measures every motion wrong by a share of it. config/covariance.yaml says how the
+parameters were calibrated.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ def spread_of(alignment: Alignment, params: RegistrarParams, scale: float = 1.0)
     What is decided is decided by the registration as it is, of ``scale`` 1.
     """
     C = scale * _inverse(alignment.information) + _floor(params)
-    for direction in alignment.slack:
+    for direction in alignment.degenerate:
         C = C + _opened(direction, params)
-    C = C + alignment.held.T @ alignment.held
+    C = C + alignment.regularised.T @ alignment.regularised
     return np.asarray((C + C.T) / 2.0)
 
 

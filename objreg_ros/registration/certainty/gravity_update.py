@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What gravity tells of a pose that surfaces and grey have found.
 
-Where depth is warped, two views of a floor tilt against each other, and a tilt of a degree is five centimetres over
-three metres. Gravity as a whole session felt it knows better. Both are weighed by their covariances: an update of
-Kalman, "A new approach to linear filtering and prediction problems", 1960.
+Where depth errs systematically, two views of a floor tilt against each other, and a tilt of a degree is five
+centimetres over three metres. Gravity as a whole session felt it knows better. Both are weighed by their covariances:
+an update of Kalman, "A new approach to linear filtering and prediction problems", 1960.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared
 
 
-class Step(NamedTuple):
+class GravityUpdate(NamedTuple):
     """A pose ``T (4, 4)`` nearer to where gravity is kept, and the ``information (6, 6)`` [t r] that gravity adds."""
 
     T: Array
     information: Array
 
 
-def levelling(
+def gravity_update(
     source: Prepared, target: Prepared, T_target_source: Array, C: Array, params: RegistrarParams
-) -> Step | None:
+) -> GravityUpdate | None:
     """The pose moved to where gravity is kept, as far as its covariance ``C (6, 6)`` [t r] leaves that open.
 
     None where one gravity is unknown.
@@ -41,4 +41,4 @@ def levelling(
     gain = C @ turns.T @ np.linalg.inv(turns @ C @ turns.T + variance * np.eye(3))
     step = gain @ (target.up - carried)
     moved = rotation_from_vector(step[3:]) @ T_target_source[:3, :3], T_target_source[:3, 3] + step[:3]
-    return Step(pose(*moved), turns.T @ turns / variance)
+    return GravityUpdate(pose(*moved), turns.T @ turns / variance)

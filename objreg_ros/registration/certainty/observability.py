@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far a pose may slide where the surfaces let it: as far as the views like it no less.
+"""How far a pose may slide where the surfaces let it: as far as its view score falls no lower.
 
-Two views of a table from opposite sides share little but its top, on which one can be pushed along the other. What
-stands on it resists, with too few points to count as surface; yet a pose that was pushed is seen to be worse. So a pose
-is pushed, and where both ways are clearly worse it is held by the views, to a third of the push. Where its position is
-known badly all the same, the views are asked for a better one about it, and then whether they resist it all around.
+Two views of a table from opposite sides share little but its top, on which one can slide along the other. What stands
+on it resists, with too few points to count as surface; yet a pose that was perturbed is seen to be worse. So a pose is
+perturbed, and where both ways are clearly worse it is held by the views, to a third of the perturbation. Where its
+position is known badly all the same, the views are asked for a better one about it, and then whether they resist it all
+around.
 """
 
 from __future__ import annotations
@@ -14,93 +15,103 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import transform
-from objreg_ros.registration.certainty.perturbation import Stand, pushed, square, turned_about
+from objreg_ros.registration.certainty.perturbation import PerturbedScore, perturbed, square_grid, turned_about
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.registration.refine.photometric_icp import finish
-from objreg_ros.registration.score.comparison import gain, liked
-from objreg_ros.registration.score.object_matches import explain
+from objreg_ros.registration.score.comparison import score_gain, score_locally
+from objreg_ros.registration.score.object_matches import match_objects
 from objreg_ros.registration.score.photometric import texture
-from objreg_ros.registration.score.view_score import rank, verify
+from objreg_ros.registration.score.view_score import score_views, verify
 
-HELD = 1.0 / 3.0  # of a push that is clearly resisted: one sigma of a pose that the views hold
-AROUND = 8  # ways in which a pose is pushed to see whether it is resisted
-CLEARLY = 0.02  # gain for which a pose is left for another
+SIGMA_SHARE = 1.0 / 3.0  # of a perturbation that is clearly resisted: one sigma of a pose that the views hold
+AROUND = 8  # ways in which a pose is perturbed to see whether it is resisted
+CLEARLY = 0.02  # gain in score for which a pose is left for another
 HOPE = 0.3  # of V, what grey may add to a pose by finishing it
 
 
-def resisted(
-    source: Prepared, target: Prepared, T_target_source: Array, slack: Array, extent: float, params: RegistrarParams
+def split_directions(
+    source: Prepared,
+    target: Prepared,
+    T_target_source: Array,
+    degenerate: Array,
+    extent: float,
+    params: RegistrarParams,
 ) -> tuple[Array, Array]:
-    """Which of the ``slack`` directions (K, 6) are free, and the motions (L, 6) of one sigma along those that are held.
+    """The ``degenerate`` directions (K, 6) that are free, and motions (L, 6) of one sigma along the regularised ones.
 
     Directions and motions [t r] are of the source camera's pose in the target's axes. ``extent`` m is the lever that
-    makes a turn of what was seen comparable to a shift. All are free where the views do not like the pose itself.
+    makes a turn of what was seen comparable to a shift. All are free where the view score of the pose itself is too
+    low.
     """
-    free, held = [], []
+    free, regularised = [], []
     lever = transform(T_target_source, source.middle) - T_target_source[:3, 3]
-    stand = _stand(source, target, T_target_source, params) if len(slack) else None
-    for direction in slack:
+    perturbed_score = _perturbed_score(source, target, T_target_source, params) if len(degenerate) else None
+    for direction in degenerate:
         unit = direction / _length(direction, lever, extent)
-        reach = None if stand is None else _reach(stand, unit, params)
+        reach = None if perturbed_score is None else _reach(perturbed_score, unit, params)
         if reach is None:
             free.append(direction)
         else:
-            held.append(HELD * reach * unit)
-    return np.reshape(free, (-1, 6)), np.reshape(held, (-1, 6))
+            regularised.append(SIGMA_SHARE * reach * unit)
+    return np.reshape(free, (-1, 6)), np.reshape(regularised, (-1, 6))
 
 
-def _stand(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> Stand | None:
-    """Where a pose stands that the views like as the gate wants it; None for any other."""
+def _perturbed_score(
+    source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams
+) -> PerturbedScore | None:
+    """The perturbed score of a pose whose view score the gate accepts; None for any other."""
     seen = verify(source.sight, target.sight, T_target_source, params)
-    return Stand(source, target, T_target_source, params) if seen.score >= params.min_score else None
+    return PerturbedScore(source, target, T_target_source, params) if seen.score >= params.min_score else None
 
 
-def resistance(source: Prepared, target: Prepared, T_target_source: Array, C: Array, params: RegistrarParams) -> float:
-    """How much less the views like the pose, at least, when it is pushed any way where it is known least.
+def margin_under_perturbation(
+    source: Prepared, target: Prepared, T_target_source: Array, C: Array, params: RegistrarParams
+) -> float:
+    """The least score margin of the pose when it is perturbed any way where it is known least.
 
-    ``C (6, 6)`` [t r] is its covariance in the target's axes. In the plane in which it is largest the pose is pushed
+    ``C (6, 6)`` [t r] is its covariance in the target's axes. In the plane in which it is largest the pose is perturbed
     all around as far as the last of ``params.pushes``, the way that its errors go: a camera that looks at one far thing
     goes sideways and turns to keep looking at it.
     """
     angles = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
-    pushes = params.pushes[-1] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    return Stand(source, target, T_target_source, params).least_fall(pushes @ weakest(C))
+    perturbations = params.pushes[-1] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return PerturbedScore(source, target, T_target_source, params).least_margin(perturbations @ least_known_motions(C))
 
 
-def weakest(C: Array) -> Array:
+def least_known_motions(C: Array) -> Array:
     """The motions (2, 6) [t r] of 1 m along the directions in which a position of covariance (6, 6) is known least."""
     values, vectors = np.linalg.eigh(C[:3, :3])
     return np.asarray((C[:, :3] @ vectors[:, 1:] / values[1:]).T)
 
 
-def preferred(
+def better_pose(
     source: Prepared, target: Prepared, T_target_source: Array, C: Array, params: RegistrarParams
 ) -> Array | None:
-    """A pose that views and objects like better where one of covariance ``C (6, 6)`` could as well be, or None.
+    """A pose of a better score of views and objects where one of covariance ``C (6, 6)`` could as well be, or None.
 
     Far away a shift looks like a turn, and what repeats itself looks alike on either side of the truth: a pose may come
-    to rest beside it. So the views are asked all over the plane in which the position is known least, and what they
-    like there, aside from the pose itself, is finished by grey; and so is the pose turned about the objects, which is
+    to rest beside it. So the views are asked all over the plane in which the position is known least, and what scores
+    best there, aside from the pose itself, is finished by grey; and so is the pose turned about the objects, which is
     taken as it is too, as grey leads astray where it says little. The objects have a say as far as the grey leaves
-    doubt (`comparison`), as views of little in common like a wrong pose a hair better. Nothing is preferred without
+    doubt (`comparison`), as views of little in common score a wrong pose a hair higher. Nothing is preferred without
     grey, nor to a pose beyond what grey may mend.
     """
     if not (source.sight.textured and target.sight.textured):
         return None
-    explained, _ = explain(source, target, T_target_source, params)
-    own = liked(source, target, T_target_source, explained, params)
+    matched, _ = match_objects(source, target, T_target_source, params)
+    own = score_locally(source, target, T_target_source, matched, params)
     if own.seen.score < params.min_score - 2.0 * HOPE:
         return None
-    poses = pushed(T_target_source, square(params.search_step, params.search_steps) @ weakest(C))
-    V = rank(source.sight, target.sight, poses, params, params.quick_sample).astype(np.float32)
-    best, liking = None, own
+    poses = perturbed(T_target_source, square_grid(params.search_step, params.search_steps) @ least_known_motions(C))
+    V = score_views(source.sight, target.sight, poses, params, params.quick_sample).astype(np.float32)
+    best, best_score = None, own
     peaks = poses[_peaks(V, 2 * params.search_steps + 1)[: params.searched]]
     turned = _turned(source, target, T_target_source, params)
     for T in (*turned, *(finish(source, target, start, params)[0] for start in (*peaks, *turned))):
-        found = liked(source, target, T, explained, params)
-        if gain(found, own, params) > CLEARLY and gain(found, liking, params) > 0.0:
-            best, liking = T, found
+        found = score_locally(source, target, T, matched, params)
+        if score_gain(found, own, params) > CLEARLY and score_gain(found, best_score, params) > 0.0:
+            best, best_score = T, found
     return best
 
 
@@ -121,45 +132,47 @@ def _peaks(V: Array, width: int) -> list[int]:
     return [int(k) for k in np.argsort(-V, kind="stable") if peaks.ravel()[k]]
 
 
-def steadied(source: Prepared, target: Prepared, T_target_source: Array, C: Array, params: RegistrarParams) -> Array:
+def regularising_information(
+    source: Prepared, target: Prepared, T_target_source: Array, C: Array, params: RegistrarParams
+) -> Array:
     """The information (6, 6) that the views add to a pose of covariance ``C (6, 6)``.
 
-    What two views of a table share may hold next to nothing across it by its shape, and everything by its print. So
-    the position is pushed where it is known least, and where the views clearly resist it is held there; then where it
-    is known least after that. Nothing is added for grey that hardly correlates.
+    What two views of a table share may hold next to nothing across it by its shape, and everything by its print. So the
+    position is perturbed where it is known least, and where the views clearly resist it is held there; then where it is
+    known least after that. Nothing is added for grey that hardly correlates.
     """
     known, added = np.linalg.inv(C), np.zeros((6, 6))
     if not (source.sight.textured and target.sight.textured):
         return added
     if texture(source.sight, target.sight, T_target_source, params) < params.steadying_texture:
         return added
-    stand, left = Stand(source, target, T_target_source, params), np.eye(3)
+    perturbed_score, left = PerturbedScore(source, target, T_target_source, params), np.eye(3)
     for _ in range(3):  # every way once: the views say the same of it again
         spread = np.linalg.inv(known + added)
         values, vectors = np.linalg.eigh(left @ spread[:3, :3] @ left)
         if values[-1] <= params.doubtful_sigma**2:
             break
         across = vectors[:, -1]
-        reach = _clear(stand, spread[:, :3] @ across / values[-1], params)
+        reach = _clear(perturbed_score, spread[:, :3] @ across / values[-1], params)
         if reach is None or reach > params.steadying_push:
             break
-        added[:3, :3] += np.outer(across, across) / (HELD * reach) ** 2
+        added[:3, :3] += np.outer(across, across) / (SIGMA_SHARE * reach) ** 2
         left -= np.outer(across, across)
     return added
 
 
-def _clear(stand: Stand, motion: Array, params: RegistrarParams) -> float | None:
-    """The least push in m along a motion that the views like clearly less, either way, between those that are tried.
+def _clear(perturbed_score: PerturbedScore, motion: Array, params: RegistrarParams) -> float | None:
+    """The least perturbation in m along a motion with a clear score margin, either way, between those that are tried.
 
     None where there is none.
     """
-    last_push, last_drop = 0.0, 0.0
-    for push in params.pushes:
-        drop = stand.fall(push * motion)
-        if drop >= params.rival_margin:
-            between = (last_push, push) if last_push > 0.0 else (push, push)
-            return float(np.interp(params.rival_margin, (last_drop, drop), between))
-        last_push, last_drop = push, max(0.0, drop)
+    last_distance, last_margin = 0.0, 0.0
+    for distance in params.pushes:
+        margin = perturbed_score.margin(distance * motion)
+        if margin >= params.rival_margin:
+            between = (last_distance, distance) if last_distance > 0.0 else (distance, distance)
+            return float(np.interp(params.rival_margin, (last_margin, margin), between))
+        last_distance, last_margin = distance, max(0.0, margin)
     return None
 
 
@@ -169,6 +182,8 @@ def _length(direction: Array, lever: Array, extent: float) -> float:
     return float(np.hypot(np.linalg.norm(shift), np.linalg.norm(turn) * extent))
 
 
-def _reach(stand: Stand, unit: Array, params: RegistrarParams) -> float | None:
-    """The least push in m that the views like clearly less, either way; None where there is none."""
-    return next((push for push in params.pushes if stand.fall(push * unit) >= params.rival_margin), None)
+def _reach(perturbed_score: PerturbedScore, unit: Array, params: RegistrarParams) -> float | None:
+    """The least perturbation in m with a clear score margin, either way; None where there is none."""
+    return next(
+        (distance for distance in params.pushes if perturbed_score.margin(distance * unit) >= params.rival_margin), None
+    )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the views think of a pose that is pushed: by how much they like it less."""
+"""The view score of a perturbed pose: by how much it is below that of the pose."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from objreg_ros.data import Array
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared
-from objreg_ros.registration.score.view_score import looks, rate, rate_sharply
+from objreg_ros.registration.score.view_score import count_both_ways, score_counts, score_sharply
 
 
-class Stand:
-    """Where a pose stands: ``score`` is V of itself, and it falls when the pose is pushed.
+class PerturbedScore:
+    """A pose and how its view score falls when it is perturbed: ``score`` is V of itself.
 
     A motion [t r] is of the source camera's pose in the target's axes. A fall is that of whichever grey tells more: in
     the images' own bands, or with one view laid into the other's image.
@@ -26,17 +26,17 @@ class Stand:
         (self._quick,), (ways,) = self._seen(T_target_source[None])
         self.score = self._sharp(T_target_source, ways, self._quick)
 
-    def fall(self, motion: Array) -> float:
-        """How much less the views like the pose after a motion either way, the way that they like more."""
-        return self.least_fall(np.array([-motion, motion]))
+    def margin(self, motion: Array) -> float:
+        """The score margin of the pose over itself after a motion either way, the way of the higher score."""
+        return self.least_margin(np.array([-motion, motion]))
 
-    def least_fall(self, motions: Array) -> float:
-        """How much less the views like the pose after that of the motions (K, 6) that they like most.
+    def least_margin(self, motions: Array) -> float:
+        """The score margin of the pose over itself after that of the motions (K, 6) of the highest score.
 
         A look at the grey of both in one image takes ten times as long as the other, so where that one finds a larger
         fall than there is elsewhere it is spared.
         """
-        poses = pushed(self._T_target_source, motions)
+        poses = perturbed(self._T_target_source, motions)
         quick, ways = self._seen(poses)
         least = np.inf
         for k in np.argsort(-quick):
@@ -49,17 +49,17 @@ class Stand:
     def _seen(self, T_target_source: Array) -> tuple[Array, list[tuple[Array, Array]]]:
         """V (K,) of poses (K, 4, 4) with the grey of each image's own band, and what was counted at each."""
         sample = self._params.grey_points
-        ways = looks(*self._sights, T_target_source, self._params, sample)
-        return rate(*self._sights, *ways, sample), list(zip(*ways, strict=True))
+        ways = count_both_ways(*self._sights, T_target_source, self._params, sample)
+        return score_counts(*self._sights, *ways, sample), list(zip(*ways, strict=True))
 
     def _sharp(self, T_target_source: Array, ways: tuple[Array, Array], quick: float) -> float:
         """V of a pose (4, 4) with the grey of both in one image; the ``quick`` one of views without grey."""
         if not all(sight.textured for sight in self._sights):
             return float(quick)
-        return rate_sharply(*self._sights, T_target_source, ways, self._params, self._params.grey_points)
+        return score_sharply(*self._sights, T_target_source, ways, self._params, self._params.grey_points)
 
 
-def pushed(T_target_source: Array, motions: Array) -> Array:
+def perturbed(T_target_source: Array, motions: Array) -> Array:
     """The poses (..., 4, 4) that a pose (4, 4) becomes by motions [t r] (..., 6)."""
     R, t = T_target_source[:3, :3], T_target_source[:3, 3]
     return pose(rotation_from_vector(motions[..., 3:]) @ R, t + motions[..., :3])
@@ -74,7 +74,7 @@ def turned_about(T_target_source: Array, middle: Array, up: Array, turns: Array)
     return np.asarray(pose(R, middle - R @ middle) @ T_target_source)
 
 
-def square(step: float, steps: int) -> Array:
+def square_grid(step: float, steps: int) -> Array:
     """The places (K, 2) m of a square of so many ``steps`` each way, row by row, its middle in the middle."""
     ticks = step * np.arange(-steps, steps + 1)
     return np.stack(np.meshgrid(ticks, ticks), axis=-1).reshape(-1, 2)

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """How well the surfaces hold a pose, by how much their patches contradict each other there.
 
-Points of one patch err together: depth that is warped moves whole surfaces, and counting its points as independent is
-what makes the covariance of an ICP over-confident. So each patch speaks once, with the sum of its residuals: the
-cluster-robust covariance H^-1 (sum of g g') H^-1 (White, "Maximum likelihood estimation of misspecified models", 1982;
-Liang and Zeger, "Longitudinal data analysis using generalized linear models", 1986), beside the usual H^-1. Points are
-weighed by the noise that a structured-light camera has at their depth.
+Points of one patch err together: depth that errs systematically moves whole surfaces, and counting its points as
+independent is what makes the covariance of an ICP over-confident. So each patch speaks once, with the sum of its
+residuals: the cluster-robust covariance H^-1 (sum of g g') H^-1 (White, "Maximum likelihood estimation of misspecified
+models", 1982; Liang and Zeger, "Longitudinal data analysis using generalized linear models", 1986), beside the usual
+H^-1. Points are weighed by the noise that a structured-light camera has at their depth.
 
 What two views share may be few patches, far away and on one side: then there is nothing to contradict, and a depth that
-is a little wrong there turns the camera about them and takes it far. `warped` says how far.
+is a little wrong there turns the camera about them and takes it far. `systematic_depth_error_of_step` says how far.
 """
 
 from __future__ import annotations
@@ -42,7 +42,9 @@ def information(xyz: Array, normals: Array, surface: Surface, T: Array, params: 
     return np.linalg.inv((C + C.T) / 2.0)
 
 
-def warped(xyz: Array, normals: Array, surface: Surface, T: Array, params: RegistrarParams) -> Array:
+def systematic_depth_error_of_step(
+    xyz: Array, normals: Array, surface: Surface, T: Array, params: RegistrarParams
+) -> Array:
     """The covariance (6, 6) of a left step [t r] of a pose (4, 4) that wrong depths make, on top of `information`.
 
     The depth of each patch is wrong by a share ``depth_warp`` of the distance, one standard deviation, as it is of a

@@ -67,7 +67,7 @@ def check_firm(
 def appearance_of(candidate: Candidate) -> Appearance:
     """The appearance of the object of a candidate."""
     correlation = candidate.verification.texture
-    return Appearance(candidate.likeness, candidate.yaw_known, correlation, candidate.margin)
+    return Appearance(candidate.silhouette_score, candidate.yaw_known, correlation, candidate.margin_over_competing)
 
 
 def is_confirmed(look: Appearance, limits: AppearanceLimits) -> bool:

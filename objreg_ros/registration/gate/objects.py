@@ -54,12 +54,12 @@ class Objects(NamedTuple):
 
 def objects_of(candidate: Candidate, limits: Limits) -> Objects:
     """What the matched objects of a candidate are worth."""
-    matched = len(candidate.explained)
+    matched = len(candidate.matched)
     return Objects(
         matched=matched,
         few=matched < limits.many,
-        few_proposers=independent(candidate.agreeing_chains) < limits.proposers,
-        inconsistent=are_inconsistent(matched, candidate.likeness_nearby, limits.silhouette_score),
+        few_proposers=independent(candidate.agreeing_proposers) < limits.proposers,
+        inconsistent=are_inconsistent(matched, candidate.silhouette_score_nearby, limits.silhouette_score),
     )
 
 

@@ -30,7 +30,7 @@ from objreg_ros.registration.gate import (
 from objreg_ros.registration.gate.limits import Limits, limits_of
 from objreg_ros.registration.gate.refusal import Refusal
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.registration.propose.evidence import lead
+from objreg_ros.registration.propose.evidence import margin_over
 from objreg_ros.registration.propose.prior import Prior
 
 __all__ = ["Refusal", "is_possible", "judge", "refuse"]
@@ -63,7 +63,7 @@ def is_possible(candidate: Candidate, params: RegistrarParams) -> bool:
     found = objects.objects_of(one, limits.objects)
     return found.matched > 0 and not (
         gravity.check(one.gravity_error_deg, limits.gravity_deg)
-        or free_space.check(one.verification.violations, one.floating, found.doubtful, limits.free_space)
+        or free_space.check(one.verification.violations, one.certain_violations, found.doubtful, limits.free_space)
     )
 
 
@@ -73,34 +73,36 @@ def refuse(
     """The first check that refuses a candidate, with its numbers; None if none does. ``possible`` poses compete."""
     one, limits = candidate, limits_of(params)
     fit, seen, T = one.alignment, one.verification, one.T_target_source
-    found, labels = objects.objects_of(one, limits.objects), [pair.label for pair in one.explained]
+    found, labels = objects.objects_of(one, limits.objects), [pair.label for pair in one.matched]
     return (
         convergence.check(fit.converged, fit.inliers)
         or odometry.check_plausible(T, limits.translation_m)
         or gravity.check(one.gravity_error_deg, limits.gravity_deg)
         or overlap.check(seen.tested, seen.inliers, limits.overlap)
-        or free_space.check(seen.violations, one.floating, found.doubtful, limits.free_space)
-        or free_space.check_few(one.floating, found.few, limits.free_space)
+        or free_space.check(seen.violations, one.certain_violations, found.doubtful, limits.free_space)
+        or free_space.check_few(one.certain_violations, found.few, limits.free_space)
         or photometric.check(seen.texture, found.few, limits.correlation)
-        or view_score.check(seen, one.likeness, one.resistance, found.lone, limits.view_score)
+        or view_score.check(seen, one.silhouette_score, one.perturbation_margin, found.lone, limits.view_score)
         or objects.check_moved(found.matched, len(one.moved))
         or lone_object.check_overlap(seen.tested, found.lone, limits.lone_object)
         or surroundings.check(one.surroundings, seen, labels, found, limits.surroundings)
         or objects.check_matched(found.matched)
-        or _check_competing(one, lead(one, possible, params), limits)
-        or lone_object.check_firm(seen.score, one.resistance, one.yaw_known, found.lone, limits.lone_object)
-        or observability.check_directions(len(fit.slack))
-        or _check_position(one, spread_of(fit, params) + one.warp, found.uncertain, limits.observability)
+        or _check_competing(one, margin_over(one, possible, params), limits)
+        or lone_object.check_firm(seen.score, one.perturbation_margin, one.yaw_known, found.lone, limits.lone_object)
+        or observability.check_directions(len(fit.degenerate))
+        or _check_position(
+            one, spread_of(fit, params) + one.systematic_depth_error, found.uncertain, limits.observability
+        )
         or odometry.check(T, prior, limits.odometry_sigmas)
     )
 
 
 def _check_competing(one: Candidate, score_margin: float, limits: Limits) -> Refusal | None:
     """Refuse a candidate whose total score is not clearly above that of the competing hypotheses."""
-    matched, agreeing = len(one.explained), len(one.agreeing_chains)
+    matched, agreeing = len(one.matched), len(one.agreeing_proposers)
     confirmed = lone_object.is_confirmed(lone_object.appearance_of(one), limits.appearance)
     return competing.check_several(matched, score_margin, limits.competing) or competing.check_lone(
-        matched, score_margin, confirmed, agreeing, one.likeness, limits.competing
+        matched, score_margin, confirmed, agreeing, one.silhouette_score, limits.competing
     )
 
 
@@ -109,4 +111,4 @@ def _check_position(one: Candidate, covariance: Array, uncertain: bool, limits: 
     sigma_m = worst_translation(covariance)
     range_m = observability.mean_range(one.alignment.middle, one.T_target_source)
     least = observability.least_margin(sigma_m, range_m, uncertain, limits)
-    return observability.check(sigma_m, one.resistance, least, limits)
+    return observability.check(sigma_m, one.perturbation_margin, least, limits)

@@ -139,24 +139,24 @@ def _shuffled(xyz: Array, normals: Array, seed: int) -> dict[str, Array]:
     return {"xyz": np.ascontiguousarray(xyz[order]), "normals": np.ascontiguousarray(normals[order])}
 
 
-class Pantry:
+class PreparedCache:
     """The last ``size`` keyframes that were made ready; for several threads."""
 
     def __init__(self, params: RegistrarParams, size: int = 32) -> None:
         self._params = params
         self._size = size
         self._lock = threading.Lock()
-        self._shelf: OrderedDict[int, Prepared] = OrderedDict()
+        self._entries: OrderedDict[int, Prepared] = OrderedDict()
 
     def get(self, keyframe: Keyframe) -> Prepared:
         """The keyframe made ready, now or before; the entry holds it, so its id stays its own."""
         with self._lock:
-            prepared = self._shelf.get(id(keyframe))
+            prepared = self._entries.get(id(keyframe))
         if prepared is None:
             prepared = prepare(keyframe, self._params)
         with self._lock:
-            self._shelf[id(keyframe)] = prepared
-            self._shelf.move_to_end(id(keyframe))
-            while len(self._shelf) > self._size:
-                self._shelf.popitem(last=False)
+            self._entries[id(keyframe)] = prepared
+            self._entries.move_to_end(id(keyframe))
+            while len(self._entries) > self._size:
+                self._entries.popitem(last=False)
         return prepared

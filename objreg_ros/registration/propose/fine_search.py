@@ -3,7 +3,7 @@
 
 Two sides of a thing share next to none of its surface. What it stands on tells where it is, by grey that is laid from
 one view into the other's image (`photometric`): a measure so sharp that it has to be asked near the truth, and several
-times as dear as `worth`. So it is asked of views at half size, about the poses that were found: farther and nearer
+times as dear as `rank_score`. So it is asked of views at half size, about the poses that were found: farther and nearer
 along either line of sight, since it is the thickness of the thing that is not known, and turned half, since many a
 front looks like its back.
 """
@@ -19,19 +19,19 @@ from objreg_ros.data import Array
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.registration.score.free_space import OCCLUDED, SEEN, VIOLATIONS
-from objreg_ros.registration.score.view_score import WORST, looks, rate, rate_sharply
+from objreg_ros.registration.score.view_score import WORST, count_both_ways, score_counts, score_sharply
 from objreg_ros.registration.shapes.shape import Shape, turned_half, upright_pose
-from objreg_ros.registration.shapes.silhouette_score import alike
+from objreg_ros.registration.shapes.silhouette_score import score_silhouettes
 
 ALONG = (-0.4, -0.25, -0.12, 0.12, 0.25, 0.4)  # widths along a line of sight at which a thing may stand as well
 THICK = (0.0, 0.2, 0.4)  # usual thicknesses of a thing, in its widths: how far its back may lie behind its front
-HOPELESS = -2.0  # worth of what no climb brings up
+HOPELESS = -2.0  # score of what no climb brings up
 FIRST = np.array([[0.0, 0.0, 0.0], [0.08, 0.0, 0.0], [0.0, 0.02, 0.0], [0.0, 0.0, 0.02]])  # rad and m: of a descent
 LAST = {"xatol": 0.002, "fatol": 0.004}  # and where it ends
 
 
-class Scrutiny:
-    """What upright motions (yaw, x, y, rise) of shape ``a`` of source upon ``b`` of target are worth on a closer look.
+class FineSearch:
+    """The fine score of upright motions (yaw, x, y, rise) of shape ``a`` of source upon ``b`` of target.
 
     Both views must have grey.
     """
@@ -41,27 +41,30 @@ class Scrutiny:
         self._extent = 0.5 * (a.extent + b.extent)
 
     def of(self, motion: Array) -> float:
-        """V as if all that is hidden had been seen to agree, and what the objects say; as `worth` weighs them."""
+        """V as if all that is hidden had been seen to agree, and what the objects say; as `rank_score` weighs them."""
         params, T, (source, target) = self._params, upright_pose(*self._shapes, motion), self._views
-        seen = looks(source.sight, target.sight, T[None], params, params.quick_sample)
-        (V,), ways = liked_closely(source, target, T[None], seen, params, params.quick_sample), [way[0] for way in seen]
+        seen = count_both_ways(source.sight, target.sight, T[None], params, params.quick_sample)
+        (V,), ways = (
+            score_views_sharply(source, target, T[None], seen, params, params.quick_sample),
+            [way[0] for way in seen],
+        )
         if V == WORST:
             return WORST
-        hidden, floating = (max(way[what] / way[SEEN] for way in ways) for what in (OCCLUDED, VIOLATIONS))
-        likeness = min(1.0, max(-1.0, alike(*self._shapes, motion, params)))
-        return float(V + hidden + params.upright_likeness * likeness - params.upright_violations * floating)
+        hidden, violations = (max(way[what] / way[SEEN] for way in ways) for what in (OCCLUDED, VIOLATIONS))
+        silhouette_score = min(1.0, max(-1.0, score_silhouettes(*self._shapes, motion, params)))
+        return float(V + hidden + params.upright_likeness * silhouette_score - params.upright_violations * violations)
 
     def improved(self, motions: Array) -> tuple[Array, Array]:
-        """The first of the motions (N, 4), or what they may be taken for, climbed: the best (K, 4) and their worth.
+        """The first of the motions (N, 4), or what they may be taken for, climbed: the best (K, 4) and their scores.
 
         None of what is hopeless already.
         """
         tried = np.array([other for motion in motions[: self._params.scrutinised] for other in self._taken_for(motion)])
-        worth = np.array([self.of(motion) for motion in tried])
-        least = max(HOPELESS, worth.max() - self._params.shape_margin)
-        best = [k for k in np.argsort(-worth, kind="stable")[: self._params.scrutinised] if worth[k] > least]
+        scores = np.array([self.of(motion) for motion in tried])
+        least = max(HOPELESS, scores.max() - self._params.shape_margin)
+        best = [k for k in np.argsort(-scores, kind="stable")[: self._params.scrutinised] if scores[k] > least]
         climbed = [self._climbed(tried[k]) for k in best]
-        return np.array([motion for motion, _ in climbed]).reshape(-1, 4), np.array([worth for _, worth in climbed])
+        return np.array([motion for motion, _ in climbed]).reshape(-1, 4), np.array([scores for _, scores in climbed])
 
     def _taken_for(self, motion: Array) -> list[Array]:
         """The motion itself, farther and nearer along either line of sight, and turned half."""
@@ -70,7 +73,7 @@ class Scrutiny:
         return [motion, *along, *turned_half(motion, self._extent * np.array(THICK))]
 
     def _climbed(self, motion: Array) -> tuple[Array, float]:
-        """The motion brought to where it is worth most, and what that is.
+        """The motion brought to where its score is highest, and that score.
 
         By the simplex of Nelder and Mead, "A simplex method for function minimization", 1965.
         """
@@ -84,7 +87,7 @@ def _moved(motion: Array, turn: float, x: float, y: float) -> Array:
     return np.asarray(motion + np.array([turn, x, y, 0.0]))
 
 
-def liked_closely(
+def score_views_sharply(
     source: Prepared,
     target: Prepared,
     T_target_source: Array,
@@ -92,12 +95,13 @@ def liked_closely(
     params: RegistrarParams,
     sample: int,
 ) -> Array:
-    """V (K,) of poses (K, 4, 4) with the grey of both in one image, at half size; as `rate` has it without grey.
+    """V (K,) of poses (K, 4, 4) with the grey of both in one image, at half size; without grey, as `score_counts` has
+    it.
 
-    ``ways`` are what `looks` counted there with the same ``sample``.
+    ``ways`` are what `count_both_ways` counted there with the same ``sample``.
     """
     a, b = source.sight, target.sight
     if not (a.textured and b.textured):
-        return rate(a, b, *ways, sample)
+        return score_counts(a, b, *ways, sample)
     pictures, each = (source.coarse, target.coarse), zip(T_target_source, *ways, strict=True)
-    return np.array([rate_sharply(*pictures, T, (there, back), params, sample) for T, there, back in each])
+    return np.array([score_sharply(*pictures, T, (there, back), params, sample) for T, there, back in each])

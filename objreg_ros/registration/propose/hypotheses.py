@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a pose may come from: the chains and what they propose.
+"""Where a pose may come from: the proposers and what they propose.
 
 Each is independent of the others but for the middles of objects, from which their shapes are looked for too: where
 these two agree the gate counts one.
@@ -17,16 +17,16 @@ from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.fpfh import match
 from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.registration.propose.pose_voting import Matches, poses
-from objreg_ros.registration.score.view_score import rank
+from objreg_ros.registration.score.view_score import score_views
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Hypothesis:
-    """A pose to be refined: who proposed it, and what it was worth to its proposer."""
+    """A pose to be refined: who proposed it, and its score."""
 
     T_target_source: Array
-    chain: str
-    worth: float
+    proposer: str
+    score: float
 
 
 def from_features(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Hypothesis]:
@@ -40,7 +40,7 @@ def from_features(source: Prepared, target: Prepared, params: RegistrarParams) -
         weights=weights,
     )
     found = poses(matches, source.up, target.up, 1.5 * params.feature_voxel, 0.3, params.seeds_per_chain)
-    return [Hypothesis(T_target_source=T, chain="features", worth=worth) for T, worth in found]
+    return [Hypothesis(T_target_source=T, proposer="features", score=support) for T, support in found]
 
 
 def from_centroids(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Hypothesis]:
@@ -58,11 +58,11 @@ def from_centroids(source: Prepared, target: Prepared, params: RegistrarParams) 
         weights=np.ones(len(a)),
     )
     found = poses(matches, source.up, target.up, params.centroid_tolerance, 0.15, params.seeds_per_chain)
-    return [Hypothesis(T_target_source=T, chain="centroids", worth=worth) for T, worth in found]
+    return [Hypothesis(T_target_source=T, proposer="centroids", score=support) for T, support in found]
 
 
 def from_objects(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Hypothesis]:
-    """Poses that lay one object upon one of its kind and turn about gravity, every yaw; those the views like best."""
+    """Poses that lay one object upon one of its kind and turn about gravity, every yaw; the best view scores."""
     if source.up is None or target.up is None:
         return []
     i, j = np.array(look_alikes(source, target), int).reshape(-1, 2).T
@@ -70,9 +70,9 @@ def from_objects(source: Prepared, target: Prepared, params: RegistrarParams) ->
     R = rotation_from_vector(yaws[:, None] * target.up) @ rotation_between(source.up, target.up)
     moved = np.einsum("kab,ib->ika", R, source.centroids[i])
     T = pose(R, target.centroids[j][:, None] - moved).reshape(-1, 4, 4)
-    worth = rank(source.sight, target.sight, T, params, params.glance)
-    best = np.argsort(-worth, kind="stable")[: params.seeds_per_object_chain]
-    return [Hypothesis(T_target_source=T[k], chain="objects", worth=float(worth[k])) for k in best]
+    view_scores = score_views(source.sight, target.sight, T, params, params.glance)
+    best = np.argsort(-view_scores, kind="stable")[: params.seeds_per_object_chain]
+    return [Hypothesis(T_target_source=T[k], proposer="objects", score=float(view_scores[k])) for k in best]
 
 
 def look_alikes(source: Prepared, target: Prepared) -> list[tuple[int, int]]:
@@ -82,4 +82,6 @@ def look_alikes(source: Prepared, target: Prepared) -> list[tuple[int, int]]:
 
 def from_prior(T_target_source: Array | None) -> list[Hypothesis]:
     """The pose that odometry expects, where it expects one."""
-    return [] if T_target_source is None else [Hypothesis(T_target_source=T_target_source, chain="odometry", worth=1.0)]
+    return (
+        [] if T_target_source is None else [Hypothesis(T_target_source=T_target_source, proposer="odometry", score=1.0)]
+    )

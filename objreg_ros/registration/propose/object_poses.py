@@ -16,23 +16,23 @@ from objreg_ros.geometry import transform
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared
-from objreg_ros.registration.propose.fine_search import Scrutiny
+from objreg_ros.registration.propose.fine_search import FineSearch
 from objreg_ros.registration.propose.hypotheses import Hypothesis, from_centroids, look_alikes
 from objreg_ros.registration.refine.batch_icp import align
-from objreg_ros.registration.score.total_score import Worth
+from objreg_ros.registration.score.total_score import TotalScore
 from objreg_ros.registration.shapes.shape import Shape, turned_half, upright_motion, upright_pose
-from objreg_ros.registration.shapes.upright_search import Fitting, glance, improve, register_shapes
+from objreg_ros.registration.shapes.upright_search import ScoredPose, coarse_poses, improve, register_shapes
 
 EACH = 2  # poses that each pair of objects proposes
 THICK = (0.0, 0.5, 1.0)  # of the usual depth of an object of its size: how far its back may lie behind its front
 
 
 def from_shapes(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Hypothesis]:
-    """Poses that lay objects upon those of their kind, those that objects and views like best first.
+    """Poses that lay objects upon those of their kind, those of the best total score first.
 
-    Upright as the objects stand; the best also drawn to all that was seen, or climbed to what both like best, where
-    that is worth more: far views of a thin thing share nothing of it, and its room still tells where it is. A lone
-    object whose best pose is liked little even so is looked at more closely.
+    Upright as the objects stand; the best also drawn to all that was seen, or climbed to the best total score, where
+    that is higher: far views of a thin thing share nothing of it, and its room still tells where it is. A lone object
+    whose best pose scores low even so gets a fine search.
     """
     pairs = shape_pairs(source, target)
     alone = len(pairs) == 1
@@ -41,27 +41,27 @@ def from_shapes(source: Prepared, target: Prepared, params: RegistrarParams) -> 
         return []
     a, b = pairs[0] if alone else (source.scene, target.scene)
     assert a is not None and b is not None
-    scale = Worth(source, target, a, b, params)
+    objective = TotalScore(source, target, a, b, params)
     motions = upright_motion(a, b, np.array([fit.T_target_source for fit in found]))
-    worth = scale.of(motions)
-    best = np.argsort(-worth, kind="stable")[: params.drawn]
-    best = best[worth[best] >= worth[best[0]] - params.shape_margin]
-    motions[best], worth[best] = _improved(source, target, a, b, motions[best], scale, params)
-    order = np.argsort(-worth, kind="stable")
-    if alone and worth[order[0]] < params.scrutiny_worth and source.sight.textured and target.sight.textured:
-        closer = Scrutiny(source, target, a, b, params).improved(motions[order])
-        motions, worth = np.concatenate([closer[0], motions]), np.concatenate([closer[1], worth])
-        order = np.argsort(-worth, kind="stable")
-    best_first = zip(upright_pose(a, b, motions[order]), worth[order].tolist(), strict=True)
-    return [Hypothesis(T_target_source=T, chain="objects", worth=value) for T, value in best_first]
+    total_scores = objective.of(motions)
+    best = np.argsort(-total_scores, kind="stable")[: params.drawn]
+    best = best[total_scores[best] >= total_scores[best[0]] - params.shape_margin]
+    motions[best], total_scores[best] = _improved(source, target, a, b, motions[best], objective, params)
+    order = np.argsort(-total_scores, kind="stable")
+    if alone and total_scores[order[0]] < params.scrutiny_worth and source.sight.textured and target.sight.textured:
+        closer = FineSearch(source, target, a, b, params).improved(motions[order])
+        motions, total_scores = np.concatenate([closer[0], motions]), np.concatenate([closer[1], total_scores])
+        order = np.argsort(-total_scores, kind="stable")
+    best_first = zip(upright_pose(a, b, motions[order]), total_scores[order].tolist(), strict=True)
+    return [Hypothesis(T_target_source=T, proposer="objects", score=value) for T, value in best_first]
 
 
 def half_turned(
     source: Prepared, target: Prepared, pair: ObjectPair, T_target_source: Array, params: RegistrarParams
 ) -> Array | None:
-    """The pose (4, 4) with a ``pair`` of objects turned half about their middle, where views and they like that best.
+    """The pose (4, 4) with a ``pair`` of objects turned half about their middle, where its total score is best.
 
-    Front and back of a screen look alike, and the true pose, in which they share nothing, is liked less than the one
+    Front and back of a screen look alike, and the true pose, in which they share nothing, scores lower than the one
     that lays them upon each other. Who has to tell them apart needs both. None where an object has no shape.
     """
     a, b = source.shapes[pair.source], target.shapes[pair.target]
@@ -69,21 +69,27 @@ def half_turned(
         return None
     through = params.shape_offset * (a.extent + b.extent) * np.array(THICK)
     turned = turned_half(upright_motion(a, b, T_target_source), through)
-    motions, worth = _improved(source, target, a, b, turned, Worth(source, target, a, b, params), params)
-    return upright_pose(a, b, motions[np.argmax(worth)])
+    motions, total_scores = _improved(source, target, a, b, turned, TotalScore(source, target, a, b, params), params)
+    return upright_pose(a, b, motions[np.argmax(total_scores)])
 
 
 def _improved(
-    source: Prepared, target: Prepared, a: Shape, b: Shape, motions: Array, scale: Worth, params: RegistrarParams
+    source: Prepared,
+    target: Prepared,
+    a: Shape,
+    b: Shape,
+    motions: Array,
+    objective: TotalScore,
+    params: RegistrarParams,
 ) -> tuple[Array, Array]:
-    """Upright motions (K, 4) drawn to the room, then climbed, each where it is worth more; and what they are worth."""
-    best, worth = motions.copy(), scale.of(motions)
-    for better in (partial(_drawn, source, target, a, b, params=params), scale.climbed):
+    """Upright motions (K, 4) drawn to the room, then climbed, each where it scores higher; and their total scores."""
+    best, total_scores = motions.copy(), objective.of(motions)
+    for better in (partial(_drawn, source, target, a, b, params=params), objective.climbed):
         tried = np.array([better(motion) for motion in best])
-        after = scale.of(tried)
-        gain = after > worth
-        best[gain], worth[gain] = tried[gain], after[gain]
-    return best, worth
+        after = objective.of(tried)
+        higher = after > total_scores
+        best[higher], total_scores[higher] = tried[higher], after[higher]
+    return best, total_scores
 
 
 def _drawn(source: Prepared, target: Prepared, a: Shape, b: Shape, motion: Array, params: RegistrarParams) -> Array:
@@ -95,20 +101,20 @@ def _drawn(source: Prepared, target: Prepared, a: Shape, b: Shape, motion: Array
     return motion if gone else upright_motion(a, b, drawn)
 
 
-def register_scenes(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Fitting]:
+def register_scenes(source: Prepared, target: Prepared, params: RegistrarParams) -> list[ScoredPose]:
     """The best distinct poses of all objects of ``source`` upon those of ``target``, best first; empty without any."""
     if source.scene is None or target.scene is None:
         return []
     pairs = shape_pairs(source, target)
     if not pairs:
         return []
-    seeds = [hypothesis.T_target_source for hypothesis in from_centroids(source, target, params)[: params.scene_seeds]]
+    starts = [hypothesis.T_target_source for hypothesis in from_centroids(source, target, params)[: params.scene_seeds]]
     for a, b in pairs:
-        seeds += glance(a, b, EACH, params)
+        starts += coarse_poses(a, b, EACH, params)
     feet_a, feet_b = (np.array([shape.foot for shape in shapes]) for shapes in zip(*pairs, strict=True))
     up = pairs[0][1].R_upright_camera[2]
-    levelled = _levelled(feet_a, feet_b, up, np.array(seeds), params.centroid_tolerance)
-    return improve(source.scene, target.scene, levelled, params)
+    at_one_height = _at_one_height(feet_a, feet_b, up, np.array(starts), params.centroid_tolerance)
+    return improve(source.scene, target.scene, at_one_height, params)
 
 
 def shape_pairs(source: Prepared, target: Prepared) -> list[tuple[Shape, Shape]]:
@@ -117,7 +123,9 @@ def shape_pairs(source: Prepared, target: Prepared) -> list[tuple[Shape, Shape]]
     return [(a, b) for a, b in pairs if a is not None and b is not None]
 
 
-def _levelled(feet_source: Array, feet_target: Array, up: Array, T_target_source: Array, tolerance: float) -> Array:
+def _at_one_height(
+    feet_source: Array, feet_target: Array, up: Array, T_target_source: Array, tolerance: float
+) -> Array:
     """The poses (K, 4, 4) raised or lowered so that the objects that each brings together stand at the same height.
 
     What an object stands on is known to a millimetre, its middle to centimetres. Feet (P, 3) of P pairs that may be

@@ -3,7 +3,7 @@
 
 Two matches fix a pose when a direction is known beside their baseline: gravity where both frames know it, the sum of
 their normals otherwise. Every pair of matches that keeps its length, its tilt and its normals gives one pose, and
-the pose is worth the weight of all matches that it brings together.
+the pose is scored by the weight of all matches that it brings together.
 """
 
 from __future__ import annotations
@@ -62,9 +62,9 @@ def poses(
     return tuple((T[k], float(support[k])) for k in chosen)
 
 
-def distinct(T: Array, worth: Array, middle: Array, limit: int, angle: float, distance: float) -> list[int]:
+def distinct(T: Array, scores: Array, middle: Array, limit: int, angle: float, distance: float) -> list[int]:
     """Indices of the best poses (N, 4, 4) that differ by ``angle`` rad, or move ``middle (3,)`` by ``distance`` m."""
-    order = np.argsort(-worth, kind="stable")
+    order = np.argsort(-scores, kind="stable")
     centres = T[:, :3, :3] @ middle + T[:, :3, 3]
     return [int(k) for k in _distinct(T, centres, order, limit, np.cos(angle), distance)]
 
@@ -77,7 +77,7 @@ def near(T: Array, T_known: Array, middle: Array, angle: float, distance: float)
 
 
 def same_pose(T: Array, T_known: Array, middle: Array, params: RegistrarParams) -> Array:
-    """Which poses (K, 4, 4) agree with one, as chains do that came to the same, seen from the context's middle."""
+    """Which poses (K, 4, 4) agree with one, as proposers do that came to the same, seen from the context's middle."""
     return near(T, T_known, middle, np.radians(params.agreement_rotation), params.agreement_translation)
 
 

@@ -12,29 +12,31 @@ import numpy as np
 
 from objreg_ros.data import Alignment, Array
 from objreg_ros.geometry import transform
-from objreg_ros.registration.certainty.degeneracy import about_camera, slack
-from objreg_ros.registration.certainty.observability import resisted
+from objreg_ros.registration.certainty.degeneracy import about_camera, degenerate_directions
+from objreg_ros.registration.certainty.observability import split_directions
 from objreg_ros.registration.certainty.sandwich import information
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.registration.refine.batch_icp import fit
 from objreg_ros.registration.refine.photometric_icp import finish
-from objreg_ros.registration.score.comparison import gain, liked
-from objreg_ros.registration.score.object_matches import explain
+from objreg_ros.registration.score.comparison import score_gain, score_locally
+from objreg_ros.registration.score.object_matches import match_objects
 
-LITTLE = 0.02  # gain after which another round is not worth its time
+LITTLE = 0.02  # gain in score after which another round is not worth its time
 
 
 def refine(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> Alignment:
     """Finish a settled pose; ``converged`` is False where next to nothing holds it.
 
-    Grey has its say, and keeps it where views and objects like the pose no less. The information is that of patches of
-    surface, because neighbouring points err together.
+    Grey has its say, and keeps it where views and objects score the pose no lower. The information is that of patches
+    of surface, because neighbouring points err together.
     """
     T, grey = _finished(source, target, T_target_source, params)
     found = fit(source.xyz, source.normals, target.surface, T, params.reaches[-1])
-    loose = slack(found._replace(H=found.H + grey), T, transform(T, source.middle), params.slack_share)
-    free, held = resisted(source, target, T, loose, found.extent, params)
+    degenerate = degenerate_directions(
+        found._replace(H=found.H + grey), T, transform(T, source.middle), params.slack_share
+    )
+    free, regularised = split_directions(source, target, T, degenerate, found.extent, params)
     return Alignment(
         T_target_source=T,
         information=about_camera(information(source.xyz, source.normals, target.surface, T, params), T),
@@ -42,8 +44,8 @@ def refine(source: Prepared, target: Prepared, T_target_source: Array, params: R
         overlap=found.inliers / max(1, len(source.xyz)),
         rmse=found.rmse,
         converged=found.inliers >= params.min_points,
-        slack=free,
-        held=held,
+        degenerate=free,
+        regularised=regularised,
         middle=transform(T, source.middle),
     )
 
@@ -51,23 +53,23 @@ def refine(source: Prepared, target: Prepared, T_target_source: Array, params: R
 def _finished(source: Prepared, target: Prepared, T: Array, params: RegistrarParams) -> tuple[Array, Array]:
     """The pose after grey had its say, and what grey adds to its information: nothing where it does not correlate.
 
-    Again while views and objects like it clearly better (`comparison`), since each round sees more of the other view;
-    the pose as it was, where they like it less: views that share little may like a pose a hair better that is
+    Again while views and objects score it clearly higher (`comparison`), since each round sees more of the other view;
+    the pose as it was, where they score it lower: views that share little may score a pose a hair higher that is
     centimetres off, and the objects then look less alike.
     """
-    held = np.zeros((6, 6))
+    grey_information = np.zeros((6, 6))
     if not (source.sight.textured and target.sight.textured):
-        return T, held
-    explained, _ = explain(source, target, T, params)
-    best = liked(source, target, T, explained, params)
+        return T, grey_information
+    matched, _ = match_objects(source, target, T, params)
+    best = score_locally(source, target, T, matched, params)
     for _ in range(params.grey_rounds):
         finished, grey = finish(source, target, T, params)
-        found = liked(source, target, finished, explained, params)
-        gained = gain(found, best, params)
+        found = score_locally(source, target, finished, matched, params)
+        gained = score_gain(found, best, params)
         if gained < 0.0:
             break
         best, T = found, finished
-        held = grey if (found.seen.texture or 0.0) >= params.holding_texture else np.zeros((6, 6))
+        grey_information = grey if (found.seen.texture or 0.0) >= params.holding_texture else np.zeros((6, 6))
         if gained < LITTLE:
             break
-    return T, held
+    return T, grey_information

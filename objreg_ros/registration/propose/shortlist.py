@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From all that the chains propose to the few hypotheses that are worth finishing.
+"""From all that the proposers propose to the few hypotheses that are worth finishing.
 
-Hypotheses are drawn to the surface by ever more points, and those go on that the views like best. Yet shape alone may
-draw a right one away: where depth is warped, two views of a wall or of a table's top fit as well a decimetre beside the
-truth. So what was proposed about the best is looked at once more where it was proposed, held there by grey.
+Hypotheses are drawn to the surface by ever more points, and those of the best view score go on. Yet shape alone may
+draw a right one away: where depth errs systematically, two views of a wall or of a table's top fit as well a decimetre
+beside the truth. So what was proposed about the best is looked at once more where it was proposed, held there by grey.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Pair
-from objreg_ros.registration.propose.evidence import agreement, gravity_error_deg
-from objreg_ros.registration.propose.fine_search import liked_closely
+from objreg_ros.registration.propose.evidence import gravity_error_deg, score_objects
+from objreg_ros.registration.propose.fine_search import score_views_sharply
 from objreg_ros.registration.propose.hypotheses import (
     Hypothesis,
     from_centroids,
@@ -29,8 +29,8 @@ from objreg_ros.registration.propose.object_poses import from_shapes
 from objreg_ros.registration.propose.pose_voting import distinct, near
 from objreg_ros.registration.refine.batch_icp import align, settle
 from objreg_ros.registration.refine.photometric_icp import finish
-from objreg_ros.registration.score.object_matches import explain, likeness
-from objreg_ros.registration.score.view_score import WORST, looks, rank, rate
+from objreg_ros.registration.score.object_matches import match_objects, score_matched_silhouettes
+from objreg_ros.registration.score.view_score import WORST, count_both_ways, score_counts, score_views
 
 APART = (np.radians(4.0), 0.04)  # rad and m: hypotheses are distinct beyond before they are settled
 ALIKE = (np.radians(0.5), 0.01)  # and after
@@ -41,33 +41,33 @@ TILTED = 1.5  # times the error of gravity that the gate allows: what is not ref
 
 
 class Shortlist(NamedTuple):
-    """What is worth finishing, the ``best`` first, and ``seeds``: all that may agree with it.
+    """What is worth finishing, the ``best`` first, and ``hypotheses``: all that may agree with it.
 
     What grey held where it was proposed agrees as it was proposed: it was chosen for being near, and drawn nearer.
     """
 
     best: tuple[Hypothesis, ...]
-    seeds: tuple[Hypothesis, ...]
+    hypotheses: tuple[Hypothesis, ...]
 
 
 def shortlist(pair: Pair, T_target_source_prior: Array | None, params: RegistrarParams) -> Shortlist:
-    """The hypotheses of all chains that views and objects like best; empty when no chain proposed any.
+    """The hypotheses of all proposers of the best score of views and objects; empty when no proposer proposed any.
 
     ``T_target_source_prior (4, 4)`` is a pose to start from too, or None.
     """
-    chains, shapes = _proposed(pair, T_target_source_prior, params), _upright(pair, params)
-    drawn = [seed for proposed in chains for seed in _drawn_best(pair, proposed, params)]
-    seeds = _settled(pair, drawn + shapes, params) + _rated(pair, shapes, params)
-    if not seeds:
+    proposers, shapes = _proposed(pair, T_target_source_prior, params), _upright(pair, params)
+    drawn = [hypothesis for proposed in proposers for hypothesis in _drawn_best(pair, proposed, params)]
+    hypotheses = _settled(pair, drawn + shapes, params) + _scored(pair, shapes, params)
+    if not hypotheses:
         return Shortlist((), ())
-    best = _best(pair, seeds, params)
-    about = _about(pair, best, [seed for proposed in chains for seed in proposed], params)
+    best = _best(pair, hypotheses, params)
+    about = _about(pair, best, [hypothesis for proposed in proposers for hypothesis in proposed], params)
     anchored = _anchored(pair, about, params)
-    return Shortlist(tuple(_best(pair, best + anchored, params)), (*seeds, *about))
+    return Shortlist(tuple(_best(pair, best + anchored, params)), (*hypotheses, *about))
 
 
 def _proposed(pair: Pair, prior: Array | None, params: RegistrarParams) -> list[list[Hypothesis]]:
-    """What each chain proposes."""
+    """What each proposer proposes."""
     source, target = pair.source, pair.target
     return [
         from_prior(prior),
@@ -80,12 +80,12 @@ def _proposed(pair: Pair, prior: Array | None, params: RegistrarParams) -> list[
 def _upright(pair: Pair, params: RegistrarParams) -> list[Hypothesis]:
     """The distinct hypotheses of the objects' shapes: they are in their basins already."""
     found = from_shapes(pair.source, pair.target, params)
-    worth = np.array([seed.worth for seed in found])
-    return [found[k] for k in distinct(_poses(found), worth, pair.source.middle, params.refined_per_chain, *APART)]
+    scores = np.array([hypothesis.score for hypothesis in found])
+    return [found[k] for k in distinct(_poses(found), scores, pair.source.middle, params.refined_per_chain, *APART)]
 
 
 def _drawn_best(pair: Pair, proposed: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
-    """The hypotheses of one chain, brought to their basins, that look best from both views, distinct.
+    """The hypotheses of one proposer, brought to their basins, of the best view score, distinct.
 
     All are brought near by a few points; what looks hopeless or has become another goes no farther.
     """
@@ -107,57 +107,61 @@ def _drawn(
     source, target = pair.source, pair.target
     wide, narrow, _ = params.reaches
     moved, _, _ = align(source.xyz[:points], source.normals[:points], target.surface, T, wide, narrow, iterations)
-    return moved, rank(source.sight, target.sight, moved, params, sample)
+    return moved, score_views(source.sight, target.sight, moved, params, sample)
 
 
-def _settled(pair: Pair, seeds: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
-    """The hypotheses where the shape alone brings them, each with its worth for the views and the objects."""
-    if not seeds:
+def _settled(pair: Pair, hypotheses: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
+    """The hypotheses where the shape alone brings them, each with its score of views and objects."""
+    if not hypotheses:
         return []
-    T, firm = settle(pair.source, pair.target, _poses(seeds), params)
-    settled = [replace(seed, T_target_source=pose) for seed, pose in zip(seeds, T, strict=True)]
-    return _rated(pair, _hopeful(pair, settled, firm, params), params)
+    T, firm = settle(pair.source, pair.target, _poses(hypotheses), params)
+    settled = [replace(hypothesis, T_target_source=pose) for hypothesis, pose in zip(hypotheses, T, strict=True)]
+    return _scored(pair, _hopeful(pair, settled, firm, params), params)
 
 
-def _hopeful(pair: Pair, seeds: list[Hypothesis], firm: Array, params: RegistrarParams) -> list[Hypothesis]:
+def _hopeful(pair: Pair, hypotheses: list[Hypothesis], firm: Array, params: RegistrarParams) -> list[Hypothesis]:
     """The hypotheses that enough points hold and that keep gravity; all of them where none does.
 
     Two views of nothing in common may look alike by chance: V sees what little meets, and that is not refused.
     """
-    good = [seed for seed, held in zip(seeds, firm, strict=True) if held and _keeps_gravity(pair, seed, params)]
-    return good or seeds
+    good = [
+        hypothesis
+        for hypothesis, held in zip(hypotheses, firm, strict=True)
+        if held and _keeps_gravity(pair, hypothesis, params)
+    ]
+    return good or hypotheses
 
 
-def _keeps_gravity(pair: Pair, seed: Hypothesis, params: RegistrarParams) -> bool:
+def _keeps_gravity(pair: Pair, hypothesis: Hypothesis, params: RegistrarParams) -> bool:
     """Whether a hypothesis, once finished, may keep gravity as the gate wants it; True where that is unknown."""
-    error = gravity_error_deg(pair.source, pair.target, seed.T_target_source)
+    error = gravity_error_deg(pair.source, pair.target, hypothesis.T_target_source)
     return error is None or error <= TILTED * params.max_gravity_error
 
 
-def _rated(pair: Pair, seeds: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
-    """The hypotheses with their worth for the views and the objects; of those that are one pose the best has it."""
+def _scored(pair: Pair, hypotheses: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
+    """The hypotheses with their score of views and objects; of those that are one pose the best has it."""
     source, target = pair.source, pair.target
-    T = _poses(seeds)
-    forward, backward = looks(source.sight, target.sight, T, params, params.grey_points)
-    V = rate(source.sight, target.sight, forward, backward, params.grey_points)
-    apart = distinct(T, V, source.middle, len(seeds), *ALIKE)
+    T = _poses(hypotheses)
+    forward, backward = count_both_ways(source.sight, target.sight, T, params, params.grey_points)
+    V = score_counts(source.sight, target.sight, forward, backward, params.grey_points)
+    apart = distinct(T, V, source.middle, len(hypotheses), *ALIKE)
     ways = forward[apart], backward[apart]
-    sharp = liked_closely(source, target, T[apart], ways, params, params.grey_points)
-    rated = [replace(seed, worth=WORST) for seed in seeds]
+    sharp = score_views_sharply(source, target, T[apart], ways, params, params.grey_points)
+    scored = [replace(hypothesis, score=WORST) for hypothesis in hypotheses]
     for k, v in zip(apart, sharp, strict=True):
-        seed = seeds[k]
-        explained, moved = explain(source, target, seed.T_target_source, params)
-        same = likeness(source, target, explained, seed.T_target_source, params)
-        rated[k] = replace(seed, worth=float(v) + agreement(explained, moved, same, params))
-    return rated
+        hypothesis = hypotheses[k]
+        matched, moved = match_objects(source, target, hypothesis.T_target_source, params)
+        same = score_matched_silhouettes(source, target, matched, hypothesis.T_target_source, params)
+        scored[k] = replace(hypothesis, score=float(v) + score_objects(matched, moved, same, params))
+    return scored
 
 
-def _best(pair: Pair, seeds: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
-    """The distinct hypotheses of most worth that are worth finishing, best first."""
-    worth = np.array([seed.worth for seed in seeds])
+def _best(pair: Pair, hypotheses: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
+    """The distinct hypotheses of the best score that are worth finishing, best first."""
+    scores = np.array([hypothesis.score for hypothesis in hypotheses])
     apart = np.radians(params.agreement_rotation), params.agreement_translation
-    best = distinct(_poses(seeds), worth, pair.source.middle, params.finished, *apart)
-    return [seeds[k] for k in best if worth[k] >= worth.max() - params.finished_margin]
+    best = distinct(_poses(hypotheses), scores, pair.source.middle, params.finished, *apart)
+    return [hypotheses[k] for k in best if scores[k] >= scores.max() - params.finished_margin]
 
 
 def _about(pair: Pair, best: list[Hypothesis], proposed: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
@@ -166,7 +170,7 @@ def _about(pair: Pair, best: list[Hypothesis], proposed: list[Hypothesis], param
     if not proposed or not (source.sight.textured and target.sight.textured):
         return []
     T = _poses(proposed)
-    V = rank(source.sight, target.sight, T, params, params.quick_sample)
+    V = score_views(source.sight, target.sight, T, params, params.quick_sample)
     chosen: dict[int, Hypothesis] = {}
     for found in best:
         close = np.flatnonzero(near(T, found.T_target_source, source.middle, *ABOUT))
@@ -175,13 +179,13 @@ def _about(pair: Pair, best: list[Hypothesis], proposed: list[Hypothesis], param
 
 
 def _anchored(pair: Pair, proposed: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
-    """Hypotheses that grey finishes where they were proposed, each with its worth; those that keep gravity."""
+    """Hypotheses that grey finishes where they were proposed, each with its score; those that keep gravity."""
     source, target = pair.source, pair.target
-    finished = (finish(source, target, seed.T_target_source, params)[0] for seed in proposed)
-    anchored = [replace(seed, T_target_source=T) for seed, T in zip(proposed, finished, strict=True)]
-    return _rated(pair, [seed for seed in anchored if _keeps_gravity(pair, seed, params)], params)
+    finished = (finish(source, target, hypothesis.T_target_source, params)[0] for hypothesis in proposed)
+    anchored = [replace(hypothesis, T_target_source=T) for hypothesis, T in zip(proposed, finished, strict=True)]
+    return _scored(pair, [hypothesis for hypothesis in anchored if _keeps_gravity(pair, hypothesis, params)], params)
 
 
-def _poses(seeds: list[Hypothesis]) -> Array:
+def _poses(hypotheses: list[Hypothesis]) -> Array:
     """The poses (K, 4, 4) of hypotheses."""
-    return np.array([seed.T_target_source for seed in seeds]).reshape(-1, 4, 4)
+    return np.array([hypothesis.T_target_source for hypothesis in hypotheses]).reshape(-1, 4, 4)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which of two poses near each other views and objects like more.
+"""Which of two poses near each other has the better score of views and objects.
 
-The likeness of an object tells its front from its back, but not half a degree: whether a thin leg falls beside its
-pixels is chance. Grey that both views see much of tells where exactly a pose is, and grey that they see little of does
-not. So the objects have a say as far as the grey leaves doubt.
+The silhouette score of an object tells its front from its back, but not half a degree: whether a thin leg falls beside
+its pixels is chance. Grey that both views see much of tells where exactly a pose is, and grey that they see little of
+does not. So the objects have a say as far as the grey leaves doubt.
 """
 
 from __future__ import annotations
@@ -14,35 +14,35 @@ from objreg_ros.data import Array
 from objreg_ros.registration.candidate import Verification
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared
-from objreg_ros.registration.score.object_matches import Pairs, likeness
+from objreg_ros.registration.score.object_matches import Pairs, score_matched_silhouettes
 from objreg_ros.registration.score.view_score import verify
 
 
-class Liking(NamedTuple):
-    """What the views say of a pose, and how alike the explained objects look under it.
+class LocalScore(NamedTuple):
+    """What the views say of a pose, and how alike the matched objects look under it.
 
-    ``likeness`` is -1 to 1, and 0 where no explained object has a shape.
+    ``silhouette_score`` is -1 to 1, and 0 where no matched object has a shape.
     """
 
     seen: Verification
-    likeness: float
+    silhouette_score: float
 
 
-def liked(
-    source: Prepared, target: Prepared, T_target_source: Array, explained: Pairs, params: RegistrarParams
-) -> Liking:
-    """What the views, by ``grey_points`` a side, and the ``explained`` objects say of a pose (4, 4)."""
+def score_locally(
+    source: Prepared, target: Prepared, T_target_source: Array, matched: Pairs, params: RegistrarParams
+) -> LocalScore:
+    """What the views, by ``grey_points`` a side, and the ``matched`` objects say of a pose (4, 4)."""
     seen = verify(source.sight, target.sight, T_target_source, params, params.grey_points)
-    return Liking(seen, likeness(source, target, explained, T_target_source, params) or 0.0)
+    return LocalScore(seen, score_matched_silhouettes(source, target, matched, T_target_source, params) or 0.0)
 
 
-def gain(other: Liking, own: Liking, params: RegistrarParams) -> float:
-    """How much more another pose is worth than one's own, in units of V; below 0 where it is worth less.
+def score_gain(other: LocalScore, own: LocalScore, params: RegistrarParams) -> float:
+    """How much higher another pose scores than one's own, in units of V; below 0 where it scores lower.
 
-    Both are of the same explained objects. The surer grey speaks for both, so that one gains what the other loses.
+    Both are of the same matched objects. The surer grey speaks for both, so that one gains what the other loses.
     """
-    doubt = min(_doubt(liking.seen, params) for liking in (other, own))
-    more_alike = other.likeness - own.likeness
+    doubt = min(_doubt(score.seen, params) for score in (other, own))
+    more_alike = other.silhouette_score - own.silhouette_score
     return other.seen.score - own.seen.score + params.likeness_weight * doubt * more_alike
 
 

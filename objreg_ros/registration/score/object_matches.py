@@ -12,36 +12,42 @@ from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.registration.score.free_space import SEEN, VIOLATIONS, count
 from objreg_ros.registration.shapes.shape import upright_motion
-from objreg_ros.registration.shapes.silhouette_score import alike
+from objreg_ros.registration.shapes.silhouette_score import score_silhouettes
 
 Pairs = tuple[ObjectPair, ...]
 
 
-def explain(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> tuple[Pairs, Pairs]:
-    """(explained, moved): one-to-one pairs of confusable labels, nearest first.
+def match_objects(
+    source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams
+) -> tuple[Pairs, Pairs]:
+    """(matched, moved): one-to-one pairs of confusable labels, nearest first.
 
-    Explained are those whose middles lie within ``explained_distance``, large ones a share of their extent farther;
+    Matched are those whose middles lie within ``explained_distance``, large ones a share of their extent farther;
     moved are those left over of which each, where it stood, is now free space in the other view.
     """
     distances = gaps(source, target, T_target_source)
     spread = params.explained_share * np.minimum(source.extents[:, None], target.extents[None])
-    explained = _assign(source, distances - spread, params.explained_distance)
+    matched = _assign(source, distances - spread, params.explained_distance)
     left = distances.copy()
-    left[[pair.source for pair in explained], :] = np.inf
-    left[:, [pair.target for pair in explained]] = np.inf
+    left[[pair.source for pair in matched], :] = np.inf
+    left[:, [pair.target for pair in matched]] = np.inf
     _keep_gone(left, source, target, T_target_source, params)
-    return explained, _assign(source, left, np.inf)
+    return matched, _assign(source, left, np.inf)
 
 
-def likeness(
-    source: Prepared, target: Prepared, explained: Pairs, T: Array, params: RegistrarParams, reach: float = 0.0
+def score_matched_silhouettes(
+    source: Prepared, target: Prepared, matched: Pairs, T: Array, params: RegistrarParams, reach: float = 0.0
 ) -> float | None:
-    """How alike the explained objects look under a pose, their mean from -1 to 1; None where none has a shape.
+    """How alike the matched objects look under a pose, their mean from -1 to 1; None where none has a shape.
 
     With a ``reach`` in m each stands so far aside along each axis as it looks most alike: what it is, if not where.
     """
-    shapes = [(source.shapes[pair.source], target.shapes[pair.target]) for pair in explained]
-    scores = [alike(a, b, upright_motion(a, b, T), params, reach) for a, b in shapes if a is not None and b is not None]
+    shapes = [(source.shapes[pair.source], target.shapes[pair.target]) for pair in matched]
+    scores = [
+        score_silhouettes(a, b, upright_motion(a, b, T), params, reach)
+        for a, b in shapes
+        if a is not None and b is not None
+    ]
     return float(np.clip(scores, -1.0, 1.0).mean()) if scores else None
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an upright pose of objects is worth, to the views and to the objects themselves, and the climb of that.
+"""The total score of an upright pose, of the views and of the objects' silhouettes, and its climb.
 
-Objects that share next to nothing between two views are held by their likeness to some degrees only, or drawn
+Objects that share next to nothing between two views are held by their silhouettes to some degrees only, or drawn
 together; the views tell the rest, and from far away: V rises over 20 degrees and 3 cm towards the true pose.
 """
 
@@ -25,29 +25,29 @@ from objreg_ros.registration.shapes.silhouette_score import two_way, weights_of
 STEPS = (0.08, 0.015)  # rad and m: the first of a climb
 LAST = 0.12  # of them: the shortest
 ROUNDS = 10
-GAIN = 0.004  # of worth that a step must bring
+GAIN = 0.004  # of score that a step must bring
 
 
-class Worth:
-    """What upright motions (yaw, x, y, rise) of shape ``a`` of source upon ``b`` of target are worth."""
+class TotalScore:
+    """The total score of upright motions (yaw, x, y, rise) of shape ``a`` of source upon ``b`` of target."""
 
     def __init__(self, source: Prepared, target: Prepared, a: Shape, b: Shape, params: RegistrarParams) -> None:
         slops = params.depth_tolerance, params.depth_tolerance_growth
         textured = source.sight.textured and target.sight.textured
         weights = np.array([*weights_of(params), params.upright_likeness, params.upright_violations])
-        self._pair = (_image(source.sight), _image(target.sight), slops, textured), a.sight, b.sight
+        self._pair = (_image(source.sight), _image(target.sight), slops, textured), a.kernel_arrays, b.kernel_arrays
         self._extent, self._weights = 0.5 * (a.extent + b.extent), weights
         self._sample, self._few = params.quick_sample, params.climb_points
         self._turns = np.radians([0.0, *params.climb_turns, *(-turn for turn in params.climb_turns)])
 
     def of(self, motions: Array) -> Array:
-        """The worth (K,) of motions (K, 4)."""
+        """The total scores (K,) of motions (K, 4)."""
         return np.asarray(_worths(*self._pair, motions, self._extent, self._weights, self._sample))
 
     def climbed(self, motion: Array) -> Array:
-        """The motion (4,) brought to where it is worth most.
+        """The motion (4,) brought to where its total score is highest.
 
-        It is turned first, to where the views like it best: out of what the objects alone are content with.
+        It is turned first, to where its view score is best: out of what the objects alone are content with.
         """
         return np.asarray(_climbed(*self._pair, motion.copy(), self._turns, self._extent, self._weights, self._few))
 
@@ -93,7 +93,7 @@ def _climbed(views, source, target, motion, turns, extent, weights, most):  # ty
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _worth(views, source, target, motion, extent, weights, most):  # type: ignore[no-untyped-def]
-    """What the views like, and the weighed likeness of the objects, -1 to 1."""
+    """The view score, and the weighed silhouette score of the objects, -1 to 1."""
     alike = two_way(source, target, motion, extent, weights[:-2], most)
     return _liked(views, source, target, motion, weights[-1], most) + weights[-2] * max(-1.0, min(1.0, alike))
 

@@ -20,7 +20,7 @@ from objreg_ros.registration.score.photometric import NARROW, compare, texture
 
 NO_TEXTURE = 0.2  # what stands in for the texture of a view without grey: less than a right pose usually has
 WORST = -3.0  # V where there is nothing to look at
-FIRMLY = 2.0  # tolerances that leave no doubt
+CERTAINLY = 2.0  # tolerances that leave no doubt
 NEUTRAL = 0.65  # what a wrong pose at its best reaches
 
 
@@ -33,8 +33,8 @@ def verify(
     A pose under which the views do not meet comes back with ``tested`` 0 and the lowest score.
     """
     ways = (
-        look(source, target, T_target_source, params, sample),
-        look(target, source, inverse(T_target_source), params, sample),
+        count_visibility(source, target, T_target_source, params, sample),
+        count_visibility(target, source, inverse(T_target_source), params, sample),
     )
     if min(way[SEEN] for way in ways) < 1:
         return Verification(inliers=0.0, violations=1.0, occluded=0.0, texture=None, tested=0, score=WORST)
@@ -56,28 +56,28 @@ def _grey(source: Sight, target: Sight, T: Array, params: RegistrarParams, count
     return texture(source, target, T, params) if counts is None else float(correlation(counts))
 
 
-def rank(source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams, sample: int) -> Array:
+def score_views(source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams, sample: int) -> Array:
     """V of many poses (K, 4, 4) at once, from the first ``sample`` points a side; -3 where the views do not meet."""
-    return rate(source, target, *looks(source, target, T_target_source, params, sample), sample)
+    return score_counts(source, target, *count_both_ways(source, target, T_target_source, params, sample), sample)
 
 
-def looks(
+def count_both_ways(
     source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams, sample: int
 ) -> tuple[Array, Array]:
-    """`look` at many poses (K, 4, 4), forward and backward: (K, 10) each."""
+    """`count_visibility` at many poses (K, 4, 4), forward and backward: (K, 10) each."""
     slops = params.depth_tolerance, params.depth_tolerance_growth
     forward = count_many(source.points[:sample], source.shades[:sample], T_target_source, *_image(target), *slops)
     back = inverses(T_target_source)
     return forward, count_many(target.points[:sample], target.shades[:sample], back, *_image(source), *slops)
 
 
-def rate(source: Sight, target: Sight, forward: Array, backward: Array, sample: int) -> Array:
-    """V (K,) of what `looks` counted, with the grey of each image's own band."""
+def score_counts(source: Sight, target: Sight, forward: Array, backward: Array, sample: int) -> Array:
+    """V (K,) of what `count_both_ways` counted, with the grey of each image's own band."""
     textured = source.textured and target.textured
     return np.asarray(_rated_many(forward, backward, textured, _asked(source, target, sample)))
 
 
-def rate_sharply(
+def score_sharply(
     source: Sight,
     target: Sight,
     T_target_source: Array,
@@ -87,8 +87,8 @@ def rate_sharply(
 ) -> float:
     """V of one pose (4, 4) with all of the source's grey laid into the target's image: slower, and it falls by more.
 
-    ``ways`` are what `looks` counted there, (10,) each. Grey one way, as the other says much the same; for poses near
-    each other, which tell a push from none. Both views must have grey.
+    ``ways`` are what `count_both_ways` counted there, (10,) each. Grey one way, as the other says much the same; for
+    poses near each other, which tell a perturbation from none. Both views must have grey.
     """
     grey = correlation(compare(source, target, T_target_source, params, NARROW))
     return float(rated(*ways, grey, _asked(source, target, sample)))
@@ -99,26 +99,28 @@ def _asked(source: Sight, target: Sight, sample: int | None) -> int:
     return sum(min(len(sight.points), sample or len(sight.points)) for sight in (source, target))
 
 
-def look(source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams, sample: int | None) -> Array:
+def count_visibility(
+    source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams, sample: int | None
+) -> Array:
     """What the target view says of the source's points; the counts of `visibility.count`."""
     slops = params.depth_tolerance, params.depth_tolerance_growth
     return np.asarray(count(source.points[:sample], source.shades[:sample], T_target_source, *_image(target), *slops))
 
 
-def floating(source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams) -> float:
+def certain_violations(source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams) -> float:
     """The share of tested pixels that float beyond doubt, the worse way's: 1 where the views do not meet.
 
     In front of everything that the other view saw in a wide window, by more than twice the tolerance: edges are ragged
     and a right pose is a little off, but a thing that is not there is larger than that.
     """
     ways = (source, target, T_target_source), (target, source, inverse(T_target_source))
-    return max(_floating(asked, seen, T, params) for asked, seen, T in ways)
+    return max(_certain_violations(asked, seen, T, params) for asked, seen, T in ways)
 
 
-def _floating(asked: Sight, seen: Sight, T: Array, params: RegistrarParams) -> float:
-    slops = FIRMLY * params.depth_tolerance, FIRMLY * params.depth_tolerance_growth
+def _certain_violations(asked: Sight, seen: Sight, T: Array, params: RegistrarParams) -> float:
+    slops = CERTAINLY * params.depth_tolerance, CERTAINLY * params.depth_tolerance_growth
     counts = count(asked.points, asked.shades, T, seen.front, seen.far, seen.detail, seen.camera, *slops)
-    tested = look(asked, seen, T, params, None)[SEEN]
+    tested = count_visibility(asked, seen, T, params, None)[SEEN]
     return float(counts[VIOLATIONS] / tested) if tested >= 1 else 1.0
 
 

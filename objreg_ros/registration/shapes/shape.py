@@ -61,7 +61,7 @@ class Shape:
         return prepare_surface(self.xyz[dense], self.normals[dense], *_cells(self.xyz))
 
     @property
-    def sight(self) -> tuple[Any, ...]:
+    def kernel_arrays(self) -> tuple[Any, ...]:
         """The points and what the camera saw, for the kernels."""
         s, few = self.silhouette, slice(self.most)
         points = self.xyz[few], self.normals[few], self.shades[few]

@@ -42,14 +42,18 @@ def weights_of(params: RegistrarParams) -> Array:
     )
 
 
-def alike(source: Shape, target: Shape, motion: Array, params: RegistrarParams, reach: float = 0.0) -> float:
+def score_silhouettes(
+    source: Shape, target: Shape, motion: Array, params: RegistrarParams, reach: float = 0.0
+) -> float:
     """The score of a motion (yaw, x, y, rise): near 1 and more if right, below 0 if the cameras saw otherwise.
 
     The best that a climb finds within ``reach`` m along each axis, height too, turned as much.
     """
     extent, most = 0.5 * (source.extent + target.extent), source.most + target.most
     steps = np.array([0.0, reach, reach, reach]) / STEPS
-    return float(climb(source.sight, target.sight, motion.copy(), extent, weights_of(params), most, steps, STEPS))
+    return float(
+        climb(source.kernel_arrays, target.kernel_arrays, motion.copy(), extent, weights_of(params), most, steps, STEPS)
+    )
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)

@@ -56,7 +56,7 @@ def turned_violations(shape: Shape) -> float:
     for turn in TURNS:
         c, s = np.cos(turn), np.sin(turn)
         motion = np.array([turn, *(axis - np.array([[c, -s], [s, c]]) @ axis), 0.0])
-        asked = ask(shape.sight, shape.sight, motion, shape.extent, shape.most, counts)
+        asked = ask(shape.kernel_arrays, shape.kernel_arrays, motion, shape.extent, shape.most, counts)
         shares.append(counts[VIOLATIONS] / asked)
     return float(np.mean(shares))
 

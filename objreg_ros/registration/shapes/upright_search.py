@@ -21,25 +21,25 @@ SAME_SHIFT = 0.015  # m
 ALIKE_TURN, CROWD = 0.5, 2  # rad within which motions turn alike, and how many of them are refined
 CLIMB = (0.05, 0.012, 0.012, 0.0)  # rad and m: the first steps of a climb; a shape keeps its height
 WIDEST_REACH = 0.07  # m within which a point finds a partner at first
-CLEARED, CLEARED_AT_A_GLANCE, CLEARED_AT_LAST = (100, 6), (50, 4), (200, 5)  # points a side and steps out of free space
+CLEARED, CLEARED_COARSELY, CLEARED_AT_LAST = (100, 6), (50, 4), (200, 5)  # points a side and steps out of free space
 
 
-class Fitting(NamedTuple):
+class ScoredPose(NamedTuple):
     """A pose of one shape upon another and what both silhouettes say of it; a higher score is better."""
 
     T_target_source: Array
     score: float
 
 
-def register_shapes(source: Shape, target: Shape, params: RegistrarParams) -> list[Fitting]:
+def register_shapes(source: Shape, target: Shape, params: RegistrarParams) -> list[ScoredPose]:
     """The best distinct poses of ``source`` upon ``target``, both upright on what they stand on, best first."""
     motions, scores = _begun(source, target, params.shape_yaws, CLEARED, params.shape_glance, params)
     return _finished(source, target, motions, scores, 0.5 * _reach(source, target), params)
 
 
-def glance(source: Shape, target: Shape, most: int, params: RegistrarParams) -> list[Array]:
+def coarse_poses(source: Shape, target: Shape, most: int, params: RegistrarParams) -> list[Array]:
     """The poses of ``source`` upon ``target`` that look best at first, at most so many: a tenth of a registration."""
-    motions, scores = _begun(source, target, params.glance_yaws, CLEARED_AT_A_GLANCE, params.glance, params)
+    motions, scores = _begun(source, target, params.glance_yaws, CLEARED_COARSELY, params.glance, params)
     return list(upright_pose(source, target, motions[np.argsort(-scores, kind="stable")[:most]]))
 
 
@@ -49,22 +49,25 @@ def _begun(
     extent = 0.5 * (source.extent + target.extent)
     starts = _starts(yaws, params.shape_offset * extent)
     settling = extent, weights_of(params), sample, _reach(source, target)
-    return _started(source.sight, target.sight, target.surface.grid, starts, *settling, cleared)
+    return _started(source.kernel_arrays, target.kernel_arrays, target.surface.grid, starts, *settling, cleared)
 
 
 def _reach(source: Shape, target: Shape) -> float:
     return min(WIDEST_REACH, 0.25 * (source.extent + target.extent))
 
 
-def improve(source: Shape, target: Shape, poses: Array, params: RegistrarParams) -> list[Fitting]:
-    """Poses (K, 4, 4) of ``source`` near ``target``, made upright and brought to where both silhouettes like them best.
+def improve(source: Shape, target: Shape, poses: Array, params: RegistrarParams) -> list[ScoredPose]:
+    """Poses (K, 4, 4) of ``source`` near ``target``, made upright and brought to where both silhouettes score them
+    best.
 
     The best distinct ones come back, best first.
     """
     motions = upright_motion(source, target, poses)
     extent = 0.5 * (source.extent + target.extent)
     settling = extent, weights_of(params), params.shape_glance, WIDEST_REACH
-    moved, scores = _started(source.sight, target.sight, target.surface.grid, motions, *settling, CLEARED)
+    moved, scores = _started(
+        source.kernel_arrays, target.kernel_arrays, target.surface.grid, motions, *settling, CLEARED
+    )
     return _finished(source, target, moved, scores, 0.5 * WIDEST_REACH, params)
 
 
@@ -76,22 +79,22 @@ def _starts(yaws: int, deeper: float) -> Array:
 
 def _finished(
     source: Shape, target: Shape, motions: Array, scores: Array, reach: float, params: RegistrarParams
-) -> list[Fitting]:
+) -> list[ScoredPose]:
     extent = 0.5 * (source.extent + target.extent)
     numbers, margin = (params.shape_kept, params.shape_climbed, params.shape_rounds), params.shape_margin
-    sights = source.sight, target.sight, target.surface.grid
-    found, worth = _finish(*sights, motions, scores, extent, weights_of(params), numbers, margin, reach)
-    order = np.argsort(-worth, kind="stable")
+    arrays = source.kernel_arrays, target.kernel_arrays, target.surface.grid
+    found, refined_scores = _finish(*arrays, motions, scores, extent, weights_of(params), numbers, margin, reach)
+    order = np.argsort(-refined_scores, kind="stable")
     poses = upright_pose(source, target, found[order])
-    return [Fitting(T, score) for T, score in zip(poses, worth[order].tolist(), strict=True)]
+    return [ScoredPose(T, score) for T, score in zip(poses, refined_scores[order].tolist(), strict=True)]
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _started(source, target, grid, starts, extent, weights, glance, reach, cleared):  # type: ignore[no-untyped-def]
     """Each start brought to where it floats least, and from there to its basin: (motions (K, 4), scores (K,)).
 
-    The latter only where both silhouettes like it: opposite sides of an object have next to no surface in common, and
-    would be drawn together.
+    The latter only where both silhouettes score it no lower: opposite sides of an object have next to no surface in
+    common, and would be drawn together.
     """
     motions, scores = starts.copy(), np.empty(len(starts))
     trial = np.empty(4)

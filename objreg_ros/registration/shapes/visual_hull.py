@@ -27,7 +27,7 @@ DAMPING = (1.5, 30.0, 30.0)  # of yaw and the shifts: a few points that float mo
 def clear(source, target, motion, most, rounds):  # type: ignore[no-untyped-def]
     """Move ``motion (yaw, x, y, rise)`` in place, but for its rise, to where the first ``most`` points float least.
 
-    ``source`` and ``target`` are `Shape.sight`. Returns by how many metres, all together, they float there.
+    ``source`` and ``target`` are `Shape.kernel_arrays`. Returns by how many metres, all together, they float there.
     """
     P, Rs, os, seen_s = source[0], source[3], source[4], (source[5], source[6], source[8], source[9], source[10])
     Q, Rt, ot, seen_t = target[0], target[3], target[4], (target[5], target[6], target[8], target[9], target[10])

@@ -52,19 +52,19 @@ def test_no_information_is_a_large_covariance_and_not_an_error() -> None:
 def test_a_free_axis_is_open_and_the_others_are_not() -> None:
     yaw = np.zeros((1, 6))
     yaw[0, 4] = 1.0
-    C = covariance_of(candidate(information=1e9 * np.eye(6), slack=yaw), PARAMS)
+    C = covariance_of(candidate(information=1e9 * np.eye(6), degenerate=yaw), PARAMS)
     assert np.sqrt(C[4, 4]) > np.radians(50) and np.sqrt(C[3, 3]) < np.radians(1)
 
 
 def test_a_slide_shows_in_the_worst_translation() -> None:
     slide = np.array([[0.6, 0.8, 0, 0, 0, 0]])
-    C = covariance_of(candidate(information=1e9 * np.eye(6), slack=slide), PARAMS)
+    C = covariance_of(candidate(information=1e9 * np.eye(6), degenerate=slide), PARAMS)
     assert worst_translation(C) == pytest.approx(0.5, rel=0.01)
 
 
 def test_what_the_views_alone_hold_is_open_by_as_much_as_they_say() -> None:
-    held = np.array([[0.03, 0.04, 0, 0, 0, 0]])
-    C = covariance_of(candidate(information=1e9 * np.eye(6), held=held), PARAMS)
+    regularised = np.array([[0.03, 0.04, 0, 0, 0, 0]])
+    C = covariance_of(candidate(information=1e9 * np.eye(6), regularised=regularised), PARAMS)
     assert worst_translation(C) == pytest.approx(np.hypot(0.05, 0.01), rel=0.01)
 
 
@@ -83,7 +83,7 @@ def test_a_wrong_calibration_is_a_share_of_the_motion_about_what_was_seen() -> N
 def test_a_slide_that_turns_is_open_as_a_turn() -> None:
     around = np.array([[0.6, 0.0, 0.0, 0.0, 0.8, 0.0]])
     params = PARAMS.replaced(slack_rotation=60.0)
-    C = covariance_of(candidate(information=1e9 * np.eye(6), slack=around), params)
+    C = covariance_of(candidate(information=1e9 * np.eye(6), degenerate=around), params)
     assert around[0] @ C @ around[0] == pytest.approx(np.radians(60.0) ** 2, rel=1e-3)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import Array
-from objreg_ros.registration.certainty.sandwich import FREEDOMS, _spread, information, warped
+from objreg_ros.registration.certainty.sandwich import FREEDOMS, _spread, information, systematic_depth_error_of_step
 from objreg_ros.registration.kernels.closest_points import Surface, prepare_surface
 from objreg_ros.registration.params import RegistrarParams
 
@@ -107,7 +107,7 @@ def test_without_partners_nothing_is_known() -> None:
 def worst_shift(xyz: Array, normals: Array, share: float) -> float:
     """How far a camera at the origin may be, by a warp of so much, that sees oriented points."""
     flat = xyz.astype(np.float32), normals.astype(np.float32)
-    C = warped(*flat, grid_of(xyz, normals), np.eye(4), PARAMS.replaced(depth_warp=share))
+    C = systematic_depth_error_of_step(*flat, grid_of(xyz, normals), np.eye(4), PARAMS.replaced(depth_warp=share))
     return float(np.sqrt(np.linalg.eigvalsh(C[:3, :3])[-1]))
 
 
@@ -124,6 +124,6 @@ def test_a_warped_depth_turns_a_camera_more_about_a_small_thing_than_about_a_lar
 def test_a_patch_aside_may_lie_off_by_the_share_of_its_distance() -> None:
     xyz, normals = wall_aside()
     flat = xyz.astype(np.float32), normals.astype(np.float32)
-    C = warped(*flat, grid_of(xyz, normals), np.eye(4), PARAMS.replaced(depth_warp=0.01))
+    C = systematic_depth_error_of_step(*flat, grid_of(xyz, normals), np.eye(4), PARAMS.replaced(depth_warp=0.01))
     ahead = ahead_of(xyz)
     assert np.sqrt(ahead @ C @ ahead) == pytest.approx(0.01 * np.linalg.norm(xyz.mean(axis=0)), rel=0.02)

@@ -12,11 +12,11 @@ CUP = ObjectPair(0, 0, "cup")
 
 
 def lone(**evidence: object) -> Candidate:
-    """A candidate of one object that no second chain confirms, in a plain room."""
-    alone = {"explained": (ObjectPair(0, 0, "cup"),), "agreeing_chains": ("objects",), "texture": 0.4}
-    return candidate(**{**alone, "likeness": 0.6, "yaw_known": True, "margin": 0.4, **evidence})
+    """A candidate of one object that no second proposer confirms, in a plain room."""
+    alone = {"matched": (ObjectPair(0, 0, "cup"),), "agreeing_proposers": ("objects",), "texture": 0.4}
+    return candidate(**{**alone, "silhouette_score": 0.6, "yaw_known": True, "margin_over_competing": 0.4, **evidence})
 
 
-def rival(one: Candidate, behind: float, **evidence: object) -> Candidate:
+def competitor(one: Candidate, behind: float, **evidence: object) -> Candidate:
     """Another pose of the same object, worth so much less."""
-    return lone(score=one.verification.score - behind, likeness=one.likeness, **evidence)
+    return lone(score=one.verification.score - behind, silhouette_score=one.silhouette_score, **evidence)

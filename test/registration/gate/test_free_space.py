@@ -42,21 +42,21 @@ def test_a_share_of_violations_is_allowed() -> None:
 
 
 def test_a_lone_object_must_respect_free_space_more_than_several() -> None:
-    far = {"floating": 0.5 * (PARAMS.max_floating_alone + PARAMS.max_floating)}
-    refusal = refuse(candidate(explained=(CUP,), margin=1.0, **far), PARAMS)
+    far = {"certain_violations": 0.5 * (PARAMS.max_floating_alone + PARAMS.max_floating)}
+    refusal = refuse(candidate(matched=(CUP,), margin_over_competing=1.0, **far), PARAMS)
     assert refusal is not None and refusal[0] is Reason.FREE_SPACE
     assert refuse(candidate(**far), PARAMS) is None
 
 
 def test_several_objects_that_look_otherwise_may_not_float_either() -> None:
-    far = {"floating": 0.5 * (PARAMS.max_floating_alone + PARAMS.max_floating)}
-    assert refuse(candidate(**far, likeness=0.0), PARAMS) is None
-    refusal = refuse(candidate(**far, likeness=PARAMS.min_likeness_unrivalled - 0.1), PARAMS)
+    far = {"certain_violations": 0.5 * (PARAMS.max_floating_alone + PARAMS.max_floating)}
+    assert refuse(candidate(**far, silhouette_score=0.0), PARAMS) is None
+    refusal = refuse(candidate(**far, silhouette_score=PARAMS.min_likeness_unrivalled - 0.1), PARAMS)
     assert refusal is not None and refusal[0] is Reason.FREE_SPACE
 
 
 def test_two_objects_may_both_have_moved_but_three_stand_where_they_stood() -> None:
-    far, three = {"floating": 1.1 * PARAMS.max_floating}, tuple(ObjectPair(k, k, "cup") for k in range(3))
+    far, three = {"certain_violations": 1.1 * PARAMS.max_floating}, tuple(ObjectPair(k, k, "cup") for k in range(3))
     refusal = refuse(candidate(**far), PARAMS)
     assert refusal is not None and refusal[0] is Reason.FREE_SPACE
-    assert refuse(candidate(**far, explained=three), PARAMS) is None
+    assert refuse(candidate(**far, matched=three), PARAMS) is None

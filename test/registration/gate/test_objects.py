@@ -35,9 +35,9 @@ def test_what_objects_are_worth_depends_on_their_number_their_proposers_and_thei
     matched: int, few_proposers: bool, inconsistent: bool, lone: bool, doubtful: bool, uncertain: bool
 ) -> None:
     one = candidate(
-        explained=tuple(ObjectPair(k, k, "cup") for k in range(matched)),
-        agreeing_chains=("objects",) if few_proposers else ("features", "objects"),
-        likeness_nearby=-0.1 if inconsistent else 0.1,
+        matched=tuple(ObjectPair(k, k, "cup") for k in range(matched)),
+        agreeing_proposers=("objects",) if few_proposers else ("features", "objects"),
+        silhouette_score_nearby=-0.1 if inconsistent else 0.1,
     )
     found = objects.objects_of(one, LIMITS)
     assert found == (matched, matched < 3, few_proposers, inconsistent)

@@ -31,7 +31,7 @@ def test_the_correlation_may_fall_by_so_much_without_the_objects() -> None:
 def test_a_plain_table_needs_no_print_where_several_objects_stand_where_they_should() -> None:
     several = tuple(ObjectPair(k, k, "cup") for k in range(PARAMS.min_objects_plain))
     plain = {"texture": 0.5 * PARAMS.min_texture}
-    assert refuse(candidate(explained=several, **plain), PARAMS) is None
-    for evidence in ({"explained": several[:-1], **plain}, {"explained": several, "texture": -0.1}):
+    assert refuse(candidate(matched=several, **plain), PARAMS) is None
+    for evidence in ({"matched": several[:-1], **plain}, {"matched": several, "texture": -0.1}):
         refusal = refuse(candidate(**evidence), PARAMS)
         assert refusal is not None and refusal[0] is Reason.TEXTURE

@@ -63,28 +63,36 @@ def test_only_a_lone_object_must_leave_a_share_of_the_views() -> None:
         ({}, None),
     ],
 )
-@pytest.mark.parametrize("explained", [(CUP,), (CUP, ObjectPair(1, 1, "book"))], ids=len)
+@pytest.mark.parametrize("matched", [(CUP,), (CUP, ObjectPair(1, 1, "book"))], ids=len)
 def test_what_is_around_few_objects_must_agree_by_itself(
-    around: dict[str, float], reason: Reason | None, explained: tuple[ObjectPair, ...]
+    around: dict[str, float], reason: Reason | None, matched: tuple[ObjectPair, ...]
 ) -> None:
-    few = candidate(explained=explained, margin=1.0, surroundings=replace(candidate().verification, **around))
+    few = candidate(
+        matched=matched, margin_over_competing=1.0, surroundings=replace(candidate().verification, **around)
+    )
     refusal = refuse(few, PARAMS)
     assert (None if refusal is None else refusal[0]) is reason
     assert refusal is None or refusal[1].startswith(
-        ("without the cup ", "without the cup and the book ")[len(explained) - 1]
+        ("without the cup ", "without the cup and the book ")[len(matched) - 1]
     )
 
 
-@pytest.mark.parametrize("chains", [("features", "objects"), ("objects",)], ids=len)
-@pytest.mark.parametrize("explained", [(CUP,), (CUP, ObjectPair(1, 1, "book"))], ids=len)
+@pytest.mark.parametrize("proposers", [("features", "objects"), ("objects",)], ids=len)
+@pytest.mark.parametrize("matched", [(CUP,), (CUP, ObjectPair(1, 1, "book"))], ids=len)
 def test_few_objects_around_which_the_print_agrees_much_less_have_moved(
-    explained: tuple[ObjectPair, ...], chains: tuple[str, ...]
+    matched: tuple[ObjectPair, ...], proposers: tuple[str, ...]
 ) -> None:
     def judged(around: float | None, whole: float | None = 0.6) -> object:
         seen = replace(candidate().verification, texture=whole)
-        told = {"explained": explained, "agreeing_chains": chains, "margin": 1.0, "yaw_known": True, "likeness": 0.9}
+        told = {
+            "matched": matched,
+            "agreeing_proposers": proposers,
+            "margin_over_competing": 1.0,
+            "yaw_known": True,
+            "silhouette_score": 0.9,
+        }
         surroundings = replace(seen, texture=around)
-        return refuse(candidate(**told, texture=whole, resistance=1.0, surroundings=surroundings), PARAMS)
+        return refuse(candidate(**told, texture=whole, perturbation_margin=1.0, surroundings=surroundings), PARAMS)
 
     assert judged(0.6 - 0.9 * PARAMS.max_fall_around) is None
     assert judged(0.99) is None
@@ -93,9 +101,9 @@ def test_few_objects_around_which_the_print_agrees_much_less_have_moved(
     assert isinstance(refusal, tuple) and refusal[0] is Reason.TEXTURE and "without the cup" in refusal[1]
 
 
-def test_a_lone_object_that_one_chain_proposed_must_leave_something_of_the_views() -> None:
+def test_a_lone_object_that_one_proposer_proposed_must_leave_something_of_the_views() -> None:
     seen = candidate().verification
-    for chains, share, accepted in (
+    for proposers, share, accepted in (
         (("objects",), 0.9, False),
         (("objects", "odometry"), 0.9, False),
         (("objects",), 1.1, True),
@@ -103,8 +111,13 @@ def test_a_lone_object_that_one_chain_proposed_must_leave_something_of_the_views
     ):
         around = replace(seen, tested=round(share * PARAMS.min_surroundings * seen.tested))
         lone = candidate(
-            explained=(CUP,), margin=1.0, resistance=1.0, agreeing_chains=chains, surroundings=around, yaw_known=True
+            matched=(CUP,),
+            margin_over_competing=1.0,
+            perturbation_margin=1.0,
+            agreeing_proposers=proposers,
+            surroundings=around,
+            yaw_known=True,
         )
         refusal = refuse(lone, PARAMS)
-        assert (refusal is None) is accepted, (chains, share, refusal)
+        assert (refusal is None) is accepted, (proposers, share, refusal)
         assert refusal is None or (refusal[0] is Reason.LOW_OVERLAP and "without the cup" in refusal[1])

@@ -8,7 +8,7 @@ import pytest
 
 from objreg_ros.data import Reason
 from objreg_ros.registration.gate.verdict import judge, refuse
-from registration.gate.samples import CUP, PARAMS, lone, rival
+from registration.gate.samples import CUP, PARAMS, competitor, lone
 from registration.samples import candidate, moved
 
 
@@ -27,13 +27,13 @@ def test_a_candidate_that_nothing_speaks_against_is_accepted() -> None:
         ({"violations": 0.5}, Reason.FREE_SPACE),
         ({"texture": -0.2}, Reason.TEXTURE),
         ({"score": -1.0}, Reason.LOW_OVERLAP),
-        ({"agreeing_chains": ("objects",), "explained": (CUP,)}, Reason.CHAINS_DISAGREE),
-        ({"agreeing_chains": ("features",), "explained": ()}, Reason.FEW_OBJECTS),
-        ({"agreeing_chains": ("features",), "explained": (), "resistance": 0.1}, Reason.FEW_OBJECTS),
-        ({"explained": (), "moved": (CUP,)}, Reason.MOVED),
+        ({"agreeing_proposers": ("objects",), "matched": (CUP,)}, Reason.CHAINS_DISAGREE),
+        ({"agreeing_proposers": ("features",), "matched": ()}, Reason.FEW_OBJECTS),
+        ({"agreeing_proposers": ("features",), "matched": (), "perturbation_margin": 0.1}, Reason.FEW_OBJECTS),
+        ({"matched": (), "moved": (CUP,)}, Reason.MOVED),
         ({"information": np.diag([1.0, 1e5, 1e5, 1e5, 1e5, 1e5])}, Reason.SLACK),
-        ({"slack": np.eye(6)[:1]}, Reason.SLACK),
-        ({"resistance": 0.02}, Reason.SLACK),
+        ({"degenerate": np.eye(6)[:1]}, Reason.SLACK),
+        ({"perturbation_margin": 0.02}, Reason.SLACK),
     ],
 )
 def test_each_kind_of_evidence_alone_can_refuse(evidence: dict[str, object], reason: Reason) -> None:
@@ -46,8 +46,8 @@ def test_a_candidate_without_grey_or_gravity_is_judged_by_the_rest() -> None:
     assert refuse(candidate(texture=None, gravity_error_deg=None), PARAMS) is None
 
 
-def test_two_objects_make_up_for_a_chain_that_is_alone() -> None:
-    assert refuse(candidate(agreeing_chains=("features",)), PARAMS) is None
+def test_two_objects_make_up_for_a_proposer_that_is_alone() -> None:
+    assert refuse(candidate(agreeing_proposers=("features",)), PARAMS) is None
 
 
 def test_the_second_candidate_is_taken_when_the_first_is_refused() -> None:
@@ -76,9 +76,9 @@ def test_an_alias_does_not_stand_in_for_a_refused_best_candidate() -> None:
 
 
 @pytest.mark.parametrize(
-    "against", [{"violations": 0.4}, {"floating": 0.3}, {"explained": ()}, {"gravity_error_deg": 30.0}], ids=str
+    "against", [{"violations": 0.4}, {"certain_violations": 0.3}, {"matched": ()}, {"gravity_error_deg": 30.0}], ids=str
 )
 def test_a_pose_that_cannot_be_true_is_no_rival(against: dict) -> None:
     one = lone()
-    assert isinstance(judge((one, rival(one, 0.05)), PARAMS), tuple)
-    assert judge((one, rival(one, 0.05, **against)), PARAMS) is one
+    assert isinstance(judge((one, competitor(one, 0.05)), PARAMS), tuple)
+    assert judge((one, competitor(one, 0.05, **against)), PARAMS) is one

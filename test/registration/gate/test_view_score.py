@@ -44,65 +44,100 @@ def test_silhouettes_add_to_a_view_score_that_is_high_enough_by_itself() -> None
     assert low == (Reason.LOW_OVERLAP, "score 0.09 < 0.10")
 
 
-def test_where_something_floats_the_fall_over_a_push_makes_up_for_a_low_score() -> None:
-    floating = 1.5 * PARAMS.max_violations_doubtful
-    little = {"score": 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful), "margin": 1.0, "violations": floating}
+def test_where_something_floats_the_fall_over_a_perturbation_makes_up_for_a_low_score() -> None:
+    certain_violations = 1.5 * PARAMS.max_violations_doubtful
+    little = {
+        "score": 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful),
+        "margin_over_competing": 1.0,
+        "violations": certain_violations,
+    }
     lacking = PARAMS.firm_margin - (little["score"] - PARAMS.min_score)
-    for explained, resistance, accepted in (
+    for matched, perturbation_margin, accepted in (
         ((CUP,), 0.9 * lacking, False),
         ((CUP,), 1.1 * lacking, True),
         ((CUP,), None, True),
         ((CUP, ObjectPair(1, 1, "book")), 0.9 * lacking, False),
     ):
-        refusal = refuse(candidate(explained=explained, resistance=resistance, **little), PARAMS)
-        assert (refusal is None) is accepted, (explained, resistance, refusal)
+        refusal = refuse(candidate(matched=matched, perturbation_margin=perturbation_margin, **little), PARAMS)
+        assert (refusal is None) is accepted, (matched, perturbation_margin, refusal)
 
 
 def test_a_pose_that_views_like_well_need_not_resist_though_something_floats() -> None:
-    floating = {"violations": 1.5 * PARAMS.max_violations_doubtful, "explained": (CUP, ObjectPair(1, 1, "book"))}
-    liked = candidate(score=1.1 * PARAMS.min_score_doubtful, resistance=1.1 * PARAMS.rival_margin, **floating)
+    certain_violations = {
+        "violations": 1.5 * PARAMS.max_violations_doubtful,
+        "matched": (CUP, ObjectPair(1, 1, "book")),
+    }
+    liked = candidate(
+        score=1.1 * PARAMS.min_score_doubtful, perturbation_margin=1.1 * PARAMS.rival_margin, **certain_violations
+    )
     assert refuse(liked, PARAMS) is None
 
 
-def test_a_lone_object_that_views_like_little_need_not_resist_a_push_where_next_to_nothing_floats() -> None:
-    little = {"score": 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful), "margin": 1.0, "explained": (CUP,)}
-    soft = candidate(resistance=0.9 * PARAMS.firm_margin, violations=0.5 * PARAMS.max_violations_doubtful, **little)
+def test_a_lone_object_that_views_like_little_need_not_resist_a_perturbation_where_next_to_nothing_floats() -> None:
+    little = {
+        "score": 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful),
+        "margin_over_competing": 1.0,
+        "matched": (CUP,),
+    }
+    soft = candidate(
+        perturbation_margin=0.9 * PARAMS.firm_margin, violations=0.5 * PARAMS.max_violations_doubtful, **little
+    )
     assert refuse(soft, PARAMS) is None
 
 
-def test_a_lone_object_that_views_like_little_needs_two_chains() -> None:
-    little = {"score": 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful), "margin": 1.0, "explained": (CUP,)}
-    for chains in (("objects",), ("centroids", "objects")):  # the objects' poses are looked for from their middles too
-        refusal = refuse(candidate(agreeing_chains=chains, **little), PARAMS)
+def test_a_lone_object_that_views_like_little_needs_two_proposers() -> None:
+    little = {
+        "score": 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful),
+        "margin_over_competing": 1.0,
+        "matched": (CUP,),
+    }
+    for proposers in (
+        ("objects",),
+        ("centroids", "objects"),
+    ):  # the objects' poses are looked for from their middles too
+        refusal = refuse(candidate(agreeing_proposers=proposers, **little), PARAMS)
         assert refusal is not None and refusal[0] is Reason.LOW_OVERLAP
-    assert refuse(candidate(agreeing_chains=("features", "objects"), **little), PARAMS) is None
+    assert refuse(candidate(agreeing_proposers=("features", "objects"), **little), PARAMS) is None
 
 
-def test_a_lone_object_of_one_chain_is_refused_where_views_like_too_little_however_alike_it_looks() -> None:
-    firm = {"resistance": PARAMS.min_firmness_alone, "agreeing_chains": ("objects",), "explained": (CUP,)}
+def test_a_lone_object_of_one_proposer_is_refused_where_views_like_too_little_however_alike_it_looks() -> None:
+    firm = {"perturbation_margin": PARAMS.min_firmness_alone, "agreeing_proposers": ("objects",), "matched": (CUP,)}
     for score, accepted in ((1.1, True), (0.9, False)):
-        alike = candidate(score=score * PARAMS.min_score, likeness=1.0, margin=1.0, **firm)
+        alike = candidate(score=score * PARAMS.min_score, silhouette_score=1.0, margin_over_competing=1.0, **firm)
         refusal = refuse(alike, PARAMS)
         assert (refusal is None) is accepted, (score, refusal)
         assert refusal is None or refusal[0] is Reason.LOW_OVERLAP
 
 
-def test_a_lone_object_of_one_chain_that_views_like_little_must_resist_a_push() -> None:
+def test_a_lone_object_of_one_proposer_that_views_like_little_must_resist_a_perturbation() -> None:
     score = 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful)
-    for resistance, accepted in ((PARAMS.min_firmness_alone, True), (0.0, False), (None, False)):
-        little = {"score": score, "likeness": 0.0, "margin": 1.0, "explained": (CUP,), "agreeing_chains": ("objects",)}
-        refusal = refuse(candidate(resistance=resistance, **little), PARAMS)
-        assert (refusal is None) is accepted, (resistance, refusal)
+    for perturbation_margin, accepted in ((PARAMS.min_firmness_alone, True), (0.0, False), (None, False)):
+        little = {
+            "score": score,
+            "silhouette_score": 0.0,
+            "margin_over_competing": 1.0,
+            "matched": (CUP,),
+            "agreeing_proposers": ("objects",),
+        }
+        refusal = refuse(candidate(perturbation_margin=perturbation_margin, **little), PARAMS)
+        assert (refusal is None) is accepted, (perturbation_margin, refusal)
 
 
 def test_an_object_that_looks_alike_makes_up_for_views_that_like_little() -> None:
-    little = {"score": 0.2, "violations": 1.5 * PARAMS.max_violations_doubtful, "yaw_known": True, "margin": 1.0}
-    little["resistance"] = 0.3 * PARAMS.firm_margin
-    alike, otherwise = (candidate(explained=(CUP,), likeness=likeness, **little) for likeness in (1.0, 0.2))
+    little = {
+        "score": 0.2,
+        "violations": 1.5 * PARAMS.max_violations_doubtful,
+        "yaw_known": True,
+        "margin_over_competing": 1.0,
+    }
+    little["perturbation_margin"] = 0.3 * PARAMS.firm_margin
+    alike, otherwise = (
+        candidate(matched=(CUP,), silhouette_score=silhouette_score, **little) for silhouette_score in (1.0, 0.2)
+    )
     assert refuse(alike, PARAMS) is None
     refusal = refuse(otherwise, PARAMS)
     assert refusal is not None and refusal[0] is Reason.LOW_OVERLAP
 
 
 def test_an_object_that_looks_otherwise_takes_nothing_from_what_views_like() -> None:
-    assert refuse(candidate(score=1.1 * PARAMS.min_score, likeness=-1.0), PARAMS) is None
+    assert refuse(candidate(score=1.1 * PARAMS.min_score, silhouette_score=-1.0), PARAMS) is None

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.registration.prepare.prepared import Pantry, prepare
+from objreg_ros.registration.prepare.prepared import PreparedCache, prepare
 from registration.rooms import keyframe, seen_from
 
 PARAMS = RegistrarParams()
@@ -44,7 +44,7 @@ def test_without_gravity_nothing_is_upright() -> None:
 
 
 def test_the_pantry_makes_a_keyframe_ready_once_and_lets_go_of_the_one_that_was_asked_for_longest_ago() -> None:
-    pantry = Pantry(PARAMS, size=2)
+    pantry = PreparedCache(PARAMS, size=2)
     views = [keyframe(seen_from(angle)) for angle in (0.0, 10.0, 20.0)]
     first, second = (pantry.get(view) for view in views[:2])
     assert pantry.get(views[0]) is first

@@ -17,7 +17,7 @@ from objreg_ros.registration.certainty.perturbation import turned_about
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared, prepare
 from objreg_ros.registration.propose import competing_hypotheses as module
-from objreg_ros.registration.propose.competing_hypotheses import _grid, alternatives
+from objreg_ros.registration.propose.competing_hypotheses import _grid, competing_poses
 from objreg_ros.registration.propose.evidence import gather
 from objreg_ros.registration.propose.pose_voting import near, same_pose
 from objreg_ros.registration.propose.refinement import refine
@@ -47,7 +47,7 @@ def beside(views: tuple[Prepared, Prepared], turn_deg: float, sideways: float) -
     found = gather(
         source, target, replace(refine(source, target, TRUTH, PARAMS), T_target_source=T), ("objects",), PARAMS
     )
-    return replace(found, explained=(ObjectPair(0, 0, "bottle"),))
+    return replace(found, matched=(ObjectPair(0, 0, "bottle"),))
 
 
 def errors(found: list[Array]) -> list[tuple[float, float]]:
@@ -58,7 +58,7 @@ def errors(found: list[Array]) -> list[tuple[float, float]]:
 def test_the_truth_is_found_beside_a_wrong_pose(
     views: tuple[Prepared, Prepared], turn_deg: float, sideways: float
 ) -> None:
-    found = alternatives(*views, beside(views, turn_deg, sideways), PARAMS)
+    found = competing_poses(*views, beside(views, turn_deg, sideways), PARAMS)
     assert any(degrees < 1.0 and centimetres < 2.0 for degrees, centimetres in errors(found))
 
 
@@ -69,7 +69,7 @@ def test_the_search_begins_where_poses_do_not_agree_with_the_candidate_and_far_f
     monkeypatch.setattr(module, "finish", lambda source, target, T, *_: (T, np.zeros((6, 6))))
     monkeypatch.setattr(module, "_is_hopeful", lambda *_: True)
     params = PARAMS.replaced(searched_around=30)
-    starts = np.array(alternatives(*views, beside(views, 0.0, 0.0), params))
+    starts = np.array(competing_poses(*views, beside(views, 0.0, 0.0), params))
     middle = views[0].middle
     assert len(starts) == 30
     assert not same_pose(starts, TRUTH, middle, params).any()
@@ -77,13 +77,13 @@ def test_the_search_begins_where_poses_do_not_agree_with_the_candidate_and_far_f
         assert np.flatnonzero(near(starts, start, middle, *module.APART)).tolist() == [k]
 
 
-def test_what_views_like_far_less_is_no_alternative(
+def test_what_views_like_far_less_is_no_competing_pose(
     views: tuple[Prepared, Prepared], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     wrong = beside(views, 12.0, 0.1)
     spoiled = replace(wrong.verification, score=5.0)
-    assert alternatives(*views, wrong, PARAMS)
-    assert alternatives(*views, replace(wrong, verification=spoiled), PARAMS) == []
+    assert competing_poses(*views, wrong, PARAMS)
+    assert competing_poses(*views, replace(wrong, verification=spoiled), PARAMS) == []
 
 
 def test_without_grey_in_both_views_nothing_is_looked_for_around(
@@ -93,14 +93,14 @@ def test_without_grey_in_both_views_nothing_is_looked_for_around(
     source, target = views
     blind_source, blind_target = (replace(view, sight=replace(view.sight, textured=False)) for view in views)
     wrong = beside(views, 12.0, 0.1)
-    assert alternatives(blind_source, target, wrong, PARAMS) == []
-    assert alternatives(source, blind_target, wrong, PARAMS) == []
+    assert competing_poses(blind_source, target, wrong, PARAMS) == []
+    assert competing_poses(source, blind_target, wrong, PARAMS) == []
 
 
-@pytest.mark.parametrize("explained", [(), (CUP, ObjectPair(1, 1, "book"))])
-def test_none_is_looked_for_where_not_one_object_speaks_for_a_pose(explained: tuple[ObjectPair, ...]) -> None:
+@pytest.mark.parametrize("matched", [(), (CUP, ObjectPair(1, 1, "book"))])
+def test_none_is_looked_for_where_not_one_object_speaks_for_a_pose(matched: tuple[ObjectPair, ...]) -> None:
     nothing: Any = None
-    assert alternatives(nothing, nothing, candidate(explained=explained), PARAMS) == []
+    assert competing_poses(nothing, nothing, candidate(matched=matched), PARAMS) == []
 
 
 def test_without_gravity_and_where_none_are_wanted_nothing_is_looked_for_around(
@@ -109,9 +109,9 @@ def test_without_gravity_and_where_none_are_wanted_nothing_is_looked_for_around(
     monkeypatch.setattr(module, "half_turned", lambda *_: None)
     source, target = views
     wrong = beside(views, 12.0, 0.1)
-    assert alternatives(source, target, wrong, PARAMS)
-    assert alternatives(source, replace(target, up=None), wrong, PARAMS) == []
-    assert alternatives(source, target, wrong, PARAMS.replaced(searched_around=0)) == []
+    assert competing_poses(source, target, wrong, PARAMS)
+    assert competing_poses(source, replace(target, up=None), wrong, PARAMS) == []
+    assert competing_poses(source, target, wrong, PARAMS.replaced(searched_around=0)) == []
 
 
 def test_the_grid_is_upright_turns_about_the_object_and_shifts_across_the_vertical(
@@ -135,10 +135,10 @@ def test_the_grid_is_upright_turns_about_the_object_and_shifts_across_the_vertic
 def test_a_half_turn_is_hopeful_where_it_is_not_far_behind_nor_floats(
     monkeypatch: pytest.MonkeyPatch, share: float, violations: float, count: int
 ) -> None:
-    one, half = candidate(explained=(CUP,), score=0.8, occluded=0.1), moved(0.4)
+    one, half = candidate(matched=(CUP,), score=0.8, occluded=0.1), moved(0.4)
     behind = share * PARAMS.finished_margin
     seen = replace(one.verification, score=0.8 + 0.1 - 0.3 - behind, occluded=0.3, violations=violations)
     monkeypatch.setattr(module, "half_turned", lambda *_: half)
     monkeypatch.setattr(module, "verify", lambda source, target, T, *_: seen if T is half else None)
     blind: Any = SimpleNamespace(sight=SimpleNamespace(textured=False), up=None)
-    assert alternatives(blind, blind, one, PARAMS) == count * [half]
+    assert competing_poses(blind, blind, one, PARAMS) == count * [half]

@@ -16,13 +16,13 @@ from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import prepare
 from objreg_ros.registration.propose import evidence
 from objreg_ros.registration.propose.evidence import (
-    agreement,
     gather,
     gravity_error_deg,
-    lead,
-    resistance_of,
+    margin_over,
+    perturbation_margin_of,
+    rank_score,
+    score_objects,
     surroundings_of,
-    worth,
 )
 from registration import rooms
 from registration.samples import candidate
@@ -32,46 +32,48 @@ BOX = (ObjectPair(0, 0, "cereal box"),)
 
 
 def test_a_candidate_leads_by_what_its_views_are_worth_more() -> None:
-    one, other = candidate(score=0.6, explained=BOX), candidate(score=0.4, explained=BOX)
-    assert lead(one, [one, other], PARAMS) == pytest.approx(0.2)
-    assert lead(other, [one, other], PARAMS) == pytest.approx(-0.2)
+    one, other = candidate(score=0.6, matched=BOX), candidate(score=0.4, matched=BOX)
+    assert margin_over(one, [one, other], PARAMS) == pytest.approx(0.2)
+    assert margin_over(other, [one, other], PARAMS) == pytest.approx(-0.2)
 
 
 def test_what_is_hidden_counts_as_if_it_agreed() -> None:
     one, other = candidate(score=0.6, occluded=0.1), candidate(score=0.4, occluded=0.5)
-    assert lead(one, [other], PARAMS) == pytest.approx(-0.2)
+    assert margin_over(one, [other], PARAMS) == pytest.approx(-0.2)
 
 
 def test_that_an_object_looks_alike_is_no_lead_and_that_it_looks_otherwise_is_none_to_have() -> None:
-    alike, unseen, otherwise = (candidate(score=0.5, explained=BOX, likeness=x) for x in (1.0, 0.0, -0.6))
-    assert lead(alike, [unseen], PARAMS) == pytest.approx(0.0)
-    assert lead(alike, [otherwise], PARAMS) == pytest.approx(0.6 * PARAMS.likeness_weight)
-    assert worth(alike, PARAMS) - worth(unseen, PARAMS) == pytest.approx(PARAMS.likeness_weight)
+    alike, unseen, otherwise = (candidate(score=0.5, matched=BOX, silhouette_score=x) for x in (1.0, 0.0, -0.6))
+    assert margin_over(alike, [unseen], PARAMS) == pytest.approx(0.0)
+    assert margin_over(alike, [otherwise], PARAMS) == pytest.approx(0.6 * PARAMS.likeness_weight)
+    assert rank_score(alike, PARAMS) - rank_score(unseen, PARAMS) == pytest.approx(PARAMS.likeness_weight)
 
 
 def test_objects_that_stand_add_to_what_views_say_and_those_that_moved_take_away() -> None:
-    assert agreement(BOX, (), None, PARAMS) == pytest.approx(PARAMS.object_bonus)
-    assert agreement(BOX, BOX, 0.0, PARAMS) == pytest.approx(0.0)
-    assert agreement(3 * BOX, 3 * BOX, 0.0, PARAMS) == pytest.approx(0.0)  # two say all
-    assert agreement(BOX, 3 * BOX, 0.0, PARAMS) == pytest.approx(-PARAMS.object_bonus)
+    assert score_objects(BOX, (), None, PARAMS) == pytest.approx(PARAMS.object_bonus)
+    assert score_objects(BOX, BOX, 0.0, PARAMS) == pytest.approx(0.0)
+    assert score_objects(3 * BOX, 3 * BOX, 0.0, PARAMS) == pytest.approx(0.0)  # two say all
+    assert score_objects(BOX, 3 * BOX, 0.0, PARAMS) == pytest.approx(-PARAMS.object_bonus)
 
 
-def test_without_a_rival_a_candidate_leads_by_more_than_any_limit() -> None:
-    assert lead(candidate(), [], PARAMS) > 2.0
-    assert np.isfinite(lead(candidate(), [], PARAMS))
+def test_without_a_competitor_a_candidate_leads_by_more_than_any_limit() -> None:
+    assert margin_over(candidate(), [], PARAMS) > 2.0
+    assert np.isfinite(margin_over(candidate(), [], PARAMS))
 
 
-def test_a_pose_is_pushed_where_surfaces_or_a_warped_depth_leave_it_doubtful(monkeypatch: pytest.MonkeyPatch) -> None:
-    pushes: list[tuple[Any, ...]] = []
-    monkeypatch.setattr(evidence, "resistance", lambda *given: pushes.append(given) or 0.25)
+def test_a_pose_is_perturbed_where_surfaces_or_a_warped_depth_leave_it_doubtful(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    perturbations: list[tuple[Any, ...]] = []
+    monkeypatch.setattr(evidence, "margin_under_perturbation", lambda *given: perturbations.append(given) or 0.25)
     variance = (2.0 * PARAMS.doubtful_sigma) ** 2
-    warped = {"warp": np.diag([variance, 0, 0, 0, 0, 0])}
-    slack = {"information": np.diag([1.0 / variance, 1e6, 1e6, 1e6, 1e6, 1e6])}
-    for doubtful, resists in (({}, None), (warped, 0.25), (slack, 0.25)):
+    warped = {"systematic_depth_error": np.diag([variance, 0, 0, 0, 0, 0])}
+    degenerate = {"information": np.diag([1.0 / variance, 1e6, 1e6, 1e6, 1e6, 1e6])}
+    for doubtful, resists in (({}, None), (warped, 0.25), (degenerate, 0.25)):
         views: Any = ("source", "target")
-        assert resistance_of(candidate(**doubtful), *views, PARAMS) == resists
-    assert [given[:2] for given in pushes] == [views, views]
-    assert [given[3][0, 0] for given in pushes] == pytest.approx([variance, variance], rel=0.2)
+        assert perturbation_margin_of(candidate(**doubtful), *views, PARAMS) == resists
+    assert [given[:2] for given in perturbations] == [views, views]
+    assert [given[3][0, 0] for given in perturbations] == pytest.approx([variance, variance], rel=0.2)
 
 
 @pytest.mark.parametrize(("here", "there"), [(True, True), (True, False), (False, True)])
@@ -79,7 +81,7 @@ def test_a_yaw_is_known_where_the_object_tells_it_in_both_views(here: bool, ther
     ready = prepare(rooms.keyframe(rooms.seen_from(0.0)), PARAMS)
     views = (replace(ready, yaw_known=(told,) * len(ready.yaw_known)) for told in (here, there))
     found = gather(*views, candidate().alignment, ("features",), PARAMS)
-    assert found.explained and found.yaw_known is (here and there)
+    assert found.matched and found.yaw_known is (here and there)
 
 
 def test_the_views_are_asked_without_the_objects_where_those_are_few(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -93,8 +95,8 @@ def test_the_views_are_asked_without_the_objects_where_those_are_few(monkeypatch
     source: Any = SimpleNamespace(sight="a", own=(first, second, first))
     target: Any = SimpleNamespace(sight="b", own=(second, first, first))
     cup, book, can = ObjectPair(0, 1, "cup"), ObjectPair(1, 0, "book"), ObjectPair(2, 2, "soda can")
-    for explained, told in (((cup,), "without"), ((cup, book), "without"), ((cup, book, can), None), ((), None)):
-        assert surroundings_of(candidate(explained=explained), source, target, PARAMS) == told
+    for matched, told in (((cup,), "without"), ((cup, book), "without"), ((cup, book, can), None), ((), None)):
+        assert surroundings_of(candidate(matched=matched), source, target, PARAMS) == told
     for (*views, own, T, _), pixels in zip(asked, ((first, first), (both, both)), strict=True):
         assert views == ["a", "b"] and np.array_equal(own, pixels)
         assert np.array_equal(T, candidate().T_target_source)

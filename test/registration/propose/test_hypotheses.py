@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The chains: what each proposes, and when it has nothing to propose."""
+"""The proposers: what each proposes, and when it has nothing to propose."""
 
 from __future__ import annotations
 
@@ -53,12 +53,12 @@ def nearest(poses: list[np.ndarray]) -> tuple[float, float]:
     return min((pose_error(T, TRUTH) for T in poses), key=sum)
 
 
-@pytest.mark.parametrize(("chain", "degrees", "centimetres"), [("features", 3, 10), ("centroids", 4, 8)])
-def test_the_true_pose_is_among_the_first_that_a_chain_proposes(
-    room: tuple[Prepared, Prepared], chain: str, degrees: float, centimetres: float
+@pytest.mark.parametrize(("proposer", "degrees", "centimetres"), [("features", 3, 10), ("centroids", 4, 8)])
+def test_the_true_pose_is_among_the_first_that_a_proposer_proposes(
+    room: tuple[Prepared, Prepared], proposer: str, degrees: float, centimetres: float
 ) -> None:
-    found = CHAINS[chain](*room, PARAMS)
-    assert {one.chain for one in found} == {chain}
+    found = CHAINS[proposer](*room, PARAMS)
+    assert {one.proposer for one in found} == {proposer}
     rotation, distance = nearest([one.T_target_source for one in found[:10]])
     assert rotation < degrees and distance < centimetres
 
@@ -72,10 +72,10 @@ def test_a_lone_object_proposes_a_pose_near_the_true_one(lone: tuple[Prepared, P
     )  # the middle of what is seen of it moves with the side
 
 
-@pytest.mark.parametrize("chain", CHAINS)
-def test_every_pose_keeps_gravity(room: tuple[Prepared, Prepared], chain: str) -> None:
+@pytest.mark.parametrize("proposer", CHAINS)
+def test_every_pose_keeps_gravity(room: tuple[Prepared, Prepared], proposer: str) -> None:
     source, target = room
-    found = CHAINS[chain](source, target, PARAMS)
+    found = CHAINS[proposer](source, target, PARAMS)
     assert source.up is not None and target.up is not None and found
     assert source.up @ target.up < np.cos(np.radians(5.0))
     for one in found:
@@ -100,29 +100,29 @@ def test_a_lone_object_is_turned_to_every_yaw(lone: tuple[Prepared, Prepared]) -
     np.testing.assert_allclose(np.sort(angles), (0, 45, 45, 90, 90, 135, 135, 180), atol=1e-4)
 
 
-@pytest.mark.parametrize("chain", CHAINS)
+@pytest.mark.parametrize("proposer", CHAINS)
 def test_what_is_worth_most_comes_first_and_no_more_comes_than_is_asked_for(
-    room: tuple[Prepared, Prepared], chain: str
+    room: tuple[Prepared, Prepared], proposer: str
 ) -> None:
     source, target = (without(each, groups=("thing",) * len(each.groups)) for each in room)  # all look alike
     few = PARAMS.replaced(seeds_per_chain=3, seeds_per_object_chain=3)
-    found, first = CHAINS[chain](source, target, PARAMS), CHAINS[chain](source, target, few)
-    worth = [one.worth for one in found]
-    assert worth == sorted(worth, reverse=True) and worth[0] > worth[-1]
+    found, first = CHAINS[proposer](source, target, PARAMS), CHAINS[proposer](source, target, few)
+    scores = [one.score for one in found]
+    assert scores == sorted(scores, reverse=True) and scores[0] > scores[-1]
     assert len(first) == 3
     for one, other in zip(first, found[:3], strict=True):
-        assert np.array_equal(one.T_target_source, other.T_target_source) and one.worth == other.worth
+        assert np.array_equal(one.T_target_source, other.T_target_source) and one.score == other.score
 
 
-@pytest.mark.parametrize("chain", ["centroids", "objects"])
+@pytest.mark.parametrize("proposer", ["centroids", "objects"])
 @pytest.mark.parametrize("lack", [{"up": None}, {"objects": None}])
 @pytest.mark.parametrize("side", [0, 1])
 def test_without_gravity_or_objects_on_either_side_objects_propose_nothing(
-    room: tuple[Prepared, Prepared], chain: str, lack: dict, side: int
+    room: tuple[Prepared, Prepared], proposer: str, lack: dict, side: int
 ) -> None:
     pair = list(room)
     pair[side] = without(pair[side], **lack)
-    assert CHAINS[chain](pair[0], pair[1], PARAMS) == []
+    assert CHAINS[proposer](pair[0], pair[1], PARAMS) == []
 
 
 def test_the_middle_of_a_lone_object_tells_no_pose(lone: tuple[Prepared, Prepared]) -> None:
@@ -158,5 +158,5 @@ def test_confusable_labels_are_of_one_group() -> None:
 
 def test_what_odometry_expects_is_proposed_as_it_is_and_nothing_where_it_expects_nothing() -> None:
     (one,) = from_prior(moved(0.4))
-    assert np.array_equal(one.T_target_source, moved(0.4)) and one.chain == "odometry"
+    assert np.array_equal(one.T_target_source, moved(0.4)) and one.proposer == "odometry"
     assert from_prior(None) == []

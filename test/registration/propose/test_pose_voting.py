@@ -91,7 +91,7 @@ def test_what_turns_or_moves_the_middle_too_far_is_not_near(turn: float, shift: 
     assert near(np.zeros((0, 4, 4)), YAW, middle, angle=0.1, distance=0.2).shape == (0,)
 
 
-def test_poses_are_the_same_within_the_tolerances_in_which_chains_agree() -> None:
+def test_poses_are_the_same_within_the_tolerances_in_which_proposers_agree() -> None:
     params, middle = RegistrarParams(), np.array([0.0, 0.0, 2.0])
     shifted = [pose(np.eye(3), np.array([share * params.agreement_translation, 0.0, 0.0])) for share in (0.9, 1.1)]
     turns = [np.radians(share * params.agreement_rotation) for share in (0.9, 1.1)]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import pose, rotation_from_vector
-from objreg_ros.keyframes.odometry import Way
+from objreg_ros.keyframes.odometry import TravelledPath
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.propose.prior import Prior, expect
 from registration.samples import keyframe, moved
@@ -24,7 +24,7 @@ TURNED = pose(rotation_from_vector(np.radians([0.0, 90.0, 0.0])), np.array([1.0,
 
 def _prior(*x: float, sessions: tuple[int, int] = (0, 0)) -> Prior | None:
     """What is expected of the last of several keyframes along x against the first."""
-    way = Way(moved(x[0]))
+    way = TravelledPath(moved(x[0]))
     for at in x:
         way.go(moved(at))
     first, last = (keyframe(i, i, session=sessions[i], T_odom_camera=moved(x[-i])) for i in (0, 1))

@@ -43,14 +43,14 @@ def test_the_pattern_of_a_bare_wall_holds_what_its_shape_lets_slide() -> None:
     wall = prepare(keyframe(T, WALL, noise=0.0003), PARAMS)
     shifted = prepare(keyframe(T @ pose(np.eye(3), np.array([0.04, 0.0, 0.0])), WALL, noise=0.0003, seed=1), PARAMS)
     found = refine(shifted, wall, np.eye(4), PARAMS)
-    assert len(found.slack) == 0
+    assert len(found.degenerate) == 0
     assert pose_error(found.T_target_source, pose(np.eye(3), np.array([0.04, 0.0, 0.0])))[1] < 1.0
 
 
 def test_a_pattern_that_does_not_correlate_holds_nothing() -> None:
     here, there = pose(np.eye(3), np.zeros(3)), pose(np.eye(3), np.array([0.5, 0.3, 0.0]))
     views = [prepare(keyframe(seen_from(0.0, height=0.75) @ T, WALL, noise=0.0003), PARAMS) for T in (here, there)]
-    assert len(refine(*views, settle(*views, np.eye(4)[None], PARAMS)[0][0], PARAMS).slack) == 3
+    assert len(refine(*views, settle(*views, np.eye(4)[None], PARAMS)[0][0], PARAMS).degenerate) == 3
 
 
 def test_what_settles_on_nothing_is_told_from_what_the_shape_holds(pair) -> None:

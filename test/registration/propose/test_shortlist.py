@@ -47,8 +47,15 @@ def _bulged(xyz: Array, at: float) -> tuple[Array, Array]:
 @pytest.mark.parametrize("grey", [True, False])
 def test_what_warped_depth_draws_away_is_held_where_it_was_proposed_by_grey_alone(grey: bool) -> None:
     nudged = pose(np.eye(3), np.array([0.015, 0.0, 0.0]))
-    best, seeds = shortlist(pair_of(warped_wall(0.0, grey), warped_wall(APART, grey)), nudged, PARAMS)
-    assert max(pose_error(seed.T_target_source, np.eye(4))[1] for seed in seeds if seed.chain == "odometry") > 8.0
+    best, hypotheses = shortlist(pair_of(warped_wall(0.0, grey), warped_wall(APART, grey)), nudged, PARAMS)
+    assert (
+        max(
+            pose_error(hypothesis.T_target_source, np.eye(4))[1]
+            for hypothesis in hypotheses
+            if hypothesis.proposer == "odometry"
+        )
+        > 8.0
+    )
     if grey:
         assert pose_error(best[0].T_target_source, np.eye(4))[1] < 1.0
     else:
@@ -56,26 +63,28 @@ def test_what_warped_depth_draws_away_is_held_where_it_was_proposed_by_grey_alon
 
 
 def test_the_best_come_first_and_are_distinct_and_few() -> None:
-    best, seeds = shortlist(pair_of(keyframe(seen_from(0.0), seed=1), keyframe(seen_from(25.0), seed=2)), None, PARAMS)
+    best, hypotheses = shortlist(
+        pair_of(keyframe(seen_from(0.0), seed=1), keyframe(seen_from(25.0), seed=2)), None, PARAMS
+    )
     truth = inverse(seen_from(25.0)) @ seen_from(0.0)
     rotation, distance = pose_error(best[0].T_target_source, truth)
     assert rotation < 1.0 and distance < 2.0
-    worth = [seed.worth for seed in best]
-    assert worth == sorted(worth, reverse=True) and worth[-1] >= worth[0] - PARAMS.finished_margin
-    assert len(best) <= PARAMS.finished and len({seed.chain for seed in seeds}) >= 2
+    scores = [hypothesis.score for hypothesis in best]
+    assert scores == sorted(scores, reverse=True) and scores[-1] >= scores[0] - PARAMS.finished_margin
+    assert len(best) <= PARAMS.finished and len({hypothesis.proposer for hypothesis in hypotheses}) >= 2
 
 
 def test_what_is_held_and_keeps_gravity_about_as_well_as_the_gate_wants_it_goes_on_and_all_where_nothing_does() -> None:
     seen = keyframe(SQUARELY, WALL)
     tilts = np.radians(PARAMS.max_gravity_error) * np.array([0.0, 1.4, 1.6])
     turned = [pose(rotation_from_vector(np.array([0.0, 0.0, tilt])), np.zeros(3)) for tilt in tilts]
-    seeds = [Hypothesis(T_target_source=T, chain="features", worth=0.0) for T in turned]
+    hypotheses = [Hypothesis(T_target_source=T, proposer="features", score=0.0) for T in turned]
     for firm, hopeful in (((1, 1, 1), (0, 1)), ((0, 1, 1), (1,)), ((0, 0, 1), (0, 1, 2)), ((0, 0, 0), (0, 1, 2))):
-        found = _hopeful(pair_of(seen, seen), seeds, np.array(firm, bool), PARAMS)
-        assert [id(seed) for seed in found] == [id(seeds[k]) for k in hopeful]
+        found = _hopeful(pair_of(seen, seen), hypotheses, np.array(firm, bool), PARAMS)
+        assert [id(hypothesis) for hypothesis in found] == [id(hypotheses[k]) for k in hopeful]
 
 
-def test_nothing_is_short_listed_where_no_chain_proposes_anything() -> None:
+def test_nothing_is_short_listed_where_no_proposer_proposes_anything() -> None:
     bare, nothing = keyframe(SQUARELY, WALL, noise=0.0), np.zeros((0, 3), np.float32)
     dark = View(xyz=np.full_like(bare.view.xyz, np.nan), grey=None, intrinsics=bare.view.intrinsics)
     empty = replace(bare, context=Context(xyz=nothing, normals=nothing), view=dark)

@@ -12,7 +12,7 @@ from objreg_ros.data import View
 from objreg_ros.geometry import inverse, pose
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import prepare
-from objreg_ros.registration.score.object_matches import explain, is_gone, likeness
+from objreg_ros.registration.score.object_matches import is_gone, match_objects, score_matched_silhouettes
 from registration import samples
 from registration.rooms import CAMERA, ROOM, keyframe, seen_from
 
@@ -23,11 +23,11 @@ def test_the_middle_of_a_large_thing_may_wander_with_the_side_that_is_seen() -> 
     here = prepare(keyframe(seen_from(0.0), seed=1), PARAMS)
     aside = pose(np.eye(3), np.array([0.13, 0.0, 0.0]))
 
-    def explained(extent: float) -> int:
+    def matched(extent: float) -> int:
         grown = replace(here, extents=np.full(len(here.extents), extent))
-        return len(explain(grown, grown, aside, PARAMS)[0])
+        return len(match_objects(grown, grown, aside, PARAMS)[0])
 
-    assert explained(0.1) == 0 and explained(1.0) == len(here.groups)
+    assert matched(0.1) == 0 and matched(1.0) == len(here.groups)
 
 
 def test_an_object_has_moved_where_each_view_looks_through_where_the_other_saw_it() -> None:
@@ -37,8 +37,8 @@ def test_an_object_has_moved_where_each_view_looks_through_where_the_other_saw_i
     now, then = (prepare(keyframe(*seen, seed=k), PARAMS) for k, seen in enumerate(((here, later), (aside, ROOM))))
     T_then_now = inverse(aside) @ here
     for source, target, T in ((now, then, T_then_now), (then, now, inverse(T_then_now))):
-        explained, moved = explain(source, target, T, PARAMS)
-        assert {pair.label for pair in explained} == {"book", "cup", "keyboard"}
+        matched, moved = match_objects(source, target, T, PARAMS)
+        assert {pair.label for pair in matched} == {"book", "cup", "keyboard"}
         assert [pair.label for pair in moved] == ["bottle"]
 
 
@@ -51,8 +51,8 @@ def test_an_object_that_still_stands_undetected_has_not_moved_to_where_another_c
     undetected = replace(seen, objects=tuple(item for item in seen.objects if item is not known))
     views = [prepare(key, PARAMS) for key in (keyframe(aside, seed=2), undetected)]
     T = inverse(here) @ aside
-    explained, moved = explain(*(views if there_first else views[::-1]), T if there_first else inverse(T), PARAMS)
-    assert {pair.label for pair in explained} == {"book", "cup", "keyboard"} and moved == ()
+    matched, moved = match_objects(*(views if there_first else views[::-1]), T if there_first else inverse(T), PARAMS)
+    assert {pair.label for pair in matched} == {"book", "cup", "keyboard"} and moved == ()
 
 
 @pytest.mark.parametrize(
@@ -75,8 +75,8 @@ def test_an_object_is_gone_where_half_of_it_is_seen_and_most_of_that_looked_thro
 def test_an_object_a_little_aside_looks_more_alike_within_reach_than_where_it_is() -> None:
     here, there = (prepare(keyframe(seen_from(0.0), seed=seed), PARAMS) for seed in (1, 2))
     aside = pose(np.eye(3), np.array([0.04, 0.0, 0.0]))
-    explained, _ = explain(here, there, aside, PARAMS)
-    where = likeness(here, there, explained, aside, PARAMS)
-    what = likeness(here, there, explained, aside, PARAMS, PARAMS.likeness_reach)
-    assert explained and where is not None and what is not None
+    matched, _ = match_objects(here, there, aside, PARAMS)
+    where = score_matched_silhouettes(here, there, matched, aside, PARAMS)
+    what = score_matched_silhouettes(here, there, matched, aside, PARAMS, PARAMS.likeness_reach)
+    assert matched and where is not None and what is not None
     assert where < what - 0.2

@@ -72,9 +72,9 @@ def test_views_that_do_not_meet_have_no_texture() -> None:
 
 def test_a_narrow_window_sees_a_small_push_better() -> None:
     pair, T = (sight(0.0), sight(25.0)), between(0.0, 25.0)
-    pushed = pose(np.eye(3), np.array([0.03, 0.0, 0.0])) @ T
+    perturbed = pose(np.eye(3), np.array([0.03, 0.0, 0.0])) @ T
     fall = [
-        correlation(compare(*pair, T, PARAMS, *window)) - correlation(compare(*pair, pushed, PARAMS, *window))
+        correlation(compare(*pair, T, PARAMS, *window)) - correlation(compare(*pair, perturbed, PARAMS, *window))
         for window in ((), (NARROW,))
     ]
     assert fall[1] > fall[0] > 0.0

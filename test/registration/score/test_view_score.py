@@ -17,12 +17,12 @@ from objreg_ros.registration.score.free_space import INLIERS, OCCLUDED, SEEN, VI
 from objreg_ros.registration.score.view_score import (
     NO_TEXTURE,
     WORST,
-    floating,
-    look,
-    looks,
-    rank,
+    certain_violations,
+    count_both_ways,
+    count_visibility,
     rated,
     rated_quickly,
+    score_views,
     verify,
 )
 from registration.rooms import CAMERA, keyframe, seen_from
@@ -63,11 +63,11 @@ def test_views_that_do_not_meet_are_not_tested(sights) -> None:
 
 
 def test_a_ragged_edge_does_not_float_and_a_thing_that_is_gone_does(sights) -> None:
-    assert floating(*sights, TRUTH, PARAMS) < 0.01
+    assert certain_violations(*sights, TRUTH, PARAMS) < 0.01
     a_little_off = pose(np.eye(3), np.array([0.03, 0.0, 0.0])) @ TRUTH
-    assert floating(*sights, a_little_off, PARAMS) < verify(*sights, a_little_off, PARAMS).violations
+    assert certain_violations(*sights, a_little_off, PARAMS) < verify(*sights, a_little_off, PARAMS).violations
     far_off = pose(np.eye(3), np.array([0.0, 0.0, -0.4])) @ TRUTH
-    assert floating(*sights, far_off, PARAMS) > 0.1
+    assert certain_violations(*sights, far_off, PARAMS) > 0.1
 
 
 def seen_at(depth: float | Array) -> Sight:
@@ -82,29 +82,31 @@ def seen_at(depth: float | Array) -> Sight:
 def test_what_is_nearer_by_more_than_twice_the_tolerance_floats(tolerances: float, share: float) -> None:
     tolerance = PARAMS.depth_tolerance + PARAMS.depth_tolerance_growth * 2.0**2
     nearer = seen_at(2.0), seen_at(2.0 + tolerances * tolerance)
-    assert floating(*nearer, np.eye(4), PARAMS) == floating(*nearer[::-1], np.eye(4), PARAMS) == share
+    assert (
+        certain_violations(*nearer, np.eye(4), PARAMS) == certain_violations(*nearer[::-1], np.eye(4), PARAMS) == share
+    )
 
 
 def test_nothing_floats_a_few_pixels_beside_what_is_as_near() -> None:
     column = np.arange(CAMERA.width)
     post, beside = (seen_at(np.where((column >= at) & (column < at + 3), 1.0, 2.0)) for at in (80, 84))
     assert verify(post, beside, np.eye(4), PARAMS).violations > 0.01
-    assert floating(post, beside, np.eye(4), PARAMS) == 0.0
+    assert certain_violations(post, beside, np.eye(4), PARAMS) == 0.0
 
 
 def test_views_that_do_not_meet_float_altogether(sights) -> None:
-    assert floating(*sights, pose(np.eye(3), np.array([0.0, 0.0, 90.0])), PARAMS) == 1.0
+    assert certain_violations(*sights, pose(np.eye(3), np.array([0.0, 0.0, 90.0])), PARAMS) == 1.0
 
 
 def test_many_poses_are_looked_at_both_ways_like_each_alone(sights) -> None:
     source, target = sights
     poses = np.stack([TRUTH, pose(rotation_from_vector(np.array([0.0, 0.1, 0.0])), np.array([0.1, 0.0, 0.05])) @ TRUTH])
-    forward, backward = looks(source, target, poses, PARAMS, 3000)
+    forward, backward = count_both_ways(source, target, poses, PARAMS, 3000)
     for k, T in enumerate(poses):
-        np.testing.assert_allclose(forward[k], look(source, target, T, PARAMS, 3000), rtol=1e-6)
-        np.testing.assert_allclose(backward[k], look(target, source, inverse(T), PARAMS, 3000), rtol=1e-6)
+        np.testing.assert_allclose(forward[k], count_visibility(source, target, T, PARAMS, 3000), rtol=1e-6)
+        np.testing.assert_allclose(backward[k], count_visibility(target, source, inverse(T), PARAMS, 3000), rtol=1e-6)
     alone = [verify(source, target, T, PARAMS, 3000).score for T in poses]
-    assert rank(source, target, poses, PARAMS, 3000) == pytest.approx(alone) and alone[0] > alone[1]
+    assert score_views(source, target, poses, PARAMS, 3000) == pytest.approx(alone) and alone[0] > alone[1]
 
 
 def counted(seen: int, inliers: int, violations: int = 0, occluded: int = 0) -> np.ndarray:
@@ -126,7 +128,7 @@ def test_v_is_of_the_worse_way_the_grey_and_the_share_that_could_be_tested() -> 
 
 def test_what_is_said_of_a_pose_is_what_the_worse_way_says_of_each(monkeypatch: pytest.MonkeyPatch) -> None:
     ways = {1: counted(100, 90, 10, 5), 2: counted(300, 150, 3, 60)}
-    monkeypatch.setattr(verify_module, "look", lambda source, *_: ways[source.side])
+    monkeypatch.setattr(verify_module, "count_visibility", lambda source, *_: ways[source.side])
     one, other = (SimpleNamespace(side=side, textured=False, points=range(200)) for side in (1, 2))
     for sights in ((one, other), (other, one)):
         found = verify(*sights, TRUTH, PARAMS)
@@ -136,7 +138,7 @@ def test_what_is_said_of_a_pose_is_what_the_worse_way_says_of_each(monkeypatch: 
 
 def test_views_of_which_only_one_sees_the_other_do_not_meet(monkeypatch: pytest.MonkeyPatch) -> None:
     ways = {1: counted(100, 90), 2: counted(0, 0)}
-    monkeypatch.setattr(verify_module, "look", lambda source, *_: ways[source.side])
+    monkeypatch.setattr(verify_module, "count_visibility", lambda source, *_: ways[source.side])
     one, other = (SimpleNamespace(side=side, textured=False, points=range(200)) for side in (1, 2))
     for sights in ((one, other), (other, one)):
         assert (verify(*sights, TRUTH, PARAMS).tested, verify(*sights, TRUTH, PARAMS).score) == (0, WORST)

@@ -9,7 +9,7 @@ import pytest
 from objreg_ros.geometry import inverse, transform
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.shapes.shape import Shape, prepare_shape
-from objreg_ros.registration.shapes.upright_search import glance, improve, register_shapes
+from objreg_ros.registration.shapes.upright_search import coarse_poses, improve, register_shapes
 from registration.drawn_shapes import BOX, ELL, error, from_side, keyframe
 
 PARAMS = RegistrarParams()
@@ -66,7 +66,7 @@ def test_a_pose_nearby_is_improved() -> None:
 
 def test_a_glance_proposes_as_many_as_asked() -> None:
     source, target = shape_of(ELL, 25.0, 1), shape_of(ELL, 0.0, 2)
-    proposed = glance(source, target, 3, PARAMS)
+    proposed = coarse_poses(source, target, 3, PARAMS)
     assert len(proposed) == 3
     foot = transform(proposed[0], source.foot)
     assert np.linalg.norm(foot - target.foot) < 0.1
