@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+import ctypes
 import re
 import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import rclpy
 from rclpy.exceptions import NotInitializedException
@@ -21,6 +22,19 @@ SOURCE_LINE = re.compile(r",? at /\S+:\d+")  # of rcl's own code, in what it say
 SIGNALS = signal.SIGINT, signal.SIGTERM
 TELL_S = 5.0  # between two lines of a work that goes on
 LOOK_S = 0.1  # a signal is heard by then
+
+
+M_ARENA_MAX, ARENAS = -8, 2  # mallopt(3): of the GNU C library, which else has eight for each core
+
+
+def share_arenas() -> None:
+    """Let all threads of this process share a few of the allocator's arenas. Elsewhere than on glibc nothing happens.
+
+    Each arena keeps what was freed in it, so a node with a dozen threads would hold hundreds of megabytes of nothing,
+    and more by the hour. To be called before there are threads.
+    """
+    with suppress(AttributeError, OSError):
+        ctypes.CDLL(None).mallopt(M_ARENA_MAX, ARENAS)
 
 
 class FirstSignal:

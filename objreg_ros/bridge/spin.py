@@ -13,7 +13,14 @@ from rclpy.executors import SingleThreadedExecutor
 
 from objreg_ros.bridge import profile
 from objreg_ros.bridge.door import Door
-from objreg_ros.bridge.lifetime import Abandoned, FirstSignal, begin, hear_first_signal, shutdown_as_interrupt
+from objreg_ros.bridge.lifetime import (
+    Abandoned,
+    FirstSignal,
+    begin,
+    hear_first_signal,
+    share_arenas,
+    shutdown_as_interrupt,
+)
 
 
 def run(make: Callable[[], Door], args: Sequence[str] | None = None) -> int:
@@ -24,6 +31,7 @@ def run(make: Callable[[], Door], args: Sequence[str] | None = None) -> int:
     For the main thread of a process that ends with it: signals stay unheard.
     """
     first_signal = hear_first_signal()
+    share_arenas()
     transport = profile.apply()
     try:
         begin(args)

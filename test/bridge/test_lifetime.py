@@ -4,7 +4,12 @@
 from __future__ import annotations
 
 import _thread
+import os
+import platform
+import subprocess
+import sys
 import threading
+from pathlib import Path
 
 import pytest
 import rclpy
@@ -73,3 +78,33 @@ def test_a_signal_while_kernels_compile_abandons_them() -> None:
     with pytest.raises(Abandoned):
         await_kernels(compile_long, str)
     compiled.set()
+
+
+THREADS = """
+import ctypes, sys, threading
+import numpy as np
+from objreg_ros.bridge.lifetime import share_arenas
+libc = ctypes.CDLL(None)
+if sys.argv[1] == "shared":
+    share_arenas()
+met = threading.Barrier(8)
+def work():
+    kept = [np.ones(1000) for _ in range(100)]
+    met.wait()
+threads = [threading.Thread(target=work) for _ in range(8)]
+[thread.start() for thread in threads], [thread.join() for thread in threads]
+libc.fopen.restype = ctypes.c_void_p
+libc.malloc_info(0, ctypes.c_void_p(libc.fopen(b"/dev/stdout", b"w")))
+libc.fflush(None)
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another allocator has no arenas")
+def test_all_threads_of_a_node_share_a_few_arenas_of_the_allocator(repository: Path) -> None:
+    def arenas(how: str) -> int:
+        environment = os.environ | {"PYTHONPATH": str(repository), "OPENBLAS_NUM_THREADS": "1"}
+        command = [sys.executable, "-c", THREADS, how]
+        told = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+        return told.count("<heap nr=")
+
+    assert arenas("shared") < arenas("as they come")
