@@ -66,5 +66,5 @@ setup(
             "mapper = objreg_ros.mapper.node:main",
         ],
     },
-    zip_safe=True,
+    zip_safe=False,
 )
