@@ -579,7 +579,7 @@ def test_a_flipped_bit_is_harmless_or_one_line(tmp_path: Path, repository: Path,
 
 def test_two_processes_killed_at_any_moment_lose_nothing_acknowledged(tmp_path: Path, repository: Path) -> None:
     path, draw = tmp_path / "place.db", random.Random(5)
-    places = (repository, repository / "test" / "registrar")
+    places = (repository, repository / "test" / "registration")
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(map(str, places))}
     acknowledged: set[int] = set()
     for _ in range(2):
