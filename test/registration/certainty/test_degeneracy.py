@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.geometry import inverse, pose, rotation_from_vector
+from objreg_ros.geometry import inverse, pose
 from objreg_ros.registration.certainty.degeneracy import about_camera, systematic_depth_error
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import prepare
@@ -14,14 +14,7 @@ from objreg_ros.registration.propose.refinement import refine
 from registration.rooms import keyframe, seen_from
 
 PARAMS = RegistrarParams()
-
-
 TRUTH = inverse(seen_from(20.0)) @ seen_from(0.0)
-
-
-OFF = pose(rotation_from_vector(np.array([0.005, 0.01, -0.005])), np.array([0.02, -0.02, 0.02]))
-
-
 WALL = (("room", (-9.0, -9.0, -9.0), (2.0, 9.0, 9.0)),)
 
 
