@@ -17,7 +17,7 @@ from objreg_ros.geometry import inverse, rotation_angle, transform
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.labels import LabelGroups
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.registration.prepare.views import Sight, prepare_sight
+from objreg_ros.registration.prepare.views import DETAIL_SIGMA_PX, Sight, prepare_sight
 from objreg_ros.registration.score.free_space import INLIERS
 from objreg_ros.registration.score.view_score import count_visibility
 
@@ -53,8 +53,8 @@ class Truths:
     def sight(self, index: int) -> Sight:
         """The view of a keyframe, made ready once."""
         if index not in self._sights:
-            params = self._params
-            self._sights[index] = prepare_sight(self._keyframes[index].view, params.context_range, params.detail_sigma)
+            view, range_m = self._keyframes[index].view, self._params.context_range
+            self._sights[index] = prepare_sight(view, range_m, DETAIL_SIGMA_PX)
         return self._sights[index]
 
     def pair(self, i: int, j: int) -> Pair | None:
@@ -73,7 +73,7 @@ class Truths:
         """Whether the two views see next to nothing of each other."""
         a, b, T = self.sight(pair.source), self.sight(pair.target), pair.T_target_source
         shares = [
-            count_visibility(x, y, M, self._params, 2000)[INLIERS] / max(1, min(2000, len(x.points)))
+            count_visibility(x, y, M, 2000)[INLIERS] / max(1, min(2000, len(x.points)))
             for x, y, M in ((a, b, T), (b, a, inverse(T)))
         ]
         return max(shares) < NO_OVERLAP

@@ -32,6 +32,7 @@ from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import FrameWindow, Keyframer
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.engine import Engine
+from objreg_ros.registration.gate.limits import LIMITS
 from objreg_ros.registration.gate.verdict import judge
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
@@ -52,14 +53,14 @@ class Ours:
     """The engine and the gate."""
 
     def __init__(self, keyframes: Sequence[Keyframe], params: RegistrarParams) -> None:
-        self._keyframes, self._params = keyframes, params
+        self._keyframes = keyframes
         self.engine = Engine(params)
 
     def __call__(self, pair: Pair) -> Row:
         """The accepted candidate, or the best one and the reason for refusing it."""
         start = time.perf_counter()
         candidates = self.engine.propose(self._keyframes[pair.source], self._keyframes[pair.target])
-        verdict = judge(candidates, self._params)
+        verdict = judge(candidates)
         ms = 1e3 * (time.perf_counter() - start)
         if isinstance(verdict, Candidate):
             return _row(verdict.T_target_source, True, ms, pair)
@@ -122,19 +123,19 @@ class Finished:
 class Checked:
     """Another method, accepted by our look at the whole views instead of by its own test."""
 
-    def __init__(self, method: Callable[[Pair], Row], truths: Truths, params: RegistrarParams) -> None:
-        self._method, self._truths, self._params = method, truths, params
+    def __init__(self, method: Callable[[Pair], Row], truths: Truths) -> None:
+        self._method, self._truths = method, truths
 
     def __call__(self, pair: Pair) -> Row:
-        """The method's pose; accepted if the views' score is at least ``min_score``."""
+        """The method's pose; accepted if the views' score is at least the gate's least."""
         row = self._method(pair)
         if row.T is None:
             return row
         source, target = self._truths.sight(pair.source), self._truths.sight(pair.target)  # made once, so not timed
         start = time.perf_counter()
-        seen = verify(source, target, row.T, self._params)
+        seen = verify(source, target, row.T)
         ms = row.ms + 1e3 * (time.perf_counter() - start)
-        accepted = seen.score >= self._params.min_score and seen.tested >= self._params.min_tested
+        accepted = seen.score >= LIMITS.view_score.least and seen.tested >= LIMITS.overlap.tested
         return Row(row.error, accepted, ms, "" if accepted else "views", row.T)
 
 
@@ -159,7 +160,7 @@ def methods_of(
         if peer.name in ("sift_pnp", "fpfh_icp"):
             finished = Finished(peer)
             methods[finished.name] = Theirs(finished, shot)
-            methods[f"{finished.name}+our views"] = Checked(Theirs(finished, shot), truths, params)
+            methods[f"{finished.name}+our views"] = Checked(Theirs(finished, shot), truths)
     return methods
 
 

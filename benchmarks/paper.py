@@ -156,22 +156,22 @@ def founding(first: Frame, second: Frame, params: RegistrarParams) -> tuple[Arra
     if not first.objects or not second.objects:
         return None
     target, source = first.objects[0].xyz, second.objects[0].xyz
-    alignment = register(source, target, np.eye(4), params)
+    alignment = register(source, target, np.eye(4))
     if alignment is None:
         return None
     return alignment.T_target_source, closest(source, target, alignment.T_target_source)
 
 
-def ours(source: Prepared, target: Prepared, params: RegistrarParams) -> Array | None:
+def ours(source: Prepared, target: Prepared) -> Array | None:
     """The best pose ``T_target_source`` of the object by its shape; None without one."""
-    found = from_shapes(source, target, params)
+    found = from_shapes(source, target)
     return found[0].T_target_source if found else None
 
 
-def whole(first: Keyframe, second: Keyframe, engine: Engine, params: RegistrarParams) -> tuple[Array, bool] | None:
+def whole(first: Keyframe, second: Keyframe, engine: Engine) -> tuple[Array, bool] | None:
     """The engine's best pose of the pair, and whether the gate accepts it; None without a pose."""
     candidates = engine.propose(second, first)
-    verdict = judge(candidates, params)
+    verdict = judge(candidates)
     if isinstance(verdict, Candidate):
         return verdict.T_target_source, True
     return (candidates[0].T_target_source, False) if candidates else None
@@ -223,10 +223,10 @@ class Bench:
         row: dict[str, Any] = {"angle": abs(((angles[0] + 180) % 360) - 180)}
         answer, spent = timed(lambda: founding(paper[0], paper[1], self.params))
         row["founding"] = {**self._judged(stage, answer, cameras), **spent}
-        T, spent = timed(lambda: ours(made[1], made[0], self.params))
+        T, spent = timed(lambda: ours(made[1], made[0]))
         found = None if T is None or not all(f.objects for f in full) else (T, self._error(full, T))
         row["ours"] = {**self._judged(stage, found, cameras), **spent, "prepare_ms": preparing["cpu_ms"] / 2}
-        answer, spent = timed(lambda: whole(keys[0], keys[1], self.engine, self.params))
+        answer, spent = timed(lambda: whole(keys[0], keys[1], self.engine))
         accepted = answer is not None and answer[1]
         found = None if answer is None else (answer[0], self._error(full, answer[0]))
         row["engine"] = {**self._judged(stage, found, cameras), **spent, "accepted": accepted}

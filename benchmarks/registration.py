@@ -162,7 +162,7 @@ class Bench:
         shots = {(label, n): self._stranger(label, n) for label in labels for n in rooms}
         rows = []
         for first, second in strangers(list(shots), count, rng):
-            verdict = judge(self.engine.propose(shots[first].key, shots[second].key), self.params)
+            verdict = judge(self.engine.propose(shots[first].key, shots[second].key))
             rows.append({"labels": [first[0], second[0]], "accepted": isinstance(verdict, Candidate)})
         return rows
 
@@ -174,7 +174,7 @@ class Bench:
         found, ms = laid(second, first, self.params)
         start = time.perf_counter()
         candidates = self.engine.propose(second.key, first.key)
-        verdict = judge(candidates, self.params)
+        verdict = judge(candidates)
         engine_ms = 1e3 * (time.perf_counter() - start)
         best = verdict if isinstance(verdict, Candidate) else (candidates[0] if candidates else None)
         row: dict[str, Any] = {"found": found, "ms": ms, "engine_ms": engine_ms, "T_engine": None, "nees": None}
@@ -252,13 +252,13 @@ def laid(source: Shot, target: Shot, params: RegistrarParams) -> tuple[Hypothesi
     """The best pose of the objects by their shapes and the views, None without one; and its milliseconds."""
     a, b = source.prepared(params), target.prepared(params)
     start = time.perf_counter()
-    found = from_shapes(a, b, params)
+    found = from_shapes(a, b)
     return (found[0] if found else None), 1e3 * (time.perf_counter() - start)
 
 
 def score_of(found: Hypothesis | None) -> float:
     """What a pose is worth; less than any for none."""
-    return -np.inf if found is None else found.score
+    return -np.inf if found is None else found.support
 
 
 def object_error(stage: Stage, first: Shot, second: Shot, found: Hypothesis | None) -> tuple[float, float]:

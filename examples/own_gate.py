@@ -7,17 +7,14 @@ from objreg_ros import Camera, register
 from objreg_ros.data import Reason
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.gate.verdict import Refusal, judge
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.propose.prior import Prior
 from objreg_ros.simulation.render import render
 from objreg_ros.simulation.scenarios import make_story
 
 
-def several(
-    candidates: Sequence[Candidate], params: RegistrarParams, prior: Prior | None = None
-) -> Candidate | Refusal:
+def several(candidates: Sequence[Candidate], prior: Prior | None = None) -> Candidate | Refusal:
     """What our gate accepts, if at least ``LEAST`` objects lie upon themselves."""
-    verdict = judge(candidates, params, prior)
+    verdict = judge(candidates, prior)
     if not isinstance(verdict, Candidate) or len(verdict.matched) >= LEAST:
         return verdict
     return Reason.FEW_OBJECTS, f"{len(verdict.matched)} objects < {LEAST}"

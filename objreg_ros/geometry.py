@@ -27,6 +27,15 @@ def inverse(T_a_b: Array) -> Array:
     return T_b_a
 
 
+def inverses(T: Array) -> Array:
+    """The inverse motions of poses (K, 4, 4)."""
+    out = np.zeros_like(T)
+    out[:, :3, :3] = T[:, :3, :3].transpose(0, 2, 1)
+    out[:, :3, 3] = -np.einsum("kij,kj->ki", out[:, :3, :3], T[:, :3, 3])
+    out[:, 3, 3] = 1.0
+    return out
+
+
 def transform(T_a_b: Array, points_b: Array) -> Array:
     """Points (..., 3) of frame b in frame a; the dtype of the points is kept."""
     R, t = T_a_b[:3, :3].astype(points_b.dtype), T_a_b[:3, 3].astype(points_b.dtype)

@@ -15,7 +15,7 @@ import dataclasses
 import math
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Self
 
 
@@ -89,7 +89,12 @@ def param(
 
 @dataclasses.dataclass(frozen=True)
 class Params:
-    """The base of every room's parameters; checks all values when it is made."""
+    """The base of every room's parameters; checks all values when it is made.
+
+    ``DROPPED`` names those that the last release had, with what took their place.
+    """
+
+    DROPPED: typing.ClassVar[Mapping[str, str]] = {}
 
     def __post_init__(self) -> None:
         for declaration in self.declarations():
@@ -103,10 +108,18 @@ class Params:
         return tuple(_declaration(field, hints[field.name]) for field in dataclasses.fields(cls))
 
     @classmethod
+    def refuse_dropped(cls, names: Iterable[str]) -> None:
+        """ValueError for the first name that only the last release had."""
+        for name in names:
+            if name in cls.DROPPED:
+                raise ValueError(f"{name}: no parameter any more; {cls.DROPPED[name]}")
+
+    @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Self:
         """Parameters from a mapping; ValueError for a name that is not declared."""
         names = [declaration.name for declaration in cls.declarations()]
         unknown = sorted(set(values) - set(names))
+        cls.refuse_dropped(unknown)
         if unknown:
             raise ValueError(f"{cls.__name__}: no parameter {', '.join(unknown)}; there are {', '.join(names)}")
         return cls(**values)

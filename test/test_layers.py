@@ -12,14 +12,20 @@ PACKAGE = Path(__file__).resolve().parents[1] / "objreg_ros"
 ROOMS = ("detector", "segmenter", "registrar", "mapper")
 # The registrar's own folders: each may import those before it, in the order in which a pair of keyframes goes.
 FLOORS = (
-    *("registration.params", "registration.labels", "registration.keyframe", "registration.candidate"),
+    *(
+        "registration.dropped",
+        "registration.params",
+        "registration.labels",
+        "registration.keyframe",
+        "registration.candidate",
+    ),
     *("registration.kernels", "registration.shapes", "registration.prepare", "registration.score"),
     *("registration.refine", "registration.certainty", "registration.propose", "registration.gate"),
     *("registration", "keyframes", "memory", "registrar"),
 )
 ROS = {"rclpy", "launch", "launch_ros", "tf2_ros", "ament_index_python", "rosgraph_msgs"}
 FREE_BRIDGE = ("bridge.from_msg", "bridge.course", "bridge.sync", "bridge.layout", "bridge.pictures")
-CORE = ("limits", "data", "geometry", "params", "share")
+CORE = ("limits", "sensor", "data", "geometry", "params", "share")
 HOUSE = ("offline", "truth", "report")
 
 
@@ -67,7 +73,7 @@ def floor(module: str) -> int | None:
 def allowed(importer: str, imported: str) -> bool:
     """The table of the import law."""
     room = importer.split(".")[0]
-    if imported == "limits" and importer != "":
+    if imported in ("limits", "sensor") and importer != "":
         return True
     if importer == "":  # what `import objreg_ros` offers, loaded when it is asked for
         return imported == "library"

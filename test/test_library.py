@@ -135,7 +135,7 @@ def test_the_models_own_labels_are_found_where_nothing_is_said_of_objects() -> N
 
 def test_a_gate_of_ones_own_refuses_and_its_reason_and_our_evidence_are_told() -> None:
     refused = register(
-        *PICTURES, CAMERA, detections=MASKS, gate=lambda candidates, params, prior=None: (Reason.MOVED, "all of it")
+        *PICTURES, CAMERA, detections=MASKS, gate=lambda candidates, prior=None: (Reason.MOVED, "all of it")
     )
     assert (refused.reason, refused.detail, refused.T_1_2) == (Reason.MOVED, "all of it", None)
     assert refused.evidence["score"] > 0

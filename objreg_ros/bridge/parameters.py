@@ -46,6 +46,7 @@ class Parameters:
         try:
             start = {name: _declare(node, declaration) for name, declaration in self._declarations.items()}
             self._current = {kind: kind(**_part(kind, start)) for kind in kinds}
+            _refuse_dropped(node, kinds)
         except ValueError as error:
             raise ValueError(f"{node.get_name()}: {error}") from error
         _warn_of_unknown(node, list(self._declarations))
@@ -77,6 +78,13 @@ class Parameters:
 
 def _part(kind: type[Params], values: dict[str, Any]) -> dict[str, Any]:
     return {d.name: values[d.name] for d in kind.declarations() if d.name in values}
+
+
+def _refuse_dropped(node: Node, kinds: Sequence[type[Params]]) -> None:
+    """ValueError for a start value of a parameter that the last release had; it would be ignored in silence."""
+    given = getattr(node, "_parameter_overrides", {})  # rclpy tells of them nowhere else
+    for kind in kinds:
+        kind.refuse_dropped(given)
 
 
 def _warn_of_unknown(node: Node, known: Sequence[str]) -> None:

@@ -38,6 +38,7 @@ class Settings:
         self._values = {node: dict(values.get(node, {})) for node in NODES}
         self.ignored = tuple(ignored)
         for node, kinds in NODES.items():
+            _refuse_dropped(node, kinds, self._values[node])
             known = _known(node)
             unknown = sorted(set(self._values[node]) - known)
             if unknown:
@@ -52,6 +53,14 @@ class Settings:
         """The values of one class of a node."""
         names = names_of(kind)
         return kind.from_mapping({name: value for name, value in self._values[node].items() if name in names})
+
+
+def _refuse_dropped(node: str, kinds: Iterable[type[Params]], values: Mapping[str, Any]) -> None:
+    for kind in kinds:
+        try:
+            kind.refuse_dropped(values)
+        except ValueError as error:
+            raise ValueError(f"{node}: {error}") from error
 
 
 def names_of(kind: type[Params]) -> list[str]:

@@ -18,6 +18,10 @@ from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.normals import view_normals
 from objreg_ros.registration.prepare.voxels import _keys, thin
 
+OBJECT_VOXEL_M = 0.004  # edge of a voxel when the frames of an object are fused: finer than a Kinect's pixels at 1 m
+OBJECT_POINTS = 2000  # most of an object that are kept: what a row of the store holds
+CONTEXT_RADIUS_M = 1.0  # how far around an object the context reaches: a table, not a room
+CONTEXT_VOXEL_M = 0.03  # edge of a voxel of the context; finer ones gain nothing
 CUT = np.uint16(PointFlag.CUT_BY_IMAGE | PointFlag.CUT_BY_BOX)
 SPARE = 3  # points of each sighting for each one that is kept of the object
 CENTRE_SPREAD = 0.05  # m: how far the middle of one small object wanders between neighbouring frames
@@ -29,14 +33,14 @@ def fuse(window: FrameWindow, params: RegistrarParams) -> Keyframe:
     reference = window.frames[chosen]
     T_reference_first = inverse(window.T_first_frame[chosen])
     motions = [T_reference_first @ T for T in window.T_first_frame]
-    objects = fuse_objects(window.frames, motions, params)
+    objects = fuse_objects(window.frames, motions, params.label_groups)
     return Keyframe(
         keyframe_id=0,
         session=window.session,
         stamp_ns=reference.stamp_ns,
         frame_id=reference.frame_id,
         objects=objects,
-        context=fuse_context(window.frames, motions, objects, params),
+        context=fuse_context(window.frames, motions, objects, params.context_range),
         view=reference.view,
         gravity=reference.gravity,
         gravity_confidence=reference.gravity_confidence,
@@ -54,35 +58,35 @@ def reference_index(frames: Sequence[Frame]) -> int:
 
 
 def fuse_objects(
-    frames: Sequence[Frame], T_reference_frame: Sequence[Array], params: RegistrarParams
+    frames: Sequence[Frame], T_reference_frame: Sequence[Array], label_groups: Sequence[str]
 ) -> tuple[KeyObject, ...]:
     """Every object once: the same label group at the same place is the same object, seen from several sides.
 
     One without points is nowhere, and is passed over.
     """
-    groups = LabelGroups(params.label_groups)
+    groups = LabelGroups(label_groups)
     tracks: list[_Track] = []
     for frame, T in zip(frames, T_reference_frame, strict=True):
         free = list(tracks)
         for item in (item for item in frame.objects if len(item)):
-            sighting = _moved(item, T, most=SPARE * params.object_points)
+            sighting = _moved(item, T, most=SPARE * OBJECT_POINTS)
             track = _nearest(sighting, free, groups)
             if track is None:
                 tracks.append(_Track([sighting]))
             else:
                 free.remove(track)
                 track.sightings.append(sighting)
-    return tuple(track.fused(number, params) for number, track in enumerate(tracks, start=1))
+    return tuple(track.fused(number) for number, track in enumerate(tracks, start=1))
 
 
 def fuse_context(
-    frames: Sequence[Frame], T_reference_frame: Sequence[Array], objects: Sequence[KeyObject], params: RegistrarParams
+    frames: Sequence[Frame], T_reference_frame: Sequence[Array], objects: Sequence[KeyObject], range_m: float
 ) -> Context:
     """What the views saw within the context's radius of any object, thinned to voxels, with the mean normals."""
-    seen = [_surface(frame, T, params.context_range) for frame, T in zip(frames, T_reference_frame, strict=True)]
+    seen = [_surface(frame, T, range_m) for frame, T in zip(frames, T_reference_frame, strict=True)]
     points, normals = (np.concatenate(part) for part in zip(*seen, strict=True))
-    xyz, directions = thin(points, normals, params.context_voxel)
-    near = _near(xyz, [item.centroid for item in objects], params.context_radius)
+    xyz, directions = thin(points, normals, CONTEXT_VOXEL_M)
+    near = _near(xyz, [item.centroid for item in objects], CONTEXT_RADIUS_M)
     return Context(xyz=xyz[near], normals=directions[near])
 
 
@@ -99,7 +103,7 @@ class _Track:
 
     sightings: list[ObjectCloud] = field(default_factory=list)
 
-    def fused(self, instance: int, params: RegistrarParams) -> KeyObject:
+    def fused(self, instance: int) -> KeyObject:
         best = max(self.sightings, key=lambda s: s.score)
         whole = [s for s in self.sightings if not (s.has(PointFlag.CUT_BY_IMAGE) or s.has(PointFlag.CUT_BY_BOX))]
         kept = whole or self.sightings
@@ -107,16 +111,14 @@ class _Track:
         for sighting in self.sightings:
             votes[sighting.label] += round(1000 * sighting.score)
         label = max(votes, key=lambda name: (votes[name], name))
-        return KeyObject(cloud=_merge(kept, label, best, instance, params), sightings=len(self.sightings))
+        return KeyObject(cloud=_merge(kept, label, best, instance), sightings=len(self.sightings))
 
 
-def _merge(
-    sightings: Sequence[ObjectCloud], label: str, best: ObjectCloud, instance: int, params: RegistrarParams
-) -> ObjectCloud:
+def _merge(sightings: Sequence[ObjectCloud], label: str, best: ObjectCloud, instance: int) -> ObjectCloud:
     """The first point of each voxel, and of those every so many: a point keeps its own colour, normal and flags."""
     xyz = np.concatenate([s.xyz for s in sightings])
-    first = np.unique(_keys(xyz, params.object_voxel), return_index=True)[1]
-    first = first[:: 1 + (len(first) - 1) // params.object_points]
+    first = np.unique(_keys(xyz, OBJECT_VOXEL_M), return_index=True)[1]
+    first = first[:: 1 + (len(first) - 1) // OBJECT_POINTS]
     coloured = [s.rgb for s in sightings if s.rgb is not None]
     return ObjectCloud(
         label=label,

@@ -21,6 +21,9 @@ from objreg_ros.keyframes.odometry import TravelledPath
 from objreg_ros.keyframes.tracking import TrackedSurface, tracked_surface, view_motion
 from objreg_ros.registration.params import RegistrarParams
 
+LEAST_OBJECTS = 1  # of a keyframe: one without objects proposes nothing
+GRAVITY_PATH_M = 2.0  # path after which gravity carried by odometry counts half
+GRAVITY_TURN_DEG = 120.0  # turn after which gravity carried by odometry counts half
 SILENCE_S = 5.0  # odometry may have begun anew in it without a leap
 UNSET_NS = 0  # the stamp of a camera that starts before the simulated clock does: no clock began then
 
@@ -214,7 +217,7 @@ class Keyframer:
             clock=self._clock,
             in_odometry=frame.T_odom_camera is not None,
             path=TravelledPath(T_session_frame),
-            gravity_filter=GravityFilter(self._params.gravity_metres, self._params.gravity_degrees),
+            gravity_filter=GravityFilter(GRAVITY_PATH_M, GRAVITY_TURN_DEG),
             first=frame,
             last_ns=frame.stamp_ns,
             T_odom_first=T_session_frame,
@@ -238,7 +241,7 @@ class Keyframer:
         labels: Counter[str] = Counter()
         for frame in window.frames:
             labels |= Counter(item.label for item in frame.objects if len(item))
-        if labels.total() < self._params.keyframe_min_objects or not self._is_news(window, labels):
+        if labels.total() < LEAST_OBJECTS or not self._is_news(window, labels):
             return None
         self._last = (window.session.number, window.T_session_first, labels)
         return FrameWindow(
@@ -290,8 +293,6 @@ class Keyframer:
 
     def _moved(self, T: Array, share: float) -> bool:
         """Whether a motion exceeds ``share`` of what ends a keyframe."""
-        turned = np.degrees(rotation_angle(T[:3, :3]))
-        params = self._params
-        return bool(
-            np.linalg.norm(T[:3, 3]) > share * params.keyframe_translation or turned > share * params.keyframe_rotation
-        )
+        metres, degrees = float(np.linalg.norm(T[:3, 3])), float(np.degrees(rotation_angle(T[:3, :3])))
+        most = self._params
+        return metres > share * most.keyframe_translation or degrees > share * most.keyframe_rotation

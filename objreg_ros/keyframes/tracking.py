@@ -16,10 +16,10 @@ from numba import float64, njit
 from objreg_ros.data import Array, View
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.registration.prepare.normals import view_normals
+from objreg_ros.sensor import TRACKING_SIGMA_GROWTH, TRACKING_SIGMA_M
 
 COARSE_TO_FINE = ((3, 0.20, 6), (2, 0.06, 10))  # stride in pixels, largest distance of a pair in metres, iterations
 GREY_SIGMA = 10.0  # grey levels: noise, vignetting and the residue of exposure
-DEPTH_SIGMA = (0.002, 0.003)  # m: at the camera, and its growth with squared depth
 HUBER = 1.3  # standard deviations beyond which an error counts linearly
 LEAST_SHARE = 0.5  # of the pixels that land in the other view; less is another scene or a lost track
 LEAST_PAIRS = 200
@@ -129,7 +129,7 @@ def _normal_equations(xyz, grey, T, target_xyz, normals, target_grey, slope, cam
         if abs(distance) > reach:
             continue
         pairs += 1
-        precision = 1.0 / (DEPTH_SIGMA[0] + DEPTH_SIGMA[1] * z * z)
+        precision = 1.0 / (TRACKING_SIGMA_M + TRACKING_SIGMA_GROWTH * z * z)
         _add(H, g, x, y, z, nx, ny, nz, distance, precision * precision * _huber(distance * precision))
         if grey_weight > 0.0:
             a, b = float64(slope[i, j, 0]), float64(slope[i, j, 1])

@@ -21,6 +21,7 @@ from objreg_ros.memory.sighting import Sighting
 from objreg_ros.registration.labels import LabelGroups
 from objreg_ros.registration.params import RegistrarParams
 
+RADIUS_M = 0.1  # an object seen again within this is the same landmark
 MIDDLE_WANDERS = 0.2  # of the extent
 CELL = 0.5  # m, edge of the cells that know which landmarks are there
 
@@ -173,7 +174,7 @@ class Landmarks:
 
         A thing may be so large that fewer cells are known than it reaches.
         """
-        reach = 2.0 * self._params.landmark_radius + MIDDLE_WANDERS * sighting.extent  # the largest that it can be
+        reach = 2.0 * RADIUS_M + MIDDLE_WANDERS * sighting.extent  # the largest that it can be
         low, high = (np.floor((sighting.position + side * reach) / CELL).astype(int) for side in (-1, 1))
         session, group, *_ = self._cell(sighting)
         spans = [range(a, b + 1) for a, b in zip(low.tolist(), high.tolist(), strict=True)]
@@ -190,7 +191,7 @@ class Landmarks:
         params = self._params
         drift = params.odometry_drift * abs(sighting.travelled - last.travelled)
         wander = MIDDLE_WANDERS * min(sighting.extent, last.extent)
-        return params.landmark_radius + wander + min(drift, params.landmark_radius)
+        return RADIUS_M + wander + min(drift, RADIUS_M)
 
     def _axes(self, index: int, sighting: Sighting, links: Sequence[Link], taken: Set[int]) -> dict[int, Array]:
         """The landmarks that an object of a new keyframe is, each with what turns the session's axes into its own.

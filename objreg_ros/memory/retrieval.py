@@ -22,12 +22,12 @@ from objreg_ros.memory.nearest_neighbours import Block
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.registration.labels import LabelGroups
 from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.propose.prior import TIGHT_TRANSLATION_M
 
 VOTE_DISTANCE = 0.5  # distance of descriptors at which a vote falls to 0.6
 VOTE_CUTOFF = 8.0  # half the squared distance behind the nearest beyond which a vote would be nothing
 SHORTLIST = 64  # votes that one object may give
 SPARE = 4  # keyframes that a query names for each one that is tried
-
 EMPTY = Block()
 
 
@@ -103,7 +103,7 @@ class Index:
         """Whether odometry is certain of the motion between the two."""
         params, way = self._params, np.abs(travelled - other_travelled)
         sigma = params.odometry_translation_noise + params.odometry_drift * way
-        return np.asarray((session == other_session) & (sigma <= params.prior_translation))
+        return np.asarray((session == other_session) & (sigma <= TIGHT_TRANSLATION_M))
 
 
 @numba.njit(cache=True, nogil=True)

@@ -19,11 +19,9 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from objreg_ros.data import LoopClosure
-from objreg_ros.memory.books import Books, count, read_books
-from objreg_ros.memory.checksum import HEAD, LIGHT, require_head, require_light, sealed_light
+from objreg_ros.memory.books import Books, read_books
+from objreg_ros.memory.checksum import HEAD, require_head
 from objreg_ros.memory.claim import Claim, StoreError
 from objreg_ros.memory.codec import (
     closure_from_row,
@@ -34,9 +32,10 @@ from objreg_ros.memory.codec import (
     sighting_from_row,
 )
 from objreg_ros.memory.landmarks import Merge
-from objreg_ros.memory.migration import insert, renew, renewed
+from objreg_ros.memory.migration import renew, renewed
 from objreg_ros.memory.sighting import Sighting
-from objreg_ros.memory.store_file import SCHEMA_VERSION, bear, check, create, read_only_uri, require_place
+from objreg_ros.memory.store_file import SCHEMA_VERSION, bear, check, connect, create, read_only_uri, require_place
+from objreg_ros.memory.transaction import OBJECTS, delete, rename_landmark, write
 from objreg_ros.registration.keyframe import Keyframe
 
 LEFT = "; it was left as it is. Use a copy of it or another path"
@@ -44,7 +43,6 @@ CACHED = 64  # decoded keyframes in memory, about 1 MB each
 MOST_CLOSURES = 100_000  # of 1.5 kB; the oldest are forgotten
 OLDEST = "WHERE id IN (SELECT id FROM closure ORDER BY id LIMIT ?)"
 HEADS = f"SELECT {', '.join(HEAD)}, seal FROM keyframe ORDER BY id"
-OBJECTS = f"SELECT {', '.join(LIGHT)}, seal FROM object"
 SPARE = 2048  # pages of 4 kB that may lie free in the file: what comes next takes them
 STEP = 4096  # pages that are given back at once: 16 MB, so that no keyframe waits long
 
@@ -64,7 +62,7 @@ class Store:
         self._books = Books()
         self._claim: Claim | None = None
         if not self.path and not read_only:
-            self._connection = _connect(":memory:")
+            self._connection = connect(":memory:")
             bear(self._connection)
             return
         with self._told("open", LEFT), ExitStack() as undo:
@@ -84,16 +82,16 @@ class Store:
     def _opened(path: Path, claim: Claim | None) -> sqlite3.Connection:
         old = check(path) < SCHEMA_VERSION
         if claim is None and old:
-            connection = _connect("")  # a file of SQLite's own, which goes with it
+            connection = connect("")  # a file of SQLite's own, which goes with it
             renew(path, connection)
             return connection
         if claim is None:
-            connection = _connect(read_only_uri(path))
+            connection = connect(read_only_uri(path))
             connection.execute("BEGIN")  # all that is read is of one moment
             return connection
         if old:
             claim.replace(lambda beside: renewed(path, beside))
-        connection = _connect(str(path))
+        connection = connect(str(path))
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA wal_autocheckpoint = 1")
         return connection
@@ -112,17 +110,17 @@ class Store:
         """
         with self._told(f"write keyframe {keyframe.keyframe_id}"), self._changing() as (transaction, books):
             row = keyframe_row(keyframe)
-            _write(transaction, books, "keyframe", row)
+            write(transaction, books, "keyframe", row)
             for item, sighting in zip(keyframe.objects, sightings, strict=True):
-                _write(transaction, books, "object", object_row(books.next("object"), item, sighting))
+                write(transaction, books, "object", object_row(books.next("object"), item, sighting))
             newest = max((sighting.landmark for sighting in sightings), default=0)
             books.landmark = max(books.landmark, newest)
             for closure in closures:
-                _write(transaction, books, "closure", closure_row(books.next("closure"), closure))
+                write(transaction, books, "closure", closure_row(books.next("closure"), closure))
             if books.closure_rows > MOST_CLOSURES:
-                _delete(transaction, books, "closure", OLDEST, (books.closure_rows - MOST_CLOSURES,))
+                delete(transaction, books, "closure", OLDEST, (books.closure_rows - MOST_CLOSURES,))
             for old, merge in (merged or {}).items():
-                _rename(transaction, books, old, merge)
+                rename_landmark(transaction, books, old, merge)
         self._heads[keyframe.keyframe_id] = {name: row[name] for name in HEAD}
         self._remember(keyframe)
 
@@ -170,8 +168,8 @@ class Store:
         """
         with self._told("remove keyframes"), self._changing() as (transaction, books):
             for keyframe_id in keyframe_ids:
-                _delete(transaction, books, "object", "WHERE keyframe = ?", (keyframe_id,))
-                _delete(transaction, books, "keyframe", "WHERE id = ?", (keyframe_id,))
+                delete(transaction, books, "object", "WHERE keyframe = ?", (keyframe_id,))
+                delete(transaction, books, "keyframe", "WHERE id = ?", (keyframe_id,))
             books.forgotten += forgotten
         for keyframe_id in keyframe_ids:
             self._cache.pop(keyframe_id, None)
@@ -182,7 +180,7 @@ class Store:
         """Forget everything."""
         with self._told("forget everything"), self._changing() as (transaction, books):
             for table in ("closure", "object", "keyframe"):
-                _delete(transaction, books, table)
+                delete(transaction, books, table)
             books.forgotten = 0
         self._cache.clear()
         self._heads.clear()
@@ -297,37 +295,3 @@ class Store:
         self._cache[keyframe.keyframe_id] = keyframe
         while len(self._cache) > CACHED:
             self._cache.popitem(last=False)
-
-
-def _connect(path: str) -> sqlite3.Connection:
-    connection = sqlite3.connect(path, check_same_thread=False, timeout=5.0, uri=path.startswith("file:"))
-    connection.row_factory = sqlite3.Row
-    connection.execute("PRAGMA foreign_keys = ON")
-    connection.execute("PRAGMA synchronous = FULL")
-    return connection
-
-
-def _write(transaction: sqlite3.Connection, books: Books, table: str, row: Mapping[str, Any]) -> None:
-    insert(transaction, table, row)
-    books.enter(table, row)
-
-
-def _delete(
-    transaction: sqlite3.Connection, books: Books, table: str, where: str = "", values: Sequence[Any] = ()
-) -> None:
-    rows, seals = count(transaction, table, where, values)
-    transaction.execute(f"DELETE FROM {table} {where}", values)
-    books.change(table, -rows, -seals)
-
-
-def _rename(transaction: sqlite3.Connection, books: Books, old: int, merge: Merge) -> None:
-    """Make every sighting of a landmark one of that which stays, in its axes."""
-    for row in transaction.execute(f"{OBJECTS} WHERE landmark = ?", (old,)).fetchall():
-        require_light(row)
-        turned = merge.R_into_old @ np.frombuffer(row["R_landmark_session"]).reshape(3, 3)
-        new = sealed_light({**row, "landmark": int(merge.into), "R_landmark_session": turned.tobytes()})
-        transaction.execute(
-            "UPDATE object SET landmark = ?, R_landmark_session = ?, seal = ? WHERE id = ?",
-            (new["landmark"], new["R_landmark_session"], new["seal"], row["id"]),
-        )
-        books.change("object", 0, new["seal"] - row["seal"])

@@ -139,3 +139,12 @@ def _foreign(connection: sqlite3.Connection) -> str:
 
 def _parts(connection: sqlite3.Connection) -> set[tuple[object, ...]]:
     return {tuple(row) for row in connection.execute("SELECT type, name, tbl_name, sql FROM sqlite_master")}
+
+
+def connect(path: str) -> sqlite3.Connection:
+    """Open a file, or what SQLite makes of an empty path or ``:memory:``, with whole writes and rows by name."""
+    connection = sqlite3.connect(path, check_same_thread=False, timeout=5.0, uri=path.startswith("file:"))
+    connection.row_factory = sqlite3.Row
+    connection.execute("PRAGMA foreign_keys = ON")
+    connection.execute("PRAGMA synchronous = FULL")
+    return connection

@@ -2,6 +2,7 @@
 """Room 3: Frames in, LoopClosures out, and a reason for every closure that was refused.
 
 `registrar` is the facade over `objreg_ros.keyframes`, `objreg_ros.memory` and `objreg_ros.registration`: `track` for
-every frame, `search` for every keyframe, `process` for both. `warm` compiles every kernel before the first frame comes;
-`node` is the door.
+every frame, `search` for every keyframe, `process` for both. A `candidate_search` tries stored keyframes; what a
+registered pair comes to is a `closure` or a refusal. `warm` compiles every kernel before the first frame comes; `node`
+is the door.
 """

@@ -34,6 +34,10 @@ from objreg_ros.registrar.registrar import FrameWindow, Outcome, Registrar
 from objreg_ros.registrar.warm import warm
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 
+PATIENCE_S = (
+    1.0  # a newer keyframe waits as long before the search in hand is cut short, if some were overtaken of late
+)
+WAITING_KEYFRAMES = 8  # most that wait for a search; no frame is followed while so many do
 GIVING_WAY = 10  # niceness of the search: the next image must not wait for it
 
 
@@ -69,7 +73,7 @@ class RegistrarNode(MatchingDoor):
         self._last_moved: dict[str, float] = {}  # m by label, of the last closure that found any
         self._names: Mapping[int, str] = {}
         self._scene, self._odom_frame = Scene(), "odom"
-        limit = Limit(inputs.waiting_keyframes, inputs.waiting_megabytes * 1_000_000, inputs.patience)
+        limit = Limit(WAITING_KEYFRAMES, inputs.waiting_megabytes * 1_000_000, PATIENCE_S)
         self.searcher: Backlog[Job] = Backlog(
             self._search, self._keep, self.fail, limit, lambda job: job.window.nbytes, GIVING_WAY
         )

@@ -11,33 +11,27 @@ import os
 import sys
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from objreg_ros.data import Array, Frame, LoopClosure, ObjectMatch, Observation, Reason, Rejected
-from objreg_ros.geometry import transform
+from objreg_ros.data import Frame, LoopClosure, Observation, Reason, Rejected
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import Clock, FrameWindow, Keyframer
 from objreg_ros.memory.landmarks import Landmark, Landmarks, Link
-from objreg_ros.memory.retrieval import CandidateKeyframe, Index
+from objreg_ros.memory.retrieval import Index
 from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.memory.thinning import Thinning
-from objreg_ros.registration import align, method_of
+from objreg_ros.registrar.candidate_search import Budget, Means, Search
+from objreg_ros.registrar.closure import Accepted, closure_of, links_of, observations, rejected
+from objreg_ros.registration import gate_of, method_of
 from objreg_ros.registration.api import Gate, Method
-from objreg_ros.registration.candidate import Candidate
-from objreg_ros.registration.certainty.covariance import covariance_of
-from objreg_ros.registration.gate.verdict import Refusal, judge
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.registration.propose.prior import expect
-from objreg_ros.registration.result import Registration, evidence_of
 
 RECENT = 500  # landmarks that are told of after every keyframe
 
@@ -56,48 +50,16 @@ class Outcome:
     frame_id: str = "camera"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Accepted:
-    target: Keyframe
-    candidate: Candidate
-
-
-class _Budget(NamedTuple):
-    """Until when new candidate keyframes are tried: a time of `time.monotonic`, or until ``hurried`` says so."""
-
-    deadline: float
-    hurried: Callable[[], bool]
-
-    def over(self) -> str:
-        """Why no more candidate keyframe is tried; empty while there is time."""
-        late = time.monotonic() - self.deadline
-        if late > 0:
-            return f"{1e3 * late:.0f} ms after the end of the search"
-        return "cut short: newer keyframes wait, or the node ends" if self.hurried() else ""
-
-
-class _Search(NamedTuple):
-    """The keyframe that candidate keyframes are sought for, the threads that try them, and how long."""
-
-    keyframe: Keyframe
-    pool: ThreadPoolExecutor
-    budget: _Budget
-
-
-_Try = tuple[CandidateKeyframe, Callable[[], _Accepted | Rejected] | None]
-"""A candidate keyframe that is being tried, and what waits for its verdict."""
-
-
 class Registrar:
     """Finds the loops. Holds the store at ``params.store`` until `close`; StoreError (an OSError) if that is bad.
 
     ``method`` finds poses between two keyframes and ``gate`` accepts or refuses them (`registration.api`); they are
-    those of ``params`` and `judge` where None. Both are called from several threads.
+    those of ``params`` where None. Both are called from several threads.
     """
 
     def __init__(self, params: RegistrarParams, method: Method | None = None, gate: Gate | None = None) -> None:
         self.params = params
-        self._method, self._gate = method or method_of(params), gate or judge
+        self._method, self._gate = method or method_of(params), gate or gate_of(params)
         self._store = Store(params.store)
         self._lock = threading.RLock()
         self._pools: dict[int, ThreadPoolExecutor] = {}
@@ -166,7 +128,7 @@ class Registrar:
         alone. Keyframes are numbered as they come here: in the order of their frames. StoreError where one cannot be
         stored; then it closes nothing. Of a frame window that a `reset` overtook nothing comes.
         """
-        budget = _Budget(time.monotonic() + seconds, hurried)
+        budget = Budget(time.monotonic() + seconds, hurried)
         with self._lock:
             if window.session < self._first_session:  # `reset` came first
                 return Outcome()
@@ -174,7 +136,7 @@ class Registrar:
             self._session = keyframe.session
             unnamed = self._follow(window.clock, keyframe)
             sightings = sightings_of(keyframe)
-            accepted, rejected = self._try_candidates(keyframe, sightings, _Search(keyframe, self._pool(), budget))
+            accepted, refused = self._find_closures(keyframe, sightings, budget)
             try:
                 closures, named = self._remember(keyframe, sightings, accepted)
             except StoreError:
@@ -184,7 +146,7 @@ class Registrar:
             seen = observations(keyframe, named)
             return Outcome(
                 closures=closures,
-                rejected=(*unnamed, *rejected),
+                rejected=(*unnamed, *refused),
                 keyframe_ns=keyframe.stamp_ns,
                 observations=seen,
                 frame_id=keyframe.frame_id,
@@ -229,72 +191,21 @@ class Registrar:
         self._clock, self._thinning, self._since = clock, Thinning(self.params.thin_seconds), last + 1
         began = f"{1e-9 * clock.began_ns:.3f} s"
         refusal = Reason.CLOCK, f"the clock began anew at {began}; sessions up to {last} had seen that time before"
-        return () if last < 0 else (_rejected(keyframe.stamp_ns, keyframe, refusal),)
+        return () if last < 0 else (rejected(keyframe.stamp_ns, keyframe, refusal),)
 
-    def _try_candidates(
-        self, keyframe: Keyframe, sightings: Sequence[Sighting], search: _Search
-    ) -> tuple[list[_Accepted], tuple[Rejected, ...]]:
-        """Try the stored keyframes that may show the same place, the likeliest first."""
-        accepted: list[_Accepted] = []
-        rejected: list[Rejected] = []
-        queue = deque(self._index.query(sightings, self._since))
-        if not queue:
+    def _find_closures(
+        self, keyframe: Keyframe, sightings: Sequence[Sighting], budget: Budget
+    ) -> tuple[list[Accepted], list[Rejected]]:
+        """What the stored keyframes that may show the same place come to; a refusal where none may."""
+        candidates = self._index.query(sightings, self._since)
+        if not candidates:
             refusal = Reason.NO_CANDIDATE, f"none of {len(self._index)} stored objects is alike and may be here"
-            rejected.append(_rejected(keyframe.stamp_ns, keyframe, refusal))
-        tries, trying = self.params.candidates, deque[_Try]()
-        while len(accepted) < self.params.closures:
-            self._begin(search, queue, trying, tries, self.params.closures - len(accepted))
-            if not trying:
-                break
-            stored, ask = trying.popleft()
-            if ask is None or self._thinning.redundant(stored.stamp_ns, keyframe.stamp_ns):
-                refusal = Reason.REDUNDANT, f"an accepted closure is nearer than {self.params.thin_seconds} s"
-                rejected.append(_rejected(stored.stamp_ns, keyframe, refusal))
-                continue
-            tries -= 1
-            verdict = ask()
-            if isinstance(verdict, _Accepted):
-                self._thinning.accept(stored.stamp_ns, keyframe.stamp_ns)
-                accepted.append(verdict)
-            else:
-                rejected.append(verdict)
-        return accepted, tuple(rejected)
-
-    def _begin(
-        self, search: _Search, queue: deque[CandidateKeyframe], trying: deque[_Try], tries: int, wanted: int
-    ) -> None:
-        """Begin to try the next candidates: as many at once as there are threads, and never more than ``tries``.
-
-        While some are being tried, no more than would be ``wanted`` if all of them were accepted. What would say what
-        is said already is put aside without a try. Verdicts are asked for in the order of the candidates, so it does
-        not matter which is done first.
-        """
-        busy = sum(ask is not None for _, ask in trying)
-        most = min(tries, self.params.threads if busy == 0 else min(wanted, self.params.threads))
-        while queue and busy < most:
-            stored = queue.popleft()
-            redundant = self._thinning.redundant(stored.stamp_ns, search.keyframe.stamp_ns)
-            trying.append((stored, None if redundant else self._try_candidate(search, stored)))
-            busy += not redundant
-
-    def _try_candidate(self, search: _Search, stored: CandidateKeyframe) -> Callable[[], _Accepted | Rejected]:
-        """Begin to register a candidate keyframe in a thread of its own; what comes back waits for the verdict."""
-        keyframe, over = search.keyframe, search.budget.over()
-        if over:
-            refusal = Reason.OVER_BUDGET, over
-            return lambda: _rejected(stored.stamp_ns, keyframe, refusal)
-        try:
-            target = self._store.keyframe(stored.keyframe_id)
-        except StoreError as error:
-            refusal = Reason.UNREADABLE, str(error)
-            return lambda: _rejected(stored.stamp_ns, keyframe, refusal)
-        self._method.prepare(keyframe)
-        prior = expect(keyframe, target, self.params)
-        registered = search.pool.submit(align, keyframe, target, prior, self.params, self._method, self._gate)
-        return lambda: _verdict(keyframe, target, registered.result())
+            return [], [rejected(keyframe.stamp_ns, keyframe, refusal)]
+        means = Means(self._store, self._method, self._gate, self._pool())
+        return Search(keyframe, self._thinning, budget, means, self.params).run(candidates)
 
     def _remember(
-        self, keyframe: Keyframe, sightings: Sequence[Sighting], accepted: Sequence[_Accepted]
+        self, keyframe: Keyframe, sightings: Sequence[Sighting], accepted: Sequence[Accepted]
     ) -> tuple[tuple[LoopClosure, ...], tuple[Sighting, ...]]:
         """Give the objects their landmarks, write everything down, and forget what has become superfluous.
 
@@ -319,71 +230,5 @@ class Registrar:
             self._index.remove(spare)
             self._landmarks.forget(spare)
 
-    def _links(self, keyframe: Keyframe, item: _Accepted) -> list[Link]:
-        stored = {sighting.instance: sighting for sighting in self._store.sightings(item.target.keyframe_id)}
-        R_there_here = _rotation(item.target) @ item.candidate.T_target_source[:3, :3] @ _rotation(keyframe).T
-        return [
-            Link(
-                index=pair.source, of=stored[item.target.objects[pair.target].cloud.instance], R_there_here=R_there_here
-            )
-            for pair in item.candidate.matched
-        ]
-
-
-def closure_of(
-    keyframe: Keyframe, sightings: Sequence[Sighting], item: _Accepted, params: RegistrarParams
-) -> LoopClosure:
-    """The constraint of an accepted candidate; ``sightings`` are the keyframe's, with their landmarks."""
-    candidate = item.candidate
-    matches = tuple(
-        ObjectMatch(label=pair.label, object_id=sightings[pair.source].landmark) for pair in candidate.matched
-    )
-    return LoopClosure(
-        from_ns=item.target.stamp_ns,
-        to_ns=keyframe.stamp_ns,
-        T_from_to=candidate.T_target_source,
-        covariance=covariance_of(candidate, params),
-        labels=tuple(dict.fromkeys(match.label for match in matches)) or tuple(dict.fromkeys(keyframe.labels)),
-        matches=matches,
-        evidence=evidence_of(candidate) | _moved(keyframe, item),
-        from_frame_id=item.target.frame_id,
-        to_frame_id=keyframe.frame_id,
-    )
-
-
-def observations(keyframe: Keyframe, sightings: Sequence[Sighting]) -> tuple[Observation, ...]:
-    """The objects of a keyframe under the ids of the landmarks that its ``sightings`` are of."""
-    return tuple(
-        Observation(label=sighting.label, object_id=sighting.landmark, xyz=item.centroid)
-        for item, sighting in zip(keyframe.objects, sightings, strict=True)
-    )
-
-
-def _rejected(from_ns: int, keyframe: Keyframe, refusal: Refusal, T_from_to: Array | None = None) -> Rejected:
-    reason, detail = refusal
-    return Rejected(reason=reason, from_ns=from_ns, to_ns=keyframe.stamp_ns, detail=detail, T_from_to=T_from_to)
-
-
-def _verdict(keyframe: Keyframe, target: Keyframe, registration: Registration) -> _Accepted | Rejected:
-    candidate, reason = registration.candidate, registration.reason
-    if reason is None and candidate is not None:
-        return _Accepted(target=target, candidate=candidate)
-    if reason is None:
-        raise ValueError("gate: expected a reason with each refusal, got None")
-    best = None if candidate is None else candidate.T_target_source
-    return _rejected(target.stamp_ns, keyframe, (reason, registration.detail), best)
-
-
-def _moved(keyframe: Keyframe, item: _Accepted) -> dict[str, float]:
-    """How far the objects went that stand elsewhere now, under `MOVED`'s names; the farthest of several of one."""
-    found: dict[str, float] = {}
-    for pair in item.candidate.moved:
-        here = transform(item.candidate.T_target_source, keyframe.objects[pair.source].centroid)
-        metres = float(np.linalg.norm(here - item.target.objects[pair.target].centroid))
-        name = f"moved {pair.label} [m]"
-        found[name] = max(metres, found.get(name, 0.0))
-    return found
-
-
-def _rotation(keyframe: Keyframe) -> Array:
-    return np.eye(3) if keyframe.T_odom_camera is None else keyframe.T_odom_camera[:3, :3]
+    def _links(self, keyframe: Keyframe, item: Accepted) -> list[Link]:
+        return links_of(keyframe, item, list(self._store.sightings(item.target.keyframe_id)))

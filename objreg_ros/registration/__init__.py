@@ -14,8 +14,8 @@ propose     hypotheses, the shortlist of them, their end and their evidence, com
 gate        the only place that says yes
 
 `keyframe` is what goes in, `candidate` a pose with its evidence, `result` what comes out with the verdict;
-`labels` are the names that a detector confuses, `params` what a user may set, `api` the Protocols of what may be
-exchanged. `engine` calls the steps in order; `paper` is the founding method.
+`labels` are the names that a detector confuses, `params` what a user may set and `dropped` what was once, `api` the
+Protocols of what may be exchanged. `engine` calls the steps in order; `paper` is the founding method.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from objreg_ros.registration.propose.prior import Prior
     from objreg_ros.registration.result import Registration
 
-__all__ = ["align", "method_of"]
+__all__ = ["align", "gate_of", "method_of"]
 
 
 def align(
@@ -44,23 +44,23 @@ def align(
 
     ``T_target_source`` of what comes back maps points of the source's camera into the target's. ``prior`` is what
     odometry expects, with its deviations (`propose.prior.expect`): a pose starts from it where it is tight, and is
-    refused where it disagrees. ``method`` is that of ``params`` where None, ``gate`` is `gate.verdict.judge`. Where the
+    refused where it disagrees. ``method`` is that of ``params`` where None, ``gate`` is `gate.verdict.judge` with
+    the limits of ``params``. Where the
     answer is no, ``accepted`` is False, and ``reason``, ``detail`` and ``evidence`` say why. The same input gives the
     same answer. The imports are inside: they load the compiled kernels.
     """
     from objreg_ros.registration.candidate import Candidate
     from objreg_ros.registration.certainty.covariance import covariance_of
-    from objreg_ros.registration.gate.verdict import judge
     from objreg_ros.registration.params import RegistrarParams
     from objreg_ros.registration.result import Registration, evidence_of
 
     params = params or RegistrarParams()
-    method, gate = method or method_of(params), gate or judge
+    method, gate = method or method_of(params), gate or gate_of(params)
     for keyframe in (source, target):
         method.prepare(keyframe)
-    start = prior.T_target_source if prior is not None and prior.tight(params) else None
+    start = prior.T_target_source if prior is not None and prior.tight() else None
     candidates = method.propose(source, target, start)  # proposed, aligned and scored, with their certainty
-    verdict = gate(candidates, params, prior)
+    verdict = gate(candidates, prior)
     if isinstance(verdict, Candidate):
         T, C, evidence = verdict.T_target_source, covariance_of(verdict, params), evidence_of(verdict)
         return Registration(accepted=True, T_target_source=T, covariance=C, evidence=evidence, candidate=verdict)
@@ -75,3 +75,13 @@ def method_of(params: RegistrarParams) -> Method:
     from objreg_ros.registration.paper import PaperEngine
 
     return PaperEngine(params) if params.method == "paper" else Engine(params)
+
+
+def gate_of(params: RegistrarParams) -> Gate:
+    """Our gate with the limits that ``params`` set."""
+    from functools import partial
+
+    from objreg_ros.registration.gate.limits import limits_of
+    from objreg_ros.registration.gate.verdict import judge
+
+    return partial(judge, limits=limits_of(params))

@@ -15,7 +15,6 @@ if TYPE_CHECKING:  # so that this file is light: the kernels need a second to lo
     from objreg_ros.registration.candidate import Candidate
     from objreg_ros.registration.gate.verdict import Refusal
     from objreg_ros.registration.keyframe import Keyframe
-    from objreg_ros.registration.params import RegistrarParams
     from objreg_ros.registration.prepare.prepared import Pair, Prepared
     from objreg_ros.registration.propose.prior import Prior
     from objreg_ros.registration.propose.shortlist import Shortlist
@@ -27,7 +26,7 @@ class Proposer(Protocol):
     ``T_target_source_prior (4, 4)`` is what odometry expects, or None. An empty shortlist where nothing is proposed.
     """
 
-    def __call__(self, pair: Pair, T_target_source_prior: Array | None, params: RegistrarParams) -> Shortlist: ...
+    def __call__(self, pair: Pair, T_target_source_prior: Array | None) -> Shortlist: ...
 
 
 class Scorer(Protocol):
@@ -42,7 +41,6 @@ class Scorer(Protocol):
         target: Prepared,
         alignment: Alignment,
         proposers: Iterable[str],
-        params: RegistrarParams,
     ) -> Candidate: ...
 
 
@@ -53,9 +51,7 @@ class Gate(Protocol):
     accepted candidate comes back, or ``(Reason, detail)``. Called from several threads.
     """
 
-    def __call__(
-        self, candidates: Sequence[Candidate], params: RegistrarParams, prior: Prior | None = None
-    ) -> Candidate | Refusal: ...
+    def __call__(self, candidates: Sequence[Candidate], prior: Prior | None = None) -> Candidate | Refusal: ...
 
 
 class Method(Protocol):

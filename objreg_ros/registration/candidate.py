@@ -19,6 +19,19 @@ class ObjectPair(NamedTuple):
     label: str
 
 
+class Score(NamedTuple):
+    """What candidates are ranked by, term by term. The unit is that of the view score V, and so is the ``total``."""
+
+    view: float  # V
+    matches: float  # what objects add that lie upon each other, less those that moved
+    silhouettes: float  # the weighted silhouette score of the matched objects
+
+    @property
+    def total(self) -> float:
+        """The sum of the terms."""
+        return self.view + (self.matches + self.silhouettes)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verification:
     """How well two views agree under a pose, looked at both ways: each field is the worse way's, except ``tested``.

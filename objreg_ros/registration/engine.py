@@ -17,12 +17,14 @@ from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.certainty.covariance import covariance_of, spread_of, worst_translation
 from objreg_ros.registration.certainty.degeneracy import systematic_depth_error
 from objreg_ros.registration.certainty.gravity_update import gravity_update
-from objreg_ros.registration.certainty.observability import better_pose, regularising_information
+from objreg_ros.registration.certainty.observability import DOUBTFUL_SIGMA_M, better_pose, regularising_information
+from objreg_ros.registration.kernels.same_pose import AGREEING, near
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Pair, PreparedCache
 from objreg_ros.registration.propose.competing_hypotheses import competing_poses
 from objreg_ros.registration.propose.evidence import (
+    CONSIDERED_MARGIN,
     gather,
     margin_over,
     perturbation_margin_of,
@@ -30,9 +32,12 @@ from objreg_ros.registration.propose.evidence import (
     surroundings_of,
 )
 from objreg_ros.registration.propose.hypotheses import Hypothesis
-from objreg_ros.registration.propose.pose_voting import same_pose
 from objreg_ros.registration.propose.refinement import refine
 from objreg_ros.registration.propose.shortlist import shortlist
+from objreg_ros.registration.refine.batch_icp import LEAST_PAIRS
+from objreg_ros.registration.score.view_score import LEAST_SCORE
+
+HOLDING_SILHOUETTE_SCORE = 0.3  # of an object from which on it resolves a degenerate direction
 
 
 class Engine:
@@ -59,41 +64,37 @@ class Engine:
         """
         # prepare/: each keyframe once
         pair = Pair(source=self._cache.get(source), target=self._cache.get(target))
-        if min(len(pair.source.xyz), len(pair.target.xyz)) < self._params.min_points:
+        if min(len(pair.source.xyz), len(pair.target.xyz)) < LEAST_PAIRS:
             return ()
         # propose/: what is worth finishing, of all that the proposers propose
-        best, hypotheses = self._shortlist(pair, T_target_source_prior, self._params)
+        best, hypotheses = self._shortlist(pair, T_target_source_prior)
         if not best:
             return ()
         # refine/ and score/: each is refined, and its evidence gathered
-        candidates = merged(
-            [self._judge(pair, hypothesis, hypotheses) for hypothesis in best], pair.source.middle, self._params
-        )
+        candidates = merged([self._judge(pair, hypothesis, hypotheses) for hypothesis in best], pair.source.middle)
         # propose/: what else a lone object's pose could be, refined and scored alike
         competitors = self._competitors(pair, [one for one in candidates if self._promises(one, candidates[0])])
         if competitors:
-            candidates = merged([*candidates, *competitors], pair.source.middle, self._params)
+            candidates = merged([*candidates, *competitors], pair.source.middle)
         # certainty/: how the views resist a perturbation, and what gravity tells
         perturbed = (self._perturbed(pair, one) if self._promises(one, candidates[0]) else one for one in candidates)
         return tuple(self._gravity_updated(pair, one) for one in perturbed)
 
     def _judge(self, pair: Pair, hypothesis: Hypothesis, hypotheses: Sequence[Hypothesis]) -> Candidate:
         """Finish a hypothesis and gather the evidence; ``hypotheses`` are all that may agree with it."""
-        params, source = self._params, pair.source
+        source = pair.source
         alignment = self._refined(pair, hypothesis.T_target_source)
         poses = np.array([other.T_target_source for other in hypotheses])
         found = hypothesis.T_target_source, alignment.T_target_source
-        same = [same_pose(poses, T_known, source.middle, params) for T_known in found]
+        same = [near(poses, T_known, source.middle, AGREEING) for T_known in found]
         agreeing = [other.proposer for other, agrees in zip(hypotheses, same[0] | same[1], strict=True) if agrees]
         return self._gathered(pair, alignment, (hypothesis.proposer, *agreeing))
 
     def _gathered(self, pair: Pair, alignment: Alignment, proposers: Sequence[str]) -> Candidate:
         """The candidate of an alignment, without degenerate directions where an object resolves them."""
-        candidate = self._score(pair.source, pair.target, alignment, proposers, self._params)
+        candidate = self._score(pair.source, pair.target, alignment, proposers)
         return (
-            replace(candidate, alignment=without_degeneracy(alignment))
-            if resolves_degeneracy(candidate, self._params)
-            else candidate
+            replace(candidate, alignment=without_degeneracy(alignment)) if resolves_degeneracy(candidate) else candidate
         )
 
     def _competitors(self, pair: Pair, candidates: Sequence[Candidate]) -> list[Candidate]:
@@ -101,22 +102,22 @@ class Engine:
 
         What comes to a candidate's pose is left out: it was looked for from there, and is no proposer that agrees.
         """
-        source, target, params = pair.source, pair.target, self._params
-        poses = [T for one in candidates for T in competing_poses(source, target, one, params)]
+        source, target, most = pair.source, pair.target, self._params.max_violations
+        poses = [T for one in candidates for T in competing_poses(source, target, one, most)]
         known, competitors = np.array([one.T_target_source for one in candidates]), []
-        for alignment in (refine(source, target, T, params) for T in poses):
-            if not same_pose(known, alignment.T_target_source, source.middle, params).any():
+        for alignment in (refine(source, target, T) for T in poses):
+            if not near(known, alignment.T_target_source, source.middle, AGREEING).any():
                 competitors.append(self._gathered(pair, alignment, ("objects",)))
         return competitors
 
     def _promises(self, candidate: Candidate, best: Candidate) -> bool:
         """Whether the gate may come to a candidate, so that it is worth perturbing."""
-        least = max(self._params.min_score, best.verification.score - self._params.rival_margin)
+        least = max(LEAST_SCORE, best.verification.score - CONSIDERED_MARGIN)
         return candidate.verification.score >= least
 
     def _perturbed(self, pair: Pair, candidate: Candidate) -> Candidate:
         """The candidate with its score margin under perturbation, and what the views say without its objects."""
-        asked = candidate, pair.source, pair.target, self._params
+        asked = candidate, pair.source, pair.target
         told = replace(
             candidate, perturbation_margin=perturbation_margin_of(*asked), surroundings=surroundings_of(*asked)
         )
@@ -128,32 +129,32 @@ class Engine:
         Its evidence stays that of the pose with the best view score.
         """
         C = covariance_of(candidate, self._params) + candidate.systematic_depth_error
-        step = gravity_update(pair.source, pair.target, candidate.T_target_source, C, self._params)
+        step = gravity_update(pair.source, pair.target, candidate.T_target_source, C)
         return candidate if step is None else self._informed(brought(candidate, step.T), step.information)
 
     def _refined(self, pair: Pair, T_target_source: Array) -> Alignment:
         """The refined pose; where that is known badly, the one of the best view score of all that it could be."""
-        params, source, target = self._params, pair.source, pair.target
-        alignment = refine(source, target, T_target_source, params)
-        C = spread_of(alignment, params) + systematic_depth_error(source, target, alignment.T_target_source, params)
-        if worst_translation(C) <= params.doubtful_sigma:
+        source, target = pair.source, pair.target
+        alignment = refine(source, target, T_target_source)
+        C = spread_of(alignment) + systematic_depth_error(source, target, alignment.T_target_source)
+        if worst_translation(C) <= DOUBTFUL_SIGMA_M:
             return alignment
-        better = better_pose(source, target, alignment.T_target_source, C, params)
-        return alignment if better is None else refine(source, target, better, params)
+        better = better_pose(source, target, alignment.T_target_source, C)
+        return alignment if better is None else refine(source, target, better)
 
     def _regularised(self, pair: Pair, candidate: Candidate) -> Candidate:
         """The candidate with what the views tell of a doubtful position that does not slide freely."""
-        alignment, C = candidate.alignment, spread_of(candidate.alignment, self._params)
+        alignment, C = candidate.alignment, spread_of(candidate.alignment)
         if candidate.perturbation_margin is None or len(alignment.degenerate) > 0:
             return candidate
         added = regularising_information(
-            pair.source, pair.target, alignment.T_target_source, C + candidate.systematic_depth_error, self._params
+            pair.source, pair.target, alignment.T_target_source, C + candidate.systematic_depth_error
         )
         return self._informed(candidate, added)
 
     def _informed(self, candidate: Candidate, added: Array) -> Candidate:
         """The candidate with information (6, 6) that neither the residuals nor a systematic depth error know of."""
-        alignment, C = candidate.alignment, spread_of(candidate.alignment, self._params)
+        alignment, C = candidate.alignment, spread_of(candidate.alignment)
         informed = replace(alignment, information=alignment.information + added)
         whole = np.linalg.inv(np.linalg.inv(C + candidate.systematic_depth_error) + added)
         return replace(
@@ -161,10 +162,10 @@ class Engine:
         )
 
 
-def resolves_degeneracy(candidate: Candidate, params: RegistrarParams) -> bool:
+def resolves_degeneracy(candidate: Candidate) -> bool:
     """Whether what the surfaces leave degenerate is resolved by the outline and the print of an object."""
     score = candidate.silhouette_score
-    return candidate.yaw_known and score is not None and score >= params.holding_likeness
+    return candidate.yaw_known and score is not None and score >= HOLDING_SILHOUETTE_SCORE
 
 
 def brought(candidate: Candidate, T_target_source: Array) -> Candidate:
@@ -177,16 +178,16 @@ def without_degeneracy(alignment: Alignment) -> Alignment:
     return replace(alignment, degenerate=np.zeros((0, 6)))
 
 
-def merged(candidates: list[Candidate], middle: Array, params: RegistrarParams) -> list[Candidate]:
+def merged(candidates: list[Candidate], middle: Array) -> list[Candidate]:
     """Distinct candidates, best first; each knows the proposers of those that came to its pose."""
-    ranked = sorted(candidates, key=lambda candidate: -rank_score(candidate, params))
+    ranked = sorted(candidates, key=lambda candidate: -rank_score(candidate).total)
     poses = np.array([candidate.T_target_source for candidate in ranked])
     kept: list[Candidate] = []
     known = np.zeros(len(ranked), bool)
     for k, candidate in enumerate(ranked):
         if not known[k]:
-            same = same_pose(poses, poses[k], middle, params)
+            same = near(poses, poses[k], middle, AGREEING)
             proposers = {proposer for j in np.flatnonzero(same) for proposer in ranked[j].agreeing_proposers}
             kept.append(replace(candidate, agreeing_proposers=tuple(sorted(proposers))))
             known |= same
-    return [replace(candidate, margin_over_competing=margin_over(candidate, kept, params)) for candidate in kept]
+    return [replace(candidate, margin_over_competing=margin_over(candidate, kept)) for candidate in kept]

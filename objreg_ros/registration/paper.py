@@ -24,6 +24,9 @@ from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared, PreparedCache
 from objreg_ros.registration.propose.evidence import gather, perturbation_margin_of
 
+PAIR_DISTANCE_M = 0.1  # pairs of points farther apart are rejected
+ITERATIONS = 100  # most
+TOLERANCE_M = 1e-06  # change of the root mean square distance that ends the iterations
 LEAST_PAIRS = 6
 FITNESS_TOLERANCE = 1e-6  # share of the points that find a partner: its change that counts as none, Open3D's default
 
@@ -42,7 +45,6 @@ class PaperEngine:
 
     def __init__(self, params: RegistrarParams) -> None:
         import_module("open3d")  # now and not with the first pair: it takes seconds
-        self._params = params
         self._cache = PreparedCache(params)
 
     def prepare(self, keyframe: Keyframe) -> None:
@@ -54,26 +56,26 @@ class PaperEngine:
     ) -> tuple[Candidate, ...]:
         """Poses of ``source`` in ``target``, the best verified first. ICP starts from rest, never from a prior."""
         alignments = [
-            register(a.cloud.xyz, b.cloud.xyz, np.eye(4), self._params)
+            register(a.cloud.xyz, b.cloud.xyz, np.eye(4))
             for a in source.objects
             for b in target.objects
             if a.label == b.label
         ]
         pair = self._cache.get(source), self._cache.get(target)
         found = [self._candidate(*pair, alignment) for alignment in alignments if alignment is not None]
-        return tuple(merged(found, pair[0].middle, self._params))
+        return tuple(merged(found, pair[0].middle))
 
     def _candidate(self, source: Prepared, target: Prepared, alignment: Alignment) -> Candidate:
-        candidate = gather(source, target, alignment, ("paper",), self._params)
-        return replace(candidate, perturbation_margin=perturbation_margin_of(candidate, source, target, self._params))
+        candidate = gather(source, target, alignment, ("paper",))
+        return replace(candidate, perturbation_margin=perturbation_margin_of(candidate, source, target))
 
 
-def register(source: Array, target: Array, T_target_source: Array, params: RegistrarParams) -> Alignment | None:
+def register(source: Array, target: Array, T_target_source: Array) -> Alignment | None:
     """Point-to-point ICP of points (N, 3) upon (M, 3) from a start; None where too few points correspond."""
     source, target = source.astype(float), target.astype(float)
     if min(len(source), len(target)) < LEAST_PAIRS:
         return None
-    found = _icp(source, target, T_target_source, params)
+    found = _icp(source, target, T_target_source)
     moved = transform(found.T_target_source, source)
     distance = np.linalg.norm(moved[found.pairs[:, 0]] - target[found.pairs[:, 1]], axis=1)
     kept = _one_to_one(found.pairs, distance)
@@ -91,7 +93,7 @@ def register(source: Array, target: Array, T_target_source: Array, params: Regis
     )
 
 
-def _icp(source: Array, target: Array, T_target_source: Array, params: RegistrarParams) -> _Icp:
+def _icp(source: Array, target: Array, T_target_source: Array) -> _Icp:
     """Open3D's ICP. It does not say whether it settled, so one more step says it."""
     import open3d as o3d
 
@@ -99,15 +101,15 @@ def _icp(source: Array, target: Array, T_target_source: Array, params: Registrar
     clouds = [o3d.geometry.PointCloud(o3d.utility.Vector3dVector(xyz)) for xyz in (source, target)]
 
     def after(start: Array, iterations: int) -> Any:
-        criteria = registration.ICPConvergenceCriteria(FITNESS_TOLERANCE, params.paper_tolerance, iterations)
+        criteria = registration.ICPConvergenceCriteria(FITNESS_TOLERANCE, TOLERANCE_M, iterations)
         method = registration.TransformationEstimationPointToPoint()
-        return registration.registration_icp(*clouds, params.paper_distance, start, method, criteria)
+        return registration.registration_icp(*clouds, PAIR_DISTANCE_M, start, method, criteria)
 
-    last = after(T_target_source, params.paper_iterations)
+    last = after(T_target_source, ITERATIONS)
     further = after(last.transformation, 1)
     converged = (
         abs(further.fitness - last.fitness) < FITNESS_TOLERANCE
-        and abs(further.inlier_rmse - last.inlier_rmse) < params.paper_tolerance
+        and abs(further.inlier_rmse - last.inlier_rmse) < TOLERANCE_M
     )
     pairs = np.array(last.correspondence_set, int).reshape(-1, 2)
     return _Icp(

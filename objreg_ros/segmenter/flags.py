@@ -8,8 +8,9 @@ import numpy as np
 
 from objreg_ros.data import Array, DepthImage, PointFlag
 from objreg_ros.segmenter.extract import Pixels
-from objreg_ros.segmenter.support import FLOOR, GROWTH, solve_symmetric
+from objreg_ros.segmenter.support import solve_symmetric
 from objreg_ros.segmenter.surface import EXACT, Surface, Window
+from objreg_ros.sensor import PLANE_TOLERANCE_GROWTH, PLANE_TOLERANCE_M
 
 LEAK = 0.08  # an object with more of it outside its box is cut by the box
 NEAR_BORDER = 0.012  # of the image's size
@@ -84,7 +85,7 @@ def _count_on_plane(depth, x, y, chosen, box, plane):  # type: ignore[no-untyped
         for j in range(0, depth.shape[1], STRIDE):
             z = depth[i, j]
             off = abs(z * (plane[0] * x[j] + plane[1] * y[i] + plane[2]) - np.float32(1))
-            flat = off < plane[3] * 2 * (FLOOR + GROWTH * z * z)
+            flat = off < plane[3] * 2 * (PLANE_TOLERANCE_M + PLANE_TOLERANCE_GROWTH * z * z)
             if i < box[1] or i >= box[3] or j < box[0] or j >= box[2]:
                 ring += z > 0
                 ring_flat += (z > 0) & flat

@@ -10,8 +10,9 @@ import numba
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.segmenter.support import FLOOR, GROWTH, Ground, Plane, fit_level
+from objreg_ros.segmenter.support import Ground, Plane, fit_level
 from objreg_ros.segmenter.surface import EXACT, Surface, Window
+from objreg_ros.sensor import PLANE_TOLERANCE_GROWTH, PLANE_TOLERANCE_M
 
 OWN_TOP = 0.65  # a level part with more of it in a box is a top of the object there, not what it stands on
 LOWEST = 0.1  # with less than this share of the cells in and around the box below it a level part is no top
@@ -143,7 +144,9 @@ def _share_below(normal, offset, grid):  # type: ignore[no-untyped-def]
             z = depth[i, j]
             if z > 0:
                 known += 1
-                below += z * (normal[0] * x[j] + normal[1] * y[i] + normal[2]) + offset < -(FLOOR + GROWTH * z * z)
+                below += z * (normal[0] * x[j] + normal[1] * y[i] + normal[2]) + offset < -(
+                    PLANE_TOLERANCE_M + PLANE_TOLERANCE_GROWTH * z * z
+                )
     return below / max(1, known)
 
 
@@ -155,4 +158,4 @@ def _mark(depth, x, y, here, n, offset, base, limit, level):  # type: ignore[no-
         for j in range(len(row)):
             z = row[j]
             height = z * (n[0] * x[j] + n[1] * y[i] + n[2]) + offset
-            out[j] |= possible[j] & (abs(height) < base + limit * (FLOOR + GROWTH * z * z))
+            out[j] |= possible[j] & (abs(height) < base + limit * (PLANE_TOLERANCE_M + PLANE_TOLERANCE_GROWTH * z * z))

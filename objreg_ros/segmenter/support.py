@@ -11,6 +11,7 @@ import numpy as np
 from objreg_ros.data import Array, Intrinsics
 from objreg_ros.segmenter.components import connect
 from objreg_ros.segmenter.surface import EXACT, MIN_COSINE, Surface
+from objreg_ros.sensor import PLANE_TOLERANCE_GROWTH, PLANE_TOLERANCE_M
 
 MAX_SUPPORTS = 6
 BIN = 0.015  # metres of height
@@ -28,7 +29,7 @@ CLIPS = (1.0, 1.5, 1.5, 2.5, 3.0, 3.0)  # the first of the tolerance, the others
 class Plane:
     """Points p with ``normal · p + offset = 0``; ``normal (3,)`` points up, so the left side is the height above it.
 
-    ``spread`` is the standard deviation of its points in tolerances, FLOOR + GROWTH z² at depth z.
+    ``spread`` is the standard deviation of its points in tolerances of a plane (`sensor`) at their depths.
     """
 
     normal: Array
@@ -58,11 +59,6 @@ class Ground:
     supports: list[Support]
     surface: Surface
     coarse: Surface
-
-
-# Metres that a point of a plane may lie off it, FLOOR + GROWTH z²: structured-light noise grows with squared depth
-# (Khoshelham and Elberink, "Accuracy and resolution of Kinect depth data", 2012).
-FLOOR, GROWTH = np.float32(0.008), np.float32(0.006)
 
 
 def find_supports(
@@ -140,7 +136,7 @@ def _claim(depth, x, y, n, offset, area, cells):  # type: ignore[no-untyped-def]
         for j in range(depth.shape[1]):
             z = depth[i, j]
             off = abs(z * (n[0] * x[j] + n[1] * y[i] + n[2]) + np.float32(offset))
-            unit = FLOOR + GROWTH * z * z
+            unit = PLANE_TOLERANCE_M + PLANE_TOLERANCE_GROWTH * z * z
             if area[i, j] > 0 and off < np.float32(1.5) * unit:
                 if off < unit:
                     cells[i, j] = True
@@ -226,7 +222,7 @@ def _sample(grid, cells, frame, start, stride, samples):  # type: ignore[no-unty
             s = a_x * p_x + a_y * p_y + a_z * z
             t = b_x * p_x + b_y * p_y + b_z * z
             r = u_x * p_x + u_y * p_y + u_z * z - (start[0] + start[1] * s + start[2] * t)
-            unit = FLOOR + GROWTH * z * z
+            unit = PLANE_TOLERANCE_M + PLANE_TOLERANCE_GROWTH * z * z
             if abs(r) < NEAR * unit:
                 samples[0, n], samples[1, n], samples[2, n], samples[3, n] = s, t, r, np.float32(1) / unit
                 n += 1

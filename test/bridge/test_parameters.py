@@ -3,6 +3,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
 import pytest
 import rclpy
@@ -16,6 +17,8 @@ from objreg_ros.params import Params, param
 @dataclass(frozen=True)
 class PotParams(Params):
     """Of every kind."""
+
+    DROPPED: ClassVar[dict[str, str]] = {"lid": "it is fixed now: LID_M in pot.py"}
 
     threshold: float = param(0.5, "least score", "1", ge=0.0, le=1.0, live=True)
     count: int = param(3, "how many", ge=1)
@@ -90,6 +93,11 @@ def test_a_start_value_is_refused_in_the_words_of_params(made: Made, override: s
     with pytest.raises(ValueError) as got:
         made(override)
     assert str(got.value) == f"pot: {expected.value}"
+
+
+def test_a_start_value_that_only_the_last_release_had_is_refused_with_what_took_its_place(made: Made) -> None:
+    with pytest.raises(ValueError, match=r"^pot: lid: no parameter any more; it is fixed now: LID_M in pot\.py$"):
+        made("lid:=0.3", "count:=4")
 
 
 def test_a_start_value_that_nobody_asked_for_is_warned_of(made: Made, capfd: pytest.CaptureFixture[str]) -> None:

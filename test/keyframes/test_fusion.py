@@ -4,15 +4,18 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from registration.samples import box, cloud, frame, moved, scene_view
 
 from objreg_ros.data import PointFlag
 from objreg_ros.geometry import inverse, transform
+from objreg_ros.keyframes import fusion
 from objreg_ros.keyframes.fusion import fuse, fuse_objects, reference_index
 from objreg_ros.keyframes.keyframer import FrameWindow
 from objreg_ros.registration.params import RegistrarParams
 
 PARAMS = RegistrarParams()
+GROUPS = PARAMS.label_groups
 
 
 def test_an_object_seen_from_two_places_is_one_object_with_both_sides() -> None:
@@ -21,20 +24,20 @@ def test_an_object_seen_from_two_places_is_one_object_with_both_sides() -> None:
         np.array([[0.06, 0, 1], [0.06, 0.05, 1], [0.06, 0.1, 1]]),
     )
     seen = (frame(0, (cloud("cup", left),)), frame(0.1, (cloud("cup", transform(moved(-0.2), right)),)))
-    (item,) = fuse_objects(seen, (np.eye(4), moved(0.2)), PARAMS)
+    (item,) = fuse_objects(seen, (np.eye(4), moved(0.2)), GROUPS)
     assert item.sightings == 2 and len(item.cloud) == 6
     assert np.allclose(item.centroid, (0.03, 0.05, 1), atol=1e-6)
 
 
 def test_two_like_objects_of_one_frame_stay_two() -> None:
     near = (box("cup", (0, 0, 1)), box("cup", (0.12, 0, 1)))
-    items = fuse_objects((frame(0, near), frame(0.1, near)), (np.eye(4), np.eye(4)), PARAMS)
+    items = fuse_objects((frame(0, near), frame(0.1, near)), (np.eye(4), np.eye(4)), GROUPS)
     assert [(item.label, item.sightings, item.cloud.instance) for item in items] == [("cup", 2, 1), ("cup", 2, 2)]
 
 
 def test_the_label_is_that_of_most_sightings() -> None:
     seen = [frame(0.1 * i, (box(name, (0, 0, 1)),)) for i, name in enumerate(("mouse", "cup", "cup"))]
-    (item,) = fuse_objects(seen, [np.eye(4)] * 3, PARAMS)
+    (item,) = fuse_objects(seen, [np.eye(4)] * 3, GROUPS)
     assert item.label == "cup"
 
 
@@ -45,7 +48,7 @@ def test_a_sighting_cut_by_the_image_gives_way_to_a_whole_one() -> None:
         **{name: getattr(half, name) for name in ("label", "score", "instance", "xyz", "normals", "rgb", "density")},
         flags=np.full(len(half), PointFlag.CUT_BY_IMAGE, np.uint16),
     )
-    (item,) = fuse_objects((frame(0, (cut,)), frame(0.1, (whole,))), [np.eye(4)] * 2, PARAMS)
+    (item,) = fuse_objects((frame(0, (cut,)), frame(0.1, (whole,))), [np.eye(4)] * 2, GROUPS)
     assert not item.cloud.has(PointFlag.CUT_BY_IMAGE) and item.sightings == 2
 
 
@@ -54,7 +57,8 @@ def test_the_reference_is_the_frame_that_shows_most() -> None:
     assert reference_index((few, more, more)) == 1
 
 
-def test_the_keyframe_is_in_the_camera_frame_of_its_reference() -> None:
+def test_the_keyframe_is_in_the_camera_frame_of_its_reference(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fusion, "CONTEXT_RADIUS_M", 3.0)
     T_first_second = moved(0.1)
     table = (box("cup", (0, 0, 1)), box("book", (0.4, 0, 1)))
     first = frame(0, table[:1])
@@ -66,7 +70,7 @@ def test_the_keyframe_is_in_the_camera_frame_of_its_reference() -> None:
     window = FrameWindow(
         frames=(first, second), T_first_frame=(np.eye(4), T_first_second), T_session_first=moved(5.0), session=2
     )
-    fused = fuse(window, PARAMS.replaced(context_radius=3.0))
+    fused = fuse(window, PARAMS)
     assert fused.stamp_ns == second.stamp_ns and fused.session == 2 and fused.labels == ("cup", "book")
     assert np.allclose(fused.objects[0].centroid, (-0.1, 0, 1), atol=0.01)
     assert np.allclose(fused.T_odom_camera, moved(5.1))
@@ -75,21 +79,23 @@ def test_the_keyframe_is_in_the_camera_frame_of_its_reference() -> None:
     assert np.abs(wall[:, 2] - 2.0).max() < 0.35
 
 
-def test_the_context_stays_within_its_radius_of_the_objects() -> None:
+def test_the_context_stays_within_its_radius_of_the_objects(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fusion, "CONTEXT_RADIUS_M", 0.5)
     window = FrameWindow(
         frames=(frame(0, (box("cup", (0, 0, 1.8)),)),), T_first_frame=(np.eye(4),), T_session_first=np.eye(4), session=0
     )
-    context = fuse(window, PARAMS.replaced(context_radius=0.5)).context
+    context = fuse(window, PARAMS).context
     assert len(context) > 0 and np.linalg.norm(context.xyz - (0, 0, 1.8), axis=1).max() < 0.56
 
 
-def test_a_large_object_is_thinned_to_the_points_that_are_kept() -> None:
+def test_a_large_object_is_thinned_to_the_points_that_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fusion, "OBJECT_POINTS", 1000)
     many = cloud("chair", np.random.default_rng(0).random((5000, 3)))
-    (item,) = fuse_objects((frame(0, (many,)),), (np.eye(4),), PARAMS.replaced(object_points=1000))
+    (item,) = fuse_objects((frame(0, (many,)),), (np.eye(4),), GROUPS)
     assert 800 < len(item.cloud) <= 1000 and np.allclose(item.centroid, 0.5, atol=0.03)
 
 
 def test_an_object_without_points_is_passed_over() -> None:
     nothing = cloud("cup", np.zeros((0, 3)))
     seen = (frame(0, (nothing, box("book", (0.4, 0, 1)))), frame(0.1, (nothing,)))
-    assert [item.label for item in fuse_objects(seen, [np.eye(4)] * 2, PARAMS)] == ["book"]
+    assert [item.label for item in fuse_objects(seen, [np.eye(4)] * 2, GROUPS)] == ["book"]

@@ -12,6 +12,7 @@ from registration.samples import box, keyframe, moved
 
 from objreg_ros.data import ObjectCloud
 from objreg_ros.geometry import pose, rotation_from_vector
+from objreg_ros.memory import landmarks as landmarks_module
 from objreg_ros.memory.landmarks import Landmarks, Link, Merge
 from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.registration.params import RegistrarParams
@@ -59,9 +60,10 @@ def test_an_object_with_a_stray_point_far_away_keeps_its_id_and_costs_no_more() 
     ],
 )
 def test_an_object_may_be_aside_by_the_radius_a_share_of_its_extent_and_the_drift(
-    extent: float, way: float, apart: float, same: bool
+    monkeypatch: pytest.MonkeyPatch, extent: float, way: float, apart: float, same: bool
 ) -> None:
-    landmarks = Landmarks(PARAMS.replaced(landmark_radius=0.1, odometry_drift=0.1))
+    monkeypatch.setattr(landmarks_module, "RADIUS_M", 0.1)
+    landmarks = Landmarks(PARAMS.replaced(odometry_drift=0.1))
     first = replace(_seen(1, CUP)[0], position=np.array([0.45, 0.0, 0.0]), extent=0.1, travelled=20.0)
     aside = first.position + np.array([apart, 0.0, 0.0])
     _take(landmarks, (first,))

@@ -219,16 +219,16 @@ def test_keyframes_that_wait_behind_a_long_search_are_bounded_and_stored_in_the_
     node, said = make(), list[str]()
     node.throttled._write = said.append
     waiting, begun = list[int](), threading.Event()
-    try_candidates = node._registrar._try_candidates
+    try_candidates = node._registrar._find_closures
 
     def try_for_long(*arguments: Any) -> Any:
         begun.set()
-        search = arguments[2]
-        while search.budget.deadline > time.monotonic() and not search.budget.hurried():
+        budget = arguments[2]
+        while budget.deadline > time.monotonic() and not budget.hurried():
             time.sleep(0.005)
         return try_candidates(*arguments)
 
-    monkeypatch.setattr(node._registrar, "_try_candidates", try_for_long)
+    monkeypatch.setattr(node._registrar, "_find_closures", try_for_long)
     for k in range(30):
         node.searcher.put(Job(10 * k * SECOND, window_at(node, 10 * k), time.monotonic()))
         waiting.append(len(node.searcher))

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 from registration import rooms
-from registration.samples import SECOND, box, candidate, keyframe
+from registration.samples import SECOND, candidate, keyframe
 
 from objreg_ros.data import Array, Frame, LoopClosure, Reason, Rejected
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import StoreError
-from objreg_ros.registrar.registrar import Registrar, closure_of
+from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.engine import Engine
 from objreg_ros.registration.params import RegistrarParams
@@ -197,23 +197,6 @@ def test_a_closure_says_how_far_an_object_has_moved() -> None:
     assert closures[0].evidence["yaw_known"] in (0.0, 1.0)
 
 
-def test_a_closure_names_each_label_once_and_the_farthest_of_several_that_moved() -> None:
-    here, there = (
-        keyframe(number, number, tuple(box("cup", (x, 0.0, 1.0), instance=k) for k, x in enumerate(places, 1)))
-        for number, places in ((2, (0.0, 0.3, 0.6, 0.9)), (1, (0.0, 0.3, 1.1, 1.0)))
-    )
-    pairs = [ObjectPair(k, k, "cup") for k in range(4)]
-    sightings = [seen.of_landmark(number, np.eye(3)) for number, seen in enumerate(sightings_of(here), 7)]
-    accepted: Any = SimpleNamespace(
-        target=replace(there, frame_id="front"), candidate=candidate(matched=pairs[:2], moved=pairs[2:])
-    )
-    closure = closure_of(here, sightings, accepted, PARAMS)
-    assert closure.labels == ("cup",) and [match.object_id for match in closure.matches] == [7, 8]
-    assert closure.moved == {"cup": pytest.approx(0.5)}
-    assert (closure.from_ns, closure.to_ns) == (there.stamp_ns, here.stamp_ns)
-    assert (closure.from_frame_id, closure.to_frame_id) == ("front", "camera")
-
-
 def test_a_link_turns_what_is_here_into_the_frame_of_the_session_there() -> None:
     yaws = (0.3, 0.5, 1.1)  # of the camera there, of the closure, of the camera here
     there_camera, T, here_camera = (pose(rotation_from_vector(np.array([0.0, yaw, 0.0])), np.ones(3)) for yaw in yaws)
@@ -329,7 +312,7 @@ def test_a_gate_of_ones_own_decides_and_a_method_of_ones_own_is_asked() -> None:
             Counting.asked += 1
             return super().propose(*pair)  # type: ignore[arg-type]
 
-    def never(candidates: object, params: object, prior: object = None) -> tuple[Reason, str]:
+    def never(candidates: object, prior: object = None) -> tuple[Reason, str]:
         return Reason.MOVED, "never"
 
     ours, _ = _run(Registrar(PARAMS, method=Counting(PARAMS)), _frame(0, HERE), _frame(30, BESIDE))

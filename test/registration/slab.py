@@ -10,7 +10,7 @@ from objreg_ros.data import Array, View
 from objreg_ros.geometry import back_project
 from objreg_ros.registration.keyframe import KeyObject
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.registration.prepare.views import Sight, prepare_sight
+from objreg_ros.registration.prepare.views import DETAIL_SIGMA_PX, Sight, prepare_sight
 from registration.samples import CAMERA, cloud, scene_view
 
 PARAMS = RegistrarParams()
@@ -26,5 +26,5 @@ def room(slab_x: float, width: float = 0.9) -> tuple[Sight, KeyObject, Array]:
     print_of_wall = 128 + 600 * cv2.GaussianBlur(np.random.default_rng(5).normal(size=shown.shape), (0, 0), 2.0)
     grey = np.clip(np.where(shown, print_of_slab, print_of_wall), 0, 255).astype(np.uint8)
     xyz = np.where(shown[..., None], ray, view.xyz).astype(np.float32)
-    sight = prepare_sight(View(xyz=xyz, grey=grey, intrinsics=CAMERA), PARAMS.context_range, PARAMS.detail_sigma)
+    sight = prepare_sight(View(xyz=xyz, grey=grey, intrinsics=CAMERA), PARAMS.context_range, DETAIL_SIGMA_PX)
     return sight, KeyObject(cloud=cloud("monitor", xyz[shown])), shown

@@ -7,7 +7,6 @@ import numpy as np
 
 from objreg_ros.registration.candidate import Candidate, ObjectPair
 from objreg_ros.registration.gate.verdict import refuse
-from objreg_ros.registration.params import RegistrarParams
 from registration.samples import candidate, moved
 
 
@@ -24,8 +23,8 @@ def test_the_pose_of_a_candidate_is_that_of_its_alignment() -> None:
 
 
 def test_a_candidate_of_which_only_the_views_speak_well_is_refused() -> None:
-    assert refuse(candidate(), RegistrarParams()) is None
-    assert refuse(bare(), RegistrarParams()) is not None
+    assert refuse(candidate()) is None
+    assert refuse(bare()) is not None
 
 
 def test_what_is_not_known_of_a_candidate_does_not_speak_for_it() -> None:

@@ -14,11 +14,15 @@ from objreg_ros.data import View
 from objreg_ros.geometry import inverse, pose_error, rotation_from_vector
 from objreg_ros.registration import engine as engine_module
 from objreg_ros.registration.candidate import ObjectPair
+from objreg_ros.registration.certainty import gravity_update
 from objreg_ros.registration.certainty.covariance import spread_of
 from objreg_ros.registration.engine import Engine, without_degeneracy
 from objreg_ros.registration.keyframe import Context, Keyframe
 from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.propose import competing_hypotheses
+from objreg_ros.registration.propose.evidence import CONSIDERED_MARGIN
 from objreg_ros.registration.propose.shortlist import Shortlist
+from objreg_ros.registration.score.view_score import LEAST_SCORE
 from registration.rooms import ROOM, keyframe, seen_from
 from registration.samples import candidate, moved
 
@@ -47,13 +51,14 @@ def test_the_other_way_round_is_the_inverse(engine: Engine) -> None:
     assert rotation < 1.0 and distance < 2.0
 
 
-def test_a_pose_is_brought_to_where_gravity_is_kept_as_far_as_that_is_known() -> None:
+def test_a_pose_is_brought_to_where_gravity_is_kept_as_far_as_that_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     source, target = keyframe(seen_from(0.0), seed=1), keyframe(seen_from(20.0), seed=2)
     tilt = rotation_from_vector(np.radians([1.0, 0.0, 0.0]))
     tilted = replace(source, gravity=tilt @ source.gravity, gravity_confidence=1.0)
     errors, spreads = [], []
     for noise in (0.01, 10.0):
-        best = Engine(PARAMS.replaced(gravity_noise=noise)).propose(tilted, replace(target, gravity_confidence=1.0))[0]
+        monkeypatch.setattr(gravity_update, "GRAVITY_SIGMA_DEG", noise)
+        best = Engine(PARAMS).propose(tilted, replace(target, gravity_confidence=1.0))[0]
         errors.append(gravity_error(best.T_target_source, tilted, target))
         spreads.append(np.linalg.inv(best.alignment.information)[3:, 3:].trace())
     assert errors[0] < 0.1 and errors[1] > 0.8
@@ -68,7 +73,7 @@ def test_what_is_told_besides_makes_the_whole_covariance_smaller_and_leaves_a_co
         np.diag([100.0, 0.0, 0.0, 0.0, 400.0, 0.0]),
     )
     doubtful = candidate(information=1e3 * np.eye(6), systematic_depth_error=systematic_depth_error)
-    alone = spread_of(doubtful.alignment, PARAMS)
+    alone = spread_of(doubtful.alignment)
     informed = engine._informed(doubtful, added)
     assert np.array_equal(informed.alignment.information, doubtful.alignment.information + added)
     whole = np.linalg.inv(np.linalg.inv(alone) + added) + informed.systematic_depth_error
@@ -96,7 +101,7 @@ def test_what_else_a_lone_objects_pose_could_be_is_a_competitor_unless_it_comes_
     known = [candidate(moved(x), matched=(ObjectPair(0, 0, "cup"),)) for x in (0.0, 1.0)]
     others = {0.0: [moved(0.5), moved(0.1)], 1.0: [moved(-0.1), moved(1.5)]}
     monkeypatch.setattr(engine_module, "competing_poses", lambda s, t, one, p: others[one.T_target_source[0, 3]])
-    monkeypatch.setattr(engine_module, "refine", lambda s, t, T, p: candidate(T).alignment)
+    monkeypatch.setattr(engine_module, "refine", lambda s, t, T: candidate(T).alignment)
     monkeypatch.setattr(engine, "_gathered", lambda pair, found, proposers: (found.T_target_source[0, 3], proposers))
     pair: Any = SimpleNamespace(source=SimpleNamespace(middle=np.zeros(3)), target=None)
     assert engine._competitors(pair, known) == [(0.5, ("objects",)), (1.5, ("objects",))]
@@ -116,7 +121,7 @@ def test_an_object_that_tells_its_yaw_and_looks_alike_takes_away_the_degenerate_
 def test_a_proposer_of_ones_own_is_asked_instead_of_ours() -> None:
     asked: list[object] = []
 
-    def none(pair: object, prior: object, params: object) -> Shortlist:
+    def none(pair: object, prior: object) -> Shortlist:
         asked.append(prior)
         return Shortlist((), ())
 
@@ -124,12 +129,14 @@ def test_a_proposer_of_ones_own_is_asked_instead_of_ours() -> None:
     assert Engine(PARAMS, propose=none).propose(*pair) == () and asked == [None]
 
 
-def test_a_pose_that_one_proposer_came_to_does_not_become_two_proposers_by_what_is_found_about_it() -> None:
+def test_a_pose_that_one_proposer_came_to_does_not_become_two_proposers_by_what_is_found_about_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     lone = tuple(box for box in ROOM if box[0] not in ("book", "cup", "keyboard"))
     source, target = keyframe(seen_from(0.0), lone, seed=1), keyframe(seen_from(20.0), lone, seed=2)
-    with_search, without = (
-        Engine(PARAMS.replaced(searched_around=n)).propose(source, target) for n in (PARAMS.searched_around, 0)
-    )
+    with_search = Engine(PARAMS).propose(source, target)
+    monkeypatch.setattr(competing_hypotheses, "REFINED", 0)
+    without = Engine(PARAMS).propose(source, target)
     assert with_search[0].agreeing_proposers == without[0].agreeing_proposers
     assert np.array_equal(with_search[0].T_target_source, without[0].T_target_source)
 
@@ -142,7 +149,7 @@ def test_the_competitors_of_promising_candidates_are_ranked_with_them(monkeypatc
     monkeypatch.setattr(engine, "_gravity_updated", lambda pair, one: one)
     found = engine.propose(keyframe(seen_from(0.0), seed=1), keyframe(seen_from(20.0), seed=2))
     assert np.array_equal(found[0].T_target_source, competitor.T_target_source) and len(found) > 1
-    least = max(PARAMS.min_score, max(one.verification.score for one in asked) - PARAMS.rival_margin)
+    least = max(LEAST_SCORE, max(one.verification.score for one in asked) - CONSIDERED_MARGIN)
     assert asked and all(one.verification.score >= least for one in asked)
     assert found[0].margin_over_competing < 9.0  # another one is known
 

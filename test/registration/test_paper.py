@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector, skew, transform
+from objreg_ros.registration import paper
 from objreg_ros.registration.certainty.covariance import spread_of
 from objreg_ros.registration.paper import LEAST_PAIRS, PaperEngine, _one_to_one, register
 from objreg_ros.registration.params import RegistrarParams
@@ -30,7 +31,7 @@ def test_a_small_motion_of_the_same_points_is_found_exactly(angle: float) -> Non
     about = pose(np.eye(3), np.array([0.1, 0.0, 1.0]))
     T = about @ T @ inverse(about)
     source = _corner()
-    found = register(source, transform(T, source), np.eye(4), PARAMS)
+    found = register(source, transform(T, source), np.eye(4))
     assert found is not None and found.converged
     rotation, distance = pose_error(found.T_target_source, T)
     assert rotation < 0.1 and distance < 0.1 and found.rmse < 1e-3
@@ -38,14 +39,14 @@ def test_a_small_motion_of_the_same_points_is_found_exactly(angle: float) -> Non
 
 def test_a_start_from_the_truth_stays_there_and_its_covariance_is_valid() -> None:
     T = pose(rotation_from_vector(np.array([0.0, 2.0, 0.0])), np.array([1.0, 0.0, 2.0]))
-    found = register(_corner(), transform(T, _corner()), T, PARAMS)
+    found = register(_corner(), transform(T, _corner()), T)
     assert found is not None and np.allclose(found.T_target_source, T, atol=1e-9)
-    assert np.linalg.eigvalsh(spread_of(found, PARAMS)).min() > 0
+    assert np.linalg.eigvalsh(spread_of(found)).min() > 0
 
 
 def test_the_information_is_that_of_a_step_about_the_camera_of_every_point() -> None:
     T = pose(rotation_from_vector(np.array([0.3, 2.0, -0.5])), np.array([1.0, 0.0, 2.0]))
-    found = register(_corner(), transform(T, _corner()), T, PARAMS)
+    found = register(_corner(), transform(T, _corner()), T)
     J = np.concatenate([np.hstack([np.eye(3), -skew(T[:3, :3] @ point)]) for point in _corner()])
     assert found is not None and np.allclose(found.information * 1e-8, J.T @ J, atol=1e-6 * len(J))
 
@@ -53,7 +54,7 @@ def test_the_information_is_that_of_a_step_about_the_camera_of_every_point() -> 
 def test_fewer_than_six_pairs_give_nothing() -> None:
     points = _corner()[::200]
     for count in (LEAST_PAIRS - 1, LEAST_PAIRS):
-        found = register(points[:count], points[:count], np.eye(4), PARAMS)
+        found = register(points[:count], points[:count], np.eye(4))
         assert (found is None) is (count < LEAST_PAIRS)
 
 
@@ -62,35 +63,37 @@ def test_of_the_points_that_share_a_partner_the_closest_has_it() -> None:
     assert _one_to_one(pairs, np.array([0.02, 0.01, 0.0])).tolist() == [1, 2]
 
 
-def test_iterations_that_end_too_early_are_not_called_converged() -> None:
+def test_iterations_that_end_too_early_are_not_called_converged(monkeypatch: pytest.MonkeyPatch) -> None:
     about = pose(rotation_from_vector(np.array([0.0, 0.1, 0.02])), np.array([-0.1, 0.0, 0.02]))
-    few = register(_corner(), transform(about, _corner()), np.eye(4), PARAMS.replaced(paper_iterations=2))
-    enough = register(_corner(), transform(about, _corner()), np.eye(4), PARAMS)
+    enough = register(_corner(), transform(about, _corner()), np.eye(4))
+    monkeypatch.setattr(paper, "ITERATIONS", 2)
+    few = register(_corner(), transform(about, _corner()), np.eye(4))
     assert few is not None and enough is not None and (few.converged, enough.converged) == (False, True)
 
 
 def test_the_same_clouds_give_the_same_pose_to_the_last_bit() -> None:
     target = np.add(_corner()[::2], (0.02, 0.01, 0.0))
-    poses = [register(_corner(), target, np.eye(4), PARAMS) for _ in range(8)]
+    poses = [register(_corner(), target, np.eye(4)) for _ in range(8)]
     assert len({found.T_target_source.tobytes() for found in poses if found is not None}) == 1
 
 
 def test_the_middle_of_what_was_aligned_is_that_of_the_points_in_the_target_frame() -> None:
     xyz = _corner()
-    found = register(xyz, xyz, np.eye(4), PARAMS)
+    found = register(xyz, xyz, np.eye(4))
     assert found is not None and np.allclose(found.middle, xyz.mean(axis=0))
 
 
 def test_points_out_of_reach_of_each_other_give_nothing() -> None:
-    assert register(_corner(), np.add(_corner(), 5.0), np.eye(4), PARAMS) is None
+    assert register(_corner(), np.add(_corner(), 5.0), np.eye(4)) is None
 
 
-def test_correspondences_are_one_to_one() -> None:
+def test_correspondences_are_one_to_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(paper, "PAIR_DISTANCE_M", 0.05)
     source = np.array(
         [[0, 0, 1], [0.001, 0, 1], [0.002, 0, 1]] + [[0.1 * i, 0.1 * i * i, 1] for i in range(1, 9)], float
     )
     target = source[2:]
-    found = register(source, target, np.eye(4), PARAMS.replaced(paper_distance=0.05))
+    found = register(source, target, np.eye(4))
     assert found is not None and found.inliers == len(target)
 
 

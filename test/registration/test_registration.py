@@ -20,7 +20,7 @@ from objreg_ros.registration.gate.verdict import Refusal
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.paper import PaperEngine
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.registration.propose.prior import Prior
+from objreg_ros.registration.propose.prior import TIGHT_TRANSLATION_M, Prior
 from registration.rooms import keyframe, seen_from
 from registration.samples import candidate, moved
 
@@ -67,22 +67,28 @@ def test_a_refusal_tells_the_evidence_of_the_best_candidate_and_gives_no_pose() 
 
 def test_both_keyframes_are_prepared_and_the_covariance_is_that_of_the_accepted_candidate() -> None:
     method, one = Fixed(candidate()), candidate()
-    found = align(HERE, THERE, method=method, gate=lambda candidates, params, prior=None: one)
+    found = align(HERE, THERE, method=method, gate=lambda candidates, prior=None: one)
     assert method.prepared == [HERE, THERE] and found.candidate is one
     assert found.covariance is not None and np.array_equal(found.covariance, covariance_of(one, PARAMS))
 
 
 def test_a_gate_of_ones_own_decides() -> None:
-    def never(candidates: Sequence[Candidate], params: RegistrarParams, prior: Prior | None = None) -> Refusal:
+    def never(candidates: Sequence[Candidate], prior: Prior | None = None) -> Refusal:
         return Reason.MOVED, f"{len(candidates)} candidates"
 
     refused = align(HERE, THERE, method=Fixed(candidate(), candidate(moved(1.0))), gate=never)
     assert (refused.reason, refused.detail) == (Reason.MOVED, "2 candidates")
 
 
+def test_our_gate_decides_by_the_limits_that_a_user_sets() -> None:
+    method, strict = Fixed(candidate(moved(1.0))), PARAMS.replaced(max_translation=0.5)
+    assert align(HERE, THERE, method=method).accepted
+    assert not align(HERE, THERE, params=strict, method=method).accepted
+
+
 @pytest.mark.parametrize("tight", [True, False])
 def test_a_pose_starts_from_the_prior_where_that_is_tight(tight: bool) -> None:
-    metres = PARAMS.prior_translation * (0.5 if tight else 2.0)
+    metres = TIGHT_TRANSLATION_M * (0.5 if tight else 2.0)
     prior = Prior(T_target_source=np.eye(4), rotation_deg=1.0, translation_m=metres, trusted=False)
     method = Fixed(candidate())
     align(HERE, THERE, prior, method=method)

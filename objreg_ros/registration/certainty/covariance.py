@@ -17,25 +17,31 @@ from objreg_ros.geometry import rotation_angle, skew
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.params import RegistrarParams
 
+SCALE_GROWTH = 2.4  # of the logarithm of the scale for each 1 that V is lower
+REFERENCE_RMSE_M = 0.0065  # of the residuals at which the scale holds; it grows in proportion
+LEAST_SIGMA_M = 0.001  # of each axis
+LEAST_SIGMA_DEG = 0.025  # of each axis
+DEGENERATE_SIGMA_M = 0.5  # along a degenerate direction of translation
+DEGENERATE_SIGMA_DEG = 60.0  # about a degenerate axis
 NEAREST = 0.3  # m: nothing is seen nearer
 
 
 def covariance_of(candidate: Candidate, params: RegistrarParams) -> Array:
     """(6, 6) float64 [tx ty tz rx ry rz] of ``T_target_source`` in the target frame, positive definite."""
     alignment, disliked = candidate.alignment, 1.0 - candidate.verification.score
-    doubt = float(np.exp(params.covariance_disliked * disliked)) * alignment.rmse / params.covariance_rmse
-    C = spread_of(alignment, params, params.covariance_scale * doubt)
+    doubt = float(np.exp(SCALE_GROWTH * disliked)) * alignment.rmse / REFERENCE_RMSE_M
+    C = spread_of(alignment, params.covariance_scale * doubt)
     return C + _miscalibrated(alignment, params.covariance_calibration)
 
 
-def spread_of(alignment: Alignment, params: RegistrarParams, scale: float = 1.0) -> Array:
+def spread_of(alignment: Alignment, scale: float = 1.0) -> Array:
     """The same of a camera that is as its calibration says: how far the pose may lie from the best one.
 
     What is decided is decided by the registration as it is, of ``scale`` 1.
     """
-    C = scale * _inverse(alignment.information) + _floor(params)
+    C = scale * _inverse(alignment.information) + _floor()
     for direction in alignment.degenerate:
-        C = C + _opened(direction, params)
+        C = C + _opened(direction)
     C = C + alignment.regularised.T @ alignment.regularised
     return np.asarray((C + C.T) / 2.0)
 
@@ -61,9 +67,9 @@ def _miscalibrated(alignment: Alignment, share: float) -> Array:
     return np.asarray(camera_from_middle @ np.diag(motion**2) @ camera_from_middle.T)
 
 
-def _floor(params: RegistrarParams) -> Array:
-    rotation = np.radians(params.covariance_floor_rotation)
-    return np.diag(np.square([params.covariance_floor_translation] * 3 + [rotation] * 3))
+def _floor() -> Array:
+    rotation = np.radians(LEAST_SIGMA_DEG)
+    return np.diag(np.square([LEAST_SIGMA_M] * 3 + [rotation] * 3))
 
 
 def _inverse(information: Array) -> Array:
@@ -72,8 +78,8 @@ def _inverse(information: Array) -> Array:
     return np.asarray((vectors / np.maximum(values, 1.0)) @ vectors.T)
 
 
-def _opened(direction: Array, params: RegistrarParams) -> Array:
+def _opened(direction: Array) -> Array:
     """The variance along a free direction: as far as the free part of the motion may go."""
     turned = float(np.linalg.norm(direction[3:]))
-    sigma = params.slack_rotation * np.pi / 180.0 if turned > 0.5 else params.slack_translation
+    sigma = DEGENERATE_SIGMA_DEG * np.pi / 180.0 if turned > 0.5 else DEGENERATE_SIGMA_M
     return np.asarray(sigma**2 * np.outer(direction, direction))

@@ -8,7 +8,6 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.geometry import skew
 from objreg_ros.registration.certainty.sandwich import systematic_depth_error_of_step
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.registration.refine.batch_icp import Fit
 
@@ -23,11 +22,9 @@ def about_camera(H: Array, T_target_source: Array) -> Array:
     return np.asarray(A.T @ H @ A)
 
 
-def systematic_depth_error(
-    source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams
-) -> Array:
+def systematic_depth_error(source: Prepared, target: Prepared, T_target_source: Array) -> Array:
     """The covariance (6, 6) [t r] of the source camera's pose by a systematic depth error, in the target's axes."""
-    C = systematic_depth_error_of_step(source.xyz, source.normals, target.surface, T_target_source, params)
+    C = systematic_depth_error_of_step(source.xyz, source.normals, target.surface, T_target_source)
     A = np.eye(6)
     A[:3, 3:] = -skew(T_target_source[:3, 3])
     return np.asarray(A @ C @ A.T)

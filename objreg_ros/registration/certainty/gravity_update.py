@@ -14,8 +14,10 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import pose, rotation_from_vector, skew
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared
+
+GRAVITY_SIGMA_DEG = 0.5  # standard deviation of gravity that odometry carried over half its path or turn
+MOST_GRAVITY_ERROR_DEG = 3.5  # angle between the two gravities under an accepted pose
 
 
 class GravityUpdate(NamedTuple):
@@ -25,9 +27,7 @@ class GravityUpdate(NamedTuple):
     information: Array
 
 
-def gravity_update(
-    source: Prepared, target: Prepared, T_target_source: Array, C: Array, params: RegistrarParams
-) -> GravityUpdate | None:
+def gravity_update(source: Prepared, target: Prepared, T_target_source: Array, C: Array) -> GravityUpdate | None:
     """The pose moved to where gravity is kept, as far as its covariance ``C (6, 6)`` [t r] leaves that open.
 
     None where one gravity is unknown.
@@ -37,7 +37,7 @@ def gravity_update(
     carried = T_target_source[:3, :3] @ source.up
     turns = np.zeros((3, 6))
     turns[:, 3:] = -skew(carried)
-    variance = np.radians(params.gravity_noise) ** 2 * (1.0 / source.up_weight + 1.0 / target.up_weight)
+    variance = np.radians(GRAVITY_SIGMA_DEG) ** 2 * (1.0 / source.up_weight + 1.0 / target.up_weight)
     gain = C @ turns.T @ np.linalg.inv(turns @ C @ turns.T + variance * np.eye(3))
     step = gain @ (target.up - carried)
     moved = rotation_from_vector(step[3:]) @ T_target_source[:3, :3], T_target_source[:3, 3] + step[:3]

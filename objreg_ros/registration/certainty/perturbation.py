@@ -7,9 +7,8 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import pose, rotation_from_vector
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared
-from objreg_ros.registration.score.view_score import count_both_ways, score_counts, score_sharply
+from objreg_ros.registration.score.view_score import PHOTOMETRIC_POINTS, count_both_ways, score_counts, score_sharply
 
 
 class PerturbedScore:
@@ -19,9 +18,8 @@ class PerturbedScore:
     the images' own bands, or with one view laid into the other's image.
     """
 
-    def __init__(self, source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> None:
+    def __init__(self, source: Prepared, target: Prepared, T_target_source: Array) -> None:
         self._sights = source.sight, target.sight
-        self._params = params
         self._T_target_source = T_target_source
         (self._quick,), (ways,) = self._seen(T_target_source[None])
         self.score = self._sharp(T_target_source, ways, self._quick)
@@ -48,15 +46,15 @@ class PerturbedScore:
 
     def _seen(self, T_target_source: Array) -> tuple[Array, list[tuple[Array, Array]]]:
         """V (K,) of poses (K, 4, 4) with the grey of each image's own band, and what was counted at each."""
-        sample = self._params.grey_points
-        ways = count_both_ways(*self._sights, T_target_source, self._params, sample)
+        sample = PHOTOMETRIC_POINTS
+        ways = count_both_ways(*self._sights, T_target_source, sample)
         return score_counts(*self._sights, *ways, sample), list(zip(*ways, strict=True))
 
     def _sharp(self, T_target_source: Array, ways: tuple[Array, Array], quick: float) -> float:
         """V of a pose (4, 4) with the grey of both in one image; the ``quick`` one of views without grey."""
         if not all(sight.textured for sight in self._sights):
             return float(quick)
-        return score_sharply(*self._sights, T_target_source, ways, self._params, self._params.grey_points)
+        return score_sharply(*self._sights, T_target_source, ways, PHOTOMETRIC_POINTS)
 
 
 def perturbed(T_target_source: Array, motions: Array) -> Array:

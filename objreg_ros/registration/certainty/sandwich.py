@@ -17,59 +17,52 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.registration.kernels.closest_points import Surface
-from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.registration.refine.batch_icp import pair
+from objreg_ros.registration.refine.batch_icp import REACHES_M, pair
+from objreg_ros.sensor import DEPTH_NOISE_GROWTH, DEPTH_NOISE_M, DEPTH_WARP, NEAR_M
 
-NEAR = 0.4  # m, where the noise of depth is least
+PATCH_M = 0.8  # edge of a patch of surface whose points err together
 FREEDOMS = 6
 
 
-def information(xyz: Array, normals: Array, surface: Surface, T: Array, params: RegistrarParams) -> Array:
+def information(xyz: Array, normals: Array, surface: Surface, T: Array) -> Array:
     """The information (6, 6) of a left step [t r] of a pose (4, 4), of points (M, 3) on a surface.
 
     Next to zero along directions that no point resists.
     """
-    at, J, residual, weight = _weighed(xyz, normals, surface, T, params)
+    at, J, residual, weight = _weighed(xyz, normals, surface, T)
     least = np.eye(FREEDOMS)
     if len(residual) <= FREEDOMS:
         return least
     inverse = np.linalg.inv((J * weight) @ J.T + least)
     excess = float((weight * residual**2).sum() / len(residual))  # in units of the expected noise, squared
-    C = (
-        inverse @ _spread(J, weight * residual, _patches(at, J[:3], params.covariance_patch)) @ inverse
-        + max(1.0, excess) * inverse
-    )
+    C = inverse @ _spread(J, weight * residual, _patches(at, J[:3], PATCH_M)) @ inverse + max(1.0, excess) * inverse
     return np.linalg.inv((C + C.T) / 2.0)
 
 
-def systematic_depth_error_of_step(
-    xyz: Array, normals: Array, surface: Surface, T: Array, params: RegistrarParams
-) -> Array:
+def systematic_depth_error_of_step(xyz: Array, normals: Array, surface: Surface, T: Array) -> Array:
     """The covariance (6, 6) of a left step [t r] of a pose (4, 4) that wrong depths make, on top of `information`.
 
-    The depth of each patch is wrong by a share ``depth_warp`` of the distance, one standard deviation, as it is of a
+    The depth of each patch is wrong by a share `DEPTH_WARP` of the distance, one standard deviation, as it is of a
     camera whose depths bend with the place in the image.
     """
-    at, J, _, weight = _weighed(xyz, normals, surface, T, params)
+    at, J, _, weight = _weighed(xyz, normals, surface, T)
     inverse = np.linalg.inv((J * weight) @ J.T + np.eye(FREEDOMS))
-    error = params.depth_warp * np.linalg.norm(at, axis=0)
-    g = _pulls(J, weight * error, _patches(at, J[:3], params.covariance_patch))
+    error = DEPTH_WARP * np.linalg.norm(at, axis=0)
+    g = _pulls(J, weight * error, _patches(at, J[:3], PATCH_M))
     return np.asarray(inverse @ g @ g.T @ inverse)
 
 
-def _weighed(
-    xyz: Array, normals: Array, surface: Surface, T: Array, params: RegistrarParams
-) -> tuple[Array, Array, Array, Array]:
+def _weighed(xyz: Array, normals: Array, surface: Surface, T: Array) -> tuple[Array, Array, Array, Array]:
     """Per pair: where it is (3, n), the Jacobian (6, n) of a left step, the residual m, the weight over the noise."""
-    index, at, J, residual, weight = pair(xyz, normals, *surface.grid, T, params.reaches[-1])
-    variance = _variance(xyz[index, 2], params) + _variance(at[2], params)
+    index, at, J, residual, weight = pair(xyz, normals, *surface.grid, T, REACHES_M[-1])
+    variance = _variance(xyz[index, 2]) + _variance(at[2])
     return at, J, residual, weight / variance
 
 
-def _variance(depth: Array, params: RegistrarParams) -> Array:
+def _variance(depth: Array) -> Array:
     """Of a structured-light camera's depths, m^2."""
-    beyond = np.maximum(0.0, np.asarray(depth, float) - NEAR)
-    return np.asarray((params.depth_noise + params.depth_noise_growth * beyond**2) ** 2)
+    beyond = np.maximum(0.0, np.asarray(depth, float) - NEAR_M)
+    return np.asarray((DEPTH_NOISE_M + DEPTH_NOISE_GROWTH * beyond**2) ** 2)
 
 
 def _patches(at: Array, normals: Array, edge: float) -> Array:

@@ -6,15 +6,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from objreg_ros.data import Reason
+from objreg_ros.registration.gate.objects import SEVERAL
 from objreg_ros.registration.gate.refusal import Refusal
 
 
 class Limits(NamedTuple):
     """How many matched objects confirm each other, and margins of the total score."""
 
-    objects: int  # matched objects that need no more evidence than the views
-    several_margin: float  # least of so many objects, over the best competing hypothesis
-    lone_margin: float  # least of fewer objects
+    objects: int = SEVERAL  # matched objects that need no more evidence than the views
+    several_margin: float = 0.1  # least of so many objects, over the best competing hypothesis
+    lone_margin: float = 0.2  # least of fewer objects
 
 
 def check_several(matched: int, score_margin: float, limits: Limits) -> Refusal | None:

@@ -16,9 +16,9 @@ from objreg_ros.registration.gate.refusal import Refusal
 class Limits(NamedTuple):
     """The largest shares of the tested pixels."""
 
-    violations: float  # of any pose
-    certain_doubtful: float  # certain violations, of a doubtful pose
-    certain_few: float  # certain violations, of a pose with few matched objects
+    violations: float = 0.07  # of any pose
+    certain_doubtful: float = 0.012  # certain violations, of a doubtful pose
+    certain_few: float = 0.015  # certain violations, of a pose with few matched objects
 
 
 def check(violations: float, certain: float, doubtful: bool, limits: Limits) -> Refusal | None:

@@ -10,26 +10,28 @@ from typing import NamedTuple
 
 from objreg_ros.data import Reason
 from objreg_ros.registration.candidate import Candidate
+from objreg_ros.registration.gate.objects import PROPOSERS, SEVERAL
 from objreg_ros.registration.gate.refusal import Refusal
+from objreg_ros.registration.propose.evidence import OBJECT_BONUS
 
 
 class Limits(NamedTuple):
     """What is asked of a lone object's pose."""
 
-    tested: int  # least number of pixels that both views see
-    firmness: float  # least view score with its margin under perturbation
-    yaw_bonus: float  # how much less firmness an object needs that tells its yaw
-    objects: int  # matched objects that are not lone, as the refusal says
-    proposers: int  # independent proposers that make up for a second object, as the refusal says
+    tested: int = 2000  # least number of pixels that both views see
+    firmness: float = 1.0  # least view score with its margin under perturbation
+    yaw_bonus: float = OBJECT_BONUS  # how much less firmness an object needs that tells its yaw
+    objects: int = SEVERAL  # matched objects that are not lone, as the refusal says
+    proposers: int = PROPOSERS  # independent proposers that make up for a second object, as the refusal says
 
 
 class AppearanceLimits(NamedTuple):
     """What confirms a lone object's pose: the least of each."""
 
-    silhouette_score: float  # without grey
-    silhouette_score_with_grey: float
-    correlation: float  # of grey that tells the yaw, or confirms the pose by itself
-    score_margin: float  # total score over any other pose, where grey confirms the pose by itself
+    silhouette_score: float = 0.1  # without grey
+    silhouette_score_with_grey: float = -0.2
+    correlation: float = 0.5  # of grey that tells the yaw, or confirms the pose by itself
+    score_margin: float = 0.45  # total score over any other pose, where grey confirms the pose by itself
 
 
 class Appearance(NamedTuple):

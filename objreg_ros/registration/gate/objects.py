@@ -9,8 +9,10 @@ from typing import NamedTuple
 from objreg_ros.data import Reason
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.gate.refusal import Refusal
+from objreg_ros.registration.propose.evidence import MANY_MATCHES
 
 SEVERAL = 2  # matched objects; fewer tell where one thing is, and not which way the camera looked at it
+PROPOSERS = 2  # independent, that make up for a second object
 SAME_EVIDENCE = {"centroids": "objects", "odometry": "objects"}
 """Proposers that are no evidence beside another one. The search for object poses starts from the centroids too. What
 drifting odometry expects is refined to whatever the objects fit nearby, right or wrong."""
@@ -19,9 +21,9 @@ drifting odometry expects is refined to whatever the objects fit nearby, right o
 class Limits(NamedTuple):
     """What makes the objects' word sure."""
 
-    many: int  # matched objects that did not all move together
-    proposers: int  # independent proposers that make up for a second object
-    silhouette_score: float  # least of several matched objects, even a little aside
+    many: int = MANY_MATCHES  # matched objects that did not all move together
+    proposers: int = PROPOSERS  # independent proposers that make up for a second object
+    silhouette_score: float = 0.0  # least of several matched objects, even a little aside
 
 
 class Objects(NamedTuple):

@@ -13,20 +13,22 @@ from typing import NamedTuple
 import numpy as np
 
 from objreg_ros.data import Array, Reason
+from objreg_ros.registration.certainty.observability import CLEAR_MARGIN, PERTURBATIONS_M
 from objreg_ros.registration.gate.refusal import Refusal
 
+FIRM_MARGIN = 0.4  # fall of V over a perturbation from which on the views alone hold a pose
 DIRECTIONS = 6  # of a pose
 
 
 class Limits(NamedTuple):
     """What a pose must be held by; margins are of the view score under perturbation."""
 
-    sigma_m: float  # deviation of the position, beyond which the margin must grow
-    range_m: float  # mean distance of what is seen, beyond which the margin must grow
-    least_margin: float
-    firm_margin: float  # from which on the views hold a pose however badly surfaces know it
-    uncertain_factor: float  # how many times the margin, where the objects are uncertain
-    perturbation_m: float  # the largest perturbation, as the refusal says
+    sigma_m: float = 0.03  # deviation of the position, beyond which the margin must grow
+    range_m: float = 2.5  # mean distance of what is seen, beyond which the margin must grow
+    least_margin: float = CLEAR_MARGIN
+    firm_margin: float = FIRM_MARGIN  # from which on the views hold a pose however badly surfaces know it
+    uncertain_factor: float = 1.5  # how many times the margin, where the objects are uncertain
+    perturbation_m: float = PERTURBATIONS_M[-1]  # the largest perturbation, as the refusal says
 
 
 def check_directions(unobservable: int) -> Refusal | None:

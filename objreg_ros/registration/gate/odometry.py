@@ -10,6 +10,8 @@ from objreg_ros.geometry import pose_error
 from objreg_ros.registration.gate.refusal import Refusal
 from objreg_ros.registration.propose.prior import Prior
 
+FAR_M = 5.0  # between two cameras of one place, at most
+SIGMAS = 4.0  # largest distance from odometry in its standard deviations
 CM = 100.0  # in a metre
 
 

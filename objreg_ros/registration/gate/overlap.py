@@ -12,8 +12,8 @@ from objreg_ros.registration.gate.refusal import Refusal
 class Limits(NamedTuple):
     """The least that both views must share."""
 
-    tested: int  # pixels of both views that land in the other one
-    inliers: float  # share of the tested pixels whose depth agrees
+    tested: int = 600  # pixels of both views that land in the other one
+    inliers: float = 0.35  # share of the tested pixels whose depth agrees
 
 
 def check(tested: int, inliers: float, limits: Limits) -> Refusal | None:

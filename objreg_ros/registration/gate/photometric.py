@@ -6,6 +6,7 @@ from __future__ import annotations
 from objreg_ros.data import Reason
 from objreg_ros.registration.gate.refusal import Refusal
 
+CORRELATED = 0.3  # least correlation of a print that lies upon itself
 PLAIN = 0.0  # correlation of a plain table, which has no print; another print in its place correlates less
 
 

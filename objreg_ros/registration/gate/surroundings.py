@@ -20,11 +20,11 @@ from objreg_ros.registration.gate.refusal import Refusal
 class Limits(NamedTuple):
     """What is asked of the surroundings; the first three are those of whole views."""
 
-    overlap: overlap.Limits
-    violations: float  # largest share of the tested pixels in seen free space
-    correlation: float  # least correlation of grey
-    correlation_loss: float  # largest, from the whole views to the surroundings
-    share: float  # least, of the tested pixels of the whole views, around a lone object
+    overlap: overlap.Limits = overlap.Limits()
+    violations: float = free_space.Limits().violations  # largest share of the tested pixels in seen free space
+    correlation: float = photometric.CORRELATED  # least correlation of grey
+    correlation_loss: float = 0.25  # largest, from the whole views to the surroundings
+    share: float = 0.15  # least, of the tested pixels of the whole views, around a lone object
 
 
 def check(

@@ -27,40 +27,39 @@ from objreg_ros.registration.gate import (
     surroundings,
     view_score,
 )
-from objreg_ros.registration.gate.limits import Limits, limits_of
+from objreg_ros.registration.gate.limits import LIMITS, Limits
 from objreg_ros.registration.gate.refusal import Refusal
-from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.registration.propose.evidence import margin_over
+from objreg_ros.registration.propose.evidence import CONSIDERED_MARGIN, margin_over
 from objreg_ros.registration.propose.prior import Prior
+from objreg_ros.registration.refine.batch_icp import LEAST_PAIRS
 
 __all__ = ["Refusal", "is_possible", "judge", "refuse"]
 
 
-def judge(candidates: Sequence[Candidate], params: RegistrarParams, prior: Prior | None = None) -> Candidate | Refusal:
+def judge(candidates: Sequence[Candidate], prior: Prior | None = None, limits: Limits = LIMITS) -> Candidate | Refusal:
     """The first candidate that no check refuses, or the refusal of the best one.
 
     ``candidates`` come best first. One whose view score is clearly below the best never stands in for it: when the
     truth is refused, for instance because it could slide, the next best is an alias.
     """
     if not candidates:
-        return Reason.NO_HYPOTHESIS, f"no chain proposed a pose, or fewer than {params.min_points} points were seen"
-    least = candidates[0].verification.score - params.rival_margin
-    possible = [one for one in candidates if is_possible(one, params)]
+        return Reason.NO_HYPOTHESIS, f"no chain proposed a pose, or fewer than {LEAST_PAIRS} points were seen"
+    least = candidates[0].verification.score - CONSIDERED_MARGIN
+    possible = [one for one in candidates if is_possible(one, limits)]
     refusals = []
     for candidate in candidates:
         if candidate.verification.score < least:
             break
-        refusal = refuse(candidate, params, prior, possible)
+        refusal = refuse(candidate, prior, possible, limits)
         if refusal is None:
             return candidate
         refusals.append(refusal)
     return refusals[0]
 
 
-def is_possible(candidate: Candidate, params: RegistrarParams) -> bool:
+def is_possible(candidate: Candidate, limits: Limits = LIMITS) -> bool:
     """Whether a pose may be true for all that is seen: it matches an object, and keeps gravity and free space."""
-    one, limits = candidate, limits_of(params)
-    found = objects.objects_of(one, limits.objects)
+    one, found = candidate, objects.objects_of(candidate, limits.objects)
     return found.matched > 0 and not (
         gravity.check(one.gravity_error_deg, limits.gravity_deg)
         or free_space.check(one.verification.violations, one.certain_violations, found.doubtful, limits.free_space)
@@ -68,11 +67,13 @@ def is_possible(candidate: Candidate, params: RegistrarParams) -> bool:
 
 
 def refuse(
-    candidate: Candidate, params: RegistrarParams, prior: Prior | None = None, possible: Sequence[Candidate] = ()
+    candidate: Candidate,
+    prior: Prior | None = None,
+    possible: Sequence[Candidate] = (),
+    limits: Limits = LIMITS,
 ) -> Refusal | None:
     """The first check that refuses a candidate, with its numbers; None if none does. ``possible`` poses compete."""
-    one, limits = candidate, limits_of(params)
-    fit, seen, T = one.alignment, one.verification, one.T_target_source
+    one, fit, seen, T = candidate, candidate.alignment, candidate.verification, candidate.T_target_source
     found, labels = objects.objects_of(one, limits.objects), [pair.label for pair in one.matched]
     return (
         convergence.check(fit.converged, fit.inliers)
@@ -87,12 +88,10 @@ def refuse(
         or lone_object.check_overlap(seen.tested, found.lone, limits.lone_object)
         or surroundings.check(one.surroundings, seen, labels, found, limits.surroundings)
         or objects.check_matched(found.matched)
-        or _check_competing(one, margin_over(one, possible, params), limits)
+        or _check_competing(one, margin_over(one, possible), limits)
         or lone_object.check_firm(seen.score, one.perturbation_margin, one.yaw_known, found.lone, limits.lone_object)
         or observability.check_directions(len(fit.degenerate))
-        or _check_position(
-            one, spread_of(fit, params) + one.systematic_depth_error, found.uncertain, limits.observability
-        )
+        or _check_position(one, spread_of(fit) + one.systematic_depth_error, found.uncertain, limits.observability)
         or odometry.check(T, prior, limits.odometry_sigmas)
     )
 

@@ -7,17 +7,20 @@ from typing import NamedTuple
 
 from objreg_ros.data import Reason
 from objreg_ros.registration.candidate import Verification
+from objreg_ros.registration.gate.observability import FIRM_MARGIN
 from objreg_ros.registration.gate.refusal import Refusal
+from objreg_ros.registration.score.comparison import SILHOUETTE_WEIGHT
+from objreg_ros.registration.score.view_score import LEAST_SCORE
 
 
 class Limits(NamedTuple):
     """View scores, unless another unit is given."""
 
-    least: float  # of any pose
-    least_doubtful: float  # with the silhouettes, of a doubtful pose
-    violations: float  # share of the tested pixels in seen free space; more make a pose doubtful
-    firm_margin: float  # margin under perturbation of a pose that is not doubtful
-    silhouette_weight: float  # what a silhouette score of 1 adds
+    least: float = LEAST_SCORE  # of any pose
+    least_doubtful: float = 0.40  # with the silhouettes, of a doubtful pose
+    violations: float = 0.02  # share of the tested pixels in seen free space; more make a pose doubtful
+    firm_margin: float = FIRM_MARGIN  # margin under perturbation of a pose that is not doubtful
+    silhouette_weight: float = SILHOUETTE_WEIGHT  # what a silhouette score of 1 adds
 
 
 def check(

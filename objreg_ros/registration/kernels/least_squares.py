@@ -71,3 +71,13 @@ def move(T, step):  # type: ignore[no-untyped-def]
     for k in range(6):
         largest = max(largest, abs(step[k]))
     return largest
+
+
+@numba.njit(cache=True, nogil=True)
+def invert(T, back):  # type: ignore[no-untyped-def]
+    """Fill ``back`` (4, 4) with the inverse of a pose."""
+    for i in range(3):
+        back[i, 3] = 0.0
+        for j in range(3):
+            back[i, j] = T[j, i]
+            back[i, 3] -= T[j, i] * T[j, 3]

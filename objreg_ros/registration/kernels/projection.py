@@ -56,6 +56,26 @@ def nearest(u, v):  # type: ignore[no-untyped-def]
     return INDEX(v + 0.5), INDEX(u + 0.5)
 
 
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
+def visible(us, vs, zs, near, far, tolerance, growth):  # type: ignore[no-untyped-def]
+    """Which of the projected points (N,) an image sees: (n,) indices.
+
+    It measured between ``near`` and ``far (h, w)`` there, 0 where it measured nothing, and a depth z agrees within
+    ``tolerance + growth z^2``.
+    """
+    found, n = np.empty(len(us), INDEX), 0
+    for i in range(len(us)):
+        u, v, z = us[i], vs[i], zs[i]
+        if not lands(u, v, z, near):
+            continue
+        row, column = nearest(u, v)
+        low, high = near[row, column], far[row, column]
+        slop = tolerance + growth * z * z
+        found[n] = i
+        n += (high > 0.0) & (z >= low - slop) & (z <= high + slop)
+    return found[:n]
+
+
 @numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
 def between(image, u, v):  # type: ignore[no-untyped-def]
     """The bilinear value of an ``image (h, w)`` at a place between four pixels, and its slopes along u and v."""

@@ -17,10 +17,21 @@ from objreg_ros.registration.labels import LabelGroups
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.fpfh import Features, describe, salient
 from objreg_ros.registration.prepare.normals import view_normals
-from objreg_ros.registration.prepare.views import Sight, halved, own_pixels, prepare_sight
+from objreg_ros.registration.prepare.views import DETAIL_SIGMA_PX, Sight, halved, own_pixels, prepare_sight
 from objreg_ros.registration.prepare.voxels import thin
 from objreg_ros.registration.shapes.shape import Shape, prepare_shape
 from objreg_ros.registration.shapes.symmetry import tells_yaw
+
+FEATURE_VOXEL_M = 0.07  # distance of the points that carry an FPFH feature
+FEATURE_RADIUS_M = 0.35  # radius of an FPFH feature: five voxels, as its authors use
+FEATURE_POINTS = 800  # most points that are matched by their features: the most salient
+SHAPE_POINTS = 400  # most points of an object's shape
+SCENE_POINTS = 800  # most points of all objects as one shape
+SURFACE_VOXEL_M = 0.03  # distance of the points of a surface that others are aligned to
+OBJECT_VOXEL_M = 0.012  # distance of the points of objects, which are aligned too
+OBJECT_POINTS = 400  # most of all objects that are aligned: as many as of the surface about them
+GRID_CELL_M = 0.05  # of the grid that knows the closest point
+GRID_REACH_M = 0.2  # how far from a surface its grid reaches: as far as ICP looks at first
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -66,38 +77,36 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
 
     Surface and features are made beside the rest: they take as long as all of it, and let go of the interpreter.
     """
-    fine = thin(*seen(keyframe, params), params.surface_voxel)
-    coarse = thin(*fine, params.feature_voxel)
-    things = thin(*of_objects(keyframe), params.thing_voxel)
+    fine = thin(*seen(keyframe, params), SURFACE_VOXEL_M)
+    coarse = thin(*fine, FEATURE_VOXEL_M)
+    things = thin(*of_objects(keyframe), OBJECT_VOXEL_M)
     groups = LabelGroups(params.label_groups)
     up = None if keyframe.gravity is None else -np.asarray(keyframe.gravity, float)
-    seeing = params.context_range, params.detail_sigma, params.seed
+    seeing = params.context_range, DETAIL_SIGMA_PX, params.seed
     with ThreadPoolExecutor(1, "prepare") as beside:
-        surface = beside.submit(prepare_surface, *joined(fine, things), params.grid_cell, params.grid_reach)
-        features = beside.submit(describe, *coarse, params.feature_radius)
-        shapes = tuple(
-            prepare_shape(keyframe, [i], params.shape_points, params.seed) for i in range(len(keyframe.objects))
-        )
+        surface = beside.submit(prepare_surface, *joined(fine, things), GRID_CELL_M, GRID_REACH_M)
+        features = beside.submit(describe, *coarse, FEATURE_RADIUS_M)
+        shapes = tuple(prepare_shape(keyframe, [i], SHAPE_POINTS, params.seed) for i in range(len(keyframe.objects)))
         sight = prepare_sight(keyframe.view, *seeing)
         return Prepared(
             keyframe=keyframe,
             sight=sight,
             coarse=prepare_sight(halved(keyframe.view), *seeing),
-            **_shuffled(*joined(coarse, sampled(things, params.thing_points, params.seed)), params.seed),
+            **_shuffled(*joined(coarse, sampled(things, OBJECT_POINTS, params.seed)), params.seed),
             up=up,
             up_weight=keyframe.gravity_confidence,
             groups=tuple(groups.of(label) for label in keyframe.labels),
             yaw_known=tuple(
-                tells_yaw(item.cloud, up, shape, params) for item, shape in zip(keyframe.objects, shapes, strict=True)
+                tells_yaw(item.cloud, up, shape) for item, shape in zip(keyframe.objects, shapes, strict=True)
             ),
             shapes=shapes,
             own=tuple(own_pixels(item, sight) for item in keyframe.objects),
-            scene=prepare_shape(keyframe, range(len(keyframe.objects)), params.scene_points, params.seed),
+            scene=prepare_shape(keyframe, range(len(keyframe.objects)), SCENE_POINTS, params.seed),
             centroids=np.array([item.centroid for item in keyframe.objects]).reshape(-1, 3),
             extents=np.array([item.extent for item in keyframe.objects]),
             middle=np.asarray(coarse[0].mean(axis=0) if len(coarse[0]) else np.zeros(3), float),
             surface=surface.result(),
-            features=salient(features.result(), params.feature_points),
+            features=salient(features.result(), FEATURE_POINTS),
         )
 
 

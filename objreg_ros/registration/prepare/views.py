@@ -17,6 +17,7 @@ from objreg_ros.data import Array, Intrinsics, View
 from objreg_ros.registration.kernels.projection import project
 from objreg_ros.registration.keyframe import KeyObject
 
+DETAIL_SIGMA_PX = 3.0  # blur that the high pass of grey takes away
 EDGE = 0.06  # of the depth: a larger range around a pixel is a depth jump
 SHADELESS = 1e6  # the shade of a point at a depth jump: not to be compared
 FINEST = 0.5  # px: a blur that takes pixel noise away

@@ -8,59 +8,59 @@ from collections.abc import Iterable
 import numpy as np
 
 from objreg_ros.data import Alignment, Array
-from objreg_ros.registration.candidate import Candidate, Verification
+from objreg_ros.registration.candidate import Candidate, Score, Verification
 from objreg_ros.registration.certainty.covariance import spread_of, worst_translation
 from objreg_ros.registration.certainty.degeneracy import systematic_depth_error
-from objreg_ros.registration.certainty.observability import margin_under_perturbation
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.certainty.observability import DOUBTFUL_SIGMA_M, margin_under_perturbation
 from objreg_ros.registration.prepare.prepared import Prepared
+from objreg_ros.registration.score.comparison import SILHOUETTE_WEIGHT
 from objreg_ros.registration.score.object_matches import Pairs, match_objects, score_matched_silhouettes
 from objreg_ros.registration.score.surroundings import verify_surroundings
 from objreg_ros.registration.score.view_score import WORST, certain_violations, verify
 
+OBJECT_BONUS = 0.25  # what a matched object adds to V when candidates are ranked
+FINISHED_MARGIN = 0.5  # score below the best at which a hypothesis is not finished
+CONSIDERED_MARGIN = 0.1  # V below the best at which a candidate is not considered: the next best is an alias
+NEARBY_M = 0.06  # how far along each axis an object may stand where it looks most alike, to tell what it is
+MANY_MATCHES = 3  # matched objects that did not all move together, and make up for a plain print
 
-def gather(
-    source: Prepared, target: Prepared, alignment: Alignment, proposers: Iterable[str], params: RegistrarParams
-) -> Candidate:
+
+def gather(source: Prepared, target: Prepared, alignment: Alignment, proposers: Iterable[str]) -> Candidate:
     """The candidate of an alignment that ``proposers`` came to, the first of which proposed it; not yet perturbed."""
     T, (proposer, *others) = alignment.T_target_source, proposers
-    matched, moved = match_objects(source, target, T, params)
+    matched, moved = match_objects(source, target, T)
     return Candidate(
         alignment=alignment,
         proposer=proposer,
         agreeing_proposers=tuple(sorted({proposer, *others})),
-        verification=verify(source.sight, target.sight, T, params),
+        verification=verify(source.sight, target.sight, T),
         matched=matched,
         moved=moved,
-        silhouette_score=score_matched_silhouettes(source, target, matched, T, params),
-        silhouette_score_nearby=score_matched_silhouettes(source, target, matched, T, params, params.likeness_reach),
+        silhouette_score=score_matched_silhouettes(source, target, matched, T),
+        silhouette_score_nearby=score_matched_silhouettes(source, target, matched, T, NEARBY_M),
         yaw_known=any(source.yaw_known[pair.source] and target.yaw_known[pair.target] for pair in matched),
         gravity_error_deg=gravity_error_deg(source, target, T),
-        certain_violations=certain_violations(source.sight, target.sight, T, params),
-        systematic_depth_error=systematic_depth_error(source, target, T, params),
+        certain_violations=certain_violations(source.sight, target.sight, T),
+        systematic_depth_error=systematic_depth_error(source, target, T),
     )
 
 
-def perturbation_margin_of(
-    candidate: Candidate, source: Prepared, target: Prepared, params: RegistrarParams
-) -> float | None:
+def perturbation_margin_of(candidate: Candidate, source: Prepared, target: Prepared) -> float | None:
     """The score margin of a pose under perturbation to where it would be false; None where it is known well."""
-    C = spread_of(candidate.alignment, params) + candidate.systematic_depth_error
-    if worst_translation(C) <= params.doubtful_sigma:
+    C = spread_of(candidate.alignment) + candidate.systematic_depth_error
+    if worst_translation(C) <= DOUBTFUL_SIGMA_M:
         return None
-    return margin_under_perturbation(source, target, candidate.T_target_source, C, params)
+    return margin_under_perturbation(source, target, candidate.T_target_source, C)
 
 
-def surroundings_of(
-    candidate: Candidate, source: Prepared, target: Prepared, params: RegistrarParams
-) -> Verification | None:
+def surroundings_of(candidate: Candidate, source: Prepared, target: Prepared) -> Verification | None:
     """What the views say of a pose without the objects that it matches, where those are few: `verify_surroundings`."""
     pairs, T = candidate.matched, candidate.T_target_source
-    if not 0 < len(pairs) < params.min_objects_plain:
+    if not 0 < len(pairs) < MANY_MATCHES:
         return None
     own_source = np.any([source.own[pair.source] for pair in pairs], axis=0)
     own_target = np.any([target.own[pair.target] for pair in pairs], axis=0)
-    return verify_surroundings(source.sight, target.sight, (own_source, own_target), T, params)
+    return verify_surroundings(source.sight, target.sight, (own_source, own_target), T)
 
 
 def gravity_error_deg(source: Prepared, target: Prepared, T_target_source: Array) -> float | None:
@@ -70,19 +70,19 @@ def gravity_error_deg(source: Prepared, target: Prepared, T_target_source: Array
     return float(np.degrees(np.arccos(np.clip(T_target_source[:3, :3] @ source.up @ target.up, -1.0, 1.0))))
 
 
-def rank_score(candidate: Candidate, params: RegistrarParams) -> float:
+def rank_score(candidate: Candidate) -> Score:
     """What candidates are ranked by: the views' verdict, and the objects' where rooms repeat themselves."""
-    more = score_objects(candidate.matched, candidate.moved, candidate.silhouette_score, params)
-    return candidate.verification.score + more
+    objects = score_objects(candidate.matched, candidate.moved, candidate.silhouette_score)
+    return Score(candidate.verification.score, *objects)
 
 
-def score_objects(matched: Pairs, moved: Pairs, silhouette_score: float | None, params: RegistrarParams) -> float:
-    """What the objects add to V."""
-    stand = params.object_bonus * (min(2, len(matched)) - min(2, len(moved)))
-    return stand + params.likeness_weight * (silhouette_score or 0.0)
+def score_objects(matched: Pairs, moved: Pairs, silhouette_score: float | None) -> tuple[float, float]:
+    """What the objects add to V: by where they stand, and by their silhouettes."""
+    stand = OBJECT_BONUS * (min(2, len(matched)) - min(2, len(moved)))
+    return stand, SILHOUETTE_WEIGHT * (silhouette_score or 0.0)
 
 
-def margin_over(candidate: Candidate, competitors: Iterable[Candidate], params: RegistrarParams) -> float:
+def margin_over(candidate: Candidate, competitors: Iterable[Candidate]) -> float:
     """The margin of a candidate's score over the best competing one; over the lowest score where there is none.
 
     What is hidden says nothing of which of two poses is the right one. V counts it against a pose all the same, as
@@ -90,16 +90,15 @@ def margin_over(candidate: Candidate, competitors: Iterable[Candidate], params: 
     anything that an object looks alike: the back of a box may have the print of its front, and the views share no side
     of it under the true pose. That it looks otherwise does.
     """
-    others = (_comparable_score(competitor, params) for competitor in competitors if competitor is not candidate)
-    return _comparable_score(candidate, params) - max(others, default=WORST)
+    others = (_comparable_score(competitor).total for competitor in competitors if competitor is not candidate)
+    return _comparable_score(candidate).total - max(others, default=WORST)
 
 
-def _comparable_score(candidate: Candidate, params: RegistrarParams) -> float:
+def _comparable_score(candidate: Candidate) -> Score:
     """The score of a pose by what tells it from others."""
     inconsistent = min(0.0, candidate.silhouette_score or 0.0)
-    return unoccluded_score(candidate.verification) + score_objects(
-        candidate.matched, candidate.moved, inconsistent, params
-    )
+    objects = score_objects(candidate.matched, candidate.moved, inconsistent)
+    return Score(unoccluded_score(candidate.verification), *objects)
 
 
 def unoccluded_score(seen: Verification) -> float:

@@ -16,13 +16,16 @@ import numpy as np
 from scipy.optimize import minimize
 
 from objreg_ros.data import Array
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.registration.score.free_space import OCCLUDED, SEEN, VIOLATIONS
-from objreg_ros.registration.score.view_score import WORST, count_both_ways, score_counts, score_sharply
+from objreg_ros.registration.score.total_score import SILHOUETTE_WEIGHT_UPRIGHT, VIOLATION_WEIGHT_UPRIGHT
+from objreg_ros.registration.score.view_score import RANKING_POINTS, WORST, count_both_ways, score_counts, score_sharply
 from objreg_ros.registration.shapes.shape import Shape, turned_half, upright_pose
 from objreg_ros.registration.shapes.silhouette_score import score_silhouettes
+from objreg_ros.registration.shapes.upright_search import SCORE_MARGIN
 
+SEARCHED = 2  # best poses of an object that are searched finely
+SIMPLEX_EVALUATIONS = 32  # most of one climb
 ALONG = (-0.4, -0.25, -0.12, 0.12, 0.25, 0.4)  # widths along a line of sight at which a thing may stand as well
 THICK = (0.0, 0.2, 0.4)  # usual thicknesses of a thing, in its widths: how far its back may lie behind its front
 HOPELESS = -2.0  # score of what no climb brings up
@@ -36,33 +39,33 @@ class FineSearch:
     Both views must have grey.
     """
 
-    def __init__(self, source: Prepared, target: Prepared, a: Shape, b: Shape, params: RegistrarParams) -> None:
-        self._views, self._shapes, self._params = (source, target), (a, b), params
+    def __init__(self, source: Prepared, target: Prepared, a: Shape, b: Shape) -> None:
+        self._views, self._shapes = (source, target), (a, b)
         self._extent = 0.5 * (a.extent + b.extent)
 
     def of(self, motion: Array) -> float:
         """V as if all that is hidden had been seen to agree, and what the objects say; as `rank_score` weighs them."""
-        params, T, (source, target) = self._params, upright_pose(*self._shapes, motion), self._views
-        seen = count_both_ways(source.sight, target.sight, T[None], params, params.quick_sample)
+        T, (source, target) = upright_pose(*self._shapes, motion), self._views
+        seen = count_both_ways(source.sight, target.sight, T[None], RANKING_POINTS)
         (V,), ways = (
-            score_views_sharply(source, target, T[None], seen, params, params.quick_sample),
+            score_views_sharply(source, target, T[None], seen, RANKING_POINTS),
             [way[0] for way in seen],
         )
         if V == WORST:
             return WORST
         hidden, violations = (max(way[what] / way[SEEN] for way in ways) for what in (OCCLUDED, VIOLATIONS))
-        silhouette_score = min(1.0, max(-1.0, score_silhouettes(*self._shapes, motion, params)))
-        return float(V + hidden + params.upright_likeness * silhouette_score - params.upright_violations * violations)
+        silhouette_score = min(1.0, max(-1.0, score_silhouettes(*self._shapes, motion)))
+        return float(V + hidden + SILHOUETTE_WEIGHT_UPRIGHT * silhouette_score - VIOLATION_WEIGHT_UPRIGHT * violations)
 
     def improved(self, motions: Array) -> tuple[Array, Array]:
         """The first of the motions (N, 4), or what they may be taken for, climbed: the best (K, 4) and their scores.
 
         None of what is hopeless already.
         """
-        tried = np.array([other for motion in motions[: self._params.scrutinised] for other in self._taken_for(motion)])
+        tried = np.array([other for motion in motions[:SEARCHED] for other in self._taken_for(motion)])
         scores = np.array([self.of(motion) for motion in tried])
-        least = max(HOPELESS, scores.max() - self._params.shape_margin)
-        best = [k for k in np.argsort(-scores, kind="stable")[: self._params.scrutinised] if scores[k] > least]
+        least = max(HOPELESS, scores.max() - SCORE_MARGIN)
+        best = [k for k in np.argsort(-scores, kind="stable")[:SEARCHED] if scores[k] > least]
         climbed = [self._climbed(tried[k]) for k in best]
         return np.array([motion for motion, _ in climbed]).reshape(-1, 4), np.array([scores for _, scores in climbed])
 
@@ -77,7 +80,7 @@ class FineSearch:
 
         By the simplex of Nelder and Mead, "A simplex method for function minimization", 1965.
         """
-        most = {"initial_simplex": FIRST, "maxfev": self._params.scrutiny_steps, **LAST}
+        most = {"initial_simplex": FIRST, "maxfev": SIMPLEX_EVALUATIONS, **LAST}
         moved = partial(_moved, motion)
         found = minimize(lambda step: -self.of(moved(*step)), FIRST[0], method="Nelder-Mead", options=most)
         return moved(*found.x), -float(found.fun)
@@ -92,7 +95,6 @@ def score_views_sharply(
     target: Prepared,
     T_target_source: Array,
     ways: tuple[Array, Array],
-    params: RegistrarParams,
     sample: int,
 ) -> Array:
     """V (K,) of poses (K, 4, 4) with the grey of both in one image, at half size; without grey, as `score_counts` has
@@ -104,4 +106,4 @@ def score_views_sharply(
     if not (a.textured and b.textured):
         return score_counts(a, b, *ways, sample)
     pictures, each = (source.coarse, target.coarse), zip(T_target_source, *ways, strict=True)
-    return np.array([score_sharply(*pictures, T, (there, back), params, sample) for T, there, back in each])
+    return np.array([score_sharply(*pictures, T, (there, back), sample) for T, there, back in each])

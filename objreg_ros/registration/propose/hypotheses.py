@@ -13,25 +13,37 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import pose, rotation_between, rotation_from_vector
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.candidate import Score
 from objreg_ros.registration.prepare.fpfh import match
-from objreg_ros.registration.prepare.prepared import Prepared
+from objreg_ros.registration.prepare.prepared import FEATURE_VOXEL_M, Prepared
 from objreg_ros.registration.propose.pose_voting import Matches, poses
 from objreg_ros.registration.score.view_score import score_views
+from objreg_ros.registration.shapes.upright_search import COARSE_POINTS
+
+FEATURE_MATCHES = 900  # most putative matches of features
+CENTROID_TOLERANCE_M = 0.12  # how far the centroid of one object may differ between views, which see other sides of it
+HYPOTHESES_PER_PROPOSER = 120  # most; more find no more
+YAW_STEPS = 36  # of one object upon another without shapes: each 10 deg
+HYPOTHESES_PER_OBJECT = 60  # most of single objects, whose poses are many
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Hypothesis:
-    """A pose to be refined: who proposed it, and its score."""
+    """A pose to be refined, and who proposed it.
+
+    ``support`` is what the proposer ranks it by, in a unit of the proposer's own: votes, view score or total score. It
+    is compared with no other proposer's. ``score`` is None until views and objects were asked.
+    """
 
     T_target_source: Array
     proposer: str
-    score: float
+    support: float
+    score: Score | None = None
 
 
-def from_features(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Hypothesis]:
+def from_features(source: Prepared, target: Prepared) -> list[Hypothesis]:
     """Poses from matched local features of the contexts."""
-    a, b, weights = match(source.features, target.features, params.feature_matches)
+    a, b, weights = match(source.features, target.features, FEATURE_MATCHES)
     matches = Matches(
         source=source.features.xyz[a].astype(float),
         target=target.features.xyz[b].astype(float),
@@ -39,11 +51,11 @@ def from_features(source: Prepared, target: Prepared, params: RegistrarParams) -
         target_normals=target.features.normals[b].astype(float),
         weights=weights,
     )
-    found = poses(matches, source.up, target.up, 1.5 * params.feature_voxel, 0.3, params.seeds_per_chain)
-    return [Hypothesis(T_target_source=T, proposer="features", score=support) for T, support in found]
+    found = poses(matches, source.up, target.up, 1.5 * FEATURE_VOXEL_M, 0.3, HYPOTHESES_PER_PROPOSER)
+    return [Hypothesis(T_target_source=T, proposer="features", support=support) for T, support in found]
 
 
-def from_centroids(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Hypothesis]:
+def from_centroids(source: Prepared, target: Prepared) -> list[Hypothesis]:
     """Poses from the middles of object pairs and triples; every assignment among look-alikes is tried."""
     pairs = look_alikes(source, target)
     if len(pairs) < 2 or source.up is None or target.up is None:
@@ -57,22 +69,22 @@ def from_centroids(source: Prepared, target: Prepared, params: RegistrarParams) 
         target_normals=unknown,
         weights=np.ones(len(a)),
     )
-    found = poses(matches, source.up, target.up, params.centroid_tolerance, 0.15, params.seeds_per_chain)
-    return [Hypothesis(T_target_source=T, proposer="centroids", score=support) for T, support in found]
+    found = poses(matches, source.up, target.up, CENTROID_TOLERANCE_M, 0.15, HYPOTHESES_PER_PROPOSER)
+    return [Hypothesis(T_target_source=T, proposer="centroids", support=support) for T, support in found]
 
 
-def from_objects(source: Prepared, target: Prepared, params: RegistrarParams) -> list[Hypothesis]:
+def from_objects(source: Prepared, target: Prepared) -> list[Hypothesis]:
     """Poses that lay one object upon one of its kind and turn about gravity, every yaw; the best view scores."""
     if source.up is None or target.up is None:
         return []
     i, j = np.array(look_alikes(source, target), int).reshape(-1, 2).T
-    yaws = np.linspace(0.0, 2.0 * np.pi, params.yaw_steps, endpoint=False)
+    yaws = np.linspace(0.0, 2.0 * np.pi, YAW_STEPS, endpoint=False)
     R = rotation_from_vector(yaws[:, None] * target.up) @ rotation_between(source.up, target.up)
     moved = np.einsum("kab,ib->ika", R, source.centroids[i])
     T = pose(R, target.centroids[j][:, None] - moved).reshape(-1, 4, 4)
-    view_scores = score_views(source.sight, target.sight, T, params, params.glance)
-    best = np.argsort(-view_scores, kind="stable")[: params.seeds_per_object_chain]
-    return [Hypothesis(T_target_source=T[k], proposer="objects", score=float(view_scores[k])) for k in best]
+    view_scores = score_views(source.sight, target.sight, T, COARSE_POINTS)
+    best = np.argsort(-view_scores, kind="stable")[:HYPOTHESES_PER_OBJECT]
+    return [Hypothesis(T_target_source=T[k], proposer="objects", support=float(view_scores[k])) for k in best]
 
 
 def look_alikes(source: Prepared, target: Prepared) -> list[tuple[int, int]]:
@@ -83,5 +95,7 @@ def look_alikes(source: Prepared, target: Prepared) -> list[tuple[int, int]]:
 def from_prior(T_target_source: Array | None) -> list[Hypothesis]:
     """The pose that odometry expects, where it expects one."""
     return (
-        [] if T_target_source is None else [Hypothesis(T_target_source=T_target_source, proposer="odometry", score=1.0)]
+        []
+        if T_target_source is None
+        else [Hypothesis(T_target_source=T_target_source, proposer="odometry", support=1.0)]
     )

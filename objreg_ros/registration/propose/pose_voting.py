@@ -15,7 +15,7 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.registration.kernels.projection import FAST
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.kernels.same_pose import VOTES_ANGLE, VOTES_TOLERANCES, Nearness, distinct
 
 MOST_PAIRS = 6000  # of matches that agree, each of which gives a pose to weigh
 ASIDE = 1e-8  # the square of 0.1 mm: a baseline that is no farther aside of its direction fixes no pose with it
@@ -58,51 +58,8 @@ def poses(
     columns = (np.ascontiguousarray(part.T, np.float32) for part in (matches.source, matches.target, matches.weights))
     support = _support(*columns, T.astype(np.float32), np.float32(tolerance))  # type: ignore[call-arg]
     middle = matches.source.mean(axis=0)
-    chosen = distinct(T, support, middle, limit, angle=np.radians(6.0), distance=1.5 * tolerance)
+    chosen = distinct(T, support, middle, limit, Nearness(VOTES_ANGLE, VOTES_TOLERANCES * tolerance))
     return tuple((T[k], float(support[k])) for k in chosen)
-
-
-def distinct(T: Array, scores: Array, middle: Array, limit: int, angle: float, distance: float) -> list[int]:
-    """Indices of the best poses (N, 4, 4) that differ by ``angle`` rad, or move ``middle (3,)`` by ``distance`` m."""
-    order = np.argsort(-scores, kind="stable")
-    centres = T[:, :3, :3] @ middle + T[:, :3, 3]
-    return [int(k) for k in _distinct(T, centres, order, limit, np.cos(angle), distance)]
-
-
-def near(T: Array, T_known: Array, middle: Array, angle: float, distance: float) -> Array:
-    """Which of the poses (N, 4, 4) differ from one by less than ``angle`` rad and ``distance`` m at ``middle (3,)``."""
-    cosine = 0.5 * (np.einsum("kij,ij->k", T[:, :3, :3], T_known[:3, :3]) - 1.0)
-    moved = np.linalg.norm((T[:, :3, :3] - T_known[:3, :3]) @ middle + T[:, :3, 3] - T_known[:3, 3], axis=-1)
-    return np.asarray((cosine > np.cos(angle)) & (moved < distance))
-
-
-def same_pose(T: Array, T_known: Array, middle: Array, params: RegistrarParams) -> Array:
-    """Which poses (K, 4, 4) agree with one, as proposers do that came to the same, seen from the context's middle."""
-    return near(T, T_known, middle, np.radians(params.agreement_rotation), params.agreement_translation)
-
-
-@numba.njit(cache=True, nogil=True)
-def _distinct(T, centres, order, limit, cosine, distance):  # type: ignore[no-untyped-def]
-    chosen = np.empty(limit, np.int64)
-    n = 0
-    for k in order:
-        if n == limit:
-            break
-        known = False
-        for m in range(n):
-            c = chosen[m]
-            trace, gap = 0.0, 0.0
-            for a in range(3):
-                gap += (centres[c, a] - centres[k, a]) ** 2
-                for b in range(3):
-                    trace += T[c, a, b] * T[k, a, b]
-            if gap < distance * distance and 0.5 * (trace - 1.0) > cosine:
-                known = True
-                break
-        if not known:
-            chosen[n] = k
-            n += 1
-    return chosen[:n]
 
 
 @numba.njit(cache=True, nogil=True, inline="always")

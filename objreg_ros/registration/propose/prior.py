@@ -10,6 +10,9 @@ from objreg_ros.geometry import inverse
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
 
+TIGHT_TRANSLATION_M = 0.2  # odometry whose position is less certain proposes no pose: it would start in another basin
+TIGHT_ROTATION_DEG = 6.0  # odometry whose rotation is less certain proposes no pose
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Prior:
@@ -24,9 +27,9 @@ class Prior:
     translation_m: float
     trusted: bool
 
-    def tight(self, params: RegistrarParams) -> bool:
+    def tight(self) -> bool:
         """Whether a registration may start from it."""
-        return self.translation_m <= params.prior_translation and self.rotation_deg <= params.prior_rotation
+        return self.translation_m <= TIGHT_TRANSLATION_M and self.rotation_deg <= TIGHT_ROTATION_DEG
 
 
 def expect(source: Keyframe, target: Keyframe, params: RegistrarParams) -> Prior | None:

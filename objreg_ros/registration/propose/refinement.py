@@ -15,42 +15,44 @@ from objreg_ros.geometry import transform
 from objreg_ros.registration.certainty.degeneracy import about_camera, degenerate_directions
 from objreg_ros.registration.certainty.observability import split_directions
 from objreg_ros.registration.certainty.sandwich import information
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared
-from objreg_ros.registration.refine.batch_icp import fit
+from objreg_ros.registration.refine.batch_icp import LEAST_PAIRS, REACHES_M, fit
 from objreg_ros.registration.refine.photometric_icp import finish
 from objreg_ros.registration.score.comparison import score_gain, score_locally
 from objreg_ros.registration.score.object_matches import match_objects
 
+PHOTOMETRIC_ROUNDS = 3  # most times that grey finishes a pose, coarse to fine
+DEGENERATE_SHARE = 0.01  # a direction that a smaller share of the surface resists is degenerate
+HOLDING_CORRELATION = 0.45  # of grey from which on it resolves a degenerate direction
 LITTLE = 0.02  # gain in score after which another round is not worth its time
 
 
-def refine(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> Alignment:
+def refine(source: Prepared, target: Prepared, T_target_source: Array) -> Alignment:
     """Finish a settled pose; ``converged`` is False where next to nothing holds it.
 
     Grey has its say, and keeps it where views and objects score the pose no lower. The information is that of patches
     of surface, because neighbouring points err together.
     """
-    T, grey = _finished(source, target, T_target_source, params)
-    found = fit(source.xyz, source.normals, target.surface, T, params.reaches[-1])
+    T, grey = _finished(source, target, T_target_source)
+    found = fit(source.xyz, source.normals, target.surface, T, REACHES_M[-1])
     degenerate = degenerate_directions(
-        found._replace(H=found.H + grey), T, transform(T, source.middle), params.slack_share
+        found._replace(H=found.H + grey), T, transform(T, source.middle), DEGENERATE_SHARE
     )
-    free, regularised = split_directions(source, target, T, degenerate, found.extent, params)
+    free, regularised = split_directions(source, target, T, degenerate, found.extent)
     return Alignment(
         T_target_source=T,
-        information=about_camera(information(source.xyz, source.normals, target.surface, T, params), T),
+        information=about_camera(information(source.xyz, source.normals, target.surface, T), T),
         inliers=found.inliers,
         overlap=found.inliers / max(1, len(source.xyz)),
         rmse=found.rmse,
-        converged=found.inliers >= params.min_points,
+        converged=found.inliers >= LEAST_PAIRS,
         degenerate=free,
         regularised=regularised,
         middle=transform(T, source.middle),
     )
 
 
-def _finished(source: Prepared, target: Prepared, T: Array, params: RegistrarParams) -> tuple[Array, Array]:
+def _finished(source: Prepared, target: Prepared, T: Array) -> tuple[Array, Array]:
     """The pose after grey had its say, and what grey adds to its information: nothing where it does not correlate.
 
     Again while views and objects score it clearly higher (`comparison`), since each round sees more of the other view;
@@ -60,16 +62,16 @@ def _finished(source: Prepared, target: Prepared, T: Array, params: RegistrarPar
     grey_information = np.zeros((6, 6))
     if not (source.sight.textured and target.sight.textured):
         return T, grey_information
-    matched, _ = match_objects(source, target, T, params)
-    best = score_locally(source, target, T, matched, params)
-    for _ in range(params.grey_rounds):
-        finished, grey = finish(source, target, T, params)
-        found = score_locally(source, target, finished, matched, params)
-        gained = score_gain(found, best, params)
+    matched, _ = match_objects(source, target, T)
+    best = score_locally(source, target, T, matched)
+    for _ in range(PHOTOMETRIC_ROUNDS):
+        finished, grey = finish(source, target, T)
+        found = score_locally(source, target, finished, matched)
+        gained = score_gain(found, best)
         if gained < 0.0:
             break
         best, T = found, finished
-        grey_information = grey if (found.seen.texture or 0.0) >= params.holding_texture else np.zeros((6, 6))
+        grey_information = grey if (found.seen.texture or 0.0) >= HOLDING_CORRELATION else np.zeros((6, 6))
         if gained < LITTLE:
             break
     return T, grey_information

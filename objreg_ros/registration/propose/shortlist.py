@@ -14,9 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.candidate import Score
+from objreg_ros.registration.certainty.gravity_update import MOST_GRAVITY_ERROR_DEG
+from objreg_ros.registration.kernels.same_pose import AGREEING, BASIN, PROPOSED, PROPOSED_FROM, REFINED, distinct, near
 from objreg_ros.registration.prepare.prepared import Pair
-from objreg_ros.registration.propose.evidence import gravity_error_deg, score_objects
+from objreg_ros.registration.propose.evidence import FINISHED_MARGIN, gravity_error_deg, score_objects
 from objreg_ros.registration.propose.fine_search import score_views_sharply
 from objreg_ros.registration.propose.hypotheses import (
     Hypothesis,
@@ -26,16 +28,23 @@ from objreg_ros.registration.propose.hypotheses import (
     from_prior,
 )
 from objreg_ros.registration.propose.object_poses import from_shapes
-from objreg_ros.registration.propose.pose_voting import distinct, near
-from objreg_ros.registration.refine.batch_icp import align, settle
+from objreg_ros.registration.refine.batch_icp import ITERATIONS, REACHES_M, align, settle
 from objreg_ros.registration.refine.photometric_icp import finish
 from objreg_ros.registration.score.object_matches import match_objects, score_matched_silhouettes
-from objreg_ros.registration.score.view_score import WORST, count_both_ways, score_counts, score_views
+from objreg_ros.registration.score.view_score import (
+    PHOTOMETRIC_POINTS,
+    RANKING_POINTS,
+    WORST,
+    count_both_ways,
+    score_counts,
+    score_views,
+)
 
-APART = (np.radians(4.0), 0.04)  # rad and m: hypotheses are distinct beyond before they are settled
-ALIKE = (np.radians(0.5), 0.01)  # and after
-BASIN = (np.radians(5.0), 0.10)  # and when they have come to their basins
-ABOUT = (np.radians(30.0), 0.5)  # rad and m: how far shape may have drawn the best from where they were proposed
+REFINED_PER_PROPOSER = 5  # hypotheses that ICP runs to the end
+FINISHED = 3  # hypotheses of all proposers that photometric ICP finishes and the gate sees
+FIRST_LOOK = (150, 5, 150)  # points, iterations and points of the views a side, for all hypotheses
+LOOKED_AT_AGAIN = 24  # hypotheses of each proposer that get more points
+BASIN_POINTS = 500  # that bring a hypothesis to its basin
 ANCHORED = 2  # hypotheses about each of the best that grey holds where they were proposed
 TILTED = 1.5  # times the error of gravity that the gate allows: what is not refined
 
@@ -50,41 +59,41 @@ class Shortlist(NamedTuple):
     hypotheses: tuple[Hypothesis, ...]
 
 
-def shortlist(pair: Pair, T_target_source_prior: Array | None, params: RegistrarParams) -> Shortlist:
+def shortlist(pair: Pair, T_target_source_prior: Array | None) -> Shortlist:
     """The hypotheses of all proposers of the best score of views and objects; empty when no proposer proposed any.
 
     ``T_target_source_prior (4, 4)`` is a pose to start from too, or None.
     """
-    proposers, shapes = _proposed(pair, T_target_source_prior, params), _upright(pair, params)
-    drawn = [hypothesis for proposed in proposers for hypothesis in _drawn_best(pair, proposed, params)]
-    hypotheses = _settled(pair, drawn + shapes, params) + _scored(pair, shapes, params)
+    proposers, shapes = _proposed(pair, T_target_source_prior), _upright(pair)
+    drawn = [hypothesis for proposed in proposers for hypothesis in _drawn_best(pair, proposed)]
+    hypotheses = _settled(pair, drawn + shapes) + _scored(pair, shapes)
     if not hypotheses:
         return Shortlist((), ())
-    best = _best(pair, hypotheses, params)
-    about = _about(pair, best, [hypothesis for proposed in proposers for hypothesis in proposed], params)
-    anchored = _anchored(pair, about, params)
-    return Shortlist(tuple(_best(pair, best + anchored, params)), (*hypotheses, *about))
+    best = _best(pair, hypotheses)
+    about = _about(pair, best, [hypothesis for proposed in proposers for hypothesis in proposed])
+    anchored = _anchored(pair, about)
+    return Shortlist(tuple(_best(pair, best + anchored)), (*hypotheses, *about))
 
 
-def _proposed(pair: Pair, prior: Array | None, params: RegistrarParams) -> list[list[Hypothesis]]:
+def _proposed(pair: Pair, prior: Array | None) -> list[list[Hypothesis]]:
     """What each proposer proposes."""
     source, target = pair.source, pair.target
     return [
         from_prior(prior),
-        from_centroids(source, target, params),
-        from_objects(source, target, params),
-        from_features(source, target, params),
+        from_centroids(source, target),
+        from_objects(source, target),
+        from_features(source, target),
     ]
 
 
-def _upright(pair: Pair, params: RegistrarParams) -> list[Hypothesis]:
+def _upright(pair: Pair) -> list[Hypothesis]:
     """The distinct hypotheses of the objects' shapes: they are in their basins already."""
-    found = from_shapes(pair.source, pair.target, params)
-    scores = np.array([hypothesis.score for hypothesis in found])
-    return [found[k] for k in distinct(_poses(found), scores, pair.source.middle, params.refined_per_chain, *APART)]
+    found = from_shapes(pair.source, pair.target)
+    scores = np.array([hypothesis.support for hypothesis in found])
+    return [found[k] for k in distinct(_poses(found), scores, pair.source.middle, REFINED_PER_PROPOSER, PROPOSED)]
 
 
-def _drawn_best(pair: Pair, proposed: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
+def _drawn_best(pair: Pair, proposed: list[Hypothesis]) -> list[Hypothesis]:
     """The hypotheses of one proposer, brought to their basins, of the best view score, distinct.
 
     All are brought near by a few points; what looks hopeless or has become another goes no farther.
@@ -92,34 +101,32 @@ def _drawn_best(pair: Pair, proposed: list[Hypothesis], params: RegistrarParams)
     if not proposed:
         return []
     middle = pair.source.middle
-    points, iterations, sample = params.first_look
-    T, V = _drawn(pair, _poses(proposed), points, iterations, sample, params)
-    close = distinct(T, V, middle, params.near_per_chain, *APART)
-    T, V = _drawn(pair, T[close], params.quick_points, params.iterations, params.quick_sample, params)
-    chosen = distinct(T, V, middle, params.refined_per_chain, *BASIN)
+    points, iterations, sample = FIRST_LOOK
+    T, V = _drawn(pair, _poses(proposed), points, iterations, sample)
+    close = distinct(T, V, middle, LOOKED_AT_AGAIN, PROPOSED)
+    T, V = _drawn(pair, T[close], BASIN_POINTS, ITERATIONS, RANKING_POINTS)
+    chosen = distinct(T, V, middle, REFINED_PER_PROPOSER, BASIN)
     return [replace(proposed[close[k]], T_target_source=T[k]) for k in chosen]
 
 
-def _drawn(
-    pair: Pair, T: Array, points: int, iterations: int, sample: int, params: RegistrarParams
-) -> tuple[Array, Array]:
+def _drawn(pair: Pair, T: Array, points: int, iterations: int, sample: int) -> tuple[Array, Array]:
     """Poses (K, 4, 4) drawn to the surface by the first so many ``points``, and V of a ``sample`` a side."""
     source, target = pair.source, pair.target
-    wide, narrow, _ = params.reaches
+    wide, narrow, _ = REACHES_M
     moved, _, _ = align(source.xyz[:points], source.normals[:points], target.surface, T, wide, narrow, iterations)
-    return moved, score_views(source.sight, target.sight, moved, params, sample)
+    return moved, score_views(source.sight, target.sight, moved, sample)
 
 
-def _settled(pair: Pair, hypotheses: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
+def _settled(pair: Pair, hypotheses: list[Hypothesis]) -> list[Hypothesis]:
     """The hypotheses where the shape alone brings them, each with its score of views and objects."""
     if not hypotheses:
         return []
-    T, firm = settle(pair.source, pair.target, _poses(hypotheses), params)
+    T, firm = settle(pair.source, pair.target, _poses(hypotheses))
     settled = [replace(hypothesis, T_target_source=pose) for hypothesis, pose in zip(hypotheses, T, strict=True)]
-    return _scored(pair, _hopeful(pair, settled, firm, params), params)
+    return _scored(pair, _hopeful(pair, settled, firm))
 
 
-def _hopeful(pair: Pair, hypotheses: list[Hypothesis], firm: Array, params: RegistrarParams) -> list[Hypothesis]:
+def _hopeful(pair: Pair, hypotheses: list[Hypothesis], firm: Array) -> list[Hypothesis]:
     """The hypotheses that enough points hold and that keep gravity; all of them where none does.
 
     Two views of nothing in common may look alike by chance: V sees what little meets, and that is not refused.
@@ -127,63 +134,67 @@ def _hopeful(pair: Pair, hypotheses: list[Hypothesis], firm: Array, params: Regi
     good = [
         hypothesis
         for hypothesis, held in zip(hypotheses, firm, strict=True)
-        if held and _keeps_gravity(pair, hypothesis, params)
+        if held and _keeps_gravity(pair, hypothesis)
     ]
     return good or hypotheses
 
 
-def _keeps_gravity(pair: Pair, hypothesis: Hypothesis, params: RegistrarParams) -> bool:
+def _keeps_gravity(pair: Pair, hypothesis: Hypothesis) -> bool:
     """Whether a hypothesis, once finished, may keep gravity as the gate wants it; True where that is unknown."""
     error = gravity_error_deg(pair.source, pair.target, hypothesis.T_target_source)
-    return error is None or error <= TILTED * params.max_gravity_error
+    return error is None or error <= TILTED * MOST_GRAVITY_ERROR_DEG
 
 
-def _scored(pair: Pair, hypotheses: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
+def _scored(pair: Pair, hypotheses: list[Hypothesis]) -> list[Hypothesis]:
     """The hypotheses with their score of views and objects; of those that are one pose the best has it."""
     source, target = pair.source, pair.target
     T = _poses(hypotheses)
-    forward, backward = count_both_ways(source.sight, target.sight, T, params, params.grey_points)
-    V = score_counts(source.sight, target.sight, forward, backward, params.grey_points)
-    apart = distinct(T, V, source.middle, len(hypotheses), *ALIKE)
+    forward, backward = count_both_ways(source.sight, target.sight, T, PHOTOMETRIC_POINTS)
+    V = score_counts(source.sight, target.sight, forward, backward, PHOTOMETRIC_POINTS)
+    apart = distinct(T, V, source.middle, len(hypotheses), REFINED)
     ways = forward[apart], backward[apart]
-    sharp = score_views_sharply(source, target, T[apart], ways, params, params.grey_points)
-    scored = [replace(hypothesis, score=WORST) for hypothesis in hypotheses]
+    sharp = score_views_sharply(source, target, T[apart], ways, PHOTOMETRIC_POINTS)
+    scored = [replace(hypothesis, score=None) for hypothesis in hypotheses]
     for k, v in zip(apart, sharp, strict=True):
         hypothesis = hypotheses[k]
-        matched, moved = match_objects(source, target, hypothesis.T_target_source, params)
-        same = score_matched_silhouettes(source, target, matched, hypothesis.T_target_source, params)
-        scored[k] = replace(hypothesis, score=float(v) + score_objects(matched, moved, same, params))
+        matched, moved = match_objects(source, target, hypothesis.T_target_source)
+        same = score_matched_silhouettes(source, target, matched, hypothesis.T_target_source)
+        scored[k] = replace(hypothesis, score=Score(float(v), *score_objects(matched, moved, same)))
     return scored
 
 
-def _best(pair: Pair, hypotheses: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
+def _best(pair: Pair, hypotheses: list[Hypothesis]) -> list[Hypothesis]:
     """The distinct hypotheses of the best score that are worth finishing, best first."""
-    scores = np.array([hypothesis.score for hypothesis in hypotheses])
-    apart = np.radians(params.agreement_rotation), params.agreement_translation
-    best = distinct(_poses(hypotheses), scores, pair.source.middle, params.finished, *apart)
-    return [hypotheses[k] for k in best if scores[k] >= scores.max() - params.finished_margin]
+    scores = np.array([_total(hypothesis) for hypothesis in hypotheses])
+    best = distinct(_poses(hypotheses), scores, pair.source.middle, FINISHED, AGREEING)
+    return [hypotheses[k] for k in best if scores[k] >= scores.max() - FINISHED_MARGIN]
 
 
-def _about(pair: Pair, best: list[Hypothesis], proposed: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
+def _total(hypothesis: Hypothesis) -> float:
+    """The total score of a hypothesis; the worst where another one of the same pose has it."""
+    return WORST if hypothesis.score is None else hypothesis.score.total
+
+
+def _about(pair: Pair, best: list[Hypothesis], proposed: list[Hypothesis]) -> list[Hypothesis]:
     """What was proposed about the best and looks best as it was proposed; nothing without grey to hold it there."""
     source, target = pair.source, pair.target
     if not proposed or not (source.sight.textured and target.sight.textured):
         return []
     T = _poses(proposed)
-    V = score_views(source.sight, target.sight, T, params, params.quick_sample)
+    V = score_views(source.sight, target.sight, T, RANKING_POINTS)
     chosen: dict[int, Hypothesis] = {}
     for found in best:
-        close = np.flatnonzero(near(T, found.T_target_source, source.middle, *ABOUT))
-        chosen |= {k: proposed[k] for k in close[distinct(T[close], V[close], source.middle, ANCHORED, *APART)]}
+        close = np.flatnonzero(near(T, found.T_target_source, source.middle, PROPOSED_FROM))
+        chosen |= {k: proposed[k] for k in close[distinct(T[close], V[close], source.middle, ANCHORED, PROPOSED)]}
     return list(chosen.values())
 
 
-def _anchored(pair: Pair, proposed: list[Hypothesis], params: RegistrarParams) -> list[Hypothesis]:
+def _anchored(pair: Pair, proposed: list[Hypothesis]) -> list[Hypothesis]:
     """Hypotheses that grey finishes where they were proposed, each with its score; those that keep gravity."""
     source, target = pair.source, pair.target
-    finished = (finish(source, target, hypothesis.T_target_source, params)[0] for hypothesis in proposed)
+    finished = (finish(source, target, hypothesis.T_target_source)[0] for hypothesis in proposed)
     anchored = [replace(hypothesis, T_target_source=T) for hypothesis, T in zip(proposed, finished, strict=True)]
-    return _scored(pair, [hypothesis for hypothesis in anchored if _keeps_gravity(pair, hypothesis, params)], params)
+    return _scored(pair, [hypothesis for hypothesis in anchored if _keeps_gravity(pair, hypothesis)])
 
 
 def _poses(hypotheses: list[Hypothesis]) -> Array:

@@ -16,9 +16,11 @@ from objreg_ros.data import Array
 from objreg_ros.registration.kernels.closest_points import Surface
 from objreg_ros.registration.kernels.least_squares import add_normal_equations, move, solve
 from objreg_ros.registration.kernels.projection import FAST, INDEX, moved
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared
 
+REACHES_M = (0.2, 0.1, 0.06)  # distance of a pair at first, in the basin, at the end
+ITERATIONS = 15  # most of one round of ICP
+LEAST_PAIRS = 60  # least number of paired points that hold a pose: ten times its freedoms
 FACING = 0.6  # cosine between the normals of a pair, at least
 
 
@@ -145,8 +147,8 @@ def _align(P, N, Q, M, closest, low, cell, poses, reach, last_reach, iterations)
     return share, rmse
 
 
-def settle(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> tuple[Array, Array]:
+def settle(source: Prepared, target: Prepared, T_target_source: Array) -> tuple[Array, Array]:
     """Poses (K, 4, 4) in their basins, brought to where the whole shape holds them, and whether it does (K,)."""
-    _, reach, last = params.reaches
-    T, share, _ = align(source.xyz, source.normals, target.surface, T_target_source, reach, last, params.iterations)
-    return T, share * len(source.xyz) >= params.min_points
+    _, reach, last = REACHES_M
+    T, share, _ = align(source.xyz, source.normals, target.surface, T_target_source, reach, last, ITERATIONS)
+    return T, share * len(source.xyz) >= LEAST_PAIRS

@@ -12,35 +12,38 @@ import numba
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.registration.kernels.least_squares import add_normal_equations, move, solve
-from objreg_ros.registration.kernels.projection import FAST, INDEX, between, lands, nearest, project
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.kernels.least_squares import add_normal_equations, invert, move, solve
+from objreg_ros.registration.kernels.projection import FAST, between, nearest, project, visible
 from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.registration.prepare.views import SHADELESS
-from objreg_ros.registration.refine.batch_icp import normal_equations
+from objreg_ros.registration.refine.batch_icp import REACHES_M, normal_equations
+from objreg_ros.registration.score.view_score import PHOTOMETRIC_POINTS
+from objreg_ros.sensor import DEPTH_TOLERANCE_GROWTH, DEPTH_TOLERANCE_M
 
+GREY_SIGMA = 0.7  # difference of the high-passed grey that weighs a quarter, in its deviations
+SURFACE_SIGMA_M = 0.03  # distance from a surface that weighs as much as one deviation of grey
 STEPS = 8  # a level
 SETTLED = 2e-4  # length of a last step, metres and radians
 
 
-def finish(source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams) -> tuple[Array, Array]:
+def finish(source: Prepared, target: Prepared, T_target_source: Array) -> tuple[Array, Array]:
     """The pose where shape and grey agree best, from one in its basin, and what grey adds to its information.
 
     The information (6, 6) is of a left step [t r], in the units of `icp.fit`: 1 is a point that holds its plane.
     Both views must have grey.
     """
-    few, shape = slice(params.grey_points), (source.xyz, source.normals, *target.surface.grid)
+    few, shape = slice(PHOTOMETRIC_POINTS), (source.xyz, source.normals, *target.surface.grid)
     a, b = source.sight, target.sight
-    slops = params.depth_tolerance, params.depth_tolerance_growth
+    slops = DEPTH_TOLERANCE_M, DEPTH_TOLERANCE_GROWTH
     T, K = np.ascontiguousarray(T_target_source, np.float64).copy(), np.zeros((6, 6))
     for here, there in zip(a.bands, b.bands, strict=True):  # the coarse one first
         _finish(
-            shape, T, params.reaches[-1],
+            shape, T, REACHES_M[-1],
             (a.points[few], here.shades[few]), (a.near, a.far, here.detail, a.camera),
             (b.points[few], there.shades[few]), (b.near, b.far, there.detail, b.camera),
-            params.grey_sigma, params.shape_sigma, slops, K,
+            GREY_SIGMA, SURFACE_SIGMA_M, slops, K,
         )  # fmt: skip
-    return T, K * params.shape_sigma**2
+    return T, K * SURFACE_SIGMA_M**2
 
 
 @numba.njit(cache=True, nogil=True)
@@ -53,7 +56,7 @@ def _finish(shape, T, reach, own, image, others, other_image, grey_sigma, shape_
         normal_equations(P, N, Q, M, closest, low, cell, T, reach, H, g)
         K[:], k[:] = 0.0, 0.0
         _add_grey(own, T, other_image, T, False, grey_sigma, slops, K, k)
-        _invert(T, back)
+        invert(T, back)
         _add_grey(others, back, image, T, True, grey_sigma, slops, K, k)
         for i in range(6):
             for j in range(6):
@@ -63,16 +66,6 @@ def _finish(shape, T, reach, own, image, others, other_image, grey_sigma, shape_
         solve(H, k)
         if move(T, k) < SETTLED:
             break
-
-
-@numba.njit(cache=True, nogil=True)
-def _invert(T, back):  # type: ignore[no-untyped-def]
-    """Fill ``back`` (4, 4) with the inverse of a pose."""
-    for i in range(3):
-        back[i, 3] = 0.0
-        for j in range(3):
-            back[i, j] = T[j, i]
-            back[i, 3] -= T[j, i] * T[j, 3]
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
@@ -106,19 +99,16 @@ def _add_grey(asked, T, image, T_target_source, backwards, sigma, slops, H, g): 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _met(us, vs, zs, shades, image, slops):  # type: ignore[no-untyped-def]
-    """Which of the projected points the image meets at their depth, on a surface of both: (n,) indices."""
+    """Which of the projected points the image meets within twice the tolerance, on a surface of both: (n,) indices."""
     near, far, _, _ = image
-    met, n = np.empty(len(us), INDEX), 0
-    for i in range(len(us)):
-        u, v, z = us[i], vs[i], zs[i]
-        if not lands(u, v, z, near):
-            continue
-        row, column = nearest(u, v)
-        low, high = near[row, column], far[row, column]
-        slop = 2.0 * (slops[0] + slops[1] * z * z)
-        agrees = (high > 0.0) & (z >= low - slop) & (z <= high + slop)
+    base, growth = 2.0 * slops[0], 2.0 * slops[1]
+    met, n = visible(us, vs, zs, near, far, base, growth), 0
+    for k in range(len(met)):
+        i = met[k]
+        row, column = nearest(us[i], vs[i])
+        slop = base + growth * zs[i] * zs[i]
         met[n] = i
-        n += agrees & (high - low <= slop) & (shades[i] < SHADELESS)
+        n += (far[row, column] - near[row, column] <= slop) & (shades[i] < SHADELESS)
     return met[:n]
 
 

@@ -8,35 +8,36 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.geometry import inverse, transform
 from objreg_ros.registration.candidate import ObjectPair
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.registration.score.free_space import SEEN, VIOLATIONS, count
 from objreg_ros.registration.shapes.shape import upright_motion
 from objreg_ros.registration.shapes.silhouette_score import score_silhouettes
+from objreg_ros.sensor import DEPTH_TOLERANCE_GROWTH, DEPTH_TOLERANCE_M
+
+MATCHED_DISTANCE_M = 0.06  # two objects match if their centroids are this close
+MATCHED_SHARE = 0.28  # of its extent that a centroid may be farther: a large thing is never seen whole
 
 Pairs = tuple[ObjectPair, ...]
 
 
-def match_objects(
-    source: Prepared, target: Prepared, T_target_source: Array, params: RegistrarParams
-) -> tuple[Pairs, Pairs]:
+def match_objects(source: Prepared, target: Prepared, T_target_source: Array) -> tuple[Pairs, Pairs]:
     """(matched, moved): one-to-one pairs of confusable labels, nearest first.
 
-    Matched are those whose middles lie within ``explained_distance``, large ones a share of their extent farther;
+    Matched are those whose middles lie within `MATCHED_DISTANCE_M`, large ones a share of their extent farther;
     moved are those left over of which each, where it stood, is now free space in the other view.
     """
     distances = gaps(source, target, T_target_source)
-    spread = params.explained_share * np.minimum(source.extents[:, None], target.extents[None])
-    matched = _assign(source, distances - spread, params.explained_distance)
+    spread = MATCHED_SHARE * np.minimum(source.extents[:, None], target.extents[None])
+    matched = _assign(source, distances - spread, MATCHED_DISTANCE_M)
     left = distances.copy()
     left[[pair.source for pair in matched], :] = np.inf
     left[:, [pair.target for pair in matched]] = np.inf
-    _keep_gone(left, source, target, T_target_source, params)
+    _keep_gone(left, source, target, T_target_source)
     return matched, _assign(source, left, np.inf)
 
 
 def score_matched_silhouettes(
-    source: Prepared, target: Prepared, matched: Pairs, T: Array, params: RegistrarParams, reach: float = 0.0
+    source: Prepared, target: Prepared, matched: Pairs, T: Array, reach: float = 0.0
 ) -> float | None:
     """How alike the matched objects look under a pose, their mean from -1 to 1; None where none has a shape.
 
@@ -44,9 +45,7 @@ def score_matched_silhouettes(
     """
     shapes = [(source.shapes[pair.source], target.shapes[pair.target]) for pair in matched]
     scores = [
-        score_silhouettes(a, b, upright_motion(a, b, T), params, reach)
-        for a, b in shapes
-        if a is not None and b is not None
+        score_silhouettes(a, b, upright_motion(a, b, T), reach) for a, b in shapes if a is not None and b is not None
     ]
     return float(np.clip(scores, -1.0, 1.0).mean()) if scores else None
 
@@ -73,17 +72,17 @@ def _assign(source: Prepared, distances: Array, limit: float) -> Pairs:
     return tuple(pairs)
 
 
-def _keep_gone(distances: Array, source: Prepared, target: Prepared, T: Array, params: RegistrarParams) -> None:
+def _keep_gone(distances: Array, source: Prepared, target: Prepared, T: Array) -> None:
     """Make infinite the rows and columns of objects that the other view does not see to be gone."""
     for i in range(distances.shape[0]):
-        if np.isfinite(distances[i]).any() and not is_gone(source, i, target, T, params):
+        if np.isfinite(distances[i]).any() and not is_gone(source, i, target, T):
             distances[i, :] = np.inf
     for j in range(distances.shape[1]):
-        if np.isfinite(distances[:, j]).any() and not is_gone(target, j, source, inverse(T), params):
+        if np.isfinite(distances[:, j]).any() and not is_gone(target, j, source, inverse(T)):
             distances[:, j] = np.inf
 
 
-def is_gone(owner: Prepared, index: int, other: Prepared, T_other_owner: Array, params: RegistrarParams) -> bool:
+def is_gone(owner: Prepared, index: int, other: Prepared, T_other_owner: Array) -> bool:
     """Whether the other view looks through most of an object where it would stand."""
     points = np.ascontiguousarray(owner.keyframe.objects[index].cloud.xyz[::4])
     sight = other.sight
@@ -95,7 +94,7 @@ def is_gone(owner: Prepared, index: int, other: Prepared, T_other_owner: Array, 
         sight.far,
         sight.detail,
         sight.camera,
-        params.depth_tolerance,
-        params.depth_tolerance_growth,
+        DEPTH_TOLERANCE_M,
+        DEPTH_TOLERANCE_GROWTH,
     )
     return bool(counts[SEEN] >= 0.5 * len(points) and counts[VIOLATIONS] > 0.5 * counts[SEEN])

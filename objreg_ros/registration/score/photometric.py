@@ -15,10 +15,10 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import inverse
-from objreg_ros.registration.kernels.projection import FAST, lands, nearest, project, spread
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.kernels.projection import FAST, project, spread, visible
 from objreg_ros.registration.prepare.views import SHADELESS, SMOOTH, Sight
 from objreg_ros.registration.score.free_space import SHADED, SUM_A, SUM_AA, SUM_AB, SUM_B, SUM_BB, correlation
+from objreg_ros.sensor import DEPTH_TOLERANCE_GROWTH, DEPTH_TOLERANCE_M
 
 WINDOW = 15  # px: its mean is the slow part of grey; a wide one tells rooms apart best
 NARROW = 9  # px: sees best that a pose was perturbed
@@ -29,17 +29,17 @@ LAYERS = 5  # that are summed in a window: where there is grey, either grey, and
 OURS, THEIRS = [SUM_A, SUM_AA], [SUM_B, SUM_BB]
 
 
-def texture(source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams) -> float:
+def texture(source: Sight, target: Sight, T_target_source: Array) -> float:
     """The correlation -1..1 over what both see, both ways; 0 where that is next to nothing. Both must have grey."""
-    forward = compare(source, target, T_target_source, params)
-    backward = compare(target, source, inverse(T_target_source), params)
+    forward = compare(source, target, T_target_source)
+    backward = compare(target, source, inverse(T_target_source))
     backward[OURS + THEIRS] = backward[THEIRS + OURS]  # the source's grey first: one picture may have more contrast
     return float(correlation(forward + backward))
 
 
-def compare(asked: Sight, seen: Sight, T_seen_asked: Array, params: RegistrarParams, window: int = WINDOW) -> Array:
+def compare(asked: Sight, seen: Sight, T_seen_asked: Array, window: int = WINDOW) -> Array:
     """The sums (10,) of `visibility.count` for a correlation, over the pixels of ``seen`` that ``asked`` meets."""
-    slops = params.depth_tolerance, params.depth_tolerance_growth
+    slops = DEPTH_TOLERANCE_M, DEPTH_TOLERANCE_GROWTH
     laid = _laid(asked.grey.points, asked.grey.shades, T_seen_asked, seen.near, seen.far, seen.camera, slops)
     return np.asarray(_sums(cv2.GaussianBlur(laid, (0, 0), SMOOTH), seen.grey.detail, window))
 
@@ -52,15 +52,8 @@ def _laid(points, greys, T, near, far, camera, slops):  # type: ignore[no-untype
     """
     out = np.zeros((*near.shape, 2), np.float32)
     us, vs, zs = project(points, T, camera)
-    for i in range(len(points)):
-        u, v, z = us[i], vs[i], zs[i]
-        if not lands(u, v, z, near):
-            continue
-        row, column = nearest(u, v)
-        low, high = near[row, column], far[row, column]
-        slop = slops[0] + slops[1] * z * z
-        if (high > 0.0) & (z >= low - slop) & (z <= high + slop):
-            spread(out, u, v, greys[i])
+    for i in visible(us, vs, zs, near, far, slops[0], slops[1]):
+        spread(out, us[i], vs[i], greys[i])
     return out
 
 

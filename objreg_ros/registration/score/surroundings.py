@@ -13,7 +13,6 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.registration.candidate import Verification
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.views import SHADELESS, Band, Print, Sight, pixels_of
 from objreg_ros.registration.score.view_score import verify
 
@@ -21,12 +20,12 @@ MUCH = 0.05  # of what a view measured: objects that fill less outvote nothing
 
 
 def verify_surroundings(
-    source: Sight, target: Sight, own: tuple[Array, Array], T_target_source: Array, params: RegistrarParams
+    source: Sight, target: Sight, own: tuple[Array, Array], T_target_source: Array
 ) -> Verification | None:
     """`verify` without the pixels ``own (h, w) bool`` of either view; None where they are few in both."""
     if max(_share(source, own[0]), _share(target, own[1])) < MUCH:
         return None
-    return verify(without(source, own[0]), without(target, own[1]), T_target_source, params)
+    return verify(without(source, own[0]), without(target, own[1]), T_target_source)
 
 
 def without(sight: Sight, own: Array) -> Sight:

@@ -13,15 +13,20 @@ import numba
 import numpy as np
 
 from objreg_ros.data import Array
+from objreg_ros.registration.kernels.least_squares import invert
 from objreg_ros.registration.kernels.projection import FAST
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.registration.prepare.views import Sight
 from objreg_ros.registration.score.free_space import SEEN, VIOLATIONS, count
-from objreg_ros.registration.score.view_score import rated_quickly
+from objreg_ros.registration.score.view_score import RANKING_POINTS, rated_quickly
 from objreg_ros.registration.shapes.shape import Shape
 from objreg_ros.registration.shapes.silhouette_score import two_way, weights_of
+from objreg_ros.sensor import DEPTH_TOLERANCE_GROWTH, DEPTH_TOLERANCE_M
 
+SILHOUETTE_WEIGHT_UPRIGHT = 1.0  # of the silhouette score, beside V, when upright poses are compared
+VIOLATION_WEIGHT_UPRIGHT = 5.0  # of violations, beyond their weight in V: an upright pose has no tilt to excuse them
+CLIMB_POINTS = 120  # a side, of objects and of views, by which an upright pose is climbed
+CLIMB_TURNS_DEG = (3.0, 6.0, 10.0, 15.0, 20.0, 25.0)  # about the objects, either way, with which a climb may begin
 STEPS = (0.08, 0.015)  # rad and m: the first of a climb
 LAST = 0.12  # of them: the shortest
 ROUNDS = 10
@@ -31,14 +36,14 @@ GAIN = 0.004  # of score that a step must bring
 class TotalScore:
     """The total score of upright motions (yaw, x, y, rise) of shape ``a`` of source upon ``b`` of target."""
 
-    def __init__(self, source: Prepared, target: Prepared, a: Shape, b: Shape, params: RegistrarParams) -> None:
-        slops = params.depth_tolerance, params.depth_tolerance_growth
+    def __init__(self, source: Prepared, target: Prepared, a: Shape, b: Shape) -> None:
+        slops = DEPTH_TOLERANCE_M, DEPTH_TOLERANCE_GROWTH
         textured = source.sight.textured and target.sight.textured
-        weights = np.array([*weights_of(params), params.upright_likeness, params.upright_violations])
+        weights = np.array([*weights_of(), SILHOUETTE_WEIGHT_UPRIGHT, VIOLATION_WEIGHT_UPRIGHT])
         self._pair = (_image(source.sight), _image(target.sight), slops, textured), a.kernel_arrays, b.kernel_arrays
         self._extent, self._weights = 0.5 * (a.extent + b.extent), weights
-        self._sample, self._few = params.quick_sample, params.climb_points
-        self._turns = np.radians([0.0, *params.climb_turns, *(-turn for turn in params.climb_turns)])
+        self._sample, self._few = RANKING_POINTS, CLIMB_POINTS
+        self._turns = np.radians([0.0, *CLIMB_TURNS_DEG, *(-turn for turn in CLIMB_TURNS_DEG)])
 
     def of(self, motions: Array) -> Array:
         """The total scores (K,) of motions (K, 4)."""
@@ -133,8 +138,5 @@ def _poses(source, target, motion):  # type: ignore[no-untyped-def]
             for k in range(3):
                 T[i, j] += R_target[k, i] * turned[k, j]
             T[i, 3] += R_target[j, i] * shift[j]
-    for i in range(3):
-        for j in range(3):
-            back[i, j] = T[j, i]
-            back[i, 3] -= T[j, i] * T[j, 3]
+    invert(T, back)
     return T, back

@@ -11,12 +11,16 @@ import numba
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.geometry import inverse
+from objreg_ros.geometry import inverse, inverses
 from objreg_ros.registration.candidate import Verification
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.views import Sight
 from objreg_ros.registration.score.free_space import INLIERS, OCCLUDED, SEEN, VIOLATIONS, correlation, count, count_many
 from objreg_ros.registration.score.photometric import NARROW, compare, texture
+from objreg_ros.sensor import DEPTH_TOLERANCE_GROWTH, DEPTH_TOLERANCE_M
+
+RANKING_POINTS = 500  # a side, of the views, by which hypotheses are ranked
+PHOTOMETRIC_POINTS = 2500  # a side, of the views, that finish a refinement
+LEAST_SCORE = 0.1  # V of a pose that the gate may accept; what is below is not looked at more closely
 
 NO_TEXTURE = 0.2  # what stands in for the texture of a view without grey: less than a right pose usually has
 WORST = -3.0  # V where there is nothing to look at
@@ -24,21 +28,19 @@ CERTAINLY = 2.0  # tolerances that leave no doubt
 NEUTRAL = 0.65  # what a wrong pose at its best reaches
 
 
-def verify(
-    source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams, sample: int | None = None
-) -> Verification:
+def verify(source: Sight, target: Sight, T_target_source: Array, sample: int | None = None) -> Verification:
     """Look at ``T_target_source`` from both views; ``sample`` limits the points that are asked on either side.
 
     Without it the grey is compared in the same image (`photometric`), with it in the images' own bands: quicker.
     A pose under which the views do not meet comes back with ``tested`` 0 and the lowest score.
     """
     ways = (
-        count_visibility(source, target, T_target_source, params, sample),
-        count_visibility(target, source, inverse(T_target_source), params, sample),
+        count_visibility(source, target, T_target_source, sample),
+        count_visibility(target, source, inverse(T_target_source), sample),
     )
     if min(way[SEEN] for way in ways) < 1:
         return Verification(inliers=0.0, violations=1.0, occluded=0.0, texture=None, tested=0, score=WORST)
-    grey = _grey(source, target, T_target_source, params, None if sample is None else ways[0] + ways[1])
+    grey = _grey(source, target, T_target_source, None if sample is None else ways[0] + ways[1])
     return Verification(
         inliers=float(min(way[INLIERS] / way[SEEN] for way in ways)),
         violations=float(max(way[VIOLATIONS] / way[SEEN] for way in ways)),
@@ -49,23 +51,21 @@ def verify(
     )
 
 
-def _grey(source: Sight, target: Sight, T: Array, params: RegistrarParams, counts: Array | None) -> float | None:
+def _grey(source: Sight, target: Sight, T: Array, counts: Array | None) -> float | None:
     """How the grey correlates, by ``counts`` where there are some; None for a view without grey."""
     if not (source.textured and target.textured):
         return None
-    return texture(source, target, T, params) if counts is None else float(correlation(counts))
+    return texture(source, target, T) if counts is None else float(correlation(counts))
 
 
-def score_views(source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams, sample: int) -> Array:
+def score_views(source: Sight, target: Sight, T_target_source: Array, sample: int) -> Array:
     """V of many poses (K, 4, 4) at once, from the first ``sample`` points a side; -3 where the views do not meet."""
-    return score_counts(source, target, *count_both_ways(source, target, T_target_source, params, sample), sample)
+    return score_counts(source, target, *count_both_ways(source, target, T_target_source, sample), sample)
 
 
-def count_both_ways(
-    source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams, sample: int
-) -> tuple[Array, Array]:
+def count_both_ways(source: Sight, target: Sight, T_target_source: Array, sample: int) -> tuple[Array, Array]:
     """`count_visibility` at many poses (K, 4, 4), forward and backward: (K, 10) each."""
-    slops = params.depth_tolerance, params.depth_tolerance_growth
+    slops = DEPTH_TOLERANCE_M, DEPTH_TOLERANCE_GROWTH
     forward = count_many(source.points[:sample], source.shades[:sample], T_target_source, *_image(target), *slops)
     back = inverses(T_target_source)
     return forward, count_many(target.points[:sample], target.shades[:sample], back, *_image(source), *slops)
@@ -82,7 +82,6 @@ def score_sharply(
     target: Sight,
     T_target_source: Array,
     ways: tuple[Array, Array],
-    params: RegistrarParams,
     sample: int,
 ) -> float:
     """V of one pose (4, 4) with all of the source's grey laid into the target's image: slower, and it falls by more.
@@ -90,7 +89,7 @@ def score_sharply(
     ``ways`` are what `count_both_ways` counted there, (10,) each. Grey one way, as the other says much the same; for
     poses near each other, which tell a perturbation from none. Both views must have grey.
     """
-    grey = correlation(compare(source, target, T_target_source, params, NARROW))
+    grey = correlation(compare(source, target, T_target_source, NARROW))
     return float(rated(*ways, grey, _asked(source, target, sample)))
 
 
@@ -99,28 +98,26 @@ def _asked(source: Sight, target: Sight, sample: int | None) -> int:
     return sum(min(len(sight.points), sample or len(sight.points)) for sight in (source, target))
 
 
-def count_visibility(
-    source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams, sample: int | None
-) -> Array:
+def count_visibility(source: Sight, target: Sight, T_target_source: Array, sample: int | None) -> Array:
     """What the target view says of the source's points; the counts of `visibility.count`."""
-    slops = params.depth_tolerance, params.depth_tolerance_growth
+    slops = DEPTH_TOLERANCE_M, DEPTH_TOLERANCE_GROWTH
     return np.asarray(count(source.points[:sample], source.shades[:sample], T_target_source, *_image(target), *slops))
 
 
-def certain_violations(source: Sight, target: Sight, T_target_source: Array, params: RegistrarParams) -> float:
+def certain_violations(source: Sight, target: Sight, T_target_source: Array) -> float:
     """The share of tested pixels that float beyond doubt, the worse way's: 1 where the views do not meet.
 
     In front of everything that the other view saw in a wide window, by more than twice the tolerance: edges are ragged
     and a right pose is a little off, but a thing that is not there is larger than that.
     """
     ways = (source, target, T_target_source), (target, source, inverse(T_target_source))
-    return max(_certain_violations(asked, seen, T, params) for asked, seen, T in ways)
+    return max(_certain_violations(asked, seen, T) for asked, seen, T in ways)
 
 
-def _certain_violations(asked: Sight, seen: Sight, T: Array, params: RegistrarParams) -> float:
-    slops = CERTAINLY * params.depth_tolerance, CERTAINLY * params.depth_tolerance_growth
+def _certain_violations(asked: Sight, seen: Sight, T: Array) -> float:
+    slops = CERTAINLY * DEPTH_TOLERANCE_M, CERTAINLY * DEPTH_TOLERANCE_GROWTH
     counts = count(asked.points, asked.shades, T, seen.front, seen.far, seen.detail, seen.camera, *slops)
-    tested = count_visibility(asked, seen, T, params, None)[SEEN]
+    tested = count_visibility(asked, seen, T, None)[SEEN]
     return float(counts[VIOLATIONS] / tested) if tested >= 1 else 1.0
 
 
@@ -133,7 +130,7 @@ def rated(forward, backward, grey, asked):  # type: ignore[no-untyped-def]
     """V of the counts (10,) of both ways, of which ``asked`` points were asked, and of the correlation of ``grey``.
 
     V is made of the worse way's inliers and violations, the texture and the share of all points that could be tested.
-    Weights rounded from a logistic fit on real frames; a view without grey counts as a weak match.
+    The weights are set by hand, near those of a logistic fit; a view without grey counts as a weak match.
     """
     seen_a, seen_b = forward[SEEN], backward[SEEN]
     if min(seen_a, seen_b) < 1.0:
@@ -158,12 +155,3 @@ def _rated_many(forward, backward, textured, asked):  # type: ignore[no-untyped-
     for k in range(len(V)):
         V[k] = rated_quickly(forward[k], backward[k], textured, asked)
     return V
-
-
-def inverses(T: Array) -> Array:
-    """The inverse motions of poses (K, 4, 4)."""
-    out = np.zeros_like(T)
-    out[:, :3, :3] = T[:, :3, :3].transpose(0, 2, 1)
-    out[:, :3, 3] = -np.einsum("kij,kj->ki", out[:, :3, :3], T[:, :3, 3])
-    out[:, 3, 3] = 1.0
-    return out

@@ -13,38 +13,39 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.registration.kernels.projection import FAST, INDEX, LEAST_DEPTH, project
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.shapes.shape import Shape
 from objreg_ros.registration.shapes.silhouette import INSIDE, RIM
+from objreg_ros.sensor import NEAR_M, SILHOUETTE_TOLERANCE_GROWTH, SILHOUETTE_TOLERANCE_M
+
+VIOLATION_WEIGHT = 12.0  # of an object's points in seen free space
+OCCLUSION_WEIGHT = 0.6  # of an object's points behind what was seen
+RESIDUAL_WEIGHT = 1.2  # of squared distances from what was seen
+GREY_WEIGHT = 3.0  # of the correlation of grey
+GREY_NEUTRAL = 0.3  # correlation of grey that says nothing
+GREY_NOISE = 12.0  # standard deviation of grey that is noise, in grey levels
 
 # What `tally` counts.
 INLIERS, VIOLATIONS, HIDDEN, RESIDUAL, SHADED, SUM_A, SUM_B, SUM_AA, SUM_BB, SUM_AB = range(10)
 COUNTS = 10
 LEAST_SHADED = 20
-
-FLOOR = 0.0106  # m: 7 mm beside three deviations of a structured-light camera at 0.4 m
-GROWTH = 0.0057  # 1/m: three deviations more for each squared metre beyond
-KNEE = 0.4  # m
 STEPS = 8  # rounds of a climb to what is nearby, each a step of that share of its reach at most
 
 
-def weights_of(params: RegistrarParams) -> Array:
+def weights_of() -> Array:
     """(6,): of free-space violations, hidden points, squared residuals and grey; expected correlation, grey's noise."""
     return np.array(
         [
-            params.shape_violations,
-            params.shape_hidden,
-            params.shape_residual,
-            params.shape_grey,
-            params.shape_grey_expected,
-            params.shape_grey_noise**2,
+            VIOLATION_WEIGHT,
+            OCCLUSION_WEIGHT,
+            RESIDUAL_WEIGHT,
+            GREY_WEIGHT,
+            GREY_NEUTRAL,
+            GREY_NOISE**2,
         ]
     )
 
 
-def score_silhouettes(
-    source: Shape, target: Shape, motion: Array, params: RegistrarParams, reach: float = 0.0
-) -> float:
+def score_silhouettes(source: Shape, target: Shape, motion: Array, reach: float = 0.0) -> float:
     """The score of a motion (yaw, x, y, rise): near 1 and more if right, below 0 if the cameras saw otherwise.
 
     The best that a climb finds within ``reach`` m along each axis, height too, turned as much.
@@ -52,14 +53,14 @@ def score_silhouettes(
     extent, most = 0.5 * (source.extent + target.extent), source.most + target.most
     steps = np.array([0.0, reach, reach, reach]) / STEPS
     return float(
-        climb(source.kernel_arrays, target.kernel_arrays, motion.copy(), extent, weights_of(params), most, steps, STEPS)
+        climb(source.kernel_arrays, target.kernel_arrays, motion.copy(), extent, weights_of(), most, steps, STEPS)
     )
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
 def slack_at(z):  # type: ignore[no-untyped-def]
     """How far two depths of one surface may differ at a depth z, m."""
-    return FLOOR + GROWTH * (z - KNEE) * (z - KNEE)
+    return SILHOUETTE_TOLERANCE_M + SILHOUETTE_TOLERANCE_GROWTH * (z - NEAR_M) * (z - NEAR_M)
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)

@@ -10,21 +10,22 @@ from __future__ import annotations
 import numpy as np
 
 from objreg_ros.data import Array, ObjectCloud
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.shapes.shape import Shape
 from objreg_ros.registration.shapes.silhouette_score import COUNTS, VIOLATIONS, ask
 
+TURN_SHARE = 0.16  # an object has no yaw if a smaller share of its surface resists a turn
+TURN_VIOLATIONS = 0.14  # it has one after all if so much of it, turned about its axis, is in seen free space
 TURNS = np.radians(np.arange(30, 360, 30))  # that an object is looked at under
 LEAST = 10  # points that tell anything
 
 
-def tells_yaw(cloud: ObjectCloud, up: Array | None, shape: Shape | None, params: RegistrarParams) -> bool:
+def tells_yaw(cloud: ObjectCloud, up: Array | None, shape: Shape | None) -> bool:
     """Whether the surface of an object or its outline tells how it is turned; False where up is unknown."""
     if up is None:
         return False
-    if yaw_share(cloud, up) >= params.symmetry_share:
+    if yaw_share(cloud, up) >= TURN_SHARE:
         return True
-    return shape is not None and turned_violations(shape) >= params.symmetry_violations
+    return shape is not None and turned_violations(shape) >= TURN_VIOLATIONS
 
 
 def yaw_share(cloud: ObjectCloud, up: Array) -> float:

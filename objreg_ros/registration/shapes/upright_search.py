@@ -10,12 +10,20 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.registration.kernels.projection import FAST
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.shapes.shape import Shape, upright_motion, upright_pose
 from objreg_ros.registration.shapes.silhouette_score import climb, two_way, weights_of
 from objreg_ros.registration.shapes.upright_icp import settle
 from objreg_ros.registration.shapes.visual_hull import clear
 
+COARSE_YAWS = 12  # yaws of a pair of objects among several: each 30 deg
+COARSE_POINTS = 100  # points a side that rank such poses
+YAWS = 16  # of a lone object's shape: each 22.5 deg, as a basin is wide
+DEPTH_SHARE = 0.1  # how much deeper an object's middle lies than what is seen of it, in its widths
+RANKING_POINTS = 100  # points a side by which poses are ranked before the best are refined
+REFINED = 4  # poses of a pair of shapes
+CLIMBED = 2  # best poses from which the score is climbed to its maximum
+SCORE_MARGIN = 0.5  # below the best, beyond which a pose is not climbed
+CLIMB_ROUNDS = 8  # most
 SAME_TURN = 0.12  # rad within which two motions are one
 SAME_SHIFT = 0.015  # m
 ALIKE_TURN, CROWD = 0.5, 2  # rad within which motions turn alike, and how many of them are refined
@@ -31,24 +39,22 @@ class ScoredPose(NamedTuple):
     score: float
 
 
-def register_shapes(source: Shape, target: Shape, params: RegistrarParams) -> list[ScoredPose]:
+def register_shapes(source: Shape, target: Shape) -> list[ScoredPose]:
     """The best distinct poses of ``source`` upon ``target``, both upright on what they stand on, best first."""
-    motions, scores = _begun(source, target, params.shape_yaws, CLEARED, params.shape_glance, params)
-    return _finished(source, target, motions, scores, 0.5 * _reach(source, target), params)
+    motions, scores = _begun(source, target, YAWS, CLEARED, RANKING_POINTS)
+    return _finished(source, target, motions, scores, 0.5 * _reach(source, target))
 
 
-def coarse_poses(source: Shape, target: Shape, most: int, params: RegistrarParams) -> list[Array]:
+def coarse_poses(source: Shape, target: Shape, most: int) -> list[Array]:
     """The poses of ``source`` upon ``target`` that look best at first, at most so many: a tenth of a registration."""
-    motions, scores = _begun(source, target, params.glance_yaws, CLEARED_COARSELY, params.glance, params)
+    motions, scores = _begun(source, target, COARSE_YAWS, CLEARED_COARSELY, COARSE_POINTS)
     return list(upright_pose(source, target, motions[np.argsort(-scores, kind="stable")[:most]]))
 
 
-def _begun(
-    source: Shape, target: Shape, yaws: int, cleared: tuple[int, int], sample: int, params: RegistrarParams
-) -> tuple[Array, Array]:
+def _begun(source: Shape, target: Shape, yaws: int, cleared: tuple[int, int], sample: int) -> tuple[Array, Array]:
     extent = 0.5 * (source.extent + target.extent)
-    starts = _starts(yaws, params.shape_offset * extent)
-    settling = extent, weights_of(params), sample, _reach(source, target)
+    starts = _starts(yaws, DEPTH_SHARE * extent)
+    settling = extent, weights_of(), sample, _reach(source, target)
     return _started(source.kernel_arrays, target.kernel_arrays, target.surface.grid, starts, *settling, cleared)
 
 
@@ -56,7 +62,7 @@ def _reach(source: Shape, target: Shape) -> float:
     return min(WIDEST_REACH, 0.25 * (source.extent + target.extent))
 
 
-def improve(source: Shape, target: Shape, poses: Array, params: RegistrarParams) -> list[ScoredPose]:
+def improve(source: Shape, target: Shape, poses: Array) -> list[ScoredPose]:
     """Poses (K, 4, 4) of ``source`` near ``target``, made upright and brought to where both silhouettes score them
     best.
 
@@ -64,11 +70,11 @@ def improve(source: Shape, target: Shape, poses: Array, params: RegistrarParams)
     """
     motions = upright_motion(source, target, poses)
     extent = 0.5 * (source.extent + target.extent)
-    settling = extent, weights_of(params), params.shape_glance, WIDEST_REACH
+    settling = extent, weights_of(), RANKING_POINTS, WIDEST_REACH
     moved, scores = _started(
         source.kernel_arrays, target.kernel_arrays, target.surface.grid, motions, *settling, CLEARED
     )
-    return _finished(source, target, moved, scores, 0.5 * WIDEST_REACH, params)
+    return _finished(source, target, moved, scores, 0.5 * WIDEST_REACH)
 
 
 def _starts(yaws: int, deeper: float) -> Array:
@@ -77,13 +83,11 @@ def _starts(yaws: int, deeper: float) -> Array:
     return np.stack([yaw, deeper - np.cos(yaw) * deeper, -np.sin(yaw) * deeper, np.zeros_like(yaw)], axis=1)
 
 
-def _finished(
-    source: Shape, target: Shape, motions: Array, scores: Array, reach: float, params: RegistrarParams
-) -> list[ScoredPose]:
+def _finished(source: Shape, target: Shape, motions: Array, scores: Array, reach: float) -> list[ScoredPose]:
     extent = 0.5 * (source.extent + target.extent)
-    numbers, margin = (params.shape_kept, params.shape_climbed, params.shape_rounds), params.shape_margin
+    numbers, margin = (REFINED, CLIMBED, CLIMB_ROUNDS), SCORE_MARGIN
     arrays = source.kernel_arrays, target.kernel_arrays, target.surface.grid
-    found, refined_scores = _finish(*arrays, motions, scores, extent, weights_of(params), numbers, margin, reach)
+    found, refined_scores = _finish(*arrays, motions, scores, extent, weights_of(), numbers, margin, reach)
     order = np.argsort(-refined_scores, kind="stable")
     poses = upright_pose(source, target, found[order])
     return [ScoredPose(T, score) for T, score in zip(poses, refined_scores[order].tolist(), strict=True)]

@@ -24,7 +24,7 @@ def pair():
 
 
 def test_a_furnished_room_leaves_no_degenerate_direction(pair) -> None:
-    found = refine(*pair, TRUTH, PARAMS)
+    found = refine(*pair, TRUTH)
     assert np.allclose(found.information, found.information.T)
     assert np.linalg.eigvalsh(found.information).min() > 0
     assert len(found.degenerate) == 0
@@ -33,7 +33,7 @@ def test_a_furnished_room_leaves_no_degenerate_direction(pair) -> None:
 def test_a_bare_wall_slides_both_ways_and_turns() -> None:
     T = seen_from(0.0, height=0.75)
     wall = prepare(keyframe(T, WALL, noise=0.0003, grey=False), PARAMS)
-    found = refine(wall, wall, np.eye(4), PARAMS)
+    found = refine(wall, wall, np.eye(4))
     assert found.degenerate.shape == (3, 6)
     assert np.allclose(np.linalg.norm(found.degenerate, axis=1), 1.0)
     span = np.linalg.qr(found.degenerate.T)[0]
@@ -53,11 +53,11 @@ def test_information_moves_from_the_target_camera_to_the_source_camera() -> None
 def test_what_a_warped_depth_turns_moves_the_source_camera_along(pair, monkeypatch) -> None:
     T, turns = pose(np.eye(3), np.array([2.0, 0.0, 1.0])), np.diag([0.1, 0.2, 0.3, 0.0, 0.0, 0.01])
     monkeypatch.setattr("objreg_ros.registration.certainty.degeneracy.systematic_depth_error_of_step", lambda *_: turns)
-    C = systematic_depth_error(*pair, T, PARAMS)
+    C = systematic_depth_error(*pair, T)
     assert (C[0, 0], C[1, 1], C[5, 5]) == pytest.approx((0.1, 0.2 + 2.0**2 * 0.01, 0.01))
     assert C[1, 5] == pytest.approx(2.0 * 0.01)  # a turn about z moves what lies along x along y
     known = turns + 1e-3 * np.eye(6)
     monkeypatch.setattr("objreg_ros.registration.certainty.degeneracy.systematic_depth_error_of_step", lambda *_: known)
     np.testing.assert_allclose(
-        systematic_depth_error(*pair, T, PARAMS), np.linalg.inv(about_camera(np.linalg.inv(known), T)), atol=1e-9
+        systematic_depth_error(*pair, T), np.linalg.inv(about_camera(np.linalg.inv(known), T)), atol=1e-9
     )

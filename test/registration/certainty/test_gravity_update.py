@@ -10,10 +10,8 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import pose, pose_error, rotation_angle, rotation_from_vector, skew
-from objreg_ros.registration.certainty.gravity_update import gravity_update
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.certainty.gravity_update import GRAVITY_SIGMA_DEG, gravity_update
 
-PARAMS = RegistrarParams()
 UP = np.array([0.0, -0.8, -0.6])
 TRUE = pose(rotation_from_vector(0.9 * UP), np.array([0.8, 0.1, 0.3]))  # it turns about gravity
 MIDDLE = np.array([0.0, 0.5, 2.5])  # of what was seen, in the target's camera
@@ -38,7 +36,7 @@ def spread() -> np.ndarray:
 
 
 def test_a_tilted_pose_is_levelled_and_brought_back_with_its_position() -> None:
-    found = gravity_update(seen(UP), seen(UP), tilted_about_what_was_seen(), spread(), PARAMS)
+    found = gravity_update(seen(UP), seen(UP), tilted_about_what_was_seen(), spread())
     assert found is not None
     before, after = (pose_error(T, TRUE) for T in (tilted_about_what_was_seen(), found.T))
     assert before[1] > 5.0
@@ -47,14 +45,14 @@ def test_a_tilted_pose_is_levelled_and_brought_back_with_its_position() -> None:
 
 def test_a_pose_that_is_known_stays() -> None:
     sure = np.diag([1e-6] * 3 + [np.radians(0.05) ** 2] * 3)
-    found = gravity_update(seen(UP), seen(UP), tilted_about_what_was_seen(), sure, PARAMS)
+    found = gravity_update(seen(UP), seen(UP), tilted_about_what_was_seen(), sure)
     assert found is not None
     assert pose_error(found.T, tilted_about_what_was_seen())[0] < 0.03 * np.degrees(TILT)
 
 
 def test_gravity_that_one_view_told_hardly_counts() -> None:
     much, little = (
-        gravity_update(seen(UP, weight), seen(UP, weight), tilted_about_what_was_seen(), spread(), PARAMS)
+        gravity_update(seen(UP, weight), seen(UP, weight), tilted_about_what_was_seen(), spread())
         for weight in (1.0, 0.05)
     )
     assert much is not None and little is not None
@@ -63,29 +61,29 @@ def test_gravity_that_one_view_told_hardly_counts() -> None:
 
 
 def test_gravity_says_nothing_of_a_turn_about_itself() -> None:
-    found = gravity_update(seen(UP), seen(UP), TRUE, spread(), PARAMS)
+    found = gravity_update(seen(UP), seen(UP), TRUE, spread())
     assert found is not None
     about = np.concatenate([np.zeros(3), UP])
     assert about @ found.information @ about == pytest.approx(0.0, abs=1e-9)
     across = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
-    assert across @ found.information @ across == pytest.approx(0.5 / np.radians(PARAMS.gravity_noise) ** 2)
+    assert across @ found.information @ across == pytest.approx(0.5 / np.radians(GRAVITY_SIGMA_DEG) ** 2)
 
 
 @pytest.mark.parametrize("weights", [(0.2, 1.0), (1.0, 0.2)])
 def test_what_is_told_is_as_doubtful_as_both_gravities_together(weights: tuple[float, float]) -> None:
-    found = gravity_update(*(seen(UP, weight) for weight in weights), TRUE, spread(), PARAMS)
+    found = gravity_update(*(seen(UP, weight) for weight in weights), TRUE, spread())
     assert found is not None
     across = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
-    doubt = (1.0 / 0.2 + 1.0 / 1.0) * np.radians(PARAMS.gravity_noise) ** 2
+    doubt = (1.0 / 0.2 + 1.0 / 1.0) * np.radians(GRAVITY_SIGMA_DEG) ** 2
     assert across @ found.information @ across == pytest.approx(1.0 / doubt)
 
 
 @pytest.mark.parametrize("weights", [(0.0, 1.0), (1.0, 0.0)])
 def test_gravity_without_weight_tells_nothing(weights: tuple[float, float]) -> None:
-    assert gravity_update(*(seen(UP, weight) for weight in weights), TRUE, spread(), PARAMS) is None
+    assert gravity_update(*(seen(UP, weight) for weight in weights), TRUE, spread()) is None
 
 
 @pytest.mark.parametrize("unknown", ["source", "target"])
 def test_without_gravity_nothing_is_told(unknown: str) -> None:
     views = [seen(None if unknown == name else UP) for name in ("source", "target")]
-    assert gravity_update(*views, TRUE, spread(), PARAMS) is None
+    assert gravity_update(*views, TRUE, spread()) is None

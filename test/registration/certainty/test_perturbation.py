@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose_error, rotation_from_vector, transform
+from objreg_ros.registration.certainty.observability import CLEAR_MARGIN
 from objreg_ros.registration.certainty.perturbation import PerturbedScore, perturbed, square_grid, turned_about
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import prepare
-from objreg_ros.registration.score.view_score import score_views
+from objreg_ros.registration.score.view_score import PHOTOMETRIC_POINTS, score_views
 from registration.rooms import keyframe, seen_from
 
 PARAMS = RegistrarParams()
@@ -20,7 +21,7 @@ ACROSS = np.array([0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 def perturbed_score(grey: bool = True) -> PerturbedScore:
     views = [prepare(keyframe(seen_from(a), grey=grey, seed=k), PARAMS) for k, a in enumerate((0.0, 20.0))]
-    return PerturbedScore(*views, TRUTH, PARAMS)
+    return PerturbedScore(*views, TRUTH)
 
 
 def test_a_perturbation_moves_the_camera_where_it_stands() -> None:
@@ -69,9 +70,9 @@ def test_no_perturbation_is_no_fall() -> None:
 
 def test_a_fall_is_never_less_than_that_of_the_images_own_bands() -> None:
     views = [prepare(keyframe(seen_from(a), seed=k), PARAMS).sight for k, a in enumerate((0.0, 20.0))]
-    own, other = score_views(*views, np.array([TRUTH, perturbed(TRUTH, ACROSS)]), PARAMS, PARAMS.grey_points)
+    own, other = score_views(*views, np.array([TRUTH, perturbed(TRUTH, ACROSS)]), PHOTOMETRIC_POINTS)
     assert perturbed_score().least_margin(ACROSS[None]) >= own - other
 
 
 def test_views_without_grey_are_asked_for_free_space_alone() -> None:
-    assert perturbed_score(grey=False).margin(ACROSS) > PARAMS.rival_margin
+    assert perturbed_score(grey=False).margin(ACROSS) > CLEAR_MARGIN

@@ -7,11 +7,17 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import Array
+from objreg_ros.registration.certainty import sandwich
 from objreg_ros.registration.certainty.sandwich import FREEDOMS, _spread, information, systematic_depth_error_of_step
 from objreg_ros.registration.kernels.closest_points import Surface, prepare_surface
-from objreg_ros.registration.params import RegistrarParams
 
-PARAMS = RegistrarParams(depth_noise=0.002, depth_noise_growth=0.0, covariance_patch=0.25)
+
+@pytest.fixture(autouse=True)
+def even_noise(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Depth that is as noisy far away as near, and small patches."""
+    monkeypatch.setattr(sandwich, "DEPTH_NOISE_M", 0.002)
+    monkeypatch.setattr(sandwich, "DEPTH_NOISE_GROWTH", 0.0)
+    monkeypatch.setattr(sandwich, "PATCH_M", 0.25)
 
 
 def corner(step: float) -> tuple[Array, Array]:
@@ -32,7 +38,7 @@ def shifted(errors: Array) -> Array:
     """The information of a corner whose points lie so far off their walls."""
     xyz, normals = corner(0.05)
     moved = (xyz + errors[:, None] * normals).astype(np.float32)
-    return information(moved, normals.astype(np.float32), grid_of(xyz, normals), np.eye(4), PARAMS)
+    return information(moved, normals.astype(np.float32), grid_of(xyz, normals), np.eye(4))
 
 
 def sigma(found: Array) -> Array:
@@ -75,7 +81,7 @@ def test_errors_that_cancel_within_a_patch_count_as_noise_of_their_size() -> Non
 
     def sigma_ahead(error: float) -> float:
         moved = (xyz + error * turns[:, None] * normals).astype(np.float32)
-        return float(np.sqrt(ahead @ np.linalg.inv(information(moved, flat, surface, np.eye(4), PARAMS)) @ ahead))
+        return float(np.sqrt(ahead @ np.linalg.inv(information(moved, flat, surface, np.eye(4))) @ ahead))
 
     assert sigma_ahead(0.008) > 2.0 * sigma_ahead(0.0)
 
@@ -94,20 +100,21 @@ def test_what_no_point_resists_is_next_to_unknown() -> None:
         normals[wall].astype(np.float32),
         grid_of(xyz[wall], normals[wall]),
         np.eye(4),
-        PARAMS,
     )
     assert found[0, 0] < 2.0 and found[1, 1] < 2.0 and found[2, 2] > 1e6
 
 
 def test_without_partners_nothing_is_known() -> None:
     xyz, normals = (part.astype(np.float32) for part in corner(0.1))
-    assert np.array_equal(information(xyz + 5.0, normals, grid_of(xyz, normals), np.eye(4), PARAMS), np.eye(6))
+    assert np.array_equal(information(xyz + 5.0, normals, grid_of(xyz, normals), np.eye(4)), np.eye(6))
 
 
 def worst_shift(xyz: Array, normals: Array, share: float) -> float:
     """How far a camera at the origin may be, by a warp of so much, that sees oriented points."""
     flat = xyz.astype(np.float32), normals.astype(np.float32)
-    C = systematic_depth_error_of_step(*flat, grid_of(xyz, normals), np.eye(4), PARAMS.replaced(depth_warp=share))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sandwich, "DEPTH_WARP", share)
+        C = systematic_depth_error_of_step(*flat, grid_of(xyz, normals), np.eye(4))
     return float(np.sqrt(np.linalg.eigvalsh(C[:3, :3])[-1]))
 
 
@@ -121,9 +128,10 @@ def test_a_warped_depth_turns_a_camera_more_about_a_small_thing_than_about_a_lar
     assert worst_shift(xyz[near_the_corner], normals[near_the_corner], 0.01) > 1.5 * worst_shift(xyz, normals, 0.01)
 
 
-def test_a_patch_aside_may_lie_off_by_the_share_of_its_distance() -> None:
+def test_a_patch_aside_may_lie_off_by_the_share_of_its_distance(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sandwich, "DEPTH_WARP", 0.01)
     xyz, normals = wall_aside()
     flat = xyz.astype(np.float32), normals.astype(np.float32)
-    C = systematic_depth_error_of_step(*flat, grid_of(xyz, normals), np.eye(4), PARAMS.replaced(depth_warp=0.01))
+    C = systematic_depth_error_of_step(*flat, grid_of(xyz, normals), np.eye(4))
     ahead = ahead_of(xyz)
     assert np.sqrt(ahead @ C @ ahead) == pytest.approx(0.01 * np.linalg.norm(xyz.mean(axis=0)), rel=0.02)

@@ -4,10 +4,8 @@
 from __future__ import annotations
 
 from objreg_ros.registration.candidate import Candidate, ObjectPair
-from objreg_ros.registration.params import RegistrarParams
 from registration.samples import candidate
 
-PARAMS = RegistrarParams()
 CUP = ObjectPair(0, 0, "cup")
 
 

@@ -6,9 +6,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from objreg_ros.data import Reason
+from objreg_ros.registration.certainty.gravity_update import MOST_GRAVITY_ERROR_DEG
 from objreg_ros.registration.gate import competing
+from objreg_ros.registration.gate.limits import LIMITS as GATE
 from objreg_ros.registration.gate.verdict import judge, refuse
-from registration.gate.samples import PARAMS, competitor, lone
+from registration.gate.samples import competitor, lone
 from registration.samples import candidate
 
 LIMITS = competing.Limits(objects=2, several_margin=0.1, lone_margin=0.2)
@@ -34,24 +36,24 @@ def test_a_lone_object_is_asked_for_a_margin_and_for_confirmation() -> None:
 def test_a_lone_object_whose_pose_has_a_competitor_is_refused_whichever_proposers_agree() -> None:
     for proposers in (("objects",), ("features", "objects")):
         one = lone(agreeing_proposers=proposers)
-        refusal = refuse(one, PARAMS, possible=[competitor(one, 0.05)])
+        refusal = refuse(one, possible=[competitor(one, 0.05)])
         assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
 
 
 def test_several_objects_whose_pose_has_a_competitor_that_is_worth_as_much_are_refused() -> None:
     several = candidate()
-    assert len(several.matched) >= PARAMS.min_objects
+    assert len(several.matched) >= GATE.competing.objects
     score = several.verification.score
-    near, far = (candidate(score=score - share * PARAMS.rival_margin) for share in (0.9, 1.1))
-    assert refuse(several, PARAMS, possible=[several, far]) is None
-    refusal = refuse(several, PARAMS, possible=[several, near])
+    near, far = (candidate(score=score - share * GATE.competing.several_margin) for share in (0.9, 1.1))
+    assert refuse(several, possible=[several, far]) is None
+    refusal = refuse(several, possible=[several, near])
     assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE and "2 objects" in refusal[1]
-    impossible = replace(near, gravity_error_deg=2.0 * PARAMS.max_gravity_error)
-    assert judge([several, impossible], PARAMS) is several
+    impossible = replace(near, gravity_error_deg=2.0 * MOST_GRAVITY_ERROR_DEG)
+    assert judge([several, impossible]) is several
 
 
 def test_a_competitor_that_hides_more_is_the_competitor_that_it_were_if_all_of_that_agreed() -> None:
     one = lone()
-    assert refuse(one, PARAMS, possible=[competitor(one, 0.6)]) is None
-    refusal = refuse(one, PARAMS, possible=[competitor(one, 0.6, occluded=0.5)])
+    assert refuse(one, possible=[competitor(one, 0.6)]) is None
+    refusal = refuse(one, possible=[competitor(one, 0.6, occluded=0.5)])
     assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE

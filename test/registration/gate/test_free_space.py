@@ -8,8 +8,9 @@ import pytest
 from objreg_ros.data import Reason
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.gate import free_space
+from objreg_ros.registration.gate.limits import LIMITS as GATE
 from objreg_ros.registration.gate.verdict import refuse
-from registration.gate.samples import CUP, PARAMS
+from registration.gate.samples import CUP
 from registration.samples import candidate
 
 LIMITS = free_space.Limits(violations=0.07, certain_doubtful=0.012, certain_few=0.015)
@@ -42,21 +43,21 @@ def test_a_share_of_violations_is_allowed() -> None:
 
 
 def test_a_lone_object_must_respect_free_space_more_than_several() -> None:
-    far = {"certain_violations": 0.5 * (PARAMS.max_floating_alone + PARAMS.max_floating)}
-    refusal = refuse(candidate(matched=(CUP,), margin_over_competing=1.0, **far), PARAMS)
+    far = {"certain_violations": 0.5 * (GATE.free_space.certain_doubtful + GATE.free_space.certain_few)}
+    refusal = refuse(candidate(matched=(CUP,), margin_over_competing=1.0, **far))
     assert refusal is not None and refusal[0] is Reason.FREE_SPACE
-    assert refuse(candidate(**far), PARAMS) is None
+    assert refuse(candidate(**far)) is None
 
 
 def test_several_objects_that_look_otherwise_may_not_float_either() -> None:
-    far = {"certain_violations": 0.5 * (PARAMS.max_floating_alone + PARAMS.max_floating)}
-    assert refuse(candidate(**far, silhouette_score=0.0), PARAMS) is None
-    refusal = refuse(candidate(**far, silhouette_score=PARAMS.min_likeness_unrivalled - 0.1), PARAMS)
+    far = {"certain_violations": 0.5 * (GATE.free_space.certain_doubtful + GATE.free_space.certain_few)}
+    assert refuse(candidate(**far, silhouette_score=0.0)) is None
+    refusal = refuse(candidate(**far, silhouette_score=GATE.appearance.silhouette_score_with_grey - 0.1))
     assert refusal is not None and refusal[0] is Reason.FREE_SPACE
 
 
 def test_two_objects_may_both_have_moved_but_three_stand_where_they_stood() -> None:
-    far, three = {"certain_violations": 1.1 * PARAMS.max_floating}, tuple(ObjectPair(k, k, "cup") for k in range(3))
-    refusal = refuse(candidate(**far), PARAMS)
+    far, three = 1.1 * GATE.free_space.certain_few, tuple(ObjectPair(k, k, "cup") for k in range(3))
+    refusal = refuse(candidate(certain_violations=far))
     assert refusal is not None and refusal[0] is Reason.FREE_SPACE
-    assert refuse(candidate(**far, matched=three), PARAMS) is None
+    assert refuse(candidate(certain_violations=far, matched=three)) is None

@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 from objreg_ros.data import Reason
+from objreg_ros.registration.certainty.gravity_update import MOST_GRAVITY_ERROR_DEG
 from objreg_ros.registration.gate import gravity
 from objreg_ros.registration.gate.verdict import refuse
-from registration.gate.samples import PARAMS
 from registration.samples import candidate
 
 
@@ -16,8 +16,8 @@ def test_gravity_that_is_unknown_refuses_nothing() -> None:
 
 
 def test_gravity_may_tilt_by_what_the_planes_of_two_views_err_and_no_more() -> None:
-    most = PARAMS.max_gravity_error
+    most = MOST_GRAVITY_ERROR_DEG
     assert most < 4.0
-    assert refuse(candidate(gravity_error_deg=most - 0.1), PARAMS) is None
-    refusal = refuse(candidate(gravity_error_deg=most + 0.1), PARAMS)
+    assert refuse(candidate(gravity_error_deg=most - 0.1)) is None
+    refusal = refuse(candidate(gravity_error_deg=most + 0.1))
     assert refusal is not None and refusal[0] is Reason.GRAVITY

@@ -7,8 +7,10 @@ import pytest
 
 from objreg_ros.data import Reason
 from objreg_ros.registration.gate import lone_object
+from objreg_ros.registration.gate.limits import LIMITS as GATE
 from objreg_ros.registration.gate.verdict import refuse
-from registration.gate.samples import CUP, PARAMS, competitor, lone
+from objreg_ros.registration.propose.evidence import OBJECT_BONUS
+from registration.gate.samples import CUP, competitor, lone
 from registration.samples import candidate
 
 LIMITS = lone_object.Limits(tested=2000, firmness=1.0, yaw_bonus=0.25, objects=2, proposers=2)
@@ -66,25 +68,25 @@ def test_the_appearance_of_a_candidate_is_its_evidence() -> None:
 
 
 def test_one_object_closes_a_loop_when_grey_holds_the_pose_and_no_other_comes_near() -> None:
-    least = PARAMS.min_texture_painted
-    assert refuse(candidate(matched=(CUP,), margin_over_competing=1.0, texture=least + 0.01), PARAMS) is None
+    least = GATE.appearance.correlation
+    assert refuse(candidate(matched=(CUP,), margin_over_competing=1.0, texture=least + 0.01)) is None
     for doubt in ({"margin_over_competing": 0.3}, {"texture": least - 0.01}, {"texture": None}):
-        refusal = refuse(candidate(**{"matched": (CUP,), "margin_over_competing": 1.0, **doubt}), PARAMS)
+        refusal = refuse(candidate(**{"matched": (CUP,), "margin_over_competing": 1.0, **doubt}))
         assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
 
 
 def test_a_lone_object_without_a_yaw_needs_grey_that_tells_it() -> None:
     alone = {"matched": (CUP,), "margin_over_competing": 1.0, "silhouette_score": 0.5}
     for yaw_known, beyond, accepted in ((True, -0.1, True), (False, -0.1, False), (False, 0.01, True)):
-        told = {"yaw_known": yaw_known, "texture": PARAMS.min_texture_painted + beyond}
-        assert (refuse(candidate(**alone, **told), PARAMS) is None) is accepted
+        told = {"yaw_known": yaw_known, "texture": GATE.appearance.correlation + beyond}
+        assert (refuse(candidate(**alone, **told)) is None) is accepted
 
 
 def test_a_lone_object_that_one_proposer_proposed_must_be_seen_with_more_of_the_views() -> None:
     for proposers, tested, accepted in (
-        (("objects",), PARAMS.min_tested_alone - 1, False),
-        (("objects",), PARAMS.min_tested_alone, True),
-        (("features", "objects"), PARAMS.min_tested_alone - 1, True),
+        (("objects",), GATE.lone_object.tested - 1, False),
+        (("objects",), GATE.lone_object.tested, True),
+        (("features", "objects"), GATE.lone_object.tested - 1, True),
     ):
         lone = candidate(
             matched=(CUP,),
@@ -94,19 +96,19 @@ def test_a_lone_object_that_one_proposer_proposed_must_be_seen_with_more_of_the_
             tested=tested,
             yaw_known=True,
         )
-        refusal = refuse(lone, PARAMS)
+        refusal = refuse(lone)
         assert (refusal is None) is accepted, (proposers, tested, refusal)
-        assert refusal is None or (refusal[0] is Reason.LOW_OVERLAP and f"{PARAMS.min_tested_alone}" in refusal[1])
+        assert refusal is None or (refusal[0] is Reason.LOW_OVERLAP and f"{GATE.lone_object.tested}" in refusal[1])
 
 
 def test_a_lone_object_of_one_proposer_needs_views_that_like_it_and_every_perturbation_of_it_less() -> None:
     liked = {
-        "score": 1.2 * PARAMS.min_score_doubtful,
+        "score": 1.2 * GATE.view_score.least_doubtful,
         "margin_over_competing": 1.0,
         "matched": (CUP,),
         "silhouette_score": 0.9,
     }
-    lacking = PARAMS.min_firmness_alone - liked["score"]
+    lacking = GATE.lone_object.firmness - liked["score"]
     for proposers, perturbation_margin, accepted in (
         (("objects",), 0.9 * lacking, False),
         (("centroids", "objects"), 0.9 * lacking, False),
@@ -115,34 +117,32 @@ def test_a_lone_object_of_one_proposer_needs_views_that_like_it_and_every_pertur
         (("objects",), None, True),
         (("features", "objects"), 0.9 * lacking, True),
     ):
-        refusal = refuse(
-            candidate(agreeing_proposers=proposers, perturbation_margin=perturbation_margin, **liked), PARAMS
-        )
+        refusal = refuse(candidate(agreeing_proposers=proposers, perturbation_margin=perturbation_margin, **liked))
         assert (refusal is None) is accepted, (proposers, perturbation_margin, refusal)
         assert refusal is None or refusal[0] is Reason.CHAINS_DISAGREE
 
 
 def test_a_lone_object_that_tells_its_yaw_makes_up_for_a_perturbation_that_is_resisted_less() -> None:
     liked = {
-        "score": 1.2 * PARAMS.min_score_doubtful,
+        "score": 1.2 * GATE.view_score.least_doubtful,
         "margin_over_competing": 1.0,
         "matched": (CUP,),
         "silhouette_score": 0.9,
     }
-    lacking = PARAMS.min_firmness_alone - liked["score"]
+    lacking = GATE.lone_object.firmness - liked["score"]
     for yaw_known, perturbation_margin, accepted in (
-        (True, lacking - 0.9 * PARAMS.object_bonus, True),
-        (True, lacking - 1.1 * PARAMS.object_bonus, False),
-        (False, lacking - 0.9 * PARAMS.object_bonus, False),
+        (True, lacking - 0.9 * OBJECT_BONUS, True),
+        (True, lacking - 1.1 * OBJECT_BONUS, False),
+        (False, lacking - 0.9 * OBJECT_BONUS, False),
     ):
         telling = candidate(
             agreeing_proposers=("objects",), perturbation_margin=perturbation_margin, yaw_known=yaw_known, **liked
         )
-        assert (refuse(telling, PARAMS) is None) is accepted, (yaw_known, perturbation_margin)
+        assert (refuse(telling) is None) is accepted, (yaw_known, perturbation_margin)
 
 
 def test_a_lone_object_that_is_unmistakable_needs_no_second_proposer() -> None:
-    assert refuse(lone(), PARAMS) is None
+    assert refuse(lone()) is None
 
 
 @pytest.mark.parametrize(
@@ -150,18 +150,18 @@ def test_a_lone_object_that_is_unmistakable_needs_no_second_proposer() -> None:
 )
 def test_proposers_that_agree_in_a_plain_room_do_not_speak_for_an_object_that_could_be_another(doubt: dict) -> None:
     doubted = lone(**doubt, margin_over_competing=0.1, agreeing_proposers=("features", "objects"))
-    refusal = refuse(doubted, PARAMS, possible=[competitor(doubted, 0.1)])
+    refusal = refuse(doubted, possible=[competitor(doubted, 0.1)])
     assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
-    assert refuse(lone(**{**doubt, "texture": 0.6, "margin_over_competing": 0.6}), PARAMS) is None
+    assert refuse(lone(**{**doubt, "texture": 0.6, "margin_over_competing": 0.6})) is None
 
 
 def test_an_object_that_looks_otherwise_is_another_however_good_its_pose() -> None:
-    refusal = refuse(lone(silhouette_score=PARAMS.min_likeness_unrivalled - 0.1, margin_over_competing=3.0), PARAMS)
+    refusal = refuse(lone(silhouette_score=GATE.appearance.silhouette_score_with_grey - 0.1, margin_over_competing=3.0))
     assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE
 
 
 def test_without_grey_a_lone_object_has_to_tell_its_yaw_and_look_alike() -> None:
-    assert refuse(lone(texture=None), PARAMS) is None
+    assert refuse(lone(texture=None)) is None
     for doubt in ({"yaw_known": False}, {"silhouette_score": -0.1}):
-        refusal = refuse(lone(texture=None, **doubt), PARAMS)
+        refusal = refuse(lone(texture=None, **doubt))
         assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE

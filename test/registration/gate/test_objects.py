@@ -9,7 +9,6 @@ from objreg_ros.data import Reason
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.gate import objects
 from objreg_ros.registration.gate.verdict import refuse
-from registration.gate.samples import PARAMS
 from registration.samples import candidate
 
 LIMITS = objects.Limits(many=3, proposers=2, silhouette_score=0.0)
@@ -56,4 +55,4 @@ def test_more_moved_than_matched_objects_refuse_and_so_does_none() -> None:
 
 
 def test_a_moved_object_is_outvoted_by_those_that_stayed() -> None:
-    assert refuse(candidate(moved=(ObjectPair(2, 2, "bottle"),)), PARAMS) is None
+    assert refuse(candidate(moved=(ObjectPair(2, 2, "bottle"),))) is None

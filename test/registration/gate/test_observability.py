@@ -9,8 +9,9 @@ import pytest
 from objreg_ros.data import Reason
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.gate import observability
+from objreg_ros.registration.gate.limits import LIMITS as GATE
 from objreg_ros.registration.gate.verdict import refuse
-from registration.gate.samples import PARAMS, lone
+from registration.gate.samples import lone
 from registration.samples import candidate, moved
 
 LIMITS = observability.Limits(
@@ -60,83 +61,83 @@ def systematic_depth_error_of_step(sigma: float) -> dict[str, object]:
 
 def test_two_objects_that_one_proposer_brought_together_leave_more_to_a_perturbation() -> None:
     two, three = (tuple(ObjectPair(k, k, "cup") for k in range(n)) for n in (2, 3))
-    short = PARAMS.rival_margin * (0.5 + 0.5 * PARAMS.doubt_factor)
+    short = GATE.observability.least_margin * (0.5 + 0.5 * GATE.observability.uncertain_factor)
     for matched, proposers, accepted in (
         (two, ("objects",), False),
         (two, ("objects", "odometry"), False),
         (two, ("centroids", "features"), True),
         (three, ("objects",), True),
     ):
-        refusal = refuse(candidate(matched=matched, agreeing_proposers=proposers, perturbation_margin=short), PARAMS)
+        refusal = refuse(candidate(matched=matched, agreeing_proposers=proposers, perturbation_margin=short))
         assert (refusal is None) is accepted, (matched, proposers, refusal)
         assert refusal is None or refusal[0] is Reason.SLACK
 
 
 def test_a_pose_that_a_warped_depth_would_move_far_is_refused_as_sliding() -> None:
     kept, refused = (
-        refuse(candidate(**systematic_depth_error_of_step(PARAMS.max_slack_sigma * share)), PARAMS)
-        for share in (0.9, 1.1)
+        refuse(candidate(**systematic_depth_error_of_step(GATE.observability.sigma_m * share))) for share in (0.9, 1.1)
     )
     assert kept is None
     assert refused is not None and refused[0] is Reason.SLACK
 
 
 def test_the_worse_the_surfaces_hold_a_pose_the_more_the_views_must() -> None:
-    loose, least = systematic_depth_error_of_step(1.5 * PARAMS.max_slack_sigma), 2.25 * PARAMS.rival_margin
-    assert refuse(candidate(**loose, perturbation_margin=least + 0.01), PARAMS) is None
-    assert refuse(candidate(**loose, perturbation_margin=least - 0.01), PARAMS) is not None
+    loose = systematic_depth_error_of_step(1.5 * GATE.observability.sigma_m)
+    least = 2.25 * GATE.observability.least_margin
+    assert refuse(candidate(**loose, perturbation_margin=least + 0.01)) is None
+    assert refuse(candidate(**loose, perturbation_margin=least - 0.01)) is not None
 
 
 @pytest.mark.parametrize("eye", [0.0, 0.4])
 def test_the_farther_away_what_is_seen_the_more_the_views_must_hold_it(eye: float) -> None:
     """Far from both cameras in the mean: the other one stands ``eye`` nearer."""
     for share, least in ((0.9, 1.0), (1.0, 1.0), (1.4, 1.96)):
-        middle = np.array([0.0, 0.0, share * PARAMS.far_range + eye / 2.0])
+        middle = np.array([0.0, 0.0, share * GATE.observability.range_m + eye / 2.0])
         seen = {"T": moved(0.0, 0.0, eye), "middle": middle}
-        assert refuse(candidate(**seen, perturbation_margin=1.01 * least * PARAMS.rival_margin), PARAMS) is None
-        refusal = refuse(candidate(**seen, perturbation_margin=0.99 * least * PARAMS.rival_margin), PARAMS)
+        assert refuse(candidate(**seen, perturbation_margin=1.01 * least * GATE.observability.least_margin)) is None
+        refusal = refuse(candidate(**seen, perturbation_margin=0.99 * least * GATE.observability.least_margin))
         assert refusal is not None and refusal[0] is Reason.SLACK
-    assert refuse(candidate(middle=np.array([0.0, 0.0, 1.4 * PARAMS.far_range])), PARAMS) is None  # not perturbed
+    assert refuse(candidate(middle=np.array([0.0, 0.0, 1.4 * GATE.observability.range_m]))) is None  # not perturbed
 
 
 def test_of_distance_and_what_surfaces_know_the_worse_counts() -> None:
     far = {
-        "middle": np.array([0.0, 0.0, 1.2 * PARAMS.far_range]),
-        **systematic_depth_error_of_step(1.5 * PARAMS.max_slack_sigma),
+        "middle": np.array([0.0, 0.0, 1.2 * GATE.observability.range_m]),
+        **systematic_depth_error_of_step(1.5 * GATE.observability.sigma_m),
     }
-    assert refuse(candidate(**far, perturbation_margin=2.3 * PARAMS.rival_margin), PARAMS) is None
-    assert refuse(candidate(**far, perturbation_margin=2.2 * PARAMS.rival_margin), PARAMS) is not None
-    far["middle"] = np.array([0.0, 0.0, 1.6 * PARAMS.far_range])
-    assert refuse(candidate(**far, perturbation_margin=2.5 * PARAMS.rival_margin), PARAMS) is not None
+    assert refuse(candidate(**far, perturbation_margin=2.3 * GATE.observability.least_margin)) is None
+    assert refuse(candidate(**far, perturbation_margin=2.2 * GATE.observability.least_margin)) is not None
+    far["middle"] = np.array([0.0, 0.0, 1.6 * GATE.observability.range_m])
+    assert refuse(candidate(**far, perturbation_margin=2.5 * GATE.observability.least_margin)) is not None
 
 
 def test_several_objects_that_look_otherwise_leave_more_to_the_views() -> None:
-    least = PARAMS.rival_margin
+    least = GATE.observability.least_margin
     several = {"matched": (ObjectPair(0, 0, "cup"), ObjectPair(1, 1, "book")), "perturbation_margin": 1.2 * least}
-    assert refuse(candidate(**several, silhouette_score=0.1), PARAMS) is None
-    refusal = refuse(candidate(**several, silhouette_score=-0.1), PARAMS)
+    assert refuse(candidate(**several, silhouette_score=0.1)) is None
+    refusal = refuse(candidate(**several, silhouette_score=-0.1))
     assert refusal is not None and refusal[0] is Reason.SLACK
-    assert refuse(candidate(**{**several, "perturbation_margin": 2.0 * least}, silhouette_score=-0.1), PARAMS) is None
+    assert refuse(candidate(**{**several, "perturbation_margin": 2.0 * least}, silhouette_score=-0.1)) is None
 
 
 def test_several_objects_may_be_what_they_are_a_little_aside_and_a_lone_one_may_not() -> None:
-    aside = {"silhouette_score": -1.0, "perturbation_margin": 1.2 * PARAMS.rival_margin}
-    assert refuse(candidate(**aside, silhouette_score_nearby=0.1), PARAMS) is None
-    assert refuse(candidate(**aside), PARAMS) is not None
-    assert refuse(lone(silhouette_score=-1.0, silhouette_score_nearby=0.1), PARAMS) is not None
+    aside = {"silhouette_score": -1.0, "perturbation_margin": 1.2 * GATE.observability.least_margin}
+    assert refuse(candidate(**aside, silhouette_score_nearby=0.1)) is None
+    assert refuse(candidate(**aside)) is not None
+    assert refuse(lone(silhouette_score=-1.0, silhouette_score_nearby=0.1)) is not None
 
 
 def test_a_pose_that_the_views_hold_firmly_is_known_however_badly_the_surfaces_know_it() -> None:
-    badly, firm = systematic_depth_error_of_step(10.0 * PARAMS.max_slack_sigma), PARAMS.firm_margin
-    assert refuse(candidate(**badly, perturbation_margin=firm + 0.01), PARAMS) is None
-    refusal = refuse(candidate(**badly, perturbation_margin=firm - 0.01), PARAMS)
+    badly, firm = systematic_depth_error_of_step(10.0 * GATE.observability.sigma_m), GATE.observability.firm_margin
+    assert refuse(candidate(**badly, perturbation_margin=firm + 0.01)) is None
+    refusal = refuse(candidate(**badly, perturbation_margin=firm - 0.01))
     assert refusal is not None and refusal[0] is Reason.SLACK
 
 
 @pytest.mark.parametrize("direction", [0, 5])
 def test_a_direction_that_nothing_holds_is_refused_however_firmly_the_rest_is_held(direction: int) -> None:
-    firm = {"perturbation_margin": 2.0 * PARAMS.firm_margin, "score": 1.0}
-    assert refuse(candidate(**firm), PARAMS) is None
-    refusal = refuse(candidate(**firm, degenerate=np.eye(6)[direction : direction + 1]), PARAMS)
+    firm = {"perturbation_margin": 2.0 * GATE.observability.firm_margin, "score": 1.0}
+    assert refuse(candidate(**firm)) is None
+    refusal = refuse(candidate(**firm, degenerate=np.eye(6)[direction : direction + 1]))
     assert refusal is not None and refusal[0] is Reason.SLACK
     assert "1 of 6" in refusal[1]

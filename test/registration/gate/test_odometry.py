@@ -11,9 +11,9 @@ import pytest
 from objreg_ros.data import Reason
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.registration.gate import odometry
+from objreg_ros.registration.gate.limits import LIMITS
 from objreg_ros.registration.gate.verdict import refuse
 from objreg_ros.registration.propose.prior import Prior
-from registration.gate.samples import PARAMS
 from registration.samples import candidate, moved
 
 
@@ -33,16 +33,16 @@ def _prior(x: float, trusted: bool = True) -> Prior:
 
 
 def test_a_pose_far_from_odometry_is_refused_unless_it_is_our_own_tracking() -> None:
-    assert refuse(candidate(), PARAMS, _prior(0.05)) is None
-    assert refuse(candidate(), PARAMS, _prior(1.0, trusted=False)) is None
-    refusal = refuse(candidate(), PARAMS, _prior(1.0))
+    assert refuse(candidate(), _prior(0.05)) is None
+    assert refuse(candidate(), _prior(1.0, trusted=False)) is None
+    refusal = refuse(candidate(), _prior(1.0))
     assert refusal is not None and refusal[0] is Reason.ODOMETRY
 
 
 @pytest.mark.parametrize(("beyond", "accepted"), [(0.9, True), (1.1, False)])
 def test_odometry_refuses_a_turn_as_well_as_a_shift_beyond_its_sigmas(beyond: float, accepted: bool) -> None:
-    sigmas = beyond * PARAMS.odometry_sigmas
+    sigmas = beyond * LIMITS.odometry_sigmas
     turned = pose(rotation_from_vector(np.radians([0.0, sigmas * 1.0, 0.0])), np.zeros(3))
     for prior in (_prior(sigmas * 0.05), replace(_prior(0.0), T_target_source=turned)):
-        refusal = refuse(candidate(), PARAMS, prior)
+        refusal = refuse(candidate(), prior)
         assert (refusal is None) is accepted and (accepted or refusal[0] is Reason.ODOMETRY)

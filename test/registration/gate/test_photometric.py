@@ -6,8 +6,9 @@ from __future__ import annotations
 from objreg_ros.data import Reason
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.gate import photometric
+from objreg_ros.registration.gate.limits import LIMITS
 from objreg_ros.registration.gate.verdict import refuse
-from registration.gate.samples import PARAMS
+from objreg_ros.registration.propose.evidence import MANY_MATCHES
 from registration.samples import candidate
 
 
@@ -29,9 +30,9 @@ def test_the_correlation_may_fall_by_so_much_without_the_objects() -> None:
 
 
 def test_a_plain_table_needs_no_print_where_several_objects_stand_where_they_should() -> None:
-    several = tuple(ObjectPair(k, k, "cup") for k in range(PARAMS.min_objects_plain))
-    plain = {"texture": 0.5 * PARAMS.min_texture}
-    assert refuse(candidate(matched=several, **plain), PARAMS) is None
+    several = tuple(ObjectPair(k, k, "cup") for k in range(MANY_MATCHES))
+    plain = {"texture": 0.5 * LIMITS.correlation}
+    assert refuse(candidate(matched=several, **plain)) is None
     for evidence in ({"matched": several[:-1], **plain}, {"matched": several, "texture": -0.1}):
-        refusal = refuse(candidate(**evidence), PARAMS)
+        refusal = refuse(candidate(**evidence))
         assert refusal is not None and refusal[0] is Reason.TEXTURE

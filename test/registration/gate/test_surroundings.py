@@ -10,9 +10,10 @@ import pytest
 from objreg_ros.data import Reason
 from objreg_ros.registration.candidate import ObjectPair, Verification
 from objreg_ros.registration.gate import overlap, surroundings
+from objreg_ros.registration.gate.limits import LIMITS as GATE
 from objreg_ros.registration.gate.objects import Objects
 from objreg_ros.registration.gate.verdict import refuse
-from registration.gate.samples import CUP, PARAMS
+from registration.gate.samples import CUP
 from registration.samples import candidate
 
 LIMITS = surroundings.Limits(
@@ -56,9 +57,9 @@ def test_only_a_lone_object_must_leave_a_share_of_the_views() -> None:
     ("around", "reason"),
     [
         ({"texture": -0.1}, Reason.TEXTURE),
-        ({"violations": 1.1 * PARAMS.max_violations}, Reason.FREE_SPACE),
-        ({"inliers": 0.5 * PARAMS.min_inliers}, Reason.LOW_OVERLAP),
-        ({"tested": PARAMS.min_tested - 1}, Reason.LOW_OVERLAP),
+        ({"violations": 1.1 * GATE.surroundings.violations}, Reason.FREE_SPACE),
+        ({"inliers": 0.5 * GATE.overlap.inliers}, Reason.LOW_OVERLAP),
+        ({"tested": GATE.overlap.tested - 1}, Reason.LOW_OVERLAP),
         ({"score": -1.0}, None),  # what is little scores little
         ({}, None),
     ],
@@ -70,7 +71,7 @@ def test_what_is_around_few_objects_must_agree_by_itself(
     few = candidate(
         matched=matched, margin_over_competing=1.0, surroundings=replace(candidate().verification, **around)
     )
-    refusal = refuse(few, PARAMS)
+    refusal = refuse(few)
     assert (None if refusal is None else refusal[0]) is reason
     assert refusal is None or refusal[1].startswith(
         ("without the cup ", "without the cup and the book ")[len(matched) - 1]
@@ -92,12 +93,12 @@ def test_few_objects_around_which_the_print_agrees_much_less_have_moved(
             "silhouette_score": 0.9,
         }
         surroundings = replace(seen, texture=around)
-        return refuse(candidate(**told, texture=whole, perturbation_margin=1.0, surroundings=surroundings), PARAMS)
+        return refuse(candidate(**told, texture=whole, perturbation_margin=1.0, surroundings=surroundings))
 
-    assert judged(0.6 - 0.9 * PARAMS.max_fall_around) is None
+    assert judged(0.6 - 0.9 * GATE.surroundings.correlation_loss) is None
     assert judged(0.99) is None
     assert judged(None) is None and judged(None, None) is None
-    refusal = judged(0.6 - 1.1 * PARAMS.max_fall_around)
+    refusal = judged(0.6 - 1.1 * GATE.surroundings.correlation_loss)
     assert isinstance(refusal, tuple) and refusal[0] is Reason.TEXTURE and "without the cup" in refusal[1]
 
 
@@ -109,7 +110,7 @@ def test_a_lone_object_that_one_proposer_proposed_must_leave_something_of_the_vi
         (("objects",), 1.1, True),
         (("features", "objects"), 0.9, True),
     ):
-        around = replace(seen, tested=round(share * PARAMS.min_surroundings * seen.tested))
+        around = replace(seen, tested=round(share * GATE.surroundings.share * seen.tested))
         lone = candidate(
             matched=(CUP,),
             margin_over_competing=1.0,
@@ -118,6 +119,6 @@ def test_a_lone_object_that_one_proposer_proposed_must_leave_something_of_the_vi
             surroundings=around,
             yaw_known=True,
         )
-        refusal = refuse(lone, PARAMS)
+        refusal = refuse(lone)
         assert (refusal is None) is accepted, (proposers, share, refusal)
         assert refusal is None or (refusal[0] is Reason.LOW_OVERLAP and "without the cup" in refusal[1])

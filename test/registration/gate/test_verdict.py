@@ -8,12 +8,12 @@ import pytest
 
 from objreg_ros.data import Reason
 from objreg_ros.registration.gate.verdict import judge, refuse
-from registration.gate.samples import CUP, PARAMS, competitor, lone
+from registration.gate.samples import CUP, competitor, lone
 from registration.samples import candidate, moved
 
 
 def test_a_candidate_that_nothing_speaks_against_is_accepted() -> None:
-    assert refuse(candidate(), PARAMS) is None
+    assert refuse(candidate()) is None
 
 
 @pytest.mark.parametrize(
@@ -37,42 +37,42 @@ def test_a_candidate_that_nothing_speaks_against_is_accepted() -> None:
     ],
 )
 def test_each_kind_of_evidence_alone_can_refuse(evidence: dict[str, object], reason: Reason) -> None:
-    refusal = refuse(candidate(**evidence), PARAMS)
+    refusal = refuse(candidate(**evidence))
     assert refusal is not None and refusal[0] is reason
     assert any(letter.isdigit() for letter in refusal[1])
 
 
 def test_a_candidate_without_grey_or_gravity_is_judged_by_the_rest() -> None:
-    assert refuse(candidate(texture=None, gravity_error_deg=None), PARAMS) is None
+    assert refuse(candidate(texture=None, gravity_error_deg=None)) is None
 
 
 def test_two_objects_make_up_for_a_proposer_that_is_alone() -> None:
-    assert refuse(candidate(agreeing_proposers=("features",)), PARAMS) is None
+    assert refuse(candidate(agreeing_proposers=("features",))) is None
 
 
 def test_the_second_candidate_is_taken_when_the_first_is_refused() -> None:
     good = candidate()
-    assert judge((candidate(violations=0.4), good), PARAMS) is good
+    assert judge((candidate(violations=0.4), good)) is good
 
 
 def test_the_refusal_is_that_of_the_best_candidate() -> None:
-    verdict = judge((candidate(violations=0.4), candidate(texture=-1.0)), PARAMS)
+    verdict = judge((candidate(violations=0.4), candidate(texture=-1.0)))
     assert isinstance(verdict, tuple) and verdict[0] is Reason.FREE_SPACE
 
 
 def test_the_best_candidate_is_the_first_whatever_views_like_more() -> None:
     good = candidate(score=0.6)
-    assert judge((candidate(violations=0.4, score=0.6), good, candidate(violations=0.4, score=0.9)), PARAMS) is good
+    assert judge((candidate(violations=0.4, score=0.6), good, candidate(violations=0.4, score=0.9))) is good
 
 
 def test_no_candidate_at_all_is_no_hypothesis() -> None:
-    verdict = judge((), PARAMS)
+    verdict = judge(())
     assert isinstance(verdict, tuple) and verdict[0] is Reason.NO_HYPOTHESIS
 
 
 def test_an_alias_does_not_stand_in_for_a_refused_best_candidate() -> None:
     alias = candidate(score=0.5)
-    assert judge((candidate(violations=0.4, score=0.9), alias), PARAMS) is not alias
+    assert judge((candidate(violations=0.4, score=0.9), alias)) is not alias
 
 
 @pytest.mark.parametrize(
@@ -80,5 +80,5 @@ def test_an_alias_does_not_stand_in_for_a_refused_best_candidate() -> None:
 )
 def test_a_pose_that_cannot_be_true_is_no_rival(against: dict) -> None:
     one = lone()
-    assert isinstance(judge((one, competitor(one, 0.05)), PARAMS), tuple)
-    assert judge((one, competitor(one, 0.05, **against)), PARAMS) is one
+    assert isinstance(judge((one, competitor(one, 0.05))), tuple)
+    assert judge((one, competitor(one, 0.05, **against))) is one

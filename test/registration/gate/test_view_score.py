@@ -10,8 +10,11 @@ import pytest
 from objreg_ros.data import Reason
 from objreg_ros.registration.candidate import ObjectPair, Verification
 from objreg_ros.registration.gate import view_score
+from objreg_ros.registration.gate.limits import LIMITS as GATE
 from objreg_ros.registration.gate.verdict import refuse
-from registration.gate.samples import CUP, PARAMS
+from objreg_ros.registration.propose.evidence import CONSIDERED_MARGIN
+from objreg_ros.registration.score.view_score import LEAST_SCORE
+from registration.gate.samples import CUP
 from registration.samples import candidate
 
 LIMITS = view_score.Limits(least=0.1, least_doubtful=0.4, violations=0.02, firm_margin=0.4, silhouette_weight=0.5)
@@ -45,49 +48,51 @@ def test_silhouettes_add_to_a_view_score_that_is_high_enough_by_itself() -> None
 
 
 def test_where_something_floats_the_fall_over_a_perturbation_makes_up_for_a_low_score() -> None:
-    certain_violations = 1.5 * PARAMS.max_violations_doubtful
+    certain_violations = 1.5 * GATE.view_score.violations
     little = {
-        "score": 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful),
+        "score": 0.5 * (LEAST_SCORE + GATE.view_score.least_doubtful),
         "margin_over_competing": 1.0,
         "violations": certain_violations,
     }
-    lacking = PARAMS.firm_margin - (little["score"] - PARAMS.min_score)
+    lacking = GATE.observability.firm_margin - (little["score"] - LEAST_SCORE)
     for matched, perturbation_margin, accepted in (
         ((CUP,), 0.9 * lacking, False),
         ((CUP,), 1.1 * lacking, True),
         ((CUP,), None, True),
         ((CUP, ObjectPair(1, 1, "book")), 0.9 * lacking, False),
     ):
-        refusal = refuse(candidate(matched=matched, perturbation_margin=perturbation_margin, **little), PARAMS)
+        refusal = refuse(candidate(matched=matched, perturbation_margin=perturbation_margin, **little))
         assert (refusal is None) is accepted, (matched, perturbation_margin, refusal)
 
 
 def test_a_pose_that_views_like_well_need_not_resist_though_something_floats() -> None:
     certain_violations = {
-        "violations": 1.5 * PARAMS.max_violations_doubtful,
+        "violations": 1.5 * GATE.view_score.violations,
         "matched": (CUP, ObjectPair(1, 1, "book")),
     }
     liked = candidate(
-        score=1.1 * PARAMS.min_score_doubtful, perturbation_margin=1.1 * PARAMS.rival_margin, **certain_violations
+        score=1.1 * GATE.view_score.least_doubtful, perturbation_margin=1.1 * CONSIDERED_MARGIN, **certain_violations
     )
-    assert refuse(liked, PARAMS) is None
+    assert refuse(liked) is None
 
 
 def test_a_lone_object_that_views_like_little_need_not_resist_a_perturbation_where_next_to_nothing_floats() -> None:
     little = {
-        "score": 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful),
+        "score": 0.5 * (LEAST_SCORE + GATE.view_score.least_doubtful),
         "margin_over_competing": 1.0,
         "matched": (CUP,),
     }
     soft = candidate(
-        perturbation_margin=0.9 * PARAMS.firm_margin, violations=0.5 * PARAMS.max_violations_doubtful, **little
+        perturbation_margin=0.9 * GATE.observability.firm_margin,
+        violations=0.5 * GATE.view_score.violations,
+        **little,
     )
-    assert refuse(soft, PARAMS) is None
+    assert refuse(soft) is None
 
 
 def test_a_lone_object_that_views_like_little_needs_two_proposers() -> None:
     little = {
-        "score": 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful),
+        "score": 0.5 * (LEAST_SCORE + GATE.view_score.least_doubtful),
         "margin_over_competing": 1.0,
         "matched": (CUP,),
     }
@@ -95,23 +100,23 @@ def test_a_lone_object_that_views_like_little_needs_two_proposers() -> None:
         ("objects",),
         ("centroids", "objects"),
     ):  # the objects' poses are looked for from their middles too
-        refusal = refuse(candidate(agreeing_proposers=proposers, **little), PARAMS)
+        refusal = refuse(candidate(agreeing_proposers=proposers, **little))
         assert refusal is not None and refusal[0] is Reason.LOW_OVERLAP
-    assert refuse(candidate(agreeing_proposers=("features", "objects"), **little), PARAMS) is None
+    assert refuse(candidate(agreeing_proposers=("features", "objects"), **little)) is None
 
 
 def test_a_lone_object_of_one_proposer_is_refused_where_views_like_too_little_however_alike_it_looks() -> None:
-    firm = {"perturbation_margin": PARAMS.min_firmness_alone, "agreeing_proposers": ("objects",), "matched": (CUP,)}
+    firm = {"perturbation_margin": GATE.lone_object.firmness, "agreeing_proposers": ("objects",), "matched": (CUP,)}
     for score, accepted in ((1.1, True), (0.9, False)):
-        alike = candidate(score=score * PARAMS.min_score, silhouette_score=1.0, margin_over_competing=1.0, **firm)
-        refusal = refuse(alike, PARAMS)
+        alike = candidate(score=score * LEAST_SCORE, silhouette_score=1.0, margin_over_competing=1.0, **firm)
+        refusal = refuse(alike)
         assert (refusal is None) is accepted, (score, refusal)
         assert refusal is None or refusal[0] is Reason.LOW_OVERLAP
 
 
 def test_a_lone_object_of_one_proposer_that_views_like_little_must_resist_a_perturbation() -> None:
-    score = 0.5 * (PARAMS.min_score + PARAMS.min_score_doubtful)
-    for perturbation_margin, accepted in ((PARAMS.min_firmness_alone, True), (0.0, False), (None, False)):
+    score = 0.5 * (LEAST_SCORE + GATE.view_score.least_doubtful)
+    for perturbation_margin, accepted in ((GATE.lone_object.firmness, True), (0.0, False), (None, False)):
         little = {
             "score": score,
             "silhouette_score": 0.0,
@@ -119,25 +124,25 @@ def test_a_lone_object_of_one_proposer_that_views_like_little_must_resist_a_pert
             "matched": (CUP,),
             "agreeing_proposers": ("objects",),
         }
-        refusal = refuse(candidate(perturbation_margin=perturbation_margin, **little), PARAMS)
+        refusal = refuse(candidate(perturbation_margin=perturbation_margin, **little))
         assert (refusal is None) is accepted, (perturbation_margin, refusal)
 
 
 def test_an_object_that_looks_alike_makes_up_for_views_that_like_little() -> None:
     little = {
         "score": 0.2,
-        "violations": 1.5 * PARAMS.max_violations_doubtful,
+        "violations": 1.5 * GATE.view_score.violations,
         "yaw_known": True,
         "margin_over_competing": 1.0,
     }
-    little["perturbation_margin"] = 0.3 * PARAMS.firm_margin
+    little["perturbation_margin"] = 0.3 * GATE.observability.firm_margin
     alike, otherwise = (
         candidate(matched=(CUP,), silhouette_score=silhouette_score, **little) for silhouette_score in (1.0, 0.2)
     )
-    assert refuse(alike, PARAMS) is None
-    refusal = refuse(otherwise, PARAMS)
+    assert refuse(alike) is None
+    refusal = refuse(otherwise)
     assert refusal is not None and refusal[0] is Reason.LOW_OVERLAP
 
 
 def test_an_object_that_looks_otherwise_takes_nothing_from_what_views_like() -> None:
-    assert refuse(candidate(score=1.1 * PARAMS.min_score, silhouette_score=-1.0), PARAMS) is None
+    assert refuse(candidate(score=1.1 * LEAST_SCORE, silhouette_score=-1.0)) is None

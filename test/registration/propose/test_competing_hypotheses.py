@@ -14,17 +14,18 @@ from objreg_ros.data import Array
 from objreg_ros.geometry import inverse, pose, pose_error, transform
 from objreg_ros.registration.candidate import Candidate, ObjectPair
 from objreg_ros.registration.certainty.perturbation import turned_about
+from objreg_ros.registration.kernels.same_pose import AGREEING, STARTS, near
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Prepared, prepare
 from objreg_ros.registration.propose import competing_hypotheses as module
 from objreg_ros.registration.propose.competing_hypotheses import _grid, competing_poses
-from objreg_ros.registration.propose.evidence import gather
-from objreg_ros.registration.propose.pose_voting import near, same_pose
+from objreg_ros.registration.propose.evidence import FINISHED_MARGIN, gather
 from objreg_ros.registration.propose.refinement import refine
 from registration.rooms import ROOM, keyframe, seen_from
 from registration.samples import candidate, moved
 
 PARAMS = RegistrarParams()
+MOST = PARAMS.max_violations
 LONE = tuple(box for box in ROOM if box[0] not in ("book", "cup", "keyboard"))
 TRUTH = inverse(seen_from(20.0)) @ seen_from(0.0)
 CUP = ObjectPair(0, 0, "cup")
@@ -44,9 +45,7 @@ def beside(views: tuple[Prepared, Prepared], turn_deg: float, sideways: float) -
     middle, up = transform(TRUTH, source.centroids[0]), np.asarray(target.up)
     across = np.cross(up, middle) / np.linalg.norm(np.cross(up, middle))
     T = pose(np.eye(3), sideways * across) @ turned_about(TRUTH, middle, up, np.radians([turn_deg]))[0]
-    found = gather(
-        source, target, replace(refine(source, target, TRUTH, PARAMS), T_target_source=T), ("objects",), PARAMS
-    )
+    found = gather(source, target, replace(refine(source, target, TRUTH), T_target_source=T), ("objects",))
     return replace(found, matched=(ObjectPair(0, 0, "bottle"),))
 
 
@@ -58,7 +57,7 @@ def errors(found: list[Array]) -> list[tuple[float, float]]:
 def test_the_truth_is_found_beside_a_wrong_pose(
     views: tuple[Prepared, Prepared], turn_deg: float, sideways: float
 ) -> None:
-    found = competing_poses(*views, beside(views, turn_deg, sideways), PARAMS)
+    found = competing_poses(*views, beside(views, turn_deg, sideways), MOST)
     assert any(degrees < 1.0 and centimetres < 2.0 for degrees, centimetres in errors(found))
 
 
@@ -68,13 +67,13 @@ def test_the_search_begins_where_poses_do_not_agree_with_the_candidate_and_far_f
     monkeypatch.setattr(module, "half_turned", lambda *_: None)
     monkeypatch.setattr(module, "finish", lambda source, target, T, *_: (T, np.zeros((6, 6))))
     monkeypatch.setattr(module, "_is_hopeful", lambda *_: True)
-    params = PARAMS.replaced(searched_around=30)
-    starts = np.array(competing_poses(*views, beside(views, 0.0, 0.0), params))
+    monkeypatch.setattr(module, "REFINED", 30)
+    starts = np.array(competing_poses(*views, beside(views, 0.0, 0.0), MOST))
     middle = views[0].middle
     assert len(starts) == 30
-    assert not same_pose(starts, TRUTH, middle, params).any()
+    assert not near(starts, TRUTH, middle, AGREEING).any()
     for k, start in enumerate(starts):
-        assert np.flatnonzero(near(starts, start, middle, *module.APART)).tolist() == [k]
+        assert np.flatnonzero(near(starts, start, middle, STARTS)).tolist() == [k]
 
 
 def test_what_views_like_far_less_is_no_competing_pose(
@@ -82,8 +81,8 @@ def test_what_views_like_far_less_is_no_competing_pose(
 ) -> None:
     wrong = beside(views, 12.0, 0.1)
     spoiled = replace(wrong.verification, score=5.0)
-    assert competing_poses(*views, wrong, PARAMS)
-    assert competing_poses(*views, replace(wrong, verification=spoiled), PARAMS) == []
+    assert competing_poses(*views, wrong, MOST)
+    assert competing_poses(*views, replace(wrong, verification=spoiled), MOST) == []
 
 
 def test_without_grey_in_both_views_nothing_is_looked_for_around(
@@ -93,14 +92,14 @@ def test_without_grey_in_both_views_nothing_is_looked_for_around(
     source, target = views
     blind_source, blind_target = (replace(view, sight=replace(view.sight, textured=False)) for view in views)
     wrong = beside(views, 12.0, 0.1)
-    assert competing_poses(blind_source, target, wrong, PARAMS) == []
-    assert competing_poses(source, blind_target, wrong, PARAMS) == []
+    assert competing_poses(blind_source, target, wrong, MOST) == []
+    assert competing_poses(source, blind_target, wrong, MOST) == []
 
 
 @pytest.mark.parametrize("matched", [(), (CUP, ObjectPair(1, 1, "book"))])
 def test_none_is_looked_for_where_not_one_object_speaks_for_a_pose(matched: tuple[ObjectPair, ...]) -> None:
     nothing: Any = None
-    assert competing_poses(nothing, nothing, candidate(matched=matched), PARAMS) == []
+    assert competing_poses(nothing, nothing, candidate(matched=matched), MOST) == []
 
 
 def test_without_gravity_and_where_none_are_wanted_nothing_is_looked_for_around(
@@ -109,17 +108,20 @@ def test_without_gravity_and_where_none_are_wanted_nothing_is_looked_for_around(
     monkeypatch.setattr(module, "half_turned", lambda *_: None)
     source, target = views
     wrong = beside(views, 12.0, 0.1)
-    assert competing_poses(source, target, wrong, PARAMS)
-    assert competing_poses(source, replace(target, up=None), wrong, PARAMS) == []
-    assert competing_poses(source, target, wrong, PARAMS.replaced(searched_around=0)) == []
+    assert competing_poses(source, target, wrong, MOST)
+    assert competing_poses(source, replace(target, up=None), wrong, MOST) == []
+    monkeypatch.setattr(module, "REFINED", 0)
+    assert competing_poses(source, target, wrong, MOST) == []
 
 
 def test_the_grid_is_upright_turns_about_the_object_and_shifts_across_the_vertical(
-    views: tuple[Prepared, Prepared],
+    views: tuple[Prepared, Prepared], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     source, target = views
-    one, params = beside(views, 0.0, 0.0), PARAMS.replaced(turns_around=(10.0,), search_step=0.1, search_steps=1)
-    grid = _grid(source, target, one, params)
+    monkeypatch.setattr(module, "TURNS_DEG", (10.0,))
+    monkeypatch.setattr(module, "SEARCH_STEP_M", 0.1)
+    monkeypatch.setattr(module, "SEARCH_STEPS", 1)
+    grid = _grid(source, target, beside(views, 0.0, 0.0))
     steps = np.array([transform(T, source.centroids[0]) - transform(TRUTH, source.centroids[0]) for T in grid])
     lengths = np.linalg.norm(steps, axis=1).reshape(3, 9)
     assert grid.shape == (27, 4, 4)
@@ -129,16 +131,14 @@ def test_the_grid_is_upright_turns_about_the_object_and_shifts_across_the_vertic
     np.testing.assert_allclose(turns, [0.0] * 9 + [10.0] * 18, atol=1e-4)
 
 
-@pytest.mark.parametrize(
-    ("share", "violations", "count"), [(0.9, 0.0, 1), (1.1, 0.0, 0), (0.9, 2.1 * PARAMS.max_violations, 0)]
-)
+@pytest.mark.parametrize(("share", "violations", "count"), [(0.9, 0.0, 1), (1.1, 0.0, 0), (0.9, 2.1 * MOST, 0)])
 def test_a_half_turn_is_hopeful_where_it_is_not_far_behind_nor_floats(
     monkeypatch: pytest.MonkeyPatch, share: float, violations: float, count: int
 ) -> None:
     one, half = candidate(matched=(CUP,), score=0.8, occluded=0.1), moved(0.4)
-    behind = share * PARAMS.finished_margin
+    behind = share * FINISHED_MARGIN
     seen = replace(one.verification, score=0.8 + 0.1 - 0.3 - behind, occluded=0.3, violations=violations)
     monkeypatch.setattr(module, "half_turned", lambda *_: half)
     monkeypatch.setattr(module, "verify", lambda source, target, T, *_: seen if T is half else None)
     blind: Any = SimpleNamespace(sight=SimpleNamespace(textured=False), up=None)
-    assert competing_poses(blind, blind, one, PARAMS) == count * [half]
+    assert competing_poses(blind, blind, one, MOST) == count * [half]

@@ -12,10 +12,12 @@ import pytest
 
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.registration.candidate import ObjectPair
+from objreg_ros.registration.certainty.observability import DOUBTFUL_SIGMA_M
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import prepare
 from objreg_ros.registration.propose import evidence
 from objreg_ros.registration.propose.evidence import (
+    OBJECT_BONUS,
     gather,
     gravity_error_deg,
     margin_over,
@@ -24,6 +26,7 @@ from objreg_ros.registration.propose.evidence import (
     score_objects,
     surroundings_of,
 )
+from objreg_ros.registration.score.comparison import SILHOUETTE_WEIGHT
 from registration import rooms
 from registration.samples import candidate
 
@@ -33,32 +36,32 @@ BOX = (ObjectPair(0, 0, "cereal box"),)
 
 def test_a_candidate_leads_by_what_its_views_are_worth_more() -> None:
     one, other = candidate(score=0.6, matched=BOX), candidate(score=0.4, matched=BOX)
-    assert margin_over(one, [one, other], PARAMS) == pytest.approx(0.2)
-    assert margin_over(other, [one, other], PARAMS) == pytest.approx(-0.2)
+    assert margin_over(one, [one, other]) == pytest.approx(0.2)
+    assert margin_over(other, [one, other]) == pytest.approx(-0.2)
 
 
 def test_what_is_hidden_counts_as_if_it_agreed() -> None:
     one, other = candidate(score=0.6, occluded=0.1), candidate(score=0.4, occluded=0.5)
-    assert margin_over(one, [other], PARAMS) == pytest.approx(-0.2)
+    assert margin_over(one, [other]) == pytest.approx(-0.2)
 
 
 def test_that_an_object_looks_alike_is_no_lead_and_that_it_looks_otherwise_is_none_to_have() -> None:
     alike, unseen, otherwise = (candidate(score=0.5, matched=BOX, silhouette_score=x) for x in (1.0, 0.0, -0.6))
-    assert margin_over(alike, [unseen], PARAMS) == pytest.approx(0.0)
-    assert margin_over(alike, [otherwise], PARAMS) == pytest.approx(0.6 * PARAMS.likeness_weight)
-    assert rank_score(alike, PARAMS) - rank_score(unseen, PARAMS) == pytest.approx(PARAMS.likeness_weight)
+    assert margin_over(alike, [unseen]) == pytest.approx(0.0)
+    assert margin_over(alike, [otherwise]) == pytest.approx(0.6 * SILHOUETTE_WEIGHT)
+    assert rank_score(alike).total - rank_score(unseen).total == pytest.approx(SILHOUETTE_WEIGHT)
 
 
 def test_objects_that_stand_add_to_what_views_say_and_those_that_moved_take_away() -> None:
-    assert score_objects(BOX, (), None, PARAMS) == pytest.approx(PARAMS.object_bonus)
-    assert score_objects(BOX, BOX, 0.0, PARAMS) == pytest.approx(0.0)
-    assert score_objects(3 * BOX, 3 * BOX, 0.0, PARAMS) == pytest.approx(0.0)  # two say all
-    assert score_objects(BOX, 3 * BOX, 0.0, PARAMS) == pytest.approx(-PARAMS.object_bonus)
+    assert score_objects(BOX, (), None) == pytest.approx((OBJECT_BONUS, 0.0))
+    assert score_objects(BOX, BOX, 0.0) == pytest.approx((0.0, 0.0))
+    assert score_objects(3 * BOX, 3 * BOX, 0.0) == pytest.approx((0.0, 0.0))  # two say all
+    assert score_objects(BOX, 3 * BOX, 0.0) == pytest.approx((-OBJECT_BONUS, 0.0))
 
 
 def test_without_a_competitor_a_candidate_leads_by_more_than_any_limit() -> None:
-    assert margin_over(candidate(), [], PARAMS) > 2.0
-    assert np.isfinite(margin_over(candidate(), [], PARAMS))
+    assert margin_over(candidate(), []) > 2.0
+    assert np.isfinite(margin_over(candidate(), []))
 
 
 def test_a_pose_is_perturbed_where_surfaces_or_a_warped_depth_leave_it_doubtful(
@@ -66,12 +69,12 @@ def test_a_pose_is_perturbed_where_surfaces_or_a_warped_depth_leave_it_doubtful(
 ) -> None:
     perturbations: list[tuple[Any, ...]] = []
     monkeypatch.setattr(evidence, "margin_under_perturbation", lambda *given: perturbations.append(given) or 0.25)
-    variance = (2.0 * PARAMS.doubtful_sigma) ** 2
+    variance = (2.0 * DOUBTFUL_SIGMA_M) ** 2
     warped = {"systematic_depth_error": np.diag([variance, 0, 0, 0, 0, 0])}
     degenerate = {"information": np.diag([1.0 / variance, 1e6, 1e6, 1e6, 1e6, 1e6])}
     for doubtful, resists in (({}, None), (warped, 0.25), (degenerate, 0.25)):
         views: Any = ("source", "target")
-        assert perturbation_margin_of(candidate(**doubtful), *views, PARAMS) == resists
+        assert perturbation_margin_of(candidate(**doubtful), *views) == resists
     assert [given[:2] for given in perturbations] == [views, views]
     assert [given[3][0, 0] for given in perturbations] == pytest.approx([variance, variance], rel=0.2)
 
@@ -80,7 +83,7 @@ def test_a_pose_is_perturbed_where_surfaces_or_a_warped_depth_leave_it_doubtful(
 def test_a_yaw_is_known_where_the_object_tells_it_in_both_views(here: bool, there: bool) -> None:
     ready = prepare(rooms.keyframe(rooms.seen_from(0.0)), PARAMS)
     views = (replace(ready, yaw_known=(told,) * len(ready.yaw_known)) for told in (here, there))
-    found = gather(*views, candidate().alignment, ("features",), PARAMS)
+    found = gather(*views, candidate().alignment, ("features",))
     assert found.matched and found.yaw_known is (here and there)
 
 
@@ -96,8 +99,8 @@ def test_the_views_are_asked_without_the_objects_where_those_are_few(monkeypatch
     target: Any = SimpleNamespace(sight="b", own=(second, first, first))
     cup, book, can = ObjectPair(0, 1, "cup"), ObjectPair(1, 0, "book"), ObjectPair(2, 2, "soda can")
     for matched, told in (((cup,), "without"), ((cup, book), "without"), ((cup, book, can), None), ((), None)):
-        assert surroundings_of(candidate(matched=matched), source, target, PARAMS) == told
-    for (*views, own, T, _), pixels in zip(asked, ((first, first), (both, both)), strict=True):
+        assert surroundings_of(candidate(matched=matched), source, target) == told
+    for (*views, own, T), pixels in zip(asked, ((first, first), (both, both)), strict=True):
         assert views == ["a", "b"] and np.array_equal(own, pixels)
         assert np.array_equal(T, candidate().T_target_source)
 

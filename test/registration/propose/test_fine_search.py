@@ -13,8 +13,9 @@ from objreg_ros.geometry import inverse, transform
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import prepare
-from objreg_ros.registration.propose.fine_search import ALONG, FineSearch, score_views_sharply
-from objreg_ros.registration.score.view_score import WORST, count_both_ways, verify
+from objreg_ros.registration.propose import fine_search as fine_search_module
+from objreg_ros.registration.propose.fine_search import ALONG, SEARCHED, FineSearch, score_views_sharply
+from objreg_ros.registration.score.view_score import RANKING_POINTS, WORST, count_both_ways, verify
 from objreg_ros.registration.shapes.shape import upright_motion, upright_pose
 from objreg_ros.registration.shapes.silhouette_score import score_silhouettes
 from registration.drawn_shapes import ELL, error, from_side, keyframe
@@ -37,7 +38,7 @@ def looked():
     a, b = source.shapes[0], target.shapes[0]
     assert a is not None and b is not None
     truth = upright_motion(a, b, inverse(from_side(0.0)) @ from_side(ANGLE))
-    return FineSearch(source, target, a, b, PARAMS), truth, lambda motion: error(upright_pose(a, b, motion), ANGLE, 0.0)
+    return FineSearch(source, target, a, b), truth, lambda motion: error(upright_pose(a, b, motion), ANGLE, 0.0)
 
 
 @pytest.mark.parametrize("off", [(0.15, 0.0, 0.0), (0.0, 0.06, 0.0), (0.0, 0.0, -0.06), (np.pi, 0.0, 0.0)])
@@ -51,22 +52,21 @@ def test_a_motion_under_which_the_views_do_not_meet_is_worth_least(looked) -> No
     assert fine_search.of(truth + np.array([0.0, 30.0, 0.0, 0.0])) == WORST
 
 
-def test_a_motion_is_worth_what_the_views_and_the_shapes_like_and_what_is_hidden_less_what_floats(looked) -> None:
+def test_a_motion_is_worth_what_the_views_and_the_shapes_like_and_what_is_hidden_less_what_floats(
+    looked, monkeypatch: pytest.MonkeyPatch
+) -> None:
     fine_search, truth, _ = looked
     motion = truth + np.array([0.0, 0.06, 0.0, 0.0])
     (source, target), (a, b), T = fine_search._views, fine_search._shapes, upright_pose(*fine_search._shapes, motion)
-    seen = verify(source.sight, target.sight, T, PARAMS, PARAMS.quick_sample)
-    ways = count_both_ways(source.sight, target.sight, T[None], PARAMS, PARAMS.quick_sample)
-    (view_score,) = score_views_sharply(source, target, T[None], ways, PARAMS, PARAMS.quick_sample)
+    seen = verify(source.sight, target.sight, T, RANKING_POINTS)
+    ways = count_both_ways(source.sight, target.sight, T[None], RANKING_POINTS)
+    (view_score,) = score_views_sharply(source, target, T[None], ways, RANKING_POINTS)
     assert seen.occluded > 0.05 and seen.violations > 0.01
     for silhouette_score, violations in ((0.0, 0.0), (2.0, 0.0), (0.0, 3.0)):
-        weighed = PARAMS.replaced(upright_likeness=silhouette_score, upright_violations=violations)
-        more = (
-            silhouette_score * np.clip(score_silhouettes(a, b, motion, PARAMS), -1.0, 1.0)
-            - violations * seen.violations
-        )
-        scores = FineSearch(source, target, a, b, weighed).of(motion)
-        assert scores == pytest.approx(view_score + seen.occluded + more, abs=1e-6)
+        monkeypatch.setattr(fine_search_module, "SILHOUETTE_WEIGHT_UPRIGHT", silhouette_score)
+        monkeypatch.setattr(fine_search_module, "VIOLATION_WEIGHT_UPRIGHT", violations)
+        more = silhouette_score * np.clip(score_silhouettes(a, b, motion), -1.0, 1.0) - violations * seen.violations
+        assert FineSearch(source, target, a, b).of(motion) == pytest.approx(view_score + seen.occluded + more, abs=1e-6)
 
 
 def test_a_thing_may_stand_farther_or_nearer_by_a_share_of_the_mean_of_both_extents(looked) -> None:
@@ -91,7 +91,7 @@ def test_it_leaves_the_motions_that_it_was_given_as_they_were(looked) -> None:
     kept = start.copy()
     motions, scores = fine_search.improved(start[None])
     assert np.array_equal(start, kept)
-    assert scores.max() >= fine_search.of(start) and 1 <= len(motions) == len(scores) <= PARAMS.scrutinised
+    assert scores.max() >= fine_search.of(start) and 1 <= len(motions) == len(scores) <= SEARCHED
 
 
 def test_what_is_hopeless_is_not_climbed(looked) -> None:

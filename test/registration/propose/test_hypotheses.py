@@ -12,7 +12,10 @@ from objreg_ros.geometry import inverse, is_rigid, pose_error, rotate, transform
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.fpfh import Features
 from objreg_ros.registration.prepare.prepared import Prepared, prepare
+from objreg_ros.registration.propose import hypotheses
 from objreg_ros.registration.propose.hypotheses import (
+    HYPOTHESES_PER_OBJECT,
+    YAW_STEPS,
     from_centroids,
     from_features,
     from_objects,
@@ -57,25 +60,23 @@ def nearest(poses: list[np.ndarray]) -> tuple[float, float]:
 def test_the_true_pose_is_among_the_first_that_a_proposer_proposes(
     room: tuple[Prepared, Prepared], proposer: str, degrees: float, centimetres: float
 ) -> None:
-    found = CHAINS[proposer](*room, PARAMS)
+    found = CHAINS[proposer](*room)
     assert {one.proposer for one in found} == {proposer}
     rotation, distance = nearest([one.T_target_source for one in found[:10]])
     assert rotation < degrees and distance < centimetres
 
 
 def test_a_lone_object_proposes_a_pose_near_the_true_one(lone: tuple[Prepared, Prepared]) -> None:
-    found = from_objects(*lone, PARAMS)
+    found = from_objects(*lone)
     assert len(lone[0].groups) == len(lone[1].groups) == 1
     rotation, distance = nearest([one.T_target_source for one in found[:5]])
-    assert (
-        rotation < 180 / PARAMS.yaw_steps + 2 and distance < 30
-    )  # the middle of what is seen of it moves with the side
+    assert rotation < 180 / YAW_STEPS + 2 and distance < 30  # the middle of what is seen of it moves with the side
 
 
 @pytest.mark.parametrize("proposer", CHAINS)
 def test_every_pose_keeps_gravity(room: tuple[Prepared, Prepared], proposer: str) -> None:
     source, target = room
-    found = CHAINS[proposer](source, target, PARAMS)
+    found = CHAINS[proposer](source, target)
     assert source.up is not None and target.up is not None and found
     assert source.up @ target.up < np.cos(np.radians(5.0))
     for one in found:
@@ -85,15 +86,17 @@ def test_every_pose_keeps_gravity(room: tuple[Prepared, Prepared], proposer: str
 
 def test_every_pose_of_an_object_lays_it_upon_one_of_its_kind(room: tuple[Prepared, Prepared]) -> None:
     source, target = room
-    found, pairs = from_objects(source, target, PARAMS), look_alikes(source, target)
-    assert len(found) == PARAMS.seeds_per_object_chain
+    found, pairs = from_objects(source, target), look_alikes(source, target)
+    assert len(found) == HYPOTHESES_PER_OBJECT
     for one in found:
         there = transform(one.T_target_source, source.centroids)
         assert min(np.linalg.norm(there[i] - target.centroids[j]) for i, j in pairs) < 1e-9
 
 
-def test_a_lone_object_is_turned_to_every_yaw(lone: tuple[Prepared, Prepared]) -> None:
-    found = from_objects(*lone, PARAMS.replaced(yaw_steps=8, seeds_per_object_chain=99))
+def test_a_lone_object_is_turned_to_every_yaw(lone: tuple[Prepared, Prepared], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hypotheses, "YAW_STEPS", 8)
+    monkeypatch.setattr(hypotheses, "HYPOTHESES_PER_OBJECT", 99)
+    found = from_objects(*lone)
     first = found[0].T_target_source[:3, :3]
     cosines = [np.clip(0.5 * (np.trace(first.T @ one.T_target_source[:3, :3]) - 1), -1, 1) for one in found]
     angles = np.degrees(np.arccos(cosines))
@@ -102,16 +105,18 @@ def test_a_lone_object_is_turned_to_every_yaw(lone: tuple[Prepared, Prepared]) -
 
 @pytest.mark.parametrize("proposer", CHAINS)
 def test_what_is_worth_most_comes_first_and_no_more_comes_than_is_asked_for(
-    room: tuple[Prepared, Prepared], proposer: str
+    room: tuple[Prepared, Prepared], proposer: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     source, target = (without(each, groups=("thing",) * len(each.groups)) for each in room)  # all look alike
-    few = PARAMS.replaced(seeds_per_chain=3, seeds_per_object_chain=3)
-    found, first = CHAINS[proposer](source, target, PARAMS), CHAINS[proposer](source, target, few)
-    scores = [one.score for one in found]
-    assert scores == sorted(scores, reverse=True) and scores[0] > scores[-1]
+    found = CHAINS[proposer](source, target)
+    monkeypatch.setattr(hypotheses, "HYPOTHESES_PER_PROPOSER", 3)
+    monkeypatch.setattr(hypotheses, "HYPOTHESES_PER_OBJECT", 3)
+    first = CHAINS[proposer](source, target)
+    supports = [one.support for one in found]
+    assert supports == sorted(supports, reverse=True) and supports[0] > supports[-1]
     assert len(first) == 3
     for one, other in zip(first, found[:3], strict=True):
-        assert np.array_equal(one.T_target_source, other.T_target_source) and one.score == other.score
+        assert np.array_equal(one.T_target_source, other.T_target_source) and one.support == other.support
 
 
 @pytest.mark.parametrize("proposer", ["centroids", "objects"])
@@ -122,11 +127,11 @@ def test_without_gravity_or_objects_on_either_side_objects_propose_nothing(
 ) -> None:
     pair = list(room)
     pair[side] = without(pair[side], **lack)
-    assert CHAINS[proposer](pair[0], pair[1], PARAMS) == []
+    assert CHAINS[proposer](pair[0], pair[1]) == []
 
 
 def test_the_middle_of_a_lone_object_tells_no_pose(lone: tuple[Prepared, Prepared]) -> None:
-    assert from_centroids(*lone, PARAMS) == []
+    assert from_centroids(*lone) == []
 
 
 @pytest.mark.parametrize("side", [0, 1])
@@ -134,11 +139,11 @@ def test_without_features_on_either_side_they_propose_nothing(room: tuple[Prepar
     pair, none = list(room), np.zeros((0, 3), np.float32)
     bare = Features(xyz=none, normals=none, histograms=np.zeros((0, 33), np.float32), saliency=none[:, 0])
     pair[side] = without(pair[side], features=bare)
-    assert from_features(pair[0], pair[1], PARAMS) == []
+    assert from_features(pair[0], pair[1]) == []
 
 
 def test_features_need_no_gravity(room: tuple[Prepared, Prepared]) -> None:
-    found = from_features(without(room[0], up=None), room[1], PARAMS)
+    found = from_features(without(room[0], up=None), room[1])
     rotation, distance = nearest([one.T_target_source for one in found])
     assert rotation < 12 and distance < 25
 

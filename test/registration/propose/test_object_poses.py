@@ -12,6 +12,7 @@ from objreg_ros.geometry import inverse, pose, rotation_from_vector, transform
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import prepare
+from objreg_ros.registration.propose import object_poses
 from objreg_ros.registration.propose.object_poses import _drawn, from_shapes, half_turned, register_scenes
 from objreg_ros.registration.shapes.shape import upright_motion
 from registration.drawn_shapes import BOX, ELL, error, from_side, keyframe
@@ -30,23 +31,23 @@ THREE = {"box": beside(BOX, -0.1, 0.22), "ell": beside(ELL, 0.1, -0.15), "can": 
 def test_three_objects_tell_the_whole_pose(angle: float) -> None:
     source = prepare(keyframe(from_side(angle), THREE, seed=1), PARAMS)
     target = prepare(keyframe(from_side(0.0), THREE, seed=2), PARAMS)
-    degrees, centimetres = error(register_scenes(source, target, PARAMS)[0].T_target_source, angle, 0.0)
+    degrees, centimetres = error(register_scenes(source, target)[0].T_target_source, angle, 0.0)
     assert degrees < 2.0 and centimetres < 1.5
 
 
 def test_objects_of_other_kinds_are_not_laid_upon_each_other() -> None:
     source = prepare(keyframe(from_side(40.0), {"ell": ELL}, seed=1), PARAMS)
     target = prepare(keyframe(from_side(0.0), {"box": BOX}, seed=2), PARAMS)
-    assert from_shapes(source, target, PARAMS) == []
+    assert from_shapes(source, target) == []
 
 
 def test_without_gravity_nothing_is_proposed() -> None:
     key = replace(keyframe(from_side(0.0), THREE), gravity=None)
     source, target = prepare(key, PARAMS), prepare(keyframe(from_side(40.0), THREE), PARAMS)
-    assert from_shapes(source, target, PARAMS) == []
+    assert from_shapes(source, target) == []
 
 
-def test_what_was_seen_around_objects_draws_their_pose() -> None:
+def test_what_was_seen_around_objects_draws_their_pose(monkeypatch: pytest.MonkeyPatch) -> None:
     source = prepare(keyframe(from_side(30.0), THREE, seed=1), PARAMS)
     target = prepare(keyframe(from_side(0.0), THREE, seed=2), PARAMS)
     truth = inverse(from_side(0.0)) @ from_side(30.0)
@@ -54,9 +55,10 @@ def test_what_was_seen_around_objects_draws_their_pose() -> None:
     a, b = source.scene, target.scene
     assert a is not None and b is not None
     start = upright_motion(a, b, off)
-    drawn = _drawn(source, target, a, b, start, PARAMS)
+    drawn = _drawn(source, target, a, b, start)
     assert np.abs(drawn - upright_motion(a, b, truth)).max() < 0.5 * np.abs(start - upright_motion(a, b, truth)).max()
-    assert np.array_equal(_drawn(source, target, a, b, start, PARAMS.replaced(drawing_reach=0.0)), start)
+    monkeypatch.setattr(object_poses, "ALIGNED_REACH_M", 0.0)
+    assert np.array_equal(_drawn(source, target, a, b, start), start)
 
 
 PAIR = ObjectPair(0, 0, "ell")
@@ -70,7 +72,7 @@ def test_from_the_pose_that_takes_front_for_back_a_half_turn_comes_near_the_true
     assert target.up is not None
     R, middle = rotation_from_vector(np.pi * target.up), transform(truth, source.centroids[0])
     alias = pose(R, middle - R @ middle) @ truth
-    found = half_turned(source, target, PAIR, alias, PARAMS)
+    found = half_turned(source, target, PAIR, alias)
     assert found is not None
     degrees, centimetres = error(found, angle, 0.0)
     assert degrees < 15.0 and centimetres < 6.0
@@ -79,4 +81,4 @@ def test_from_the_pose_that_takes_front_for_back_a_half_turn_comes_near_the_true
 def test_an_object_without_a_shape_is_not_turned() -> None:
     key = replace(keyframe(from_side(0.0), {"ell": ELL}), gravity=None)
     one = prepare(key, PARAMS)
-    assert half_turned(one, one, PAIR, np.eye(4), PARAMS) is None
+    assert half_turned(one, one, PAIR, np.eye(4)) is None

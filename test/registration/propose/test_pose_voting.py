@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector, transform
-from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.registration.propose.pose_voting import Matches, distinct, near, poses, same_pose
+from objreg_ros.registration.propose.pose_voting import Matches, poses
 
 UP = np.array([0.0, 0.0, 1.0])
 YAW = pose(rotation_from_vector(np.array([0.0, 0.0, 2.0])), np.array([0.5, -0.4, 0.1]))
@@ -64,37 +63,6 @@ def test_a_baseline_along_its_own_normals_gives_no_pose_without_gravity() -> Non
     assert poses(steps, None, None, 0.06, 0.3, 5) == ()
 
 
-def test_poses_that_are_the_same_come_back_once() -> None:
-    near = YAW @ pose(np.eye(3), np.array([0.01, 0.0, 0.0]))
-    chosen = distinct(np.stack([near, YAW, np.eye(4)]), np.array([1.0, 2.0, 0.5]), np.zeros(3), 5, 0.1, 0.05)
-    assert chosen == [1, 2]
-
-
-@pytest.mark.parametrize(("limit", "count"), [(0, 0), (1, 1), (2, 2), (5, 3)])
-def test_no_more_poses_come_back_than_are_wanted(limit: int, count: int) -> None:
-    apart = np.stack([TUMBLE, YAW, np.eye(4)])
-    assert distinct(apart, np.array([1.0, 3.0, 2.0]), np.zeros(3), limit, 0.1, 0.05) == [1, 2, 0][:count]
-
-
 def test_the_same_matches_give_the_same_poses() -> None:
     first, second = (poses(matches(YAW, 10, 50), UP, UP, 0.06, 0.3, 5) for _ in range(2))
     assert all(np.array_equal(a[0], b[0]) and a[1] == b[1] for a, b in zip(first, second, strict=True))
-
-
-@pytest.mark.parametrize(("turn", "shift", "is_near"), [(0.09, 0.19, True), (0.11, 0.0, False), (0.0, 0.21, False)])
-def test_what_turns_or_moves_the_middle_too_far_is_not_near(turn: float, shift: float, is_near: bool) -> None:
-    middle = np.array([3.0, 0.0, 0.0])
-    R = rotation_from_vector(np.array([0.0, 0.0, turn]))
-    other = pose(R, middle - R @ middle + [0.0, shift, 0.0])  # it turns about the middle
-    found = near(np.array([YAW @ other, YAW]), YAW, middle, angle=0.1, distance=0.2)
-    assert found.tolist() == [is_near, True]
-    assert near(np.zeros((0, 4, 4)), YAW, middle, angle=0.1, distance=0.2).shape == (0,)
-
-
-def test_poses_are_the_same_within_the_tolerances_in_which_proposers_agree() -> None:
-    params, middle = RegistrarParams(), np.array([0.0, 0.0, 2.0])
-    shifted = [pose(np.eye(3), np.array([share * params.agreement_translation, 0.0, 0.0])) for share in (0.9, 1.1)]
-    turns = [np.radians(share * params.agreement_rotation) for share in (0.9, 1.1)]
-    about = [rotation_from_vector(np.array([0.0, turn, 0.0])) for turn in turns]
-    turned = [pose(R, middle - R @ middle) for R in about]
-    assert same_pose(np.array([*shifted, *turned]), np.eye(4), middle, params).tolist() == [True, False, True, False]

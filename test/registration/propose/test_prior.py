@@ -11,6 +11,7 @@ import pytest
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.keyframes.odometry import TravelledPath
 from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.propose import prior as prior_module
 from objreg_ros.registration.propose.prior import Prior, expect
 from registration.samples import keyframe, moved
 
@@ -31,11 +32,15 @@ def _prior(*x: float, sessions: tuple[int, int] = (0, 0)) -> Prior | None:
     return expect(replace(last, travelled=way.travelled, turned=way.turned), first, PARAMS)
 
 
-def test_the_motion_is_that_of_the_odometry_and_its_uncertainty_grows_with_the_path() -> None:
+def test_the_motion_is_that_of_the_odometry_and_its_uncertainty_grows_with_the_path(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     prior = _prior(0.0, 1.0, 0.5)
     assert prior is not None and np.allclose(prior.T_target_source, moved(0.5))
     assert prior.translation_m == pytest.approx(0.03 + 0.1 * 1.5) and prior.rotation_deg == pytest.approx(1.0)
-    assert prior.tight(PARAMS) and not prior.tight(PARAMS.replaced(prior_translation=0.1))
+    assert prior.tight()
+    monkeypatch.setattr(prior_module, "TIGHT_TRANSLATION_M", 0.1)
+    assert not prior.tight()
 
 
 def test_keyframes_of_different_sessions_expect_nothing() -> None:
@@ -66,8 +71,9 @@ def test_odometry_is_trusted_where_it_carried_both_keyframes(source: bool, targe
     assert prior is not None and prior.trusted is (source and target)
 
 
-def test_a_registration_starts_from_what_is_certain_in_place_and_turn() -> None:
+def test_a_registration_starts_from_what_is_certain_in_place_and_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(prior_module, "TIGHT_TRANSLATION_M", 0.2)
+    monkeypatch.setattr(prior_module, "TIGHT_ROTATION_DEG", 6.0)
     sure = Prior(T_target_source=np.eye(4), rotation_deg=6.0, translation_m=0.2, trusted=True)
-    limits = PARAMS.replaced(prior_translation=0.2, prior_rotation=6.0)
-    assert sure.tight(limits)
-    assert not replace(sure, rotation_deg=6.1).tight(limits) and not replace(sure, translation_m=0.21).tight(limits)
+    assert sure.tight()
+    assert not replace(sure, rotation_deg=6.1).tight() and not replace(sure, translation_m=0.21).tight()

@@ -10,11 +10,13 @@ import pytest
 
 from objreg_ros.data import Array, View
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
+from objreg_ros.registration.certainty.gravity_update import MOST_GRAVITY_ERROR_DEG
 from objreg_ros.registration.keyframe import Context, Keyframe
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Pair, prepare
+from objreg_ros.registration.propose.evidence import FINISHED_MARGIN
 from objreg_ros.registration.propose.hypotheses import Hypothesis
-from objreg_ros.registration.propose.shortlist import _hopeful, shortlist
+from objreg_ros.registration.propose.shortlist import FINISHED, _hopeful, shortlist
 from registration.rooms import keyframe, look_at, seen_from
 
 PARAMS = RegistrarParams()
@@ -47,7 +49,7 @@ def _bulged(xyz: Array, at: float) -> tuple[Array, Array]:
 @pytest.mark.parametrize("grey", [True, False])
 def test_what_warped_depth_draws_away_is_held_where_it_was_proposed_by_grey_alone(grey: bool) -> None:
     nudged = pose(np.eye(3), np.array([0.015, 0.0, 0.0]))
-    best, hypotheses = shortlist(pair_of(warped_wall(0.0, grey), warped_wall(APART, grey)), nudged, PARAMS)
+    best, hypotheses = shortlist(pair_of(warped_wall(0.0, grey), warped_wall(APART, grey)), nudged)
     assert (
         max(
             pose_error(hypothesis.T_target_source, np.eye(4))[1]
@@ -63,24 +65,22 @@ def test_what_warped_depth_draws_away_is_held_where_it_was_proposed_by_grey_alon
 
 
 def test_the_best_come_first_and_are_distinct_and_few() -> None:
-    best, hypotheses = shortlist(
-        pair_of(keyframe(seen_from(0.0), seed=1), keyframe(seen_from(25.0), seed=2)), None, PARAMS
-    )
+    best, hypotheses = shortlist(pair_of(keyframe(seen_from(0.0), seed=1), keyframe(seen_from(25.0), seed=2)), None)
     truth = inverse(seen_from(25.0)) @ seen_from(0.0)
     rotation, distance = pose_error(best[0].T_target_source, truth)
     assert rotation < 1.0 and distance < 2.0
-    scores = [hypothesis.score for hypothesis in best]
-    assert scores == sorted(scores, reverse=True) and scores[-1] >= scores[0] - PARAMS.finished_margin
-    assert len(best) <= PARAMS.finished and len({hypothesis.proposer for hypothesis in hypotheses}) >= 2
+    scores = [hypothesis.score.total for hypothesis in best if hypothesis.score is not None]
+    assert scores == sorted(scores, reverse=True) and scores[-1] >= scores[0] - FINISHED_MARGIN
+    assert len(scores) == len(best) <= FINISHED and len({hypothesis.proposer for hypothesis in hypotheses}) >= 2
 
 
 def test_what_is_held_and_keeps_gravity_about_as_well_as_the_gate_wants_it_goes_on_and_all_where_nothing_does() -> None:
     seen = keyframe(SQUARELY, WALL)
-    tilts = np.radians(PARAMS.max_gravity_error) * np.array([0.0, 1.4, 1.6])
+    tilts = np.radians(MOST_GRAVITY_ERROR_DEG) * np.array([0.0, 1.4, 1.6])
     turned = [pose(rotation_from_vector(np.array([0.0, 0.0, tilt])), np.zeros(3)) for tilt in tilts]
-    hypotheses = [Hypothesis(T_target_source=T, proposer="features", score=0.0) for T in turned]
+    hypotheses = [Hypothesis(T_target_source=T, proposer="features", support=0.0) for T in turned]
     for firm, hopeful in (((1, 1, 1), (0, 1)), ((0, 1, 1), (1,)), ((0, 0, 1), (0, 1, 2)), ((0, 0, 0), (0, 1, 2))):
-        found = _hopeful(pair_of(seen, seen), hypotheses, np.array(firm, bool), PARAMS)
+        found = _hopeful(pair_of(seen, seen), hypotheses, np.array(firm, bool))
         assert [id(hypothesis) for hypothesis in found] == [id(hypotheses[k]) for k in hopeful]
 
 
@@ -88,4 +88,4 @@ def test_nothing_is_short_listed_where_no_proposer_proposes_anything() -> None:
     bare, nothing = keyframe(SQUARELY, WALL, noise=0.0), np.zeros((0, 3), np.float32)
     dark = View(xyz=np.full_like(bare.view.xyz, np.nan), grey=None, intrinsics=bare.view.intrinsics)
     empty = replace(bare, context=Context(xyz=nothing, normals=nothing), view=dark)
-    assert shortlist(pair_of(bare, empty), None, PARAMS) == ((), ())
+    assert shortlist(pair_of(bare, empty), None) == ((), ())

@@ -12,6 +12,7 @@ from objreg_ros.data import View
 from objreg_ros.geometry import inverse, pose
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import prepare
+from objreg_ros.registration.propose.evidence import NEARBY_M
 from objreg_ros.registration.score.object_matches import is_gone, match_objects, score_matched_silhouettes
 from registration import samples
 from registration.rooms import CAMERA, ROOM, keyframe, seen_from
@@ -25,7 +26,7 @@ def test_the_middle_of_a_large_thing_may_wander_with_the_side_that_is_seen() -> 
 
     def matched(extent: float) -> int:
         grown = replace(here, extents=np.full(len(here.extents), extent))
-        return len(match_objects(grown, grown, aside, PARAMS)[0])
+        return len(match_objects(grown, grown, aside)[0])
 
     assert matched(0.1) == 0 and matched(1.0) == len(here.groups)
 
@@ -37,7 +38,7 @@ def test_an_object_has_moved_where_each_view_looks_through_where_the_other_saw_i
     now, then = (prepare(keyframe(*seen, seed=k), PARAMS) for k, seen in enumerate(((here, later), (aside, ROOM))))
     T_then_now = inverse(aside) @ here
     for source, target, T in ((now, then, T_then_now), (then, now, inverse(T_then_now))):
-        matched, moved = match_objects(source, target, T, PARAMS)
+        matched, moved = match_objects(source, target, T)
         assert {pair.label for pair in matched} == {"book", "cup", "keyboard"}
         assert [pair.label for pair in moved] == ["bottle"]
 
@@ -51,7 +52,7 @@ def test_an_object_that_still_stands_undetected_has_not_moved_to_where_another_c
     undetected = replace(seen, objects=tuple(item for item in seen.objects if item is not known))
     views = [prepare(key, PARAMS) for key in (keyframe(aside, seed=2), undetected)]
     T = inverse(here) @ aside
-    matched, moved = match_objects(*(views if there_first else views[::-1]), T if there_first else inverse(T), PARAMS)
+    matched, moved = match_objects(*(views if there_first else views[::-1]), T if there_first else inverse(T))
     assert {pair.label for pair in matched} == {"book", "cup", "keyboard"} and moved == ()
 
 
@@ -69,14 +70,14 @@ def test_an_object_is_gone_where_half_of_it_is_seen_and_most_of_that_looked_thro
     thing = samples.cloud("cup", pixels * np.where(share < through, 1.0, 2.0)[:, None])
     owner = replace(samples.keyframe(objects=(thing,)), view=View(xyz=wall, grey=None, intrinsics=CAMERA))
     prepared = prepare(owner, PARAMS)
-    assert is_gone(prepared, 0, prepared, np.eye(4), PARAMS) is gone
+    assert is_gone(prepared, 0, prepared, np.eye(4)) is gone
 
 
 def test_an_object_a_little_aside_looks_more_alike_within_reach_than_where_it_is() -> None:
     here, there = (prepare(keyframe(seen_from(0.0), seed=seed), PARAMS) for seed in (1, 2))
     aside = pose(np.eye(3), np.array([0.04, 0.0, 0.0]))
-    matched, _ = match_objects(here, there, aside, PARAMS)
-    where = score_matched_silhouettes(here, there, matched, aside, PARAMS)
-    what = score_matched_silhouettes(here, there, matched, aside, PARAMS, PARAMS.likeness_reach)
+    matched, _ = match_objects(here, there, aside)
+    where = score_matched_silhouettes(here, there, matched, aside)
+    what = score_matched_silhouettes(here, there, matched, aside, NEARBY_M)
     assert matched and where is not None and what is not None
     assert where < what - 0.2

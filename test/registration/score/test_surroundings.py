@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import Array
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.gate.limits import LIMITS
 from objreg_ros.registration.prepare.views import Sight, own_pixels, pixels_of
 from objreg_ros.registration.score.surroundings import verify_surroundings, without
 from objreg_ros.registration.score.view_score import verify
 from registration.samples import CAMERA, moved
 from registration.slab import room
 
-PARAMS = RegistrarParams()
 FROM, TO = -0.15, 0.2  # m: the slab went
 
 
@@ -30,19 +29,19 @@ def rooms() -> tuple[Sight, Sight, tuple[Array, Array]]:
 def test_an_object_that_moved_outvotes_the_room_and_is_outvoted_once_it_is_left_out(rooms) -> None:
     before, after, own = rooms
     with_the_slab, with_the_room = moved(TO - FROM), np.eye(4)
-    assert verify(before, after, with_the_slab, PARAMS).score > verify(before, after, with_the_room, PARAMS).score
-    false, true = (verify_surroundings(before, after, own, T, PARAMS) for T in (with_the_slab, with_the_room))
+    assert verify(before, after, with_the_slab).score > verify(before, after, with_the_room).score
+    false, true = (verify_surroundings(before, after, own, T) for T in (with_the_slab, with_the_room))
     assert false is not None and true is not None and true.score > false.score + 0.5
     assert true.texture is not None and true.texture > 0.9
-    assert false.texture is not None and false.texture < PARAMS.min_texture
+    assert false.texture is not None and false.texture < LIMITS.correlation
 
 
 def test_a_small_object_outvotes_nothing_and_is_not_left_out(rooms) -> None:
     _, after, own = rooms
     (small, item, _), (same, again, _) = room(FROM, 0.2), room(TO, 0.2)
     few = own_pixels(item, small), own_pixels(again, same)
-    assert verify_surroundings(small, same, few, np.eye(4), PARAMS) is None
-    assert verify_surroundings(small, after, (few[0], own[1]), np.eye(4), PARAMS) is not None  # much of one is enough
+    assert verify_surroundings(small, same, few, np.eye(4)) is None
+    assert verify_surroundings(small, after, (few[0], own[1]), np.eye(4)) is not None  # much of one is enough
 
 
 def test_nothing_is_measured_where_an_object_was_left_out_and_the_rest_is_as_it_was(rooms) -> None:
@@ -62,7 +61,7 @@ def test_nothing_is_measured_where_an_object_was_left_out_and_the_rest_is_as_it_
 def test_views_without_grey_are_asked_for_their_depth_alone(rooms) -> None:
     before, after, own = rooms
     blind = replace(before, textured=False)
-    found = verify_surroundings(blind, after, own, np.eye(4), PARAMS)
+    found = verify_surroundings(blind, after, own, np.eye(4))
     assert found is not None and found.texture is None and found.inliers > 0.95
 
 
@@ -71,4 +70,4 @@ def test_a_camera_that_is_not_that_of_its_points_breaks_nothing(rooms) -> None:
     for wrong in (0.5, 2.0):
         other = replace(before, intrinsics=replace(CAMERA, fx=wrong * CAMERA.fx, cx=0.2 * CAMERA.cx))
         assert len(without(other, own[0]).points) < len(other.points)
-        assert verify_surroundings(other, after, own, np.eye(4), PARAMS) is not None
+        assert verify_surroundings(other, after, own, np.eye(4)) is not None

@@ -9,6 +9,7 @@ import pytest
 from objreg_ros.geometry import inverse, pose_error
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import prepare
+from objreg_ros.registration.score import total_score
 from objreg_ros.registration.score.total_score import TotalScore, _poses
 from objreg_ros.registration.score.view_score import score_views
 from objreg_ros.registration.shapes.shape import upright_motion, upright_pose
@@ -32,26 +33,25 @@ def test_the_kernel_and_the_shapes_mean_the_same_pose(pair) -> None:
     assert np.allclose(T, upright_pose(a, b, motion)) and np.allclose(T @ back, np.eye(4))
 
 
-def test_worth_is_what_the_views_like_and_how_alike_the_objects_look(pair) -> None:
+def test_worth_is_what_the_views_like_and_how_alike_the_objects_look(pair, monkeypatch: pytest.MonkeyPatch) -> None:
     source, target = pair
     a, b = source.scene, target.scene
     motion = upright_motion(a, b, TRUTH)
-    params = PARAMS.replaced(upright_violations=0.0, quick_sample=10**6)
-    V = score_views(source.sight, target.sight, upright_pose(a, b, motion)[None], params, params.quick_sample)[0]
-    same = np.clip(score_silhouettes(a, b, motion, params), -1.0, 1.0)
-    assert TotalScore(source, target, a, b, params).of(motion[None])[0] == pytest.approx(V + same)
+    monkeypatch.setattr(total_score, "VIOLATION_WEIGHT_UPRIGHT", 0.0)
+    monkeypatch.setattr(total_score, "RANKING_POINTS", 10**6)
+    V = score_views(source.sight, target.sight, upright_pose(a, b, motion)[None], 10**6)[0]
+    same = np.clip(score_silhouettes(a, b, motion), -1.0, 1.0)
+    assert TotalScore(source, target, a, b).of(motion[None])[0] == pytest.approx(V + same)
 
 
-def test_seen_free_space_costs_more_than_in_the_views_verdict(pair) -> None:
+def test_seen_free_space_costs_more_than_in_the_views_verdict(pair, monkeypatch: pytest.MonkeyPatch) -> None:
     source, target = pair
     off = upright_motion(source.scene, target.scene, TRUTH) + np.array([0.0, 0.1, 0.0, 0.0])
-    strict, lax = (
-        TotalScore(source, target, source.scene, target.scene, PARAMS.replaced(upright_violations=weight)).of(
-            off[None]
-        )[0]
-        for weight in (5.0, 0.0)
-    )
-    assert strict < lax
+    scores = []
+    for weight in (5.0, 0.0):
+        monkeypatch.setattr(total_score, "VIOLATION_WEIGHT_UPRIGHT", weight)
+        scores.append(TotalScore(source, target, source.scene, target.scene).of(off[None])[0])
+    assert scores[0] < scores[1]
 
 
 @pytest.mark.parametrize("off", [(0.25, 0.02, 0.0, 0.0), (-0.4, 0.0, 0.02, 0.0), (0.1, 0.02, -0.01, 0.0)])
@@ -59,7 +59,7 @@ def test_a_climb_comes_back_from_far_away(pair, off: tuple) -> None:
     source, target = pair
     a, b = source.scene, target.scene
     start = upright_motion(a, b, TRUTH) + np.array(off)
-    degrees, _ = pose_error(upright_pose(a, b, TotalScore(source, target, a, b, PARAMS).climbed(start)), TRUTH)
+    degrees, _ = pose_error(upright_pose(a, b, TotalScore(source, target, a, b).climbed(start)), TRUTH)
     assert degrees < 2.0
 
 
@@ -67,5 +67,5 @@ def test_a_climb_leaves_its_start_as_it_was(pair) -> None:
     source, target = pair
     start = upright_motion(source.scene, target.scene, TRUTH) + np.array([0.2, 0.0, 0.0, 0.0])
     kept = start.copy()
-    TotalScore(source, target, source.scene, target.scene, PARAMS).climbed(start)
+    TotalScore(source, target, source.scene, target.scene).climbed(start)
     assert np.array_equal(start, kept)

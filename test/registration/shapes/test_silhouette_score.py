@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse
-from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.shapes.shape import upright_motion
 from objreg_ros.registration.shapes.silhouette import BESIDE, INSIDE, RIM
 from objreg_ros.registration.shapes.silhouette_score import (
@@ -23,8 +22,6 @@ from objreg_ros.registration.shapes.silhouette_score import (
 from registration.drawn_shapes import BOX, ELL, from_side
 from registration.shapes.test_upright_search import shape_of
 
-PARAMS = RegistrarParams()
-
 
 def truth(angle: float) -> np.ndarray:
     return inverse(from_side(0.0)) @ from_side(angle)
@@ -33,16 +30,14 @@ def truth(angle: float) -> np.ndarray:
 def test_the_truth_looks_alike_and_a_wrong_turn_does_not() -> None:
     source, target = shape_of(ELL, 30.0, 1), shape_of(ELL, 0.0, 2)
     motion = upright_motion(source, target, truth(30.0))
-    assert score_silhouettes(source, target, motion, PARAMS) > 0.5
-    assert score_silhouettes(source, target, np.add(motion, (np.pi / 2, 0, 0, 0)), PARAMS) < 0.0
+    assert score_silhouettes(source, target, motion) > 0.5
+    assert score_silhouettes(source, target, np.add(motion, (np.pi / 2, 0, 0, 0))) < 0.0
 
 
 def test_a_shift_into_free_space_costs_more_than_it_can_gain() -> None:
     source, target = shape_of(BOX, 0.0, 1), shape_of(BOX, 0.0, 2)
     motion = upright_motion(source, target, truth(0.0))
-    scores = [
-        score_silhouettes(source, target, np.add(motion, (0, 0, shift, 0)), PARAMS) for shift in (0.0, 0.02, 0.05)
-    ]
+    scores = [score_silhouettes(source, target, np.add(motion, (0, 0, shift, 0))) for shift in (0.0, 0.02, 0.05)]
     assert scores[0] > 0.7 and scores[0] > scores[1] > scores[2] and scores[2] < 0.0
 
 
@@ -50,18 +45,16 @@ def test_what_lies_a_little_aside_looks_alike_within_reach_and_what_is_turned_do
     source, target = shape_of(ELL, 30.0, 1), shape_of(ELL, 0.0, 2)
     motion = upright_motion(source, target, truth(30.0))
     aside, turned = np.add(motion, (0, 0.03, -0.03, 0.01)), np.add(motion, (np.pi / 2, 0, 0, 0))
-    assert score_silhouettes(source, target, aside, PARAMS) < 0.0
-    assert score_silhouettes(source, target, aside, PARAMS, reach=0.06) > 0.9 * score_silhouettes(
-        source, target, motion, PARAMS
-    )
-    assert score_silhouettes(source, target, turned, PARAMS, reach=0.06) < 0.0
-    assert score_silhouettes(source, target, np.add(motion, (0, 0.2, 0, 0)), PARAMS, reach=0.06) < 0.0
+    assert score_silhouettes(source, target, aside) < 0.0
+    assert score_silhouettes(source, target, aside, reach=0.06) > 0.9 * score_silhouettes(source, target, motion)
+    assert score_silhouettes(source, target, turned, reach=0.06) < 0.0
+    assert score_silhouettes(source, target, np.add(motion, (0, 0.2, 0, 0)), reach=0.06) < 0.0
 
 
 def test_both_ways_say_the_same() -> None:
     source, target = shape_of(ELL, 40.0, 1), shape_of(ELL, 0.0, 2)
-    forward = score_silhouettes(source, target, upright_motion(source, target, truth(40.0)), PARAMS)
-    backward = score_silhouettes(target, source, upright_motion(target, source, inverse(truth(40.0))), PARAMS)
+    forward = score_silhouettes(source, target, upright_motion(source, target, truth(40.0)))
+    backward = score_silhouettes(target, source, upright_motion(target, source, inverse(truth(40.0))))
     assert abs(forward - backward) < 1e-6
 
 
@@ -71,9 +64,9 @@ def test_a_climb_never_ends_lower() -> None:
     motion = start.copy()
     extent = 0.5 * (source.extent + target.extent)
     steps = np.array([0.05, 0.012, 0.012, 0.0])
-    reached = climb(source.kernel_arrays, target.kernel_arrays, motion, extent, weights_of(PARAMS), 400, steps, 8)
-    assert reached > score_silhouettes(source, target, start, PARAMS) + 0.1
-    assert abs(reached - score_silhouettes(source, target, motion, PARAMS)) < 1e-9
+    reached = climb(source.kernel_arrays, target.kernel_arrays, motion, extent, weights_of(), 400, steps, 8)
+    assert reached > score_silhouettes(source, target, start) + 0.1
+    assert abs(reached - score_silhouettes(source, target, motion)) < 1e-9
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from objreg_ros.data import ObjectCloud
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.prepare.prepared import SHAPE_POINTS
+from objreg_ros.registration.shapes import symmetry
 from objreg_ros.registration.shapes.shape import prepare_shape
 from objreg_ros.registration.shapes.symmetry import tells_yaw, turned_violations, yaw_share
 from registration.drawn_shapes import ELL, from_side, keyframe
@@ -53,16 +55,16 @@ def test_a_cloud_without_normals_is_not_called_symmetric() -> None:
     assert yaw_share(cloud(np.zeros((20, 3)), np.zeros((20, 3))), UP) == 1.0
 
 
-def test_what_is_not_round_would_stand_in_seen_free_space_if_it_were_turned() -> None:
-    params = RegistrarParams(symmetry_share=1.0)  # no surface tells a yaw
+def test_what_is_not_round_would_stand_in_seen_free_space_if_it_were_turned(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(symmetry, "TURN_SHARE", 1.0)  # no surface tells a yaw
     for angle in (0.0, 70.0, 200.0):
         for thing, told in ((ELL, True), ((0.0, 0.0), False)):
             seen = keyframe(from_side(angle), {"thing": thing})
-            shape = prepare_shape(seen, [0], params.shape_points)
+            shape = prepare_shape(seen, [0], SHAPE_POINTS)
             assert shape is not None and (turned_violations(shape) > 0.1) is told
-            assert tells_yaw(seen.objects[0].cloud, -np.asarray(seen.gravity), shape, params) is told
+            assert tells_yaw(seen.objects[0].cloud, -np.asarray(seen.gravity), shape) is told
 
 
 def test_where_up_is_unknown_no_yaw_is_told() -> None:
-    assert not tells_yaw(corner_of_a_box(), None, None, RegistrarParams())
-    assert tells_yaw(corner_of_a_box(), UP, None, RegistrarParams())
+    assert not tells_yaw(corner_of_a_box(), None, None)
+    assert tells_yaw(corner_of_a_box(), UP, None)

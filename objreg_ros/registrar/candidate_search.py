@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The search for places that a keyframe shows again: stored keyframes are tried, the likeliest first."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
+
+from objreg_ros.data import Reason, Rejected
+from objreg_ros.memory.retrieval import CandidateKeyframe
+from objreg_ros.memory.store import Store, StoreError
+from objreg_ros.memory.thinning import Thinning
+from objreg_ros.registrar.closure import Accepted, rejected, verdict_of
+from objreg_ros.registration import align
+from objreg_ros.registration.api import Gate, Method
+from objreg_ros.registration.keyframe import Keyframe
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.propose.prior import expect
+
+
+class Budget(NamedTuple):
+    """Until when new candidate keyframes are tried: a time of `time.monotonic`, or until ``hurried`` says so."""
+
+    deadline: float
+    hurried: Callable[[], bool]
+
+    def over(self) -> str:
+        """Why no more candidate keyframe is tried; empty while there is time."""
+        late = time.monotonic() - self.deadline
+        if late > 0:
+            return f"{1e3 * late:.0f} ms after the end of the search"
+        return "cut short: newer keyframes wait, or the node ends" if self.hurried() else ""
+
+
+class Means(NamedTuple):
+    """What every search uses: the stored keyframes, how they are registered and judged, the threads that do it."""
+
+    store: Store
+    method: Method
+    gate: Gate
+    pool: ThreadPoolExecutor
+
+
+_Try = tuple[CandidateKeyframe, Callable[[], Accepted | Rejected] | None]
+"""A candidate keyframe that is being tried, and what waits for its verdict."""
+
+
+class Search:
+    """The search for one ``keyframe``; ``thinning`` knows what was accepted before, and learns what is now."""
+
+    def __init__(
+        self, keyframe: Keyframe, thinning: Thinning, budget: Budget, means: Means, params: RegistrarParams
+    ) -> None:
+        self._keyframe, self._thinning, self._budget = keyframe, thinning, budget
+        self._means, self._params = means, params
+        self._trying = deque[_Try]()
+
+    def run(self, candidates: Iterable[CandidateKeyframe]) -> tuple[list[Accepted], list[Rejected]]:
+        """Try the candidates, best first, until enough closures are accepted or ``params.candidates`` were tried."""
+        accepted: list[Accepted] = []
+        refused: list[Rejected] = []
+        queue, tries = deque(candidates), self._params.candidates
+        while len(accepted) < self._params.closures:
+            self._begin(queue, tries, self._params.closures - len(accepted))
+            if not self._trying:
+                break
+            stored, ask = self._trying.popleft()
+            if ask is None or self._thinning.redundant(stored.stamp_ns, self._keyframe.stamp_ns):
+                refused.append(self._redundant(stored))
+                continue
+            tries -= 1
+            verdict = ask()
+            if isinstance(verdict, Accepted):
+                self._thinning.accept(stored.stamp_ns, self._keyframe.stamp_ns)
+                accepted.append(verdict)
+            else:
+                refused.append(verdict)
+        return accepted, refused
+
+    def _redundant(self, stored: CandidateKeyframe) -> Rejected:
+        refusal = Reason.REDUNDANT, f"an accepted closure is nearer than {self._params.thin_seconds} s"
+        return rejected(stored.stamp_ns, self._keyframe, refusal)
+
+    def _begin(self, queue: deque[CandidateKeyframe], tries: int, wanted: int) -> None:
+        """Begin to try the next candidates: as many at once as there are threads, and never more than ``tries``.
+
+        While some are being tried, no more than would be ``wanted`` if all of them were accepted. What would say what
+        is said already is put aside without a try. Verdicts are asked for in the order of the candidates, so it does
+        not matter which is done first.
+        """
+        busy, threads = sum(ask is not None for _, ask in self._trying), self._params.threads
+        most = min(tries, threads if busy == 0 else min(wanted, threads))
+        while queue and busy < most:
+            stored = queue.popleft()
+            redundant = self._thinning.redundant(stored.stamp_ns, self._keyframe.stamp_ns)
+            self._trying.append((stored, None if redundant else self._try_candidate(stored)))
+            busy += not redundant
+
+    def _try_candidate(self, stored: CandidateKeyframe) -> Callable[[], Accepted | Rejected]:
+        """Begin to register a candidate keyframe in a thread of its own; what comes back waits for the verdict."""
+        keyframe, over = self._keyframe, self._budget.over()
+        if over:
+            refusal = Reason.OVER_BUDGET, over
+            return lambda: rejected(stored.stamp_ns, keyframe, refusal)
+        try:
+            target = self._means.store.keyframe(stored.keyframe_id)
+        except StoreError as error:
+            refusal = Reason.UNREADABLE, str(error)
+            return lambda: rejected(stored.stamp_ns, keyframe, refusal)
+        _, method, gate, pool = self._means
+        method.prepare(keyframe)
+        prior = expect(keyframe, target, self._params)
+        registered = pool.submit(align, keyframe, target, prior, self._params, method, gate)
+        return lambda: verdict_of(keyframe, target, registered.result())

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The search for places that a keyframe shows again, with a method and a gate that say what they are told."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import pytest
+from registration.samples import box, candidate, keyframe
+
+from objreg_ros.data import Reason
+from objreg_ros.memory.retrieval import CandidateKeyframe
+from objreg_ros.memory.sighting import sightings_of
+from objreg_ros.memory.store import Store
+from objreg_ros.memory.thinning import Thinning
+from objreg_ros.registrar.candidate_search import Budget, Means, Search
+from objreg_ros.registration.candidate import Candidate
+from objreg_ros.registration.params import RegistrarParams
+
+PARAMS = RegistrarParams(threads=1, closures=2, candidates=3, thin_seconds=1.0)
+CUPS = (box("cup", (0.0, 0.0, 1.0)),)
+ENDLESS = Budget(float("inf"), lambda: False)
+STORED = (0, 10, 20, 30, 40)  # s
+NOW = 90
+
+
+class Recorded:
+    """A method that proposes one pose for every pair, and remembers which were asked for."""
+
+    def __init__(self) -> None:
+        self.targets: list[int] = []
+
+    def prepare(self, keyframe: object) -> None:
+        """Nothing to make ready."""
+
+    def propose(self, source: Any, target: Any, prior: object = None) -> tuple[Candidate, ...]:
+        self.targets.append(round(1e-9 * target.stamp_ns))
+        return (candidate(),)
+
+
+def accept(candidates: Sequence[Candidate], prior: object = None) -> Candidate:
+    return candidates[0]
+
+
+def refuse(candidates: Sequence[Candidate], prior: object = None) -> tuple[Reason, str]:
+    return Reason.GRAVITY, "9 deg"
+
+
+@pytest.fixture
+def means() -> Iterator[Means]:
+    store = Store()
+    for number, seconds in enumerate(STORED, 1):
+        stored = keyframe(number, seconds, CUPS)
+        store.add(stored, sightings_of(stored))
+    with ThreadPoolExecutor(1) as pool:
+        yield Means(store, Recorded(), refuse, pool)
+    store.close()
+
+
+def search(means: Means, params: RegistrarParams = PARAMS, budget: Budget = ENDLESS) -> Search:
+    return Search(keyframe(9, NOW, CUPS), Thinning(params.thin_seconds), budget, means, params)
+
+
+def ids(*numbers: int) -> list[CandidateKeyframe]:
+    return [CandidateKeyframe(number, round(1e9 * STORED[number - 1]), 1.0) for number in numbers]
+
+
+def test_no_more_keyframes_are_tried_than_are_asked_for_best_first(means: Means) -> None:
+    accepted, refused = search(means).run(ids(3, 1, 5, 2, 4))
+    assert accepted == [] and [one.reason for one in refused] == [Reason.GRAVITY] * 3
+    assert means.method.targets == [20, 0, 40]
+
+
+def test_enough_accepted_closures_end_the_search(means: Means) -> None:
+    accepted, refused = search(means._replace(gate=accept)).run(ids(3, 1, 5, 2, 4))
+    assert [item.target.keyframe_id for item in accepted] == [3, 1] and refused == []
+
+
+def test_what_would_say_the_same_again_is_put_aside_without_a_try(means: Means) -> None:
+    params = PARAMS.replaced(thin_seconds=15.0)
+    accepted, refused = search(means._replace(gate=accept), params).run(ids(2, 1, 5))
+    assert [item.target.keyframe_id for item in accepted] == [2, 5]
+    assert [one.reason for one in refused] == [Reason.REDUNDANT]
+
+
+def test_what_is_not_begun_in_time_is_refused_as_over_budget(means: Means) -> None:
+    for budget in (Budget(time.monotonic() - 1.0, lambda: False), Budget(float("inf"), lambda: True)):
+        accepted, refused = search(means, budget=budget).run(ids(1, 2))
+        assert accepted == [] and [one.reason for one in refused] == [Reason.OVER_BUDGET] * 2
+    assert means.method.targets == []
