@@ -4,9 +4,12 @@
 from __future__ import annotations
 
 import ast
+from collections import Counter
 from pathlib import Path
 
 import pytest
+
+from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 
 PACKAGE = Path(__file__).resolve().parents[1] / "objreg_ros"
 ROOMS = ("detector", "segmenter", "registrar", "mapper")
@@ -155,3 +158,11 @@ def test_the_law_can_be_broken() -> None:
     assert not allowed("library", "memory.store")
     assert not allowed("library", "detector.node")
     assert allowed("registration.refine.batch_icp", "registration.score.view_score")
+
+
+def test_the_rooms_that_followed_the_registrar_stay_small() -> None:
+    """No file over 300 lines, no folder over 16 files, and no more than 30 parameters."""
+    files = [path for name, path in MODULES.items() if below(name, "registration", "keyframes", "memory", "registrar")]
+    assert {path.name for path in files if len(path.read_text(encoding="utf-8").splitlines()) > 300} == set()
+    assert max(Counter(path.parent for path in files).values()) <= 16
+    assert len(RegistrarParams.declarations()) + len(RegistrarNodeParams.declarations()) <= 30

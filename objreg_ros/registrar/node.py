@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The door of the registrar: ``objects``, ``view``, ``view/camera_info``, ``gravity``, ``labels`` and ``odom`` in;
-``constraints``, ``refusals``, ``transforms``, ``landmarks`` and ``markers`` out."""
+"""The door of the registrar: objects, views, gravity and odometry in; constraints, refusals and landmarks out."""
 
 from __future__ import annotations
 
@@ -34,9 +33,7 @@ from objreg_ros.registrar.registrar import FrameWindow, Outcome, Registrar
 from objreg_ros.registrar.warm import warm
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 
-PATIENCE_S = (
-    1.0  # a newer keyframe waits as long before the search in hand is cut short, if some were overtaken of late
-)
+PATIENCE_S = 1.0  # a newer keyframe waits before the search in hand is cut short, if some were overtaken of late
 WAITING_KEYFRAMES = 8  # most that wait for a search; no frame is followed while so many do
 GIVING_WAY = 10  # niceness of the search: the next image must not wait for it
 

@@ -47,7 +47,7 @@ class TotalScore:
 
     def of(self, motions: Array) -> Array:
         """The total scores (K,) of motions (K, 4)."""
-        return np.asarray(_worths(*self._pair, motions, self._extent, self._weights, self._sample))
+        return np.asarray(_total_scores(*self._pair, motions, self._extent, self._weights, self._sample))
 
     def climbed(self, motion: Array) -> Array:
         """The motion (4,) brought to where its total score is highest.
@@ -62,10 +62,10 @@ def _image(sight: Sight) -> tuple[Any, ...]:
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
-def _worths(views, source, target, motions, extent, weights, most):  # type: ignore[no-untyped-def]
+def _total_scores(views, source, target, motions, extent, weights, most):  # type: ignore[no-untyped-def]
     found = np.empty(len(motions))
     for k in range(len(motions)):
-        found[k] = _worth(views, source, target, motions[k], extent, weights, most)
+        found[k] = _total_score(views, source, target, motions[k], extent, weights, most)
     return found
 
 
@@ -74,18 +74,18 @@ def _climbed(views, source, target, motion, turns, extent, weights, most):  # ty
     best, trial = -np.inf, motion.copy()
     for turn in turns:
         trial[0] = motion[0] + turn
-        liked = _liked(views, source, target, trial, weights[-1], most)
-        if liked > best:
-            best, yaw = liked, trial[0]
+        seen = _view_score(views, source, target, trial, weights[-1], most)
+        if seen > best:
+            best, yaw = seen, trial[0]
     motion[0] = yaw
-    best = _worth(views, source, target, motion, extent, weights, most)
+    best = _total_score(views, source, target, motion, extent, weights, most)
     angle, shift = STEPS
     for _ in range(ROUNDS):
         improved = False
         for k in range(6):
             trial[:] = motion
             trial[k // 2] += (angle if k < 2 else shift) * (1.0 if k % 2 == 0 else -1.0)
-            found = _worth(views, source, target, trial, extent, weights, most)
+            found = _total_score(views, source, target, trial, extent, weights, most)
             if found > best + GAIN:
                 best, improved = found, True
                 motion[:] = trial
@@ -97,14 +97,14 @@ def _climbed(views, source, target, motion, turns, extent, weights, most):  # ty
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
-def _worth(views, source, target, motion, extent, weights, most):  # type: ignore[no-untyped-def]
+def _total_score(views, source, target, motion, extent, weights, most):  # type: ignore[no-untyped-def]
     """The view score, and the weighed silhouette score of the objects, -1 to 1."""
     alike = two_way(source, target, motion, extent, weights[:-2], most)
-    return _liked(views, source, target, motion, weights[-1], most) + weights[-2] * max(-1.0, min(1.0, alike))
+    return _view_score(views, source, target, motion, weights[-1], most) + weights[-2] * max(-1.0, min(1.0, alike))
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
-def _liked(views, source, target, motion, violated, most):  # type: ignore[no-untyped-def]
+def _view_score(views, source, target, motion, violated, most):  # type: ignore[no-untyped-def]
     """V of an upright motion, less what is in seen free space once more: an upright pose has no tilt to excuse it."""
     (points, shades, image), (others, their_shades, their_image), slops, textured = views
     T, back = _poses(source, target, motion)

@@ -58,7 +58,7 @@ def score_silhouettes(source: Shape, target: Shape, motion: Array, reach: float 
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
-def slack_at(z):  # type: ignore[no-untyped-def]
+def tolerance_at(z):  # type: ignore[no-untyped-def]
     """How far two depths of one surface may differ at a depth z, m."""
     return SILHOUETTE_TOLERANCE_M + SILHOUETTE_TOLERANCE_GROWTH * (z - NEAR_M) * (z - NEAR_M)
 
@@ -77,16 +77,16 @@ def tally(P, N, S, most, T, depth, mask, grey, camera, extent, out):  # type: ig
         if d <= 0.0:
             continue
         on = mask[row, column]
-        slack = slack_at(z)
+        tolerance = tolerance_at(z)
         e = z - d
-        if e < -slack:
+        if e < -tolerance:
             if on != RIM:
                 out[VIOLATIONS] += 1.0
-        elif e > slack:
+        elif e > tolerance:
             out[HIDDEN] += min(1.0, max(0.0, e / extent - 0.5)) if on == INSIDE else 0.5
         elif on != 0 and _faces(T, N[i], (u - camera[2]) / camera[0], (v - camera[3]) / camera[1]):
             out[INLIERS] += 1.0
-            out[RESIDUAL] += e * e / (slack * slack)
+            out[RESIDUAL] += e * e / (tolerance * tolerance)
             if on == INSIDE:
                 f, g = S[i], grey[row, column]
                 out[SHADED] += 1.0
@@ -108,7 +108,7 @@ def _faces(T, normal, x, y):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
-def likeness(out, n, weights):  # type: ignore[no-untyped-def]
+def rated(out, n, weights):  # type: ignore[no-untyped-def]
     """The score of a tally of n points; `weights_of` says what the weights are."""
     violated, hidden, residual, grey, expected, noise = weights
     m = max(out[SHADED], 1.0)
@@ -148,7 +148,7 @@ def two_way(source, target, motion, extent, weights, most):  # type: ignore[no-u
     """The score of a motion (yaw, x, y, rise), asked of both cameras."""
     out = np.empty(COUNTS)
     n = ask(source, target, motion, extent, most, out)
-    return likeness(out, n, weights)
+    return rated(out, n, weights)
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)

@@ -94,7 +94,7 @@ def _finished(source: Shape, target: Shape, motions: Array, scores: Array, reach
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
-def _started(source, target, grid, starts, extent, weights, glance, reach, cleared):  # type: ignore[no-untyped-def]
+def _started(source, target, grid, starts, extent, weights, most, reach, cleared):  # type: ignore[no-untyped-def]
     """Each start brought to where it floats least, and from there to its basin: (motions (K, 4), scores (K,)).
 
     The latter only where both silhouettes score it no lower: opposite sides of an object have next to no surface in
@@ -104,10 +104,10 @@ def _started(source, target, grid, starts, extent, weights, glance, reach, clear
     trial = np.empty(4)
     for k in range(len(starts)):
         clear(source, target, motions[k], *cleared)
-        scores[k] = two_way(source, target, motions[k], extent, weights, glance)
+        scores[k] = two_way(source, target, motions[k], extent, weights, most)
         trial[:] = motions[k]
-        settle(source[0], source[1], glance, grid, trial, reach, 0.4 * reach, 8)
-        scores[k] = _better(source, target, trial, motions[k], scores[k], extent, weights, glance)
+        settle(source[0], source[1], most, grid, trial, reach, 0.4 * reach, 8)
+        scores[k] = _better(source, target, trial, motions[k], scores[k], extent, weights, most)
     return motions, scores
 
 
@@ -139,25 +139,25 @@ def _finish(  # type: ignore[no-untyped-def]
         if n < kept and not _known(motions[start], best, n) and _crowd(motions[start], best, n) < CROWD:
             best[n] = motions[start]
             n += 1
-    best, worth = best[:n], np.empty(n)
+    best, refined = best[:n], np.empty(n)
     for k in range(n):
-        worth[k] = two_way(source, target, best[k], extent, weights, every)
+        refined[k] = two_way(source, target, best[k], extent, weights, every)
         trial[:] = best[k]
         clear(source, target, trial, *CLEARED_AT_LAST)
-        worth[k] = _better(source, target, trial, best[k], worth[k], extent, weights, every)
+        refined[k] = _better(source, target, trial, best[k], refined[k], extent, weights, every)
         trial[:] = best[k]
         settle(P, N, every, grid, trial, reach, max(1.5 * cell, 0.008), 12)
-        worth[k] = _better(source, target, trial, best[k], worth[k], extent, weights, every)
-    _rank(worth, order)
-    top = worth[order[0]] if n else 0.0
+        refined[k] = _better(source, target, trial, best[k], refined[k], extent, weights, every)
+    _rank(refined, order)
+    top = refined[order[0]] if n else 0.0
     for k in order[: min(n, climbed)]:
-        if worth[k] < top - margin:
+        if refined[k] < top - margin:
             break
-        worth[k] = climb(source, target, best[k], extent, weights, every, np.array(CLIMB), rounds)
+        refined[k] = climb(source, target, best[k], extent, weights, every, np.array(CLIMB), rounds)
         trial[:] = best[k]
         settle(P, N, every, grid, trial, max(1.5 * cell, 0.010), max(1.2 * cell, 0.006), 8)
-        worth[k] = _better(source, target, trial, best[k], worth[k], extent, weights, every)
-    return best, worth
+        refined[k] = _better(source, target, trial, best[k], refined[k], extent, weights, every)
+    return best, refined
 
 
 @numba.njit(cache=True, nogil=True)

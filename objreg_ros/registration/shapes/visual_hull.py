@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The push of an upright motion out of seen free space, until each shape lies within the visual hull of the other.
+"""An upright motion is moved out of seen free space, until each shape lies within the visual hull of the other.
 
 Two sides of an object that share no surface still tell where it stands: what the one camera saw must fall inside the
 outline that the other saw, or behind it. From a start that is decimetres off, where no point has a partner, each point
@@ -15,7 +15,7 @@ import numpy as np
 from objreg_ros.registration.kernels.least_squares import solve
 from objreg_ros.registration.kernels.projection import FAST
 from objreg_ros.registration.shapes.silhouette import BESIDE, INSIDE
-from objreg_ros.registration.shapes.silhouette_score import slack_at
+from objreg_ros.registration.shapes.silhouette_score import tolerance_at
 
 LARGEST_TURN, LARGEST_SHIFT = 0.3, 0.15  # rad and m in one step
 KNEE = 0.02  # m: a point that floats farther pulls no harder, so that what one camera missed does not tear
@@ -100,10 +100,10 @@ def _pushes(P, most, R, t, seen, level, lever, A, g):  # type: ignore[no-untyped
         beyond = abs(du) + abs(dv) > 1.0
         if on == INSIDE and not beyond:  # before the surface?
             far, nx, ny, nz = d - z, 0.0, 0.0, 1.0
-            if far < slack_at(z):
+            if far < tolerance_at(z):
                 continue
         else:  # beside the outline, and not behind what is seen there?
-            if (on != BESIDE and not beyond) or (d > 0.0 and z - d > slack_at(z)):
+            if (on != BESIDE and not beyond) or (d > 0.0 and z - d > tolerance_at(z)):
                 continue
             du, dv = du + inward[row, column, 0], dv + inward[row, column, 1]
             pixels = np.sqrt(du * du + dv * dv) + 1e-9
