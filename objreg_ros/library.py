@@ -183,7 +183,9 @@ def _segment(image: DepthImage, rgb: Array | None, known: Found | None, detector
             raise ValueError("rgb: expected uint8 of shape (H, W, 3) to detect objects in, got None")
         known = (detector or _detect)(rgb)
     detections, masks = (known, None) if isinstance(known, Detections) else _listed(known, image)
-    return _segmenter().segment(detections, image, masks=masks)
+    segmenter = _segmenter()
+    segmenter.forget()  # each call stands for itself
+    return segmenter.segment(detections, image, masks=masks)
 
 
 @cache

@@ -13,6 +13,8 @@ import numpy as np
 from objreg_ros.data import Array, DepthImage, Detections, Frame, Intrinsics, ObjectCloud, PointFlag
 from objreg_ros.segmenter import boxes, paper
 from objreg_ros.segmenter.boxes import Box
+from objreg_ros.segmenter.depth_to_colour import DepthToColour
+from objreg_ros.segmenter.depth_to_colour import warm as warm_offset
 from objreg_ros.segmenter.extract import Pixels, cell_points, colours
 from objreg_ros.segmenter.gravity import camera_up, estimate_up, known_normals
 from objreg_ros.segmenter.isolate import Isolated, cut_out, isolate, mark
@@ -28,7 +30,7 @@ NORMALS = 3  # every so many of these tell gravity
 
 
 class Segmenter:
-    """Segments one frame at a time; keeps nothing between frames.
+    """Segments one frame at a time; keeps nothing between frames but how depth is turned against colour.
 
     A second thread takes half of the boxes: the kernels let go of the interpreter's lock.
     """
@@ -36,6 +38,7 @@ class Segmenter:
     def __init__(self, params: SegmenterParams | None = None) -> None:
         self.params = params or SegmenterParams()
         self._beside = ThreadPoolExecutor(1, "segmenter")
+        self._depth_to_colour = DepthToColour()
 
     def warm(self) -> None:
         """Compile or load every kernel and claim memory, so that the first frame is as fast as the others."""
@@ -55,6 +58,12 @@ class Segmenter:
                 stamp_ns=0,
             )
             self.segment(asked, image)
+            warm_offset(image)
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin with another stream: nothing is known of how its depth is turned against its colour."""
+        self._depth_to_colour.forget()
 
     def segment(
         self,
@@ -74,7 +83,7 @@ class Segmenter:
         of what stands in the box. ValueError for masks of another number, type or shape.
         """
         params, outlines = self.params, _outlines(masks, len(detections), depth)
-        depth = _plain(depth)
+        depth = self._depth_to_colour.register(_plain(depth))
         seen = (depth, step_for(depth.depth.shape[1], params.view_step), params.z_min, params.limits[0])
         view = self._beside.submit(reduced_view, *seen)
         ground = self._ground(depth, gravity)

@@ -1,0 +1,271 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The rotation that brings depth upon colour, found in every frame: where depth steps, colour has an edge.
+
+Depth that was exposed before or after colour, or whose camera is not quite where its calibration says, is beside the
+colour by some pixels. A camera that turns by 100 degrees a second turns by 2.5 degrees in a lag of 25 ms. Both are a
+small rotation between the two cameras. It is the one under which depth steps lie upon the strongest gradients of grey:
+the alignment of depth and colour edges (Levinson and Thrun, "Automatic online calibration of cameras and lasers",
+2013), here for each frame by itself, with what earlier frames told as its prior.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
+
+import cv2
+import numba
+import numpy as np
+
+from objreg_ros.data import Array, DepthImage, Intrinsics
+from objreg_ros.sensor import PLANE_TOLERANCE_GROWTH, PLANE_TOLERANCE_M
+
+WIDTH = 320  # px: the picture is halved until it is no wider
+POINTS = 1500  # most depth steps that are asked
+LEAST_POINTS = 400  # fewer tell nothing
+LEAST_STRENGTH = 0.2  # of the gradients at the steps, in deviations, for these to be edges; real ones have 0.3 to 1
+STEP = (3.0 * PLANE_TOLERANCE_M, 3.0 * PLANE_TOLERANCE_GROWTH)  # m and 1/m: depths that differ by more are a step
+SHADOW = 8  # px: the depth behind a step may be missing for as far
+BLURS = (3.0, 1.5, 0.8)  # px of the reduced picture, coarse to fine
+COARSE = (np.linspace(-0.05, 0.05, 9), np.linspace(-0.04, 0.04, 5))  # rad: about x and y, about z
+STEPS = ((0.012, 0.006), (0.006, 0.003), (0.002, 0.001))  # rad, of each blur
+ROUNDS = 6  # most of a step
+BACKGROUND = 10.0  # px of the reduced picture: gradients are measured by the mean about them
+FIRST_SIGMA = 0.03  # rad: what may be off before anything was seen
+NOISE = np.array([0.002, 0.002, 0.004])  # rad: standard deviation of what a frame tells; in simulation 1, 1 and 3 mrad
+INDEPENDENT = 0.1  # share of the depth steps that tell something of their own: neighbours say the same
+MOST_TOLD = 150.0  # by all of a frame
+SURPRISE = 3.0  # deviations: what differs by more is taken in as if it differed by as much
+MEMORY = 0.05  # share of the newest frame in what is remembered
+SMALLEST = 1e-3  # rad: half a pixel of the usual camera; less is left as it is
+
+
+class Offset(NamedTuple):
+    """How depth is turned against colour in a frame, ``rotation (3,)`` rad; ``told`` where the frame itself says it."""
+
+    rotation: Array
+    told: bool
+
+
+@dataclass(slots=True, eq=False)
+class DepthToColour:
+    """The offset of one stream; remembers what its frames told, until another camera comes.
+
+    ``mean (3,)`` and ``spread (3,)`` rad are of the offsets that were told, in so many ``frames``.
+    """
+
+    mean: Array = field(default_factory=lambda: np.zeros(3))
+    spread: Array = field(default_factory=lambda: np.full(3, FIRST_SIGMA))
+    frames: int = 0
+    _camera: tuple[Any, ...] | None = None
+
+    def forget(self) -> None:
+        """Begin with another stream."""
+        self.mean, self.spread, self.frames = np.zeros(3), np.full(3, FIRST_SIGMA), 0
+
+    def register(self, image: DepthImage) -> DepthImage:
+        """The image with its depth brought upon its colour; itself where it has no colour or nothing is to be done."""
+        if image.rgb is None:
+            return image
+        rotation = self.offset(image).rotation
+        return image if np.abs(rotation).max() < SMALLEST else turned(image, rotation)
+
+    def offset(self, image: DepthImage) -> Offset:
+        """The offset of a frame, by its edges and by the frames before; those alone where it has few edges."""
+        camera = image.frame_id, image.depth.shape, _reduced(image.intrinsics, 1)
+        if self._camera not in (None, camera):
+            self.forget()
+        self._camera = camera
+        found = find_rotation(image, self.mean, self.spread)
+        if found is None:
+            return Offset(self.mean.copy(), False)
+        self._remember(found)
+        share = (
+            1.0 - NOISE**2 / self.spread**2
+        )  # of what is told that is no noise: frames that agree differ by it alone
+        return Offset(self.mean + share * (found - self.mean), True)
+
+    def _remember(self, rotation: Array) -> None:
+        self.frames += 1
+        share = max(MEMORY, 1.0 / (self.frames + 1.0))
+        away = np.clip(rotation - self.mean, -SURPRISE * self.spread, SURPRISE * self.spread)
+        variance = (1.0 - share) * (self.spread**2 + share * away**2)
+        self.mean = self.mean + share * away
+        self.spread = np.maximum(np.sqrt(variance), NOISE)
+
+
+def find_rotation(image: DepthImage, mean: Array, spread: Array) -> Array | None:
+    """The rotation (3,) rad of the depth camera against the colour camera, most likely under a prior.
+
+    A depth step p is seen in colour where ``p + rotation x p`` is. None where too few steps are seen, or where they lie
+    upon no edges under any rotation.
+    """
+    assert image.rgb is not None
+    every = max(1, image.depth.shape[1] // WIDTH)
+    depth, camera = np.ascontiguousarray(image.depth[::every, ::every]), _reduced(image.intrinsics, every)
+    rays = _steps(depth, *camera, *STEP)
+    if len(rays) < LEAST_POINTS:
+        return None
+    told = min(INDEPENDENT * len(rays), MOST_TOLD)
+    rays = np.ascontiguousarray(rays[:: len(rays) // POINTS + 1])
+    grey = cv2.cvtColor(_shrunk(image.rgb, every), cv2.COLOR_RGB2GRAY).astype(np.float32)
+    weight = 1.0 / (np.sqrt(told) * spread)  # of the prior, in units of the score
+    camera, rotation, strength = _halfway(camera, every), np.array(mean, float), _strength(grey)
+    for k, blur in enumerate(BLURS):
+        picture = cv2.GaussianBlur(strength, (0, 0), blur)
+        if k == 0:
+            rotation = _coarse(np.ascontiguousarray(rays[::3]), picture, camera, mean, weight, *COARSE)
+        rotation = _climbed(rays, picture, camera, mean, weight, rotation, np.array(STEPS[k]), ROUNDS)
+        if k == 0 and _score(rays, picture, camera, mean, np.zeros(3), rotation) < LEAST_STRENGTH:
+            return None  # the steps lie upon no edges
+    return rotation
+
+
+def turned(image: DepthImage, rotation: Array) -> DepthImage:
+    """The image with its depth as the colour camera would see it, ``rotation (3,)`` rad away from the depth camera."""
+    camera = image.intrinsics
+    depth = _turned(image.depth, camera.fx, camera.fy, camera.cx, camera.cy, np.asarray(rotation, np.float64))
+    return DepthImage(depth=depth, rgb=image.rgb, intrinsics=camera, stamp_ns=image.stamp_ns, frame_id=image.frame_id)
+
+
+def warm(image: DepthImage) -> None:
+    """Compile or load every kernel: depth like a draughts board is put in the stead of the image's."""
+    rows, columns = np.indices(image.depth.shape)
+    board = np.where((rows // 16 + columns // 16) % 2, 1.0, 2.0).astype(np.float32)
+    found = find_rotation(replace(image, depth=board), np.zeros(3), np.full(3, FIRST_SIGMA))
+    turned(image, np.zeros(3) if found is None else found)
+
+
+def _reduced(camera: Intrinsics, every: int) -> tuple[float, float, float, float]:
+    return camera.fx / every, camera.fy / every, camera.cx / every, camera.cy / every
+
+
+def _halfway(camera: tuple[float, float, float, float], every: int) -> tuple[float, float, float, float]:
+    """The camera of a picture of which each pixel is the mean of ``every`` by ``every``: their middle is its place."""
+    fx, fy, cx, cy = camera
+    return fx, fy, cx - 0.5 * (every - 1) / every, cy - 0.5 * (every - 1) / every
+
+
+def _shrunk(rgb: Array, every: int) -> Array:
+    return np.asarray(cv2.resize(rgb, None, fx=1.0 / every, fy=1.0 / every, interpolation=cv2.INTER_AREA))
+
+
+def _strength(grey: Array) -> Array:
+    """How strong the gradient of grey is, by what is usual about it: (h, w) float32 of mean 0 and deviation 1."""
+    smooth = cv2.GaussianBlur(grey, (0, 0), 1.0)
+    strength = np.sqrt(cv2.magnitude(cv2.Sobel(smooth, cv2.CV_32F, 1, 0), cv2.Sobel(smooth, cv2.CV_32F, 0, 1)))
+    strength -= cv2.GaussianBlur(strength, (0, 0), BACKGROUND)
+    return np.asarray(strength / max(float(strength.std()), 1e-6))
+
+
+@numba.njit(cache=True, nogil=True)
+def _steps(depth, fx, fy, cx, cy, base, growth):  # type: ignore[no-untyped-def]
+    """The rays (N, 2), x and y at z = 1, of the depth steps along rows and columns, half a pixel off the near side."""
+    height, width = depth.shape
+    at, n = np.empty((2 * height * width, 2)), 0
+    for row in range(2, height - 2):
+        first, n = n, _steps_along(depth[row], at, n, 0, base, growth)
+        at[first:n, 1] = row
+    for column in range(2, width - 2):
+        first, n = n, _steps_along(depth[:, column], at, n, 1, base, growth)
+        at[first:n, 0] = column
+    rays = at[:n]
+    for k in range(n):
+        rays[k, 0], rays[k, 1] = (rays[k, 0] - cx) / fx, (rays[k, 1] - cy) / fy
+    return rays
+
+
+@numba.njit(cache=True, nogil=True)
+def _steps_along(line, at, n, axis, base, growth):  # type: ignore[no-untyped-def]
+    """Add where measured depths step that follow each other along a line, `SHADOW` apart at most; returns how many."""
+    last = -1
+    for k in range(len(line)):
+        z = line[k]
+        if z <= 0.0:
+            continue
+        if last >= 0 and k - last <= SHADOW:
+            before = line[last]
+            closer = min(z, before)
+            if abs(z - before) > (base + growth * closer * closer) * (k - last):
+                at[n, axis] = last + 0.5 if before < z else k - 0.5
+                n += 1
+        last = k
+    return n
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _score(rays, picture, camera, mean, weight, rotation):  # type: ignore[no-untyped-def]
+    """The mean strength of the gradients where turned rays land, less what the prior says against the rotation."""
+    fx, fy, cx, cy = camera
+    a, b, c = rotation[0], rotation[1], rotation[2]
+    height, width = picture.shape
+    total = 0.0
+    for k in range(len(rays)):
+        x, y = rays[k, 0], rays[k, 1]
+        z = 1.0 + a * y - b * x
+        u, v = fx * (x + b - c * y) / z + cx, fy * (y + c * x - a) / z + cy
+        if u < 0.0 or v < 0.0 or u >= width - 1.0 or v >= height - 1.0:
+            continue
+        left, top = int(u), int(v)
+        p, q = u - left, v - top
+        upper = (1.0 - p) * picture[top, left] + p * picture[top, left + 1]
+        lower = (1.0 - p) * picture[top + 1, left] + p * picture[top + 1, left + 1]
+        total += (1.0 - q) * upper + q * lower
+    against = 0.0
+    for k in range(3):
+        against += ((rotation[k] - mean[k]) * weight[k]) ** 2
+    return total / len(rays) - 0.5 * against
+
+
+@numba.njit(cache=True, nogil=True)
+def _coarse(rays, picture, camera, mean, weight, across, around):  # type: ignore[no-untyped-def]
+    """The best rotation (3,) of a grid about the mean, ``across`` about x and y, ``around`` about z."""
+    best, chosen, trial = -np.inf, mean.copy(), np.empty(3)
+    for a in across:
+        for b in across:
+            for c in around:
+                trial[0], trial[1], trial[2] = mean[0] + a, mean[1] + b, mean[2] + c
+                found = _score(rays, picture, camera, mean, weight, trial)
+                if found > best:
+                    best = found
+                    chosen[:] = trial
+    return chosen
+
+
+@numba.njit(cache=True, nogil=True)
+def _climbed(rays, picture, camera, mean, weight, rotation, steps, rounds):  # type: ignore[no-untyped-def]
+    """A rotation brought to where the score is highest, an axis at a time."""
+    rotation = rotation.copy()
+    best, trial = _score(rays, picture, camera, mean, weight, rotation), rotation.copy()
+    for step in steps:
+        for _ in range(rounds):
+            improved = False
+            for k in range(6):
+                trial[:] = rotation
+                trial[k // 2] += step if k % 2 == 0 else -step
+                found = _score(rays, picture, camera, mean, weight, trial)
+                if found > best:
+                    best, improved = found, True
+                    rotation[:] = trial
+            if not improved:
+                break
+    return rotation
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _turned(depth, fx, fy, cx, cy, rotation):  # type: ignore[no-untyped-def]
+    """Depth (H, W) as a camera sees it from which the depth camera is turned away; the nearest pixel's, 0 beyond."""
+    height, width = depth.shape
+    a, b, c = rotation[0], rotation[1], rotation[2]
+    out = np.zeros_like(depth)
+    for row in range(height):
+        y = (row - cy) / fy
+        for column in range(width):
+            x = (column - cx) / fx
+            away = 1.0 - a * y + b * x  # the rotation back, of a ray of the colour camera
+            u, v = fx * (x - b + c * y) / away + cx, fy * (y - c * x + a) / away + cy
+            if u < -0.5 or v < -0.5 or u >= width - 0.5 or v >= height - 0.5:
+                continue
+            z = depth[int(v + 0.5), int(u + 0.5)]
+            out[row, column] = z / away
+    return out
