@@ -8,6 +8,7 @@ Kannala and Brandt (2006). Pixel centres are on integers.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -25,8 +26,9 @@ MODELS = {
 UPRIGHT = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)  # no rotation between raw and rectified rays
 MOST_SIDE = 32766  # px: OpenCV's remap counts in 16 bits
 LEAST_SHOWN = 0.25  # of the rectified picture; a wide lens that is shown whole still fills more
-OUTLINE = 9  # points of each side of a box: a bent side bulges between its corners
+OUTLINE = 5  # points of each side of a box: a bent side bulges between its corners
 STEPS, CLOSE_PX, PROBE = 30, 0.01, 1e-5  # of Newton's method; what it must reach; its step in a derivative
+FOLD_PIXELS = 1_000_000  # that are looked at for folds; of larger pictures every so many
 GRID = 65  # points of a row and of a column that tell how far pixels are moved
 ON_THE_WAY = (0.25, 0.5, 0.75, 1.0)  # from the axis to a ray, where the picture must not be folded yet
 NOWHERE = -1e4  # px: where a pixel is looked for that the raw picture does not show
@@ -164,6 +166,10 @@ class Lens:
 
     def shift_px(self) -> tuple[float, float]:
         """How far the lens moves a pixel of the rectified picture of the raw camera's matrix: median, and most."""
+        return self._shift_px
+
+    @cached_property
+    def _shift_px(self) -> tuple[float, float]:
         K, size = _matrix(self.raw), np.array([self.raw.width, self.raw.height])
         middles = (np.arange(GRID) + 0.5) / GRID  # of as many parts of the picture, for the median
         frame = _outlines(np.array([[0.5, 0.5, *(size - 0.5)]]))[0]  # where most is, as a rule
@@ -193,8 +199,11 @@ class Lens:
         K, D, P = _matrix(self.raw), np.array(self.D), _matrix(self.camera)
         make = cv2.fisheye.initUndistortRectifyMap if self.model == "equidistant" else cv2.initUndistortRectifyMap
         u, v = make(K, D, self._turn, P, (self.raw.width, self.raw.height), cv2.CV_32FC1)
-        folded = ~_unfolded(u, v, self.camera)
-        u[folded] = v[folded] = NOWHERE
+        step = math.ceil(math.sqrt(u.size / FOLD_PIXELS))
+        kept = _unfolded(u[::step, ::step], v[::step, ::step], self.camera.cx / step, self.camera.cy / step)
+        if step > 1:
+            kept = cv2.resize(kept.astype(np.uint8), u.shape[::-1], interpolation=cv2.INTER_NEAREST) > 0
+        u[~kept] = v[~kept] = NOWHERE
         return u, v
 
 
@@ -234,7 +243,7 @@ def _determinant(J: Array) -> Array:
     return np.asarray(J[:, 0, 0] * J[:, 1, 1] - J[:, 0, 1] * J[:, 1, 0])
 
 
-def _unfolded(u: Array, v: Array, camera: Intrinsics) -> Array:
+def _unfolded(u: Array, v: Array, cx: float, cy: float) -> Array:
     """(H, W) bool: what can be reached from the principal point without the map turning over itself."""
     if min(u.shape) < 2:
         return np.isfinite(u) & np.isfinite(v)
@@ -242,6 +251,5 @@ def _unfolded(u: Array, v: Array, camera: Intrinsics) -> Array:
         (u_down, u_right), (v_down, v_right) = np.gradient(u), np.gradient(v)
         keeps = (u_right * v_down - u_down * v_right > 0) & np.isfinite(u) & np.isfinite(v)
     _, parts = cv2.connectedComponents(keeps.astype(np.uint8), connectivity=4)
-    row = int(np.clip(round(camera.cy), 0, camera.height - 1))
-    column = int(np.clip(round(camera.cx), 0, camera.width - 1))
+    row, column = (int(np.clip(round(c), 0, size - 1)) for c, size in zip((cy, cx), u.shape, strict=True))
     return keeps & (parts == parts[row, column])

@@ -218,3 +218,11 @@ def test_cameras_of_two_sizes_or_of_too_large_a_one_are_refused() -> None:
 def test_a_rotation_that_is_none_is_refused() -> None:
     with pytest.raises(ValueError, match="expected a rotation R"):
         replace(lens("plumb_bob"), R=(2.0, 0, 0, 0, 1, 0, 0, 0, 1))
+
+
+def test_folds_of_a_large_picture_are_found_on_a_part_of_its_pixels(monkeypatch: pytest.MonkeyPatch) -> None:
+    wide = replace(CAMERA, fx=110.0, fy=110.0)
+    whole = Lens("plumb_bob", (-0.2, 0, 0, 0), wide, wide)
+    monkeypatch.setattr("objreg_ros.lens.FOLD_PIXELS", wide.width * wide.height / 9)
+    thinned = Lens("plumb_bob", (-0.2, 0, 0, 0), wide, wide)
+    assert (whole.shown != thinned.shown).mean() < 0.02 and 0.5 < whole.shown.mean() < 0.95
