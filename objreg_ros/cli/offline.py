@@ -73,7 +73,12 @@ def command(
     summary = run.summary(truth)
     _say(run, summary)
     if json_file is not None:
-        told = {"recording": str(recording.resolve()), "inputs": inputs.outright, "odometry": inputs.odom}
+        told = {
+            "recording": str(recording.resolve()),
+            "inputs": inputs.outright,
+            "odometry": inputs.odom,
+            "rectified": settings.of("segmenter", SegmenterNodeParams).rectified,
+        }
         json_file.write_text(json.dumps({**told, **summary}, indent=1))
 
 
