@@ -113,7 +113,9 @@ class Source:
         seen = self.detections.get(frame.stamp_ns)
         if seen is None:
             return Shot(image)
-        return Shot(image, Segmenter(SegmenterParams(preset="paper")).segment(seen, image).objects)
+        return Shot(
+            image, Segmenter(SegmenterParams(preset="paper")).segment(self.album.rectified(seen), image).objects
+        )
 
 
 @contextmanager

@@ -192,7 +192,8 @@ class DepthImage:
     """What every depth source becomes at the segmenter's door.
 
     ``depth (H, W) float32`` metres along the optical axis, 0 to `limits.MOST_DEPTH`, 0 where there is none (never NaN);
-    ``rgb (H, W, 3) uint8`` registered to it, or None; ``intrinsics`` of the same size.
+    ``rgb (H, W, 3) uint8`` registered to it, or None; ``intrinsics`` of the same size; ``shown (H, W) bool`` to which
+    pixels the sensor's picture reaches, where it was rectified and leaves some out, or None for all.
     """
 
     depth: Array
@@ -200,9 +201,12 @@ class DepthImage:
     intrinsics: Intrinsics
     stamp_ns: int
     frame_id: str = "camera"
+    shown: Array | None = None
 
     def __post_init__(self) -> None:
         sizes = {"H": self.intrinsics.height, "W": self.intrinsics.width}
+        if self.shown is not None:
+            _hold(self, "shown", np.bool_, ("H", "W"), sizes)
         _hold(self, "depth", np.float32, ("H", "W"), sizes)
         if self.rgb is not None:
             _hold(self, "rgb", np.uint8, ("H", "W", 3), sizes)

@@ -22,6 +22,7 @@ from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import inverse
 from objreg_ros.keyframes.fusion import fuse, reference_index
 from objreg_ros.keyframes.keyframer import FrameWindow, alone
+from objreg_ros.lens import Lens
 from objreg_ros.registration import align
 from objreg_ros.registration.api import Gate, Method
 from objreg_ros.registration.keyframe import Keyframe
@@ -41,7 +42,11 @@ Detects = Callable[[Array], Found]
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera without distortion, in pixels: ``u = fx x/z + cx``, pixel centres on integers.
+    """A camera in pixels: ``u = fx x/z + cx``, pixel centres on integers.
+
+    ``distortion`` are the coefficients of its lens in OpenCV's order and ``model`` says of which: ``plumb_bob`` 4 or 5,
+    ``rational_polynomial`` 8, 12 or 14, ``equidistant`` 4. Pictures are rectified by them, and what was detected in
+    these. None or zeros: the pictures are taken as rectified. Clouds are metres already: nothing of them is rectified.
 
     ``width`` and ``height`` are those of the picture where they are 0; only clouds that are no pictures need them.
     """
@@ -52,6 +57,15 @@ class Camera:
     cy: float
     width: int = 0
     height: int = 0
+    distortion: tuple[float, ...] = ()
+    model: str = "plumb_bob"
+
+    def lens(self, height: int, width: int) -> Lens | None:
+        """The lens of a picture of this size, None without one; ValueError for one that is unknown or cannot be."""
+        if not any(self.distortion):
+            return None
+        camera = self.intrinsics(height, width)
+        return Lens(self.model, tuple(map(float, self.distortion)), camera, camera)
 
     def intrinsics(self, height: int, width: int) -> Intrinsics:
         """The camera of a picture of this size; ValueError where it is said to be of another."""
@@ -165,7 +179,7 @@ def segment(
     if rgb is not None:
         rgb = _colour(rgb, (*metres.shape, 3))
     image = DepthImage(depth=metres, rgb=rgb, intrinsics=intrinsics, stamp_ns=stamp_ns)
-    frame = _segment(image, rgb, detections, detector)
+    frame = _segment(image, rgb, detections, detector, camera.lens(*metres.shape))
     return frame if T_odom_camera is None else replace(frame, T_odom_camera=np.array(T_odom_camera, np.float64))
 
 
@@ -176,13 +190,18 @@ def _segment_cloud(
     return _segment(image, image.rgb, known, detector)
 
 
-def _segment(image: DepthImage, rgb: Array | None, known: Found | None, detector: Detects | None) -> Frame:
-    """The frame of an image; ``rgb`` is its colour as it came, which a detector may know by identity."""
+def _segment(
+    image: DepthImage, rgb: Array | None, known: Found | None, detector: Detects | None, lens: Lens | None = None
+) -> Frame:
+    """The frame of an image, rectified after detection; ``rgb`` is its colour as it came: a detector may know it."""
     if known is None:
         if rgb is None:
             raise ValueError("rgb: expected uint8 of shape (H, W, 3) to detect objects in, got None")
         known = (detector or _detect)(rgb)
     detections, masks = (known, None) if isinstance(known, Detections) else _listed(known, image)
+    if lens is not None:
+        image, detections = lens.rectify(image), lens.rectify_detections(detections)
+        masks = masks and [None if mask is None else lens.rectify_mask(mask) for mask in masks]
     segmenter = _segmenter()
     segmenter.forget()  # each call stands for itself
     return segmenter.segment(detections, image, masks=masks)

@@ -17,7 +17,7 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from objreg_ros.bridge import from_msg
+from objreg_ros.bridge import from_msg, lenses
 from objreg_ros.bridge.sync import Match, Need, Stream, Synchroniser
 from objreg_ros.data import (
     Array,
@@ -116,6 +116,7 @@ class Timing:
     colour: bool = True  # whether a depth image takes its colour from `image`
     level_odom: bool = False
     T_level_camera: Array | None = None
+    rectified: str = "auto"  # whether pictures come without the distortion of their lens, as the segmenter's parameter
 
 
 @dataclass
@@ -125,6 +126,7 @@ class Run:
     frames: int = 0
     detections: int = 0
     objects: int = 0
+    lens: str = ""  # what was assumed of it; empty where no camera_info came
     closures: list[LoopClosure] = field(default_factory=list)
     rejected: Counter[str] = field(default_factory=Counter)
     refusals: list[Rejected] = field(default_factory=list)
@@ -139,6 +141,7 @@ class Run:
             "frames": self.frames,
             "detections": self.detections,
             "objects": self.objects,
+            "lens": self.lens,
             "constraints": [constraint_with_error(closure, truth) for closure in self.closures],
             "rejected": dict(sorted(self.rejected.items())),
             "dropped": dict(sorted(self.dropped.items())),
@@ -190,6 +193,7 @@ class Line:
         self.run = Run()
         self._rooms, self._timing, self._max_frames = rooms, timing, max_frames
         self._from_points = inputs.points is not None
+        self._raw = lenses.raw_pictures(timing.rectified, inputs.depth or inputs.points, inputs.image)
         self._camera_info: Any = None
         self._labels: dict[int, tuple[str, ...]] = {}  # what was detected in the frames that are under way
         self._views = Synchroniser(self._streams(), self._unmatched)
@@ -267,16 +271,22 @@ class Line:
 
     def _frame(self, match: Match) -> Frame:
         with self._timed("decode"):
-            depth = self._depth(match)
+            depth, detections = self._depth(match)
             gravity = from_msg.level_gravity(match.stamp_ns, match.payloads.get("odom"), self._timing.T_level_camera)
         with self._timed("segment"):
-            return as_sent(self._rooms.segmenter.segment(match["detections"], depth, gravity))
+            return as_sent(self._rooms.segmenter.segment(detections, depth, gravity))
 
-    def _depth(self, match: Match) -> DepthImage:
+    def _depth(self, match: Match) -> tuple[DepthImage, Detections]:
+        """Depth and boxes of one picture without a lens."""
+        seen, raw = match["detections"], self._raw
         if not self._from_points:
-            return from_msg.depth_image(match["depth"], match["camera_info"], match.payloads.get("image"))
+            camera_info = match["camera_info"]
+            depth = lenses.depth_image(match["depth"], camera_info, match.payloads.get("image"), raw=raw)
+            self.run.lens = self.run.lens or lenses.describe(camera_info, raw)
+            return depth, lenses.detections(seen, camera_info, raw)
         cloud = from_msg.point_cloud(match["depth"])
-        return self._rooms.organise(cloud, from_msg.camera_of_cloud(self._camera_info, cloud))
+        depth = self._rooms.organise(cloud, from_msg.camera_of_cloud(self._camera_info, cloud))
+        return depth, lenses.detections(seen, self._camera_info, raw, cloud)
 
     def _track(self, matches: Iterable[Match]) -> None:
         for match in matches:

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import cv2
 import numpy as np
 import pytest
 from registration import rooms
@@ -244,3 +245,37 @@ def test_the_public_names_are_there_and_no_other() -> None:
 def test_the_package_says_that_it_is_typed(repository: Path) -> None:
     assert (repository / "objreg_ros" / "py.typed").is_file()
     assert "py.typed" in (repository / "setup.py").read_text(encoding="utf-8")
+
+
+LENS = replace(CAMERA, distortion=(-0.2, 0.05, 0.0, 0.0, 0.0))
+
+
+def through_lens(seen: Shot) -> Shot:
+    """The picture that a camera with `LENS` would have taken of what is in the picture."""
+    of = LENS.lens(*seen.depth.shape)
+    assert of is not None
+    v, u = np.mgrid[: seen.depth.shape[0], : seen.depth.shape[1]]
+    straight, known = of.rectify_uv(np.column_stack([u.ravel(), v.ravel()]).astype(float))
+    assert known.all()
+    column, row = straight.astype(np.float32).T.reshape(2, *seen.depth.shape)
+    bend = lambda picture: cv2.remap(picture, column, row, cv2.INTER_NEAREST)  # noqa: E731
+    masks = [(bend(mask.astype(np.uint8)) > 0, label, score) for mask, label, score in seen.masks]
+    return seen._replace(rgb=bend(seen.rgb), depth=bend(seen.depth), masks=masks)
+
+
+@pytest.mark.parametrize("what", ["masks", "boxes"])
+def test_pictures_of_a_lens_are_rectified_with_their_masks_and_boxes(what: str) -> None:
+    one, two = through_lens(ONE), through_lens(TWO)
+    pictures, found = (one.rgb, one.depth, two.rgb, two.depth), (getattr(one, what), getattr(two, what))
+    assert_right(register(*pictures, LENS, detections=found))
+
+
+def test_a_lens_that_cannot_be_is_refused() -> None:
+    with pytest.raises(ValueError, match="picture 1: lens: expected 4 or 5 coefficients of plumb_bob, got 2"):
+        register(*PICTURES, replace(CAMERA, distortion=(0.1, 0.2)), detections=MASKS)
+    with pytest.raises(ValueError, match=r"expected a distortion model of .*, got 'round'"):
+        register(*PICTURES, replace(LENS, model="round"), detections=MASKS)
+
+
+def test_a_lens_of_zeros_is_none() -> None:
+    assert replace(CAMERA, distortion=(0.0,) * 5, model="round").lens(240, 320) is None

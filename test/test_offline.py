@@ -4,6 +4,8 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from recording.folders import CAMERA, records, uncalibrated
 from simple_rooms import simple_rooms
 
 from objreg_ros.bridge import from_msg
-from objreg_ros.data import DepthImage
+from objreg_ros.data import DepthImage, Detections, Frame
 from objreg_ros.geometry import back_project, pose, rotation_from_vector
 from objreg_ros.offline import Timing, as_sent, run_offline
 from objreg_ros.recording import Record, messages
@@ -287,3 +289,54 @@ def test_the_json_tells_of_every_refusal() -> None:
     run = run_offline(without("/odom", 1100 * MS), rooms, INPUTS)
     expected = {"reason": "no_candidate", "from_ns": 1100 * MS, "to_ns": 1200 * MS, "detail": "no odometry"}
     assert run.summary(Truth([]))["refusals"][1] == expected | {"T_from_to": None}
+
+
+def of_a_lens(frames: int, model: str = "plumb_bob", **names: str) -> Iterator[Record]:
+    """The records, with a camera_info that tells of a lens; ``names`` call topics otherwise."""
+    for record in records(frames):
+        message = record.message
+        if record.topic == "/camera_info":
+            message = messages.camera_info(CAMERA, record.stamp_ns, "camera", (-0.3, 0.1, 0.0, 0.0, 0.0))
+            message.distortion_model = model
+        yield Record.of(names.get(record.topic[1:].replace("/", "_"), record.topic), message, record.stamp_ns)
+
+
+def seen_of_a_lens(records: Iterator[Record], inputs: Inputs, rectified: str = "auto") -> tuple[Any, list[Any]]:
+    """What a run gives, and the depth image and the box of each frame that reached the segmenter."""
+    rooms, _ = simple_rooms()
+    met: list[Any] = []
+
+    def segment(detections: Detections, depth: DepthImage, gravity: Any = None) -> Frame:
+        met.append((depth, detections.xyxy))
+        return rooms.segmenter.segment(detections, depth, gravity)
+
+    spied = replace(rooms, segmenter=SimpleNamespace(segment=segment))
+    return run_offline(records, spied, inputs, Timing(rectified=rectified)), met
+
+
+def test_pictures_and_boxes_of_a_lens_reach_the_segmenter_rectified() -> None:
+    straight, as_they_are = seen_of_a_lens(records(3), INPUTS)
+    run, rectified = seen_of_a_lens(of_a_lens(3), INPUTS)
+    assert run.frames == 3 and run.lens.startswith("plumb_bob, moves a pixel by ") and run.lens.endswith("; rectified")
+    assert run.summary(Truth([]))["lens"] == run.lens and straight.lens == "none told: taken as rectified"
+    for (depth, box), (plain, told) in zip(rectified, as_they_are, strict=True):
+        assert depth.shown is not None and plain.shown is None and not np.array_equal(box, told)
+
+
+def test_pictures_whose_topics_say_that_they_are_rectified_reach_it_as_they_are() -> None:
+    inputs = replace(INPUTS, image="/image_rect", depth="/depth/image_rect")
+    renamed = of_a_lens(2, image="/image_rect", depth_image="/depth/image_rect")
+    _, as_they_are = seen_of_a_lens(records(2), INPUTS)
+    run, met = seen_of_a_lens(renamed, inputs)
+    assert run.frames == 2 and "taken as rectified" in run.lens
+    for (depth, box), (plain, told) in zip(met, as_they_are, strict=True):
+        assert np.array_equal(depth.depth, plain.depth) and np.array_equal(box, told)
+    again, met = seen_of_a_lens(of_a_lens(2), INPUTS, "all")
+    assert "taken as rectified" in again.lens and met[0][0].shown is None
+
+
+def test_frames_of_a_lens_that_nobody_knows_are_dropped_with_what_to_do() -> None:
+    rooms, chain = simple_rooms()
+    run = run_offline(of_a_lens(3, "nobody's"), rooms, INPUTS)
+    assert chain.frames == [] and run.dropped == {"malformed_depth": 3}
+    assert 'got "nobody\'s"; set segmenter.rectified to all' in run.complaints["malformed_depth"]

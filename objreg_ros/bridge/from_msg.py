@@ -105,7 +105,18 @@ def intrinsics(message: Any) -> Intrinsics:
     PinholeCameraModel), and K where P is left at zeros. ValueError for a camera that is not calibrated (ROS drivers
     say so with zeros in both).
     """
-    matrix = _calibrated(message)
+    return _windowed(_calibrated(message), message)
+
+
+def pinhole(message: Any, name: str) -> Intrinsics:
+    """The pinhole camera of one matrix of a CameraInfo, ``k`` or ``p``, with binning and region of interest applied.
+
+    ValueError where that one is not calibrated.
+    """
+    return _windowed(_usable(message, name), message)
+
+
+def _windowed(matrix: Array, message: Any) -> Intrinsics:
     roi, (bin_x, bin_y) = message.roi, (max(1, int(b)) for b in (message.binning_x, message.binning_y))
     width, height = int(roi.width) or int(message.width), int(roi.height) or int(message.height)
     return Intrinsics(
@@ -140,11 +151,14 @@ def camera_of_cloud(
 
 def _calibrated(message: Any) -> Array:
     """P (3, 4) or, where it says nothing, K (3, 3), in pixels of the whole picture; ValueError if neither is usable."""
-    P, K = _camera_matrix(message, "p"), _camera_matrix(message, "k")
-    name, matrix = ("P", P) if P.flat[0] != 0 else ("K", K)
+    return _usable(message, "p" if _camera_matrix(message, "p").flat[0] != 0 else "k")
+
+
+def _usable(message: Any, name: str) -> Array:
+    matrix = _camera_matrix(message, name)
     if not np.isfinite(matrix).all() or matrix[0, 0] <= 0 or matrix[1, 1] <= 0:
         got = matrix.ravel().tolist()
-        raise ValueError(f"camera_info: expected a calibrated {name} with focal lengths above 0, got {got}")
+        raise ValueError(f"camera_info: expected a calibrated {name.upper()} with focal lengths above 0, got {got}")
     return matrix
 
 

@@ -13,7 +13,7 @@ from objreg_ros.cli import options
 from objreg_ros.memory.store_file import is_store
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import GRAPH_TOPICS, Inputs, choose_inputs, parse_remaps
-from objreg_ros.recording.summary import describe_topics, warnings
+from objreg_ros.recording.summary import describe_lens, describe_topics, warnings
 from objreg_ros.report.live_pictures import write_picture
 from objreg_ros.report.store_summary import describe, draw, survey
 from objreg_ros.truth import Truth
@@ -38,6 +38,7 @@ def command(recording: Path, remaps: tuple[str, ...], picture: Path | None) -> N
         _say_what_it_is(source)
         _say_topics(source)
         _say_inputs(inputs)
+        _say_lens(source, inputs)
         _say_truth(source, inputs)
         for warning in warnings(source, inputs):
             click.echo(f"! {warning}")
@@ -73,6 +74,12 @@ def _say_inputs(inputs: Inputs) -> None:
     chosen = inputs.chosen()
     rows = [(GRAPH_TOPICS[name], chosen.get(name, "-")) for name in GRAPH_TOPICS]
     click.echo(columns(("input of the graph", "topic that it would use"), rows) + "\n")
+
+
+def _say_lens(source: Recording, inputs: Inputs) -> None:
+    lens = describe_lens(source, inputs)
+    if lens:
+        click.echo(f"lens: {lens}\n")
 
 
 def _say_truth(source: Recording, inputs: Inputs) -> None:

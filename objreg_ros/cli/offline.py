@@ -73,7 +73,12 @@ def command(
     summary = run.summary(truth)
     _say(run, summary)
     if json_file is not None:
-        told = {"recording": str(recording.resolve()), "inputs": inputs.outright, "odometry": inputs.odom}
+        told = {
+            "recording": str(recording.resolve()),
+            "inputs": inputs.outright,
+            "odometry": inputs.odom,
+            "rectified": settings.of("segmenter", SegmenterNodeParams).rectified,
+        }
         json_file.write_text(json.dumps({**told, **summary}, indent=1))
 
 
@@ -136,8 +141,16 @@ def _timing(settings: Settings, odometry: str | None) -> Timing:
     if _drifts(odometry):
         if registrar.mounting is not None or segmenter.level_odom:
             click.echo(f"! {CAMERAS_OWN.format(odometry)}", err=True)
-        return Timing(slop_ns, odom_slop_ns, colour=segmenter.colour)
-    return Timing(slop_ns, odom_slop_ns, registrar.mounting, segmenter.colour, segmenter.level_odom, segmenter.mounting)
+        return Timing(slop_ns, odom_slop_ns, colour=segmenter.colour, rectified=segmenter.rectified)
+    return Timing(
+        slop_ns=slop_ns,
+        odom_slop_ns=odom_slop_ns,
+        T_base_camera=registrar.mounting,
+        colour=segmenter.colour,
+        level_odom=segmenter.level_odom,
+        T_level_camera=segmenter.mounting,
+        rectified=segmenter.rectified,
+    )
 
 
 def _records(source: Recording, inputs: Inputs, odometry: str | None) -> Iterator[Record]:
@@ -151,6 +164,8 @@ def _say(run: Run, summary: dict) -> None:
     click.echo(
         f"{run.frames} frames, {run.detections} detections, {run.objects} objects, {len(run.closures)} constraints"
     )
+    if run.lens:
+        click.echo(f"  lens: {run.lens}")
     for title in ("rejected", "dropped"):
         for reason, count in summary[title].items():
             click.echo(f"  {title} {reason}: {count}")

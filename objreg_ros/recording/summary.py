@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from objreg_ros.bridge import from_msg
+from objreg_ros.bridge import from_msg, lenses
 from objreg_ros.bridge.layout import table
 from objreg_ros.data import Intrinsics
 from objreg_ros.recording.inputs import Inputs
@@ -39,6 +39,19 @@ def describe_topics(recording: Recording) -> list[Line]:
         rate = (topic.count - 1) / recording.seconds if topic.count > 1 and recording.seconds > 0 else None
         lines.append(Line(topic.name, topic.msgtype, topic.count, rate, _what(recording, topic.name, topic.msgtype)))
     return lines
+
+
+def describe_lens(recording: Recording, inputs: Inputs, rectified: str = "auto") -> str:
+    """What the graph would assume of the lens of the camera; empty where there is no camera_info that can be read."""
+    record = _first(recording, inputs.camera_info)
+    message = None if record is None else record.read()
+    if message is None:
+        return ""
+    raw = lenses.raw_pictures(rectified, inputs.depth or inputs.points, inputs.image)
+    try:
+        return lenses.describe(message, raw, points=inputs.points is not None)
+    except ValueError as error:
+        return f"not usable, and frames would be dropped: {error}"
 
 
 def _what(recording: Recording, name: str, msgtype: str) -> str:
@@ -70,11 +83,7 @@ def _cloud(message: Any) -> str:
 def _camera(message: Any) -> str:
     camera = from_msg.intrinsics(message)
     numbers = " ".join(f"{name} {getattr(camera, name):.1f}" for name in ("fx", "fy", "cx", "cy"))
-    return f"{camera.width} × {camera.height} {numbers}{', distorted' if _is_distorted(message) else ''}"
-
-
-def _is_distorted(message: Any) -> bool:
-    return bool(np.any(np.asarray(getattr(message, "d", getattr(message, "D", ())))))
+    return f"{camera.width} × {camera.height} {numbers}{', distorted' if lenses.is_distorted(message) else ''}"
 
 
 def _pose(message: Any) -> str:

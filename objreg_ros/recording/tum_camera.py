@@ -15,6 +15,7 @@ from typing import Any
 import yaml
 
 from objreg_ros.data import Intrinsics
+from objreg_ros.lens import require_model
 from objreg_ros.recording.text import SETTINGS_BYTES, read_text
 
 FOCAL_PX, FOCAL_WIDTH = 525.0, 640  # the default camera's focal length, and of which width of a picture it is
@@ -102,4 +103,7 @@ def _depth_scale(value: Any) -> float:
 def _distortion(value: Any) -> tuple[float, ...]:
     if isinstance(value, str) or not hasattr(value, "__iter__"):
         raise ValueError(f"distortion {value!r}, which is no list like [0.1, -0.2, 0, 0, 0]")
-    return tuple(float(number) for number in value)
+    numbers = tuple(float(number) for number in value)
+    if any(numbers):
+        require_model("plumb_bob", numbers)
+    return numbers

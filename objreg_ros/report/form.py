@@ -68,6 +68,8 @@ def _each(fits: Check) -> Check:
 FIELDS: dict[str, tuple[str, Check]] = {
     "recording": ("the path of a recording", _is_text),
     "name": ("text", _is_text),
+    "lens": ("text", _is_text),
+    "rectified": ("auto, all or none", lambda value: value in ("auto", "all", "none")),
     "inputs": ("an object of topics by input", _each(_is_text)),
     "T_base_camera": ("seven numbers or none", _is_mounting),
     "frames": ("a count", _is_count),

@@ -78,8 +78,8 @@ def _head(story: Story, tracks: Tracks | None) -> str:
     if tracks is not None and tracks.odometry_error is not None and tracks.corrected_error is not None:
         before, after = (100 * root_mean_square(e) for e in (tracks.odometry_error, tracks.corrected_error))
         tiles.append(_tile(f"{before:.1f} → {after:.1f} cm", "trajectory error", _change(before, after)))
-    headline = escape(story.name)
-    return f"<h1>{headline}</h1><p>{escape(_verdict(story, false, judged))}</p><div class=tiles>{''.join(tiles)}</div>"
+    said = _verdict(story, false, judged) + (f" Lens: {lens}." if (lens := story.summary.get("lens")) else "")
+    return f"<h1>{escape(story.name)}</h1><p>{escape(said)}</p><div class=tiles>{''.join(tiles)}</div>"
 
 
 def root_mean_square(values: Array) -> float:

@@ -10,8 +10,8 @@ from typing import Any
 import cv2
 import numpy as np
 
-from objreg_ros.bridge import from_msg
-from objreg_ros.data import UNTRIED, Array, DepthImage, LoopClosure, Rejected
+from objreg_ros.bridge import from_msg, lenses
+from objreg_ros.data import UNTRIED, Array, DepthImage, Detections, LoopClosure, Rejected
 from objreg_ros.geometry import back_project, transform
 from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.record import Recording
@@ -24,14 +24,18 @@ QUALITY = 82
 
 
 class Album:
-    """The colour and depth of a recording at any moment, by the stamps of the messages."""
+    """The colour and depth of a recording at any moment, by the stamps of the messages.
 
-    def __init__(self, recording: Recording, inputs: Inputs) -> None:
+    Pictures of a lens are rectified, unless they are so already: ``rectified`` is the segmenter's parameter.
+    """
+
+    def __init__(self, recording: Recording, inputs: Inputs, rectified: str = "auto") -> None:
         source = inputs.depth or inputs.points
         self._is_cloud = inputs.depth is None
         image = None if self._is_cloud else inputs.image  # a cloud has its colour in it
         self._source, self._image = (Shelf(recording, topic) if topic else None for topic in (source, image))
         self._cameras = Cameras(recording, inputs.camera_info)
+        self._raw = lenses.raw_pictures(rectified, source, inputs.image)
         self._known: dict[int, DepthImage | str] = {}
 
     def at(self, stamp_ns: int) -> DepthImage | None:
@@ -43,6 +47,10 @@ class Album:
         """Why there is no picture of a moment, in words; empty where there is one."""
         seen = self._seen(stamp_ns)
         return seen if isinstance(seen, str) else ""
+
+    def rectified(self, detections: Detections) -> Detections:
+        """Boxes of the recorded picture of a moment, in the picture that `at` gives."""
+        return lenses.detections(detections, self._cameras.at(detections.stamp_ns), self._raw)
 
     def _seen(self, stamp_ns: int) -> DepthImage | str:
         if stamp_ns not in self._known:
@@ -74,7 +82,7 @@ class Album:
             return organise(cloud, from_msg.camera_of_cloud(camera_info, cloud))
         if camera_info is None:
             raise ValueError("expected a calibrated camera_info, got none")
-        return from_msg.depth_image(depth, camera_info, colour)
+        return lenses.depth_image(depth, camera_info, colour, raw=self._raw)
 
 
 def overlay(target: DepthImage, source: DepthImage, T_target_source: Array) -> Array:

@@ -54,7 +54,7 @@ def _chapter(file: Path, stack: ExitStack) -> tuple[Story, Album | None]:
     glimpses = _with_odometry(summary.get("glimpses", ()), recording, inputs.odom, T_base_camera)
     told = {**_of_nodes(summary), **summary, "glimpses": glimpses}
     story = Story.of(summary.get("name", place.resolve().name), told, Truth.of(recording, inputs.ground_truth))
-    return story, Album(recording, inputs)
+    return story, Album(recording, inputs, summary.get("rectified", "auto"))
 
 
 def _inputs_of(summary: Mapping[str, Any], recording: Recording) -> dict[str, str]:

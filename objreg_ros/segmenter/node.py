@@ -16,7 +16,7 @@ from rclpy.qos import DurabilityPolicy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from std_msgs.msg import String
 
-from objreg_ros.bridge import from_msg, qos, to_msg
+from objreg_ros.bridge import from_msg, lenses, qos, to_msg
 from objreg_ros.bridge.lifetime import await_kernels
 from objreg_ros.bridge.matching import MatchingDoor
 from objreg_ros.bridge.overridable import FIXED
@@ -46,6 +46,7 @@ class SegmenterNode(MatchingDoor):
         await_kernels(self._segmenter.warm, self.get_logger().info)
         self._camera_info: Any = None
         self._source: str | None = None  # the topic that depth comes by
+        self._lens = ""  # what was said of it
         self._objects = self.create_publisher(PointCloud2, "objects", qos.room())
         self._view = self.create_publisher(PointCloud2, "view", qos.room())
         self._view_info = self.create_publisher(CameraInfo, "view/camera_info", qos.room())
@@ -157,10 +158,12 @@ class SegmenterNode(MatchingDoor):
 
     def compute(self, stamp_ns: int, payload: Match) -> bool:
         """One depth image or cloud with its detections."""
-        depth = self._depth(payload)
+        raw = self._raw_pictures()
+        depth, cloud = self._depth(payload, raw)
         names = payload["labels"]
         shape = depth.depth.shape
-        detections = self.read("detections", from_msg.detections, payload["detections"], names, shape)
+        seen = self.read("detections", from_msg.detections, payload["detections"], names, shape)
+        detections = self.read("camera_info", lenses.detections, seen, self._camera_of(payload), raw, cloud)
         gravity = self._level_gravity(payload)
         with self.ledger.timed("segment"):
             frame = self._segmenter.segment(detections, depth, gravity)
@@ -186,14 +189,33 @@ class SegmenterNode(MatchingDoor):
             if text is not None:
                 self.throttled.remind(reason, text)
 
-    def _depth(self, match: Match) -> DepthImage:
+    def _camera_of(self, match: Match) -> Any:
+        return match.payloads.get("camera_info", self._camera_info)
+
+    def _raw_pictures(self) -> lenses.Raw:
+        """Which pictures are to be rectified, by what their topics are called behind all remaps."""
+        image = (self.taken("image") if self._inputs.colour and self._source in DEPTH else None) or "image"
+        topics = self._source or "depth/image", image
+        return lenses.raw_pictures(self._inputs.rectified, *map(self.resolve_topic_name, topics))
+
+    def _tell_lens(self, camera_info: Any, raw: lenses.Raw) -> None:
+        """Say once, and again where it changes, what is assumed of the lens."""
+        lens = self.read("camera_info", lenses.describe, camera_info, raw)
+        if lens != self._lens:
+            self._lens = lens
+            self.get_logger().info(f"lens: {lens}")
+
+    def _depth(self, match: Match, raw: lenses.Raw) -> tuple[DepthImage, PointCloud | None]:
+        """The depth image, and the cloud where it comes of one."""
         if "camera_info" in match.payloads:
             messages = match["depth"], match["camera_info"], match["image"]
-            return self.read("depth", from_msg.depth_image, *messages, self.most_pixels)
+            depth = self.read("depth", lenses.depth_image, *messages, self.most_pixels, raw)
+            self._tell_lens(match["camera_info"], raw)
+            return depth, None
         cloud = self.read("points", from_msg.point_cloud, match["depth"])
         camera = self.read("camera_info", from_msg.camera_of_cloud, self._camera_info, cloud, self.most_pixels)
         with self.ledger.timed("organise"):
-            return organise(cloud, camera)
+            return organise(cloud, camera), cloud
 
     def _publish(self, frame: Frame, names: to_msg.Labels) -> None:
         self._objects.publish(to_msg.objects(frame, names))

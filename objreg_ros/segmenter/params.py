@@ -64,6 +64,12 @@ class SegmenterNodeParams(Params):
         "auto", "where depth comes from; auto takes whichever publishes first", choices=("auto", "points", "depth")
     )
     slop: float = param(0.02, "largest distance in time between depth and what goes with it", "s", ge=0.0)
+    rectified: str = param(
+        "auto",
+        "which of depth and image come without the distortion that camera_info tells of; auto: those whose topic has "
+        "rect in its name; the others are rectified here",
+        choices=("auto", "all", "none"),
+    )
     colour: bool = param(True, "take the colour of the points from `image` when depth comes as an image")
     level_odom: bool = param(
         False, "take gravity from `odom`, whose frame an IMU keeps level with z up; frames are no more often than it"

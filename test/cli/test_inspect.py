@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from recording.folders import lost, tum_folder
+from recording.folders import CAMERA, lost, tum_folder
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from objreg_ros.cli.inspect import columns, command
@@ -89,3 +89,20 @@ def test_nothing_is_refused(tmp_path: Path) -> None:
 
 def test_columns_line_up() -> None:
     assert columns(("a", "b"), [("long", "x")]) == "a     b\n----  -\nlong  x"
+
+
+def test_what_is_assumed_of_the_lens_is_told(tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path)
+    assert "lens: none told: taken as rectified" in CliRunner().invoke(command, [str(folder)]).output
+    with (folder / "camera.yaml").open("a") as file:
+        file.write("\ndistortion: [-0.3, 0.1, 0, 0, 0]\n")
+    output = CliRunner().invoke(command, [str(folder)]).output
+    assert "lens: plumb_bob, moves a pixel by " in output and "at most; rectified" in output
+
+
+def test_a_lens_that_cannot_be_undone_is_told_with_what_to_do(tmp_path: Path) -> None:
+    info = messages.camera_info(CAMERA, 10**9, "camera", (0.1,) * 5)
+    info.distortion_model = "nobody's"
+    write_rosbag2(tmp_path / "bag", [Record.of("/camera_info", info, 10**9)])
+    output = CliRunner().invoke(command, [str(tmp_path / "bag")]).output
+    assert "lens: not usable, and frames would be dropped: camera_info: lens: expected a distortion model" in output

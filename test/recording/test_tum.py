@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from objreg_ros.bridge import from_msg
+from objreg_ros.bridge import from_msg, lenses
 from objreg_ros.recording import open_recording
 from objreg_ros.recording.tum import ASSOCIATION_NS, Picture, _associate
 
@@ -301,3 +301,15 @@ def test_the_work_for_a_list_grows_as_the_list() -> None:
     finally:
         signal.alarm(0)
         signal.signal(signal.SIGALRM, before)
+
+
+def test_the_distortion_of_a_folder_s_camera_is_undone_in_depth_and_colour(tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path)
+    with (folder / "camera.yaml").open("a") as file:
+        file.write("\ndistortion: [-0.3, 0.1, 0.001, 0.002, 0]\n")
+    first = {r.topic: r.message for r in open_recording(folder).records(end_ns=1)}
+    said = first["/depth/image"], first["/camera_info"], first["/image"]
+    word, raw, of = lenses.depth_image(*said), from_msg.depth_image(*said), lenses.lens_of(first["/camera_info"])
+    assert of is not None and of.D == (-0.3, 0.1, 0.001, 0.002, 0)
+    assert np.array_equal(word.depth, of.rectify_depth(raw.depth)) and (word.depth > 0).any()
+    assert raw.rgb is not None and np.array_equal(word.rgb, of.rectify_colour(raw.rgb))

@@ -72,3 +72,9 @@ def test_yaml_that_nests_or_says_what_no_reader_takes_is_refused_in_one_line(tex
     with pytest.raises(ValueError, match=r"camera\.yaml: expected YAML, got: ") as refusal:
         camera(tmp_path, text)
     assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("value", ["[0.1, 0.2]", "[.nan, 0, 0, 0, 0]", "[0.1, 0, 0, 0, 0, 0]"])
+def test_distortion_that_is_no_lens_of_a_plumb_bob_is_refused(value: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"camera\.yaml: .*expected (4 or 5|finite) coefficients of plumb_bob, got"):
+        camera(tmp_path, f"{WHOLE}\ndistortion: {value}")

@@ -106,3 +106,9 @@ def test_what_has_no_picture_is_counted_with_the_reason() -> None:
     text = page([(Story.of("walk", summary(), TRUTH), Blank())])
     assert "Accepted registrations" in text and "No picture of 4 of these 4: nothing is near (4 times)." in text
     assert "No picture of 2 of these 2: nothing is near (2 times)." in text
+
+
+def test_the_head_says_what_was_assumed_of_the_lens() -> None:
+    told = {**summary(), "lens": "plumb_bob, moves a pixel by 4.8 px (median), 36.8 at most; rectified"}
+    assert "Lens: plumb_bob, moves a pixel by 4.8 px" in page([(Story.of("walk", told, TRUTH), None)])
+    assert "Lens:" not in page([(Story.of("walk", summary(), TRUTH), None)])

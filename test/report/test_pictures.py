@@ -11,7 +11,7 @@ import pytest
 from recording.folders import STEP_NS, records, tum_folder, uncalibrated
 
 from objreg_ros.bridge.layout import VIEW
-from objreg_ros.data import DepthImage, Intrinsics
+from objreg_ros.data import DepthImage, Detections, Intrinsics
 from objreg_ros.geometry import pose
 from objreg_ros.recording import Record, messages, write_rosbag2
 from objreg_ros.recording.inputs import Inputs, choose_inputs
@@ -128,3 +128,19 @@ def test_a_cloud_has_its_own_colour_and_needs_no_calibrated_camera(tmp_path: Pat
         album = Album(recording, Inputs(points="/points", camera_info="/camera_info"))
         assert (album.at(5) is not None) == coloured
         assert album.lacking(5) == ("" if coloured else "the cloud has no colour")
+
+
+def test_pictures_and_boxes_of_a_lens_are_shown_rectified_unless_they_are_so_already(tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path, frames=1)
+    with (folder / "camera.yaml").open("a") as file:
+        file.write("\ndistortion: [-0.3, 0.1, 0, 0, 0]\n")
+    recording = open_recording(folder)
+    inputs = choose_inputs(recording.topics)
+    box = Detections(
+        xyxy=np.array([[5, 5, 30, 30]], np.float32), score=np.ones(1, np.float32), label=("cup",), image_hw=(48, 64),
+        stamp_ns=0,
+    )  # fmt: skip
+    bent, straight = Album(recording, inputs), Album(recording, inputs, "all")
+    seen, raw = bent.at(0), straight.at(0)
+    assert seen is not None and raw is not None and seen.shown is not None and raw.shown is None
+    assert not np.array_equal(bent.rectified(box).xyxy, box.xyxy) and straight.rectified(box) is box

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -153,3 +155,23 @@ def test_a_plane_that_leans_both_ways_is_found_in_a_corner_of_it() -> None:
     chosen = np.add.outer(np.arange(48), np.arange(64)) < 50
     slope = np.sqrt(0.3**2 + 0.2**2 + 0.5**2)
     assert _fit_plane(depth, x, y, chosen) == pytest.approx((0.3, -0.2, 0.5, slope), abs=1e-4)
+
+
+@pytest.mark.parametrize(("column", "is_cut"), [(30, True), (43, True), (44, False), (200, False)])
+def test_an_object_at_the_border_of_what_a_rectified_picture_shows_is_cut_by_the_image(
+    column: int, is_cut: bool
+) -> None:
+    """The picture begins at column 40 in its upper half, and 4 px, a hundredth of the width, are near to that."""
+    shown = np.ones((240, 320), bool)
+    shown[:120, :40] = False
+    scene = Scene(SMALL)
+    image = replace(scene.image(NOISE), shown=shown)
+    u, v = np.arange(column, column + 20.0), np.full(20, 60.0)
+    xyz = np.column_stack([(u - SMALL.cx) / SMALL.fx, (v - SMALL.cy) / SMALL.fy, np.ones(20)]).astype(np.float32)
+    there = Pixels(xyz, xyz, None, np.zeros(20, np.uint16), 1.0, (column, 60, column + 20, 61))
+    surface = scene.ground(image).surface
+    flags = whole_flags(image, there, surface, np.zeros((240, 320), bool), (0, 0, 320, 240))
+    assert (PointFlag.CUT_BY_IMAGE in flags) == is_cut
+    below = replace(there, xyz=xyz + np.float32([0, 100 / SMALL.fy, 0]), bounds=(column, 160, column + 20, 161))
+    flags = whole_flags(image, below, surface, np.zeros((240, 320), bool), (0, 0, 320, 240))
+    assert PointFlag.CUT_BY_IMAGE not in flags

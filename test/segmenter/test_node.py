@@ -16,8 +16,9 @@ from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import String
 
-from objreg_ros.bridge import qos, to_msg
+from objreg_ros.bridge import lenses, qos, to_msg
 from objreg_ros.data import DepthImage, Detections, Intrinsics
+from objreg_ros.lens import Lens
 from objreg_ros.segmenter.node import LOOK_S, SegmenterNode
 from objreg_ros.segmenter.segment import Segmenter
 
@@ -28,10 +29,13 @@ NAMES = {0: "cup"}
 class Camera:
     """A camera whose info was published before the segmenter came, and that is kept for it or published again."""
 
-    def __init__(self, kept: bool) -> None:
+    def __init__(self, kept: bool, distortion: tuple[float, ...] = (), model: str = "plumb_bob") -> None:
         self.node = rclpy.create_node("camera")
         self.info = self.node.create_publisher(CameraInfo, "camera_info", qos.latched() if kept else qos.room())
-        self.info.publish(to_msg.camera_info(CAMERA, 1, "eye"))
+        told = to_msg.camera_info(CAMERA, 1, "eye")
+        if distortion:
+            told.d, told.distortion_model = list(distortion), model
+        self.info.publish(told)
         self.depth = self.node.create_publisher(Image, "depth/image", qos.room())
         self.table = self.node.create_publisher(PointCloud2, "detections_table", qos.room())
         self.labels = self.node.create_publisher(String, "labels", qos.latched())
@@ -66,7 +70,7 @@ class Camera:
         )  # fmt: skip
         self.table.publish(to_msg.detections_table(seen, NAMES))
         self.depth.publish(message)
-        self.wait(lambda: self.door.ledger.balance().published == 1)
+        self.wait(lambda: self.door.ledger.balance().published + sum(self.door.ledger.balance().dropped.values()) == 1)
 
 
 @pytest.fixture
@@ -76,8 +80,8 @@ def made(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[bool], Camera]]:
     rclpy.init(args=["--ros-args", "-p", "colour:=false"], domain_id=100 + os.getpid() % 100)
     cameras: list[Camera] = []
 
-    def make(kept: bool = True) -> Camera:
-        cameras.append(Camera(kept))
+    def make(kept: bool = True, **lens: Any) -> Camera:
+        cameras.append(Camera(kept, **lens))
         return cameras[-1]
 
     yield make
@@ -128,3 +132,67 @@ def test_millimetres_as_floats_are_told_with_what_to_do(made: Callable[..., Came
     camera.see(1200.0, "eye", "eye")
     (line,) = camera.said
     assert "z_min … z_max" in line and "16UC1" in line
+
+
+def spied(camera: Camera, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """The boxes and the depth image of each frame that its segmenter gets."""
+    met: list[Any] = []
+    segment = camera.door._segmenter.segment
+    spy = lambda boxes, depth, gravity: met.append((boxes.xyxy, depth)) or segment(boxes, depth, gravity)  # noqa: E731
+    monkeypatch.setattr(camera.door._segmenter, "segment", spy)
+    return met
+
+
+@pytest.mark.parametrize(
+    ("model", "distortion"),
+    [
+        ("plumb_bob", (-0.3, 0.1, 0.0, 0.0, 0.0)),
+        ("rational_polynomial", (0.4, -2.5, 0.0005, -0.0003, 1.4, 0.6, -2.3, 1.3)),
+        ("equidistant", (-0.03, 0.01, -0.005, 0.001)),
+    ],
+)
+def test_depth_and_boxes_of_a_lens_are_rectified_before_they_are_segmented(
+    model: str, distortion: tuple[float, ...], made: Callable[..., Camera], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    camera = made(distortion=distortion, model=model)
+    met = spied(camera, monkeypatch)
+    camera.see(1.2, "eye", "eye")
+    ((xyxy, depth),) = met
+    of = Lens(model, distortion, CAMERA, CAMERA)
+    assert np.array_equal(depth.shown, of.shown) and np.array_equal(depth.depth > 0, of.shown)
+    assert np.abs(xyxy - of.rectify_xyxy(np.array([[100, 70, 220, 170]]))).max() < 1e-3
+    assert camera.door._lens == f"{of}; rectified"
+
+
+def test_pictures_that_are_said_to_be_rectified_are_segmented_as_they_come(
+    made: Callable[..., Camera], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    camera = made(distortion=(-0.3, 0.1, 0.0, 0.0, 0.0))
+    camera.door._inputs = replace(camera.door._inputs, rectified="all")
+    met = spied(camera, monkeypatch)
+    camera.see(1.2, "eye", "eye")
+    ((xyxy, depth),) = met
+    assert xyxy.tolist() == [[100, 70, 220, 170]] and depth.shown is None and (depth.depth > 0).all()
+    assert "taken as rectified" in camera.door._lens
+
+
+def test_the_name_of_a_topic_behind_its_remap_tells_what_is_rectified(
+    made: Callable[..., Camera], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    camera = made(distortion=(-0.3, 0.1, 0.0, 0.0, 0.0))
+    monkeypatch.setattr(camera.door, "resolve_topic_name", lambda name: {"depth/image": "/cam/image_rect"}[name])
+    camera.door._source = "depth/image"
+    with pytest.raises(KeyError, match="image"):
+        camera.door._raw_pictures()  # it asks for the name of the colour too
+    names = {"depth/image": "/cam/depth/image_rect", "image": "/cam/rgb/image_raw"}
+    monkeypatch.setattr(camera.door, "resolve_topic_name", names.__getitem__)
+    assert camera.door._raw_pictures() == lenses.Raw(depth=False, colour=True)
+
+
+def test_a_frame_of_a_lens_that_nobody_knows_is_dropped_and_counted(made: Callable[..., Camera]) -> None:
+    camera = made(distortion=(0.1, 0.2, 0.3, 0.4, 0.5), model="nobody's")
+    camera.see(1.2, "eye", "eye")
+    assert camera.door.ledger.balance().dropped == {"malformed_depth": 1}
+    (line,) = camera.said
+    assert 'expected a distortion model of plumb_bob, rational_polynomial, equidistant, got "nobody\'s"' in line
+    assert "set segmenter.rectified to all" in line
