@@ -77,7 +77,7 @@ def command(
     settings: tuple[str, ...],
     **rig: float,
 ) -> None:
-    """Simulate a depth camera that is carried through a room; write OUT, a rosbag2 folder (mcap) with OUT/truth in it."""
+    """Simulate a depth camera that is carried through a room, and write OUT, a rosbag2 folder with OUT/truth in it."""
     camera = camera_of(intrinsics or SENSORS[sensor][0], size)
     sensors = sensors_of(camera, stress, (*_rig_settings(lens, rig), *settings), sensor)
     with tqdm(total=frames, unit="frame", desc=scenario, disable=None) as bar:

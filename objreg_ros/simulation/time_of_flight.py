@@ -24,7 +24,7 @@ from objreg_ros.simulation.params import StressParams, TimeOfFlightParams
 from objreg_ros.simulation.surfaces import Surfaces
 from objreg_ros.simulation.view import View
 
-LEAST_REFLECTANCE = 0.01
+LEAST_REFLECTANCE = 0.004
 SURROUNDINGS_SHARE = 0.08
 """A corner is told by a square of this share of the picture's width."""
 CORNER_SHARE = 0.02
