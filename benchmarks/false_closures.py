@@ -9,13 +9,16 @@ it is said how often the best pose that was proposed was loosely right, and why 
     python benchmarks/false_closures.py --json OUT
     python benchmarks/false_closures.py --simulate look-alikes:82 --simulate moved:103:qvga:stress
     python benchmarks/false_closures.py --simulate moved:704:realsense_d435 --model truth
+    python benchmarks/false_closures.py --simulate loop:9:sensor=realsense_d435:lens=webcam:lag_ms=25:blur_ms=10
+
+A camera by name changes the view only. ``sensor=`` takes its depth sensor and its camera. The other settings are the
+options of `objreg simulate` of the same name.
 """
 
 from __future__ import annotations
 
 import json
 import multiprocessing
-import re
 import tempfile
 from collections import Counter
 from collections.abc import Sequence
@@ -28,12 +31,12 @@ import click
 import cv2
 from sources import detector_of, read_source
 
-from objreg_ros.cli.simulate import camera_of, sensors_of
+from objreg_ros.cli.simulate import camera_of, distortion_of, sensors_of
 from objreg_ros.data import UNTRIED, LoopClosure, Rejected
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.simulation.camera import CAMERAS
+from objreg_ros.simulation.camera import CAMERAS, SENSORS
 from objreg_ros.simulation.scenarios import SCENARIOS
 from objreg_ros.simulation.write import simulate
 from objreg_ros.truth import LOOSE, Truth, summarise, within
@@ -61,16 +64,47 @@ class Told(NamedTuple):
     seed: int
     camera: str
     stress: bool
+    sensor: str = "kinect_v1"
+    rig: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """In words, as tables have it."""
+        sensor = [] if self.sensor == "kinect_v1" else [f"{self.sensor} depth"]
+        rig = [setting.removeprefix("rig.") for setting in self.rig]
+        return ", ".join([f"{self.scenario} {self.seed}", self.camera, *sensor, *rig, *["stress"] * self.stress])
 
 
 def told(text: str) -> Told:
-    """``moved:103:qvga:stress``, of which camera and stress may be left out; `click.BadParameter` for anything else."""
-    found = re.fullmatch(r"([\w-]+):(\d+)(?::(\w+))??(:stress)?", text)
-    scenario, seed, camera, stress = found.groups() if found else ("", 0, "", None)
-    story = Told(scenario, int(seed), camera or "kinect", stress is not None)
-    if story.scenario not in SCENARIOS or story.camera not in CAMERAS:
-        expected = f"SCENARIO:SEED[:CAMERA][:stress] of {', '.join(SCENARIOS)} and {', '.join(CAMERAS)}"
-        raise click.BadParameter(f"expected {expected}, got {text!r}", param_hint="--simulate")
+    """``moved:103:qvga:sensor=azure_kinect:lag_ms=25:stress``; all behind the seed may be left out, in this order.
+
+    `click.BadParameter` for anything else.
+    """
+    try:
+        return _told(*text.split(":"))
+    except (TypeError, ValueError) as error:
+        cameras = f"{', '.join(SCENARIOS)} and {', '.join(CAMERAS)}"
+        why = f" ({error})" if "=" in text else ""
+        raise click.BadParameter(
+            f"expected SCENARIO:SEED[:CAMERA][:SETTING=VALUE...][:stress] of {cameras}, got {text!r}{why}",
+            param_hint="--simulate",
+        ) from error
+
+
+def _told(scenario: str, seed: str, *more: str) -> Told:
+    stress = more[-1:] == ("stress",)
+    rest = more[: len(more) - stress]
+    settings = dict(part.split("=", 1) for part in rest if "=" in part)
+    sensor = settings.pop("sensor", "kinect_v1")
+    named = [part for part in rest[:1] if "=" not in part]
+    camera = named[0] if named else SENSORS.get(sensor, ("", None))[0]
+    known = scenario in SCENARIOS and seed.isdigit() and camera in CAMERAS
+    if not known or len(named) + len(settings) + ("sensor=" in ":".join(rest)) != len(rest):
+        raise ValueError(f"settings are sensor={'|'.join(SENSORS)}, lens= and those of the rig")
+    if "lens" in settings:
+        settings["distortion"] = distortion_of(settings.pop("lens"))
+    story = Told(scenario, int(seed), camera, stress, sensor, tuple(f"rig.{k}={v}" for k, v in settings.items()))
+    sensors_of(camera_of(camera, None), stress, story.rig, sensor)  # refuses what is out of range
     return story
 
 
@@ -78,7 +112,7 @@ def measure(story: Told, frames: int, model: str) -> dict[str, Any]:
     """The figures of one recording, which is gone afterwards."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "recording"
-        sensors = sensors_of(camera_of(story.camera, None), story.stress, ())
+        sensors = sensors_of(camera_of(story.camera, None), story.stress, story.rig, story.sensor)
         simulate(path, story.scenario, story.seed, frames, sensors=sensors, jpeg=True, threads=1)
         with read_source(path, detector_of(model), story.seed) as source:
             registrar = Registrar(RegistrarParams().replaced(**EAGER, **source.camera))
@@ -143,7 +177,7 @@ def line(name: str, row: dict[str, Any], group: str = "all") -> str:
     multiple=True,
     default=STORIES,
     show_default=True,
-    metavar="SCENARIO:SEED[:CAMERA][:stress]",
+    metavar="SCENARIO:SEED[:CAMERA][:SETTING=VALUE...][:stress]",
     callback=lambda _context, _option, texts: [told(text) for text in texts],
     help="Simulate this; may be repeated.",
 )
@@ -157,9 +191,8 @@ def main(stories: list[Told], frames: int, model: str, json_file: Path | None, p
     click.echo(HEAD)
     with ProcessPoolExecutor(processes, multiprocessing.get_context("fork"), initializer=_begin) as pool:
         for story, row in zip(stories, pool.map(partial(measure, frames=frames, model=model), stories), strict=True):
-            name = f"{story.scenario} {story.seed}, {story.camera}{', stress' * story.stress}"
-            rows[name] = row
-            click.echo(line(name, row))
+            rows[story.name] = row
+            click.echo(line(story.name, row))
             if json_file is not None:
                 total = added(list(rows.values()))
                 json_file.write_text(json.dumps({"frames": frames, "recordings": rows, "total": total}, indent=1))

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """How fast the simulator is, stage by stage and as a whole, and how its depth noise compares to the model's.
 
-    python benchmarks/simulation.py --json simulation.json [--quick]
+    python benchmarks/simulation.py --json simulation.json [--quick] [--picture sensors.png]
 
 ``stages``: milliseconds of processor time a frame (median) of one thread at 640x480 over the views of a `loop`.
 ``frame_ms``: wall time of a whole frame with 1 and 2 threads, p50 and p95, and ``depth_only_ms``; ``processor_ms``: the
 processor time of one by two threads, which a busy machine changes little. ``recording_fps``:
 frames a second of a whole recording, everything included. ``noise``: standard deviation of a wall's depth in
-millimetres by distance, measured and by the model with its quantisation.
+millimetres by distance, measured and by the model with its quantisation. The picture has a room through every sensor,
+colour beside depth, and last through a Kinect with a lens, a lag, a rolling shutter, blur and misregistration.
 """
 
 from __future__ import annotations
@@ -24,19 +25,23 @@ import cv2
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.simulation.camera import KINECT, ColourSensor
+from objreg_ros.simulation.camera import CAMERAS, KINECT, LENSES, SENSORS, ColourSensor
 from objreg_ros.simulation.light import looking
 from objreg_ros.simulation.mesh import Material, box
 from objreg_ros.simulation.noise import DepthSensor
-from objreg_ros.simulation.params import ColourParams, DepthParams, StressParams
+from objreg_ros.simulation.params import ColourParams, DepthParams, RigParams, StressParams
 from objreg_ros.simulation.raster import Projection
-from objreg_ros.simulation.render import render, see
+from objreg_ros.simulation.render import Rendering, render, see
+from objreg_ros.simulation.rig import Motion, Rig
 from objreg_ros.simulation.scenarios import Story, make_story
 from objreg_ros.simulation.scene import Scene
 from objreg_ros.simulation.shade import shade
 from objreg_ros.simulation.write import simulate
 
 SHAPE = (KINECT.height, KINECT.width)
+BUILT = RigParams(distortion=LENSES["webcam"], lag_ms=30.0, rolling_ms=25.0, blur_ms=12.0, misregistration_px=4.0)
+SHOWN = 6
+"""The frame of the story that the picture shows."""
 DISTANCES_M = (0.6, 1.0, 1.5, 2.0, 3.0, 4.0)
 
 
@@ -108,6 +113,23 @@ def wall_noise(metres: float) -> dict[str, float]:
     return {"measured_mm": 1e3 * float(depth[depth > 0].std()), "model_mm": 1e3 * float(model)}
 
 
+def draw_sensors(path: Path, story: Story) -> None:
+    """A room through every sensor, colour beside depth (0.4 m red to 5 m blue, black for none)."""
+    scene, T = story.scenes[0], story.T_world_camera[SHOWN]
+    images = [render(scene, T, CAMERAS[camera], 1, depth) for camera, depth in SENSORS.values()]
+    motion = Motion(story.T_world_camera, story.rate)
+    images.append(Rig(BUILT, KINECT, 1).take(scene, motion, SHOWN / story.rate, 1))
+    cv2.imwrite(str(path), np.vstack([_beside(image) for image in images]))
+
+
+def _beside(image: Rendering) -> Array:
+    assert image.rgb is not None
+    near = np.clip(255 * (5.0 - image.depth) / 4.6, 0, 255).astype(np.uint8)
+    coloured = cv2.applyColorMap(near, cv2.COLORMAP_TURBO)
+    coloured[image.depth == 0] = 0
+    return np.hstack([image.rgb[..., ::-1], coloured])
+
+
 def quantiles(ms: list[float]) -> dict[str, float]:
     """p50 and p95."""
     return {"p50": float(np.median(ms)), "p95": float(np.percentile(ms, 95))}
@@ -116,7 +138,8 @@ def quantiles(ms: list[float]) -> dict[str, float]:
 @click.command()
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
 @click.option("--quick", is_flag=True, help="Few frames: within half a minute.")
-def command(json_file: Path | None, quick: bool) -> None:
+@click.option("--picture", type=click.Path(dir_okay=False, path_type=Path), help="Draw a room through every sensor.")
+def command(json_file: Path | None, quick: bool, picture: Path | None) -> None:
     """Time the simulator and print a table."""
     cv2.setNumThreads(1)
     story = make_story("loop", 1, frames=60)
@@ -124,6 +147,8 @@ def command(json_file: Path | None, quick: bool) -> None:
     scene.prepare()
     views = story.T_world_camera[:: 6 if quick else 2]
     whole_frames(story, views[:1])  # compile
+    if picture:
+        draw_sensors(picture, story)
     stages = Stages()
     for k, T in enumerate(views):
         one_frame(scene, T, k, stages)

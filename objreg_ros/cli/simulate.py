@@ -11,8 +11,8 @@ from tqdm import tqdm
 
 from objreg_ros.data import Intrinsics
 from objreg_ros.params import Params
-from objreg_ros.simulation.camera import CAMERAS
-from objreg_ros.simulation.params import ColourParams, DepthParams, OdometryParams, StressParams
+from objreg_ros.simulation.camera import CAMERAS, LENSES, SENSORS
+from objreg_ros.simulation.params import ColourParams, DepthParams, OdometryParams, RigParams, StressParams
 from objreg_ros.simulation.scenarios import SCENARIOS
 from objreg_ros.simulation.write import Sensors, simulate
 
@@ -21,6 +21,7 @@ SECTIONS: dict[str, type[Params]] = {
     "colour": ColourParams,
     "stress": StressParams,
     "odometry": OdometryParams,
+    "rig": RigParams,
 }
 HARD = {"depth_bias": 0.005, "warp": 0.003, "ragged": 0.9, "motion_blur": 4.0, "occluders": 5}
 
@@ -39,13 +40,23 @@ def _list(context: click.Context, _: click.Parameter, wanted: bool) -> None:
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Decides all that is random.")
 @click.option("--frames", type=click.IntRange(2), default=600, show_default=True, help="Number of image pairs.")
 @click.option("--rate", type=click.FloatRange(1.0, 240.0), default=30.0, show_default=True, help="Frames per second.")
-@click.option("--intrinsics", default="kinect", show_default=True, help=f"{', '.join(CAMERAS)}, or fx,fy,cx,cy.")
+@click.option(
+    "--sensor", type=click.Choice(list(SENSORS)), default="kinect_v1", show_default=True, help="How depth is measured."
+)
+@click.option("--intrinsics", help=f"{', '.join(CAMERAS)}, or fx,fy,cx,cy; the sensor's own by default.")
 @click.option("--size", help="WIDTHxHEIGHT in pixels; a named camera is scaled to it.")
 @click.option("--points", is_flag=True, help="Also write an organised PointCloud2 (9.8 MB a frame at 640x480).")
 @click.option("--jpeg", is_flag=True, help="Write image/compressed (jpeg) instead of image.")
 @click.option(
     "--stress", is_flag=True, help="Bias and warp the depth, fray its edges, blur the colour, crowd the tables."
 )
+@click.option("--lens", default="", help=f"Bend the pictures by {', '.join(LENSES)}, or k1,k2,p1,p2[,k3] (plumb_bob).")
+@click.option("--lag-ms", type=float, default=0.0, help="Depth shows the pose of so much before its stamp.")
+@click.option("--rolling-ms", type=float, default=0.0, help="Time from the first row of colour to the last.")
+@click.option("--blur-ms", type=float, default=0.0, help="Exposure of colour, over which motion blurs it.")
+@click.option("--misregistration-px", type=float, default=0.0, help="Shift of depth against colour.")
+@click.option("--misregistration-deg", type=float, default=0.0, help="Rotation of depth against colour.")
+@click.option("--misregistration-mm", type=float, default=0.0, help="Displacement of the depth camera.")
 @click.option(
     "--set", "settings", multiple=True, metavar="SECTION.NAME=VALUE", help="Change one parameter; see --list."
 )
@@ -56,15 +67,19 @@ def command(
     seed: int,
     frames: int,
     rate: float,
-    intrinsics: str,
+    sensor: str,
+    intrinsics: str | None,
     size: str | None,
     points: bool,
     jpeg: bool,
     stress: bool,
+    lens: str,
     settings: tuple[str, ...],
+    **rig: float,
 ) -> None:
-    """Simulate a Kinect that is carried through a room, and write OUT, a rosbag2 folder (mcap) with OUT/truth in it."""
-    sensors = sensors_of(camera_of(intrinsics, size), stress, settings)
+    """Simulate a depth camera that is carried through a room, and write OUT, a rosbag2 folder with OUT/truth in it."""
+    camera = camera_of(intrinsics or SENSORS[sensor][0], size)
+    sensors = sensors_of(camera, stress, (*_rig_settings(lens, rig), *settings), sensor)
     with tqdm(total=frames, unit="frame", desc=scenario, disable=None) as bar:
         story = simulate(
             out, scenario, seed, frames, rate, sensors, points, jpeg, progress=lambda n: bar.update(n - bar.n)
@@ -110,9 +125,33 @@ def _scaled(camera: Intrinsics, width: int, height: int) -> Intrinsics:
     return Intrinsics(fx=camera.fx * x, fy=camera.fy * y, cx=cx, cy=cy, width=width, height=height)
 
 
-def sensors_of(camera: Intrinsics, stress: bool, settings: tuple[str, ...]) -> Sensors:
-    """The sensors with every ``section.name=value`` applied; ValueError for one that there is not or out of range."""
-    values: dict[str, dict[str, object]] = {section: {} for section in SECTIONS}
+def distortion_of(lens: str) -> str:
+    """The numbers of a lens by its name, or these numbers themselves; ValueError for anything else."""
+    numbers = ",".join(map(str, LENSES[lens])) if lens in LENSES else lens
+    try:
+        count = len([_finite(part) for part in numbers.split(",")])
+    except ValueError:
+        count = 0
+    if count not in (4, 5):
+        raise ValueError(f"lens: expected {', '.join(LENSES)} or k1,k2,p1,p2[,k3], got {lens!r}")
+    return numbers
+
+
+def _rig_settings(lens: str, rig: dict[str, float]) -> list[str]:
+    """Options as settings, those that are not at zero."""
+    bent = [f"rig.distortion={distortion_of(lens)}"] if lens else []
+    return [*bent, *(f"rig.{name}={value}" for name, value in rig.items() if value)]
+
+
+def sensors_of(camera: Intrinsics, stress: bool, settings: tuple[str, ...], sensor: str = "kinect_v1") -> Sensors:
+    """The sensors with every ``section.name=value`` applied; ValueError for one that there is not or out of range.
+
+    ``sensor`` names how depth is measured, and so what the section ``depth`` is.
+    """
+    if sensor not in SENSORS:
+        raise ValueError(f"sensor: expected one of {', '.join(SENSORS)}, got {sensor!r}")
+    sections = {**SECTIONS, "depth": type(SENSORS[sensor][1])}
+    values: dict[str, dict[str, object]] = {section: {} for section in sections}
     values["stress"].update(HARD if stress else {})
     for setting in settings:
         key, _, text = setting.partition("=")
@@ -121,13 +160,12 @@ def sensors_of(camera: Intrinsics, stress: bool, settings: tuple[str, ...]) -> S
             raise ValueError(
                 f"--set: expected SECTION.NAME=VALUE with a section of {', '.join(SECTIONS)}, got {setting!r}"
             )
-        values[section][name] = _parsed(SECTIONS[section], name, text)
-    made = {section: _made(section, chosen) for section, chosen in values.items()}
+        values[section][name] = _parsed(sections[section], name, text)
+    made = {section: _made(section, sections[section], chosen) for section, chosen in values.items()}
     return Sensors(camera, **made)  # type: ignore[arg-type]
 
 
-def _made(section: str, values: dict[str, object]) -> Params:
-    kind = SECTIONS[section]
+def _made(section: str, kind: type[Params], values: dict[str, object]) -> Params:
     try:
         return kind.from_mapping(values)
     except ValueError as error:
@@ -150,7 +188,10 @@ def _parsed(section: type[Params], name: str, text: str) -> object:
 def parameter_table() -> str:
     """One line for every parameter: name, default, unit, range, meaning."""
     lines = []
-    for section, kind in SECTIONS.items():
+    measured = [(f"depth of {name}", "depth", type(params)) for name, (_, params) in SENSORS.items()]
+    others = [(section, section, kind) for section, kind in SECTIONS.items() if section != "depth"]
+    for title, section, kind in (*measured, *others):
+        lines.append(f"# {title}")
         for d in kind.declarations():
             about = " ".join(part for part in (f"[{d.unit}]" if d.unit else "", d.range_text) if part)
             lines.append(f"{section}.{d.name} = {d.default}  {about}\n    {d.doc}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A Kinect over rooms of objects, with ground truth; it writes ordinary recordings.
+"""A depth camera over rooms of objects, with ground truth; it writes ordinary recordings.
 
 Everything is a pure function of seeds. Lengths are metres, the world has z up and the floor at 0, cameras are optical
 frames (x right, y down, z forward), ``T_a_b`` maps points of b into a.
@@ -14,8 +14,10 @@ frames (x right, y down, z forward), ``T_a_b`` maps points of b into a.
         o.label, o.xyxy, o.visibility, o.pixels, o.instance, o.T_camera_object, o.T_world_object, o.symmetry
 
 `render` takes any `Intrinsics` (`camera.CAMERAS` has some by name), the sensors' parameters (`params.DepthParams`,
-`params.ColourParams`, `params.StressParams`), ``with_colour=False`` for depth alone, and ``threads`` (1 by default; 2
-is faster; the images are the same; safe in forked workers).
+`params.StereoParams` or `params.TimeOfFlightParams`, `params.ColourParams`, `params.StressParams`; `camera.SENSORS` has
+some by name), ``with_colour=False`` for depth alone, and ``threads`` (1 by default; 2 is faster; the images are the
+same; safe in forked workers). `rig.Rig` takes pictures of a moving camera with a lens, a lag, a rolling shutter and so
+on (`params.RigParams`).
 
 Objects: ``objects.make_object(label, seed) -> ObjectModel`` for the labels in ``objects.LABELS``, and
 ``distractors.make_distractor(kind, seed)``. A model stands on z = 0, z up, and states its `Symmetry`, whose
@@ -36,8 +38,12 @@ Recordings: ``write.simulate(path, scenario, seed, frames)`` (command `objreg si
 | `model` `objects` `chair` `distractors` `furniture` | what rooms are filled with |
 | `scene` | placing it; random rooms and views |
 | `raster` `surfaces` `light` `shade` | triangles to depth, instance and light |
-| `noise` `camera` `params` | the depth and the colour sensor |
+| `view` | what a pinhole camera sees before any sensor |
+| `depth_sensors` | a depth sensor by its parameters: |
+| `noise` `active_stereo` `time_of_flight` `fields` | structured light, stereo, flight, and what they share |
+| `camera` `params` | the colour sensor; cameras, sensors and lenses by name; what can be set |
 | `render` | all of it for one image |
+| `lens` `rig` | cameras as they are built and timed: lens, lag, rolling shutter, blur, misregistration |
 | `trajectory` `odometry` `scenarios` | how the camera is carried, what odometry makes of it, and through what |
 | `write` `truth` | recordings, and the truth beside them |
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cameras by name, and what a colour sensor makes of light: exposure, blur, vignetting, tone, noise."""
+"""Cameras, sensors and lenses by name, and what a colour sensor makes of light: exposure, blur, tone, noise."""
 
 from __future__ import annotations
 
@@ -9,7 +9,14 @@ import numpy as np
 
 from objreg_ros.data import Array, Intrinsics
 from objreg_ros.simulation.noise import mixed_bits, normal
-from objreg_ros.simulation.params import ColourParams, StressParams
+from objreg_ros.simulation.params import (
+    ColourParams,
+    DepthParams,
+    DepthSensing,
+    StereoParams,
+    StressParams,
+    TimeOfFlightParams,
+)
 from objreg_ros.simulation.shade import LIGHT_SCALE
 
 KINECT = Intrinsics(fx=525.0, fy=525.0, cx=319.5, cy=239.5, width=640, height=480)
@@ -19,6 +26,17 @@ CAMERAS = {
     "azure_kinect": Intrinsics(fx=504.0, fy=504.0, cx=319.5, cy=287.5, width=640, height=576),
     "qvga": Intrinsics(fx=262.5, fy=262.5, cx=159.5, cy=119.5, width=320, height=240),
 }
+SENSORS: dict[str, tuple[str, DepthSensing]] = {
+    "kinect_v1": ("kinect", DepthParams()),
+    "realsense_d435": ("realsense_d435", StereoParams()),
+    "azure_kinect": ("azure_kinect", TimeOfFlightParams()),
+}
+"""Of each sensor the name of its camera, and how it measures depth."""
+LENSES = {
+    "kinect_v1": (0.262383, -0.953104, -0.005358, 0.002628, 1.163314),
+    "webcam": (-0.32, 0.11, 0.0005, -0.0004, 0.0),
+}
+"""k1, k2, p1, p2, k3 (plumb_bob) by name: the colour camera of TUM's freiburg1; a wide lens with a strong barrel."""
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "arcp", "nsz", "reassoc"})

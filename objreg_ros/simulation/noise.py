@@ -5,7 +5,7 @@ The axial noise is that of Nguyen, Izadi and Lovell, "Modeling Kinect sensor noi
 tracking" (2012): 0.0012 + 0.0019 (z - 0.4)^2 metres. It is correlated between neighbours, more along a row than across,
 as that of real Kinect clouds is, because the sensor matches windows of several pixels. Steps grow with the square of
 depth, because disparity is measured in eighths of a pixel. Points that the projector does not reach (it sits a baseline
-to the right) have no depth, nor have blotches of surfaces that shine.
+to the right) have no depth, nor have blotches of surfaces that shine. Other sensors: `active_stereo`, `time_of_flight`.
 """
 
 from __future__ import annotations

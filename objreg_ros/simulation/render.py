@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numba as nb
@@ -13,14 +11,13 @@ import numpy as np
 from objreg_ros.data import Array, Intrinsics
 from objreg_ros.geometry import inverse
 from objreg_ros.simulation.camera import KINECT, ColourSensor
+from objreg_ros.simulation.depth_sensors import measure, needs_light
 from objreg_ros.simulation.model import Symmetry
-from objreg_ros.simulation.noise import DepthSensor
-from objreg_ros.simulation.params import ColourParams, DepthParams, StressParams
-from objreg_ros.simulation.raster import Projection, rasterise
+from objreg_ros.simulation.params import ColourParams, DepthParams, DepthSensing, StressParams
+from objreg_ros.simulation.raster import rasterise
 from objreg_ros.simulation.scene import Placed, Scene
-from objreg_ros.simulation.shade import shade
+from objreg_ros.simulation.view import View, draw, in_bands
 
-BANDS = 8
 ALONE_PX = 96
 """An object is drawn alone at about this size to see how much of it is hidden."""
 
@@ -72,7 +69,7 @@ def render(
     T_world_camera: Array,
     intrinsics: Intrinsics = KINECT,
     seed: int = 0,
-    depth: DepthParams | None = None,
+    depth: DepthSensing | None = None,
     colour: ColourParams | None = None,
     stress: StressParams | None = None,
     with_colour: bool = True,
@@ -82,47 +79,30 @@ def render(
 
     ``seed`` draws the sensors' noise. Without ``with_colour`` there is no ``rgb``. ``threads`` changes the time only.
     """
-    stress = stress or StressParams()
-    shape = (intrinsics.height, intrinsics.width)
-    surfaces = scene.surfaces
-    mesh = (surfaces.vertices, surfaces.faces, surfaces.open_surface)
-    projection = Projection(*mesh, T_world_camera, intrinsics)
-    nearness, triangle = np.empty(shape, np.float32), np.empty(shape, np.int32)
-    measured, light = np.empty(shape, np.float32), np.empty((*shape, 3), np.uint16)
-    sensor = DepthSensor(depth or DepthParams(), stress, seed, shape, surfaces)
-    maps = scene.shadows if with_colour else None
-
-    def draw(first: int, last: int) -> None:
-        projection.fill(nearness, triangle, first, last)
-        if maps is not None:
-            light_of = (surfaces, T_world_camera, scene.lamps, scene.ambient, maps)
-            shade(projection, nearness, triangle, *light_of, (first, last), light)
-
-    _in_bands(draw, shape[0], threads)
-    _in_bands(lambda a, b: sensor.sense(projection, nearness, triangle, (a, b), measured), shape[0], threads)
-    rgb = _photograph(light, colour or ColourParams(), stress, seed, threads) if with_colour else None
-    true_depth = np.divide(1, nearness, out=np.zeros(shape, np.float32), where=nearness > 0)
-    instance = np.where(triangle >= 0, surfaces.instance[triangle], 0).astype(np.uint16)
-    seen = see(scene, instance, T_world_camera, intrinsics)
-    return Rendering(measured, true_depth, rgb, instance, seen, T_world_camera, intrinsics)
+    depth, stress = depth or DepthParams(), stress or StressParams()
+    view = draw(scene, T_world_camera, intrinsics, with_colour or needs_light(depth), threads)
+    measured = measure(view, scene.surfaces, depth, stress, seed, threads)
+    rgb = photograph(view.light, colour or ColourParams(), stress, seed, threads) if with_colour else None
+    return truth_of(scene, view, T_world_camera, measured, rgb)
 
 
-def _in_bands(work: Callable[[int, int], None], height: int, threads: int) -> None:
-    """Do ``work(first row, last row)`` over all rows, in bands that several threads share."""
-    if threads <= 1:
-        work(0, height)
-        return
-    edges = np.linspace(0, height // 2, BANDS + 1).astype(int) * 2  # shading goes by pairs of rows
-    edges[-1] = height
-    with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(work, edges[:-1].tolist(), edges[1:].tolist()))
+def truth_of(scene: Scene, view: View, T_world_camera: Array, measured: Array, rgb: Array | None) -> Rendering:
+    """What was measured, with the truth of a view."""
+    nearness, triangle = view.nearness, view.triangle
+    true_depth = np.divide(1, nearness, out=np.zeros(nearness.shape, np.float32), where=nearness > 0)
+    instance = np.where(triangle >= 0, scene.surfaces.instance[triangle], 0).astype(np.uint16)
+    seen = see(scene, instance, T_world_camera, view.camera)
+    return Rendering(measured, true_depth, rgb, instance, seen, T_world_camera, view.camera)
 
 
-def _photograph(light: Array, colour: ColourParams, stress: StressParams, seed: int, threads: int) -> Array:
+def photograph(light: Array | None, colour: ColourParams, stress: StressParams, seed: int, threads: int) -> Array:
+    """(H, W, 3) uint8: the picture of ``light (H, W, 3) uint16``, as `shade` has it."""
+    if light is None:
+        raise ValueError("expected a view with light to photograph, got one without")
     sensor = ColourSensor(colour, stress, seed)
     raw, gains = sensor.exposed(light)
     rgb = np.empty(light.shape, np.uint8)
-    _in_bands(lambda a, b: sensor.develop(raw, gains, (a, b), rgb), light.shape[0], threads)
+    in_bands(lambda a, b: sensor.develop(raw, gains, (a, b), rgb), light.shape[0], threads)
     return rgb
 
 

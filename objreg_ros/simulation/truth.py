@@ -7,6 +7,8 @@ It lies in the recording's folder as ``truth/``:
 
     {"format": "objreg-truth/1", "scenario": "loop", "seed": 1, "rate": 30.0, "frames": 600, "labels": [the nine],
      "camera": {"fx": .., "fy": .., "cx": .., "cy": .., "width": 640, "height": 480},
+     "sensors": {"sensor": "structured light", "depth": {..}, "colour": {..}, "stress": {..}, "odometry": {..},
+                 "rig": {"distortion": [k1, k2, p1, p2, k3], "lag_ms": .., ..}: every parameter by its name},
      "scenes": [{"objects": [{"instance": 1, "label": "book", "distractor": false, "size": [x, y, z] m,
                               "T_world_object": [16 numbers by rows], "symmetry":
                                 {"axis": [x, y, z] or null, "centre": [x, y, z], "turns": [[16], ..] or null}},
@@ -19,6 +21,9 @@ and every other line one frame, in order of time::
 
 ``truth/masks.zip`` holds ``<stamp_ns>.png`` for every frame: 8 bit (16 bit where a scene has more than 255 objects),
 the instance number of every pixel, 0 for the room.
+
+Poses, boxes and masks are those of the colour picture in the middle of its exposure, which is its stamp. Where a lens
+bends pictures, boxes and masks are those of the rectified picture.
 """
 
 from __future__ import annotations
@@ -81,7 +86,10 @@ class TrueFrame:
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """The truth of a recording; ``objects`` of every scene by instance number, ``frames`` in order of time."""
+    """The truth of a recording; ``objects`` of every scene by instance number, ``frames`` in order of time.
+
+    ``sensors`` are the parameters it was made with, by section and name; empty in older recordings.
+    """
 
     folder: Path
     scenario: str
@@ -90,6 +98,7 @@ class Truth:
     intrinsics: Intrinsics
     objects: tuple[dict[int, TrueObject], ...]
     frames: tuple[TrueFrame, ...]
+    sensors: dict[str, Any]
 
     def frame(self, stamp_ns: int) -> TrueFrame | None:
         """The frame of exactly this time, or None."""
@@ -119,7 +128,8 @@ def read_truth(recording: Path | str) -> Truth:
     objects = tuple({o["instance"]: _object(o) for o in scene["objects"]} for scene in head["scenes"])
     frames = tuple(_frame(json.loads(line), objects) for line in lines[1:])
     camera = Intrinsics(**head["camera"])
-    return Truth(folder, head["scenario"], head["seed"], head["rate"], camera, objects, frames)
+    made_with = head.get("sensors", {})
+    return Truth(folder, head["scenario"], head["seed"], head["rate"], camera, objects, frames, made_with)
 
 
 def _object(o: dict[str, Any]) -> TrueObject:
@@ -146,12 +156,15 @@ def _frame(line: dict[str, Any], objects: tuple[dict[int, TrueObject], ...]) -> 
 class TruthWriter:
     """Collects the truth frame by frame and writes it when told to; small enough to be kept in memory until then."""
 
-    def __init__(self, story: Story, scenario: str, seed: int, intrinsics: Intrinsics) -> None:
+    def __init__(
+        self, story: Story, scenario: str, seed: int, intrinsics: Intrinsics, sensors: dict[str, Any] | None = None
+    ) -> None:
         i = intrinsics
         camera = {"fx": i.fx, "fy": i.fy, "cx": i.cx, "cy": i.cy, "width": i.width, "height": i.height}
         head = {"format": FORMAT, "scenario": scenario, "seed": seed, "rate": story.rate, "frames": len(story)}
         scenes = [{"objects": [_describe(o) for o in scene.objects]} for scene in story.scenes]
-        self._lines = [json.dumps({**head, "labels": list(LABELS), "camera": camera, "scenes": scenes})]
+        of = {"labels": list(LABELS), "camera": camera, "sensors": sensors or {}, "scenes": scenes}
+        self._lines = [json.dumps({**head, **of})]
         self._masks: list[tuple[str, bytes]] = []
         self._dtype = np.uint8 if max(_most(scene) for scene in story.scenes) < 256 else np.uint16
 

@@ -5,7 +5,7 @@
 | --- | --- | --- |
 | `/image` (`/image/compressed`) | sensor_msgs/Image rgb8 (CompressedImage, jpeg) | colour |
 | `/depth/image` | sensor_msgs/Image 16UC1 | depth in mm, registered to colour, 0 where there is none |
-| `/camera_info` | sensor_msgs/CameraInfo | the camera of both |
+| `/camera_info` | sensor_msgs/CameraInfo | the camera of both; D is the lens's distortion (plumb_bob) |
 | `/points` (optional) | sensor_msgs/PointCloud2 | organised x y z rgb, NaN where there is no depth |
 | `/odom` | nav_msgs/Odometry | drifting pose of `camera` in `odom` |
 | `/ground_truth` | geometry_msgs/PoseStamped | true pose of the camera in `world` |
@@ -18,8 +18,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -29,8 +30,18 @@ from objreg_ros.geometry import back_project
 from objreg_ros.recording import Record, messages, write_rosbag2
 from objreg_ros.simulation.camera import KINECT
 from objreg_ros.simulation.odometry import drifted
-from objreg_ros.simulation.params import ColourParams, DepthParams, OdometryParams, StressParams
+from objreg_ros.simulation.params import (
+    ColourParams,
+    DepthParams,
+    DepthSensing,
+    OdometryParams,
+    RigParams,
+    StereoParams,
+    StressParams,
+    TimeOfFlightParams,
+)
 from objreg_ros.simulation.render import Rendering, render
+from objreg_ros.simulation.rig import Motion, Rig
 from objreg_ros.simulation.scenarios import Story, make_story
 from objreg_ros.simulation.truth import TruthWriter
 
@@ -38,6 +49,7 @@ START_NS = 1_700_000_000_000_000_000
 """When simulated recordings begin: a fixed moment, so that the same seed gives the same bytes."""
 CAMERA_FRAME, ODOM_FRAME, WORLD_FRAME = "camera", "odom", "world"
 JPEG_QUALITY = 90
+HOW = {DepthParams: "structured light", StereoParams: "active stereo", TimeOfFlightParams: "time of flight"}
 POINT = np.dtype(
     {"names": ["x", "y", "z", "rgb"], "formats": ["<f4", "<f4", "<f4", "<u4"], "offsets": [0, 4, 8, 16], "itemsize": 32}
 )
@@ -49,10 +61,17 @@ class Sensors:
     """The camera of a recording and everything that is wrong with it."""
 
     intrinsics: Intrinsics = KINECT
-    depth: DepthParams = field(default_factory=DepthParams)
+    depth: DepthSensing = field(default_factory=DepthParams)
     colour: ColourParams = field(default_factory=ColourParams)
     stress: StressParams = field(default_factory=StressParams)
     odometry: OdometryParams = field(default_factory=OdometryParams)
+    rig: RigParams = field(default_factory=RigParams)
+
+    def described(self) -> dict[str, Any]:
+        """Every parameter by section and name, and in ``sensor`` the way in which depth is measured."""
+        sections = {"depth": self.depth, "colour": self.colour, "stress": self.stress}
+        told = {name: asdict(params) for name, params in sections.items()}
+        return {"sensor": HOW[type(self.depth)], **told, "odometry": asdict(self.odometry), "rig": asdict(self.rig)}
 
 
 def simulate(
@@ -96,14 +115,15 @@ def write_story(
     sensors = sensors or Sensors()
     for scene in story.scenes:
         scene.prepare()
-    truth = TruthWriter(story, name, seed, sensors.intrinsics)
+    truth = TruthWriter(story, name, seed, sensors.intrinsics, sensors.described())
+    rig = None if sensors.rig.is_plain else Rig(sensors.rig, sensors.intrinsics, seed)
     T_odom_camera, covariance = drifted(story.T_world_camera, sensors.odometry, seed)
 
     def records() -> Iterator[Record]:
-        for k, image in enumerate(_rendered(story, seed, sensors, threads)):
+        for k, image in enumerate(_rendered(story, seed, sensors, rig, threads)):
             stamp_ns = START_NS + round(k * 1e9 / story.rate)
             truth.add(stamp_ns, int(story.scene_of[k]), image)
-            yield from _camera_records(image, stamp_ns, points, jpeg)
+            yield from _camera_records(image, stamp_ns, points, jpeg, rig)
             yield from _pose_records(image.T_world_camera, T_odom_camera[k], covariance[k], stamp_ns)
             progress(k + 1)
 
@@ -111,34 +131,40 @@ def write_story(
     truth.write(Path(path))
 
 
-def _rendered(story: Story, seed: int, sensors: Sensors, threads: int) -> Iterator[Rendering]:
+def _rendered(story: Story, seed: int, sensors: Sensors, rig: Rig | None, threads: int) -> Iterator[Rendering]:
     """Every frame in order; ``threads`` of them are in the making at once, and as many more may wait."""
     with ThreadPoolExecutor(threads) as pool:
         ahead: deque[Future[Rendering]] = deque()
         for k in range(len(story)):
-            ahead.append(pool.submit(_frame, story, k, seed, sensors))
+            ahead.append(pool.submit(_frame, story, k, seed, sensors, rig))
             if len(ahead) > 2 * threads:
                 yield ahead.popleft().result()
         while ahead:
             yield ahead.popleft().result()
 
 
-def _frame(story: Story, k: int, seed: int, sensors: Sensors) -> Rendering:
+def _frame(story: Story, k: int, seed: int, sensors: Sensors, rig: Rig | None) -> Rendering:
     scene = story.scenes[int(story.scene_of[k])]
     noise_seed = int(np.random.default_rng([seed, 41, k]).integers(2**31))
     of = (sensors.depth, sensors.colour, sensors.stress)
+    if rig is not None:
+        return rig.take(scene, Motion(story.T_world_camera, story.rate), k / story.rate, noise_seed, *of)
     return render(scene, story.T_world_camera[k], sensors.intrinsics, noise_seed, *of)
 
 
-def _camera_records(image: Rendering, stamp_ns: int, points: bool, jpeg: bool) -> Iterator[Record]:
+def _camera_records(image: Rendering, stamp_ns: int, points: bool, jpeg: bool, rig: Rig | None) -> Iterator[Record]:
     assert image.rgb is not None
     millimetres = np.rint(image.depth * 1000.0).astype(np.uint16)
     colour = _compressed(image.rgb, stamp_ns) if jpeg else messages.image(image.rgb, "rgb8", stamp_ns, CAMERA_FRAME)
-    yield Record.of("/camera_info", messages.camera_info(image.intrinsics, stamp_ns, CAMERA_FRAME), stamp_ns)
+    lens = rig.lens if rig is not None else None
+    distortion = (0.0,) * 5 if lens is None else lens.distortion
+    info = messages.camera_info(image.intrinsics, stamp_ns, CAMERA_FRAME, distortion)
+    yield Record.of("/camera_info", info, stamp_ns)
     yield Record.of("/image/compressed" if jpeg else "/image", colour, stamp_ns)
     yield Record.of("/depth/image", messages.image(millimetres, "16UC1", stamp_ns, CAMERA_FRAME), stamp_ns)
     if points:
-        yield Record.of("/points", messages.point_cloud(organised(image), stamp_ns, CAMERA_FRAME), stamp_ns)
+        cloud = organised(image, None if lens is None else lens.rays)
+        yield Record.of("/points", messages.point_cloud(cloud, stamp_ns, CAMERA_FRAME), stamp_ns)
 
 
 def _pose_records(T_world_camera: Array, T_odom_camera: Array, covariance: Array, stamp_ns: int) -> Iterator[Record]:
@@ -156,11 +182,16 @@ def _compressed(rgb: Array, stamp_ns: int) -> object:
     )
 
 
-def organised(image: Rendering) -> Array:
-    """(H, W) records x y z rgb of the measured points in the camera frame, NaN where there is no depth."""
+def organised(image: Rendering, rays: Array | None = None) -> Array:
+    """(H, W) records x y z rgb of the measured points in the camera frame, NaN where there is no depth.
+
+    ``rays (H, W, 2)`` are x/z and y/z of every pixel where a lens bends them.
+    """
     assert image.rgb is not None
     i = image.intrinsics
     xyz = back_project(image.depth, i.fx, i.fy, i.cx, i.cy)
+    if rays is not None:
+        xyz[..., :2] = rays * image.depth[..., None]
     xyz[image.depth == 0] = np.nan
     records = np.zeros(image.depth.shape, POINT)
     for k, name in enumerate("xyz"):

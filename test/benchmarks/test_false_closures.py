@@ -11,6 +11,10 @@ from objreg_ros.data import LoopClosure, Reason, Rejected
 from objreg_ros.geometry import pose
 from objreg_ros.truth import Truth
 
+WRONG = (
+    *("loop", "loop:x", "foo:1", "loop:1:eye", "loop:1:qvga:much", "loop:1:qvga:stress:"),
+    *("loop:1:sensor=eye", "loop:1:lag=1", "loop:1:lag_ms=x", "loop:1:lens=round", "loop:1:lag_ms=1:qvga"),
+)
 STILL = Truth([(0, np.eye(4)), (10**8, np.eye(4))])
 
 
@@ -41,10 +45,19 @@ def refused(metres: float | None, reason: Reason) -> Rejected:
 def test_a_recording_is_named_by_scenario_seed_camera_and_stress(text: str, story: tuple) -> None:
     from false_closures import told
 
-    assert told(text) == story
+    assert told(text) == (*story, "kinect_v1", ())
 
 
-@pytest.mark.parametrize("text", ["loop", "loop:x", "foo:1", "loop:1:eye", "loop:1:qvga:much", "loop:1:qvga:stress:"])
+def test_a_recording_may_name_its_sensor_and_what_is_wrong_with_it() -> None:
+    from false_closures import told
+
+    story = told("loop:7:sensor=realsense_d435:lens=0.1,0,0,0:lag_ms=25:stress")
+    assert story == ("loop", 7, "realsense_d435", True, "realsense_d435", ("rig.lag_ms=25", "rig.distortion=0.1,0,0,0"))
+    assert story.name == "loop 7, realsense_d435, realsense_d435 depth, lag_ms=25, distortion=0.1,0,0,0, stress"
+    assert told("loop:7:qvga:sensor=azure_kinect")[2:5] == ("qvga", False, "azure_kinect")
+
+
+@pytest.mark.parametrize("text", WRONG)
 def test_what_names_no_recording_is_refused(text: str) -> None:
     from false_closures import told
 

@@ -9,8 +9,8 @@ import pytest
 from click.testing import CliRunner
 
 from objreg_ros.cli import main
-from objreg_ros.cli.simulate import camera_of, command, sensors_of
-from objreg_ros.simulation.camera import KINECT
+from objreg_ros.cli.simulate import camera_of, command, distortion_of, sensors_of
+from objreg_ros.simulation.camera import KINECT, LENSES
 from objreg_ros.simulation.truth import read_truth
 
 
@@ -81,3 +81,42 @@ def test_the_list_of_parameters_needs_no_folder() -> None:
 def test_intrinsics_that_are_no_numbers_are_refused(intrinsics: str) -> None:
     with pytest.raises(ValueError, match=f"intrinsics: expected kinect.* or fx,fy,cx,cy in pixels, got '{intrinsics}'"):
         camera_of(intrinsics, None)
+
+
+def test_a_sensor_brings_its_camera_its_depth_and_what_is_said_of_its_rig_into_the_truth(tmp_path: Path) -> None:
+    out = tmp_path / "bag"
+    timed = ["--lag-ms", "25", "--rolling-ms", "20", "--blur-ms", "5"]
+    built = ["--lens", "kinect_v1", "--misregistration-px", "3"]
+    options = ["--sensor", "realsense_d435", "--frames", "2", "--size", "160x120", "--set", "depth.subpixel=0.2"]
+    result = CliRunner().invoke(command, [str(out), *options, *timed, *built])
+    assert result.exit_code == 0, result.output
+    truth = read_truth(out)
+    assert truth.intrinsics.fx == camera_of("realsense_d435", "160x120").fx
+    told = truth.sensors
+    assert told["sensor"] == "active stereo" and told["depth"]["subpixel"] == 0.2
+    assert told["rig"] == {
+        "distortion": list(LENSES["kinect_v1"]), "lag_ms": 25.0, "rolling_ms": 20.0, "blur_ms": 5.0,
+        "misregistration_px": 3.0, "misregistration_deg": 0.0, "misregistration_mm": 0.0,
+    }  # fmt: skip
+
+
+def test_a_lens_is_a_name_or_its_numbers() -> None:
+    assert distortion_of("kinect_v1") == "0.262383,-0.953104,-0.005358,0.002628,1.163314"
+    assert distortion_of("0.1,0,0,0") == "0.1,0,0,0"
+    for lens in ("round", "0.1,0,0", "0.1,0,0,nan", "0,0,0,0,0,0"):
+        with pytest.raises(ValueError, match=r"lens: expected kinect_v1, webcam or k1,k2,p1,p2\[,k3\], got"):
+            distortion_of(lens)
+
+
+def test_a_sensor_that_there_is_not_and_a_parameter_of_another_are_refused() -> None:
+    with pytest.raises(ValueError, match="sensor: expected one of kinect_v1, realsense_d435, azure_kinect, got 'eye'"):
+        sensors_of(KINECT, False, (), "eye")
+    with pytest.raises(ValueError, match="--set depth: no parameter quantum; there are subpixel"):
+        sensors_of(KINECT, False, ("depth.quantum=0",), "realsense_d435")
+    with pytest.raises(ValueError, match="--set rig: lag_ms: expected"):
+        sensors_of(KINECT, False, ("rig.lag_ms=1000",))
+
+
+def test_the_list_has_the_parameters_of_every_sensor() -> None:
+    listed = CliRunner().invoke(command, ["--list"]).output
+    assert "# depth of azure_kinect" in listed and "depth.subpixel = 0.08  [px]" in listed and "rig.lag_ms" in listed

@@ -7,7 +7,15 @@ import pytest
 
 from objreg_ros.params import Params
 from objreg_ros.simulation.camera import KINECT
-from objreg_ros.simulation.params import ColourParams, DepthParams, OdometryParams, StressParams
+from objreg_ros.simulation.params import (
+    ColourParams,
+    DepthParams,
+    OdometryParams,
+    RigParams,
+    StereoParams,
+    StressParams,
+    TimeOfFlightParams,
+)
 
 SHARES = [
     (DepthParams, "dropout"), (DepthParams, "grazing_cosine"), (DepthParams, "edge_dropout"), (DepthParams, "mixed"),
@@ -18,12 +26,24 @@ NEVER_NEGATIVE = [
     (DepthParams, "near"), (DepthParams, "far"), (DepthParams, "edge_jitter"), (ColourParams, "brightness"),
     (ColourParams, "blur"), (ColourParams, "shot_noise"), (ColourParams, "read_noise"), (StressParams, "warp"),
     (StressParams, "ragged"), (StressParams, "motion_blur"), (OdometryParams, "turn_drift"),
-    (OdometryParams, "tilt_error"),
+    (OdometryParams, "tilt_error"), (StereoParams, "subpixel"), (StereoParams, "projector"),
+    (TimeOfFlightParams, "noise"), (TimeOfFlightParams, "multipath"), (RigParams, "rolling_ms"),
+    (RigParams, "blur_ms"), (RigParams, "misregistration_px"),
 ]  # fmt: skip
 
 
 def test_there_is_no_stress_by_default() -> None:
     assert not any(getattr(StressParams(), declaration.name) for declaration in StressParams.declarations())
+
+
+def test_nothing_is_wrong_with_the_rig_by_default() -> None:
+    assert RigParams().is_plain and RigParams(distortion=(0.0,) * 4).is_plain
+    assert not RigParams(lag_ms=-1.0).is_plain and not RigParams(distortion=(0.1, 0.0, 0.0, 0.0)).is_plain
+
+
+def test_a_d435_errs_by_4_mm_at_1_m() -> None:
+    p = StereoParams()
+    assert p.subpixel / (p.focal * p.baseline) == pytest.approx(0.0038, abs=1e-4)
 
 
 def test_the_step_of_depth_is_an_eighth_of_a_pixel_of_a_kinects_disparity() -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -11,6 +12,8 @@ import pytest
 
 from objreg_ros.data import Intrinsics
 from objreg_ros.recording import open_recording
+from objreg_ros.simulation.camera import LENSES
+from objreg_ros.simulation.params import RigParams
 from objreg_ros.simulation.truth import read_truth
 from objreg_ros.simulation.write import Sensors, simulate
 
@@ -80,6 +83,48 @@ def test_the_same_seed_writes_the_same_bytes(recorded: Path, tmp_path: Path) -> 
             assert (a.topic, a.stamp_ns, a.cdr) == (b.topic, b.stamp_ns, b.cdr)
     for name in ("frames.jsonl", "masks.zip"):
         assert (recorded / "truth" / name).read_bytes() == (again / "truth" / name).read_bytes()
+
+
+@pytest.fixture(scope="module")
+def bent(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("bent") / "loop"
+    rig = RigParams(distortion=LENSES["webcam"], lag_ms=20.0)
+    simulate(path, "loop", seed=8, frames=FRAMES, sensors=replace(SMALL, rig=rig), points=True)
+    return path
+
+
+def test_the_camera_info_of_a_lens_has_its_distortion_and_the_stamps_do_not_tell_the_lag(bent: Path) -> None:
+    stamps: dict[str, list[int]] = {}
+    with open_recording(bent) as recording:
+        for record in recording.records(["/image", "/depth/image", "/camera_info"]):
+            stamp = record.message.header.stamp
+            stamps.setdefault(record.topic, []).append(stamp.sec * 10**9 + stamp.nanosec)
+            if record.topic == "/camera_info":
+                assert record.message.distortion_model == "plumb_bob"
+                assert tuple(record.message.d) == LENSES["webcam"]
+    assert stamps["/image"] == stamps["/depth/image"] == stamps["/camera_info"]
+
+
+def test_the_points_of_a_lens_lie_on_its_bent_rays(bent: Path) -> None:
+    with open_recording(bent) as recording:
+        cloud = next(recording.records(["/points"])).message
+    points = np.frombuffer(cloud.data.tobytes(), np.float32).reshape(120, 160, 8)[..., :3]
+    rows, columns = np.nonzero(np.isfinite(points[..., 2]))
+    i = SMALL.intrinsics
+    K = np.array([[i.fx, 0, i.cx], [0, i.fy, i.cy], [0, 0, 1]])
+    seen = cv2.projectPoints(
+        points[rows, columns].astype(float), np.zeros(3), np.zeros(3), K, np.array(LENSES["webcam"])
+    )
+    np.testing.assert_allclose(seen[0].reshape(-1, 2), np.column_stack([columns, rows]), atol=0.05)
+
+
+def test_a_rig_changes_the_pictures_and_not_the_truth(recorded: Path, bent: Path) -> None:
+    plain, other = read_truth(recorded), read_truth(bent)
+    for a, b in zip(plain.frames, other.frames, strict=True):
+        np.testing.assert_allclose(a.T_world_camera, b.T_world_camera, atol=1e-12)
+        assert [s.pixels for s in a.seen] == [s.pixels for s in b.seen]
+    assert plain.sensors["rig"]["lag_ms"] == 0 and other.sensors["rig"]["lag_ms"] == 20.0
+    assert plain.sensors["sensor"] == "structured light"
 
 
 def test_colour_can_be_compressed(tmp_path: Path) -> None:
