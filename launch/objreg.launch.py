@@ -22,6 +22,7 @@ TOPICS = {
     "depth": "depth image, instead of points; its compressed form is looked for at <depth>/compressedDepth",
     "camera_info": "camera of the depth image",
     "odom": "odometry of the camera's body",
+    "imu": "IMU of the camera",
 }
 REMAPPED = {  # what the nodes listen to → the argument that says where it is, and what is added to it
     "image": ("image", ""),
@@ -31,6 +32,7 @@ REMAPPED = {  # what the nodes listen to → the argument that says where it is,
     "depth/image/compressedDepth": ("depth", "/compressedDepth"),
     "camera_info": ("camera_info", ""),
     "odom": ("odom", ""),
+    "imu": ("imu", ""),
 }
 TF = [("/tf", "tf"), ("/tf_static", "tf_static")]  # robots in namespaces of their own have frames of the same names
 

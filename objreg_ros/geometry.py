@@ -54,15 +54,15 @@ def pose(R: Array, t: Array) -> Array:
     return T
 
 
-def mounting(numbers: Sequence[float]) -> Array | None:
-    """``T_base_camera`` (4, 4) of ``x y z qx qy qz qw``, None of no numbers: the camera is where the body is.
+def mounting(numbers: Sequence[float], name: str = "T_base_camera") -> Array | None:
+    """The pose (4, 4) of ``x y z qx qy qz qw``, None of no numbers: one is where the other is.
 
-    ValueError for any other count and for a quaternion of length 0.
+    ``name`` is that of the parameter. ValueError for any other count and for a quaternion of length 0.
     """
     if not numbers:
         return None
     if len(numbers) != 7:
-        raise ValueError(f"T_base_camera: expected x y z qx qy qz qw or nothing, got {tuple(numbers)}")
+        raise ValueError(f"{name}: expected x y z qx qy qz qw or nothing, got {tuple(numbers)}")
     return pose(rotation_from_quaternion(np.array(numbers[3:])), np.array(numbers[:3], float))
 
 

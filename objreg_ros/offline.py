@@ -24,6 +24,7 @@ from objreg_ros.data import (
     ColourImage,
     DepthImage,
     Detections,
+    FeltGravity,
     Frame,
     LoopClosure,
     ObjectCloud,
@@ -36,6 +37,8 @@ from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.record import Record
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.report.export import constraint
+from objreg_ros.segmenter.gravity_choice import GravityChoice
+from objreg_ros.segmenter.imu import FindPose, Imu
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.truth import Truth, summarise
 
@@ -53,7 +56,19 @@ class Detects(Protocol):
 class Segments(Protocol):
     """What the second room does."""
 
-    def segment(self, detections: Detections, depth: DepthImage, gravity: Array | None = None) -> Frame: ...
+    @property
+    def choice(self) -> GravityChoice:
+        """Who told gravity in the last frame."""
+        ...
+
+    def segment(
+        self,
+        detections: Detections,
+        depth: DepthImage,
+        gravity: Array | None = None,
+        *,
+        gravity_sigma_deg: float | None = None,
+    ) -> Frame: ...
 
 
 class Outcome(Protocol):
@@ -108,6 +123,7 @@ class Timing:
     """How the inputs are brought together, as the nodes' parameters say; ``T_base_camera`` as the registrar's.
 
     With ``level_odom`` the segmenter takes gravity from the odometry, and ``T_level_camera`` is its T_base_camera.
+    ``T_camera_imu`` is the segmenter's, and ``find_pose`` what it asks without one: (camera's frame, IMU's) → the same.
     """
 
     slop_ns: int = 20_000_000
@@ -117,6 +133,8 @@ class Timing:
     level_odom: bool = False
     T_level_camera: Array | None = None
     rectified: str = "auto"  # whether pictures come without the distortion of their lens, as the segmenter's parameter
+    T_camera_imu: Array | None = None
+    find_pose: FindPose = lambda camera, imu: None
 
 
 @dataclass
@@ -133,6 +151,9 @@ class Run:
     glimpses: list[dict[str, Any]] = field(default_factory=list)  # `glimpse` of every frame
     dropped: Counter[str] = field(default_factory=Counter)  # ``malformed_<input>``, ``depth_<why>``, ``frame_<why>``
     complaints: dict[str, str] = field(default_factory=dict)  # the first of each kind
+    gravity_from: Counter[str] = field(default_factory=Counter)  # frames that went to the segmenter by who told it
+    gravity_apart_deg: list[float] = field(default_factory=list)  # IMU and picture, in the frames that have both
+    imu_passed_over: Counter[str] = field(default_factory=Counter)  # by reason
     stage_s: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
 
     def summary(self, truth: Truth) -> dict[str, Any]:
@@ -145,10 +166,20 @@ class Run:
             "constraints": [constraint_with_error(closure, truth) for closure in self.closures],
             "rejected": dict(sorted(self.rejected.items())),
             "dropped": dict(sorted(self.dropped.items())),
+            "gravity": self.gravity(),
             "stage_ms": {stage: percentiles_ms(seconds) for stage, seconds in self.stage_s.items()},
             "truth": summarise(truth.errors(self.closures)),
             "refusals": [refusal(rejected) for rejected in self.refusals],
             "glimpses": self.glimpses,
+        }
+
+    def gravity(self) -> dict[str, Any]:
+        """Who told gravity in how many frames, how far IMU and picture are apart, and what of the IMU told nothing."""
+        apart = np.percentile(self.gravity_apart_deg, (50, 95)).round(2).tolist() if self.gravity_apart_deg else None
+        return {
+            "from": dict(sorted(self.gravity_from.items())),
+            "imu_and_picture_apart_deg": None if apart is None else dict(zip(("p50", "p95"), apart, strict=True)),
+            "imu_passed_over": dict(sorted(self.imu_passed_over.items())),
         }
 
 
@@ -195,6 +226,8 @@ class Line:
         self._from_points = inputs.points is not None
         self._raw = lenses.raw_pictures(timing.rectified, inputs.depth or inputs.points, inputs.image)
         self._camera_info: Any = None
+        self._imu = Imu(timing.T_camera_imu, timing.find_pose)
+        self.run.imu_passed_over = self._imu.counts
         self._labels: dict[int, tuple[str, ...]] = {}  # what was detected in the frames that are under way
         self._views = Synchroniser(self._streams(), self._unmatched)
         expected = inputs.odom is not None
@@ -205,6 +238,8 @@ class Line:
         streams = [Stream("depth"), Stream("detections", slop_ns=self._timing.slop_ns)]
         if self._timing.level_odom:
             streams.append(Stream("odom", Need.OPTIONAL, self._timing.slop_ns, ODOM_DEPTH, enclosing=True))
+        else:
+            streams.append(Stream("imu", Need.OPTIONAL, self._timing.slop_ns, ODOM_DEPTH, enclosing=True))
         if self._from_points:
             return streams
         colour = [Stream("image", Need.OPTIONAL, self._timing.slop_ns)] if self._timing.colour else []
@@ -236,6 +271,11 @@ class Line:
             if odometry is not None:
                 self._feed(name, stamp_ns, odometry)
                 self._track(self._frames.add(name, stamp_ns, odometry))
+        elif name == "imu":
+            sample = self._kept(name, partial(from_msg.imu, message))
+            felt = None if sample is None else self._imu.hear(sample)
+            if felt is not None:
+                self._feed(name, stamp_ns, felt)
 
     def finish(self) -> Run:
         """Let out what waits."""
@@ -273,8 +313,23 @@ class Line:
         with self._timed("decode"):
             depth, detections = self._depth(match)
             gravity = from_msg.level_gravity(match.stamp_ns, match.payloads.get("odom"), self._timing.T_level_camera)
+            felt = self._felt_gravity(match, depth.frame_id)
         with self._timed("segment"):
-            return as_sent(self._rooms.segmenter.segment(detections, depth, gravity))
+            sigma_deg = None if felt is None else felt.gravity_sigma_deg
+            gravity = gravity if felt is None else felt.gravity
+            segmenter = self._rooms.segmenter
+            frame = as_sent(segmenter.segment(detections, depth, gravity, gravity_sigma_deg=sigma_deg))
+        self._note_gravity(segmenter.choice)
+        return frame
+
+    def _felt_gravity(self, match: Match, camera_frame: str) -> FeltGravity | None:
+        words = match.payloads.get("imu")
+        return self._imu.in_camera(from_msg.gravity_at(match.stamp_ns, words), camera_frame) if words else None
+
+    def _note_gravity(self, choice: GravityChoice) -> None:
+        self.run.gravity_from[choice.source] += 1
+        if choice.disagreement_deg is not None:
+            self.run.gravity_apart_deg.append(choice.disagreement_deg)
 
     def _depth(self, match: Match) -> tuple[DepthImage, Detections]:
         """Depth and boxes of one picture without a lens."""

@@ -21,6 +21,7 @@ from objreg_ros.data import (
 )
 from objreg_ros.geometry import back_project, inverse
 from objreg_ros.offline import Rooms
+from objreg_ros.segmenter.gravity_choice import GravityChoice
 
 
 @dataclass
@@ -46,7 +47,20 @@ class OneBox:
 class OneCloud:
     """Cuts one point out of every depth image."""
 
-    def segment(self, detections: Detections, depth: DepthImage, gravity: np.ndarray | None = None) -> Frame:
+    choice = GravityChoice(None, 0.0, "nothing")
+
+    def __init__(self) -> None:
+        self.heard_sigma_deg: list[float | None] = []
+
+    def segment(
+        self,
+        detections: Detections,
+        depth: DepthImage,
+        gravity: np.ndarray | None = None,
+        *,
+        gravity_sigma_deg: float | None = None,
+    ) -> Frame:
+        self.heard_sigma_deg.append(gravity_sigma_deg)
         cloud = ObjectCloud(
             label=detections.label[0],
             score=0.1,

@@ -27,7 +27,9 @@ FLOORS = (
     *("registration", "keyframes", "memory", "registrar"),
 )
 ROS = {"rclpy", "launch", "launch_ros", "tf2_ros", "ament_index_python", "rosgraph_msgs"}
-FREE_BRIDGE = ("bridge.from_msg", "bridge.course", "bridge.sync", "bridge.layout", "bridge.lenses", "bridge.pictures")
+FREE_BRIDGE = tuple(
+    f"bridge.{name}" for name in ("from_msg", "course", "sync", "layout", "lenses", "pictures", "static_frames")
+)
 CORE = ("limits", "sensor", "data", "lens", "geometry", "params", "share")
 HOUSE = ("offline", "truth", "report")
 

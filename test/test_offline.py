@@ -110,6 +110,46 @@ def test_gravity_comes_from_a_level_odometry_where_there_is_one() -> None:
         np.testing.assert_allclose(frame.gravity, expected, atol=1e-6)
 
 
+def felt(degrees: float, frame_id: str = "camera") -> Iterator[Record]:
+    """`records`, and a still IMU that is tilted by an angle about x, 50 times a second."""
+    up = turned_about_x(np.radians(degrees))[:3, :3] @ np.array([0.0, -9.8, 0.0])
+    stamps = range(800 * MS, 1400 * MS, 20 * MS)
+    samples = [Record.of("/imu", messages.imu(up, (1e-6, 0, 0), s, frame_id), s) for s in stamps]
+    yield from sorted([*records(4), *samples], key=lambda record: record.stamp_ns)
+
+
+def test_gravity_comes_from_an_imu_in_the_cameras_frame_with_how_sure_it_is() -> None:
+    rooms, chain = simple_rooms()
+    run_offline(felt(30.0), rooms, replace(INPUTS, imu="/imu"))
+    assert len(chain.frames) == 4
+    for frame in chain.frames:
+        expected = [0, np.cos(np.radians(30)), np.sin(np.radians(30))]
+        np.testing.assert_allclose(frame.gravity, expected, atol=1e-4)
+    assert 1.0 < rooms.segmenter.heard_sigma_deg[-1] < rooms.segmenter.heard_sigma_deg[0] < 3.1
+
+
+def test_the_mounting_of_the_imu_is_applied_and_without_one_it_tells_nothing() -> None:
+    rooms, chain = simple_rooms()
+    timing = Timing(T_camera_imu=turned_about_x(np.radians(-30.0)))
+    run_offline(felt(30.0, "imu"), rooms, replace(INPUTS, imu="/imu"), timing)
+    for frame in chain.frames:
+        np.testing.assert_allclose(frame.gravity, [0, 1, 0], atol=1e-4)
+    rooms, chain = simple_rooms()
+    run = run_offline(felt(30.0, "imu"), rooms, replace(INPUTS, imu="/imu"))
+    assert rooms.segmenter.heard_sigma_deg == [None] * 4 and run.frames == 4
+    assert run.summary(Truth([]))["gravity"]["imu_passed_over"] == {"unknown_frame": 4}
+
+
+def test_an_imu_that_measures_nonsense_ends_nothing_and_is_counted() -> None:
+    rooms, _ = simple_rooms()
+    nan = Record.of("/imu", messages.imu((np.nan, 0, 0), None, 1050 * MS, "camera"), 1050 * MS)
+    zero = Record.of("/imu", messages.imu((0, 0, 0), None, 1060 * MS, "camera"), 1060 * MS)
+    said = sorted([*records(4), nan, zero], key=lambda record: record.stamp_ns)
+    run = run_offline(said, rooms, replace(INPUTS, imu="/imu"))
+    assert run.frames == 4 and run.dropped == {"malformed_imu": 1}
+    assert run.gravity()["imu_passed_over"] == {"no_acceleration": 1}
+
+
 def turned_about_x(angle: float) -> np.ndarray:
     return pose(rotation_from_vector(np.array([angle, 0.0, 0.0])), np.zeros(3))
 

@@ -24,7 +24,9 @@ from objreg_ros.data import (
     ColourImage,
     DepthImage,
     Detections,
+    FeltGravity,
     Frame,
+    ImuSample,
     Intrinsics,
     LoopClosure,
     ObjectCloud,
@@ -36,6 +38,7 @@ from objreg_ros.geometry import interpolate, pose, rotation_from_quaternion
 
 Array = NDArray[Any]
 
+UNIT = 0.01  # how far from 1 the length of a quaternion may be that was meant as one
 COLUMNS = {"p": 4, "k": 3}  # of the matrices of a camera_info
 MOMENT = re.compile(r"(?P<name>.*)@(?P<seconds>-?[0-9]{1,10})\.(?P<nanoseconds>[0-9]{9})", re.DOTALL)
 
@@ -225,6 +228,60 @@ def level_gravity(moment_ns: int, words: Sequence[Odometry] | None, T_body_camer
     T_level_body = pose_at(moment_ns, words)
     T_level_camera = T_level_body if T_body_camera is None else T_level_body @ T_body_camera
     return -T_level_camera[2, :3]
+
+
+def imu(message: Any) -> ImuSample:
+    """An Imu; a field whose covariance begins with -1 is not measured (REP-145).
+
+    Nor is an orientation that is no unit quaternion, or none but what an empty message holds. ValueError where what is
+    measured is not finite.
+    """
+    return ImuSample(
+        acceleration=_measured(message.linear_acceleration, "xyz", message.linear_acceleration_covariance),
+        angular_velocity=_measured(message.angular_velocity, "xyz", message.angular_velocity_covariance),
+        orientation=_orientation(message),
+        orientation_sigma_deg=_tilt_deg(message.orientation_covariance),
+        **_when_and_where(message),
+    )
+
+
+def _measured(vector: Any, names: str, covariance: Any) -> Array | None:
+    return None if covariance[0] < 0 else np.array([getattr(vector, name) for name in names], float)
+
+
+def _orientation(message: Any) -> Array | None:
+    xyzw = _measured(message.orientation, "xyzw", message.orientation_covariance)
+    if xyzw is None or abs(float(np.linalg.norm(xyzw)) - 1.0) >= UNIT:
+        return None
+    is_empty = xyzw[3] == 1.0 and not np.any(message.orientation_covariance)
+    return None if is_empty else xyzw / np.linalg.norm(xyzw)
+
+
+def _tilt_deg(covariance: Any) -> float:
+    """The standard deviation of roll and pitch, the larger one; 0 where it is not known."""
+    variance = max(float(covariance[0]), float(covariance[4]))
+    return float(np.degrees(np.sqrt(variance))) if 0.0 < variance < np.inf else 0.0
+
+
+def gravity_at(moment_ns: int, words: Sequence[FeltGravity]) -> FeltGravity:
+    """The gravity at a moment, between the two words of a filter that enclose it; of one word its own.
+
+    The less sure of the two says how sure; the nearer one's where they speak of different frames.
+    """
+    first, last = words[0], words[-1]
+    if first.stamp_ns == last.stamp_ns:
+        return first
+    share = min(1.0, max(0.0, (moment_ns - first.stamp_ns) / (last.stamp_ns - first.stamp_ns)))
+    mean = (1.0 - share) * first.gravity + share * last.gravity
+    length = float(np.linalg.norm(mean))
+    if first.frame_id != last.frame_id or length < 0.5:
+        return first if share <= 0.5 else last
+    return FeltGravity(
+        gravity=mean / length,
+        gravity_sigma_deg=max(first.gravity_sigma_deg, last.gravity_sigma_deg),
+        stamp_ns=moment_ns,
+        frame_id=first.frame_id,
+    )
 
 
 def _pose(message: Any) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -18,6 +19,7 @@ from objreg_ros.offline import Run, Timing, build_rooms, run_offline
 from objreg_ros.recording import Record, Recording, open_recording
 from objreg_ros.recording.drift import ODOM, with_drifting_odometry
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
+from objreg_ros.recording.mounts import static_frames
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_ros.truth import Truth
@@ -119,7 +121,7 @@ def _inputs(source: Recording, remaps: tuple[str, ...], odometry: str | None, de
 
 
 def _run(source: Recording, inputs: Inputs, settings: Settings, max_frames: int | None, odometry: str | None) -> Run:
-    timing = _timing(settings, odometry)
+    timing = replace(_timing(settings, odometry), find_pose=static_frames(source).between)
     click.echo(f"preparing the rooms ({FIRST_TIME})", err=True)
     rooms, close = build_rooms(
         settings.of("detector", DetectorParams),
@@ -141,7 +143,8 @@ def _timing(settings: Settings, odometry: str | None) -> Timing:
     if _drifts(odometry):
         if registrar.mounting is not None or segmenter.level_odom:
             click.echo(f"! {CAMERAS_OWN.format(odometry)}", err=True)
-        return Timing(slop_ns, odom_slop_ns, colour=segmenter.colour, rectified=segmenter.rectified)
+        imu = segmenter.imu_mounting
+        return Timing(slop_ns, odom_slop_ns, colour=segmenter.colour, rectified=segmenter.rectified, T_camera_imu=imu)
     return Timing(
         slop_ns=slop_ns,
         odom_slop_ns=odom_slop_ns,
@@ -150,6 +153,7 @@ def _timing(settings: Settings, odometry: str | None) -> Timing:
         level_odom=segmenter.level_odom,
         T_level_camera=segmenter.mounting,
         rectified=segmenter.rectified,
+        T_camera_imu=segmenter.imu_mounting,
     )
 
 
@@ -166,6 +170,15 @@ def _say(run: Run, summary: dict) -> None:
     )
     if run.lens:
         click.echo(f"  lens: {run.lens}")
+    if run.gravity_from:
+        click.echo(
+            f"  gravity from {', '.join(f'{name}: {count}' for name, count in sorted(run.gravity_from.items()))}"
+        )
+    apart = summary["gravity"]["imu_and_picture_apart_deg"]
+    if apart is not None:
+        click.echo(f"  imu and picture apart: {apart['p50']:.1f}° median, {apart['p95']:.1f}° p95")
+    for reason, count in summary["gravity"]["imu_passed_over"].items():
+        click.echo(f"  imu {reason}: {count}")
     for title in ("rejected", "dropped"):
         for reason, count in summary[title].items():
             click.echo(f"  {title} {reason}: {count}")

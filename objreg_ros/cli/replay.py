@@ -16,6 +16,7 @@ from objreg_ros.cli import options
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import SOURCES, Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.messages import header_stamp_ns
+from objreg_ros.recording.mounts import TRANSFORMS, static_topics
 from objreg_ros.recording.replay import Selection, graph_names, read_ahead, recorded_names
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ def command(
         for note in source.notes:
             click.echo(f"! {note}", err=True)
         inputs = choose_inputs(source.topics, parse_remaps(remaps), depth_source)
-        names = playable_names(source, inputs) if everything else graph_names(source, inputs)
+        names = playable_names(source, inputs) if everything else {**graph_names(source, inputs), **_mounts(source)}
         if not names:
             raise ValueError(f"{recording}: expected topics that the graph can use, got {', '.join(source.topics)}")
         selection = Selection(names, start, end)
@@ -101,6 +102,13 @@ def _begun(player: Player) -> Iterator[Player]:
     finally:
         player.close()
         rclpy.try_shutdown()
+
+
+def _mounts(source: Recording) -> dict[str, str]:
+    """The recording's /tf_static, by which the segmenter knows how an IMU is mounted, where its type is installed."""
+    from objreg_ros.bridge.player import is_installed
+
+    return {topic: "/tf_static" for topic in static_topics(source)[:1] if is_installed(TRANSFORMS)}
 
 
 def playable_names(source: Recording, inputs: Inputs) -> dict[str, str]:

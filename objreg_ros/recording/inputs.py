@@ -90,6 +90,11 @@ RULES = {
         DEPTH_ENCODING,
     ),
     "odom": Rule(("nav_msgs/msg/Odometry",), TRUTH, (r"^/?odom$", r"odom", r".")),
+    "imu": Rule(
+        ("sensor_msgs/msg/Imu",),
+        r"gyro|mag(netic)?(/|_|$)",
+        (r"^/?imu$", r"(camera|kinect|realsense|k4a|oak)[^/]*/imu", r"(^|/)imu", r"imu", r"accel", r"."),
+    ),
     "ground_truth": Rule(POSES, r"(?!.*(" + TRUTH + r"))^", (TRUTH,)),
 }
 NATIVE = "rgb_to_depth"  # colour in the geometry of the native depth
@@ -109,6 +114,7 @@ class Inputs:
     depth: str | None = None
     camera_info: str | None = None
     odom: str | None = None
+    imu: str | None = None
     ground_truth: str | None = None
 
     def chosen(self) -> dict[str, str]:
@@ -146,6 +152,7 @@ GRAPH_TOPICS = {  # the names that the nodes subscribe to
     "depth": "depth/image",
     "camera_info": "camera_info",
     "odom": "odom",
+    "imu": "imu",
     "ground_truth": "ground_truth",
 }
 _INPUT_OF = {topic: name for name, topic in GRAPH_TOPICS.items()}

@@ -26,9 +26,10 @@ PADDING = "structure_needs_at_least_one_member"  # what some definitions say of 
 READ = tuple(
     f"{package}/msg/{name}"
     for package, names in (
-        ("sensor_msgs", ("Image", "CompressedImage", "PointCloud2", "CameraInfo")),
+        ("sensor_msgs", ("Image", "CompressedImage", "PointCloud2", "CameraInfo", "Imu")),
         ("geometry_msgs", ("PoseStamped", "PoseWithCovarianceStamped", "TransformStamped")),
         ("nav_msgs", ("Odometry",)),
+        ("tf2_msgs", ("TFMessage",)),
     )
     for name in names
 )  # the types whose fields are read here, and not only passed on
@@ -237,6 +238,23 @@ def pose(T_parent_child: Array) -> Any:
 def pose_stamped(T_parent_child: Array, stamp_ns: int, frame_id: str) -> Any:
     """geometry_msgs/PoseStamped: the pose of something in ``frame_id``."""
     return message("geometry_msgs/PoseStamped", header=header(stamp_ns, frame_id), pose=pose(T_parent_child))
+
+
+def imu(acceleration: Sequence[float], angular_velocity: Sequence[float] | None, stamp_ns: int, frame_id: str) -> Any:
+    """sensor_msgs/Imu without an orientation, in m/s^2 and rad/s; None for no gyroscope."""
+    names = ("x", "y", "z")
+    unknown = np.concatenate([[-1.0], np.zeros(8)])
+    turn = (0.0, 0.0, 0.0) if angular_velocity is None else angular_velocity
+    return message(
+        "sensor_msgs/Imu",
+        header=header(stamp_ns, frame_id),
+        orientation=message("geometry_msgs/Quaternion", x=0.0, y=0.0, z=0.0, w=1.0),
+        orientation_covariance=unknown,
+        angular_velocity=message("geometry_msgs/Vector3", **dict(zip(names, map(float, turn), strict=True))),
+        angular_velocity_covariance=unknown if angular_velocity is None else np.zeros(9),
+        linear_acceleration=message("geometry_msgs/Vector3", **dict(zip(names, map(float, acceleration), strict=True))),
+        linear_acceleration_covariance=np.zeros(9),
+    )
 
 
 def odometry(T_odom_body: Array, covariance: Array, stamp_ns: int, frame_id: str, child_frame_id: str) -> Any:

@@ -15,6 +15,7 @@ from objreg_ros.bridge import from_msg, lenses
 from objreg_ros.bridge.layout import table
 from objreg_ros.data import Intrinsics
 from objreg_ros.recording.inputs import Inputs
+from objreg_ros.recording.mounts import static_frames
 from objreg_ros.recording.record import Record, Recording
 
 SAMPLE = 60  # messages of colour and depth whose stamps are compared
@@ -91,11 +92,21 @@ def _pose(message: Any) -> str:
     return f"{word.frame_id} → {word.child_frame_id or 'pose'}"
 
 
+def _imu(message: Any) -> str:
+    sample = from_msg.imu(message)
+    measured = {
+        "acceleration": sample.acceleration, "turns": sample.angular_velocity, "orientation": sample.orientation,
+    }  # fmt: skip
+    told = ", ".join(name for name, values in measured.items() if values is not None) or "nothing measured"
+    return f"{told}, {message.header.frame_id}"
+
+
 DESCRIBE: dict[str, Callable[[Any], str]] = {
     "sensor_msgs/msg/Image": _image,
     "sensor_msgs/msg/CompressedImage": _compressed,
     "sensor_msgs/msg/PointCloud2": _cloud,
     "sensor_msgs/msg/CameraInfo": _camera,
+    "sensor_msgs/msg/Imu": _imu,
     "nav_msgs/msg/Odometry": _pose,
     "geometry_msgs/msg/PoseStamped": _pose,
     "geometry_msgs/msg/PoseWithCovarianceStamped": _pose,
@@ -114,6 +125,7 @@ def warnings(recording: Recording, inputs: Inputs) -> list[str]:
         found.append("no odometry: the registrar follows the camera by itself, and the gate is less strict")
     if inputs.ground_truth is None:
         found.append("no ground truth: the true error of constraints cannot be told")
+    found += _mount_of_imu(recording, inputs)
     return [*found, *_first_messages(recording, inputs), *_frames(recording, inputs), *_stamps(recording, inputs)]
 
 
@@ -159,6 +171,17 @@ def _frames(recording: Recording, inputs: Inputs) -> list[str]:
     return [
         f"colour is in the frame {colour} and depth in {depth}: depth that is not registered to colour gives wrong "
         "objects; record registered depth (RealSense: align_depth.enable:=true, OpenNI: depth_registered)"
+    ]
+
+
+def _mount_of_imu(recording: Recording, inputs: Inputs) -> list[str]:
+    """Whether it is known how the IMU sits on the camera."""
+    camera, imu = (_frame_id(recording, topic) for topic in (inputs.depth or inputs.points, inputs.imu))
+    if not camera or not imu or camera == imu or static_frames(recording).between(camera, imu) is not None:
+        return []
+    return [
+        f"the IMU is in the frame {imu} and depth in {camera}, and no /tf_static ties them: it tells gravity only with "
+        "segmenter.T_camera_imu, its pose in the camera's optical frame"
     ]
 
 

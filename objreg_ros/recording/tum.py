@@ -2,9 +2,10 @@
 """Folders in the TUM RGB-D layout, as a recording of standard messages.
 
 ``rgb/`` and ``depth/`` (16-bit PNG registered to colour), ``associations.txt`` or ``rgb.txt`` and ``depth.txt``,
-``groundtruth.txt`` (timestamp tx ty tz qx qy qz qw of the colour camera in the world) and ``camera.yaml`` (see
-`tum_camera`), which may both be missing. See Sturm et al., "A Benchmark
-for the Evaluation of RGB-D SLAM Systems" (2012).
+``groundtruth.txt`` (timestamp tx ty tz qx qy qz qw of the colour camera in the world), ``accelerometer.txt``
+(timestamp ax ay az in m/s^2, in axes of its own that the benchmark does not tell) and ``camera.yaml`` (see
+`tum_camera`), which may all be missing. See Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM Systems"
+(2012).
 """
 
 from __future__ import annotations
@@ -32,15 +33,17 @@ from objreg_ros.recording.tum_camera import TumCamera, read_camera
 
 Array = NDArray[Any]
 
-IMAGE, DEPTH, CAMERA_INFO, GROUND_TRUTH = "/image", "/depth/image", "/camera_info", "/ground_truth"
+IMAGE, DEPTH, CAMERA_INFO, GROUND_TRUTH, IMU = "/image", "/depth/image", "/camera_info", "/ground_truth", "/imu"
 TYPES = {
     CAMERA_INFO: "sensor_msgs/msg/CameraInfo",
     GROUND_TRUTH: "geometry_msgs/msg/PoseStamped",
+    IMU: "sensor_msgs/msg/Imu",
     IMAGE: "sensor_msgs/msg/Image",
     DEPTH: "sensor_msgs/msg/Image",
 }
-CAMERA_FRAME, WORLD_FRAME = "camera", "world"
+CAMERA_FRAME, WORLD_FRAME, IMU_FRAME = "camera", "world", "accelerometer"
 ASSOCIATION_NS = 20_000_000  # as the benchmark's associate.py
+AROUND_NS = 500_000_000  # what the accelerometer felt before and after all pictures is left out
 NS_DIGITS = 19
 MOST_NAMED = 5  # files in a note
 END_OF_TIME_S = 2**31  # what the stamp of a message holds, until 2038
@@ -71,6 +74,8 @@ class TumRecording(Recording):
         pairs, self.notes = _pairs(path)
         self._camera = self._read_camera(list(dict.fromkeys(colour for _, colour, _, _ in pairs)))
         moments = [m for pair in pairs for m in self._moments(*pair)] + self._ground_truth()
+        first_ns, last_ns = min(m.stamp_ns for m in moments), max(m.stamp_ns for m in moments)
+        moments += _accelerations(path / "accelerometer.txt", first_ns - AROUND_NS, last_ns + AROUND_NS)
         order = list(TYPES)
         self._sequence = sorted(moments, key=lambda m: (m.stamp_ns, order.index(m.topic)))
         counts = {name: sum(m.topic == name for m in moments) for name in TYPES}
@@ -195,6 +200,21 @@ def _associate(colour: list[Picture], depth: list[Picture]) -> list[Pair]:
 def _around(stamps: Array, stamp: int) -> list[tuple[int, int]]:
     place = int(np.searchsorted(stamps, stamp))
     return [(j, int(stamps[j])) for j in (place - 1, place) if 0 <= j < len(stamps)]
+
+
+def _accelerations(file: Path, first_ns: int, last_ns: int) -> list[Moment]:
+    """The rows of an accelerometer within a time; none where there is no such file."""
+    told = [_acceleration(row, file) for row in _rows(file, 4)] if file.exists() else []
+    return [moment for moment in told if first_ns <= moment.stamp_ns <= last_ns]
+
+
+def _acceleration(row: list[str], file: Path) -> Moment:
+    try:
+        numbers = [float(text) for text in row[1:4]]
+    except ValueError as error:
+        raise ValueError(f"{file}: expected timestamp ax ay az, got {' '.join(row)}") from error
+    stamp_ns = _stamp(row[0], file)
+    return Moment(stamp_ns, IMU, partial(messages.imu, numbers, None, stamp_ns, IMU_FRAME))
 
 
 def _true_moment(row: list[str], file: Path) -> Moment | None:

@@ -1,19 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """The door of the segmenter: ``points``, or ``depth/image`` with ``camera_info`` and ``image``, and
-``detections_table`` and ``labels`` in, and ``odom`` where gravity comes from it; ``objects``, ``view``,
+``detections_table`` and ``labels`` in, and ``imu``, or ``odom`` where gravity comes from it; ``objects``, ``view``,
 ``view/camera_info`` and ``gravity`` out."""
 
 from __future__ import annotations
 
 import sys
+from collections import Counter, deque
+from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import Vector3Stamped
 from nav_msgs.msg import Odometry
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import DurabilityPolicy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
+from sensor_msgs.msg import Imu as ImuMessage
 from std_msgs.msg import String
 
 from objreg_ros.bridge import from_msg, lenses, qos, to_msg
@@ -21,18 +25,27 @@ from objreg_ros.bridge.lifetime import await_kernels
 from objreg_ros.bridge.matching import MatchingDoor
 from objreg_ros.bridge.overridable import FIXED
 from objreg_ros.bridge.spin import run
+from objreg_ros.bridge.static_frames import StaticFrames
 from objreg_ros.bridge.sync import Match, Need, Stream
-from objreg_ros.data import Array, ColourImage, DepthImage, Detections, Frame, PointCloud
+from objreg_ros.data import Array, ColourImage, DepthImage, Detections, FeltGravity, Frame, PointCloud
 from objreg_ros.segmenter.doubts import range_doubt, registration_doubt
+from objreg_ros.segmenter.imu import Imu
 from objreg_ros.segmenter.organise import organise
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
+
+try:
+    from tf2_msgs.msg import TFMessage
+except ImportError:  # no message of common_interfaces
+    TFMessage = None
 
 POINTS = {"points": PointCloud2}
 DEPTH = {"depth/image": Image, "depth/image/compressedDepth": CompressedImage}
 SOURCES = {"auto": {**POINTS, **DEPTH}, "points": POINTS, "depth": DEPTH}
 LOOK_S = 0.5  # between two looks for who keeps a camera_info
-ODOM_DEPTH = 1000  # odometry is small and many times as frequent as frames
+ODOM_DEPTH = 1000  # odometry is small and many times as frequent as frames; what an IMU feels is too
+COMPARED = 100  # of the last frames is told by how much IMU and picture disagree
+ENOUGH_COMPARED, ODD_DEG = 20, 20.0  # of so many half disagree by more: the IMU is mounted otherwise than was said
 IMAGES = {"image": Image, "image/compressed": CompressedImage}
 
 
@@ -45,6 +58,10 @@ class SegmenterNode(MatchingDoor):
         self._segmenter = Segmenter(self.settings.of(SegmenterParams))
         await_kernels(self._segmenter.warm, self.get_logger().info)
         self._camera_info: Any = None
+        self._frames = StaticFrames()
+        self._imu = Imu(self._inputs.imu_mounting, self._frames.between)
+        self._told: Counter[str] = Counter()  # frames by who told their gravity
+        self._apart_deg: deque[float] = deque(maxlen=COMPARED)
         self._source: str | None = None  # the topic that depth comes by
         self._lens = ""  # what was said of it
         self._objects = self.create_publisher(PointCloud2, "objects", qos.room())
@@ -64,8 +81,15 @@ class SegmenterNode(MatchingDoor):
         self.listen_to_first("depth", sources, self._decode_depth, self._hear_depth, self.sensor())
         if self._inputs.level_odom:
             self.listen(Odometry, "odom", self._hear_odom, self.sensor(qos.ODOMETRY))
+        else:
+            self._listen_for_imu()
         self.listen(PointCloud2, "detections_table", self._hear_detections, qos.room(), watched="detections_table")
         self.expect("detections_table", "detections_table")
+
+    def _listen_for_imu(self) -> None:
+        self.listen(ImuMessage, "imu", self._hear_imu, self.sensor(qos.ODOMETRY))
+        if TFMessage is not None and self._inputs.imu_mounting is None:
+            self.listen(TFMessage, "/tf_static", self._frames.hear, qos.latched(depth=100))
 
     def _listen_for_colour(self) -> None:
         if self._inputs.colour:
@@ -110,6 +134,12 @@ class SegmenterNode(MatchingDoor):
         if odometry is not None:
             self.feed("odom", odometry.stamp_ns, odometry)
 
+    def _hear_imu(self, message: Any) -> None:
+        sample = self.read_aside("imu", from_msg.imu, message)
+        felt = None if sample is None else self._imu.hear(sample)
+        if felt is not None:
+            self.feed("imu", felt.stamp_ns, felt)
+
     def _decode_image(self, _: str, message: Any) -> ColourImage:
         return from_msg.image(message, self.most_pixels)
 
@@ -140,6 +170,8 @@ class SegmenterNode(MatchingDoor):
         streams = [Stream("depth"), Stream("detections", slop_ns=slop_ns), Stream("labels", Need.LATCHED)]
         if self._inputs.level_odom:
             streams.append(Stream("odom", Need.OPTIONAL, slop_ns, ODOM_DEPTH, enclosing=True))
+        else:
+            streams.append(Stream("imu", Need.OPTIONAL, slop_ns, ODOM_DEPTH, enclosing=True))
         if topic in DEPTH:
             if self._source in POINTS:
                 self._listen_for_colour()
@@ -164,9 +196,15 @@ class SegmenterNode(MatchingDoor):
         shape = depth.depth.shape
         seen = self.read("detections", from_msg.detections, payload["detections"], names, shape)
         detections = self.read("camera_info", lenses.detections, seen, self._camera_of(payload), raw, cloud)
-        gravity = self._level_gravity(payload)
+        gravity, felt = self._level_gravity(payload), self._felt_gravity(payload, depth.frame_id)
         with self.ledger.timed("segment"):
-            frame = self._segmenter.segment(detections, depth, gravity)
+            if felt is None:
+                frame = self._segmenter.segment(detections, depth, gravity)
+            else:
+                frame = self._segmenter.segment(
+                    detections, depth, felt.gravity, gravity_sigma_deg=felt.gravity_sigma_deg
+                )
+        self._note_gravity()
         self._doubt(detections, depth, frame)
         self._publish(frame, names)
         return True
@@ -179,6 +217,39 @@ class SegmenterNode(MatchingDoor):
                 "is odom published 8 times a second at least, stamped by the clock of the camera?"
             )  # fmt: skip
         return gravity
+
+    def _felt_gravity(self, match: Match, camera_frame: str) -> FeltGravity | None:
+        words = match.payloads.get("imu")
+        if not words:
+            return None
+        felt = self._imu.in_camera(from_msg.gravity_at(match.stamp_ns, words), camera_frame)
+        if felt is None:
+            self.throttled.remind(
+                "imu_frame", f"expected to know how the IMU is mounted, got it in {words[0].frame_id!r} and depth in "
+                f"{camera_frame!r}: gravity is estimated; set segmenter.T_camera_imu, or publish it on /tf_static"
+            )  # fmt: skip
+        return felt
+
+    def _note_gravity(self) -> None:
+        choice = self._segmenter.choice
+        self._told[choice.source] += 1
+        if choice.disagreement_deg is None:
+            return
+        self._apart_deg.append(choice.disagreement_deg)
+        median = float(np.median(self._apart_deg))
+        if len(self._apart_deg) >= ENOUGH_COMPARED and median > ODD_DEG:
+            self.throttled.remind(
+                "imu_mounting", f"expected the gravity of the IMU and of the picture to agree, got {median:.0f} deg "
+                "between them: is segmenter.T_camera_imu right, and does the IMU tell what holds it up, not down?"
+            )  # fmt: skip
+
+    def extra_diagnostics(self) -> Mapping[str, object]:
+        """What matching tells, who told gravity, and what of the IMU was passed over."""
+        apart = sorted(self._apart_deg.copy())
+        told = {f"gravity from {source}": count for source, count in sorted(self._told.items())}
+        passed_over = {f"imu {reason}": count for reason, count in sorted(self._imu.counts.items())}
+        middle = {"gravity of imu and picture apart p50 [deg]": f"{apart[len(apart) // 2]:.1f}"} if apart else {}
+        return {**super().extra_diagnostics(), **told, **middle, **passed_over}
 
     def _doubt(self, detections: Detections, depth: DepthImage, frame: Frame) -> None:
         doubts = {

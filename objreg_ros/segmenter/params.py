@@ -78,11 +78,23 @@ class SegmenterNodeParams(Params):
         (), "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: the odometry is the camera's"
     )
 
+    T_camera_imu: tuple[float, ...] = param(
+        (),
+        "the IMU in the camera's optical frame: x y z qx qy qz qw; empty: as /tf_static says, or the optical frame "
+        "where `imu` names the same one",
+    )
+
     def __post_init__(self) -> None:
         super().__post_init__()
         mounting(self.T_base_camera)
+        mounting(self.T_camera_imu, "T_camera_imu")
 
     @property
     def mounting(self) -> Array | None:
         """``T_base_camera`` as a (4, 4) pose, None where none is set."""
         return mounting(self.T_base_camera)
+
+    @property
+    def imu_mounting(self) -> Array | None:
+        """``T_camera_imu`` as a (4, 4) pose, None where none is set."""
+        return mounting(self.T_camera_imu, "T_camera_imu")

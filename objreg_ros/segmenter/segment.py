@@ -17,6 +17,7 @@ from objreg_ros.segmenter.depth_to_colour import DepthToColour
 from objreg_ros.segmenter.depth_to_colour import warm as warm_offset
 from objreg_ros.segmenter.extract import Pixels, cell_points, colours
 from objreg_ros.segmenter.gravity import camera_up, estimate_up, known_normals
+from objreg_ros.segmenter.gravity_choice import GravityChoice, choose_gravity
 from objreg_ros.segmenter.isolate import Isolated, cut_out, isolate, mark
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.support import Ground, find_supports
@@ -30,13 +31,16 @@ NORMALS = 3  # every so many of these tell gravity
 
 
 class Segmenter:
-    """Segments one frame at a time; keeps nothing between frames but how depth is turned against colour.
+    """Segments one frame at a time.
+
+    Between frames it keeps how depth is turned against colour, and ``choice``: who told the last one's gravity.
 
     A second thread takes half of the boxes: the kernels let go of the interpreter's lock.
     """
 
     def __init__(self, params: SegmenterParams | None = None) -> None:
         self.params = params or SegmenterParams()
+        self.choice = GravityChoice(None, 0.0, "nothing")
         self._beside = ThreadPoolExecutor(1, "segmenter")
         self._depth_to_colour = DepthToColour()
 
@@ -71,13 +75,16 @@ class Segmenter:
         depth: DepthImage,
         gravity: Array | None = None,
         masks: Sequence[Array | None] | None = None,
+        gravity_sigma_deg: float | None = None,
     ) -> Frame:
         """The objects of one moment, in the order of their boxes; stamp and frame_id are those of ``depth``.
 
         Boxes of a picture of another size are scaled by ``detections.image_hw`` to the depth image, which must show
         the same field of view. ``gravity (3,)`` is the way things fall in the camera frame where an odometry or an IMU
-        knows it; it is then handed on with confidence 1, else it is estimated from the frame. A box without an object
-        of `min_points` gives none; instances count the objects from 1. ``T_odom_camera`` is None.
+        knows it. With ``gravity_sigma_deg``, the standard deviation of its tilts, it is handed on where it is surer
+        than what the frame shows; without, in any case and with confidence 1. Where there is none it is estimated from
+        the frame. A box without an object of `min_points` gives none; instances count the objects from 1.
+        ``T_odom_camera`` is None.
 
         ``masks`` has for each box a mask (H, W) bool of the depth image, or None: what it covers is the object, instead
         of what stands in the box. ValueError for masks of another number, type or shape.
@@ -86,7 +93,7 @@ class Segmenter:
         depth = self._depth_to_colour.register(_plain(depth))
         seen = (depth, step_for(depth.depth.shape[1], params.view_step), params.z_min, params.limits[0])
         view = self._beside.submit(reduced_view, *seen)
-        ground = self._ground(depth, gravity)
+        ground = self._ground(depth, gravity, gravity_sigma_deg)
         taken = np.zeros(ground.surface.depth.shape, np.bool_)
         found = self._cut_all(depth, boxes.pixel_boxes(detections, *depth.depth.shape), outlines, ground)
         objects: list[ObjectCloud] = []
@@ -126,13 +133,14 @@ class Segmenter:
             return Isolated(paper.cut(depth, box, self.params), PointFlag(0), None)
         return isolate(depth, box, ground, self.params)
 
-    def _ground(self, depth: DepthImage, gravity: Array | None) -> Ground:
+    def _ground(self, depth: DepthImage, gravity: Array | None, sigma_deg: float | None) -> Ground:
         params = self.params
         z_max, y_max = params.limits
         limits, jump = (params.z_min, z_max, y_max), (params.jump, params.jump_z2)
         surface = reduce(depth.depth, depth.intrinsics, cell_size(*depth.depth.shape), limits, jump)
         coarse = surface.every(COARSE)
-        up, confidence = _up(coarse, gravity, params)
+        self.choice = _choice(coarse, gravity, sigma_deg, params)
+        up, confidence = self.choice.up, self.choice.confidence
         supports = [] if up is None else find_supports(coarse, depth.intrinsics, up, params.support_area, jump)
         return Ground(up, confidence, supports, surface, coarse)
 
@@ -181,13 +189,21 @@ def _block_on_table(camera: Intrinsics) -> Array:
     return depth
 
 
-def _up(surface: Surface, gravity: Array | None, params: SegmenterParams) -> tuple[Array | None, float]:
-    if gravity is not None:
-        length = float(np.linalg.norm(gravity))
-        if not np.isfinite(length) or length < 1e-6:
-            raise ValueError(f"gravity: expected a direction of non-zero length, got {np.asarray(gravity).tolist()}")
-        return -np.asarray(gravity, np.float64) / length, 1.0
-    return estimate_up(known_normals(surface.normals, NORMALS), camera_up(params.roll), params.up_tilt)
+def _choice(surface: Surface, gravity: Array | None, sigma_deg: float | None, params: SegmenterParams) -> GravityChoice:
+    told = None if gravity is None else -_direction(gravity)
+    if told is not None and sigma_deg is None:
+        return GravityChoice(told, 1.0, "odom")
+    seen, confidence = estimate_up(known_normals(surface.normals, NORMALS), camera_up(params.roll), params.up_tilt)
+    if told is not None and sigma_deg is not None:
+        return choose_gravity(told, sigma_deg, seen, confidence)
+    return GravityChoice(seen, confidence, "nothing" if seen is None else "picture")
+
+
+def _direction(gravity: Array) -> Array:
+    length = float(np.linalg.norm(gravity))
+    if not np.isfinite(length) or length < 1e-6:
+        raise ValueError(f"gravity: expected a direction of non-zero length, got {np.asarray(gravity).tolist()}")
+    return np.asarray(gravity, np.float64) / length
 
 
 def _object(label: str, score: float, instance: int, pixels: Pixels, flags: PointFlag) -> ObjectCloud:

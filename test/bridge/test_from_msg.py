@@ -10,6 +10,7 @@ import pytest
 
 from objreg_ros.bridge import from_msg
 from objreg_ros.bridge.layout import DETECTIONS, OBJECTS, SUPPORT_ID, VIEW
+from objreg_ros.data import FeltGravity
 from objreg_ros.geometry import pose, rotation_from_vector
 
 from . import messages
@@ -222,6 +223,63 @@ def test_gravity_is_down_in_the_frame_of_a_level_odometry() -> None:
     assert np.allclose(from_msg.level_gravity(0, (on_its_side,)), (0, -1, 0))
     T_body_camera = pose(rotation_from_vector(np.array([0, 0, np.pi / 2])), np.ones(3))  # the body's y is its x
     assert np.allclose(from_msg.level_gravity(0, (on_its_side,), T_body_camera), (-1, 0, 0))
+
+
+def imu(**changes: object) -> SimpleNamespace:
+    """An Imu at rest in an upright camera, without an orientation."""
+    fields = {
+        "linear_acceleration": SimpleNamespace(x=0.0, y=-9.8, z=0.1),
+        "angular_velocity": SimpleNamespace(x=0.1, y=0.2, z=0.3),
+        "orientation": SimpleNamespace(x=0.0, y=0.0, z=0.0, w=1.0),
+        "linear_acceleration_covariance": np.zeros(9),
+        "angular_velocity_covariance": np.zeros(9),
+        "orientation_covariance": np.array([-1.0, *np.zeros(8)]),
+    }
+    header = SimpleNamespace(stamp=SimpleNamespace(sec=1, nanosec=5), frame_id="imu")
+    return SimpleNamespace(header=header, **{**fields, **changes})
+
+
+def test_an_imu_tells_what_its_covariances_say_that_it_measures() -> None:
+    word = from_msg.imu(imu())
+    assert word.acceleration is not None and word.acceleration.tolist() == [0.0, -9.8, 0.1]
+    assert word.angular_velocity is not None and word.angular_velocity.tolist() == [0.1, 0.2, 0.3]
+    assert (word.orientation, word.stamp_ns, word.frame_id) == (None, 1_000_000_005, "imu")
+    unknown = np.array([-1.0, *np.zeros(8)])
+    word = from_msg.imu(imu(linear_acceleration_covariance=unknown, angular_velocity_covariance=unknown))
+    assert word.acceleration is None and word.angular_velocity is None
+
+
+def test_an_orientation_is_a_unit_quaternion_that_somebody_set() -> None:
+    told = {"orientation_covariance": np.diag([4e-4, 1e-4, 9.0]).ravel()}
+    word = from_msg.imu(imu(**told))
+    assert word.orientation is not None and word.orientation_sigma_deg == pytest.approx(np.degrees(0.02))
+    empty = np.zeros(9)
+    assert from_msg.imu(imu(orientation_covariance=empty)).orientation is None
+    turned = SimpleNamespace(x=0.6, y=0.0, z=0.0, w=0.8)
+    assert from_msg.imu(imu(orientation_covariance=empty, orientation=turned)).orientation is not None
+    nothing = SimpleNamespace(x=0.0, y=0.0, z=0.0, w=0.0)
+    assert from_msg.imu(imu(**told, orientation=nothing)).orientation is None
+
+
+@pytest.mark.parametrize("field", ["linear_acceleration", "angular_velocity", "orientation"])
+def test_an_imu_that_measures_no_number_is_refused(field: str) -> None:
+    broken = SimpleNamespace(x=0.0, y=float("nan"), z=0.0, w=0.0)
+    with pytest.raises(ValueError, match="ImuSample: expected finite"):
+        from_msg.imu(imu(**{field: broken, "orientation_covariance": np.full(9, 1e-4)}))
+
+
+def test_gravity_between_two_words_is_between_theirs_and_as_sure_as_the_less_sure() -> None:
+    def word(stamp_ns: int, degrees: float, sigma_deg: float, frame_id: str = "imu") -> FeltGravity:
+        gravity = np.array([np.sin(np.radians(degrees)), np.cos(np.radians(degrees)), 0.0])
+        return FeltGravity(gravity=gravity, gravity_sigma_deg=sigma_deg, stamp_ns=stamp_ns, frame_id=frame_id)
+
+    between = from_msg.gravity_at(15, (word(10, 0.0, 1.0), word(20, 4.0, 2.0)))
+    assert between.gravity == pytest.approx(word(15, 2.0, 2.0).gravity)
+    assert (between.gravity_sigma_deg, between.stamp_ns) == (2.0, 15)
+    alone = word(10, 0.0, 1.0)
+    assert from_msg.gravity_at(15, (alone,)) is alone
+    other = word(20, 4.0, 2.0, "another")
+    assert from_msg.gravity_at(18, (alone, other)) is other
 
 
 def test_a_stamped_pose_and_a_transform_are_odometry_too() -> None:

@@ -12,6 +12,7 @@ KINDS = {
     "info": INFO,
     "points": "sensor_msgs/msg/PointCloud2",
     "odom": "nav_msgs/msg/Odometry",
+    "imu": "sensor_msgs/msg/Imu",
     "pose": "geometry_msgs/msg/PoseStamped",
     "transform": "geometry_msgs/msg/TransformStamped",
     "jpeg": "sensor_msgs/msg/CompressedImage",
@@ -25,6 +26,18 @@ def topics(text: str) -> dict[str, Topic]:
 
 
 DRIVERS = {
+    "a RealSense with its IMU on a robot with another": (
+        "/camera/color/image_raw /camera/color/camera_info:info /camera/aligned_depth_to_color/image_raw "
+        "/camera/aligned_depth_to_color/camera_info:info /camera/imu:imu /camera/gyro/sample:imu "
+        "/camera/accel/sample:imu /mavros/imu/data:imu",
+        "image=/camera/color/image_raw depth=/camera/aligned_depth_to_color/image_raw "
+        "camera_info=/camera/aligned_depth_to_color/camera_info imu=/camera/imu",
+    ),
+    "a RealSense whose IMU is not united": (
+        "/camera/gyro/sample:imu /camera/accel/sample:imu",
+        "imu=/camera/accel/sample",
+    ),
+    "any IMU": ("/gyro_only:imu /phone/motion:imu", "imu=/phone/motion"),
     "ours": (
         "/image /depth/image /camera_info:info /odom:odom /ground_truth:pose /view:points /objects:points",
         "image=/image depth=/depth/image camera_info=/camera_info odom=/odom ground_truth=/ground_truth",

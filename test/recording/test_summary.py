@@ -86,6 +86,15 @@ def test_depth_in_the_frame_of_colour_or_in_none_is_fine(frame_id: str, tmp_path
     assert "in the frame" not in said(bag(tmp_path / "bag", depth_and_colour(METRE, "16UC1", frame_id=frame_id)))
 
 
+def test_an_imu_that_is_mounted_nobody_knows_how_is_said_with_what_to_set(tmp_path: Path) -> None:
+    stamps = range(10**9, 2 * 10**9, 10**7)
+    felt = [Record.of("/imu", messages.imu((0, -9.8, 0), (0, 0, 0.1), ns, "imu"), ns) for ns in stamps]
+    recording = bag(tmp_path / "bag", sorted([*records(), *felt], key=lambda record: record.stamp_ns))
+    assert "the IMU is in the frame imu and depth in camera" in said(recording)
+    (line,) = (line for line in describe_topics(recording) if line.topic == "/imu")
+    assert line.what == "acceleration, turns, imu"
+
+
 def test_only_depth_that_would_be_used_is_looked_at(tmp_path: Path) -> None:
     rows = np.ones((48, 64), [("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
     cloud = Record.of("/points", messages.point_cloud(rows, 5, "c"), 5)

@@ -12,6 +12,7 @@ import pytest
 
 from objreg_ros.bridge import from_msg, lenses
 from objreg_ros.recording import open_recording
+from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.tum import ASSOCIATION_NS, Picture, _associate
 
 from .folders import numbered_folder, tum_folder
@@ -42,6 +43,25 @@ def test_a_folder_lasts_until_its_last_picture_has_come(tmp_path: Path) -> None:
     assert recording.start_ns == stamps[0] and recording.end_ns > stamps[-1]
     part = [record.stamp_ns for record in recording.records(None, recording.start_ns, recording.end_ns)]
     assert part == stamps and recording.seconds == pytest.approx((stamps[-1] - stamps[0]) * 1e-9)
+
+
+def test_an_accelerometer_is_an_imu_around_the_time_of_the_pictures(tmp_path: Path) -> None:
+    tum_folder(tmp_path)
+    lines = [f"{t:.4f} 0.1 -9.7 0.5" for t in (-2.0, -0.1, 0.05, 0.15, 9.0)]
+    (tmp_path / "accelerometer.txt").write_text("# timestamp ax ay az\n" + "\n".join(lines))
+    recording = open_recording(tmp_path)
+    felt = [from_msg.imu(record.message) for record in recording.records(["/imu"])]
+    assert recording.topics["/imu"].count == len(felt) == 3
+    assert [word.stamp_ns for word in felt] == [-100_000_000, 50_000_000, 150_000_000]
+    assert felt[0].acceleration is not None and felt[0].acceleration.tolist() == [0.1, -9.7, 0.5]
+    assert felt[0].angular_velocity is None and felt[0].orientation is None and felt[0].frame_id == "accelerometer"
+    assert choose_inputs(recording.topics).imu == "/imu"
+
+
+def test_a_row_of_the_accelerometer_that_is_none_is_refused_by_name(tmp_path: Path) -> None:
+    (tum_folder(tmp_path) / "accelerometer.txt").write_text("0.0 a b c")
+    with pytest.raises(ValueError, match=r"expected timestamp ax ay az, got 0\.0 a b c"):
+        open_recording(tmp_path)
 
 
 def test_pictures_farther_apart_than_the_association_are_no_pair(tmp_path: Path) -> None:

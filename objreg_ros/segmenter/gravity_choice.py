@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whose word on gravity counts: that of an odometry or an IMU, or that of the picture."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from objreg_ros.data import Array, gravity_confidence, gravity_sigma_deg
+
+APART = 3.0  # deviations of both together: beyond, the picture took for level what is not
+
+
+class GravityChoice(NamedTuple):
+    """Up (3,) of length 1 in the camera frame or None, its confidence 0..1, who tells it, and who says otherwise.
+
+    ``source`` is ``imu``, ``picture``, ``odom`` or ``nothing``; ``disagreement_deg`` is the angle between the IMU's
+    direction and the picture's, None where there are not both.
+    """
+
+    up: Array | None
+    confidence: float
+    source: str
+    disagreement_deg: float | None = None
+
+
+def choose_gravity(up: Array, sigma_deg: float, seen: Array | None, confidence: float) -> GravityChoice:
+    """The surer one of what an IMU feels, ``up (3,)``, and what the picture shows, ``seen (3,)`` or None.
+
+    Where they contradict each other, it is the IMU: no confidence of the picture tells a slope from a floor.
+    """
+    felt = gravity_confidence(sigma_deg)
+    if seen is None:
+        return GravityChoice(up, felt, "imu") if felt > 0.0 else GravityChoice(None, 0.0, "nothing")
+    cross = float(np.linalg.norm(np.cross(up, seen)))
+    apart_deg = float(np.degrees(np.arctan2(cross, up @ seen)))
+    seen_sigma_deg = gravity_sigma_deg(confidence)
+    contradicts = apart_deg > APART * float(np.hypot(sigma_deg, seen_sigma_deg))
+    if felt > 0.0 and (contradicts or sigma_deg <= seen_sigma_deg):
+        return GravityChoice(up, felt, "imu", apart_deg)
+    return GravityChoice(seen, confidence, "picture", apart_deg)
