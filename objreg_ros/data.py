@@ -364,24 +364,39 @@ class FeltGravity:
 
 
 # A confidence and the standard deviation of either tilt in degrees that it stands for, between which their logarithm is
-# linear. That of 1 is that of gravity which many views tell; in between as single views err on KITCHEN (0.96: 0.7
-# degrees in the median, below 0.9: 2.4); the least that is told is hardly better than a guess.
-CONFIDENCE = (0.1, 0.3, 0.85, 0.96, 1.0)
-SIGMA_DEG = (40.0, 20.0, 2.0, 0.6, 0.5)
+# linear: as single views err in simulation with all sensors and stress, times 1.5 for rooms that are less level
+# (`training/gravity.py`). Below the first, gravity is no better than a guess, and counts as unknown.
+CONFIDENCE = (0.3, 0.5, 0.7, 0.85, 0.96, 1.0)
+SIGMA_DEG = (2.4, 1.8, 1.3, 0.85, 0.6, 0.5)
 
 
 def gravity_sigma_deg(confidence: float) -> float:
-    """The standard deviation in degrees of a gravity with this confidence 0..1; 90 below 0.1."""
+    """The standard deviation in degrees of a gravity with this confidence 0..1; 90 below the least of `CONFIDENCE`."""
     if confidence < CONFIDENCE[0]:
         return 90.0
     return float(np.exp(np.interp(confidence, CONFIDENCE, np.log(SIGMA_DEG))))
 
 
 def gravity_confidence(sigma_deg: float) -> float:
-    """The confidence 0..1 of a gravity with this standard deviation in degrees, the inverse; 0 beyond 40."""
+    """The confidence 0..1 of a gravity with this standard deviation in degrees, the inverse; 0 beyond the largest."""
     if not sigma_deg <= SIGMA_DEG[0]:
         return 0.0
     return float(np.interp(-np.log(max(sigma_deg, 1e-9)), -np.log(SIGMA_DEG), CONFIDENCE))
+
+
+ONE_VIEW = 0.02  # weight of the gravity that a single view tells, beside 1 of many from around
+MANY_VIEWS_DEG = 0.5  # standard deviation of what those tell
+
+
+def session_gravity_sigma_deg(weight: float) -> float:
+    """The standard deviation in degrees of either tilt of a keyframe's gravity, by its weight 0..1.
+
+    Many views have told it, carried by odometry (`keyframes/gravity_filter.py`), or this one alone: then its weight is
+    at most `ONE_VIEW`, which falls with the third power of the view's confidence.
+    """
+    if weight <= ONE_VIEW:
+        return gravity_sigma_deg(float(np.cbrt(weight / ONE_VIEW)))
+    return float(MANY_VIEWS_DEG / np.sqrt(weight))
 
 
 @word

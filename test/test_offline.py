@@ -346,11 +346,11 @@ def seen_of_a_lens(records: Iterator[Record], inputs: Inputs, rectified: str = "
     rooms, _ = simple_rooms()
     met: list[Any] = []
 
-    def segment(detections: Detections, depth: DepthImage, gravity: Any = None) -> Frame:
+    def segment(detections: Detections, depth: DepthImage, gravity: Any = None, **more: Any) -> Frame:
         met.append((depth, detections.xyxy))
-        return rooms.segmenter.segment(detections, depth, gravity)
+        return rooms.segmenter.segment(detections, depth, gravity, **more)
 
-    spied = replace(rooms, segmenter=SimpleNamespace(segment=segment))
+    spied = replace(rooms, segmenter=SimpleNamespace(segment=segment, choice=rooms.segmenter.choice))
     return run_offline(records, spied, inputs, Timing(rectified=rectified)), met
 
 

@@ -11,12 +11,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data import ONE_VIEW, Array
 from objreg_ros.keyframes.odometry import TravelledPath
 
-ONE_VIEW = 0.02  # weight of what a single view tells, beside 1 of many from around
 AT_REST_M, AT_REST_DEG = 0.01, 0.5  # what odometry may jitter by while the camera rests
-DOUBT = 3  # power of a view's own confidence: 0.96 err by 0.7 degrees, below 0.9 by 2.4
+DOUBT = 3  # power of a view's own confidence (`data.session_gravity_sigma_deg` knows it)
 
 
 @dataclass(slots=True, eq=False)

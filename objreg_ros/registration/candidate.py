@@ -75,6 +75,7 @@ class Candidate:
     matched: tuple[ObjectPair, ...] = ()
     moved: tuple[ObjectPair, ...] = ()
     gravity_error_deg: float | None = None
+    gravity_error_sigmas: float = 0.0
     silhouette_score: float | None = None
     silhouette_score_nearby: float | None = None
     yaw_known: bool = False

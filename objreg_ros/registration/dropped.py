@@ -34,9 +34,11 @@ CONSTANT_OF = {
         "slack_translation": "DEGENERATE_SIGMA_M",
         "slack_rotation": "DEGENERATE_SIGMA_DEG",
     },
-    "registration/certainty/gravity_update.py": {
-        "gravity_noise": "GRAVITY_SIGMA_DEG",
-        "max_gravity_error": "MOST_GRAVITY_ERROR_DEG",
+    "data.py": {
+        "gravity_noise": "MANY_VIEWS_DEG",
+    },
+    "registration/gate/gravity.py": {
+        "max_gravity_error": "SIGMAS",
     },
     "registration/certainty/observability.py": {
         "pushes": "PERTURBATIONS_M",

@@ -10,13 +10,13 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data import CONFIDENCE, Array
 
 CANDIDATES = 64
 CLUSTER = np.float32(np.cos(np.radians(8.0)))
 RIVAL = np.float32(np.cos(np.radians(16.0)))
 CONES = tuple(np.cos(np.radians((16.0, 12.0, 10.0, 8.0, 6.0, 6.0))).tolist())  # where a cluster's middle is sought
-LEAST = 0.1  # confidence; a guess that deserves less is none
+LEAST = CONFIDENCE[0]  # a guess that deserves less is none
 ENOUGH = 0.10  # share of the normals that makes a cluster fully believed
 MIN_NORMALS = 20
 
@@ -32,7 +32,7 @@ def estimate_up(normals: Array, prior: Array, cone_deg: float) -> tuple[Array | 
 
     ``normals (N, 3)`` of length 1, towards the camera. Only clusters within ``cone_deg`` of ``prior`` count; each is
     weighed by the fourth power of the cosine to the prior. The confidence is what the cluster's weight leads the best
-    other cluster by, less where only a small part of the frame is level; below 0.1 there is no answer.
+    other cluster by, less where only a small part of the frame is level; below `LEAST` there is no answer.
     """
     limit = np.float32(np.cos(np.radians(cone_deg)))
     up, confidence = _estimate(normals, prior.astype(np.float32), limit)

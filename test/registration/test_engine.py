@@ -56,8 +56,8 @@ def test_a_pose_is_brought_to_where_gravity_is_kept_as_far_as_that_is_known(monk
     tilt = rotation_from_vector(np.radians([1.0, 0.0, 0.0]))
     tilted = replace(source, gravity=tilt @ source.gravity, gravity_confidence=1.0)
     errors, spreads = [], []
-    for noise in (0.01, 10.0):
-        monkeypatch.setattr(gravity_update, "GRAVITY_SIGMA_DEG", noise)
+    for sigma_deg in (0.01, 10.0):
+        monkeypatch.setattr(gravity_update, "MANY_VIEWS_DEG", sigma_deg)
         best = Engine(PARAMS).propose(tilted, replace(target, gravity_confidence=1.0))[0]
         errors.append(gravity_error(best.T_target_source, tilted, target))
         spreads.append(np.linalg.inv(best.alignment.information)[3:, 3:].trace())

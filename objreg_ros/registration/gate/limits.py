@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from objreg_ros.registration.certainty.gravity_update import MOST_GRAVITY_ERROR_DEG
 from objreg_ros.registration.gate import (
     competing,
     free_space,
+    gravity,
     lone_object,
     objects,
     observability,
@@ -28,7 +28,7 @@ class Limits(NamedTuple):
     """What every file of the gate needs; a single number where a check has one."""
 
     translation_m: float = odometry.FAR_M
-    gravity_deg: float = MOST_GRAVITY_ERROR_DEG
+    gravity_sigmas: float = gravity.SIGMAS
     objects: objects.Limits = objects.Limits()
     overlap: overlap.Limits = overlap.Limits()
     free_space: free_space.Limits = free_space.Limits()

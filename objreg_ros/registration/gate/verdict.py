@@ -61,7 +61,7 @@ def is_possible(candidate: Candidate, limits: Limits = LIMITS) -> bool:
     """Whether a pose may be true for all that is seen: it matches an object, and keeps gravity and free space."""
     one, found = candidate, objects.objects_of(candidate, limits.objects)
     return found.matched > 0 and not (
-        gravity.check(one.gravity_error_deg, limits.gravity_deg)
+        gravity.check(one.gravity_error_deg, one.gravity_error_sigmas, limits.gravity_sigmas)
         or free_space.check(one.verification.violations, one.certain_violations, found.doubtful, limits.free_space)
     )
 
@@ -78,7 +78,7 @@ def refuse(
     return (
         convergence.check(fit.converged, fit.inliers)
         or odometry.check_plausible(T, limits.translation_m)
-        or gravity.check(one.gravity_error_deg, limits.gravity_deg)
+        or gravity.check(one.gravity_error_deg, one.gravity_error_sigmas, limits.gravity_sigmas)
         or overlap.check(seen.tested, seen.inliers, limits.overlap)
         or free_space.check(seen.violations, one.certain_violations, found.doubtful, limits.free_space)
         or free_space.check_few(one.certain_violations, found.few, limits.free_space)

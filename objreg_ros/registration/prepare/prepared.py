@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data import Array, session_gravity_sigma_deg
 from objreg_ros.registration.kernels.closest_points import Surface, prepare_surface
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.labels import LabelGroups
@@ -39,7 +39,8 @@ class Prepared:
     """All that was seen, thinned: ``sight`` and, at half its size, ``coarse`` to look with.
 
     ``surface`` to be aligned to, ``xyz`` and ``normals (M, 3)`` to align with; ``up (3,)`` is against gravity, or None,
-    and ``up_weight`` 0..1 how much was seen that tells it; ``groups`` the confusable group of each object,
+    ``up_weight`` 0..1 how much was seen that tells it, and
+    ``up_sigma_deg`` the standard deviation of either tilt of it; ``groups`` the confusable group of each object,
     ``centroids (K, 3)`` their middles and ``extents (K,)`` m, ``shapes`` what is laid upon others and ``yaw_known``
     whether that tells a turn; ``own`` is where the view shows each (h, w) bool; ``scene`` is all of them as one shape;
     ``middle (3,)`` that of everything: where poses are compared.
@@ -54,6 +55,7 @@ class Prepared:
     normals: Array
     up: Array | None
     up_weight: float
+    up_sigma_deg: float
     groups: tuple[str, ...]
     yaw_known: tuple[bool, ...]
     shapes: tuple[Shape | None, ...]
@@ -95,6 +97,7 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
             **_shuffled(*joined(coarse, sampled(things, OBJECT_POINTS, params.seed)), params.seed),
             up=up,
             up_weight=keyframe.gravity_confidence,
+            up_sigma_deg=session_gravity_sigma_deg(keyframe.gravity_confidence),
             groups=tuple(groups.of(label) for label in keyframe.labels),
             yaw_known=tuple(
                 tells_yaw(item.cloud, up, shape) for item, shape in zip(keyframe.objects, shapes, strict=True)

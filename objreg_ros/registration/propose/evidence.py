@@ -7,10 +7,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from objreg_ros.data import Alignment, Array
+from objreg_ros.data import Alignment
 from objreg_ros.registration.candidate import Candidate, Score, Verification
 from objreg_ros.registration.certainty.covariance import spread_of, worst_translation
 from objreg_ros.registration.certainty.degeneracy import systematic_depth_error
+from objreg_ros.registration.certainty.gravity_update import gravity_error
 from objreg_ros.registration.certainty.observability import DOUBTFUL_SIGMA_M, margin_under_perturbation
 from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.registration.score.comparison import SILHOUETTE_WEIGHT
@@ -29,6 +30,7 @@ def gather(source: Prepared, target: Prepared, alignment: Alignment, proposers: 
     """The candidate of an alignment that ``proposers`` came to, the first of which proposed it; not yet perturbed."""
     T, (proposer, *others) = alignment.T_target_source, proposers
     matched, moved = match_objects(source, target, T)
+    gravity = gravity_error(source, target, T)
     return Candidate(
         alignment=alignment,
         proposer=proposer,
@@ -39,7 +41,8 @@ def gather(source: Prepared, target: Prepared, alignment: Alignment, proposers: 
         silhouette_score=score_matched_silhouettes(source, target, matched, T),
         silhouette_score_nearby=score_matched_silhouettes(source, target, matched, T, NEARBY_M),
         yaw_known=any(source.yaw_known[pair.source] and target.yaw_known[pair.target] for pair in matched),
-        gravity_error_deg=gravity_error_deg(source, target, T),
+        gravity_error_deg=gravity.degrees,
+        gravity_error_sigmas=gravity.sigmas,
         certain_violations=certain_violations(source.sight, target.sight, T),
         systematic_depth_error=systematic_depth_error(source, target, T),
     )
@@ -61,13 +64,6 @@ def surroundings_of(candidate: Candidate, source: Prepared, target: Prepared) ->
     own_source = np.any([source.own[pair.source] for pair in pairs], axis=0)
     own_target = np.any([target.own[pair.target] for pair in pairs], axis=0)
     return verify_surroundings(source.sight, target.sight, (own_source, own_target), T)
-
-
-def gravity_error_deg(source: Prepared, target: Prepared, T_target_source: Array) -> float | None:
-    """The angle between the two gravities under a pose; None where one is unknown."""
-    if source.up is None or target.up is None:
-        return None
-    return float(np.degrees(np.arccos(np.clip(T_target_source[:3, :3] @ source.up @ target.up, -1.0, 1.0))))
 
 
 def rank_score(candidate: Candidate) -> Score:

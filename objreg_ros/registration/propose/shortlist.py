@@ -15,10 +15,10 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.registration.candidate import Score
-from objreg_ros.registration.certainty.gravity_update import MOST_GRAVITY_ERROR_DEG
+from objreg_ros.registration.certainty.gravity_update import gravity_error
 from objreg_ros.registration.kernels.same_pose import AGREEING, BASIN, PROPOSED, PROPOSED_FROM, REFINED, distinct, near
 from objreg_ros.registration.prepare.prepared import Pair
-from objreg_ros.registration.propose.evidence import FINISHED_MARGIN, gravity_error_deg, score_objects
+from objreg_ros.registration.propose.evidence import FINISHED_MARGIN, score_objects
 from objreg_ros.registration.propose.fine_search import score_views_sharply
 from objreg_ros.registration.propose.hypotheses import (
     Hypothesis,
@@ -46,7 +46,7 @@ FIRST_LOOK = (150, 5, 150)  # points, iterations and points of the views a side,
 LOOKED_AT_AGAIN = 24  # hypotheses of each proposer that get more points
 BASIN_POINTS = 500  # that bring a hypothesis to its basin
 ANCHORED = 2  # hypotheses about each of the best that grey holds where they were proposed
-TILTED = 1.5  # times the error of gravity that the gate allows: what is not refined
+TILTED = 5.5  # deviations of gravity: what is not refined; photometric ICP may bring it to what the gate allows
 
 
 class Shortlist(NamedTuple):
@@ -140,9 +140,8 @@ def _hopeful(pair: Pair, hypotheses: list[Hypothesis], firm: Array) -> list[Hypo
 
 
 def _keeps_gravity(pair: Pair, hypothesis: Hypothesis) -> bool:
-    """Whether a hypothesis, once finished, may keep gravity as the gate wants it; True where that is unknown."""
-    error = gravity_error_deg(pair.source, pair.target, hypothesis.T_target_source)
-    return error is None or error <= TILTED * MOST_GRAVITY_ERROR_DEG
+    """Whether a hypothesis, once finished, may keep gravity as the gate wants it."""
+    return gravity_error(pair.source, pair.target, hypothesis.T_target_source).sigmas <= TILTED
 
 
 def _scored(pair: Pair, hypotheses: list[Hypothesis]) -> list[Hypothesis]:

@@ -6,8 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from objreg_ros.data import Reason
-from objreg_ros.registration.certainty.gravity_update import MOST_GRAVITY_ERROR_DEG
-from objreg_ros.registration.gate import competing
+from objreg_ros.registration.gate import competing, gravity
 from objreg_ros.registration.gate.limits import LIMITS as GATE
 from objreg_ros.registration.gate.verdict import judge, refuse
 from registration.gate.samples import competitor, lone
@@ -48,7 +47,7 @@ def test_several_objects_whose_pose_has_a_competitor_that_is_worth_as_much_are_r
     assert refuse(several, possible=[several, far]) is None
     refusal = refuse(several, possible=[several, near])
     assert refusal is not None and refusal[0] is Reason.CHAINS_DISAGREE and "2 objects" in refusal[1]
-    impossible = replace(near, gravity_error_deg=2.0 * MOST_GRAVITY_ERROR_DEG)
+    impossible = replace(near, gravity_error_sigmas=2.0 * gravity.SIGMAS)
     assert judge([several, impossible]) is several
 
 

@@ -3,21 +3,23 @@
 
 from __future__ import annotations
 
+import pytest
+
 from objreg_ros.data import Reason
-from objreg_ros.registration.certainty.gravity_update import MOST_GRAVITY_ERROR_DEG
 from objreg_ros.registration.gate import gravity
 from objreg_ros.registration.gate.verdict import refuse
 from registration.samples import candidate
 
 
-def test_gravity_that_is_unknown_refuses_nothing() -> None:
-    assert gravity.check(None, 3.5) is None and gravity.check(3.5, 3.5) is None
-    assert gravity.check(3.6, 3.5) == (Reason.GRAVITY, "3.6 deg > 3.5 deg")
+def test_a_refusal_says_the_angle_and_how_unlikely_it_is() -> None:
+    assert gravity.check(3.5, 3.5, 3.5) is None
+    assert gravity.check(7.2, 3.6, 3.5) == (Reason.GRAVITY, "7.2 deg, 3.6 standard deviations > 3.5")
+    assert gravity.check(None, 5.0, 3.5) == (Reason.GRAVITY, "upside down, 5.0 standard deviations > 3.5")
 
 
-def test_gravity_may_tilt_by_what_the_planes_of_two_views_err_and_no_more() -> None:
-    most = MOST_GRAVITY_ERROR_DEG
-    assert most < 4.0
-    assert refuse(candidate(gravity_error_deg=most - 0.1)) is None
-    refusal = refuse(candidate(gravity_error_deg=most + 0.1))
-    assert refusal is not None and refusal[0] is Reason.GRAVITY
+@pytest.mark.parametrize("degrees", [1.0, 9.0])
+def test_what_counts_is_how_sure_both_views_are(degrees: float) -> None:
+    kept = candidate(gravity_error_deg=degrees, gravity_error_sigmas=gravity.SIGMAS - 0.1)
+    lost = candidate(gravity_error_deg=degrees, gravity_error_sigmas=gravity.SIGMAS + 0.1)
+    refusal = refuse(lost)
+    assert refuse(kept) is None and refusal is not None and refusal[0] is Reason.GRAVITY

@@ -10,7 +10,7 @@ from objreg_ros.registration.params import RegistrarParams
 
 VALUES = {
     "translation_m": 5.0,
-    "gravity_deg": 3.5,
+    "gravity_sigmas": 3.5,
     "objects.many": 3,
     "objects.proposers": 2,
     "objects.silhouette_score": 0.0,

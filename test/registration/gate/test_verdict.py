@@ -21,7 +21,7 @@ def test_a_candidate_that_nothing_speaks_against_is_accepted() -> None:
     [
         ({"converged": False}, Reason.NOT_CONVERGED),
         ({"T": moved(100.0)}, Reason.IMPLAUSIBLE_MOTION),
-        ({"gravity_error_deg": 30.0}, Reason.GRAVITY),
+        ({"gravity_error_deg": 30.0, "gravity_error_sigmas": 30.0}, Reason.GRAVITY),
         ({"tested": 20}, Reason.LOW_OVERLAP),
         ({"inliers": 0.1}, Reason.LOW_OVERLAP),
         ({"violations": 0.5}, Reason.FREE_SPACE),
@@ -76,7 +76,9 @@ def test_an_alias_does_not_stand_in_for_a_refused_best_candidate() -> None:
 
 
 @pytest.mark.parametrize(
-    "against", [{"violations": 0.4}, {"certain_violations": 0.3}, {"matched": ()}, {"gravity_error_deg": 30.0}], ids=str
+    "against",
+    [{"violations": 0.4}, {"certain_violations": 0.3}, {"matched": ()}, {"gravity_error_sigmas": 30.0}],
+    ids=str,
 )
 def test_a_pose_that_cannot_be_true_is_no_rival(against: dict) -> None:
     one = lone()

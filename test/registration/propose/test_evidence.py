@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.certainty.observability import DOUBTFUL_SIGMA_M
 from objreg_ros.registration.params import RegistrarParams
@@ -19,7 +18,6 @@ from objreg_ros.registration.propose import evidence
 from objreg_ros.registration.propose.evidence import (
     OBJECT_BONUS,
     gather,
-    gravity_error_deg,
     margin_over,
     perturbation_margin_of,
     rank_score,
@@ -103,12 +101,3 @@ def test_the_views_are_asked_without_the_objects_where_those_are_few(monkeypatch
     for (*views, own, T), pixels in zip(asked, ((first, first), (both, both)), strict=True):
         assert views == ["a", "b"] and np.array_equal(own, pixels)
         assert np.array_equal(T, candidate().T_target_source)
-
-
-@pytest.mark.parametrize("angle", [0.0, 3.0, 90.0, 180.0])
-def test_the_error_of_gravity_is_the_angle_between_what_the_two_views_felt(angle: float) -> None:
-    tilted: Any = SimpleNamespace(up=rotation_from_vector(np.radians([angle, 0.0, 0.0])) @ (0.0, -1.0, 0.0))
-    level: Any = SimpleNamespace(up=np.array([0.0, -1.0, 0.0]))
-    T = pose(rotation_from_vector(np.radians([0.0, 40.0, 0.0])), np.ones(3))  # about what falls
-    assert gravity_error_deg(tilted, level, T) == pytest.approx(angle, abs=1e-5)
-    assert gravity_error_deg(level, SimpleNamespace(up=None), T) is None  # type: ignore[arg-type]

@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objreg_ros.data import Array, View
+from objreg_ros.data import Array, View, session_gravity_sigma_deg
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
-from objreg_ros.registration.certainty.gravity_update import MOST_GRAVITY_ERROR_DEG
+from objreg_ros.registration.certainty.gravity_update import POSE_SIGMA_DEG
 from objreg_ros.registration.keyframe import Context, Keyframe
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Pair, prepare
 from objreg_ros.registration.propose.evidence import FINISHED_MARGIN
 from objreg_ros.registration.propose.hypotheses import Hypothesis
-from objreg_ros.registration.propose.shortlist import FINISHED, _hopeful, shortlist
+from objreg_ros.registration.propose.shortlist import FINISHED, TILTED, _hopeful, shortlist
 from registration.rooms import keyframe, look_at, seen_from
 
 PARAMS = RegistrarParams()
@@ -76,7 +76,8 @@ def test_the_best_come_first_and_are_distinct_and_few() -> None:
 
 def test_what_is_held_and_keeps_gravity_about_as_well_as_the_gate_wants_it_goes_on_and_all_where_nothing_does() -> None:
     seen = keyframe(SQUARELY, WALL)
-    tilts = np.radians(MOST_GRAVITY_ERROR_DEG) * np.array([0.0, 1.4, 1.6])
+    sigma_deg = float(np.hypot(np.sqrt(2.0) * session_gravity_sigma_deg(seen.gravity_confidence), POSE_SIGMA_DEG))
+    tilts = np.radians(sigma_deg) * np.array([0.0, 0.95, 1.05]) * TILTED
     turned = [pose(rotation_from_vector(np.array([0.0, 0.0, tilt])), np.zeros(3)) for tilt in tilts]
     hypotheses = [Hypothesis(T_target_source=T, proposer="features", support=0.0) for T in turned]
     for firm, hopeful in (((1, 1, 1), (0, 1)), ((0, 1, 1), (1,)), ((0, 0, 1), (0, 1, 2)), ((0, 0, 0), (0, 1, 2))):
