@@ -364,10 +364,10 @@ class FeltGravity:
 
 
 # A confidence and the standard deviation of either tilt in degrees that it stands for, between which their logarithm is
-# linear: as single views err in simulation with all sensors and stress, times 1.5 for rooms that are less level
-# (`training/gravity.py`). Below the first, gravity is no better than a guess, and counts as unknown.
-CONFIDENCE = (0.3, 0.5, 0.7, 0.85, 0.96, 1.0)
-SIGMA_DEG = (2.4, 1.8, 1.3, 0.85, 0.6, 0.5)
+# linear: as single views err in simulation with all sensors and stress, times 1.5 for rooms that are less level, and
+# 0.5 at least (`training/gravity.py`). Below the first, gravity is no better than a guess, and counts as unknown.
+CONFIDENCE = (0.3, 0.5, 0.7, 0.85, 0.94, 1.0)
+SIGMA_DEG = (5.0, 4.0, 2.5, 0.95, 0.55, 0.5)
 
 
 def gravity_sigma_deg(confidence: float) -> float:

@@ -37,6 +37,7 @@ from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.record import Record
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.report.export import constraint
+from objreg_ros.segmenter.depth_to_colour import DepthToColour
 from objreg_ros.segmenter.gravity_choice import GravityChoice
 from objreg_ros.segmenter.imu import FindPose, Imu
 from objreg_ros.segmenter.params import SegmenterParams
@@ -59,6 +60,11 @@ class Segments(Protocol):
     @property
     def choice(self) -> GravityChoice:
         """Who told gravity in the last frame."""
+        ...
+
+    @property
+    def depth_to_colour(self) -> DepthToColour:
+        """How depth is turned against colour."""
         ...
 
     def segment(
@@ -152,6 +158,7 @@ class Run:
     dropped: Counter[str] = field(default_factory=Counter)  # ``malformed_<input>``, ``depth_<why>``, ``frame_<why>``
     complaints: dict[str, str] = field(default_factory=dict)  # the first of each kind
     gravity_from: Counter[str] = field(default_factory=Counter)  # frames that went to the segmenter by who told it
+    depth_to_colour: str = ""  # how depth was turned against colour, in the end
     gravity_apart_deg: list[float] = field(default_factory=list)  # IMU and picture, in the frames that have both
     imu_passed_over: Counter[str] = field(default_factory=Counter)  # by reason
     stage_s: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
@@ -163,6 +170,7 @@ class Run:
             "detections": self.detections,
             "objects": self.objects,
             "lens": self.lens,
+            "depth_to_colour": self.depth_to_colour,
             "constraints": [constraint_with_error(closure, truth) for closure in self.closures],
             "rejected": dict(sorted(self.rejected.items())),
             "dropped": dict(sorted(self.dropped.items())),
@@ -320,6 +328,7 @@ class Line:
             segmenter = self._rooms.segmenter
             frame = as_sent(segmenter.segment(detections, depth, gravity, gravity_sigma_deg=sigma_deg))
         self._note_gravity(segmenter.choice)
+        self.run.depth_to_colour = segmenter.depth_to_colour.text()
         return frame
 
     def _felt_gravity(self, match: Match, camera_frame: str) -> FeltGravity | None:

@@ -21,6 +21,7 @@ from objreg_ros.data import (
 )
 from objreg_ros.geometry import back_project, inverse
 from objreg_ros.offline import Rooms
+from objreg_ros.segmenter.depth_to_colour import DepthToColour
 from objreg_ros.segmenter.gravity_choice import GravityChoice
 
 
@@ -48,6 +49,7 @@ class OneCloud:
     """Cuts one point out of every depth image."""
 
     choice = GravityChoice(None, 0.0, "nothing")
+    depth_to_colour = DepthToColour()
 
     def __init__(self) -> None:
         self.heard_sigma_deg: list[float | None] = []

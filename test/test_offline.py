@@ -350,7 +350,10 @@ def seen_of_a_lens(records: Iterator[Record], inputs: Inputs, rectified: str = "
         met.append((depth, detections.xyxy))
         return rooms.segmenter.segment(detections, depth, gravity, **more)
 
-    spied = replace(rooms, segmenter=SimpleNamespace(segment=segment, choice=rooms.segmenter.choice))
+    spied_segmenter = SimpleNamespace(
+        segment=segment, choice=rooms.segmenter.choice, depth_to_colour=rooms.segmenter.depth_to_colour
+    )
+    spied = replace(rooms, segmenter=spied_segmenter)
     return run_offline(records, spied, inputs, Timing(rectified=rectified)), met
 
 

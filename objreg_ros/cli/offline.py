@@ -170,6 +170,8 @@ def _say(run: Run, summary: dict) -> None:
     )
     if run.lens:
         click.echo(f"  lens: {run.lens}")
+    if run.depth_to_colour:
+        click.echo(f"  depth is turned against colour by {run.depth_to_colour}; undone")
     if run.gravity_from:
         click.echo(
             f"  gravity from {', '.join(f'{name}: {count}' for name, count in sorted(run.gravity_from.items()))}"

@@ -32,11 +32,12 @@ STEPS = ((0.012, 0.006), (0.006, 0.003), (0.002, 0.001))  # rad, of each blur
 ROUNDS = 6  # most of a step
 BACKGROUND = 10.0  # px of the reduced picture: gradients are measured by the mean about them
 FIRST_SIGMA = 0.03  # rad: what may be off before anything was seen
-NOISE = np.array([0.002, 0.002, 0.004])  # rad: standard deviation of what a frame tells; in simulation 1, 1 and 3 mrad
+NOISE = np.array([0.0012, 0.0008, 0.0025])  # rad: standard deviation of what a frame tells, as in simulation
 INDEPENDENT = 0.1  # share of the depth steps that tell something of their own: neighbours say the same
 MOST_TOLD = 150.0  # by all of a frame
 SURPRISE = 3.0  # deviations: what differs by more is taken in as if it differed by as much
-MEMORY = 0.05  # share of the newest frame in what is remembered
+MEMORY = 20  # frames that are remembered
+FIRST_FRAMES = 0.2  # that the first guess of the spread is worth
 SMALLEST = 1e-3  # rad: half a pixel of the usual camera; less is left as it is
 
 
@@ -58,6 +59,15 @@ class DepthToColour:
     spread: Array = field(default_factory=lambda: np.full(3, FIRST_SIGMA))
     frames: int = 0
     _camera: tuple[Any, ...] | None = None
+
+    def text(self) -> str:
+        """How depth is turned against colour, in words; empty where no frame told it."""
+        if self.frames == 0:
+            return ""
+        mean, spread = (
+            " ".join(f"{degrees:.2f}" for degrees in np.degrees(value)) for value in (self.mean, self.spread)
+        )
+        return f"{mean} deg about x y z, {spread} from frame to frame"
 
     def forget(self) -> None:
         """Begin with another stream."""
@@ -86,12 +96,12 @@ class DepthToColour:
         return Offset(self.mean + share * (found - self.mean), True)
 
     def _remember(self, rotation: Array) -> None:
+        """Take a frame in: exponential means of the offset and of its square, the first guess worth `FIRST_FRAMES`."""
         self.frames += 1
-        share = max(MEMORY, 1.0 / (self.frames + 1.0))
+        known = FIRST_FRAMES + min(self.frames - 1, MEMORY)
         away = np.clip(rotation - self.mean, -SURPRISE * self.spread, SURPRISE * self.spread)
-        variance = (1.0 - share) * (self.spread**2 + share * away**2)
-        self.mean = self.mean + share * away
-        self.spread = np.maximum(np.sqrt(variance), NOISE)
+        self.mean = self.mean + away / (1.0 + min(self.frames - 1, MEMORY))
+        self.spread = np.maximum(np.sqrt((known * self.spread**2 + away**2) / (known + 1.0)), NOISE)
 
 
 def find_rotation(image: DepthImage, mean: Array, spread: Array) -> Array | None:

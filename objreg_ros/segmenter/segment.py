@@ -33,7 +33,8 @@ NORMALS = 3  # every so many of these tell gravity
 class Segmenter:
     """Segments one frame at a time.
 
-    Between frames it keeps how depth is turned against colour, and ``choice``: who told the last one's gravity.
+    Between frames it keeps ``depth_to_colour``: how depth is turned against colour, and ``choice``: who told the last
+    one's gravity.
 
     A second thread takes half of the boxes: the kernels let go of the interpreter's lock.
     """
@@ -42,7 +43,7 @@ class Segmenter:
         self.params = params or SegmenterParams()
         self.choice = GravityChoice(None, 0.0, "nothing")
         self._beside = ThreadPoolExecutor(1, "segmenter")
-        self._depth_to_colour = DepthToColour()
+        self.depth_to_colour = DepthToColour()
 
     def warm(self) -> None:
         """Compile or load every kernel and claim memory, so that the first frame is as fast as the others."""
@@ -67,7 +68,7 @@ class Segmenter:
 
     def forget(self) -> None:
         """Begin with another stream: nothing is known of how its depth is turned against its colour."""
-        self._depth_to_colour.forget()
+        self.depth_to_colour.forget()
 
     def segment(
         self,
@@ -90,7 +91,7 @@ class Segmenter:
         of what stands in the box. ValueError for masks of another number, type or shape.
         """
         params, outlines = self.params, _outlines(masks, len(detections), depth)
-        depth = self._depth_to_colour.register(_plain(depth))
+        depth = self.depth_to_colour.register(_plain(depth))
         seen = (depth, step_for(depth.depth.shape[1], params.view_step), params.z_min, params.limits[0])
         view = self._beside.submit(reduced_view, *seen)
         ground = self._ground(depth, gravity, gravity_sigma_deg)
