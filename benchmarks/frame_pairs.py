@@ -28,20 +28,30 @@ NO_OVERLAP = 0.02
 
 
 class Pair(NamedTuple):
-    """Keyframes by index, the true ``T_target_source``, the view change in degrees, and whether they could close."""
+    """Keyframes by index, the true ``T_target_source``, the view change in degrees, and whether they could close.
+
+    ``lagged`` are the true poses if what was seen is older than its stamp says.
+    """
 
     source: int
     target: int
     T_target_source: Array
     turned: float
     could_close: bool
+    lagged: tuple[Array, ...] = ()
 
 
 class Truths:
-    """What is true of the keyframes of a recording."""
+    """What is true of the keyframes of a recording; ``lagged`` has the poses again for every lag of what was seen."""
 
-    def __init__(self, keyframes: Sequence[Keyframe], poses: Sequence[Array], params: RegistrarParams) -> None:
-        self._keyframes, self._poses, self._params = keyframes, poses, params
+    def __init__(
+        self,
+        keyframes: Sequence[Keyframe],
+        poses: Sequence[Array],
+        params: RegistrarParams,
+        lagged: Sequence[Sequence[Array]] = (),
+    ) -> None:
+        self._keyframes, self._poses, self._params, self._lagged = keyframes, poses, params, lagged
         groups = LabelGroups(params.label_groups)
         self._groups = [np.array([groups.of(label) for label in k.labels]) for k in keyframes]
         self._places = [
@@ -67,7 +77,8 @@ class Truths:
         gaps = np.linalg.norm(self._places[i][:, None] - self._places[j][None], axis=-1)
         T = inverse(self._poses[j]) @ self._poses[i]
         turned = float(np.degrees(rotation_angle(T[:3, :3])))
-        return Pair(i, j, T, turned, bool((gaps[same] < SAME_PLACE).any()))
+        lagged = tuple(inverse(poses[j]) @ poses[i] for poses in self._lagged)
+        return Pair(i, j, T, turned, bool((gaps[same] < SAME_PLACE).any()), lagged)
 
     def apart(self, pair: Pair) -> bool:
         """Whether the two views see next to nothing of each other."""

@@ -21,13 +21,17 @@ from objreg_ros.truth import FALSE, LOOSE, STRICT, Error, within
 
 @dataclass
 class Row:
-    """What one method said of one pair: the error of its pose, whether it stands by it, and the time it took."""
+    """What one method said of one pair: the error of its pose, whether it stands by it, and the time it took.
+
+    ``lagged`` are the errors by the truth at other lags, where these are asked for.
+    """
 
     error: Error | None
     accepted: bool
     ms: float
     reason: str = ""
     T: Array | None = field(default=None, repr=False)
+    lagged: tuple[Error, ...] = ()
 
     def within(self, bound: Error) -> bool:
         """Whether there is a pose within a bound."""
@@ -37,6 +41,12 @@ class Row:
 def is_wrong(pair: Pair, row: Row) -> bool:
     """Whether an accepted pose is a lie."""
     return row.accepted and not row.within(FALSE if pair.could_close else LOOSE)
+
+
+def is_wrong_at_every_lag(pair: Pair, row: Row) -> bool:
+    """Whether an accepted pose is a lie however late what was seen is."""
+    bound = FALSE if pair.could_close else LOOSE
+    return is_wrong(pair, row) and not any(within(error, bound) for error in row.lagged)
 
 
 def summed(pairs: Sequence[Pair], rows: Sequence[Row]) -> dict[str, Any]:
@@ -52,6 +62,7 @@ def summed(pairs: Sequence[Pair], rows: Sequence[Row]) -> dict[str, Any]:
         "accepted_strict": share(lambda r: r.accepted and r.within(STRICT)),
         "accepted_recall": share(lambda r: r.accepted and r.within(LOOSE)),
         "wrong": sum(is_wrong(p, r) for p, r in zip(pairs, rows, strict=True)),
+        "wrong_at_every_lag": sum(is_wrong_at_every_lag(p, r) for p, r in zip(pairs, rows, strict=True)),
         "wrong_of_could_not": sum(is_wrong(p, r) for p, r in zip(pairs, rows, strict=True) if not p.could_close),
         "rotation_deg": float(np.median([e[0] for e in found])) if found else None,
         "translation_cm": float(np.median([e[1] for e in found])) if found else None,
@@ -89,7 +100,8 @@ def figures(pairs: Sequence[Pair], rows: Sequence[Row], middle: int) -> dict[str
 def line(name: str, row: dict[str, Any]) -> str:
     """One method in one line."""
     show = lambda value: "  -  " if value is None else f"{value:.3f}"  # noqa: E731
+    lagged = "" if row["wrong_at_every_lag"] == row["wrong"] else f", {row['wrong_at_every_lag']} at every lag"
     return (
         f"{name:28s} strict {show(row['strict'])} loose {show(row['loose'])} accepted {show(row['accepted_recall'])} "
-        f"wrong {row['wrong']:3d} of {row['tried']}  {row['ms_p50']:.0f} ms (p95 {row['ms_p95']:.0f})"
+        f"wrong {row['wrong']:3d} of {row['tried']}{lagged}  {row['ms_p50']:.0f} ms (p95 {row['ms_p95']:.0f})"
     )

@@ -3,7 +3,8 @@
 
 A pair could close when both frames show an object at one place; it could not when they share a label but no object,
 and see next to nothing of each other. The moments lie 2 s apart or more. Errors are of the camera's pose: strict is 3
-degrees and 5 cm, loose 5 degrees and 10 cm, wrong is beyond 8 degrees or 15 cm.
+degrees and 5 cm, loose 5 degrees and 10 cm, wrong is beyond 8 degrees or 15 cm. With ``--lag-ms`` poses that are wrong
+at every lag of the truth up to that are counted beside those that are wrong at the stamps.
 
     python benchmarks/pairs.py REC --json pairs.json --pictures failures/
 """
@@ -13,6 +14,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -37,8 +39,10 @@ from objreg_ros.registration.gate.verdict import judge
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.score.view_score import verify
+from objreg_ros.truth import Truth
 
 QUICK = {"wanted": 15, "names": ("paper", "orb_pnp")}
+LAG_STEP_MS = 10
 GICP_VOXEL = 0.03  # m, of the whole frames that finish a peer's pose
 
 
@@ -136,13 +140,14 @@ class Checked:
         seen = verify(source, target, row.T)
         ms = row.ms + 1e3 * (time.perf_counter() - start)
         accepted = seen.score >= LIMITS.view_score.least and seen.tested >= LIMITS.overlap.tested
-        return Row(row.error, accepted, ms, "" if accepted else "views", row.T)
+        return replace(row, accepted=accepted, ms=ms, reason="" if accepted else "views")
 
 
 def _row(T: Array | None, accepted: bool, ms: float, pair: Pair, reason: str = "") -> Row:
     if T is None or not np.isfinite(T).all():
         return Row(None, False, ms, reason)
-    return Row(pose_error(T, pair.T_target_source), accepted, ms, reason, np.asarray(T))
+    lagged = tuple(pose_error(T, true) for true in pair.lagged)
+    return Row(pose_error(T, pair.T_target_source), accepted, ms, reason, np.asarray(T), lagged)
 
 
 def methods_of(
@@ -164,13 +169,25 @@ def methods_of(
     return methods
 
 
+def lagged_poses(truth: Truth, keyframes: Sequence[Keyframe], lag_ms: int) -> list[Array]:
+    """The true poses of what was seen ``lag_ms`` before the stamps; at the stamps where the truth tells no others."""
+    found = []
+    for keyframe in keyframes:
+        T = truth.at(keyframe.stamp_ns - 1_000_000 * lag_ms)
+        at_stamp = truth.at(keyframe.stamp_ns)
+        assert at_stamp is not None
+        found.append(at_stamp if T is None else T)
+    return found
+
+
 def compare(source: Source, params: RegistrarParams, options: dict[str, Any]) -> dict[str, Any]:
     """All methods over the same pairs of one recording."""
     frames = [frame for frame in source.frames if source.truth.at(frame.stamp_ns) is not None]
     makes = fused(frames, params) if options["keyframes"] else [fuse(FrameWindow.of(frame), params) for frame in frames]
     keyframes = [keyframe for keyframe in makes if keyframe.objects]
     poses = [source.truth.at(keyframe.stamp_ns) for keyframe in keyframes]
-    truths = Truths(keyframes, [T for T in poses if T is not None], params)
+    lagged = [lagged_poses(source.truth, keyframes, lag_ms) for lag_ms in options["lags_ms"]]
+    truths = Truths(keyframes, [T for T in poses if T is not None], params, lagged)
     pairs = draw_pairs(truths, len(keyframes), options["wanted"], options["seed"])
     out: dict[str, Any] = {"keyframes": len(keyframes), "pairs": len(pairs), "methods": {}}
     for name, method in methods_of(source, keyframes, truths, params, options["peers"]).items():
@@ -197,6 +214,7 @@ def compare(source: Source, params: RegistrarParams, options: dict[str, Any]) ->
     "--peers", "names", default="paper,orb_pnp,sift_pnp,fpfh_icp", show_default=True, callback=named, help="Methods."
 )
 @click.option("--pictures", type=click.Path(file_okay=False, path_type=Path), help="Draw the worst failures here.")
+@click.option("--lag-ms", default=0, show_default=True, help="Most that what is seen may be behind its stamp.")
 @click.option("--seed", default=1, show_default=True)
 @click.pass_context
 def main(
@@ -210,6 +228,7 @@ def main(
     threshold: float,
     names: tuple[str, ...],
     pictures: Path | None,
+    lag_ms: int,
     seed: int,
 ) -> None:
     """Register pairs of frames of RECORDING by every method and compare."""
@@ -220,6 +239,7 @@ def main(
         "wanted": few.get("wanted", wanted),
         "peers": few.get("names", names),
         "pictures": pictures,
+        "lags_ms": range(LAG_STEP_MS, lag_ms + 1, LAG_STEP_MS),
         "seed": seed,
     }
     with read_source(recording, detector_of(model, threshold), seed) as source:

@@ -51,3 +51,13 @@ def test_each_view_change_and_half_of_a_recording_is_counted_by_itself() -> None
         "across": 0.0,
         "second": 1.0,
     }
+
+
+def test_a_pose_that_is_right_at_some_lag_of_the_truth_is_not_wrong_at_every_lag() -> None:
+    from pair_figures import Row, is_wrong_at_every_lag, line, summed
+
+    late, lie = Row((9.0, 1.0), True, 1.0, lagged=((2.0, 1.0),)), Row((9.0, 1.0), True, 1.0, lagged=((8.5, 1.0),))
+    assert not is_wrong_at_every_lag(_pair(True), late) and is_wrong_at_every_lag(_pair(True), lie)
+    figures = summed([_pair(True), _pair(True)], [late, lie])
+    assert (figures["wrong"], figures["wrong_at_every_lag"]) == (2, 1)
+    assert "wrong   2 of 2, 1 at every lag" in line("ours", figures)

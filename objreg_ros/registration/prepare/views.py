@@ -16,6 +16,7 @@ import numpy as np
 from objreg_ros.data import Array, Intrinsics, View
 from objreg_ros.registration.kernels.projection import project
 from objreg_ros.registration.keyframe import KeyObject
+from objreg_ros.sensor import depth_noise
 
 DETAIL_SIGMA_PX = 3.0  # blur that the high pass of grey takes away
 EDGE = 0.06  # of the depth: a larger range around a pixel is a depth jump
@@ -55,7 +56,7 @@ class Sight:
     ``front (h, w) float32`` m is the nearest depth in a wide window around each pixel, 0 where nothing was measured.
 
     ``points (P, 3) float32`` m are its measured pixels in a fixed shuffled order, so that the first n of them are a
-    fair sample; a pixel at a depth jump has the shade SHADELESS.
+    fair sample; a pixel at a depth jump has the shade SHADELESS. ``noise`` is that of depth, in a Kinect's.
     """
 
     near: Array
@@ -66,6 +67,7 @@ class Sight:
     grey: Print
     textured: bool
     intrinsics: Intrinsics
+    noise: float = 1.0
 
     @property
     def detail(self) -> Array:
@@ -99,6 +101,7 @@ def prepare_sight(view: View, sight_range: float, detail_sigma: float, seed: int
         grey=_print(view, (depth > 0) & ~jump),
         textured=view.grey is not None,
         intrinsics=view.intrinsics,
+        noise=depth_noise(depth),
     )
 
 

@@ -18,7 +18,7 @@ from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.registration.prepare.views import SHADELESS
 from objreg_ros.registration.refine.batch_icp import REACHES_M, normal_equations
 from objreg_ros.registration.score.view_score import PHOTOMETRIC_POINTS
-from objreg_ros.sensor import DEPTH_TOLERANCE_GROWTH, DEPTH_TOLERANCE_M
+from objreg_ros.sensor import depth_tolerance
 
 GREY_SIGMA = 0.7  # difference of the high-passed grey that weighs a quarter, in its deviations
 SURFACE_SIGMA_M = 0.03  # distance from a surface that weighs as much as one deviation of grey
@@ -34,7 +34,7 @@ def finish(source: Prepared, target: Prepared, T_target_source: Array) -> tuple[
     """
     few, shape = slice(PHOTOMETRIC_POINTS), (source.xyz, source.normals, *target.surface.grid)
     a, b = source.sight, target.sight
-    slops = DEPTH_TOLERANCE_M, DEPTH_TOLERANCE_GROWTH
+    slops = depth_tolerance(a.noise, b.noise)
     T, K = np.ascontiguousarray(T_target_source, np.float64).copy(), np.zeros((6, 6))
     for here, there in zip(a.bands, b.bands, strict=True):  # the coarse one first
         _finish(

@@ -12,7 +12,7 @@ from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.registration.score.free_space import SEEN, VIOLATIONS, count
 from objreg_ros.registration.shapes.shape import upright_motion
 from objreg_ros.registration.shapes.silhouette_score import score_silhouettes
-from objreg_ros.sensor import DEPTH_TOLERANCE_GROWTH, DEPTH_TOLERANCE_M
+from objreg_ros.sensor import depth_tolerance
 
 MATCHED_DISTANCE_M = 0.06  # two objects match if their centroids are this close
 MATCHED_SHARE = 0.28  # of its extent that a centroid may be farther: a large thing is never seen whole
@@ -94,7 +94,6 @@ def is_gone(owner: Prepared, index: int, other: Prepared, T_other_owner: Array) 
         sight.far,
         sight.detail,
         sight.camera,
-        DEPTH_TOLERANCE_M,
-        DEPTH_TOLERANCE_GROWTH,
+        *depth_tolerance(owner.sight.noise, sight.noise),
     )
     return bool(counts[SEEN] >= 0.5 * len(points) and counts[VIOLATIONS] > 0.5 * counts[SEEN])

@@ -18,7 +18,7 @@ from objreg_ros.geometry import inverse
 from objreg_ros.registration.kernels.projection import FAST, project, spread, visible
 from objreg_ros.registration.prepare.views import SHADELESS, SMOOTH, Sight
 from objreg_ros.registration.score.free_space import SHADED, SUM_A, SUM_AA, SUM_AB, SUM_B, SUM_BB, correlation
-from objreg_ros.sensor import DEPTH_TOLERANCE_GROWTH, DEPTH_TOLERANCE_M
+from objreg_ros.sensor import depth_tolerance
 
 WINDOW = 15  # px: its mean is the slow part of grey; a wide one tells rooms apart best
 NARROW = 9  # px: sees best that a pose was perturbed
@@ -39,7 +39,7 @@ def texture(source: Sight, target: Sight, T_target_source: Array) -> float:
 
 def compare(asked: Sight, seen: Sight, T_seen_asked: Array, window: int = WINDOW) -> Array:
     """The sums (10,) of `visibility.count` for a correlation, over the pixels of ``seen`` that ``asked`` meets."""
-    slops = DEPTH_TOLERANCE_M, DEPTH_TOLERANCE_GROWTH
+    slops = depth_tolerance(asked.noise, seen.noise)
     laid = _laid(asked.grey.points, asked.grey.shades, T_seen_asked, seen.near, seen.far, seen.camera, slops)
     return np.asarray(_sums(cv2.GaussianBlur(laid, (0, 0), SMOOTH), seen.grey.detail, window))
 

@@ -21,7 +21,7 @@ from objreg_ros.registration.score.free_space import SEEN, VIOLATIONS, count
 from objreg_ros.registration.score.view_score import RANKING_POINTS, rated_quickly
 from objreg_ros.registration.shapes.shape import Shape
 from objreg_ros.registration.shapes.silhouette_score import two_way, weights_of
-from objreg_ros.sensor import DEPTH_TOLERANCE_GROWTH, DEPTH_TOLERANCE_M
+from objreg_ros.sensor import depth_tolerance
 
 SILHOUETTE_WEIGHT_UPRIGHT = 1.0  # of the silhouette score, beside V, when upright poses are compared
 VIOLATION_WEIGHT_UPRIGHT = 5.0  # of violations, beyond their weight in V: an upright pose has no tilt to excuse them
@@ -37,7 +37,7 @@ class TotalScore:
     """The total score of upright motions (yaw, x, y, rise) of shape ``a`` of source upon ``b`` of target."""
 
     def __init__(self, source: Prepared, target: Prepared, a: Shape, b: Shape) -> None:
-        slops = DEPTH_TOLERANCE_M, DEPTH_TOLERANCE_GROWTH
+        slops = depth_tolerance(source.sight.noise, target.sight.noise)
         textured = source.sight.textured and target.sight.textured
         weights = np.array([*weights_of(), SILHOUETTE_WEIGHT_UPRIGHT, VIOLATION_WEIGHT_UPRIGHT])
         self._pair = (_image(source.sight), _image(target.sight), slops, textured), a.kernel_arrays, b.kernel_arrays

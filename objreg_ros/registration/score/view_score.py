@@ -16,7 +16,7 @@ from objreg_ros.registration.candidate import Verification
 from objreg_ros.registration.prepare.views import Sight
 from objreg_ros.registration.score.free_space import INLIERS, OCCLUDED, SEEN, VIOLATIONS, correlation, count, count_many
 from objreg_ros.registration.score.photometric import NARROW, compare, texture
-from objreg_ros.sensor import DEPTH_TOLERANCE_GROWTH, DEPTH_TOLERANCE_M
+from objreg_ros.sensor import depth_tolerance
 
 RANKING_POINTS = 500  # a side, of the views, by which hypotheses are ranked
 PHOTOMETRIC_POINTS = 2500  # a side, of the views, that finish a refinement
@@ -65,7 +65,7 @@ def score_views(source: Sight, target: Sight, T_target_source: Array, sample: in
 
 def count_both_ways(source: Sight, target: Sight, T_target_source: Array, sample: int) -> tuple[Array, Array]:
     """`count_visibility` at many poses (K, 4, 4), forward and backward: (K, 10) each."""
-    slops = DEPTH_TOLERANCE_M, DEPTH_TOLERANCE_GROWTH
+    slops = depth_tolerance(source.noise, target.noise)
     forward = count_many(source.points[:sample], source.shades[:sample], T_target_source, *_image(target), *slops)
     back = inverses(T_target_source)
     return forward, count_many(target.points[:sample], target.shades[:sample], back, *_image(source), *slops)
@@ -100,7 +100,7 @@ def _asked(source: Sight, target: Sight, sample: int | None) -> int:
 
 def count_visibility(source: Sight, target: Sight, T_target_source: Array, sample: int | None) -> Array:
     """What the target view says of the source's points; the counts of `visibility.count`."""
-    slops = DEPTH_TOLERANCE_M, DEPTH_TOLERANCE_GROWTH
+    slops = depth_tolerance(source.noise, target.noise)
     return np.asarray(count(source.points[:sample], source.shades[:sample], T_target_source, *_image(target), *slops))
 
 
@@ -115,7 +115,8 @@ def certain_violations(source: Sight, target: Sight, T_target_source: Array) -> 
 
 
 def _certain_violations(asked: Sight, seen: Sight, T: Array) -> float:
-    slops = CERTAINLY * DEPTH_TOLERANCE_M, CERTAINLY * DEPTH_TOLERANCE_GROWTH
+    base, growth = depth_tolerance(asked.noise, seen.noise)
+    slops = CERTAINLY * base, CERTAINLY * growth
     counts = count(asked.points, asked.shades, T, seen.front, seen.far, seen.detail, seen.camera, *slops)
     tested = count_visibility(asked, seen, T, None)[SEEN]
     return float(counts[VIOLATIONS] / tested) if tested >= 1 else 1.0
