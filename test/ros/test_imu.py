@@ -10,7 +10,7 @@ from sensor_msgs.msg import Image, Imu, PointCloud2
 from std_msgs.msg import Header
 
 from objreg_ros.bridge import to_msg
-from objreg_ros.data import Detections
+from objreg_ros.data import Detections, gravity_sigma_deg
 
 from .graph import Graph
 from .moments import CAMERA, SECOND
@@ -74,7 +74,7 @@ def test_a_segmenter_tells_the_gravity_that_an_imu_feels_whatever_else_the_imu_s
     falls = np.array([vector.x, vector.y, vector.z])
     confidence = float(np.linalg.norm(falls))
     assert falls / confidence == pytest.approx([0.0, np.cos(tilt), -np.sin(tilt)], abs=1e-3)
-    assert 0.8 < confidence < 1.0
+    assert gravity_sigma_deg(confidence) < 2.5
 
     def told() -> dict[str, str]:
         return {pair.key: pair.value for pair in running.status["/segmenter"].values}
