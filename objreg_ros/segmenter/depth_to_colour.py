@@ -18,6 +18,7 @@ import numba
 import numpy as np
 
 from objreg_ros.data import Array, DepthImage, Intrinsics
+from objreg_ros.limits import MOST_DEPTH
 from objreg_ros.sensor import PLANE_TOLERANCE_GROWTH, PLANE_TOLERANCE_M
 
 WIDTH = 320  # px: the picture is halved until it is no wider
@@ -38,6 +39,8 @@ MOST_TOLD = 150.0  # by all of a frame
 SURPRISE = 3.0  # deviations: what differs by more is taken in as if it differed by as much
 MEMORY = 20  # frames that are remembered
 FIRST_FRAMES = 0.2  # that the first guess of the spread is worth
+LEAST_AWAY = 0.1  # m before the camera, of a ray that is 1 m long along the other's axis: else it looks aside
+FAST = {"reassoc", "contract", "arcp", "nsz", "afn"}  # fast arithmetic that still knows NaN
 SMALLEST = 1e-3  # rad: half a pixel of the usual camera; less is left as it is
 
 
@@ -135,7 +138,7 @@ def turned(image: DepthImage, rotation: Array) -> DepthImage:
     """The image with its depth as the colour camera would see it, ``rotation (3,)`` rad away from the depth camera."""
     camera = image.intrinsics
     depth = _turned(image.depth, camera.fx, camera.fy, camera.cx, camera.cy, np.asarray(rotation, np.float64))
-    return DepthImage(depth=depth, rgb=image.rgb, intrinsics=camera, stamp_ns=image.stamp_ns, frame_id=image.frame_id)
+    return replace(image, depth=depth)
 
 
 def warm(image: DepthImage) -> None:
@@ -168,7 +171,7 @@ def _strength(grey: Array) -> Array:
     return np.asarray(strength / max(float(strength.std()), 1e-6))
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _steps(depth, fx, fy, cx, cy, base, growth):  # type: ignore[no-untyped-def]
     """The rays (N, 2), x and y at z = 1, of the depth steps along rows and columns, half a pixel off the near side."""
     height, width = depth.shape
@@ -185,7 +188,7 @@ def _steps(depth, fx, fy, cx, cy, base, growth):  # type: ignore[no-untyped-def]
     return rays
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _steps_along(line, at, n, axis, base, growth):  # type: ignore[no-untyped-def]
     """Add where measured depths step that follow each other along a line, `SHADOW` apart at most; returns how many."""
     last = -1
@@ -203,7 +206,7 @@ def _steps_along(line, at, n, axis, base, growth):  # type: ignore[no-untyped-de
     return n
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
 def _score(rays, picture, camera, mean, weight, rotation):  # type: ignore[no-untyped-def]
     """The mean strength of the gradients where turned rays land, less what the prior says against the rotation."""
     fx, fy, cx, cy = camera
@@ -214,7 +217,7 @@ def _score(rays, picture, camera, mean, weight, rotation):  # type: ignore[no-un
         x, y = rays[k, 0], rays[k, 1]
         z = 1.0 + a * y - b * x
         u, v = fx * (x + b - c * y) / z + cx, fy * (y + c * x - a) / z + cy
-        if u < 0.0 or v < 0.0 or u >= width - 1.0 or v >= height - 1.0:
+        if not (u >= 0.0 and v >= 0.0 and u < width - 1.0 and v < height - 1.0):
             continue
         left, top = int(u), int(v)
         p, q = u - left, v - top
@@ -227,7 +230,7 @@ def _score(rays, picture, camera, mean, weight, rotation):  # type: ignore[no-un
     return total / len(rays) - 0.5 * against
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _coarse(rays, picture, camera, mean, weight, across, around):  # type: ignore[no-untyped-def]
     """The best rotation (3,) of a grid about the mean, ``across`` about x and y, ``around`` about z."""
     best, chosen, trial = -np.inf, mean.copy(), np.empty(3)
@@ -242,7 +245,7 @@ def _coarse(rays, picture, camera, mean, weight, across, around):  # type: ignor
     return chosen
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _climbed(rays, picture, camera, mean, weight, rotation, steps, rounds):  # type: ignore[no-untyped-def]
     """A rotation brought to where the score is highest, an axis at a time."""
     rotation = rotation.copy()
@@ -262,7 +265,7 @@ def _climbed(rays, picture, camera, mean, weight, rotation, steps, rounds):  # t
     return rotation
 
 
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@numba.njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")
 def _turned(depth, fx, fy, cx, cy, rotation):  # type: ignore[no-untyped-def]
     """Depth (H, W) as a camera sees it from which the depth camera is turned away; the nearest pixel's, 0 beyond."""
     height, width = depth.shape
@@ -274,8 +277,8 @@ def _turned(depth, fx, fy, cx, cy, rotation):  # type: ignore[no-untyped-def]
             x = (column - cx) / fx
             away = 1.0 - a * y + b * x  # the rotation back, of a ray of the colour camera
             u, v = fx * (x - b + c * y) / away + cx, fy * (y - c * x + a) / away + cy
-            if u < -0.5 or v < -0.5 or u >= width - 0.5 or v >= height - 0.5:
+            if not (away > LEAST_AWAY and u > -0.5 and v > -0.5 and u < width - 0.5 and v < height - 0.5):
                 continue
-            z = depth[int(v + 0.5), int(u + 0.5)]
-            out[row, column] = z / away
+            z = depth[int(v + 0.5), int(u + 0.5)] / away
+            out[row, column] = z if z <= MOST_DEPTH else 0.0
     return out

@@ -10,6 +10,7 @@ import pytest
 
 from objreg_ros.data import Array, DepthImage, Intrinsics
 from objreg_ros.geometry import rotation_from_vector
+from objreg_ros.limits import MOST_DEPTH
 from objreg_ros.segmenter.depth_to_colour import NOISE, DepthToColour, find_rotation, turned
 
 CAMERA = Intrinsics(fx=525.0, fy=525.0, cx=319.5, cy=239.5, width=640, height=480)
@@ -128,3 +129,22 @@ def test_what_was_found_is_said_in_degrees() -> None:
     for _ in range(30):
         stream._remember(np.radians([0.5, -1.0, 0.0]))
     assert stream.text().startswith("0.50 -1.00 0.00 deg about x y z, 0.")
+
+
+@pytest.mark.parametrize("focal", [1e-3, 1.0, 1e5])
+@pytest.mark.parametrize("depth", [MOST_DEPTH, 1e-3])
+def test_no_camera_and_no_depth_makes_depth_that_is_none(focal: float, depth: float) -> None:
+    camera = Intrinsics(fx=focal, fy=focal, cx=20.0, cy=-3.0, width=64, height=48)
+    board = np.where(np.indices((48, 64)).sum(axis=0) % 5 > 2, depth, 0.5 * depth).astype(np.float32)
+    rgb = np.random.default_rng(0).integers(0, 256, (48, 64, 3)).astype(np.uint8)
+    odd = DepthImage(depth=board, rgb=rgb, intrinsics=camera, stamp_ns=0)
+    for rotation in (LAG, -LAG, np.full(3, 0.06)):
+        back = turned(odd, rotation).depth
+        assert (back >= 0.0).all() and back.max() <= MOST_DEPTH
+    find_rotation(odd, np.zeros(3), WIDE)
+
+
+def test_what_the_raw_picture_showed_is_kept() -> None:
+    shown = np.ones((480, 640), np.bool_)
+    shown[:, :20] = False
+    assert np.array_equal(turned(replace(image(LAG), shown=shown), LAG).shown, shown)
