@@ -19,14 +19,14 @@ import numpy as np
 
 from objreg_ros.data import Array, DepthImage, Intrinsics
 from objreg_ros.limits import MOST_DEPTH
-from objreg_ros.sensor import PLANE_TOLERANCE_GROWTH, PLANE_TOLERANCE_M
+from objreg_ros.sensor import PLANE_TOLERANCE_GROWTH, PLANE_TOLERANCE_M, depth_noise
 
 WIDTH = 320  # px: the picture is halved until it is no wider
 POINTS = 1500  # most depth steps that are asked
 LEAST_POINTS = 400  # fewer tell nothing
 LEAST_STRENGTH = 0.2  # of the gradients at the steps, in deviations, for these to be edges; real ones have 0.3 to 1
 STEP = (3.0 * PLANE_TOLERANCE_M, 3.0 * PLANE_TOLERANCE_GROWTH)  # m and 1/m: depths that differ by more are a step
-SHADOW = 8  # px: the depth behind a step may be missing for as far
+SHADOW = 3  # px: the depth behind a step may be missing for as far; behind wider shadows it is another thing's
 BLURS = (3.0, 1.5, 0.8)  # px of the reduced picture, coarse to fine
 COARSE = (np.linspace(-0.05, 0.05, 9), np.linspace(-0.04, 0.04, 5))  # rad: about x and y, about z
 STEPS = ((0.012, 0.006), (0.006, 0.003), (0.002, 0.001))  # rad, of each blur
@@ -41,6 +41,8 @@ MEMORY = 20  # frames that are remembered
 FIRST_FRAMES = 0.2  # that the first guess of the spread is worth
 LEAST_AWAY = 0.1  # m before the camera, of a ray that is 1 m long along the other's axis: else it looks aside
 FAST = {"reassoc", "contract", "arcp", "nsz", "afn"}  # fast arithmetic that still knows NaN
+NOISE_WIDTH = 160  # px: depth is thinned to no less for its noise to be measured
+MATCHED = 1.5  # noise of depth in a Kinect's: simulated and real Kinects have 0.9 to 1.4, a RealSense D435 1.8 and more
 SMALLEST = 1e-3  # rad: half a pixel of the usual camera; less is left as it is
 
 
@@ -77,8 +79,11 @@ class DepthToColour:
         self.mean, self.spread, self.frames = np.zeros(3), np.full(3, FIRST_SIGMA), 0
 
     def register(self, image: DepthImage) -> DepthImage:
-        """The image with its depth brought upon its colour; itself where it has no colour or nothing is to be done."""
-        if image.rgb is None:
+        """The image with its depth brought upon its colour; itself where it has no colour or nothing is to be done.
+
+        Depth of a stereo camera is left as it is: its steps are half a matching window beside the things.
+        """
+        if image.rgb is None or is_matched(image):
             return image
         rotation = self.offset(image).rotation
         return image if np.abs(rotation).max() < SMALLEST else turned(image, rotation)
@@ -105,6 +110,12 @@ class DepthToColour:
         away = np.clip(rotation - self.mean, -SURPRISE * self.spread, SURPRISE * self.spread)
         self.mean = self.mean + away / (1.0 + min(self.frames - 1, MEMORY))
         self.spread = np.maximum(np.sqrt((known * self.spread**2 + away**2) / (known + 1.0)), NOISE)
+
+
+def is_matched(image: DepthImage) -> bool:
+    """Whether depth is that of a stereo camera, which matches windows: it has more noise than any other."""
+    every = max(1, image.depth.shape[1] // NOISE_WIDTH)
+    return depth_noise(image.depth[::every, ::every]) > MATCHED
 
 
 def find_rotation(image: DepthImage, mean: Array, spread: Array) -> Array | None:

@@ -148,3 +148,11 @@ def test_what_the_raw_picture_showed_is_kept() -> None:
     shown = np.ones((480, 640), np.bool_)
     shown[:, :20] = False
     assert np.array_equal(turned(replace(image(LAG), shown=shown), LAG).shown, shown)
+
+
+def test_depth_of_a_stereo_camera_is_left_as_it_is() -> None:
+    late = image(LAG)
+    noise = 0.004 * late.depth**2 * np.random.default_rng(0).normal(size=late.depth.shape)
+    stereo = replace(late, depth=(late.depth + noise).astype(np.float32))
+    assert DepthToColour().register(stereo) is stereo
+    assert DepthToColour().register(late) is not late
