@@ -37,6 +37,7 @@ RIGS = {
     "both": RigParams(misregistration_deg=0.6, lag_ms=25.0),
 }
 VIEW_STEP, NEAREST_M, FARTHEST_M = 4, 0.2, 4.0
+SHOWN_DEG = 1.8  # in the picture
 FIRST = 5  # frames before anything is remembered of a stream
 
 
@@ -78,16 +79,18 @@ def draw(rows: dict[str, dict[str, Any]], path: Path) -> None:
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
-    figure, panels = pyplot.subplots(1, len(RIGS), figsize=(4 * len(RIGS), 4), sharex=True, sharey=True)
+    figure, panels = pyplot.subplots(1, len(RIGS), figsize=(3.4 * len(RIGS), 4.2), sharex=True, sharey=True)
     for panel, rig in zip(panels, RIGS, strict=True):
         for sensor in SENSORS:
             row = rows[f"{sensor}, {rig}"]
-            panel.plot(np.ravel(row["true"]), np.ravel(row["found"]), ".", markersize=3, label=sensor)
+            label = f"{sensor}, not used" if sensor == "realsense_d435" else sensor
+            panel.plot(np.ravel(row["true"]), np.ravel(row["found"]), ".", markersize=4, label=label)
         panel.axline((0, 0), slope=1, color="grey", linewidth=0.8)
-        panel.set(title=rig, xlabel="true offset about x, y, z [deg]", aspect="equal")
+        panel.set(title=rig, xlabel="true offset about x, y, z [deg]", xlim=(-SHOWN_DEG, SHOWN_DEG))
+        panel.set(ylim=(-SHOWN_DEG, SHOWN_DEG), aspect="equal")
     panels[0].set_ylabel("found in the frame [deg]")
-    panels[0].legend()
-    figure.tight_layout()
+    figure.tight_layout(rect=(0.0, 0.08, 1.0, 1.0))
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="lower center", ncols=len(SENSORS), frameon=False)
     figure.savefig(path, dpi=120)
 
 
