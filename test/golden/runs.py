@@ -46,7 +46,7 @@ class Real(NamedTuple):
 
 Source = Told | Real
 SOURCES: dict[str, Source] = {
-    "redkitchen_a": Real("redkitchen_a", 136),
+    "redkitchen_a": Real("redkitchen_a", 128),
     "loop": Told("loop", 1, 36),
     "opposite": Told("opposite", 121, 36),
     "look-alikes": Told("look-alikes", 82, 36),
