@@ -363,42 +363,6 @@ class FeltGravity:
         _require(self, abs(length - 1) < 1e-6, "gravity of length 1", length)
 
 
-# A confidence and the standard deviation of either tilt in degrees that it stands for, between which their logarithm is
-# linear: as single views err in simulation with all sensors and stress, times 1.5 for rooms that are less level, and
-# 0.5 at least (`training/gravity.py`). Below the first, gravity is no better than a guess, and counts as unknown.
-CONFIDENCE = (0.3, 0.5, 0.7, 0.85, 0.94, 1.0)
-SIGMA_DEG = (5.0, 4.0, 2.5, 0.95, 0.55, 0.5)
-
-
-def gravity_sigma_deg(confidence: float) -> float:
-    """The standard deviation in degrees of a gravity with this confidence 0..1; 90 below the least of `CONFIDENCE`."""
-    if confidence < CONFIDENCE[0]:
-        return 90.0
-    return float(np.exp(np.interp(confidence, CONFIDENCE, np.log(SIGMA_DEG))))
-
-
-def gravity_confidence(sigma_deg: float) -> float:
-    """The confidence 0..1 of a gravity with this standard deviation in degrees, the inverse; 0 beyond the largest."""
-    if not sigma_deg <= SIGMA_DEG[0]:
-        return 0.0
-    return float(np.interp(-np.log(max(sigma_deg, 1e-9)), -np.log(SIGMA_DEG), CONFIDENCE))
-
-
-ONE_VIEW = 0.02  # weight of the gravity that a single view tells, beside 1 of many from around
-MANY_VIEWS_DEG = 0.5  # standard deviation of what those tell
-
-
-def session_gravity_sigma_deg(weight: float) -> float:
-    """The standard deviation in degrees of either tilt of a keyframe's gravity, by its weight 0..1.
-
-    Many views have told it, carried by odometry (`keyframes/gravity_filter.py`), or this one alone: then its weight is
-    at most `ONE_VIEW`, which falls with the third power of the view's confidence.
-    """
-    if weight <= ONE_VIEW:
-        return gravity_sigma_deg(float(np.cbrt(weight / ONE_VIEW)))
-    return float(MANY_VIEWS_DEG / np.sqrt(weight))
-
-
 @word
 class Odometry:
     """The pose of a body in the odometry frame at ``stamp_ns``."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far gravity errs that a single view tells, by its confidence: the numbers behind `data.SIGMA_DEG`.
+"""How far gravity errs that a single view tells, by its confidence: the numbers behind `sensor.SIGMA_DEG`.
 
     python training/gravity.py            # some minutes; prints a table
 
@@ -17,8 +17,9 @@ import numpy as np
 from tqdm import tqdm
 
 from objreg_ros.cli.simulate import HARD
-from objreg_ros.data import CONFIDENCE, SIGMA_DEG, DepthImage, Detections, Intrinsics
+from objreg_ros.data import DepthImage, Detections, Intrinsics
 from objreg_ros.segmenter.segment import Segmenter
+from objreg_ros.sensor import CONFIDENCE, SIGMA_DEG
 from objreg_ros.simulation.camera import CAMERAS, SENSORS
 from objreg_ros.simulation.params import StressParams
 from objreg_ros.simulation.render import render

@@ -11,11 +11,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from objreg_ros.data import ONE_VIEW, Array
+from objreg_ros.data import Array
 from objreg_ros.keyframes.odometry import TravelledPath
+from objreg_ros.sensor import ONE_VIEW
 
 AT_REST_M, AT_REST_DEG = 0.01, 0.5  # what odometry may jitter by while the camera rests
-DOUBT = 3  # power of a view's own confidence (`data.session_gravity_sigma_deg` knows it)
+DOUBT = 3  # power of a view's own confidence (`sensor.session_gravity_sigma_deg` knows it)
 
 
 @dataclass(slots=True, eq=False)

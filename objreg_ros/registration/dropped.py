@@ -34,9 +34,6 @@ CONSTANT_OF = {
         "slack_translation": "DEGENERATE_SIGMA_M",
         "slack_rotation": "DEGENERATE_SIGMA_DEG",
     },
-    "data.py": {
-        "gravity_noise": "MANY_VIEWS_DEG",
-    },
     "registration/gate/gravity.py": {
         "max_gravity_error": "SIGMAS",
     },
@@ -222,6 +219,7 @@ CONSTANT_OF = {
         "shape_rounds": "CLIMB_ROUNDS",
     },
     "sensor.py": {
+        "gravity_noise": "MANY_VIEWS_DEG",
         "depth_noise": "DEPTH_NOISE_M",
         "depth_noise_growth": "DEPTH_NOISE_GROWTH",
         "depth_warp": "DEPTH_WARP",

@@ -10,7 +10,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from objreg_ros.data import CONFIDENCE, Array
+from objreg_ros.data import Array
+from objreg_ros.sensor import CONFIDENCE
 
 CANDIDATES = 64
 CLUSTER = np.float32(np.cos(np.radians(8.0)))

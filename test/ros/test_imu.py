@@ -10,7 +10,8 @@ from sensor_msgs.msg import Image, Imu, PointCloud2
 from std_msgs.msg import Header
 
 from objreg_ros.bridge import to_msg
-from objreg_ros.data import Detections, gravity_sigma_deg
+from objreg_ros.data import Detections
+from objreg_ros.sensor import gravity_sigma_deg
 
 from .graph import Graph
 from .moments import CAMERA, SECOND

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.data import gravity_confidence, gravity_sigma_deg
 from objreg_ros.segmenter.gravity_choice import choose_gravity
+from objreg_ros.sensor import gravity_confidence, gravity_sigma_deg
 
 UP = np.array([0.0, -1.0, 0.0])
 

@@ -12,9 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from objreg_ros.data import MANY_VIEWS_DEG, Array
+from objreg_ros.data import Array
 from objreg_ros.geometry import pose, rotation_from_vector, skew
 from objreg_ros.registration.prepare.prepared import Prepared
+from objreg_ros.sensor import MANY_VIEWS_DEG
 
 POSE_SIGMA_DEG = 0.4  # standard deviation of the tilt of a right pose before gravity corrects it
 UPRIGHT = np.array([0.0, -1.0, 0.0])  # up in a camera of which nothing else is known: it is not carried upside down

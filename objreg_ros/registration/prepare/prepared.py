@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from objreg_ros.data import Array, session_gravity_sigma_deg
+from objreg_ros.data import Array
 from objreg_ros.registration.kernels.closest_points import Surface, prepare_surface
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.labels import LabelGroups
@@ -21,6 +21,7 @@ from objreg_ros.registration.prepare.views import DETAIL_SIGMA_PX, Sight, halved
 from objreg_ros.registration.prepare.voxels import thin
 from objreg_ros.registration.shapes.shape import Shape, prepare_shape
 from objreg_ros.registration.shapes.symmetry import tells_yaw
+from objreg_ros.sensor import session_gravity_sigma_deg
 
 FEATURE_VOXEL_M = 0.07  # distance of the points that carry an FPFH feature
 FEATURE_RADIUS_M = 0.35  # radius of an FPFH feature: five voxels, as its authors use

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from objreg_ros.data import Array, View, session_gravity_sigma_deg
+from objreg_ros.data import Array, View
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
 from objreg_ros.registration.certainty.gravity_update import POSE_SIGMA_DEG
 from objreg_ros.registration.keyframe import Context, Keyframe
@@ -17,6 +17,7 @@ from objreg_ros.registration.prepare.prepared import Pair, prepare
 from objreg_ros.registration.propose.evidence import FINISHED_MARGIN
 from objreg_ros.registration.propose.hypotheses import Hypothesis
 from objreg_ros.registration.propose.shortlist import FINISHED, TILTED, _hopeful, shortlist
+from objreg_ros.sensor import session_gravity_sigma_deg
 from registration.rooms import keyframe, look_at, seen_from
 
 PARAMS = RegistrarParams()
