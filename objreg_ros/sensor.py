@@ -30,7 +30,7 @@ PLANE_TOLERANCE_GROWTH = np.float32(0.006)  # 1/m
 # Silhouettes: two depths of one surface differ by SILHOUETTE_TOLERANCE_M + SILHOUETTE_TOLERANCE_GROWTH (z - NEAR_M)^2
 # at most: 7 mm and three deviations of each.
 SILHOUETTE_TOLERANCE_M = 0.0106
-SILHOUETTE_TOLERANCE_GROWTH = 0.0057  # 1/m
+SILHOUETTE_TOLERANCE_GROWTH = 0.0057  # 1/m; `silhouette_tolerance` has both
 
 # Free space: depths agree within DEPTH_TOLERANCE_M + DEPTH_TOLERANCE_GROWTH z^2.
 DEPTH_TOLERANCE_M = 0.02
@@ -61,14 +61,24 @@ def _ratios(depth: NDArray[np.floating]) -> NDArray[np.floating]:
     a, b, c = nearness[: -2 * SPAN], nearness[SPAN:-SPAN], nearness[2 * SPAN :]
     flat = (a > 0.0) & (b > 0.0) & (c > 0.0) & (np.maximum(np.abs(a - b), np.abs(c - b)) < SAME_SURFACE * b)
     a, b, c = a[flat], b[flat], c[flat]
-    expected = DEPTH_NOISE_M + DEPTH_NOISE_GROWTH * np.maximum(1.0 / b - NEAR_M, 0.0) ** 2
-    return np.asarray(np.abs(a - 2.0 * b + c) / (np.sqrt(6.0) * b * b * expected))
+    return np.asarray(np.abs(a - 2.0 * b + c) / (np.sqrt(6.0) * b * b * depth_sigma(1.0 / b)))
+
+
+def depth_sigma(depth: NDArray[np.floating], noise: float = 1.0) -> NDArray[np.floating]:
+    """The standard deviation in m of depths (...) m, of a camera with that `depth_noise`, if more than a Kinect's."""
+    beyond = np.maximum(0.0, np.asarray(depth, float) - NEAR_M)
+    return np.asarray(max(1.0, noise) * (DEPTH_NOISE_M + DEPTH_NOISE_GROWTH * beyond**2))
 
 
 def depth_tolerance(noise: float, other_noise: float) -> tuple[float, float]:
     """Within what depths z of two views agree: m, and its growth with z^2 in 1/m; wider for cameras with more noise."""
     both = np.sqrt(0.5 * (noise**2 + other_noise**2))
     return DEPTH_TOLERANCE_M, DEPTH_TOLERANCE_GROWTH * max(1.0, float(both))
+
+
+def silhouette_tolerance(noise: float) -> NDArray[np.floating]:
+    """(2,): within what depths z of a silhouette agree, m, and its growth with (z - NEAR_M)^2, 1/m."""
+    return np.array([SILHOUETTE_TOLERANCE_M, SILHOUETTE_TOLERANCE_GROWTH * max(1.0, noise)])
 
 
 # A confidence and the standard deviation of either tilt in degrees that it stands for, between which their logarithm is

@@ -15,7 +15,9 @@ from objreg_ros.sensor import (
     KINECT,
     NEAR_M,
     depth_noise,
+    depth_sigma,
     depth_tolerance,
+    silhouette_tolerance,
 )
 
 
@@ -48,3 +50,15 @@ def test_depths_of_noisier_cameras_may_differ_by_more_and_never_by_less_than_a_k
     assert depth_tolerance(1.0, 1.0) == depth_tolerance(0.2, 0.3) == (DEPTH_TOLERANCE_M, DEPTH_TOLERANCE_GROWTH)
     base, growth = depth_tolerance(1.0, 7.0)
     assert base == DEPTH_TOLERANCE_M and growth == pytest.approx(5.0 * DEPTH_TOLERANCE_GROWTH)
+
+
+def test_silhouettes_of_noisier_cameras_may_differ_by_more_with_distance() -> None:
+    usual, noisy = silhouette_tolerance(0.4), silhouette_tolerance(2.0)
+    assert tuple(usual) == tuple(silhouette_tolerance(1.0))
+    assert noisy[0] == usual[0] and noisy[1] == 2.0 * usual[1]
+
+
+def test_a_depth_s_deviation_grows_with_its_distance_and_with_the_noise_of_its_camera() -> None:
+    near, far = depth_sigma(np.array([NEAR_M, NEAR_M + 1.0]))
+    assert near == DEPTH_NOISE_M and far == pytest.approx(DEPTH_NOISE_M + DEPTH_NOISE_GROWTH)
+    assert np.allclose(depth_sigma(np.array([0.2, 2.0]), 2.0), 2.0 * depth_sigma(np.array([NEAR_M, 2.0])))

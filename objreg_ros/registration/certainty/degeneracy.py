@@ -24,7 +24,9 @@ def about_camera(H: Array, T_target_source: Array) -> Array:
 
 def systematic_depth_error(source: Prepared, target: Prepared, T_target_source: Array) -> Array:
     """The covariance (6, 6) [t r] of the source camera's pose by a systematic depth error, in the target's axes."""
-    C = systematic_depth_error_of_step(source.xyz, source.normals, target.surface, T_target_source)
+    C = systematic_depth_error_of_step(
+        source.xyz, source.normals, target.surface, T_target_source, (source.sight.noise, target.sight.noise)
+    )
     A = np.eye(6)
     A[:3, 3:] = -skew(T_target_source[:3, 3])
     return np.asarray(A @ C @ A.T)

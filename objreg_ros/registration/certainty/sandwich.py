@@ -5,7 +5,7 @@ Points of one patch err together: depth that errs systematically moves whole sur
 independent is what makes the covariance of an ICP over-confident. So each patch speaks once, with the sum of its
 residuals: the cluster-robust covariance H^-1 (sum of g g') H^-1 (White, "Maximum likelihood estimation of misspecified
 models", 1982; Liang and Zeger, "Longitudinal data analysis using generalized linear models", 1986), beside the usual
-H^-1. Points are weighed by the noise that a structured-light camera has at their depth.
+H^-1. Points are weighed by the noise that their camera has at their depth.
 
 What two views share may be few patches, far away and on one side: then there is nothing to contradict, and a depth that
 is a little wrong there turns the camera about them and takes it far. `systematic_depth_error_of_step` says how far.
@@ -18,18 +18,21 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.registration.kernels.closest_points import Surface
 from objreg_ros.registration.refine.batch_icp import REACHES_M, pair
-from objreg_ros.sensor import DEPTH_NOISE_GROWTH, DEPTH_NOISE_M, DEPTH_WARP, NEAR_M
+from objreg_ros.sensor import DEPTH_WARP, depth_sigma
 
 PATCH_M = 0.8  # edge of a patch of surface whose points err together
 FREEDOMS = 6
+Noises = tuple[float, float]
+KINECTS: Noises = (1.0, 1.0)  # how noisy the depth of two cameras is, in that of a Kinect
 
 
-def information(xyz: Array, normals: Array, surface: Surface, T: Array) -> Array:
+def information(xyz: Array, normals: Array, surface: Surface, T: Array, noises: Noises = KINECTS) -> Array:
     """The information (6, 6) of a left step [t r] of a pose (4, 4), of points (M, 3) on a surface.
 
-    Next to zero along directions that no point resists.
+    ``noises`` are the `depth_noise` of the camera of the points and of that of the surface. Next to zero along
+    directions that no point resists.
     """
-    at, J, residual, weight = _weighed(xyz, normals, surface, T)
+    at, J, residual, weight = _weighed(xyz, normals, surface, T, noises)
     least = np.eye(FREEDOMS)
     if len(residual) <= FREEDOMS:
         return least
@@ -39,30 +42,28 @@ def information(xyz: Array, normals: Array, surface: Surface, T: Array) -> Array
     return np.linalg.inv((C + C.T) / 2.0)
 
 
-def systematic_depth_error_of_step(xyz: Array, normals: Array, surface: Surface, T: Array) -> Array:
+def systematic_depth_error_of_step(
+    xyz: Array, normals: Array, surface: Surface, T: Array, noises: Noises = KINECTS
+) -> Array:
     """The covariance (6, 6) of a left step [t r] of a pose (4, 4) that wrong depths make, on top of `information`.
 
     The depth of each patch is wrong by a share `DEPTH_WARP` of the distance, one standard deviation, as it is of a
     camera whose depths bend with the place in the image.
     """
-    at, J, _, weight = _weighed(xyz, normals, surface, T)
+    at, J, _, weight = _weighed(xyz, normals, surface, T, noises)
     inverse = np.linalg.inv((J * weight) @ J.T + np.eye(FREEDOMS))
     error = DEPTH_WARP * np.linalg.norm(at, axis=0)
     g = _pulls(J, weight * error, _patches(at, J[:3], PATCH_M))
     return np.asarray(inverse @ g @ g.T @ inverse)
 
 
-def _weighed(xyz: Array, normals: Array, surface: Surface, T: Array) -> tuple[Array, Array, Array, Array]:
+def _weighed(
+    xyz: Array, normals: Array, surface: Surface, T: Array, noises: Noises
+) -> tuple[Array, Array, Array, Array]:
     """Per pair: where it is (3, n), the Jacobian (6, n) of a left step, the residual m, the weight over the noise."""
     index, at, J, residual, weight = pair(xyz, normals, *surface.grid, T, REACHES_M[-1])
-    variance = _variance(xyz[index, 2]) + _variance(at[2])
+    variance = depth_sigma(xyz[index, 2], noises[0]) ** 2 + depth_sigma(at[2], noises[1]) ** 2
     return at, J, residual, weight / variance
-
-
-def _variance(depth: Array) -> Array:
-    """Of a structured-light camera's depths, m^2."""
-    beyond = np.maximum(0.0, np.asarray(depth, float) - NEAR_M)
-    return np.asarray((DEPTH_NOISE_M + DEPTH_NOISE_GROWTH * beyond**2) ** 2)
 
 
 def _patches(at: Array, normals: Array, edge: float) -> Array:

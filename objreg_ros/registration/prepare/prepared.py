@@ -89,8 +89,9 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
     with ThreadPoolExecutor(1, "prepare") as beside:
         surface = beside.submit(prepare_surface, *joined(fine, things), GRID_CELL_M, GRID_REACH_M)
         features = beside.submit(describe, *coarse, FEATURE_RADIUS_M)
-        shapes = tuple(prepare_shape(keyframe, [i], SHAPE_POINTS, params.seed) for i in range(len(keyframe.objects)))
         sight = prepare_sight(keyframe.view, *seeing)
+        each, drawn = range(len(keyframe.objects)), (params.seed, sight.noise)
+        shapes = tuple(prepare_shape(keyframe, [i], SHAPE_POINTS, *drawn) for i in each)
         return Prepared(
             keyframe=keyframe,
             sight=sight,
@@ -105,7 +106,7 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
             ),
             shapes=shapes,
             own=tuple(own_pixels(item, sight) for item in keyframe.objects),
-            scene=prepare_shape(keyframe, range(len(keyframe.objects)), SCENE_POINTS, params.seed),
+            scene=prepare_shape(keyframe, each, SCENE_POINTS, *drawn),
             centroids=np.array([item.centroid for item in keyframe.objects]).reshape(-1, 3),
             extents=np.array([item.extent for item in keyframe.objects]),
             middle=np.asarray(coarse[0].mean(axis=0) if len(coarse[0]) else np.zeros(3), float),

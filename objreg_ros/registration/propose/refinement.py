@@ -38,10 +38,11 @@ def refine(source: Prepared, target: Prepared, T_target_source: Array) -> Alignm
     degenerate = degenerate_directions(
         found._replace(H=found.H + grey), T, transform(T, source.middle), DEGENERATE_SHARE
     )
+    noises = source.sight.noise, target.sight.noise
     free, regularised = split_directions(source, target, T, degenerate, found.extent)
     return Alignment(
         T_target_source=T,
-        information=about_camera(information(source.xyz, source.normals, target.surface, T), T),
+        information=about_camera(information(source.xyz, source.normals, target.surface, T, noises), T),
         inliers=found.inliers,
         overlap=found.inliers / max(1, len(source.xyz)),
         rmse=found.rmse,

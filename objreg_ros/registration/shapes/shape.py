@@ -65,13 +65,16 @@ class Shape:
         """The points and what the camera saw, for the kernels."""
         s, few = self.silhouette, slice(self.most)
         points = self.xyz[few], self.normals[few], self.shades[few]
-        return (*points, self.R_upright_camera, self.origin, s.depth, s.mask, s.grey, s.camera, s.inward, s.edges)
+        image = s.depth, s.mask, s.grey, s.camera, s.tolerance
+        return (*points, self.R_upright_camera, self.origin, *image, s.inward, s.edges)
 
 
-def prepare_shape(keyframe: Keyframe, indices: Sequence[int], most: int, seed: int = 0) -> Shape | None:
+def prepare_shape(
+    keyframe: Keyframe, indices: Sequence[int], most: int, seed: int = 0, noise: float = 1.0
+) -> Shape | None:
     """The objects ``indices`` of a keyframe as one shape of at most ``most`` points.
 
-    None without gravity or with too few points.
+    ``noise`` is the `depth_noise` of its view. None without gravity or with too few points.
     """
     clouds = [keyframe.objects[i].cloud for i in indices]
     if keyframe.gravity is None or sum(len(cloud) for cloud in clouds) < LEAST:
@@ -98,7 +101,7 @@ def prepare_shape(keyframe: Keyframe, indices: Sequence[int], most: int, seed: i
         normals=facing,
         shades=grey[order],
         most=most,
-        silhouette=draw(xyz, grey, keyframe.view),
+        silhouette=draw(xyz, grey, keyframe.view, noise),
         R_upright_camera=R,
         origin=origin,
         extent=extent,

@@ -15,6 +15,7 @@ import numba
 import numpy as np
 
 from objreg_ros.data import Array, View
+from objreg_ros.sensor import silhouette_tolerance
 
 BESIDE, INSIDE, RIM = 0, 1, 2  # the values of a silhouette's mask
 FINEST = 4.0  # pixels of a silhouette for one of the view
@@ -26,7 +27,8 @@ class Silhouette:
     """A window of a virtual camera: ``depth (h, w) float32`` m of the object inside and of what is behind beside it.
 
     0 where nothing was measured; ``mask (h, w) uint8`` is BESIDE, INSIDE or RIM (too close to tell); ``grey (h, w)
-    float32`` is the object's own; ``camera (4,) float64`` fx fy cx cy of the window.
+    float32`` is the object's own; ``camera (4,) float64`` fx fy cx cy of the window; ``tolerance (2,)`` is the camera's
+    `silhouette_tolerance`.
 
     ``inward (h, w, 2) int16`` px leads from each pixel to the nearest inside; ``edges (4,) bool`` tells which sides of
     the window, left, top, right and bottom, are those of the whole picture: nothing is known beyond.
@@ -36,12 +38,16 @@ class Silhouette:
     mask: Array
     grey: Array
     camera: Array
+    tolerance: Array
     inward: Array
     edges: Array
 
 
-def draw(xyz: Array, grey: Array, view: View) -> Silhouette:
-    """The silhouette of points (N, 3) with ``grey (N,) float32``, seen by the camera of ``view``; N at least 1."""
+def draw(xyz: Array, grey: Array, view: View, noise: float = 1.0) -> Silhouette:
+    """The silhouette of points (N, 3) with ``grey (N,) float32``, seen by the camera of ``view``; N at least 1.
+
+    ``noise`` is the `depth_noise` of that camera.
+    """
     scale = _scale(xyz, view)
     camera = view.intrinsics
     lens = np.array([camera.fx, camera.fy, camera.cx + 0.5, camera.cy + 0.5]) * scale
@@ -61,6 +67,7 @@ def draw(xyz: Array, grey: Array, view: View) -> Silhouette:
         mask=np.where(mask > 0, INSIDE, np.where(near > 0, RIM, BESIDE)).astype(np.uint8),
         grey=shade,
         camera=lens,
+        tolerance=silhouette_tolerance(noise),
         inward=_inward(mask),
         edges=np.array([left == 0, top == 0, right == width, bottom == height]),
     )

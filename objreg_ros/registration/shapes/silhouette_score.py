@@ -15,7 +15,7 @@ from objreg_ros.data import Array
 from objreg_ros.registration.kernels.projection import FAST, INDEX, LEAST_DEPTH, project
 from objreg_ros.registration.shapes.shape import Shape
 from objreg_ros.registration.shapes.silhouette import INSIDE, RIM
-from objreg_ros.sensor import NEAR_M, SILHOUETTE_TOLERANCE_GROWTH, SILHOUETTE_TOLERANCE_M
+from objreg_ros.sensor import NEAR_M
 
 VIOLATION_WEIGHT = 12.0  # of an object's points in seen free space
 OCCLUSION_WEIGHT = 0.6  # of an object's points behind what was seen
@@ -58,13 +58,13 @@ def score_silhouettes(source: Shape, target: Shape, motion: Array, reach: float 
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
-def tolerance_at(z):  # type: ignore[no-untyped-def]
-    """How far two depths of one surface may differ at a depth z, m."""
-    return SILHOUETTE_TOLERANCE_M + SILHOUETTE_TOLERANCE_GROWTH * (z - NEAR_M) * (z - NEAR_M)
+def tolerance_at(z, tolerance):  # type: ignore[no-untyped-def]
+    """How far two depths of one surface may differ at a depth z, m: `Silhouette.tolerance`."""
+    return tolerance[0] + tolerance[1] * (z - NEAR_M) * (z - NEAR_M)
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
-def tally(P, N, S, most, T, depth, mask, grey, camera, extent, out):  # type: ignore[no-untyped-def]
+def tally(P, N, S, most, T, depth, mask, grey, camera, tolerance, extent, out):  # type: ignore[no-untyped-def]
     """Add to ``out (10,)`` what a silhouette says of the first ``most`` points under T (3, 4), camera from points."""
     height, width = depth.shape
     us, vs, zs = project(P[:most], T, camera)
@@ -77,16 +77,16 @@ def tally(P, N, S, most, T, depth, mask, grey, camera, extent, out):  # type: ig
         if d <= 0.0:
             continue
         on = mask[row, column]
-        tolerance = tolerance_at(z)
+        within = tolerance_at(z, tolerance)
         e = z - d
-        if e < -tolerance:
+        if e < -within:
             if on != RIM:
                 out[VIOLATIONS] += 1.0
-        elif e > tolerance:
+        elif e > within:
             out[HIDDEN] += min(1.0, max(0.0, e / extent - 0.5)) if on == INSIDE else 0.5
         elif on != 0 and _faces(T, N[i], (u - camera[2]) / camera[0], (v - camera[3]) / camera[1]):
             out[INLIERS] += 1.0
-            out[RESIDUAL] += e * e / (tolerance * tolerance)
+            out[RESIDUAL] += e * e / (within * within)
             if on == INSIDE:
                 f, g = S[i], grey[row, column]
                 out[SHADED] += 1.0
@@ -124,8 +124,8 @@ def rated(out, n, weights):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
 def ask(source, target, motion, extent, most, out):  # type: ignore[no-untyped-def]
     """Fill ``out`` with what both cameras say of a motion (yaw, x, y, rise); returns how many points were asked."""
-    P, N, S, Rs, os, depth_s, mask_s, grey_s, camera_s, _, _ = source
-    Q, M, G, Rt, ot, depth_t, mask_t, grey_t, camera_t, _, _ = target
+    P, N, S, Rs, os, depth_s, mask_s, grey_s, camera_s, tolerance_s, _, _ = source
+    Q, M, G, Rt, ot, depth_t, mask_t, grey_t, camera_t, tolerance_t, _, _ = target
     c, s = np.cos(motion[0]), np.sin(motion[0])
     T = np.empty((3, 4))
     out[:] = 0.0
@@ -134,13 +134,13 @@ def ask(source, target, motion, extent, most, out):  # type: ignore[no-untyped-d
         a, b, d = Rt[0, k], Rt[1, k], Rt[2, k]
         T[k, 0], T[k, 1], T[k, 2] = a * c + b * s, b * c - a * s, d
         T[k, 3] = a * (motion[1] + ot[0]) + b * (motion[2] + ot[1]) + d * (motion[3] + ot[2])
-    n = tally(P, N, S, most, T, depth_t, mask_t, grey_t, camera_t, extent, out)
+    n = tally(P, N, S, most, T, depth_t, mask_t, grey_t, camera_t, tolerance_t, extent, out)
     # and back: Rs' (turn' (q - shift) + os)
     for k in range(3):
         a, b, d = Rs[0, k], Rs[1, k], Rs[2, k]
         T[k, 0], T[k, 1], T[k, 2] = a * c - b * s, a * s + b * c, d
         T[k, 3] = a * os[0] + b * os[1] + d * (os[2] - motion[3]) - T[k, 0] * motion[1] - T[k, 1] * motion[2]
-    return n + tally(Q, M, G, most, T, depth_s, mask_s, grey_s, camera_s, extent, out)
+    return n + tally(Q, M, G, most, T, depth_s, mask_s, grey_s, camera_s, tolerance_s, extent, out)
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)

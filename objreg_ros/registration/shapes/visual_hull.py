@@ -29,8 +29,8 @@ def clear(source, target, motion, most, rounds):  # type: ignore[no-untyped-def]
 
     ``source`` and ``target`` are `Shape.kernel_arrays`. Returns by how many metres, all together, they float there.
     """
-    P, Rs, os, seen_s = source[0], source[3], source[4], (source[5], source[6], source[8], source[9], source[10])
-    Q, Rt, ot, seen_t = target[0], target[3], target[4], (target[5], target[6], target[8], target[9], target[10])
+    P, Rs, os, seen_s = source[0], source[3], source[4], (source[5], source[6], *source[8:])
+    Q, Rt, ot, seen_t = target[0], target[3], target[4], (target[5], target[6], *target[8:])
     R, t, level, A, g = np.empty((3, 3)), np.empty(3), np.empty((3, 2)), np.empty((3, 3)), np.empty(3)
     best, kept = 1e9, motion.copy()
     for iteration in range(rounds + 1):
@@ -79,7 +79,7 @@ def _pushes(P, most, R, t, seen, level, lever, A, g):  # type: ignore[no-untyped
     (R, t) is camera from points; ``level (3, 2)`` how the camera sees the two shifts; ``lever`` (c, s, x, y): yaw moves
     a point by its level place, turned by (c, s) and less (x, y).
     """
-    depth, mask, camera, inward, edges = seen
+    depth, mask, camera, tolerance, inward, edges = seen
     fx, fy, cx, cy = camera[0], camera[1], camera[2], camera[3]
     h, w = depth.shape
     per_pixel, total = 2.0 / (fx + fy), 0.0
@@ -100,10 +100,10 @@ def _pushes(P, most, R, t, seen, level, lever, A, g):  # type: ignore[no-untyped
         beyond = abs(du) + abs(dv) > 1.0
         if on == INSIDE and not beyond:  # before the surface?
             far, nx, ny, nz = d - z, 0.0, 0.0, 1.0
-            if far < tolerance_at(z):
+            if far < tolerance_at(z, tolerance):
                 continue
         else:  # beside the outline, and not behind what is seen there?
-            if (on != BESIDE and not beyond) or (d > 0.0 and z - d > tolerance_at(z)):
+            if (on != BESIDE and not beyond) or (d > 0.0 and z - d > tolerance_at(z, tolerance)):
                 continue
             du, dv = du + inward[row, column, 0], dv + inward[row, column, 1]
             pixels = np.sqrt(du * du + dv * dv) + 1e-9

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from objreg_ros import sensor
 from objreg_ros.data import Array
 from objreg_ros.registration.certainty import sandwich
 from objreg_ros.registration.certainty.sandwich import FREEDOMS, _spread, information, systematic_depth_error_of_step
@@ -15,8 +16,8 @@ from objreg_ros.registration.kernels.closest_points import Surface, prepare_surf
 @pytest.fixture(autouse=True)
 def even_noise(monkeypatch: pytest.MonkeyPatch) -> None:
     """Depth that is as noisy far away as near, and small patches."""
-    monkeypatch.setattr(sandwich, "DEPTH_NOISE_M", 0.002)
-    monkeypatch.setattr(sandwich, "DEPTH_NOISE_GROWTH", 0.0)
+    monkeypatch.setattr(sensor, "DEPTH_NOISE_M", 0.002)
+    monkeypatch.setattr(sensor, "DEPTH_NOISE_GROWTH", 0.0)
     monkeypatch.setattr(sandwich, "PATCH_M", 0.25)
 
 
@@ -135,3 +136,10 @@ def test_a_patch_aside_may_lie_off_by_the_share_of_its_distance(monkeypatch: pyt
     C = systematic_depth_error_of_step(*flat, grid_of(xyz, normals), np.eye(4))
     ahead = ahead_of(xyz)
     assert np.sqrt(ahead @ C @ ahead) == pytest.approx(0.01 * np.linalg.norm(xyz.mean(axis=0)), rel=0.02)
+
+
+def test_a_camera_with_twice_the_noise_knows_a_pose_half_as_well_and_a_quiet_one_no_better() -> None:
+    xyz, normals = (part.astype(np.float32) for part in corner(0.05))
+    surface = grid_of(xyz, normals)
+    told = [sigma(information(xyz, normals, surface, np.eye(4), (noise, noise))) for noise in (0.3, 1.0, 2.0)]
+    assert np.allclose(told[0], told[1]) and np.allclose(told[2], 2.0 * told[1], rtol=0.01)

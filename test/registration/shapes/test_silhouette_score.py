@@ -19,6 +19,7 @@ from objreg_ros.registration.shapes.silhouette_score import (
     tally,
     weights_of,
 )
+from objreg_ros.sensor import silhouette_tolerance
 from registration.drawn_shapes import BOX, ELL, from_side
 from registration.shapes.test_upright_search import shape_of
 
@@ -91,6 +92,7 @@ def test_a_point_is_on_the_surface_floats_or_is_hidden_the_more_the_deeper_it_li
     depth, mask, out = np.ones((3, 3), np.float32), np.full((3, 3), on, np.uint8), np.zeros(COUNTS)
     point, normal = np.array([[0.0, 0.0, 1.0 + behind]], np.float32), np.array([[0.0, 0.0, facing]], np.float32)
     grey = np.zeros((3, 3), np.float32)
-    tally(point, normal, grey[0, :1], 1, np.eye(4)[:3], depth, mask, grey, np.array([1.0, 1.0, 1.5, 1.5]), 0.2, out)
+    camera, tolerance = np.array([1.0, 1.0, 1.5, 1.5]), silhouette_tolerance(1.0)
+    tally(point, normal, grey[0, :1], 1, np.eye(4)[:3], depth, mask, grey, camera, tolerance, 0.2, out)
     assert out[what] == pytest.approx(counted, abs=1e-5)
     assert out[[INLIERS, VIOLATIONS, HIDDEN]].sum() == pytest.approx(counted, abs=1e-5)
