@@ -34,15 +34,15 @@ from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import FrameWindow, Keyframer
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.engine import Engine
-from objreg_ros.registration.gate.limits import LIMITS
 from objreg_ros.registration.gate.verdict import judge
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.registration.score.view_score import verify
+from objreg_ros.registration.score.view_score import LEAST_SCORE, verify
 from objreg_ros.truth import Truth
 
 QUICK = {"wanted": 15, "names": ("paper", "orb_pnp")}
 LAG_STEP_MS = 10
+LEAST_TESTED = 600  # pixels that both views see under a peer's pose, to be accepted by them
 GICP_VOXEL = 0.03  # m, of the whole frames that finish a peer's pose
 
 
@@ -131,7 +131,7 @@ class Checked:
         self._method, self._truths = method, truths
 
     def __call__(self, pair: Pair) -> Row:
-        """The method's pose; accepted if the views' score is at least the gate's least."""
+        """The method's pose; accepted if the views agree in more than next to nothing."""
         row = self._method(pair)
         if row.T is None:
             return row
@@ -139,7 +139,7 @@ class Checked:
         start = time.perf_counter()
         seen = verify(source, target, row.T)
         ms = row.ms + 1e3 * (time.perf_counter() - start)
-        accepted = seen.score >= LIMITS.view_score.least and seen.tested >= LIMITS.overlap.tested
+        accepted = seen.score >= LEAST_SCORE and seen.tested >= LEAST_TESTED
         return replace(row, accepted=accepted, ms=ms, reason="" if accepted else "views")
 
 

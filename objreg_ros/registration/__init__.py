@@ -45,9 +45,8 @@ def align(
     ``T_target_source`` of what comes back maps points of the source's camera into the target's. ``prior`` is what
     odometry expects, with its deviations (`propose.prior.expect`): a pose starts from it where it is tight, and is
     refused where it disagrees. ``method`` is that of ``params`` where None, ``gate`` is `gate.verdict.judge` with
-    the limits of ``params``. Where the
-    answer is no, ``accepted`` is False, and ``reason``, ``detail`` and ``evidence`` say why. The same input gives the
-    same answer. The imports are inside: they load the compiled kernels.
+    the limits of ``params``. Where the answer is no, ``accepted`` is False, and ``reason``, ``detail`` and
+    ``evidence`` say why. The same input gives the same answer. The imports are inside: they load the compiled kernels.
     """
     from objreg_ros.registration.candidate import Candidate
     from objreg_ros.registration.certainty.covariance import covariance_of

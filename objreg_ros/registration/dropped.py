@@ -53,49 +53,25 @@ CONSTANT_OF = {
     "registration/engine.py": {
         "holding_likeness": "HOLDING_SILHOUETTE_SCORE",
     },
-    "registration/gate/competing.py": {
-        "min_margin_alone": "Limits.lone_margin",
-    },
-    "registration/gate/free_space.py": {
-        "max_floating": "Limits.certain_few",
-        "max_floating_alone": "Limits.certain_doubtful",
-    },
-    "registration/gate/lone_object.py": {
-        "min_tested_alone": "Limits.tested",
-        "min_firmness_alone": "Limits.firmness",
-        "min_likeness_alone": "AppearanceLimits.silhouette_score",
-        "min_likeness_unrivalled": "AppearanceLimits.silhouette_score_with_grey",
-        "min_texture_painted": "AppearanceLimits.correlation",
-        "min_margin_painted": "AppearanceLimits.score_margin",
-    },
+    "registration/gate/kinds.py": dict.fromkeys(
+        (
+            *("min_margin_alone", "max_floating", "max_floating_alone", "min_tested_alone", "min_firmness_alone"),
+            *("min_likeness_alone", "min_likeness_unrivalled", "min_texture_painted", "min_margin_painted"),
+            *("min_likeness_several", "doubt_factor", "firm_margin", "max_slack_sigma", "far_range", "min_tested"),
+            *("min_inliers", "min_texture", "min_score_doubtful", "max_violations_doubtful", "max_violations"),
+        ),
+        "KINDS",
+    ),
     "registration/gate/objects.py": {
         "min_chains": "PROPOSERS",
         "min_objects": "SEVERAL",
-        "min_likeness_several": "Limits.silhouette_score",
-    },
-    "registration/gate/observability.py": {
-        "doubt_factor": "Limits.uncertain_factor",
-        "firm_margin": "FIRM_MARGIN",
-        "max_slack_sigma": "Limits.sigma_m",
-        "far_range": "Limits.range_m",
     },
     "registration/gate/odometry.py": {
         "odometry_sigmas": "SIGMAS",
     },
-    "registration/gate/overlap.py": {
-        "min_tested": "Limits.tested",
-        "min_inliers": "Limits.inliers",
-    },
-    "registration/gate/photometric.py": {
-        "min_texture": "CORRELATED",
-    },
     "registration/gate/surroundings.py": {
         "min_surroundings": "Limits.share",
         "max_fall_around": "Limits.correlation_loss",
-    },
-    "registration/gate/view_score.py": {
-        "min_score_doubtful": "Limits.least_doubtful",
-        "max_violations_doubtful": "Limits.violations",
     },
     "registration/kernels/same_pose.py": {
         "agreement_rotation": "AGREEING",

@@ -102,8 +102,8 @@ class Engine:
 
         What comes to a candidate's pose is left out: it was looked for from there, and is no proposer that agrees.
         """
-        source, target, most = pair.source, pair.target, self._params.max_violations
-        poses = [T for one in candidates for T in competing_poses(source, target, one, most)]
+        source, target = pair.source, pair.target
+        poses = [T for one in candidates for T in competing_poses(source, target, one)]
         known, competitors = np.array([one.T_target_source for one in candidates]), []
         for alignment in (refine(source, target, T) for T in poses):
             if not near(known, alignment.T_target_source, source.middle, AGREEING).any():

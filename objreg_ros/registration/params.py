@@ -61,7 +61,9 @@ class RegistrarParams(Params):
     candidates: int = param(4, "stored keyframes that are tried for each new one, best first", ge=1, le=100)
 
     # What decides a closure.
-    max_violations: float = param(0.07, "largest share of tested pixels in seen free space", ge=0.0, le=1.0)
+    least_odds: float = param(
+        75.0, "right poses for each false one, among poses as sure as the least sure that is accepted", ge=1.0, le=1e6
+    )
     max_translation: float = param(5.0, "largest distance between the two cameras", "m", ge=0.0)
 
     # How wrong an accepted pose may be; config/covariance.yaml says how these were calibrated.

@@ -10,6 +10,7 @@ import numpy as np
 from objreg_ros.data import Array, Reason
 from objreg_ros.geometry import skew
 from objreg_ros.registration.candidate import Candidate
+from objreg_ros.registration.gate.likelihood import odds_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -57,6 +58,7 @@ def evidence_of(candidate: Candidate) -> dict[str, float]:
     """The numbers of the verification, for whoever wants to look at a pose."""
     seen, aligned = candidate.verification, candidate.alignment
     numbers: dict[str, float | None] = {
+        "odds": odds_of(candidate),
         "score": seen.score,
         "inliers": seen.inliers,
         "violations": seen.violations,

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Surroundings: the views without the one or two matched objects that fill much of them.
 
-Objects that moved together and fill the views agree with themselves, and carry their print along. So what is around
-them must pass by itself what whole views pass.
+Objects that moved together and fill the views agree with themselves, and carry their print along: a monitor that had
+moved by 38 cm had a view score of 0.83. So what is around them must agree by itself.
 """
 
 from __future__ import annotations
@@ -12,43 +12,52 @@ from typing import NamedTuple
 
 from objreg_ros.data import Reason
 from objreg_ros.registration.candidate import Verification
-from objreg_ros.registration.gate import free_space, overlap, photometric
-from objreg_ros.registration.gate.objects import Objects
 from objreg_ros.registration.gate.refusal import Refusal
 
 
 class Limits(NamedTuple):
-    """What is asked of the surroundings; the first three are those of whole views."""
+    """What is asked of the surroundings."""
 
-    overlap: overlap.Limits = overlap.Limits()
-    violations: float = free_space.Limits().violations  # largest share of the tested pixels in seen free space
-    correlation: float = photometric.CORRELATED  # least correlation of grey
+    tested: int = 600  # least number of pixels of both views that land in the other one
+    inliers: float = 0.35  # least share of those whose depth agrees
     correlation_loss: float = 0.25  # largest, from the whole views to the surroundings
     share: float = 0.15  # least, of the tested pixels of the whole views, around a lone object
 
 
+LIMITS = Limits()
+
+
 def check(
-    around: Verification | None, whole: Verification, labels: Iterable[str], objects: Objects, limits: Limits
+    around: Verification | None, whole: Verification, labels: Iterable[str], lone: bool, limits: Limits = LIMITS
 ) -> Refusal | None:
     """Refuse a pose that its surroundings do not confirm; ``labels`` are those of the matched objects.
 
-    ``around`` is None where the objects are small in both views, none or many. The view score is not asked: a small
-    area scores little.
+    ``around`` is None where the objects are small in both views, none or many. ``lone`` says that one object speaks.
     """
     if around is None:
         return None
     refusal = (
-        _check_share(around.tested, whole.tested, objects.lone, limits.share)
-        or overlap.check(around.tested, around.inliers, limits.overlap)
-        or free_space.check_violations(around.violations, limits.violations)
-        or photometric.check(around.texture, objects.few, limits.correlation)
-        or photometric.check_loss(around.texture, whole.texture, limits.correlation_loss)
+        _check_share(around.tested, limits.share * whole.tested if lone else 0.0)
+        or _check_overlap(around, limits)
+        or _check_loss(around.texture, whole.texture, limits.correlation_loss)
     )
     return refusal and (refusal[0], f"without the {' and the '.join(labels)} {refusal[1]}")
 
 
-def _check_share(around: int, whole: int, lone: bool, least: float) -> Refusal | None:
-    """Refuse a ``lone`` object's pose with less than a share ``least`` of the ``whole`` pixels around the object."""
-    if not lone or around >= least * whole:
+def _check_share(tested: int, least: float) -> Refusal | None:
+    return None if tested >= least else (Reason.LOW_OVERLAP, f"{tested} pixels < {least:.0f}")
+
+
+def _check_overlap(around: Verification, limits: Limits) -> Refusal | None:
+    if around.tested < limits.tested:
+        return Reason.LOW_OVERLAP, f"{around.tested} pixels tested < {limits.tested}"
+    if around.inliers < limits.inliers:
+        return Reason.LOW_OVERLAP, f"inliers {around.inliers:.2f} < {limits.inliers:.2f}"
+    return None
+
+
+def _check_loss(around: float | None, whole: float | None, most: float) -> Refusal | None:
+    """Refuse a pose whose grey correlates by more than ``most`` less around the objects than in the ``whole`` views."""
+    if around is None or whole is None or whole - around <= most:
         return None
-    return Reason.LOW_OVERLAP, f"{around} pixels < {least:.2f} of {whole}"
+    return Reason.TEXTURE, f"correlation {around:.2f} < {whole:.2f} by more than {most:.2f}"

@@ -23,11 +23,11 @@ from objreg_ros.registration.score.view_score import PHOTOMETRIC_POINTS, RANKING
 
 TURNS_DEG = (5.0, 10.0, 15.0)  # about a lone object, each way, of the grid of competing poses
 REFINED = 4  # best starts about a lone object's pose
-HOPELESS = 2.0  # times the violations that the gate allows: what is not refined any more
+HOPELESS = 0.14  # share of violations from which on a pose is not refined any more
 BESIDE = 1.1  # tolerances of agreement off: where the search around a pose begins, rounding aside
 
 
-def competing_poses(source: Prepared, target: Prepared, candidate: Candidate, max_violations: float) -> list[Array]:
+def competing_poses(source: Prepared, target: Prepared, candidate: Candidate) -> list[Array]:
     """Poses (4, 4) that views score below a candidate's of one object by `FINISHED_MARGIN` at most.
 
     None for any other candidate. Some may be its own again once they are refined.
@@ -36,7 +36,7 @@ def competing_poses(source: Prepared, target: Prepared, candidate: Candidate, ma
         return []
     turned = half_turned(source, target, candidate.matched[0], candidate.T_target_source)
     found = [*([] if turned is None else [turned]), *_around(source, target, candidate)]
-    return [T for T in found if _is_hopeful(source, target, T, candidate, max_violations)]
+    return [T for T in found if _is_hopeful(source, target, T, candidate)]
 
 
 def _around(source: Prepared, target: Prepared, candidate: Candidate) -> list[Array]:
@@ -69,8 +69,8 @@ def _grid(source: Prepared, target: Prepared, candidate: Candidate) -> Array:
     return grid.reshape(-1, 4, 4)
 
 
-def _is_hopeful(source: Prepared, target: Prepared, T: Array, candidate: Candidate, max_violations: float) -> bool:
+def _is_hopeful(source: Prepared, target: Prepared, T: Array, candidate: Candidate) -> bool:
     """Whether a pose may come near to a candidate in its score, had all that is hidden been seen to agree."""
     seen = verify(source.sight, target.sight, T, PHOTOMETRIC_POINTS)
     behind = unoccluded_score(candidate.verification) - unoccluded_score(seen)
-    return behind <= FINISHED_MARGIN and seen.violations <= HOPELESS * max_violations
+    return behind <= FINISHED_MARGIN and seen.violations <= HOPELESS

@@ -9,18 +9,14 @@ import pytest
 
 from objreg_ros.data import Reason
 from objreg_ros.registration.candidate import ObjectPair, Verification
-from objreg_ros.registration.gate import overlap, surroundings
+from objreg_ros.registration.gate import surroundings
 from objreg_ros.registration.gate.limits import LIMITS as GATE
-from objreg_ros.registration.gate.objects import Objects
 from objreg_ros.registration.gate.verdict import refuse
 from registration.gate.samples import CUP
 from registration.samples import candidate
 
-LIMITS = surroundings.Limits(
-    overlap=overlap.Limits(600, 0.35), violations=0.07, correlation=0.3, correlation_loss=0.25, share=0.15
-)
+LIMITS = surroundings.Limits(tested=600, inliers=0.35, correlation_loss=0.25, share=0.15)
 SEEN = Verification(inliers=0.9, violations=0.0, occluded=0.0, texture=0.6, tested=9000, score=0.8)
-LONE = Objects(matched=1, few=True, few_proposers=True, inconsistent=False)
 
 
 @pytest.mark.parametrize(
@@ -30,36 +26,33 @@ LONE = Objects(matched=1, few=True, few_proposers=True, inconsistent=False)
         ({"score": -1.0}, None),
         ({"tested": 1349}, Reason.LOW_OVERLAP),
         ({"inliers": 0.3}, Reason.LOW_OVERLAP),
-        ({"violations": 0.08}, Reason.FREE_SPACE),
-        ({"texture": 0.2}, Reason.TEXTURE),
         ({"texture": 0.34}, Reason.TEXTURE),
         ({"texture": None}, None),
     ],
 )
 def test_surroundings_are_asked_for_what_whole_views_are(around: dict[str, float], reason: Reason | None) -> None:
-    refusal = surroundings.check(replace(SEEN, **around), SEEN, ["cup", "book"], LONE, LIMITS)
+    refusal = surroundings.check(replace(SEEN, **around), SEEN, ["cup", "book"], True, LIMITS)
     assert (None if refusal is None else refusal[0]) is reason
     assert refusal is None or refusal[1].startswith("without the cup and the book ")
 
 
 def test_surroundings_that_were_not_looked_at_refuse_nothing() -> None:
-    assert surroundings.check(None, SEEN, [], LONE, LIMITS) is None
+    assert surroundings.check(None, SEEN, [], True, LIMITS) is None
 
 
 def test_only_a_lone_object_must_leave_a_share_of_the_views() -> None:
-    around, confirmed = replace(SEEN, tested=1349), LONE._replace(few_proposers=False)
-    assert surroundings.check(around, SEEN, ["cup"], confirmed, LIMITS) is None
-    refusal = surroundings.check(around, SEEN, ["cup"], LONE, LIMITS)
-    assert refusal == (Reason.LOW_OVERLAP, "without the cup 1349 pixels < 0.15 of 9000")
+    around = replace(SEEN, tested=1349)
+    assert surroundings.check(around, SEEN, ["cup"], False, LIMITS) is None
+    refusal = surroundings.check(around, SEEN, ["cup"], True, LIMITS)
+    assert refusal == (Reason.LOW_OVERLAP, "without the cup 1349 pixels < 1350")
 
 
 @pytest.mark.parametrize(
     ("around", "reason"),
     [
         ({"texture": -0.1}, Reason.TEXTURE),
-        ({"violations": 1.1 * GATE.surroundings.violations}, Reason.FREE_SPACE),
-        ({"inliers": 0.5 * GATE.overlap.inliers}, Reason.LOW_OVERLAP),
-        ({"tested": GATE.overlap.tested - 1}, Reason.LOW_OVERLAP),
+        ({"inliers": 0.5 * GATE.surroundings.inliers}, Reason.LOW_OVERLAP),
+        ({"tested": GATE.surroundings.tested - 1}, Reason.LOW_OVERLAP),
         ({"score": -1.0}, None),  # what is little scores little
         ({}, None),
     ],
