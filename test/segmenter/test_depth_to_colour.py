@@ -11,7 +11,7 @@ import pytest
 from objreg_ros.data import Array, DepthImage, Intrinsics
 from objreg_ros.geometry import rotation_from_vector
 from objreg_ros.limits import MOST_DEPTH
-from objreg_ros.segmenter.depth_to_colour import NOISE, DepthToColour, find_rotation, turned
+from objreg_ros.segmenter.depth_to_colour import FIRST_SIGMA, NOISE, DepthToColour, find_rotation, turned
 
 CAMERA = Intrinsics(fx=525.0, fy=525.0, cx=319.5, cy=239.5, width=640, height=480)
 WALL = 2.5  # m
@@ -123,10 +123,20 @@ def test_depth_steps_without_edges_of_colour_tell_nothing() -> None:
     assert find_rotation(replace(painted, rgb=np.repeat(noise[..., None], 3, axis=2)), np.zeros(3), WIDE) is None
 
 
+def test_a_lone_frame_is_turned_far_less_than_one_of_a_stream_that_insists() -> None:
+    stream, seen_once = DepthToColour(), image(LAG)
+    first = stream.offset(seen_once).rotation
+    for _ in range(9):
+        later = stream.offset(seen_once).rotation
+    assert np.abs(later - LAG).max() < 0.003
+    assert np.linalg.norm(first) <= np.linalg.norm(later) + 1e-3
+    assert np.radians(0.25) > FIRST_SIGMA  # a frame with few things is led astray by degrees
+
+
 def test_what_was_found_is_said_in_degrees() -> None:
     stream = DepthToColour()
     assert stream.text() == ""
-    for _ in range(30):
+    for _ in range(90):
         stream._remember(np.radians([0.5, -1.0, 0.0]))
     assert stream.text().startswith("0.50 -1.00 0.00 deg about x y z, 0.")
 

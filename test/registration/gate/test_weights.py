@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -30,3 +32,10 @@ def test_no_kind_of_evidence_alone_makes_a_pose_likely() -> None:
     for name, weights in WEIGHTS.items():
         others = sum(min(WEIGHTS[other]) for other in WEIGHTS if other != name)
         assert PRIOR + max(weights) + others < 0.0
+
+
+def test_the_reference_says_what_each_kind_weighs() -> None:
+    told = (Path(__file__).parents[3] / "docs" / "gate.md").read_text()
+    for name, weights in WEIGHTS.items():
+        (row,) = (line for line in told.splitlines() if line.startswith(f"| `{name}` |"))
+        assert f"| {min(weights):+.2f} … {max(weights):+.2f} |" in row, "make docs/gate.md as gate/weights.py is"
