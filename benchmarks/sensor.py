@@ -6,7 +6,9 @@
 Every depth sensor is carried through rooms with a rig that is built well, one that is misregistered, one with a lag of
 depth, and one with both. ``offset``: the rotation that brings depth upon colour, as `segmenter/depth_to_colour.py`
 finds it in every frame, against the true one; that of stereo is not used. ``noise``: that of depth in a Kinect's, as
-`sensor.depth_noise` measures it.
+`sensor.depth_noise` measures it. ``lag``: how late depth is behind colour, as `segmenter/sensor_estimate.py` tells it,
+beside the rig's; not that of stereo.
+It takes ``--frames 240`` or more: fewer are too far apart.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from tqdm import tqdm
 from objreg_ros.data import Array, DepthImage
 from objreg_ros.geometry import inverse, vector_from_rotation
 from objreg_ros.segmenter.depth_to_colour import DepthToColour
+from objreg_ros.segmenter.sensor_estimate import SensorEstimate
 from objreg_ros.segmenter.view import reduced_view, step_for
 from objreg_ros.sensor import depth_noise
 from objreg_ros.simulation.camera import CAMERAS, SENSORS
@@ -57,9 +60,11 @@ def frames_of(sensor: str, rig: RigParams, seed: int, count: int, rate: float) -
 def measured(sensor: str, rig: RigParams, seed: int, count: int, rate: float) -> dict[str, Any]:
     """What one stream tells, and the truth, frame by frame."""
     stream, found, true, noise = DepthToColour(), [], [], []  # what would be found of a stereo camera is not used
+    estimate = SensorEstimate()
     for image, rotation in frames_of(sensor, rig, seed, count, rate):
         found.append(stream.offset(image).rotation)
         true.append(rotation)
+        estimate.register(image)
         view = reduced_view(image, step_for(image.depth.shape[1], VIEW_STEP), NEAREST_M, FARTHEST_M)
         noise.append(depth_noise(np.nan_to_num(view.xyz[..., 2])))
     degrees = {"found": np.degrees(found[FIRST:]), "true": np.degrees(true[FIRST:])}
@@ -68,6 +73,9 @@ def measured(sensor: str, rig: RigParams, seed: int, count: int, rate: float) ->
         "off_deg": np.percentile(off, (50, 90)).tolist(),
         "true_deg": np.percentile(np.linalg.norm(degrees["true"], axis=1), (50, 90)).tolist(),
         "noise": np.percentile(noise, (10, 50, 90)).tolist(),
+        "told_noise": estimate.noise,
+        "true_lag_ms": rig.lag_ms,
+        "lag": None if estimate.lag is None else estimate.lag._asdict(),
         **{name: value.tolist() for name, value in degrees.items()},
     }
 
@@ -104,11 +112,13 @@ def main(frames: int, rate: float, seed: int, json_file: Path | None, picture: P
     """Compare what streams tell of their sensor with the truth."""
     streams = [(f"{sensor}, {name}", sensor, rig) for sensor in SENSORS for name, rig in RIGS.items()]
     rows = {name: measured(sensor, rig, seed, frames, rate) for name, sensor, rig in tqdm(streams, unit="stream")}
-    click.echo(f"{'stream':40} {'true offset':>16} {'found, off by':>16}   noise (median, 10 and 90 %)")
+    click.echo(f"{'stream':40} {'true offset':>16} {'found, off by':>16}   noise (median, 10 and 90 %)  true lag  told")
     for name, row in rows.items():
         (true, true_90), (off, off_90), (low, noise, high) = row["true_deg"], row["off_deg"], row["noise"]
         offsets = f"{true:6.2f} (p90 {true_90:.2f}) {off:6.2f} (p90 {off_90:.2f})"
-        click.echo(f"{name:40} {offsets}   {noise:.2f} ({low:.2f}, {high:.2f})")
+        told = "-" if row["lag"] is None else f"{row['lag']['ms']:.0f} +- {row['lag']['sigma_ms']:.0f} ms"
+        lags = f"{row['true_lag_ms']:.0f} ms  {told}"
+        click.echo(f"{name:40} {offsets}   {noise:.2f} ({low:.2f}, {high:.2f})  {lags}")
     if json_file is not None:
         json_file.write_text(json.dumps(rows))
     if picture is not None:

@@ -37,10 +37,10 @@ from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.record import Record
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.report.export import constraint
-from objreg_ros.segmenter.depth_to_colour import DepthToColour
 from objreg_ros.segmenter.gravity_choice import GravityChoice
 from objreg_ros.segmenter.imu import FindPose, Imu
 from objreg_ros.segmenter.params import SegmenterParams
+from objreg_ros.segmenter.sensor_estimate import Lag, SensorEstimate
 from objreg_ros.truth import Truth, summarise
 
 Word = TypeVar("Word")
@@ -63,8 +63,8 @@ class Segments(Protocol):
         ...
 
     @property
-    def depth_to_colour(self) -> DepthToColour:
-        """How depth is turned against colour."""
+    def sensor(self) -> SensorEstimate:
+        """What the frames told of their sensor."""
         ...
 
     def segment(
@@ -159,6 +159,8 @@ class Run:
     complaints: dict[str, str] = field(default_factory=dict)  # the first of each kind
     gravity_from: Counter[str] = field(default_factory=Counter)  # frames that went to the segmenter by who told it
     depth_to_colour: str = ""  # how depth was turned against colour, in the end
+    depth_noise: float | None = None  # in that of a Kinect v1; None where too little was measured
+    depth_lag: Lag | None = None  # behind colour; None where it is not known well
     gravity_apart_deg: list[float] = field(default_factory=list)  # IMU and picture, in the frames that have both
     imu_passed_over: Counter[str] = field(default_factory=Counter)  # by reason
     stage_s: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
@@ -171,6 +173,8 @@ class Run:
             "objects": self.objects,
             "lens": self.lens,
             "depth_to_colour": self.depth_to_colour,
+            "depth_noise": None if self.depth_noise is None else round(self.depth_noise, 3),
+            "depth_lag": None if self.depth_lag is None else self.depth_lag._asdict(),
             "constraints": [constraint_with_error(closure, truth) for closure in self.closures],
             "rejected": dict(sorted(self.rejected.items())),
             "dropped": dict(sorted(self.dropped.items())),
@@ -290,6 +294,9 @@ class Line:
         self._segment(self._views.flush())
         self._track(self._frames.flush())
         self._note(self._rooms.registrar.finish())
+        sensor = self._rooms.segmenter.sensor
+        self.run.depth_to_colour = sensor.depth_to_colour.text()
+        self.run.depth_noise, self.run.depth_lag = sensor.noise, sensor.lag
         return self.run
 
     def _take_image(self, stamp_ns: int, message: Any) -> None:
@@ -328,7 +335,6 @@ class Line:
             segmenter = self._rooms.segmenter
             frame = as_sent(segmenter.segment(detections, depth, gravity, gravity_sigma_deg=sigma_deg))
         self._note_gravity(segmenter.choice)
-        self.run.depth_to_colour = segmenter.depth_to_colour.text()
         return frame
 
     def _felt_gravity(self, match: Match, camera_frame: str) -> FeltGravity | None:

@@ -50,8 +50,14 @@ def depth_noise(depth: NDArray[np.floating]) -> float:
     On a plane inverse depth is linear along rows and columns. What its second differences have is noise, but for edges
     and what is curved: so the median counts.
     """
+    noise = measured_noise(depth)
+    return 1.0 if noise is None else noise
+
+
+def measured_noise(depth: NDArray[np.floating]) -> float | None:
+    """The `depth_noise` of the depth (h, w) m of a view; None where too little was measured."""
     ratios = np.concatenate([_ratios(depth), _ratios(depth.T)])
-    return 1.0 if len(ratios) < LEAST_TRIPLES else float(np.median(ratios)) / (GAUSSIAN * KINECT)
+    return None if len(ratios) < LEAST_TRIPLES else float(np.median(ratios)) / (GAUSSIAN * KINECT)
 
 
 def _ratios(depth: NDArray[np.floating]) -> NDArray[np.floating]:

@@ -21,8 +21,8 @@ from objreg_ros.data import (
 )
 from objreg_ros.geometry import back_project, inverse
 from objreg_ros.offline import Rooms
-from objreg_ros.segmenter.depth_to_colour import DepthToColour
 from objreg_ros.segmenter.gravity_choice import GravityChoice
+from objreg_ros.segmenter.sensor_estimate import SensorEstimate
 
 
 @dataclass
@@ -49,7 +49,7 @@ class OneCloud:
     """Cuts one point out of every depth image."""
 
     choice = GravityChoice(None, 0.0, "nothing")
-    depth_to_colour = DepthToColour()
+    sensor = SensorEstimate()
 
     def __init__(self) -> None:
         self.heard_sigma_deg: list[float | None] = []

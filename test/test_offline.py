@@ -19,6 +19,7 @@ from objreg_ros.offline import Timing, as_sent, run_offline
 from objreg_ros.recording import Record, messages
 from objreg_ros.recording.inputs import Inputs
 from objreg_ros.segmenter.organise import organise
+from objreg_ros.segmenter.sensor_estimate import Lag, SensorEstimate
 from objreg_ros.truth import Truth
 
 INPUTS = Inputs(image="/image", depth="/depth/image", camera_info="/camera_info", odom="/odom")
@@ -350,9 +351,7 @@ def seen_of_a_lens(records: Iterator[Record], inputs: Inputs, rectified: str = "
         met.append((depth, detections.xyxy))
         return rooms.segmenter.segment(detections, depth, gravity, **more)
 
-    spied_segmenter = SimpleNamespace(
-        segment=segment, choice=rooms.segmenter.choice, depth_to_colour=rooms.segmenter.depth_to_colour
-    )
+    spied_segmenter = SimpleNamespace(segment=segment, choice=rooms.segmenter.choice, sensor=rooms.segmenter.sensor)
     spied = replace(rooms, segmenter=spied_segmenter)
     return run_offline(records, spied, inputs, Timing(rectified=rectified)), met
 
@@ -383,3 +382,21 @@ def test_frames_of_a_lens_that_nobody_knows_are_dropped_with_what_to_do() -> Non
     run = run_offline(of_a_lens(3, "nobody's"), rooms, INPUTS)
     assert chain.frames == [] and run.dropped == {"malformed_depth": 3}
     assert 'got "nobody\'s"; set segmenter.rectified to all' in run.complaints["malformed_depth"]
+
+
+def test_a_run_tells_what_its_frames_told_of_their_sensor() -> None:
+    rooms, _ = simple_rooms()
+    sensor = SimpleNamespace(
+        noise=1.234567, lag=Lag(24.0, 3.5), depth_to_colour=SimpleNamespace(text=lambda: "0.50 deg")
+    )
+    told = SimpleNamespace(segment=rooms.segmenter.segment, choice=rooms.segmenter.choice, sensor=sensor)
+    summary = run_offline(records(2), replace(rooms, segmenter=told), INPUTS).summary(Truth([]))
+    assert summary["depth_noise"] == 1.235 and summary["depth_to_colour"] == "0.50 deg"
+    assert summary["depth_lag"] == {"ms": 24.0, "sigma_ms": 3.5}
+
+
+def test_a_run_whose_frames_tell_nothing_of_their_sensor_says_none() -> None:
+    rooms, _ = simple_rooms()
+    told = SimpleNamespace(segment=rooms.segmenter.segment, choice=rooms.segmenter.choice, sensor=SensorEstimate())
+    summary = run_offline(records(2), replace(rooms, segmenter=told), INPUTS).summary(Truth([]))
+    assert summary["depth_noise"] is None and summary["depth_lag"] is None

@@ -17,6 +17,7 @@ from objreg_ros.sensor import (
     depth_noise,
     depth_sigma,
     depth_tolerance,
+    measured_noise,
     silhouette_tolerance,
 )
 
@@ -44,6 +45,7 @@ def test_edges_and_holes_change_next_to_nothing() -> None:
 def test_a_plane_without_noise_has_none_and_a_view_without_depth_counts_as_usual() -> None:
     assert depth_noise(tilted_plane(0.0)) < 1e-6
     assert depth_noise(np.zeros((120, 160))) == 1.0 and depth_noise(np.ones((2, 3))) == 1.0
+    assert measured_noise(np.zeros((120, 160))) is None
 
 
 def test_depths_of_noisier_cameras_may_differ_by_more_and_never_by_less_than_a_kinect_s() -> None:

@@ -172,6 +172,10 @@ def _say(run: Run, summary: dict) -> None:
         click.echo(f"  lens: {run.lens}")
     if run.depth_to_colour:
         click.echo(f"  depth is turned against colour by {run.depth_to_colour}; undone")
+    if run.depth_lag is not None:
+        click.echo(f"  depth is behind colour by {run.depth_lag.text()}")
+    if run.depth_noise is not None:
+        click.echo(f"  depth noise: {run.depth_noise:.2f} (a Kinect v1 has 1)")
     if run.gravity_from:
         click.echo(
             f"  gravity from {', '.join(f'{name}: {count}' for name, count in sorted(run.gravity_from.items()))}"

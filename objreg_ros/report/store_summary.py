@@ -14,11 +14,13 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.memory.landmarks import Landmark, Landmarks
 from objreg_ros.memory.sighting import Sighting
-from objreg_ros.memory.store import Store
+from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.sensor import measured_noise
 
 PANEL = 640  # px
 MARGIN = 60  # px
+MOST_VIEWS = 100  # are read for the noise of their depth
 COLOURS = np.array([[214, 96, 77], [67, 147, 195], [90, 174, 97], [153, 112, 171], [191, 129, 45], [53, 151, 143]])
 
 
@@ -31,6 +33,7 @@ class Survey:
     counts: dict[str, int]
     landmarks: tuple[Landmark, ...]
     sightings: tuple[Sighting, ...]
+    depth_noise: float | None  # median of the views, in that of a Kinect v1; None where none has enough depth
 
     @property
     def labels(self) -> dict[str, int]:
@@ -64,9 +67,27 @@ def survey(path: str | Path) -> Survey:
             counts=store.counts(),
             landmarks=landmarks.known(),
             sightings=sightings,
+            depth_noise=_depth_noise(store),
         )
     finally:
         store.close()
+
+
+def _depth_noise(store: Store) -> float | None:
+    """The median noise of the depth of stored views; of `MOST_VIEWS` spread evenly where there are more."""
+    ids = store.keyframe_ids()
+    chosen = np.unique(np.linspace(0, len(ids) - 1, min(len(ids), MOST_VIEWS)).round().astype(int)).tolist()
+    noises = (_noise_of(store, ids[k]) for k in chosen)
+    told = [noise for noise in noises if noise is not None]
+    return float(np.median(told)) if told else None
+
+
+def _noise_of(store: Store, keyframe_id: int) -> float | None:
+    try:
+        view = store.keyframe(keyframe_id).view
+    except StoreError:
+        return None  # a damaged keyframe leaves the others to tell
+    return measured_noise(np.nan_to_num(view.xyz[..., 2], nan=0.0))
 
 
 def describe(path: str | Path) -> str:
@@ -75,6 +96,8 @@ def describe(path: str | Path) -> str:
     lines = [f"{found.path}: a store of objreg_ros, {found.bytes / 1e6:.1f} MB"]
     lines += ["  " + ", ".join(f"{count} {name}" for name, count in found.counts.items())]
     lines += ["  labels: " + (", ".join(f"{name} {count}" for name, count in found.labels.items()) or "none")]
+    if found.depth_noise is not None:
+        lines.append(f"  depth noise of the views: {found.depth_noise:.2f} (a Kinect v1 has 1)")
     for session in found.sessions:
         seconds = 1e-9 * (session["last_ns"] - session["first_ns"])
         lines.append(

@@ -57,12 +57,14 @@ class Offset(NamedTuple):
 class DepthToColour:
     """The offset of one stream; remembers what its frames told, until another camera comes.
 
-    ``mean (3,)`` and ``spread (3,)`` rad are of the offsets that were told, in so many ``frames``.
+    ``mean (3,)`` and ``spread (3,)`` rad are of the offsets that were told, in so many ``frames``. ``found (3,)`` rad
+    is what the last frame told by itself, None where it told nothing.
     """
 
     mean: Array = field(default_factory=lambda: np.zeros(3))
     spread: Array = field(default_factory=lambda: np.full(3, FIRST_SIGMA))
     frames: int = 0
+    found: Array | None = None
     _camera: tuple[Any, ...] | None = None
 
     def text(self) -> str:
@@ -77,6 +79,7 @@ class DepthToColour:
     def forget(self) -> None:
         """Begin with another stream."""
         self.mean, self.spread, self.frames = np.zeros(3), np.full(3, FIRST_SIGMA), 0
+        self.found = None
 
     def register(self, image: DepthImage) -> DepthImage:
         """The image with its depth brought upon its colour; itself where it has no colour or nothing is to be done.
@@ -84,6 +87,7 @@ class DepthToColour:
         Depth of a stereo camera is left as it is: its steps are half a matching window beside the things.
         """
         if image.rgb is None or is_matched(image):
+            self.found = None
             return image
         rotation = self.offset(image).rotation
         return image if np.abs(rotation).max() < SMALLEST else turned(image, rotation)
@@ -94,7 +98,7 @@ class DepthToColour:
         if self._camera not in (None, camera):
             self.forget()
         self._camera = camera
-        found = find_rotation(image, self.mean, self.spread)
+        self.found = found = find_rotation(image, self.mean, self.spread)
         if found is None:
             return Offset(self.mean.copy(), False)
         self._remember(found)

@@ -244,14 +244,12 @@ class SegmenterNode(MatchingDoor):
             )  # fmt: skip
 
     def extra_diagnostics(self) -> Mapping[str, object]:
-        """What matching tells, who told gravity, what of the IMU was passed over, and how depth lies upon colour."""
+        """What matching tells, who told gravity, what of the IMU was passed over, and how the sensor errs."""
         apart = sorted(self._apart_deg.copy())
         told = {f"gravity from {source}": count for source, count in sorted(self._told.items())}
         passed_over = {f"imu {reason}": count for reason, count in sorted(self._imu.counts.items())}
         middle = {"gravity of imu and picture apart p50 [deg]": f"{apart[len(apart) // 2]:.1f}"} if apart else {}
-        turned = self._segmenter.depth_to_colour.text()
-        offset = {"depth is turned against colour by": turned} if turned else {}
-        return {**super().extra_diagnostics(), **told, **middle, **passed_over, **offset}
+        return {**super().extra_diagnostics(), **told, **middle, **passed_over, **self._segmenter.sensor.text()}
 
     def _doubt(self, detections: Detections, depth: DepthImage, frame: Frame) -> None:
         doubts = {

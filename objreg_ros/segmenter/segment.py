@@ -13,13 +13,13 @@ import numpy as np
 from objreg_ros.data import Array, DepthImage, Detections, Frame, Intrinsics, ObjectCloud, PointFlag
 from objreg_ros.segmenter import boxes, paper
 from objreg_ros.segmenter.boxes import Box
-from objreg_ros.segmenter.depth_to_colour import DepthToColour
 from objreg_ros.segmenter.depth_to_colour import warm as warm_offset
 from objreg_ros.segmenter.extract import Pixels, cell_points, colours
 from objreg_ros.segmenter.gravity import camera_up, estimate_up, known_normals
 from objreg_ros.segmenter.gravity_choice import GravityChoice, choose_gravity
 from objreg_ros.segmenter.isolate import Isolated, cut_out, isolate, mark
 from objreg_ros.segmenter.params import SegmenterParams
+from objreg_ros.segmenter.sensor_estimate import SensorEstimate
 from objreg_ros.segmenter.support import Ground, find_supports
 from objreg_ros.segmenter.surface import Surface, cell_size, reduce
 from objreg_ros.segmenter.view import reduced_view, step_for
@@ -33,8 +33,8 @@ NORMALS = 3  # every so many of these tell gravity
 class Segmenter:
     """Segments one frame at a time.
 
-    Between frames it keeps ``depth_to_colour``: how depth is turned against colour, and ``choice``: who told the last
-    one's gravity.
+    Between frames it keeps ``sensor``: how noisy depth is, how it is turned against colour and how late it is, and
+    ``choice``: who told the last one's gravity.
 
     A second thread takes half of the boxes: the kernels let go of the interpreter's lock.
     """
@@ -43,7 +43,7 @@ class Segmenter:
         self.params = params or SegmenterParams()
         self.choice = GravityChoice(None, 0.0, "nothing")
         self._beside = ThreadPoolExecutor(1, "segmenter")
-        self.depth_to_colour = DepthToColour()
+        self.sensor = SensorEstimate()
 
     def warm(self) -> None:
         """Compile or load every kernel and claim memory, so that the first frame is as fast as the others."""
@@ -67,8 +67,8 @@ class Segmenter:
         self.forget()
 
     def forget(self) -> None:
-        """Begin with another stream: nothing is known of how its depth is turned against its colour."""
-        self.depth_to_colour.forget()
+        """Begin with another stream: nothing is known of its sensor."""
+        self.sensor.forget()
 
     def segment(
         self,
@@ -91,7 +91,7 @@ class Segmenter:
         of what stands in the box. ValueError for masks of another number, type or shape.
         """
         params, outlines = self.params, _outlines(masks, len(detections), depth)
-        depth = self.depth_to_colour.register(_plain(depth))
+        depth = self.sensor.register(_plain(depth))
         seen = (depth, step_for(depth.depth.shape[1], params.view_step), params.z_min, params.limits[0])
         view = self._beside.submit(reduced_view, *seen)
         ground = self._ground(depth, gravity, gravity_sigma_deg)

@@ -81,6 +81,7 @@ def test_a_segmenter_tells_the_gravity_that_an_imu_feels_whatever_else_the_imu_s
         return {pair.key: pair.value for pair in running.status["/segmenter"].values}
 
     running.wait_for(lambda: told().get("gravity from imu") == "1", what="diagnostics of gravity")
+    assert told()["depth noise (a Kinect v1 has 1)"] == "0.00"  # a wall without any
     expected = {"malformed imu": "1", "imu no_acceleration": "1", "imu norm": "1", "imu late": "1"}
     assert {key: told().get(key) for key in expected} == expected
     assert running.alive("/segmenter")
