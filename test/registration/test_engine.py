@@ -100,7 +100,7 @@ def test_what_else_a_lone_objects_pose_could_be_is_a_competitor_unless_it_comes_
 ) -> None:
     known = [candidate(moved(x), matched=(ObjectPair(0, 0, "cup"),)) for x in (0.0, 1.0)]
     others = {0.0: [moved(0.5), moved(0.1)], 1.0: [moved(-0.1), moved(1.5)]}
-    monkeypatch.setattr(engine_module, "competing_poses", lambda s, t, one, p: others[one.T_target_source[0, 3]])
+    monkeypatch.setattr(engine_module, "competing_poses", lambda s, t, one: others[one.T_target_source[0, 3]])
     monkeypatch.setattr(engine_module, "refine", lambda s, t, T: candidate(T).alignment)
     monkeypatch.setattr(engine, "_gathered", lambda pair, found, proposers: (found.T_target_source[0, 3], proposers))
     pair: Any = SimpleNamespace(source=SimpleNamespace(middle=np.zeros(3)), target=None)
