@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from objreg_ros.registration.gate import free_space, gravity, likelihood, odometry, surroundings
+from objreg_ros.registration.gate import competing, free_space, gravity, likelihood, odometry, surroundings
 from objreg_ros.registration.params import RegistrarParams
 
 
@@ -17,6 +17,7 @@ class Limits(NamedTuple):
     gravity_sigmas: float = gravity.SIGMAS
     free_space: free_space.Limits = free_space.LIMITS
     surroundings: surroundings.Limits = surroundings.LIMITS
+    score_margin: float = competing.LEAST_MARGIN
     odometry_sigmas: float = odometry.SIGMAS
 
 

@@ -14,6 +14,7 @@ from dataclasses import replace
 from objreg_ros.data import Reason
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.gate import (
+    competing,
     convergence,
     free_space,
     gravity,
@@ -74,6 +75,7 @@ def check_rules(one: Candidate, prior: Prior | None = None, limits: Limits = LIM
         or objects.check_moved(matched, len(one.moved))
         or objects.check_matched(matched)
         or surroundings.check(one.surroundings, one.verification, labels, lone, limits.surroundings)
+        or competing.check(one.margin_over_competing, limits.score_margin)
         or observability.check(len(one.alignment.degenerate))
         or odometry.check(one.T_target_source, prior, limits.odometry_sigmas)
     )

@@ -65,7 +65,7 @@ def chosen(candidates: tuple[Candidate, ...]) -> Alignment | None:
 
 def test_the_second_candidate_is_taken_when_the_first_is_refused() -> None:
     good = candidate()
-    assert chosen((candidate(violations=0.4), good)) is good.alignment
+    assert chosen((candidate(**TILTED), good)) is good.alignment
 
 
 def test_the_refusal_is_that_of_the_best_candidate() -> None:
@@ -75,7 +75,7 @@ def test_the_refusal_is_that_of_the_best_candidate() -> None:
 
 def test_the_best_candidate_is_the_first_whatever_views_like_more() -> None:
     good = candidate(score=0.6)
-    rest = candidate(violations=0.4, score=0.6), candidate(**TILTED, score=0.9)
+    rest = candidate(**TILTED, score=0.6), candidate(**TILTED, score=0.9)
     assert chosen((rest[0], good, rest[1])) is good.alignment
 
 
