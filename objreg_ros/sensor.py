@@ -3,7 +3,7 @@
 
 The numbers are those of a structured-light camera (Kinect v1). Where two of them speak of the same thing they differ,
 since each room was fitted with its own. What another camera errs by as much again is measured in every view
-(`depth_noise`), and its tolerances grow with it (`depth_tolerance`): nobody has to name a camera.
+(`depth_noise`), and the registration's tolerances grow with it (`depth_tolerance`): nobody has to name a camera.
 """
 
 from __future__ import annotations
@@ -18,12 +18,14 @@ DEPTH_NOISE_M = 0.0012
 DEPTH_NOISE_GROWTH = 0.0019  # 1/m
 DEPTH_WARP = 0.005  # error of depth that a patch of surface shares, as a share of its distance
 
-# Tracking between frames: the standard deviation is TRACKING_SIGMA_M + TRACKING_SIGMA_GROWTH z^2.
+# Tracking between frames: the standard deviation is TRACKING_SIGMA_M + TRACKING_SIGMA_GROWTH z^2, for every camera:
+# more for a noisier one gains nothing where grey holds the pose as well (docs/tried.md).
 TRACKING_SIGMA_M = 0.002
 TRACKING_SIGMA_GROWTH = 0.003  # 1/m
 
 # Segmentation: a point of a plane may lie PLANE_TOLERANCE_M + PLANE_TOLERANCE_GROWTH z^2 off it
-# (Khoshelham and Elberink, "Accuracy and resolution of Kinect depth data", 2012).
+# (Khoshelham and Elberink, "Accuracy and resolution of Kinect depth data", 2012),
+# for every camera: more for a noisier one makes segments worse (docs/tried.md).
 PLANE_TOLERANCE_M = np.float32(0.008)
 PLANE_TOLERANCE_GROWTH = np.float32(0.006)  # 1/m
 
