@@ -52,6 +52,11 @@ class Outside:
         self.executor.add_node(door)
         self.executor.add_node(self.node)
         self.wait(lambda: self.odom.get_subscription_count() and self.constraints.get_subscription_count())
+        self.wait(self._is_heard)  # a reader that has not met its writer yet misses what that sends
+
+    def _is_heard(self) -> bool:
+        names = self.odom.topic_name, self.constraints.topic_name
+        return all(one.get_publisher_count() for one in self.door.subscriptions if one.topic_name in names)
 
     def wait(self, done: Callable[[], Any], seconds: float = 20.0) -> None:
         end = time.monotonic() + seconds
