@@ -42,6 +42,7 @@ DEPTH_TOLERANCE_GROWTH = 0.006  # 1/m
 SPAN = 3  # pixels of a view between the depths that are compared: block matching errs alike over fewer
 SAME_SURFACE = 0.1  # share by which inverse depths on one surface differ at most over that
 LEAST_TRIPLES = 200
+NOISE_WIDTH = 160  # px: a picture is thinned to no less for its noise to be measured, as views are
 KINECT = 1.25  # what `depth_noise` gives before it is divided by this: 1.1 in simulation, 1.1 to 1.25 with real ones
 GAUSSIAN = 0.6745  # the median of what has a standard deviation of 1, regardless of its sign
 
@@ -60,6 +61,12 @@ def measured_noise(depth: NDArray[np.floating]) -> float | None:
     """The `depth_noise` of the depth (h, w) m of a view; None where too little was measured."""
     ratios = np.concatenate([_ratios(depth), _ratios(depth.T)])
     return None if len(ratios) < LEAST_TRIPLES else float(np.median(ratios)) / (GAUSSIAN * KINECT)
+
+
+def thinned(depth: NDArray[np.floating]) -> NDArray[np.floating]:
+    """The depth (h, w) of a picture with pixels left out, as many as leave it `NOISE_WIDTH` wide or more."""
+    every = max(1, depth.shape[1] // NOISE_WIDTH)
+    return depth[::every, ::every]
 
 
 def _ratios(depth: NDArray[np.floating]) -> NDArray[np.floating]:

@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from objreg_ros import share
-from objreg_ros.cli.simulate import camera_of, sensors_of
+from objreg_ros.cli.simulate import camera_of, distortion_of, sensors_of
 from objreg_ros.data import Array
 from objreg_ros.detector.mobilenet_ssd import Detector
 from objreg_ros.detector.params import DetectorParams
@@ -46,7 +46,10 @@ SCENARIOS = ("loop", "opposite", "look-alikes", "moved")
 RIGS = {
     "plain": (),
     "stress": (),
-    "rig": ("rig.lag_ms=20", "rig.rolling_ms=20", "rig.blur_ms=8", "rig.misregistration_px=1.5"),
+    "rig": (
+        *("rig.lag_ms=20", "rig.rolling_ms=20", "rig.blur_ms=8", "rig.misregistration_px=1.5"),
+        f"rig.distortion={distortion_of('webcam')}",
+    ),
 }
 EAGER = {"candidates": 10, "closures": 10, "thin_seconds": 0.2, "threads": 1, "covariance_calibration": 0.01}
 FRAMES, RATE = 200, 10.0

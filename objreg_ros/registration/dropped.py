@@ -53,12 +53,20 @@ CONSTANT_OF = {
     "registration/engine.py": {
         "holding_likeness": "HOLDING_SILHOUETTE_SCORE",
     },
+    "registration/gate/competing.py": {
+        "min_margin_alone": "LEAST_MARGIN",
+    },
+    "registration/gate/free_space.py": {
+        "max_floating": "Limits.certain",
+        "max_floating_alone": "Limits.certain",
+        "max_violations": "Limits.violations",
+    },
     "registration/gate/kinds.py": dict.fromkeys(
         (
-            *("min_margin_alone", "max_floating", "max_floating_alone", "min_tested_alone", "min_firmness_alone"),
+            *("min_tested_alone", "min_firmness_alone"),
             *("min_likeness_alone", "min_likeness_unrivalled", "min_texture_painted", "min_margin_painted"),
             *("min_likeness_several", "doubt_factor", "firm_margin", "max_slack_sigma", "far_range", "min_tested"),
-            *("min_inliers", "min_texture", "min_score_doubtful", "max_violations_doubtful", "max_violations"),
+            *("min_inliers", "min_texture", "min_score_doubtful", "max_violations_doubtful"),
         ),
         "KINDS",
     ),

@@ -19,7 +19,7 @@ import numpy as np
 
 from objreg_ros.data import Array, DepthImage, Intrinsics
 from objreg_ros.limits import MOST_DEPTH
-from objreg_ros.sensor import PLANE_TOLERANCE_GROWTH, PLANE_TOLERANCE_M, depth_noise
+from objreg_ros.sensor import PLANE_TOLERANCE_GROWTH, PLANE_TOLERANCE_M, depth_noise, thinned
 
 WIDTH = 320  # px: the picture is halved until it is no wider
 POINTS = 1500  # most depth steps that are asked
@@ -41,7 +41,6 @@ MEMORY = 20  # frames that are remembered
 FIRST_FRAMES = 0.2  # that the first guess of the spread is worth
 LEAST_AWAY = 0.1  # m before the camera, of a ray that is 1 m long along the other's axis: else it looks aside
 FAST = {"reassoc", "contract", "arcp", "nsz", "afn"}  # fast arithmetic that still knows NaN
-NOISE_WIDTH = 160  # px: depth is thinned to no less for its noise to be measured
 MATCHED = 1.5  # noise of depth in a Kinect's: simulated and real Kinects have 0.9 to 1.4, a RealSense D435 1.8 and more
 SMALLEST = 1e-3  # rad: half a pixel of the usual camera; less is left as it is
 
@@ -118,8 +117,7 @@ class DepthToColour:
 
 def is_matched(image: DepthImage) -> bool:
     """Whether depth is that of a stereo camera, which matches windows: it has more noise than any other."""
-    every = max(1, image.depth.shape[1] // NOISE_WIDTH)
-    return depth_noise(image.depth[::every, ::every]) > MATCHED
+    return depth_noise(thinned(image.depth)) > MATCHED
 
 
 def find_rotation(image: DepthImage, mean: Array, spread: Array) -> Array | None:

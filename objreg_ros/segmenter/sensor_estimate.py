@@ -19,16 +19,13 @@ import numpy as np
 
 from objreg_ros.data import Array, DepthImage
 from objreg_ros.segmenter.depth_to_colour import DepthToColour
-from objreg_ros.sensor import measured_noise
+from objreg_ros.sensor import measured_noise, thinned
 
-NOISE_WIDTH = 160  # px: depth is thinned to no less for its noise to be measured
 NOISE_EVERY = 10  # frames: so it costs a tenth of a millisecond of each
 NOISES = 100  # that are remembered
 PICTURE_WIDTH = 160  # px: to so many or more a picture is halved, to see how it moves
 LEAST_RESPONSE = 0.1  # of a phase correlation, for the picture to have moved as a whole
-MOST_SHIFT = (
-    0.05  # of the picture: as it rolls or moves by more, its shift says too little of the offset of that moment
-)
+MOST_SHIFT = 0.05  # of the picture: as it rolls or moves by more, its shift says too little of that moment's offset
 LONGEST_S = 0.25  # between two frames for a velocity; a hand that carries a camera turns back in half a second
 TURNS = 1000  # that are remembered
 LEAST_TURNS, LEAST_CLUSTERS = 30, 5  # for a lag to be told
@@ -155,8 +152,7 @@ class SensorEstimate:
         self._waiting = None if found is None else (1e-9 * image.stamp_ns, found[:2])
 
     def _measure_noise(self, image: DepthImage) -> None:
-        every = max(1, image.depth.shape[1] // NOISE_WIDTH)
-        noise = measured_noise(image.depth[::every, ::every])
+        noise = measured_noise(thinned(image.depth))
         if noise is not None:
             self._noises.append(noise)
 
