@@ -43,9 +43,9 @@ class Result:
     refused: Counter[str] = field(default_factory=Counter)  # by reason
 
 
-def ours(source: Source, seed: int) -> Result:
-    """The registrar, frame by frame."""
-    params = RegistrarParams(seed=seed).replaced(**source.camera)
+def ours(source: Source, seed: int, **other: float) -> Result:
+    """The registrar, frame by frame, with ``other`` values of its parameters."""
+    params = RegistrarParams(seed=seed).replaced(**source.camera, **other)
     warm(params)
     registrar = Registrar(params)
     result = Result([], 0, 0.0)

@@ -4,8 +4,9 @@
 For every recording and method: constraints, true ones (within 5 degrees and 10 cm), false ones (worse than 8 degrees or
 15 cm), the share of the revisits that were closed by view change, the processor's milliseconds a pair, and the error of
 the trajectory by drifting odometry and after the same pose graph took the method's constraints. The oracle's
-constraints are perfect and there is one for every revisit: what is left then, no closing of loops can take away. In
-simulation our constraints know that the camera is calibrated well (covariance_calibration); all else is default.
+constraints are perfect and there is one for every revisit: what is left then, no closing of loops can take away. Pairs
+alone are ours without what neighbouring keyframes say. In simulation our constraints know that the camera is calibrated
+well (covariance_calibration); all else is default.
 
     python benchmarks/closure.py --quick
     python benchmarks/closure.py --simulate loop:0,1,2,3,4 --simulate moved:0,1,2,3,4 --json OUT --figure closure.png
@@ -39,7 +40,7 @@ from objreg_ros.detector.params import DetectorParams
 from objreg_ros.simulation.scenarios import SCENARIOS
 from objreg_ros.simulation.write import simulate
 
-OURS, ORACLE = "objreg", "oracle"
+OURS, ALONE, ORACLE = "objreg", "objreg, pairs alone", "oracle"
 QUICK = {"frames": 300, "names": ("orb_pnp",), "candidates": 1}
 QUICK_STORY = ("loop:0",)
 
@@ -57,7 +58,7 @@ class Asked:
     @property
     def methods(self) -> tuple[str, ...]:
         """The names of all methods."""
-        return (OURS, *self.names, ORACLE)
+        return (OURS, ALONE, *self.names, ORACLE)
 
     def tag(self) -> str:
         """What the figures depend on, as a part of a file's name."""
@@ -117,6 +118,7 @@ def _measure(source: Source, asked: Asked, names: Sequence[str], kept: Kept) -> 
     found = closers.loops_of(keyframes, source.truth)
     pairs = closers.candidate_pairs(keyframes, asked.candidates)
     work = {OURS: partial(closers.ours, source, asked.seed), ORACLE: partial(closers.oracle, source, found)}
+    work[ALONE] = partial(closers.ours, source, asked.seed, confirm_seconds=0.0)
     work |= {name: partial(closers.theirs, PEERS[name](), source, keyframes, pairs) for name in asked.names}
     kept.row |= {"frames": len(source.frames), "keyframes": len(keyframes), "revisits": len(found)}
     kept.row["path_m"] = round(source.truth.length, 2)

@@ -487,6 +487,7 @@ class Reason(Enum):
     OVER_BUDGET = "over_budget"
     UNREADABLE = "unreadable"
     CLOCK = "clock_began_anew"
+    NEIGHBOURS = "neighbours_disagree"
 
 
 UNTRIED = frozenset({Reason.NO_CANDIDATE, Reason.REDUNDANT, Reason.OVER_BUDGET, Reason.UNREADABLE, Reason.CLOCK})

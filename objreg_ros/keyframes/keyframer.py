@@ -21,6 +21,7 @@ from objreg_ros.keyframes.odometry import TravelledPath
 from objreg_ros.keyframes.tracking import TrackedSurface, tracked_surface, view_motion
 from objreg_ros.registration.params import RegistrarParams
 
+MOST_FRAMES = 4  # that are fused into one keyframe
 LEAST_OBJECTS = 1  # of a keyframe: one without objects proposes nothing
 GRAVITY_PATH_M = 2.0  # path after which gravity carried by odometry counts half
 GRAVITY_TURN_DEG = 120.0  # turn after which gravity carried by odometry counts half
@@ -268,9 +269,9 @@ class Keyframer:
 
     def _collect(self, window: _Open, frame: Frame, T_first_frame: Array) -> None:
         window.T_first_last = T_first_frame
-        if not frame.objects or len(window.frames) >= self._params.keyframe_frames:
+        if not frame.objects or len(window.frames) >= MOST_FRAMES:
             return
-        share = 1.0 / self._params.keyframe_frames
+        share = 1.0 / MOST_FRAMES
         if not window.frames or self._moved(inverse(window.motions[-1]) @ T_first_frame, share):
             window.frames.append(frame)
             window.motions.append(T_first_frame)

@@ -121,6 +121,25 @@ class Landmarks:
             named.append(sighting.of_landmark(oldest, axes[oldest]))
         return tuple(named), merged
 
+    def joined(self, pairs: Iterable[tuple[Sighting, Sighting]], R_there_here: Array) -> dict[int, Merge]:
+        """Which landmarks become which older, where a late closure says that each of ``pairs`` is one object.
+
+        Each pair is a sighting of the later keyframe and one of the earlier; ``R_there_here`` as in `Link`. Two that
+        some keyframe shows together stay two.
+        """
+        merged: dict[int, Merge] = {}
+        touched: set[int] = set()
+        for here, there in pairs:
+            two = {here.landmark, there.landmark}
+            if len(two) == 1 or two & touched or self._shown_beside(max(two), two):
+                continue
+            R_there = there.R_landmark_session @ R_there_here @ here.R_landmark_session.T  # from here's axes
+            newer = here.landmark > there.landmark
+            into, R = (there.landmark, R_there) if newer else (here.landmark, R_there.T)
+            merged[max(two)] = Merge(into=into, R_into_old=R)
+            touched |= two
+        return merged
+
     def add(self, sightings: Iterable[Sighting], merged: Mapping[int, Merge] | None = None) -> None:
         """Take in sightings that have their landmarks, after merging the landmarks that turned out to be one."""
         for old, merge in (merged or {}).items():

@@ -25,7 +25,6 @@ from objreg_ros.memory.checksum import HEAD, require_head
 from objreg_ros.memory.claim import Claim, StoreError
 from objreg_ros.memory.codec import (
     closure_from_row,
-    closure_row,
     keyframe_from_rows,
     keyframe_row,
     object_row,
@@ -35,13 +34,12 @@ from objreg_ros.memory.landmarks import Merge
 from objreg_ros.memory.migration import renew, renewed
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.memory.store_file import SCHEMA_VERSION, bear, check, connect, create, read_only_uri, require_place
-from objreg_ros.memory.transaction import OBJECTS, delete, rename_landmark, write
+from objreg_ros.memory.transaction import OBJECTS, delete, rename_landmarks, write, write_closures
 from objreg_ros.registration.keyframe import Keyframe
 
 LEFT = "; it was left as it is. Use a copy of it or another path"
 CACHED = 64  # decoded keyframes in memory, about 1 MB each
 MOST_CLOSURES = 100_000  # of 1.5 kB; the oldest are forgotten
-OLDEST = "WHERE id IN (SELECT id FROM closure ORDER BY id LIMIT ?)"
 HEADS = f"SELECT {', '.join(HEAD)}, seal FROM keyframe ORDER BY id"
 SPARE = 2048  # pages of 4 kB that may lie free in the file: what comes next takes them
 STEP = 4096  # pages that are given back at once: 16 MB, so that no keyframe waits long
@@ -115,14 +113,16 @@ class Store:
                 write(transaction, books, "object", object_row(books.next("object"), item, sighting))
             newest = max((sighting.landmark for sighting in sightings), default=0)
             books.landmark = max(books.landmark, newest)
-            for closure in closures:
-                write(transaction, books, "closure", closure_row(books.next("closure"), closure))
-            if books.closure_rows > MOST_CLOSURES:
-                delete(transaction, books, "closure", OLDEST, (books.closure_rows - MOST_CLOSURES,))
-            for old, merge in (merged or {}).items():
-                rename_landmark(transaction, books, old, merge)
+            write_closures(transaction, books, closures, MOST_CLOSURES)
+            rename_landmarks(transaction, books, merged or {})
         self._heads[keyframe.keyframe_id] = {name: row[name] for name in HEAD}
         self._remember(keyframe)
+
+    def add_closure(self, closure: LoopClosure, merged: Mapping[int, Merge]) -> None:
+        """Write a closure of keyframes that are stored already; ``merged`` and StoreError as in `add`."""
+        with self._told("write a closure"), self._changing() as (transaction, books):
+            write_closures(transaction, books, (closure,), MOST_CLOSURES)
+            rename_landmarks(transaction, books, merged)
 
     def keyframe(self, keyframe_id: int) -> Keyframe:
         """A stored keyframe; KeyError if it is not there, StoreError if it is damaged."""

@@ -4,16 +4,19 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from objreg_ros.data import LoopClosure
 from objreg_ros.memory.books import Books, count
 from objreg_ros.memory.checksum import LIGHT, require_light, sealed_light
+from objreg_ros.memory.codec import closure_row
 from objreg_ros.memory.landmarks import Merge
 from objreg_ros.memory.migration import insert
 
+OLDEST = "WHERE id IN (SELECT id FROM closure ORDER BY id LIMIT ?)"
 OBJECTS = f"SELECT {', '.join(LIGHT)}, seal FROM object"
 
 
@@ -32,7 +35,21 @@ def delete(
     books.change(table, -rows, -seals)
 
 
-def rename_landmark(transaction: sqlite3.Connection, books: Books, old: int, merge: Merge) -> None:
+def write_closures(transaction: sqlite3.Connection, books: Books, closures: Iterable[LoopClosure], most: int) -> None:
+    """Enter closures, and forget the oldest of more than ``most``."""
+    for closure in closures:
+        write(transaction, books, "closure", closure_row(books.next("closure"), closure))
+    if books.closure_rows > most:
+        delete(transaction, books, "closure", OLDEST, (books.closure_rows - most,))
+
+
+def rename_landmarks(transaction: sqlite3.Connection, books: Books, merged: Mapping[int, Merge]) -> None:
+    """Make every sighting of the landmarks that are gone one of that which stays."""
+    for old, merge in merged.items():
+        _rename_landmark(transaction, books, old, merge)
+
+
+def _rename_landmark(transaction: sqlite3.Connection, books: Books, old: int, merge: Merge) -> None:
     """Make every sighting of a landmark one of that which stays, in its axes."""
     for row in transaction.execute(f"{OBJECTS} WHERE landmark = ?", (old,)).fetchall():
         require_light(row)

@@ -3,6 +3,7 @@
 
 `registrar` is the facade over `objreg_ros.keyframes`, `objreg_ros.memory` and `objreg_ros.registration`: `track` for
 every frame, `search` for every keyframe, `process` for both. A `candidate_search` tries stored keyframes; what a
-registered pair comes to is a `closure` or a refusal. `warm` compiles every kernel before the first frame comes; `node`
+registered pair comes to is a `closure` or a refusal, or waits for its `confirmation` by others whose `consistency`
+with it odometry tells. `warm` compiles every kernel before the first frame comes; `node`
 is the door.
 """

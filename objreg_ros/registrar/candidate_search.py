@@ -13,7 +13,8 @@ from objreg_ros.data import Reason, Rejected
 from objreg_ros.memory.retrieval import CandidateKeyframe
 from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.memory.thinning import Thinning
-from objreg_ros.registrar.closure import Accepted, rejected, verdict_of
+from objreg_ros.registrar.closure import Accepted, redundant, rejected
+from objreg_ros.registrar.confirmation import Confirmation, Held, Tried
 from objreg_ros.registration import align
 from objreg_ros.registration.api import Gate, Method
 from objreg_ros.registration.keyframe import Keyframe
@@ -41,11 +42,20 @@ class Means(NamedTuple):
     store: Store
     method: Method
     gate: Gate
+    confirmation: Confirmation
     pool: ThreadPoolExecutor
 
 
-_Try = tuple[CandidateKeyframe, Callable[[], Accepted | Rejected] | None]
-"""A candidate keyframe that is being tried, and what waits for its verdict."""
+class Found(NamedTuple):
+    """What the candidates of one keyframe came to, in the order in which they were tried."""
+
+    accepted: list[Accepted]
+    held: list[Held]
+    refused: list[Rejected]
+
+
+_Try = tuple[CandidateKeyframe, Callable[[], Tried | Rejected] | None]
+"""A candidate keyframe that is being tried, and what waits for its registration."""
 
 
 class Search:
@@ -58,31 +68,32 @@ class Search:
         self._means, self._params = means, params
         self._trying = deque[_Try]()
 
-    def run(self, candidates: Iterable[CandidateKeyframe]) -> tuple[list[Accepted], list[Rejected]]:
+    def run(self, candidates: Iterable[CandidateKeyframe]) -> Found:
         """Try the candidates, best first, until enough closures are accepted or ``params.candidates`` were tried."""
-        accepted: list[Accepted] = []
-        refused: list[Rejected] = []
+        found = Found([], [], [])
         queue, tries = deque(candidates), self._params.candidates
-        while len(accepted) < self._params.closures:
-            self._begin(queue, tries, self._params.closures - len(accepted))
+        while len(found.accepted) < self._params.closures:
+            self._begin(queue, tries, self._params.closures - len(found.accepted))
             if not self._trying:
                 break
             stored, ask = self._trying.popleft()
             if ask is None or self._thinning.redundant(stored.stamp_ns, self._keyframe.stamp_ns):
-                refused.append(self._redundant(stored))
+                found.refused.append(self._redundant(stored))
                 continue
             tries -= 1
-            verdict = ask()
+            tried = ask()
+            verdict = self._means.confirmation.hear(tried) if isinstance(tried, Tried) else tried
             if isinstance(verdict, Accepted):
                 self._thinning.accept(stored.stamp_ns, self._keyframe.stamp_ns)
-                accepted.append(verdict)
+                found.accepted.append(verdict)
+            elif isinstance(verdict, Held):
+                found.held.append(verdict)
             else:
-                refused.append(verdict)
-        return accepted, refused
+                found.refused.append(verdict)
+        return found
 
     def _redundant(self, stored: CandidateKeyframe) -> Rejected:
-        refusal = Reason.REDUNDANT, f"an accepted closure is nearer than {self._params.thin_seconds} s"
-        return rejected(stored.stamp_ns, self._keyframe, refusal)
+        return rejected(stored.stamp_ns, self._keyframe, redundant(self._params.thin_seconds))
 
     def _begin(self, queue: deque[CandidateKeyframe], tries: int, wanted: int) -> None:
         """Begin to try the next candidates: as many at once as there are threads, and never more than ``tries``.
@@ -99,8 +110,8 @@ class Search:
             self._trying.append((stored, None if redundant else self._try_candidate(stored)))
             busy += not redundant
 
-    def _try_candidate(self, stored: CandidateKeyframe) -> Callable[[], Accepted | Rejected]:
-        """Begin to register a candidate keyframe in a thread of its own; what comes back waits for the verdict."""
+    def _try_candidate(self, stored: CandidateKeyframe) -> Callable[[], Tried | Rejected]:
+        """Begin to register a candidate keyframe in a thread of its own; what comes back waits for the end of it."""
         keyframe, over = self._keyframe, self._budget.over()
         if over:
             refusal = Reason.OVER_BUDGET, over
@@ -110,8 +121,8 @@ class Search:
         except StoreError as error:
             refusal = Reason.UNREADABLE, str(error)
             return lambda: rejected(stored.stamp_ns, keyframe, refusal)
-        _, method, gate, pool = self._means
+        method, gate, pool = self._means.method, self._means.gate, self._means.pool
         method.prepare(keyframe)
         prior = expect(keyframe, target, self._params)
         registered = pool.submit(align, keyframe, target, prior, self._params, method, gate)
-        return lambda: verdict_of(keyframe, target, registered.result())
+        return lambda: Tried(keyframe, target, prior, registered.result())

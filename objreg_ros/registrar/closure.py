@@ -3,46 +3,80 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from objreg_ros.data import Array, LoopClosure, ObjectMatch, Observation, Rejected
+from objreg_ros.data import Array, LoopClosure, ObjectMatch, Observation, Reason, Rejected
 from objreg_ros.geometry import transform
 from objreg_ros.memory.landmarks import Link
 from objreg_ros.memory.sighting import Sighting
+from objreg_ros.registrar.consistency import Support
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.certainty.covariance import covariance_of
 from objreg_ros.registration.gate.verdict import Refusal
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.registration.result import Registration, evidence_of
+from objreg_ros.registration.result import evidence_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Accepted:
-    """A stored keyframe and the pose that the gate accepted of a new one in it."""
+    """A stored keyframe and the pose of a new one in it, with what others say of it where that was asked."""
 
     target: Keyframe
     candidate: Candidate
+    support: Support | None = None
 
 
-def verdict_of(keyframe: Keyframe, target: Keyframe, registration: Registration) -> Accepted | Rejected:
-    """What a registration upon the stored ``target`` comes to; ValueError where a gate gave no reason."""
-    candidate, reason = registration.candidate, registration.reason
-    if reason is None and candidate is not None:
-        return Accepted(target=target, candidate=candidate)
-    if reason is None:
-        raise ValueError("gate: expected a reason with each refusal, got None")
-    best = None if candidate is None else candidate.T_target_source
-    return rejected(target.stamp_ns, keyframe, (reason, registration.detail), best)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Waiting:
+    """A constraint that waits for others to confirm it; ``accepted`` by the gate, and others disagree.
+
+    ``refusal`` is what becomes of it if none do. ``pairs`` are the instances of each matched object in the keyframes
+    ``source_id`` and ``target_id``; ``R_there_here (3, 3)`` as in `Link`.
+    """
+
+    closure: LoopClosure
+    refusal: Refusal
+    accepted: bool
+    source_id: int
+    target_id: int
+    pairs: tuple[tuple[int, int], ...]
+    R_there_here: Array
+
+    def confirmed(self, support: Support) -> Waiting:
+        """The same with what others say of it as evidence."""
+        evidence = self.closure.evidence | support_evidence(support)
+        return replace(self, closure=replace(self.closure, evidence=evidence))
+
+    def renamed(self, landmarks: Mapping[int, int]) -> Waiting:
+        """The same under the ids that its objects have by now, by their instance in the later keyframe."""
+        matches = tuple(
+            replace(match, object_id=landmarks.get(here, match.object_id))
+            for match, (here, _) in zip(self.closure.matches, self.pairs, strict=True)
+        )
+        return replace(self, closure=replace(self.closure, matches=matches))
+
+    def refused(self, refusal: Refusal) -> Rejected:
+        """The refusal that it comes to."""
+        reason, detail = refusal
+        moments = self.closure.from_ns, self.closure.to_ns
+        return Rejected(
+            reason=reason, from_ns=moments[0], to_ns=moments[1], detail=detail, T_from_to=self.closure.T_from_to
+        )
 
 
 def rejected(from_ns: int, keyframe: Keyframe, refusal: Refusal, T_from_to: Array | None = None) -> Rejected:
     """A refusal as it is published; ``T_from_to (4, 4)`` is the best pose that was refused, if any."""
     reason, detail = refusal
     return Rejected(reason=reason, from_ns=from_ns, to_ns=keyframe.stamp_ns, detail=detail, T_from_to=T_from_to)
+
+
+def redundant(seconds: float) -> Refusal:
+    """Why a constraint of two moments is not published of which another is known."""
+    return Reason.REDUNDANT, f"an accepted closure is nearer than {seconds} s"
 
 
 def closure_of(
@@ -60,10 +94,33 @@ def closure_of(
         covariance=covariance_of(candidate, params),
         labels=tuple(dict.fromkeys(match.label for match in matches)) or tuple(dict.fromkeys(keyframe.labels)),
         matches=matches,
-        evidence=evidence_of(candidate) | _moved(keyframe, item),
+        evidence=evidence_of(candidate) | _moved(keyframe, item) | support_evidence(item.support),
         from_frame_id=item.target.frame_id,
         to_frame_id=keyframe.frame_id,
     )
+
+
+def waiting_of(
+    keyframe: Keyframe, sightings: Sequence[Sighting], item: Accepted, refusal: Refusal, params: RegistrarParams
+) -> Waiting:
+    """What is kept of a pose that waits: no clouds. ``sightings`` as for `closure_of`."""
+    here, there = keyframe.objects, item.target.objects
+    return Waiting(
+        closure=closure_of(keyframe, sightings, item, params),
+        refusal=refusal,
+        accepted=refusal[0] is Reason.NEIGHBOURS,
+        source_id=keyframe.keyframe_id,
+        target_id=item.target.keyframe_id,
+        pairs=tuple(
+            (here[pair.source].cloud.instance, there[pair.target].cloud.instance) for pair in item.candidate.matched
+        ),
+        R_there_here=_turn(keyframe, item),
+    )
+
+
+def support_evidence(support: Support | None) -> dict[str, float]:
+    """What others say of a pose, as evidence of its constraint; nothing where that was not asked."""
+    return {} if support is None else {"agreeing": float(support.agreeing), "agreeing_share": support.share}
 
 
 def observations(keyframe: Keyframe, sightings: Sequence[Sighting]) -> tuple[Observation, ...]:
@@ -77,7 +134,7 @@ def observations(keyframe: Keyframe, sightings: Sequence[Sighting]) -> tuple[Obs
 def links_of(keyframe: Keyframe, item: Accepted, stored: Sequence[Sighting]) -> list[Link]:
     """Which objects of a keyframe are which ``stored`` ones of the target, by the accepted pose."""
     of = {sighting.instance: sighting for sighting in stored}
-    R_there_here = _rotation(item.target) @ item.candidate.T_target_source[:3, :3] @ _rotation(keyframe).T
+    R_there_here = _turn(keyframe, item)
     return [
         Link(index=pair.source, of=of[item.target.objects[pair.target].cloud.instance], R_there_here=R_there_here)
         for pair in item.candidate.matched
@@ -93,6 +150,11 @@ def _moved(keyframe: Keyframe, item: Accepted) -> dict[str, float]:
         name = f"moved {pair.label} [m]"
         found[name] = max(metres, found.get(name, 0.0))
     return found
+
+
+def _turn(keyframe: Keyframe, item: Accepted) -> Array:
+    """(3, 3) from the axes of the keyframe's session into those of the target's."""
+    return _rotation(item.target) @ item.candidate.T_target_source[:3, :3] @ _rotation(keyframe).T
 
 
 def _rotation(keyframe: Keyframe) -> Array:

@@ -63,13 +63,11 @@ class RegistrarNode(MatchingDoor):
         self._tracking, self._telling = threading.Lock(), threading.Lock()
         self._enabled = True
         self._counts = dict(self._registrar.counts())
-        self._accepted, self._unsearched, self._refused = 0, 0, Counter[str]()
-        self._without_odometry = 0  # frames
+        self._unsearched, self._without_odometry, self._refused = 0, 0, Counter[str]()
+        self._published = Counter[bool]()  # constraints, by whether others confirmed them
         self._camera: str | None = None  # the frame_id of the last frame
-        self._last_refusals: dict[str, str] = {}  # by reason
-        self._last_moved: dict[str, float] = {}  # m by label, of the last closure that found any
-        self._names: Mapping[int, str] = {}
-        self._scene, self._odom_frame = Scene(), "odom"
+        self._last_refusals, self._last_moved = dict[str, str](), dict[str, float]()  # by reason; m by label
+        self._names, self._scene, self._odom_frame = dict[int, str](), Scene(), "odom"
         limit = Limit(WAITING_KEYFRAMES, inputs.waiting_megabytes * 1_000_000, PATIENCE_S)
         self.searcher: Backlog[Job] = Backlog(
             self._search, self._keep, self.fail, limit, lambda job: job.window.nbytes, GIVING_WAY
@@ -177,22 +175,24 @@ class RegistrarNode(MatchingDoor):
             for transform in to_msg.transforms(closure):
                 self._transforms.publish(transform)
             self._last_moved = closure.moved or self._last_moved
-        self._accepted += len(outcome.closures)
+        self._published.update("agreeing" in closure.evidence for closure in outcome.closures)
         self._refused.update(refusal.reason.value for refusal in outcome.rejected)
         self._last_refusals.update((refusal.reason.value, refusal.detail) for refusal in outcome.rejected)
         if outcome.rejected:
             node, now = self.get_fully_qualified_name(), self.get_clock().now().to_msg()
             self._refusals.publish(refusals(node, now, outcome.rejected))
-        forgotten, self._counts = self._counts["forgotten"], dict(self._registrar.counts())
-        if self._counts["forgotten"] > forgotten:
-            self._say_full()
+        self._count()
         if outcome.keyframe_ns is not None:
             seen = outcome.observations, outcome.keyframe_ns, outcome.frame_id
             self._landmarks.publish(to_msg.landmarks(*seen, self._names))
             self._scene.settle(outcome.keyframe_ns, outcome.closures, outcome.rejected)
             self._show(outcome.keyframe_ns)
 
-    def _say_full(self) -> None:
+    def _count(self) -> None:
+        """Count what is stored, and say so where the oldest had to go."""
+        forgotten, self._counts = self._counts["forgotten"], dict(self._registrar.counts())
+        if self._counts["forgotten"] == forgotten:
+            return
         self.throttled.warn(
             "forgotten",
             f"the store is full: it keeps {self._counts['keyframes']} keyframes (max_keyframes), and has forgotten the "
@@ -208,10 +208,12 @@ class RegistrarNode(MatchingDoor):
         stored = {f"stored {what}": count for what, count in self._counts.items() if what != "forgotten"}
         refused = {f"{REJECTED}{reason}": count for reason, count in sorted(self._refused.items())}
         counts = {
-            "constraints": self._accepted,
+            "constraints": self._published.total(),
             "stored unsearched": self._unsearched,
             "forgotten keyframes": self._counts["forgotten"],
             "waiting keyframes": len(self.searcher),
+            "waiting poses": self._registrar.waiting,
+            "constraints confirmed by others": self._published[True],
             "frames without odometry": self._without_odometry,
         }
         last = {f"last rejected: {reason}": detail for reason, detail in sorted(self._last_refusals.items())}
@@ -242,7 +244,7 @@ class RegistrarNode(MatchingDoor):
         return True, "forgot every keyframe"
 
     async def _save(self, _: Any, response: Any) -> Any:
-        """Also ends the keyframe in hand: what the last frames closed is published before the answer.
+        """Also ends the keyframe in hand and settles what waits: what can be published is, before the answer.
 
         With odometry the session goes on; without, our own tracking begins another.
         """
@@ -254,9 +256,7 @@ class RegistrarNode(MatchingDoor):
         try:
             with self._tracking:
                 self.searcher.drain()
-                window = self._registrar.end()
-                if window is not None:
-                    self._publish(self._registrar.search(window, self._seconds, self.searcher.hurried))
+                self._publish(self._registrar.finish(self._seconds, self.searcher.hurried))
             return True, self._registrar.save()
         except (ValueError, OSError) as error:
             return False, str(error)
@@ -279,7 +279,7 @@ class RegistrarNode(MatchingDoor):
 
     def _store_the_rest(self) -> None:
         """Store the keyframes that were not searched for; of those that cannot be the log says how many and why."""
-        lost: list[str] = []
+        lost = list[str]()
         for window in (*(job.window for job in self.searcher.rest()), self._registrar.end()):
             if window is not None:
                 try:

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,8 +26,18 @@ from objreg_ros.memory.retrieval import Index
 from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.memory.thinning import Thinning
-from objreg_ros.registrar.candidate_search import Budget, Means, Search
-from objreg_ros.registrar.closure import Accepted, closure_of, links_of, observations, rejected
+from objreg_ros.registrar.candidate_search import Budget, Found, Means, Search
+from objreg_ros.registrar.closure import (
+    Accepted,
+    Waiting,
+    closure_of,
+    links_of,
+    observations,
+    redundant,
+    rejected,
+    waiting_of,
+)
+from objreg_ros.registrar.confirmation import Confirmation
 from objreg_ros.registration import gate_of, method_of
 from objreg_ros.registration.api import Gate, Method
 from objreg_ros.registration.keyframe import Keyframe
@@ -49,17 +59,23 @@ class Outcome:
     observations: tuple[Observation, ...] = ()
     frame_id: str = "camera"
 
+    def with_late(self, late: Outcome) -> Outcome:
+        """With what became of earlier keyframes' poses; a late constraint keeps its own stamps."""
+        return replace(self, closures=self.closures + late.closures, rejected=self.rejected + late.rejected)
+
 
 class Registrar:
     """Finds the loops. Holds the store at ``params.store`` until `close`; StoreError (an OSError) if that is bad.
 
     ``method`` finds poses between two keyframes and ``gate`` accepts or refuses them (`registration.api`); they are
-    those of ``params`` where None. Both are called from several threads.
+    those of ``params`` where None. Both are called from several threads. What a gate of one's own refuses is refused:
+    only what ours does waits for other keyframes to confirm it.
     """
 
     def __init__(self, params: RegistrarParams, method: Method | None = None, gate: Gate | None = None) -> None:
         self.params = params
         self._method, self._gate = method or method_of(params), gate or gate_of(params)
+        self._confirm_seconds = params.confirm_seconds if gate is None else 0.0
         self._store = Store(params.store)
         self._lock = threading.RLock()
         self._pools: dict[int, ThreadPoolExecutor] = {}
@@ -77,6 +93,7 @@ class Registrar:
         self._landmarks = Landmarks(self.params, self._store.sightings(), self._store.next_landmark())
         self._clock: Clock | None = None  # the run of the clock that goes on
         self._thinning = Thinning(self.params.thin_seconds)  # of what was accepted in it
+        self._confirmation = Confirmation(self.params.replaced(confirm_seconds=self._confirm_seconds))
         self._since = 0  # the first session whose stamps are not of this run too
         self._session: int | None = None  # the one that goes on, None before the first keyframe
 
@@ -92,6 +109,11 @@ class Registrar:
         with self._lock:
             return self._landmarks.recent(self._session, RECENT)
 
+    @property
+    def waiting(self) -> int:
+        """How many poses wait for other keyframes to confirm them."""
+        return len(self._confirmation)
+
     def counts(self) -> dict[str, int]:
         """How many ``keyframes``, ``objects``, ``landmarks``, ``sessions`` and ``closures`` the store holds.
 
@@ -105,10 +127,10 @@ class Registrar:
         window = self.track(frame)
         return Outcome() if window is None else self.search(window)
 
-    def finish(self) -> Outcome:
-        """Search for the keyframe that was still being collected: the end of a recording."""
+    def finish(self, seconds: float = np.inf, hurried: Callable[[], bool] = lambda: False) -> Outcome:
+        """`search` for the keyframe that was still being collected, and settle what waits: the end of a recording."""
         window = self.end()
-        return Outcome() if window is None else self.search(window)
+        return (Outcome() if window is None else self.search(window, seconds, hurried)).with_late(self.settle())
 
     def end(self) -> FrameWindow | None:
         """The frame window that was still being collected, None if it shows nothing new."""
@@ -134,23 +156,30 @@ class Registrar:
                 return Outcome()
             keyframe = fuse(window, self.params).numbered(self._store.next_keyframe())
             self._session = keyframe.session
-            unnamed = self._follow(window.clock, keyframe)
+            before = self._follow(window.clock, keyframe)
             sightings = sightings_of(keyframe)
-            accepted, refused = self._find_closures(keyframe, sightings, budget)
+            found = self._find_closures(keyframe, sightings, budget)
             try:
-                closures, named = self._remember(keyframe, sightings, accepted)
+                closures, named = self._remember(keyframe, sightings, found.accepted)
             except StoreError:
-                for item in accepted:
+                for item in found.accepted:
                     self._thinning.withdraw(item.target.stamp_ns, keyframe.stamp_ns)
                 raise
-            seen = observations(keyframe, named)
-            return Outcome(
+            for number, item, refusal in found.held:
+                self._confirmation.hold(number, waiting_of(keyframe, named, item, refusal, self.params))
+            outcome = Outcome(
                 closures=closures,
-                rejected=(*unnamed, *refused),
+                rejected=(*before, *found.refused),
                 keyframe_ns=keyframe.stamp_ns,
-                observations=seen,
+                observations=observations(keyframe, named),
                 frame_id=keyframe.frame_id,
             )
+            return outcome.with_late(self._settled(keyframe.stamp_ns))
+
+    def settle(self) -> Outcome:
+        """Publish or refuse what still waits for other keyframes to confirm it: the end of a recording, or a save."""
+        with self._lock:
+            return self._settled(None)
 
     def reset(self) -> None:
         """Forget everything, in the store too; StoreError, and nothing is forgotten, where that cannot be."""
@@ -187,22 +216,50 @@ class Registrar:
         """
         if clock == self._clock:
             return ()
+        given_up = self._settled(None).rejected
         last = self._store.last_session_beyond(clock.session, clock.began_ns)
         self._clock, self._thinning, self._since = clock, Thinning(self.params.thin_seconds), last + 1
         began = f"{1e-9 * clock.began_ns:.3f} s"
         refusal = Reason.CLOCK, f"the clock began anew at {began}; sessions up to {last} had seen that time before"
-        return () if last < 0 else (rejected(keyframe.stamp_ns, keyframe, refusal),)
+        return given_up if last < 0 else (*given_up, rejected(keyframe.stamp_ns, keyframe, refusal))
 
-    def _find_closures(
-        self, keyframe: Keyframe, sightings: Sequence[Sighting], budget: Budget
-    ) -> tuple[list[Accepted], list[Rejected]]:
+    def _find_closures(self, keyframe: Keyframe, sightings: Sequence[Sighting], budget: Budget) -> Found:
         """What the stored keyframes that may show the same place come to; a refusal where none may."""
         candidates = self._index.query(sightings, self._since)
         if not candidates:
             refusal = Reason.NO_CANDIDATE, f"none of {len(self._index)} stored objects is alike and may be here"
-            return [], [rejected(keyframe.stamp_ns, keyframe, refusal)]
-        means = Means(self._store, self._method, self._gate, self._pool())
+            return Found([], [], [rejected(keyframe.stamp_ns, keyframe, refusal)])
+        means = Means(self._store, self._method, self._gate, self._confirmation, self._pool())
         return Search(keyframe, self._thinning, budget, means, self.params).run(candidates)
+
+    def _settled(self, now_ns: int | None) -> Outcome:
+        """What waits no more: late constraints, and refusals."""
+        confirmed, refused = self._confirmation.settle(now_ns)
+        closures = []
+        for waiting in confirmed:
+            from_ns, to_ns = waiting.closure.from_ns, waiting.closure.to_ns
+            if self._thinning.redundant(from_ns, to_ns):
+                refused.append(waiting.refused(redundant(self.params.thin_seconds)))
+                continue
+            self._thinning.accept(from_ns, to_ns)
+            closures.append(self._remember_late(waiting))
+        return Outcome(closures=tuple(closures), rejected=tuple(refused))
+
+    def _remember_late(self, waiting: Waiting) -> LoopClosure:
+        """Write a late constraint down, and merge the landmarks that it says are one. It holds without that, too."""
+        with suppress(StoreError):
+            here, there = (
+                {sighting.instance: sighting for sighting in self._store.sightings(number)}
+                for number in (waiting.source_id, waiting.target_id)
+            )
+            pairs = [(here[a], there[b]) for a, b in waiting.pairs if a in here and b in there]
+            merged = self._landmarks.joined(pairs, waiting.R_there_here)
+            self._store.add_closure(waiting.closure, merged)
+            self._landmarks.add((), merged)
+            joined = {old: merge.into for old, merge in merged.items()}
+            names = {instance: joined.get(seen.landmark, seen.landmark) for instance, seen in here.items()}
+            waiting = waiting.renamed(names)
+        return waiting.closure
 
     def _remember(
         self, keyframe: Keyframe, sightings: Sequence[Sighting], accepted: Sequence[Accepted]

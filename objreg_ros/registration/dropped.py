@@ -16,6 +16,7 @@ CONSTANT_OF = {
     },
     "keyframes/keyframer.py": {
         "keyframe_min_objects": "LEAST_OBJECTS",
+        "keyframe_frames": "MOST_FRAMES",
         "gravity_metres": "GRAVITY_PATH_M",
         "gravity_degrees": "GRAVITY_TURN_DEG",
     },

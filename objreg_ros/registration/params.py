@@ -31,7 +31,6 @@ class RegistrarParams(Params):
     keyframe_rotation: float = param(8.0, "rotation that ends a keyframe", "deg", ge=0.0, le=180.0)
     keyframe_seconds: float = param(1.0, "longest time that a keyframe spans", "s", ge=0.0)
     max_speed: float = param(5.0, "odometry that leaps faster than this has begun anew: another session", "m/s", ge=0.1)
-    keyframe_frames: int = param(4, "most frames that are fused into one keyframe", ge=1, le=30)
     context_range: float = param(4.0, "context farther from the camera is left out", "m", ge=0.5)
 
     # Which stored keyframes a new one is compared with.
@@ -63,6 +62,13 @@ class RegistrarParams(Params):
     # What decides a closure.
     least_odds: float = param(
         75.0, "right poses for each false one, among poses as sure as the least sure that is accepted", ge=1.0, le=1e6
+    )
+    confirm_seconds: float = param(
+        10.0,
+        "longest time that a likely pose waits for poses of other keyframes that agree by way of "
+        "odometry; 0: a pair of keyframes proves itself or is refused",
+        "s",
+        ge=0.0,
     )
     max_translation: float = param(5.0, "largest distance between the two cameras", "m", ge=0.0)
 

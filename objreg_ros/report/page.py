@@ -34,6 +34,7 @@ MEANINGS = {
     "redundant": "a closure of this revisit was accepted already",
     "over_budget": "time ran out before this place was tried",
     "unreadable": "what the store holds of this place is damaged",
+    "neighbours_disagree": "the keyframes around it tell another pose",
     "clock_began_anew": "what was seen before then has stamps of now, and is left out",
 }
 

@@ -14,7 +14,7 @@ from objreg_ros.geometry import inverse, is_rigid, pose, rotation_from_vector
 from objreg_ros.keyframes.keyframer import Clock, FrameWindow, Keyframer
 from objreg_ros.registration.params import RegistrarParams
 
-PARAMS = RegistrarParams(keyframe_translation=0.1, keyframe_rotation=10.0, keyframe_seconds=1.0, keyframe_frames=4)
+PARAMS = RegistrarParams(keyframe_translation=0.1, keyframe_rotation=10.0, keyframe_seconds=1.0)
 CUP = (box("cup", (0, 0, 1)),)
 DOWN = np.array([0.0, 1.0, 0.0])  # of a camera that is level
 

@@ -251,3 +251,27 @@ def test_a_landmark_whose_last_keyframe_is_forgotten_is_gone_and_its_id_is_not_g
     landmarks.forget([2])
     assert not landmarks.known() and not landmarks._there
     assert _take(landmarks, _seen(3, CUP)) == [2]
+
+
+def test_a_late_closure_joins_the_landmarks_that_it_says_are_one() -> None:
+    turn = rotation_from_vector(np.array([0.0, 1.2, 0.0]))
+    landmarks = Landmarks(PARAMS)
+    first, _ = landmarks.assign(_seen(1, CUP))
+    landmarks.add(first)
+    second, _ = landmarks.assign(sightings_of(keyframe(2, 2, (CUP,), 1, pose(turn.T, np.zeros(3)))))
+    landmarks.add(second)
+    merged = landmarks.joined([(second[0], first[0])], turn)
+    assert merged.keys() == {2} and merged[2].into == 1 and np.allclose(merged[2].R_into_old, turn)
+    back = landmarks.joined([(first[0], second[0])], turn.T)
+    assert back.keys() == {2} and np.allclose(back[2].R_into_old, turn)
+    landmarks.add((), merged)
+    views = np.array(list(landmarks._known[1].views.values()))
+    assert len(landmarks) == 1 and len(views) == 2 and np.allclose(views, views[0])
+
+
+def test_a_late_closure_joins_no_two_that_a_keyframe_shows_together() -> None:
+    landmarks = Landmarks(PARAMS)
+    first, _ = landmarks.assign(_seen(1, CUP, BOOK))
+    landmarks.add(first)
+    assert landmarks.joined([(first[1], first[0])], np.eye(3)) == {}
+    assert landmarks.joined([(first[0], first[0])], np.eye(3)) == {}

@@ -597,3 +597,16 @@ def test_two_processes_killed_at_any_moment_lose_nothing_acknowledged(tmp_path: 
         assert acknowledged <= set(store.keyframe_ids())
         assert all(store.keyframe(number).labels == ("cup",) for number in store.keyframe_ids())
         store.close()
+
+
+def test_a_late_closure_is_written_and_renames_the_landmarks_that_it_joins(tmp_path: Path) -> None:
+    store = Store(tmp_path / "place.db")
+    for number in (1, 2):
+        stored = keyframe(number, number)
+        store.add(stored, [seen.of_landmark(number, np.eye(3)) for seen in sightings_of(stored)])
+    late = LoopClosure(from_ns=1, to_ns=2, T_from_to=moved(0.3), covariance=np.eye(6), labels=("cup",))
+    store.add_closure(late, {2: Merge(into=1, R_into_old=np.eye(3))})
+    store.close()
+    again = Store(tmp_path / "place.db")
+    assert [closure.from_ns for closure in again.closures()] == [1] and again.counts()["closures"] == 1
+    assert {sighting.landmark for sighting in again.sightings()} == {1}

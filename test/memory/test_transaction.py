@@ -15,7 +15,7 @@ from objreg_ros.memory.codec import keyframe_row, object_row
 from objreg_ros.memory.landmarks import Merge
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store_file import bear, connect
-from objreg_ros.memory.transaction import OBJECTS, delete, rename_landmark, write
+from objreg_ros.memory.transaction import OBJECTS, delete, rename_landmarks, write
 
 QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
@@ -49,7 +49,7 @@ def test_a_row_that_is_deleted_is_taken_out_of_them(filled: tuple[sqlite3.Connec
 def test_a_renamed_landmark_is_turned_into_the_axes_of_the_one_that_stays(
     filled: tuple[sqlite3.Connection, Books],
 ) -> None:
-    rename_landmark(*filled, 3, Merge(into=2, R_into_old=QUARTER))
+    rename_landmarks(*filled, {3: Merge(into=2, R_into_old=QUARTER)})
     (row,) = filled[0].execute(OBJECTS).fetchall()
     require_light(row)
     assert row["landmark"] == 2 and booked(*filled)

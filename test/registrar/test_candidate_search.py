@@ -17,10 +17,11 @@ from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store
 from objreg_ros.memory.thinning import Thinning
 from objreg_ros.registrar.candidate_search import Budget, Means, Search
+from objreg_ros.registrar.confirmation import Confirmation
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.params import RegistrarParams
 
-PARAMS = RegistrarParams(threads=1, closures=2, candidates=3, thin_seconds=1.0)
+PARAMS = RegistrarParams(threads=1, closures=2, candidates=3, thin_seconds=1.0, confirm_seconds=0.0)
 CUPS = (box("cup", (0.0, 0.0, 1.0)),)
 ENDLESS = Budget(float("inf"), lambda: False)
 STORED = (0, 10, 20, 30, 40)  # s
@@ -56,7 +57,7 @@ def means() -> Iterator[Means]:
         stored = keyframe(number, seconds, CUPS)
         store.add(stored, sightings_of(stored))
     with ThreadPoolExecutor(1) as pool:
-        yield Means(store, Recorded(), refuse, pool)
+        yield Means(store, Recorded(), refuse, Confirmation(PARAMS), pool)
     store.close()
 
 
@@ -69,25 +70,31 @@ def ids(*numbers: int) -> list[CandidateKeyframe]:
 
 
 def test_no_more_keyframes_are_tried_than_are_asked_for_best_first(means: Means) -> None:
-    accepted, refused = search(means).run(ids(3, 1, 5, 2, 4))
+    accepted, _, refused = search(means).run(ids(3, 1, 5, 2, 4))
     assert accepted == [] and [one.reason for one in refused] == [Reason.GRAVITY] * 3
     assert means.method.targets == [20, 0, 40]
 
 
 def test_enough_accepted_closures_end_the_search(means: Means) -> None:
-    accepted, refused = search(means._replace(gate=accept)).run(ids(3, 1, 5, 2, 4))
+    accepted, _, refused = search(means._replace(gate=accept)).run(ids(3, 1, 5, 2, 4))
     assert [item.target.keyframe_id for item in accepted] == [3, 1] and refused == []
 
 
 def test_what_would_say_the_same_again_is_put_aside_without_a_try(means: Means) -> None:
     params = PARAMS.replaced(thin_seconds=15.0)
-    accepted, refused = search(means._replace(gate=accept), params).run(ids(2, 1, 5))
+    accepted, _, refused = search(means._replace(gate=accept), params).run(ids(2, 1, 5))
     assert [item.target.keyframe_id for item in accepted] == [2, 5]
     assert [one.reason for one in refused] == [Reason.REDUNDANT]
 
 
 def test_what_is_not_begun_in_time_is_refused_as_over_budget(means: Means) -> None:
     for budget in (Budget(time.monotonic() - 1.0, lambda: False), Budget(float("inf"), lambda: True)):
-        accepted, refused = search(means, budget=budget).run(ids(1, 2))
+        accepted, _, refused = search(means, budget=budget).run(ids(1, 2))
         assert accepted == [] and [one.reason for one in refused] == [Reason.OVER_BUDGET] * 2
     assert means.method.targets == []
+
+
+def test_what_waits_for_others_counts_as_tried_and_closes_nothing(means: Means) -> None:
+    waits = means._replace(confirmation=Confirmation(PARAMS.replaced(confirm_seconds=10.0)))
+    accepted, held, refused = search(waits).run(ids(3, 1, 5, 2))
+    assert [one.item.target.keyframe_id for one in held] == [3, 1, 5] and not accepted and not refused

@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 from registration.samples import box, candidate, keyframe
 
-from objreg_ros.data import Reason, Rejected
 from objreg_ros.memory.sighting import sightings_of
-from objreg_ros.registrar.closure import Accepted, closure_of, links_of, observations, verdict_of
+from objreg_ros.registrar.closure import Accepted, closure_of, links_of, observations
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.registration.result import Registration
 
 PARAMS = RegistrarParams()
 CUP = box("cup", (0.0, 0.0, 1.0))
@@ -36,27 +34,6 @@ def test_a_closure_names_each_label_once_and_the_farthest_of_several_that_moved(
     assert closure.moved == {"cup": pytest.approx(0.5)}
     assert (closure.from_ns, closure.to_ns) == (there.stamp_ns, here.stamp_ns)
     assert (closure.from_frame_id, closure.to_frame_id) == ("front", "camera")
-
-
-def test_an_accepted_pose_is_of_the_stored_keyframe() -> None:
-    found = candidate()
-    verdict = verdict_of(NEW, STORED, Registration(accepted=True, candidate=found))
-    assert isinstance(verdict, Accepted) and verdict.target is STORED and verdict.candidate is found
-
-
-def test_a_refusal_tells_its_reason_its_moments_and_the_pose_that_was_refused() -> None:
-    found = candidate()
-    refused = Registration(accepted=False, reason=Reason.GRAVITY, detail="9 deg", candidate=found)
-    verdict = verdict_of(NEW, STORED, refused)
-    assert isinstance(verdict, Rejected)
-    assert (verdict.reason, verdict.detail) == (Reason.GRAVITY, "9 deg")
-    assert (verdict.from_ns, verdict.to_ns) == (STORED.stamp_ns, NEW.stamp_ns)
-    assert np.array_equal(verdict.T_from_to, found.T_target_source)
-
-
-def test_a_gate_that_refuses_without_a_reason_is_an_error() -> None:
-    with pytest.raises(ValueError, match="expected a reason with each refusal, got None"):
-        verdict_of(NEW, STORED, Registration(accepted=False))
 
 
 def test_a_link_says_which_stored_object_an_object_is_and_how_it_is_turned() -> None:

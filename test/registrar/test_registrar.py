@@ -320,3 +320,71 @@ def test_a_gate_of_ones_own_decides_and_a_method_of_ones_own_is_asked() -> None:
     closures, rejected = _run(Registrar(PARAMS, gate=never), _frame(0, HERE), _frame(30, BESIDE))
     assert not closures
     assert any(one.reason == Reason.MOVED and one.T_from_to is not None for one in rejected)
+
+
+class Odometrical:
+    """A method that proposes what odometry says; the gate doubts its poses of the keyframes at ``doubtful`` s."""
+
+    def __init__(self, *doubtful: float) -> None:
+        self._doubtful = {round(1e9 * seconds) for seconds in doubtful}
+
+    def prepare(self, keyframe: object) -> None:
+        """Nothing to make ready."""
+
+    def propose(self, source: Any, target: Any, prior: object = None) -> tuple:
+        doubts = {"texture": 0.1, "tested": 2000, "perturbation_margin": 0.1}
+        T = inverse(target.T_odom_camera) @ source.T_odom_camera
+        pairs = tuple(
+            ObjectPair(a, b, one.label)
+            for a, one in enumerate(source.objects)
+            for b, other in enumerate(target.objects)
+            if one.label == other.label
+        )
+        return (candidate(T, matched=pairs[:2], **(doubts if source.stamp_ns in self._doubtful else {})),)
+
+
+def _passes(*sides: float) -> list[Frame]:
+    """A place from three sides, a look away, and the place again from as many."""
+    places = [rooms.look_at((0.2, 0.2 * side, 1.3), (1.8, 0.0, 0.75)) for side in sides]
+    there = [_frame(k, T, True) for k, T in enumerate(places)]
+    return [*there, _frame(10, AWAY, True), *(_frame(30 + k, T, True) for k, T in enumerate(places))]
+
+
+def test_what_a_keyframe_cannot_prove_is_published_late_with_its_own_stamps_when_others_agree() -> None:
+    params = PARAMS.replaced(thin_seconds=0.1, closures=1, candidates=1)
+    registrar = Registrar(params, method=Odometrical(30))
+    outcomes = [registrar.process(frame) for frame in _passes(-1.0, 0.0, 1.0)] + [registrar.finish()]
+    by_keyframe = {o.keyframe_ns: [c.to_ns for c in o.closures] for o in outcomes if o.keyframe_ns is not None}
+    first, second, third = (round(1e9 * seconds) for seconds in (30, 31, 32))
+    assert by_keyframe[first] == [] and by_keyframe[second] == [second]
+    assert sorted(by_keyframe[third]) == [first, third]
+    (late,) = [c for o in outcomes for c in o.closures if c.to_ns == first]
+    assert late.evidence["agreeing"] == 2 and registrar.waiting == 0
+    known = {landmark.landmark for landmark in registrar.landmarks}
+    assert late.matches and {match.object_id for match in late.matches} <= known
+    assert registrar.counts()["closures"] == sum(len(o.closures) for o in outcomes)
+
+
+def test_what_nobody_confirms_is_refused_at_the_end_and_at_once_without_time_to_wait() -> None:
+    for seconds, waiting in ((10.0, 1), (0.0, 0)):
+        params = PARAMS.replaced(thin_seconds=0.1, closures=1, candidates=1, confirm_seconds=seconds)
+        registrar = Registrar(params, method=Odometrical(30))
+        for frame in _passes(0.0):
+            registrar.process(frame)
+        window = registrar.end()
+        assert window is not None
+        outcome = registrar.search(window)
+        assert outcome.closures == () and registrar.waiting == waiting
+        rejected = (*outcome.rejected, *registrar.settle().rejected)
+        assert len([one for one in rejected if one.to_ns == round(30e9)]) == 1 and registrar.waiting == 0
+
+
+def test_what_waits_is_refused_when_the_clock_begins_anew() -> None:
+    params = PARAMS.replaced(thin_seconds=0.1, closures=1, candidates=1)
+    registrar = Registrar(params, method=Odometrical(30))
+    for frame in (*_passes(0.0), _frame(3, AWAY, True)):
+        registrar.process(frame)
+    assert registrar.waiting == 1
+    outcome = registrar.finish()
+    assert [one.to_ns for one in outcome.rejected if one.T_from_to is not None][:1] == [round(30e9)]
+    assert registrar.waiting == 0

@@ -30,7 +30,7 @@ from objreg_ros.registration.propose.evidence import CONSIDERED_MARGIN, margin_o
 from objreg_ros.registration.propose.prior import Prior
 from objreg_ros.registration.refine.batch_icp import LEAST_PAIRS
 
-__all__ = ["Refusal", "check_rules", "compared", "judge", "refuse"]
+__all__ = ["Refusal", "check_possible", "check_rules", "compared", "judge", "refuse"]
 
 
 def judge(candidates: Sequence[Candidate], prior: Prior | None = None, limits: Limits = LIMITS) -> Candidate | Refusal:
@@ -66,18 +66,29 @@ def refuse(one: Candidate, prior: Prior | None = None, limits: Limits = LIMITS) 
 
 def check_rules(one: Candidate, prior: Prior | None = None, limits: Limits = LIMITS) -> Refusal | None:
     """The first rule that refuses a candidate however likely it looks, with the numbers; None if none does."""
-    matched, labels, lone = len(one.matched), [pair.label for pair in one.matched], objects.is_lone(one)
+    return check_possible(one, prior, limits) or check_alone(one, limits)
+
+
+def check_possible(one: Candidate, prior: Prior | None = None, limits: Limits = LIMITS) -> Refusal | None:
+    """The first rule by which a candidate is no pose of one place, whatever others say; None if it may be one."""
     return (
         convergence.check(one.alignment.converged, one.alignment.inliers)
         or odometry.check_plausible(one.T_target_source, limits.translation_m)
         or _check_gravity(one, limits)
         or free_space.check(one.verification.violations, one.certain_violations, limits.free_space)
-        or objects.check_moved(matched, len(one.moved))
-        or objects.check_matched(matched)
-        or surroundings.check(one.surroundings, one.verification, labels, lone, limits.surroundings)
+        or objects.check_moved(len(one.matched), len(one.moved))
+        or odometry.check(one.T_target_source, prior, limits.odometry_sigmas)
+    )
+
+
+def check_alone(one: Candidate, limits: Limits = LIMITS) -> Refusal | None:
+    """The first rule by which a candidate does not stand by itself: poses that agree with it may confirm it."""
+    labels = [pair.label for pair in one.matched]
+    return (
+        objects.check_matched(len(one.matched))
+        or surroundings.check(one.surroundings, one.verification, labels, objects.is_lone(one), limits.surroundings)
         or competing.check(one.margin_over_competing, limits.score_margin)
         or observability.check(len(one.alignment.degenerate))
-        or odometry.check(one.T_target_source, prior, limits.odometry_sigmas)
     )
 
 

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Between gate and publication: what one pair of keyframes cannot prove waits for others that agree.
+
+A pose that is likely right, and that no rule makes impossible, waits until `SUPPORTERS` others agree
+with it by way of odometry, and little disagrees. What the gate accepts is published at once, unless more disagrees than
+agrees: then it waits as well. What waits longer than ``confirm_seconds``, or beyond the reach of odometry, is refused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+from objreg_ros.data import Reason, Rejected
+from objreg_ros.registrar.closure import Accepted, Waiting, rejected
+from objreg_ros.registrar.consistency import Consistency, Standpoint, Statement, Support
+from objreg_ros.registration.candidate import Candidate
+from objreg_ros.registration.gate.likelihood import odds_of
+from objreg_ros.registration.gate.limits import limits_of
+from objreg_ros.registration.gate.refusal import Refusal
+from objreg_ros.registration.gate.verdict import check_possible
+from objreg_ros.registration.keyframe import Keyframe
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.propose.prior import Prior
+from objreg_ros.registration.result import Registration
+
+LEAST_ODDS = 3.0  # of what waits: with even odds slides of 15 to 20 cm confirm each other
+SUPPORTERS = 2  # that agree with it and each other
+LEAST_SHARE = 0.85  # of what is said of its place, that agrees
+OPPOSED_SHARE = 0.5  # what the gate accepts waits below
+HEARD = 1.0  # what weighs less opposes nothing: one that is certain
+
+
+class Tried(NamedTuple):
+    """A pair of keyframes, what odometry expected of it, and what its registration came to."""
+
+    source: Keyframe
+    target: Keyframe
+    prior: Prior | None
+    registration: Registration
+
+
+class Held(NamedTuple):
+    """A pose that waits, by the number of its statement, and why it is not published."""
+
+    number: int
+    item: Accepted
+    refusal: Refusal
+
+
+class Confirmation:
+    """Hears of every pair that was tried, and says which poses others confirm.
+
+    It remembers statements within reach (`consistency`), and what waits. The same pairs in the same order give the same
+    answers.
+    """
+
+    def __init__(self, params: RegistrarParams) -> None:
+        self._limits, self._wait_ns = limits_of(params), round(1e9 * params.confirm_seconds)
+        self._consistency = Consistency()
+        self._waiting: dict[int, Waiting] = {}
+
+    def __len__(self) -> int:
+        """How many wait."""
+        return len(self._waiting)
+
+    def hear(self, tried: Tried) -> Accepted | Held | Rejected:
+        """What a registration comes to beside what was heard before; ValueError where a gate gave no reason."""
+        registration = tried.registration
+        candidate, accepted = registration.candidate, registration.accepted
+        if candidate is None or not (accepted or (self._wait_ns and self._possible(candidate, tried.prior))):
+            return _refused(tried)
+        item = Accepted(target=tried.target, candidate=candidate)
+        if not self._wait_ns:
+            return item
+        number = self._consistency.add(_statement(tried, candidate))
+        support = self._consistency.support(number)
+        if accepted:
+            return Held(number, item, _opposition(support)) if _opposed(support) else item
+        if odds_of(candidate) < LEAST_ODDS:
+            return _refused(tried)
+        return replace(item, support=support) if _confirmed(support) else Held(number, item, _refusal(tried))
+
+    def hold(self, number: int, waiting: Waiting) -> None:
+        """Let a held pose wait, with what its constraint needs once the keyframes are gone."""
+        self._waiting[number] = waiting
+
+    def settle(self, now_ns: int | None) -> tuple[list[Waiting], list[Rejected]]:
+        """What waits no more at the end of a keyframe: what is confirmed, and what is refused for good.
+
+        All of it where ``now_ns`` is None.
+        """
+        confirmed, refused = [], []
+        for number, waiting in list(self._waiting.items()):
+            known = number in self._consistency
+            support = self._consistency.support(number) if known else None
+            if support is not None and self._settled(waiting, support):
+                confirmed.append(waiting.confirmed(support))
+            elif known and now_ns is not None and now_ns - waiting.closure.to_ns <= self._wait_ns:
+                continue
+            else:
+                refused.append(waiting.refused(waiting.refusal))
+            del self._waiting[number]
+        return confirmed, refused
+
+    def _possible(self, candidate: Candidate, prior: Prior | None) -> bool:
+        return check_possible(candidate, prior, self._limits) is None
+
+    def _settled(self, waiting: Waiting, support: Support) -> bool:
+        """Whether it is published after all."""
+        return not _opposed(support) if waiting.accepted else _confirmed(support)
+
+
+def _confirmed(support: Support) -> bool:
+    return support.agreeing >= SUPPORTERS and support.share >= LEAST_SHARE
+
+
+def _opposed(support: Support) -> bool:
+    return support.heard >= HEARD and support.share < OPPOSED_SHARE
+
+
+def _statement(tried: Tried, candidate: Candidate) -> Statement:
+    return Statement(
+        Standpoint.of(tried.source),
+        Standpoint.of(tried.target),
+        candidate.T_target_source,
+        odds_of(candidate),
+        tried.registration.accepted,
+    )
+
+
+def _refusal(tried: Tried) -> Refusal:
+    """Why the gate refused; ValueError where it gave no reason."""
+    if tried.registration.reason is None:
+        raise ValueError("gate: expected a reason with each refusal, got None")
+    return tried.registration.reason, tried.registration.detail
+
+
+def _refused(tried: Tried) -> Rejected:
+    best = tried.registration.candidate
+    pose = None if best is None else best.T_target_source
+    return rejected(tried.target.stamp_ns, tried.source, _refusal(tried), pose)
+
+
+def _opposition(support: Support) -> Refusal:
+    return Reason.NEIGHBOURS, f"{support.share:.2f} < {OPPOSED_SHARE} of what is said of its place agrees"

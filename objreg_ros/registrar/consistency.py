@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which poses between keyframes agree, where odometry carries one to the other.
+
+Pairwise consistency (Olson, "Recognizing places using spectrally clustered local matches", 2009; Mangelson et al.,
+"Pairwise consistent measurement set maximization for robust multi-robot map merging", 2018). Wrong poses agree as well
+where they slide along the same surface. So what disagrees counts too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.geometry import inverse
+from objreg_ros.registration.keyframe import Keyframe
+
+REACH_M = 3.0  # of path, at both ends together, over which odometry carries a pose
+NEAR_M = 2.0  # of path: poses so near speak of the same place
+ROTATION_DEG, ROTATION_GROWTH_DEG_M = 3.0, 2.0  # between poses that agree: the noise of both, and of the way
+TRANSLATION_M, TRANSLATION_GROWTH = 0.06, 0.07
+MOST = 512  # statements that are kept, the newest
+
+
+class Standpoint(NamedTuple):
+    """Where a keyframe was: ``T_session_camera (4, 4)``, ``travelled`` m in its session."""
+
+    stamp_ns: int
+    session: int
+    T_session_camera: Array
+    travelled: float
+
+    @classmethod
+    def of(cls, keyframe: Keyframe) -> Standpoint:
+        """Of a keyframe."""
+        T = keyframe.T_odom_camera
+        return cls(keyframe.stamp_ns, keyframe.session, np.eye(4) if T is None else T, keyframe.travelled)
+
+
+class Statement(NamedTuple):
+    """The best pose ``T_target_source (4, 4)`` of a pair of keyframes, and the ``odds`` that it is right.
+
+    ``sure`` where the gate accepts it by itself.
+    """
+
+    source: Standpoint
+    target: Standpoint
+    T_target_source: Array
+    odds: float
+    sure: bool
+
+    @property
+    def weight(self) -> float:
+        """The probability that it is right."""
+        return self.odds / (1.0 + self.odds)
+
+
+class Support(NamedTuple):
+    """What other statements say of one.
+
+    ``agreeing`` counts those that agree with it and with each other, each of two keyframes of its own, one of them
+    ``sure`` or it itself is. Of all that speak of the same place, weighing ``heard``, ``share`` agrees.
+    """
+
+    agreeing: int
+    share: float
+    heard: float
+
+
+class Consistency:
+    """The statements of late, by number, and which of them agree."""
+
+    def __init__(self) -> None:
+        self._statements: dict[int, Statement] = {}
+        self._agree: dict[int, set[int]] = {}
+        self._near: dict[int, set[int]] = {}
+        self._next = 0
+
+    def __len__(self) -> int:
+        return len(self._statements)
+
+    def __contains__(self, number: int) -> bool:
+        return number in self._statements
+
+    def add(self, statement: Statement) -> int:
+        """Take in a statement; its number. Forgets what nothing that comes can speak of any more."""
+        self._forget(statement.source)
+        number, self._next = self._next, self._next + 1
+        others = [n for n, other in self._statements.items() if _same_sessions(other, statement)]
+        metres = np.array([_path_m(self._statements[n], statement) for n in others])
+        agrees = _agree([self._statements[n] for n in others], statement, metres)
+        self._statements[number] = statement
+        self._agree[number] = {n for n, yes in zip(others, agrees, strict=True) if yes}
+        self._near[number] = {n for n, way in zip(others, metres, strict=True) if way <= NEAR_M}
+        for table in (self._agree, self._near):
+            for n in table[number]:
+                table[n].add(number)
+        return number
+
+    def support(self, number: int) -> Support:
+        """What the others say of a statement that is still known."""
+        near = self._near[number]
+        heard = sum(self._statements[n].weight for n in near)
+        agreeing = sum(self._statements[n].weight for n in near & self._agree[number])
+        return Support(self._clique(number), agreeing / heard if heard > 0.0 else 0.0, heard)
+
+    def _clique(self, number: int) -> int:
+        """How many others agree with a statement and each other, the surest first; 0 where none of them all is sure.
+
+        Only likely ones count, and of two of one keyframe one.
+        """
+        likely = [n for n in self._agree[number] if self._statements[n].odds >= 1.0]
+        clique = [number]
+        for n in sorted(likely, key=lambda n: (not self._statements[n].sure, -self._statements[n].odds, n)):
+            if all(n in self._agree[m] and self._distinct(n, m) for m in clique):
+                clique.append(n)
+        return len(clique) - 1 if any(self._statements[n].sure for n in clique) else 0
+
+    def _distinct(self, a: int, b: int) -> bool:
+        one, other = self._statements[a], self._statements[b]
+        return (one.source.stamp_ns != other.source.stamp_ns) and (one.target.stamp_ns != other.target.stamp_ns)
+
+    def _forget(self, now: Standpoint) -> None:
+        """Leave out what is beyond reach of the camera, and the oldest of too many."""
+        gone = [
+            n
+            for n, one in self._statements.items()
+            if one.source.session != now.session or now.travelled - one.source.travelled > REACH_M
+        ]
+        gone += list(self._statements)[: max(len(self._statements) + 1 - MOST - len(gone), 0)]
+        for n in dict.fromkeys(gone):
+            del self._statements[n]
+            for table in (self._agree, self._near):
+                for m in table.pop(n):
+                    table[m].discard(n)
+
+
+def _same_sessions(one: Statement, other: Statement) -> bool:
+    return (one.source.session, one.target.session) == (other.source.session, other.target.session)
+
+
+def _path_m(one: Statement, other: Statement) -> float:
+    """The camera's path from one pair of keyframes to the other, at both ends together."""
+    source = abs(one.source.travelled - other.source.travelled)
+    return source + abs(one.target.travelled - other.target.travelled)
+
+
+def _agree(others: Sequence[Statement], one: Statement, metres: Array) -> Array:
+    """(N,) bool: whether odometry carries the pose of ``one`` to where each of ``others`` is, or back."""
+    if not others:
+        return np.zeros(0, bool)
+    T_there = np.array([other.target.T_session_camera for other in others])
+    T_here = np.array([other.source.T_session_camera for other in others])
+    T_others = np.array([other.T_target_source for other in others])
+    T_target, T_source = one.target.T_session_camera, one.source.T_session_camera
+    forth = np.linalg.inv(T_there) @ T_target @ one.T_target_source @ inverse(T_source) @ T_here
+    back = inverse(T_target) @ T_there @ T_others @ np.linalg.inv(T_here) @ T_source
+    cosine = (np.sum(forth[:, :3, :3] * T_others[:, :3, :3], axis=(1, 2)) - 1.0) / 2.0
+    degrees = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    apart = np.linalg.norm(forth[:, :3, 3] - T_others[:, :3, 3], axis=1)
+    apart = np.minimum(apart, np.linalg.norm(back[:, :3, 3] - one.T_target_source[:3, 3], axis=1))
+    turned = degrees <= ROTATION_DEG + ROTATION_GROWTH_DEG_M * metres
+    return np.asarray((metres <= REACH_M) & turned & (apart <= TRANSLATION_M + TRANSLATION_GROWTH * metres))

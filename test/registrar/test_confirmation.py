@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Poses that wait for others, along two passes of a corridor."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from registration.samples import box, candidate, keyframe, moved
+
+from objreg_ros.data import Array, Reason, Rejected
+from objreg_ros.memory.sighting import sightings_of
+from objreg_ros.registrar.closure import Accepted, Waiting, waiting_of
+from objreg_ros.registrar.confirmation import Confirmation, Held, Tried
+from objreg_ros.registration.gate.verdict import judge
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.result import Registration
+from registrar.test_consistency import ASIDE, TRUE
+
+PARAMS = RegistrarParams(confirm_seconds=10.0)
+THINGS = (box("cup", (0.0, 0.0, 1.0)), box("book", (0.3, 0.0, 1.0), instance=2))
+DOUBTFUL = {"texture": 0.1, "tested": 2000, "perturbation_margin": 0.1}
+
+
+def tried(at_m: float, T: Array = TRUE, seconds: float | None = None, **evidence: object) -> Tried:
+    """The pair at a place of the corridor, judged by the gate."""
+    found = candidate(T, **evidence)
+    verdict = judge((found,))
+    source, target = (
+        replace(keyframe(number, when, THINGS, T_odom_camera=moved(at_m)), travelled=way)
+        for number, when, way in (
+            (2, 100 + at_m if seconds is None else seconds, 100 + at_m),
+            (1, at_m, at_m),
+        )
+    )
+    if isinstance(verdict, tuple):
+        told = Registration(accepted=False, reason=verdict[0], detail=verdict[1], candidate=found)
+    else:
+        told = Registration(accepted=True, candidate=found)
+    return Tried(source, target, None, told)
+
+
+def hold(confirmation: Confirmation, one: Tried, held: object) -> Waiting:
+    assert isinstance(held, Held)
+    sightings = [seen.of_landmark(7, np.eye(3)) for seen in sightings_of(one.source)]
+    waiting = waiting_of(one.source, sightings, held.item, held.refusal, PARAMS)
+    confirmation.hold(held.number, waiting)
+    return waiting
+
+
+def test_an_accepted_pose_is_of_the_stored_keyframe_and_does_not_wait() -> None:
+    one = tried(0.0)
+    verdict = Confirmation(PARAMS).hear(one)
+    assert isinstance(verdict, Accepted)
+    assert verdict.target is one.target and verdict.candidate is one.registration.candidate
+
+
+def test_a_doubtful_pose_waits_until_two_sure_ones_agree_and_keeps_its_own_stamps() -> None:
+    confirmation, first = Confirmation(PARAMS), tried(0.0, **DOUBTFUL)
+    hold(confirmation, first, confirmation.hear(first))
+    confirmation.hear(tried(0.2))
+    assert confirmation.settle(first.source.stamp_ns) == ([], []) and len(confirmation) == 1
+    confirmation.hear(tried(0.4))
+    (late,), refused = confirmation.settle(first.source.stamp_ns)
+    assert refused == [] and len(confirmation) == 0
+    assert (late.closure.from_ns, late.closure.to_ns) == (first.target.stamp_ns, first.source.stamp_ns)
+    assert late.closure.evidence["agreeing"] == 2 and late.closure.evidence["agreeing_share"] > 0.99
+
+
+def test_a_doubtful_pose_that_others_confirmed_before_does_not_wait() -> None:
+    confirmation = Confirmation(PARAMS)
+    for at_m in (0.0, 0.2):
+        confirmation.hear(tried(at_m))
+    verdict = confirmation.hear(tried(0.4, **DOUBTFUL))
+    assert isinstance(verdict, Accepted) and verdict.support is not None and verdict.support.agreeing == 2
+
+
+def test_a_doubtful_pose_that_slides_is_refused_in_the_end_with_the_gate_s_reason() -> None:
+    confirmation, slid = Confirmation(PARAMS), tried(0.1, ASIDE, **DOUBTFUL)
+    waiting = hold(confirmation, slid, confirmation.hear(slid))
+    for at_m in (0.2, 0.4, 0.6):
+        confirmation.hear(tried(at_m))
+    assert confirmation.settle(slid.source.stamp_ns + 10 * 10**9) == ([], [])
+    accepted, (refused,) = confirmation.settle(slid.source.stamp_ns + 10 * 10**9 + 1)
+    assert accepted == [] and (refused.reason, refused.detail) == waiting.refusal
+    assert np.allclose(refused.T_from_to, ASIDE)
+
+
+def test_an_accepted_pose_that_its_neighbours_contradict_is_not_published() -> None:
+    confirmation = Confirmation(PARAMS)
+    for at_m in (0.0, 0.2, 0.4):
+        confirmation.hear(tried(at_m))
+    false = tried(0.6, ASIDE)
+    assert false.registration.accepted
+    hold(confirmation, false, confirmation.hear(false))
+    confirmed, (refused,) = confirmation.settle(None)
+    assert confirmed == [] and refused.reason is Reason.NEIGHBOURS and "0.00 < 0.5" in refused.detail
+
+
+def test_an_accepted_pose_that_was_contradicted_by_false_ones_is_published_when_others_come() -> None:
+    confirmation = Confirmation(PARAMS)
+    for at_m in (0.0, 0.2):
+        confirmation.hear(tried(at_m, ASIDE))
+    right = tried(0.4)
+    hold(confirmation, right, confirmation.hear(right))
+    for at_m in (0.5, 0.6, 0.7):
+        confirmation.hear(tried(at_m))
+    (late,), _ = confirmation.settle(right.source.stamp_ns)
+    assert late.closure.to_ns == right.source.stamp_ns
+
+
+@pytest.mark.parametrize(
+    "evidence", [{"certain_violations": 0.2}, {"converged": False}, {"texture": -0.9, "tested": 50}]
+)
+def test_what_is_impossible_or_unlikely_never_waits(evidence: dict[str, object]) -> None:
+    confirmation = Confirmation(PARAMS)
+    for at_m in (0.0, 0.2):
+        confirmation.hear(tried(at_m))
+    poor = {"perturbation_margin": 0.0, "information": np.diag([1e2] * 6), **evidence}
+    assert isinstance(confirmation.hear(tried(0.4, **poor)), Rejected)
+
+
+def test_nothing_waits_where_no_time_is_given() -> None:
+    confirmation = Confirmation(PARAMS.replaced(confirm_seconds=0.0))
+    for at_m in (0.0, 0.2):
+        confirmation.hear(tried(at_m))
+    assert isinstance(confirmation.hear(tried(0.4, **DOUBTFUL)), Rejected)
+    assert isinstance(confirmation.hear(tried(0.6, ASIDE)), Accepted)
+
+
+def test_a_refusal_tells_its_reason_its_moments_and_the_pose_that_was_refused() -> None:
+    one = tried(0.0, certain_violations=0.2)
+    verdict = Confirmation(PARAMS).hear(one)
+    assert isinstance(verdict, Rejected) and verdict.reason is Reason.FREE_SPACE
+    assert (verdict.from_ns, verdict.to_ns) == (one.target.stamp_ns, one.source.stamp_ns)
+    assert np.array_equal(verdict.T_from_to, TRUE)
+
+
+def test_a_gate_that_refuses_without_a_reason_is_an_error() -> None:
+    with pytest.raises(ValueError, match="expected a reason with each refusal, got None"):
+        Confirmation(PARAMS).hear(tried(0.0)._replace(registration=Registration(accepted=False)))
