@@ -16,8 +16,10 @@ from registration.samples import SECOND, candidate, keyframe
 
 from objreg_ros.data import Array, Frame, LoopClosure, Reason, Rejected
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
+from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import StoreError
+from objreg_ros.registrar import registrar as module
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.engine import Engine
@@ -320,3 +322,10 @@ def test_a_gate_of_ones_own_decides_and_a_method_of_ones_own_is_asked() -> None:
     closures, rejected = _run(Registrar(PARAMS, gate=never), _frame(0, HERE), _frame(30, BESIDE))
     assert not closures
     assert any(one.reason == Reason.MOVED and one.T_from_to is not None for one in rejected)
+
+
+def test_a_moment_of_which_fusion_leaves_no_object_is_no_keyframe(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "fuse", lambda window, params: replace(fuse(window, params), objects=()))
+    registrar = Registrar(PARAMS)
+    assert _run(registrar, _frame(0, HERE, True), _frame(30, BESIDE, True)) == ([], [])
+    assert registrar.landmarks == ()

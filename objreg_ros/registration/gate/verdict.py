@@ -66,14 +66,14 @@ def refuse(one: Candidate, prior: Prior | None = None, limits: Limits = LIMITS) 
 
 def check_rules(one: Candidate, prior: Prior | None = None, limits: Limits = LIMITS) -> Refusal | None:
     """The first rule that refuses a candidate however likely it looks, with the numbers; None if none does."""
-    matched, labels, lone = len(one.matched), [pair.label for pair in one.matched], objects.is_lone(one)
+    labels, lone = [pair.label for pair in one.matched], objects.is_lone(one)
     return (
         convergence.check(one.alignment.converged, one.alignment.inliers)
         or odometry.check_plausible(one.T_target_source, limits.translation_m)
         or _check_gravity(one, limits)
         or free_space.check(one.verification.violations, one.certain_violations, limits.free_space)
-        or objects.check_moved(matched, len(one.moved))
-        or objects.check_matched(matched)
+        or objects.check_moved(objects.counted(one.matched), objects.counted(one.moved))
+        or objects.check_matched(one.matched, limits.unnamed)
         or surroundings.check(one.surroundings, one.verification, labels, lone, limits.surroundings)
         or competing.check(one.margin_over_competing, limits.score_margin)
         or observability.check(len(one.alignment.degenerate))
