@@ -21,6 +21,7 @@ from objreg_ros import limits
 
 Array = NDArray[Any]
 
+UNNAMED = "thing"  # the label of an object that the detector has no name for
 LEAST_VARIANCE = 1e-30  # m^2, rad^2: the information of less is no number that can be reckoned with
 JUMP_NS = 1_000_000_000  # stamps that go back so far are of a clock that began anew; by less, one message came late
 MOVED = re.compile(r"moved (?P<label>.+) \[m\]")  # evidence: how far an object of the label went
@@ -231,6 +232,7 @@ class ObjectCloud:
 
     ``xyz (M, 3) float32`` m, within `limits.MOST_RANGE`; ``normals (M, 3) float32`` of length 1, towards the camera
     (0 0 0 where unknown);
+    ``label`` is `UNNAMED` where the detector has no name for it;
     ``rgb (M, 3) uint8`` or None; ``flags (M,) uint16`` of `PointFlag`; ``density`` measured points per square metre of
     surface; ``instance`` counts the objects of the frame from 1 (0 is the support surface).
     """

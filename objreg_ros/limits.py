@@ -11,7 +11,7 @@ LEAST_STAMP_NS = -(2**31) * NANOSECONDS  # builtin_interfaces/Time has seconds o
 MOST_STAMP_NS = 2**31 * NANOSECONDS - 1
 
 MOST_NAME = 1000  # characters of a frame or of a label
-MOST_CLASS_ID = 65534  # class ids have 16 bits; the last one is the support surface's
+MOST_CLASS_ID = 65533  # class ids have 16 bits; the last two are the support surface's and the unnamed objects'
 MOST_LABELS_TEXT = 4_000_000  # characters of the table of labels
 MOST_RECORD = 65536  # bytes of one point of a cloud
 MOST_FIELDS = 200  # of one point of a cloud

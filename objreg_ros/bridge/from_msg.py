@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from objreg_ros import limits
-from objreg_ros.bridge.layout import SUPPORT_ID, SUPPORT_LABEL, columns, table, whole_numbers
+from objreg_ros.bridge.layout import SUPPORT_ID, SUPPORT_LABEL, UNNAMED_ID, columns, table, whole_numbers
 from objreg_ros.bridge.pictures import colour_pixels, depth_metres, unpack_rgb
 from objreg_ros.data import (
     SURROGATE,
+    UNNAMED,
     ColourImage,
     DepthImage,
     Detections,
@@ -403,7 +404,8 @@ def objects(message: Any, names: Mapping[int, str]) -> tuple[tuple[ObjectCloud, 
 
 
 def _label_of(number: int, names: Mapping[int, str]) -> str:
-    return SUPPORT_LABEL if number == SUPPORT_ID else names.get(number, str(number))
+    own = {SUPPORT_ID: SUPPORT_LABEL, UNNAMED_ID: UNNAMED}
+    return own[number] if number in own else names.get(number, str(number))
 
 
 def _object(rows: Array, instance: int, label: str, flags: Array) -> ObjectCloud:

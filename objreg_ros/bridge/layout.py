@@ -19,6 +19,7 @@ Array = NDArray[Any]
 
 SUPPORT_ID = 65535  # class_id of the support surface, which is no class
 SUPPORT_LABEL = "support"
+UNNAMED_ID = 65534  # class_id of the objects that the detector has no name for
 MOST_WHOLE = 65535  # of the numbers of the tables, which are u2
 
 DETECTIONS = np.dtype(

@@ -23,8 +23,9 @@ from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
 from std_msgs.msg import Header, String
 
 from objreg_ros import limits
-from objreg_ros.bridge.layout import DETECTIONS, LANDMARKS, MOST_WHOLE, OBJECTS, SUPPORT_ID, VIEW, fields_of
+from objreg_ros.bridge.layout import DETECTIONS, LANDMARKS, MOST_WHOLE, OBJECTS, SUPPORT_ID, UNNAMED_ID, VIEW, fields_of
 from objreg_ros.data import (
+    UNNAMED,
     ColourImage,
     DepthImage,
     Detections,
@@ -254,14 +255,14 @@ def _numbers(names: Labels) -> dict[str, int]:
 
 
 def _is_numbered(label: str, numbers: Mapping[str, int]) -> bool:
-    return label in numbers or (label.isdecimal() and int(label) < SUPPORT_ID)
+    return label in numbers or label == UNNAMED or (label.isdecimal() and int(label) <= limits.MOST_CLASS_ID)
 
 
 def _number(label: str, numbers: Mapping[str, int]) -> int:
     """The id of a label. A class without a name is called by its number on the way in, and so on the way out."""
     if not _is_numbered(label, numbers):
         raise ValueError(f"label {label!r}: expected one of the {len(numbers)} published labels")
-    return numbers[label] if label in numbers else int(label)
+    return UNNAMED_ID if label == UNNAMED else numbers[label] if label in numbers else int(label)
 
 
 def view(frame: Frame) -> PointCloud2:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from objreg_ros.data import Array, Frame, ObjectCloud, PointFlag
+from objreg_ros.data import UNNAMED, Array, Frame, ObjectCloud, PointFlag
 from objreg_ros.geometry import inverse, rigid, rotate, transform
 from objreg_ros.keyframes.keyframer import FrameWindow
 from objreg_ros.registration.keyframe import Context, Keyframe, KeyObject, bounding_box
@@ -62,7 +62,8 @@ def fuse_objects(
 ) -> tuple[KeyObject, ...]:
     """Every object once: the same label group at the same place is the same object, seen from several sides.
 
-    One without points is nowhere, and is passed over.
+    One without points is nowhere, and is passed over. So is one without a name that only one of several frames shows;
+    where another frame names it, it is that.
     """
     groups = LabelGroups(label_groups)
     tracks: list[_Track] = []
@@ -76,7 +77,8 @@ def fuse_objects(
             else:
                 free.remove(track)
                 track.sightings.append(sighting)
-    return tuple(track.fused(number) for number, track in enumerate(tracks, start=1))
+    kept = [track for track in tracks if track.name != UNNAMED or len(track.sightings) > 1 or len(frames) == 1]
+    return tuple(track.fused(number) for number, track in enumerate(kept, start=1))
 
 
 def fuse_context(
@@ -103,12 +105,18 @@ class _Track:
 
     sightings: list[ObjectCloud] = field(default_factory=list)
 
+    @property
+    def name(self) -> str:
+        """The last label that a detector gave, `UNNAMED` if none did."""
+        return next((s.label for s in reversed(self.sightings) if s.label != UNNAMED), UNNAMED)
+
     def fused(self, instance: int) -> KeyObject:
-        best = max(self.sightings, key=lambda s: s.score)
-        whole = [s for s in self.sightings if not (s.has(PointFlag.CUT_BY_IMAGE) or s.has(PointFlag.CUT_BY_BOX))]
-        kept = whole or self.sightings
+        named = [s for s in self.sightings if s.label != UNNAMED] or self.sightings
+        best = max(named, key=lambda s: s.score)
+        whole = [s for s in named if not (s.has(PointFlag.CUT_BY_IMAGE) or s.has(PointFlag.CUT_BY_BOX))]
+        kept = whole or named
         votes: Counter[str] = Counter()
-        for sighting in self.sightings:
+        for sighting in named:
             votes[sighting.label] += round(1000 * sighting.score)
         label = max(votes, key=lambda name: (votes[name], name))
         return KeyObject(cloud=_merge(kept, label, best, instance), sightings=len(self.sightings))
@@ -137,7 +145,7 @@ def _nearest(item: ObjectCloud, tracks: Sequence[_Track], groups: LabelGroups) -
     best, best_distance = None, np.inf
     for track in tracks:
         last = track.sightings[-1]
-        if groups.of(last.label) != groups.of(item.label):
+        if UNNAMED not in (item.label, track.name) and groups.of(track.name) != groups.of(item.label):
             continue
         last_middle, last_extent = bounding_box(last.xyz)
         distance = float(np.linalg.norm(middle - last_middle))

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from objreg_ros.data import JUMP_NS, Array, Frame
+from objreg_ros.data import JUMP_NS, UNNAMED, Array, Frame
 from objreg_ros.geometry import inverse, leaps, rigid, rotation_angle
 from objreg_ros.keyframes.gravity_filter import GravityFilter
 from objreg_ros.keyframes.odometry import TravelledPath
@@ -242,7 +242,9 @@ class Keyframer:
         labels: Counter[str] = Counter()
         for frame in window.frames:
             labels |= Counter(item.label for item in frame.objects if len(item))
-        if labels.total() < LEAST_OBJECTS or not self._is_news(window, labels):
+        empty = labels.total() < LEAST_OBJECTS
+        del labels[UNNAMED]  # one more of these is no news: they come and go with the noise
+        if empty or not self._is_news(window, labels):
             return None
         self._last = (window.session.number, window.T_session_first, labels)
         return FrameWindow(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from objreg_ros.data import Array, LoopClosure, ObjectMatch, Observation, Reason, Rejected
+from objreg_ros.data import UNNAMED, Array, LoopClosure, ObjectMatch, Observation, Reason, Rejected
 from objreg_ros.geometry import transform
 from objreg_ros.memory.landmarks import Link
 from objreg_ros.memory.sighting import Sighting
@@ -142,9 +142,12 @@ def links_of(keyframe: Keyframe, item: Accepted, stored: Sequence[Sighting]) -> 
 
 
 def _moved(keyframe: Keyframe, item: Accepted) -> dict[str, float]:
-    """How far the objects went that stand elsewhere now, under `MOVED`'s names; the farthest of several of one."""
+    """How far the objects went that stand elsewhere now, under `MOVED`'s names; the farthest of several of one.
+
+    Of two without a name nobody knows whether they are the same.
+    """
     found: dict[str, float] = {}
-    for pair in item.candidate.moved:
+    for pair in (pair for pair in item.candidate.moved if pair.label != UNNAMED):
         here = transform(item.candidate.T_target_source, keyframe.objects[pair.source].centroid)
         metres = float(np.linalg.norm(here - item.target.objects[pair.target].centroid))
         name = f"moved {pair.label} [m]"

@@ -148,13 +148,17 @@ class Registrar:
         The likeliest places come first; those that are not begun within ``seconds``, or before ``hurried``, are refused
         as over budget: with no time the keyframe is only stored. Without a limit the outcome depends on the frames
         alone. Keyframes are numbered as they come here: in the order of their frames. StoreError where one cannot be
-        stored; then it closes nothing. Of a frame window that a `reset` overtook nothing comes.
+        stored; then it closes nothing. Of a frame window that a `reset` overtook nothing comes, nor of
+        one whose objects have no name and were seen but once.
         """
         budget = Budget(time.monotonic() + seconds, hurried)
         with self._lock:
             if window.session < self._first_session:  # `reset` came first
                 return Outcome()
-            keyframe = fuse(window, self.params).numbered(self._store.next_keyframe())
+            fused = fuse(window, self.params)
+            if not fused.objects:
+                return Outcome()
+            keyframe = fused.numbered(self._store.next_keyframe())
             self._session = keyframe.session
             before = self._follow(window.clock, keyframe)
             sightings = sightings_of(keyframe)

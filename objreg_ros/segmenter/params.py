@@ -21,6 +21,7 @@ class SegmenterParams(Params):
     z_max: float = param(4.0, "farthest depth that is believed (1.75 in preset paper)", "m", ge=0.1, live=True)
     y_max: float = param(100.0, "farthest point below or above the camera's axis (0.75 in preset paper)", "m", ge=0.0)
     min_points: int = param(80, "an object of fewer points is not published", ge=1, live=True)
+    unnamed: bool = param(True, "what stands on a support or apart from everything is an object without a name")
     margin: float = param(0.15, "how far around a box is looked at, of the box's size", ge=0.0, le=1.0)
     jump: float = param(0.012, "depth step that ends an object, at the camera", "m", ge=0.001)
     jump_z2: float = param(0.012, "how the depth step grows with squared depth", "1/m", ge=0.0)

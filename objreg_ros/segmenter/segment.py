@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from objreg_ros.data import Array, DepthImage, Detections, Frame, Intrinsics, ObjectCloud, PointFlag
+from objreg_ros import limits
+from objreg_ros.data import UNNAMED, Array, DepthImage, Detections, Frame, Intrinsics, ObjectCloud, PointFlag
 from objreg_ros.segmenter import boxes, paper
 from objreg_ros.segmenter.boxes import Box
 from objreg_ros.segmenter.depth_to_colour import warm as warm_offset
@@ -22,6 +23,7 @@ from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.sensor_estimate import SensorEstimate
 from objreg_ros.segmenter.support import Ground, find_supports
 from objreg_ros.segmenter.surface import Surface, cell_size, reduce
+from objreg_ros.segmenter.unnamed import PERSON, find_things
 from objreg_ros.segmenter.view import reduced_view, step_for
 
 COARSE = 2  # every so many cells tell gravity and the support surfaces
@@ -85,6 +87,7 @@ class Segmenter:
         knows it. With ``gravity_sigma_deg``, the standard deviation of its tilts, it is handed on where it is surer
         than what the frame shows; without, in any case and with confidence 1. Where there is none it is estimated from
         the frame. A box without an object of `min_points` gives none; instances count the objects from 1.
+        Objects without a name come last, with `UNNAMED` for a label, where the parameter `unnamed` asks for them.
         ``T_odom_camera`` is None.
 
         ``masks`` has for each box a mask (H, W) bool of the depth image, or None: what it covers is the object, instead
@@ -96,7 +99,8 @@ class Segmenter:
         view = self._beside.submit(reduced_view, *seen)
         ground = self._ground(depth, gravity, gravity_sigma_deg)
         taken = np.zeros(ground.surface.depth.shape, np.bool_)
-        found = self._cut_all(depth, boxes.pixel_boxes(detections, *depth.depth.shape), outlines, ground)
+        asked = boxes.pixel_boxes(detections, *depth.depth.shape)
+        found = self._cut_all(depth, asked, outlines, ground)
         objects: list[ObjectCloud] = []
         for k in sorted(found):
             cut = found[k]
@@ -105,6 +109,8 @@ class Segmenter:
             if len(cut.pixels) >= params.min_points:
                 label, score = detections.label[k], float(detections.score[k])
                 objects.append(_object(label, score, len(objects) + 1, cut.pixels, cut.flags))
+        people = [box for box, label in zip(asked, detections.label, strict=True) if label == PERSON]
+        objects += self._things(depth, ground, taken, people, len(objects))
         return Frame(
             objects=tuple(objects),
             support=_support_cloud(ground, taken, depth),
@@ -115,6 +121,15 @@ class Segmenter:
             stamp_ns=depth.stamp_ns,
             frame_id=depth.frame_id,
         )
+
+    def _things(
+        self, depth: DepthImage, ground: Ground, taken: Array, people: list[Box], named: int
+    ) -> list[ObjectCloud]:
+        """The objects without a name, counted from behind the ``named`` ones."""
+        if not self.params.unnamed or self.params.preset == "paper":
+            return []
+        found = find_things(depth, ground, taken, people, self.params)[: limits.MOST_OBJECTS - named]
+        return [_object(UNNAMED, one.own, named + k, one.pixels, one.flags) for k, one in enumerate(found, start=1)]
 
     def _cut_all(
         self, depth: DepthImage, asked: list[Box], outlines: Sequence[Array | None], ground: Ground

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from objreg_ros.bridge import from_msg, to_msg
-from objreg_ros.bridge.layout import OBJECTS, SUPPORT_ID, table
+from objreg_ros.bridge.layout import OBJECTS, SUPPORT_ID, UNNAMED_ID, table
 from objreg_ros.data import (
+    UNNAMED,
     ColourImage,
     DepthImage,
     Detections,
@@ -180,6 +181,13 @@ def test_a_number_that_means_the_support_is_no_label() -> None:
         to_msg.objects(frame_of(cloud_of(str(SUPPORT_ID), 1, 3)), NAMES)
 
 
+def test_an_object_without_a_name_travels_under_a_number_of_its_own() -> None:
+    message = to_msg.objects(frame_of(cloud_of(UNNAMED, 1, 3)), NAMES)
+    assert set(table(message, "class_id").ravel()["class_id"].tolist()) == {UNNAMED_ID}
+    objects, _ = from_msg.objects(message, {})
+    assert objects[0].label == UNNAMED
+
+
 def test_a_class_without_a_name_keeps_its_number() -> None:
     objects, _ = from_msg.objects(to_msg.objects(frame_of(cloud_of("17", 1, 3)), NAMES), NAMES)
     assert objects[0].label == "17"
@@ -305,9 +313,9 @@ def test_a_stamp_beyond_32_bits_of_seconds_is_refused_and_not_cut(stamp_ns: int)
 
 
 def test_labels_of_ids_that_the_tables_cannot_carry_are_refused() -> None:
-    with pytest.raises(ValueError, match="labels: expected ids of at most 65534, got 70000"):
+    with pytest.raises(ValueError, match="labels: expected ids of at most 65533, got 70000"):
         to_msg.labels({0: "cup", 70000: "tv"})
-    assert json.loads(to_msg.labels({65534: "cup"}).data) == {"65534": "cup"}
+    assert json.loads(to_msg.labels({65533: "cup"}).data) == {"65533": "cup"}
 
 
 def test_a_picture_that_is_too_long_for_the_table_is_refused() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from registration.samples import box, cloud, frame, moved, scene_view
 
-from objreg_ros.data import PointFlag
+from objreg_ros.data import UNNAMED, PointFlag
 from objreg_ros.geometry import inverse, transform
 from objreg_ros.keyframes import fusion
 from objreg_ros.keyframes.fusion import fuse, fuse_objects, reference_index
@@ -99,3 +99,26 @@ def test_an_object_without_points_is_passed_over() -> None:
     nothing = cloud("cup", np.zeros((0, 3)))
     seen = (frame(0, (nothing, box("book", (0.4, 0, 1)))), frame(0.1, (nothing,)))
     assert [item.label for item in fuse_objects(seen, [np.eye(4)] * 2, GROUPS)] == ["book"]
+
+
+def test_an_object_without_a_name_is_seen_in_more_than_one_of_several_frames() -> None:
+    thing, cup = box(UNNAMED, (0, 0, 1)), box("cup", (0.4, 0, 1))
+    once = fuse_objects((frame(0, (cup, thing)), frame(0.1, (cup,))), [np.eye(4)] * 2, GROUPS)
+    assert [item.label for item in once] == ["cup"] and once[0].cloud.instance == 1
+    twice = fuse_objects((frame(0, (cup, thing)), frame(0.1, (thing,))), [np.eye(4)] * 2, GROUPS)
+    assert [(item.label, item.sightings) for item in twice] == [("cup", 1), (UNNAMED, 2)]
+    (alone,) = fuse_objects((frame(0, (thing,)),), [np.eye(4)], GROUPS)
+    assert alone.label == UNNAMED
+
+
+@pytest.mark.parametrize("names", [(UNNAMED, "cup"), ("cup", UNNAMED)])
+def test_what_one_frame_names_is_no_second_object_without_a_name(names: tuple[str, str]) -> None:
+    seen = [frame(0.1 * i, (box(name, (0, 0, 1)),)) for i, name in enumerate(names)]
+    (item,) = fuse_objects(seen, [np.eye(4)] * 2, GROUPS)
+    assert item.label == "cup" and item.sightings == 2
+
+
+def test_two_names_at_one_place_stay_two_objects_with_one_without_a_name_between() -> None:
+    seen = [frame(0.1 * i, (box(name, (0, 0, 1)),)) for i, name in enumerate(("cup", UNNAMED, "book"))]
+    items = fuse_objects(seen, [np.eye(4)] * 3, GROUPS)
+    assert sorted(item.label for item in items) == ["book", "cup"]

@@ -16,8 +16,10 @@ from registration.samples import SECOND, candidate, keyframe
 
 from objreg_ros.data import Array, Frame, LoopClosure, Reason, Rejected
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
+from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import StoreError
+from objreg_ros.registrar import registrar as module
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.engine import Engine
@@ -388,3 +390,10 @@ def test_what_waits_is_refused_when_the_clock_begins_anew() -> None:
     outcome = registrar.finish()
     assert [one.to_ns for one in outcome.rejected if one.T_from_to is not None][:1] == [round(30e9)]
     assert registrar.waiting == 0
+
+
+def test_a_moment_of_which_fusion_leaves_no_object_is_no_keyframe(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "fuse", lambda window, params: replace(fuse(window, params), objects=()))
+    registrar = Registrar(PARAMS)
+    assert _run(registrar, _frame(0, HERE, True), _frame(30, BESIDE, True)) == ([], [])
+    assert registrar.landmarks == ()

@@ -17,7 +17,7 @@ import numpy as np
 from objreg_ros.data import Reason
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.certainty.covariance import covariance_of, spread_of, worst_translation
-from objreg_ros.registration.gate.objects import independent
+from objreg_ros.registration.gate.objects import counted, independent
 from objreg_ros.registration.params import RegistrarParams
 
 
@@ -68,7 +68,7 @@ KINDS = {
         (-0.5, -0.2, 0.0, 0.2, 0.5), True, Reason.CHAINS_DISAGREE, "silhouette score",
     ),
     "matched": Kind(
-        lambda one: float(len(one.matched)),
+        lambda one: counted(one.matched),
         (0.0, 1.0, 2.0, 3.0, 4.0, 6.0), True, Reason.FEW_OBJECTS, "matched objects",
     ),
     "proposers": Kind(

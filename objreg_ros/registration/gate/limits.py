@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from objreg_ros.registration.gate import competing, free_space, gravity, likelihood, odometry, surroundings
+from objreg_ros.registration.gate import competing, free_space, gravity, likelihood, objects, odometry, surroundings
 from objreg_ros.registration.params import RegistrarParams
 
 
@@ -15,6 +15,7 @@ class Limits(NamedTuple):
     odds: float = likelihood.ODDS
     translation_m: float = odometry.FAR_M
     gravity_sigmas: float = gravity.SIGMAS
+    unnamed: int = objects.LEAST_UNNAMED
     free_space: free_space.Limits = free_space.LIMITS
     surroundings: surroundings.Limits = surroundings.LIMITS
     score_margin: float = competing.LEAST_MARGIN

@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
-from objreg_ros.data import Reason
-from objreg_ros.registration.candidate import Candidate
+from objreg_ros.data import UNNAMED, Reason
+from objreg_ros.registration.candidate import Candidate, ObjectPair
 from objreg_ros.registration.gate.refusal import Refusal
 
 SEVERAL = 2  # matched objects; fewer tell where one thing is, and not which way the camera looked at it
 PROPOSERS = 2  # independent, that make up for a second object
+LEAST_UNNAMED = 3  # matched objects without a name that make up for one with a name
+UNNAMED_COUNTS = 0.5  # of what an object with a name counts: any two of these may be taken for one
 SAME_EVIDENCE = {"centroids": "objects", "odometry": "objects"}
 """Proposers that are no evidence beside another one. The search for object poses starts from the centroids too. What
 drifting odometry expects is refined to whatever the objects fit nearby, right or wrong."""
@@ -18,7 +20,7 @@ drifting odometry expects is refined to whatever the objects fit nearby, right o
 
 def is_lone(candidate: Candidate) -> bool:
     """Whether no second object and too few independent proposers confirm the pose."""
-    return len(candidate.matched) < SEVERAL and independent(candidate.agreeing_proposers) < PROPOSERS
+    return counted(candidate.matched) < SEVERAL and independent(candidate.agreeing_proposers) < PROPOSERS
 
 
 def independent(proposers: Iterable[str]) -> int:
@@ -26,13 +28,25 @@ def independent(proposers: Iterable[str]) -> int:
     return len({SAME_EVIDENCE.get(proposer, proposer) for proposer in proposers})
 
 
-def check_moved(matched: int, moved: int) -> Refusal | None:
+def counted(pairs: Sequence[ObjectPair]) -> float:
+    """How many objects the ``pairs`` count for: those without a name for less than the others."""
+    unnamed = sum(pair.label == UNNAMED for pair in pairs)
+    return len(pairs) - (1.0 - UNNAMED_COUNTS) * unnamed
+
+
+def check_moved(matched: float, moved: float) -> Refusal | None:
     """Refuse a pose under which more objects moved than stayed: nothing is known then."""
     if moved <= matched:
         return None
-    return Reason.MOVED, f"{moved} objects moved, {matched} stayed"
+    return Reason.MOVED, f"{moved:g} objects moved, {matched:g} stayed"
 
 
-def check_matched(matched: int) -> Refusal | None:
-    """Refuse a pose without a matched object: rooms that repeat themselves look the same."""
-    return (Reason.FEW_OBJECTS, "0 objects < 1") if matched == 0 else None
+def check_matched(matched: Sequence[ObjectPair], least_unnamed: int = LEAST_UNNAMED) -> Refusal | None:
+    """Refuse a pose without a matched object: rooms that repeat themselves look the same.
+
+    One with a name is enough, or ``least_unnamed`` without: what these are nobody knows, so any may be another.
+    """
+    if any(pair.label != UNNAMED for pair in matched) or len(matched) >= least_unnamed:
+        return None
+    told = f"0 objects < 1, {len(matched)} without a name < {least_unnamed}" if matched else "0 objects < 1"
+    return Reason.FEW_OBJECTS, told

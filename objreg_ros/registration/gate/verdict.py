@@ -76,7 +76,7 @@ def check_possible(one: Candidate, prior: Prior | None = None, limits: Limits = 
         or odometry.check_plausible(one.T_target_source, limits.translation_m)
         or _check_gravity(one, limits)
         or free_space.check(one.verification.violations, one.certain_violations, limits.free_space)
-        or objects.check_moved(len(one.matched), len(one.moved))
+        or objects.check_moved(objects.counted(one.matched), objects.counted(one.moved))
         or odometry.check(one.T_target_source, prior, limits.odometry_sigmas)
     )
 
@@ -85,7 +85,7 @@ def check_alone(one: Candidate, limits: Limits = LIMITS) -> Refusal | None:
     """The first rule by which a candidate does not stand by itself: poses that agree with it may confirm it."""
     labels = [pair.label for pair in one.matched]
     return (
-        objects.check_matched(len(one.matched))
+        objects.check_matched(one.matched, limits.unnamed)
         or surroundings.check(one.surroundings, one.verification, labels, objects.is_lone(one), limits.surroundings)
         or competing.check(one.margin_over_competing, limits.score_margin)
         or observability.check(len(one.alignment.degenerate))

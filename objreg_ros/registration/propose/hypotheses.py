@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data import UNNAMED, Array
 from objreg_ros.geometry import pose, rotation_between, rotation_from_vector
 from objreg_ros.registration.candidate import Score
 from objreg_ros.registration.prepare.fpfh import match
@@ -24,6 +24,8 @@ FEATURE_MATCHES = 900  # most putative matches of features
 CENTROID_TOLERANCE_M = 0.12  # how far the centroid of one object may differ between views, which see other sides of it
 HYPOTHESES_PER_PROPOSER = 120  # most; more find no more
 YAW_STEPS = 36  # of one object upon another without shapes: each 10 deg
+UNNAMED_PAIRS = 6  # most objects without a name that are laid upon each other
+UNNAMED_SIZES = 0.65  # least ratio of their sizes
 HYPOTHESES_PER_OBJECT = 60  # most of single objects, whose poses are many
 
 
@@ -88,8 +90,16 @@ def from_objects(source: Prepared, target: Prepared) -> list[Hypothesis]:
 
 
 def look_alikes(source: Prepared, target: Prepared) -> list[tuple[int, int]]:
-    """Indices of all objects of source and target that a detector may call by one name."""
-    return [(i, j) for i, a in enumerate(source.groups) for j, b in enumerate(target.groups) if a == b]
+    """Indices of all objects of source and target that a detector may call by one name.
+
+    Of those without a name the `UNNAMED_PAIRS` that are most alike in size, if they are.
+    """
+    pairs = [(i, j) for i, a in enumerate(source.groups) for j, b in enumerate(target.groups) if a == b]
+    unnamed = [(i, j) for i, j in pairs if source.groups[i] == UNNAMED]
+    a, b = source.extents, target.extents
+    sizes = {(i, j): min(a[i], b[j]) / max(a[i], b[j], 1e-9) for i, j in unnamed}
+    alike = sorted((pair for pair in unnamed if sizes[pair] > UNNAMED_SIZES), key=lambda pair: -sizes[pair])
+    return [pair for pair in pairs if pair not in sizes or pair in alike[:UNNAMED_PAIRS]]
 
 
 def from_prior(T_target_source: Array | None) -> list[Hypothesis]:

@@ -5,11 +5,14 @@ from __future__ import annotations
 
 import pytest
 
-from objreg_ros.data import Reason
+from objreg_ros.data import UNNAMED, Reason
+from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.gate import objects
 from objreg_ros.registration.gate.verdict import refuse
 from registration.gate.samples import CUP
 from registration.samples import candidate
+
+THING = ObjectPair(0, 0, UNNAMED)
 
 
 def test_proposers_of_the_same_evidence_are_one() -> None:
@@ -35,6 +38,18 @@ def test_no_more_objects_may_have_moved_than_stayed() -> None:
 
 
 def test_a_pose_without_a_matched_object_is_refused_however_well_the_views_agree() -> None:
-    assert objects.check_matched(1) is None
+    assert objects.check_matched((CUP,)) is None
     refusal = refuse(candidate(matched=()))
     assert refusal is not None and refusal == (Reason.FEW_OBJECTS, "0 objects < 1")
+
+
+def test_objects_without_a_name_need_one_with_a_name_or_two_more_of_them() -> None:
+    assert objects.check_matched((THING, CUP)) is None and objects.check_matched((THING,) * 3) is None
+    refusal = refuse(candidate(matched=(THING,) * 2))
+    assert refusal == (Reason.FEW_OBJECTS, "0 objects < 1, 2 without a name < 3")
+
+
+def test_objects_without_a_name_count_for_half() -> None:
+    assert objects.counted((THING, CUP)) == 1.5 and objects.counted((THING,) * 3) == 1.5 and objects.counted(()) == 0
+    assert objects.is_lone(candidate(matched=(THING, CUP), agreeing_proposers=("objects",)))
+    assert refuse(candidate(matched=(CUP,), moved=(THING, THING))) is None

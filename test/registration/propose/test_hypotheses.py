@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from objreg_ros.data import UNNAMED
 from objreg_ros.geometry import inverse, is_rigid, pose_error, rotate, transform
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.fpfh import Features
@@ -107,7 +108,7 @@ def test_a_lone_object_is_turned_to_every_yaw(lone: tuple[Prepared, Prepared], m
 def test_what_is_worth_most_comes_first_and_no_more_comes_than_is_asked_for(
     room: tuple[Prepared, Prepared], proposer: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    source, target = (without(each, groups=("thing",) * len(each.groups)) for each in room)  # all look alike
+    source, target = (without(each, groups=("cup",) * len(each.groups)) for each in room)  # all look alike
     found = CHAINS[proposer](source, target)
     monkeypatch.setattr(hypotheses, "HYPOTHESES_PER_PROPOSER", 3)
     monkeypatch.setattr(hypotheses, "HYPOTHESES_PER_OBJECT", 3)
@@ -152,6 +153,18 @@ def test_objects_look_alike_where_a_detector_may_call_them_by_one_name(room: tup
     source, target = (without(each, groups=groups) for each, groups in zip(room, ("aba", "cab"), strict=True))
     assert look_alikes(source, target) == [(0, 1), (1, 2), (2, 1)]
     assert look_alikes(source, without(target, objects=None)) == []
+
+
+def test_of_objects_without_a_name_the_few_of_the_most_alike_sizes_are_tried(
+    room: tuple[Prepared, Prepared], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, target = (
+        replace(room[side], groups=(UNNAMED, UNNAMED, "cup"), extents=np.array(extents))
+        for side, extents in enumerate(((0.1, 0.5, 0.2), (0.12, 0.11, 0.9)))
+    )
+    assert look_alikes(source, target) == [(0, 0), (0, 1), (2, 2)]
+    monkeypatch.setattr(hypotheses, "UNNAMED_PAIRS", 1)
+    assert look_alikes(source, target) == [(0, 1), (2, 2)]
 
 
 def test_confusable_labels_are_of_one_group() -> None:
