@@ -19,8 +19,8 @@ from objreg_ros.registration.keyframe import Keyframe
 
 REACH_M = 3.0  # of path, at both ends together, over which odometry carries a pose
 NEAR_M = 2.0  # of path: poses so near speak of the same place
-ROTATION_DEG, ROTATION_GROWTH_DEG_M = 3.0, 2.0  # between poses that agree: the noise of both, and of the way
-TRANSLATION_M, TRANSLATION_GROWTH = 0.06, 0.07
+ROTATION_DEG, ROTATION_GROWTH_DEG_M = 2.0, 2.0  # between poses that agree: the noise of both, and of the way
+TRANSLATION_M, TRANSLATION_GROWTH = 0.05, 0.06
 MOST = 512  # statements that are kept, the newest
 
 
