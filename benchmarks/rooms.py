@@ -193,12 +193,10 @@ def measure(taken: Taken, store: Path | None, seed: int, register: bool) -> dict
             others = list(stored.sightings())
     found = retrieve(taken, params, others)
     row: dict[str, Any] = {**found._asdict(), "share": round(found.found / max(found.could_close, 1), 3)}
-    if register and store is None:
-        row |= close_loops(taken, params)
-    elif register:
+    if register:
         with tempfile.TemporaryDirectory() as folder:
-            copy = shutil.copy(store, folder)  # type: ignore[type-var]
-            row |= close_loops(taken, params.replaced(store=str(copy)))
+            copy = "" if store is None else str(shutil.copy(store, folder))
+            row |= close_loops(taken, params.replaced(store=copy))
     return row
 
 
