@@ -27,7 +27,7 @@ from objreg_ros.registration.propose.prior import TIGHT_TRANSLATION_M
 
 VOTE_DISTANCE = 0.5  # distance of descriptors at which a vote falls to 0.6
 VOTE_CUTOFF = 8.0  # half the squared distance behind the nearest beyond which a vote would be nothing
-SHORTLIST = 256  # votes that one object may give: beside many rooms the right one is far down
+SHORTLIST = 128  # votes that one object may give: beside many rooms the right one is far down
 SPARE = 8  # keyframes that a query names for each one that is tried
 RANKED = 64  # keyframes with the most votes, which take turns
 GAP_SIGMA_M = 0.08  # deviation of the distance of two objects' middles from one view to another
