@@ -3,7 +3,8 @@
 
 ``found``: of the keyframes that could close the share in which one of the first candidates (as many as are tried) is
 right. A keyframe could close when a stored one of the same recording, that odometry does not leave out as too near in
-time, truly shows one of its objects at its place, and their views overlap. ``constraints``, those that are loosely true
+time, truly shows one of its objects at its place, and their views overlap. ``restarted``: the same if the second half
+is another session, and only places of the first are right. ``constraints``, those that are loosely true
 (5 degrees, 10 cm) and false ones (worse than 8 degrees or 15 cm, or with another room): what the registrar makes of it.
 
     python benchmarks/rooms.py --simulate loop:61000,61001 --json OUT
@@ -57,6 +58,7 @@ FIRST_ROOM = 60_000  # the seed of the first of the other rooms
 FRAMES, RATE_HZ = 40, 5.0  # of a room: a frame a view
 ROOM_NS, LATER_NS = 10**12, 10**15  # rooms are so far apart in time, and recordings so much later
 LEAST_OVERLAP = 0.25  # of the views of a keyframe and of the stored one that is right
+ACCEPTED_EACH = 3  # so many right tries between sessions until one is accepted, where nothing is registered
 QUICK = {"rooms": 5, "frames": 120}
 
 
@@ -141,12 +143,22 @@ def right_of(keyframes: Sequence[Keyframe], truth: Truth, params: RegistrarParam
     return right
 
 
-def retrieve(taken: Taken, params: RegistrarParams, others: Sequence[Sighting]) -> Found:
-    """How often a right place is among the tries, by replaying keyframes: nothing is registered."""
+def retrieve(taken: Taken, params: RegistrarParams, others: Sequence[Sighting]) -> tuple[Found, Found]:
+    """How often a right place is among the tries, in one session and restarted: nothing is registered."""
     session = 1 + max((sighting.session for sighting in others), default=-1)
     first_id = 1 + max((sighting.keyframe_id for sighting in others), default=0)
     keyframes = keyframes_of(moved_to(taken.frames, LATER_NS), params, session, first_id)
-    return found_among(keyframes, right_of(keyframes, taken.truth, params), params, others)
+    right = right_of(keyframes, taken.truth, params)
+    return found_among(keyframes, right, params, others), found_among(*restarted(keyframes, right), params, others)
+
+
+def restarted(keyframes: Sequence[Keyframe], right: Array) -> tuple[list[Keyframe], Array]:
+    """The keyframes, the second half in the next session, and which of those could close with which of the first."""
+    half = len(keyframes) // 2
+    later = [replace(keyframe, session=keyframe.session + 1) for keyframe in keyframes[half:]]
+    across = np.zeros_like(right)
+    across[half:, :half] = right[half:, :half]
+    return [*keyframes[:half], *later], across
 
 
 def found_among(
@@ -161,8 +173,11 @@ def found_among(
         candidates = index.query(sightings)[: params.candidates]
         seconds += time.process_time() - began
         rows = [candidate.keyframe_id - keyframes[0].keyframe_id for candidate in candidates]
-        hits += any(row >= 0 and right[k, row] for row in rows)
+        found = [keyframes[row].session for row in rows if row >= 0 and right[k, row]]
         index.add(sightings)
+        hits += bool(found)
+        if found and hits % ACCEPTED_EACH == 0:
+            index.meet(keyframe.session, found[0])
     return Found(len(keyframes), int(right.any(axis=1).sum()), hits, 1e3 * seconds / max(len(keyframes), 1))
 
 
@@ -191,8 +206,9 @@ def measure(taken: Taken, store: Path | None, seed: int, register: bool) -> dict
     if store is not None:
         with closing(Store(store, read_only=True)) as stored:
             others = list(stored.sightings())
-    found = retrieve(taken, params, others)
-    row: dict[str, Any] = {**found._asdict(), "share": round(found.found / max(found.could_close, 1), 3)}
+    found, anew = retrieve(taken, params, others)
+    row: dict[str, Any] = {**found._asdict(), "share": share(found)}
+    row["restarted"] = {**anew._asdict(), "share": share(anew)}
     if register:
         with tempfile.TemporaryDirectory() as folder:
             copy = "" if store is None else str(shutil.copy(store, folder))
@@ -200,14 +216,23 @@ def measure(taken: Taken, store: Path | None, seed: int, register: bool) -> dict
     return row
 
 
+def share(found: Found) -> float:
+    """Of the keyframes that could close those that would be tried with a right one."""
+    return round(found.found / max(found.could_close, 1), 3)
+
+
 def line(name: str, beside: str, row: dict[str, Any]) -> str:
     """A row of the table."""
-    of = f"{row['found']}/{row['could_close']} = {row['share']:.3f}"
+    parts = row, row["restarted"]
+    of = " ".join(f"{part['found']}/{part['could_close']} = {part['share']:.3f}".rjust(16) for part in parts)
     made = [f"{row[key]:>6}" for key in ("constraints", "true", "false") if key in row]
-    return f"{name:24} {beside:>9} {row['keyframes']:>9} {of:>18} {row['query_ms']:>9.2f} {' '.join(made)}"
+    return f"{name:24} {beside:>9} {row['keyframes']:>9} {of} {row['query_ms']:>9.2f} {' '.join(made)}"
 
 
-HEAD = f"{'recording':24} {'beside':>9} {'keyframes':>9} {'found':>18} {'query ms':>9} constr   true  false"
+HEAD = (
+    f"{'recording':24} {'beside':>9} {'keyframes':>9} {'found':>16} {'restarted':>16} {'query ms':>9} "
+    "constr   true  false"
+)
 
 
 @click.command(help=__doc__)

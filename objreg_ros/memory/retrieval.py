@@ -5,7 +5,8 @@ The index holds one row an object, in one block a label group, so a query touche
 Objects vote for their keyframes: the nearer the descriptors and the rarer the label, the more. So do pairs of them that
 are as far from each other as those of the new keyframe. Odometry takes out what cannot be there: stored objects of the
 same session farther away than its uncertainty has grown. Our own tracking does not: it may have slipped unnoticed. What
-is left of the session is likelier than any other room; `benchmarks/rooms.py` measured by how much.
+is left of the session is likelier than another room, and so are sessions that are known to show the same place: they
+share a landmark, or were registered with each other. `benchmarks/rooms.py` measured by how much.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ SHORTLIST = 128  # votes that one object may give: beside many rooms the right o
 SPARE = 8  # keyframes that a query names for each one that is tried
 RANKED = 64  # keyframes with the most votes, which take turns
 GAP_SIGMA_M = 0.08  # deviation of the distance of two objects' middles from one view to another
-SAME_SESSION = 3.0  # a place of the session that goes on, where odometry lets it be, is so much likelier
+SAME_PLACE = 5.0  # so much likelier is what the session that goes on saw, or one that is known to show its place
 NEXT_OF_PASS = 0.7  # what the votes of a place are worth after each one of its pass that is tried before
 THIS_PASS = 0.9  # and of the very pass that goes on: its motion is known
 NEIGHBOUR = 1e-3  # and of a neighbour in time of one that is tried before
@@ -54,13 +55,17 @@ class Index:
         self._groups = LabelGroups(params.label_groups)
         self._blocks: dict[str, Block] = {}
         self._rows: dict[int, list[tuple[Block, int]]] = {}  # of each keyframe
+        self._met: dict[int, set[int]] = {}  # the sessions that are known to show one place, of each of them
 
     def __len__(self) -> int:
         return sum(map(len, self._blocks.values()))
 
     def add(self, sightings: Iterable[Sighting]) -> None:
-        """Add the objects of a keyframe."""
+        """Add the objects of keyframes. Sessions in which the same landmark was seen have met."""
+        first_session: dict[int, int] = {}
         for sighting in sightings:
+            if sighting.landmark:  # 0: it has none yet
+                self.meet(sighting.session, first_session.setdefault(sighting.landmark, sighting.session))
             block = self._blocks.setdefault(self._groups.of(sighting.label), Block())
             self._rows.setdefault(sighting.keyframe_id, []).append((block, block.append(sighting)))
 
@@ -68,6 +73,12 @@ class Index:
         """Forget every object of these keyframes."""
         for block, row in chain.from_iterable(self._rows.pop(number, ()) for number in keyframe_ids):
             block.remove(row)
+
+    def meet(self, session: int, other: int) -> None:
+        """Two sessions show the same place: so do all that either was known to share one with."""
+        if other not in self._met.get(session, {session}):
+            together = self._met.get(session, {session}) | self._met.get(other, {other})
+            self._met |= dict.fromkeys(together, together)
 
     def query(self, sightings: Sequence[Sighting], since: int = 0) -> list[CandidateKeyframe]:
         """Places of the sessions from ``since`` on for the objects of a new keyframe, the most promising first.
@@ -94,9 +105,10 @@ class Index:
         return block.where[rows], block.when[rows], rarity * np.exp(-halves / VOTE_DISTANCE**2)
 
     def _likelihood(self, session: Array, travelled: Array, asked: Sighting) -> Array:
-        """How much likelier than in another session a place is before anything is seen of it, (K,)."""
+        """How much likelier than in a session that may be anywhere a place is before anything is seen of it, (K,)."""
         here = self._same_pass(session, travelled, asked.session, asked.travelled)
-        return np.where(session == asked.session, SAME_SESSION, 1.0) * np.where(here, THIS_PASS, 1.0)
+        together = np.isin(session, list(self._met.get(asked.session, (asked.session,))))
+        return np.where(together, SAME_PLACE, 1.0) * np.where(here, THIS_PASS, 1.0)
 
     def _turns(self, where: Array, when: Array, votes: Array) -> Array:
         """The order in which to try: the best of each pass by here before what is not much less likely of the same.

@@ -111,6 +111,27 @@ def test_fifty_other_rooms_with_things_as_alike_do_not_crowd_out_the_place_where
     assert {52, 51} <= {candidate.keyframe_id for candidate in found[: PARAMS.candidates]}
 
 
+def test_a_session_that_met_the_one_that_goes_on_comes_before_other_rooms_and_so_do_those_that_it_met() -> None:
+    rooms = [_seen(k, 10.0 * k, CUP, session=k) for k in range(1, 11)]
+    index, asked = _index(*rooms), _seen(99, 300, CUP, session=20)
+    assert [candidate.keyframe_id for candidate in index.query(asked)[:3]] == [1, 2, 3]
+    index.meet(7, 4)
+    index.meet(20, 7)
+    found = index.query(asked)
+    assert [candidate.keyframe_id for candidate in found[:3]] == [4, 7, 1]
+    assert found[0].votes > 2 * found[2].votes and found[0].votes == found[1].votes
+
+
+def test_stored_sessions_with_a_landmark_in_common_have_met_and_what_has_no_landmark_has_met_nothing() -> None:
+    rooms = [_seen(k, 10.0 * k, CUP, session=k) for k in range(1, 4)]
+    named = [x.of_landmark(number, np.eye(3)) for (x,), number in zip(rooms, (5, 6, 5), strict=True)]
+    index = Index(PARAMS)
+    index.add(named)
+    assert [candidate.keyframe_id for candidate in index.query(_seen(99, 300, CUP, session=1))] == [1, 3, 2]
+    unnamed = _index(*rooms).query(_seen(99, 300, CUP, session=3))
+    assert [candidate.keyframe_id for candidate in unnamed] == [3, 1, 2]
+
+
 def test_neighbours_of_a_chosen_keyframe_give_way_to_other_moments() -> None:
     index = _index(_seen(1, 0.0, CUP), _seen(2, 0.1, CUP), _seen(3, 0.2, CUP), _seen(4, 10, CUP))
     assert [candidate.keyframe_id for candidate in index.query(_seen(9, 100, CUP))] == [1, 4, 2, 3]
