@@ -28,14 +28,14 @@ from objreg_ros.registration.propose.prior import TIGHT_TRANSLATION_M
 
 VOTE_DISTANCE = 0.5  # distance of descriptors at which a vote falls to 0.6
 VOTE_CUTOFF = 8.0  # half the squared distance behind the nearest beyond which a vote would be nothing
-SHORTLIST = 128  # votes that one object may give: beside many rooms the right one is far down
+SHORTLIST = 64  # votes that one object may give
 SPARE = 8  # keyframes that a query names for each one that is tried
 RANKED = 64  # keyframes with the most votes, which take turns
 GAP_SIGMA_M = 0.08  # deviation of the distance of two objects' middles from one view to another
-SAME_PLACE = 5.0  # so much likelier is what the session that goes on saw, or one that is known to show its place
+SAME_PLACE = 8.0  # so much likelier is what the session that goes on saw, or one that is known to show its place
 NEXT_OF_PASS = 0.7  # what the votes of a place are worth after each one of its pass that is tried before
 THIS_PASS = 0.9  # and of the very pass that goes on: its motion is known
-NEIGHBOUR = 1e-3  # and of a neighbour in time of one that is tried before
+NEIGHBOUR = 0.4  # and of a neighbour in time of one that is tried before
 EMPTY = Block()
 
 
@@ -113,7 +113,7 @@ class Index:
     def _turns(self, where: Array, when: Array, votes: Array) -> Array:
         """The order in which to try: the best of each pass by here before what is not much less likely of the same.
 
-        Neighbours of a chosen keyframe come after every other place.
+        Neighbours of a chosen keyframe come after other places that are not much less likely.
         """
         stamp_ns, session, travelled = when[:, 0], when[:, 1], where[:, 3]
         near = (session[:, None] == session) & (
