@@ -59,7 +59,7 @@ FRAMES, RATE_HZ = 40, 5.0  # of a room: a frame a view
 ROOM_NS, LATER_NS = 10**12, 10**15  # rooms are so far apart in time, and recordings so much later
 LEAST_OVERLAP = 0.25  # of the views of a keyframe and of the stored one that is right
 ACCEPTED_EACH = 3  # so many right tries between sessions until one is accepted, where nothing is registered
-QUICK = {"rooms": 5, "frames": 120}
+QUICK = {"rooms": 3, "frames": 80}
 
 
 class Taken(Protocol):
@@ -246,7 +246,7 @@ HEAD = (
 @click.option("--retrieval-only", is_flag=True, help="Register nothing: seconds instead of minutes.")
 @click.option("--json", "out", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
 @click.option("--keep", type=click.Path(file_okay=False, path_type=Path), default=Path("out/rooms"), show_default=True)
-@click.option("--quick", is_flag=True, help="Five rooms, and one short loop without RECORDINGS.")
+@click.option("--quick", is_flag=True, help="Three rooms, and one short loop without RECORDINGS.")
 @click.pass_context
 def main(
     context: click.Context,
