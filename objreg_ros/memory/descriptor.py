@@ -17,6 +17,9 @@ HUES = 8
 SIZE_WEIGHT, SHAPE_WEIGHT, COLOUR_WEIGHT = 0.5, 1.0, 0.7
 SIZE = 3 + (len(DISTANCE_EDGES) - 1) + HUES + 4  # extents, D2, hues, greys
 
+EMPHASIS = np.repeat(np.array([0.7, 1.0, 1.4], np.float32), [3, len(DISTANCE_EDGES) - 1, HUES + 4])
+"""What the parts of a stored descriptor weigh in retrieval: of many rooms' things colour tells more apart than size."""
+
 
 def describe(cloud: ObjectCloud) -> Array:
     """The (SIZE,) float32 descriptor of an object; without colour the colour's share is 0."""

@@ -14,7 +14,7 @@ import numba
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.memory.descriptor import SIZE
+from objreg_ros.memory.descriptor import EMPHASIS, SIZE
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.registration.kernels.projection import FAST
 from objreg_ros.registration.params import RegistrarParams
@@ -48,8 +48,9 @@ class Block:
         i = self._free.pop() if self._free else self._used
         self._used = max(self._used, i + 1)
         tile, lane = divmod(i, LANES)
-        self._descriptors[tile, :, lane] = sighting.descriptor
-        self._half_norms[tile, lane] = 0.5 * float(sighting.descriptor @ sighting.descriptor)
+        descriptor = EMPHASIS * sighting.descriptor
+        self._descriptors[tile, :, lane] = descriptor
+        self._half_norms[tile, lane] = 0.5 * float(descriptor @ descriptor)
         self.where[i] = *sighting.position, sighting.travelled
         self.when[i] = sighting.stamp_ns, sighting.session, sighting.keyframe_id, sighting.by_odometry
         return i
@@ -69,7 +70,7 @@ class Block:
         older keyframe comes first.
         """
         tiles = -(-self._used // LANES)
-        descriptor = np.asarray(sighting.descriptor, np.float32)
+        descriptor = EMPHASIS * np.asarray(sighting.descriptor, np.float32)
         session = sighting.session if sighting.by_odometry else NO_SESSION
         found, similarity = _likest(  # type: ignore[call-arg]
             self._descriptors[:tiles], self._half_norms[:tiles], self.where, self.when, descriptor,

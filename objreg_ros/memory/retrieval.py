@@ -2,9 +2,11 @@
 """Which stored keyframes may show the same place as a new one: by what their objects are and how they look.
 
 The index holds one row an object, in one block a label group, so a query touches only objects that could be the same.
-Objects vote for their keyframes: the nearer the descriptors and the rarer the label, the more. Odometry takes out what
-cannot be there: stored objects of the same session farther away than its uncertainty has grown. Our own tracking does
-not: it may have slipped unnoticed.
+Objects vote for their keyframes: the nearer the descriptors and the rarer the label, the more. So do pairs of them that
+are as far from each other as those of the new keyframe. Odometry takes out what cannot be there: stored objects of the
+same session farther away than its uncertainty has grown. Our own tracking does not: it may have slipped unnoticed. What
+is left of the session is likelier than another room, and so are sessions that are known to show the same place: they
+share a landmark, or were registered with each other. `benchmarks/rooms.py` measured by how much.
 """
 
 from __future__ import annotations
@@ -27,7 +29,13 @@ from objreg_ros.registration.propose.prior import TIGHT_TRANSLATION_M
 VOTE_DISTANCE = 0.5  # distance of descriptors at which a vote falls to 0.6
 VOTE_CUTOFF = 8.0  # half the squared distance behind the nearest beyond which a vote would be nothing
 SHORTLIST = 64  # votes that one object may give
-SPARE = 4  # keyframes that a query names for each one that is tried
+SPARE = 8  # keyframes that a query names for each one that is tried
+RANKED = 64  # keyframes with the most votes, which take turns
+GAP_SIGMA_M = 0.08  # deviation of the distance of two objects' middles from one view to another
+SAME_PLACE = 8.0  # so much likelier is what the session that goes on saw, or one that is known to show its place
+NEXT_OF_PASS = 0.7  # what the votes of a place are worth after each one of its pass that is tried before
+THIS_PASS = 0.9  # and of the very pass that goes on: its motion is known
+NEIGHBOUR = 0.4  # and of a neighbour in time of one that is tried before
 EMPTY = Block()
 
 
@@ -47,13 +55,17 @@ class Index:
         self._groups = LabelGroups(params.label_groups)
         self._blocks: dict[str, Block] = {}
         self._rows: dict[int, list[tuple[Block, int]]] = {}  # of each keyframe
+        self._met: dict[int, set[int]] = {}  # the sessions that are known to show one place, of each of them
 
     def __len__(self) -> int:
         return sum(map(len, self._blocks.values()))
 
     def add(self, sightings: Iterable[Sighting]) -> None:
-        """Add the objects of a keyframe."""
+        """Add the objects of keyframes. Sessions in which the same landmark was seen have met."""
+        first_session: dict[int, int] = {}
         for sighting in sightings:
+            if sighting.landmark:  # 0: it has none yet
+                self.meet(sighting.session, first_session.setdefault(sighting.landmark, sighting.session))
             block = self._blocks.setdefault(self._groups.of(sighting.label), Block())
             self._rows.setdefault(sighting.keyframe_id, []).append((block, block.append(sighting)))
 
@@ -61,6 +73,12 @@ class Index:
         """Forget every object of these keyframes."""
         for block, row in chain.from_iterable(self._rows.pop(number, ()) for number in keyframe_ids):
             block.remove(row)
+
+    def meet(self, session: int, other: int) -> None:
+        """Two sessions show the same place: so do all that either was known to share one with."""
+        if other not in self._met.get(session, {session}):
+            together = self._met.get(session, {session}) | self._met.get(other, {other})
+            self._met |= dict.fromkeys(together, together)
 
     def query(self, sightings: Sequence[Sighting], since: int = 0) -> list[CandidateKeyframe]:
         """Places of the sessions from ``since`` on for the objects of a new keyframe, the most promising first.
@@ -70,13 +88,12 @@ class Index:
         ballots = [self._ballot(sighting, len(self), since) for sighting in sightings]
         where, when, votes = (np.concatenate(column) for column in zip(*ballots, strict=True))
         ballot = np.repeat(np.arange(len(ballots)), [len(ballot[-1]) for ballot in ballots])
-        first, votes = _tally(when[:, 2], ballot, votes)
+        positions = np.array([sighting.position for sighting in sightings], float)
+        first, votes = _tally(when[:, 2], ballot, votes, where[:, :3], positions)
         where, when = where[first], when[first]
-        here = self._same_pass(when[:, 1], where[:, 3], sightings[0].session, sightings[0].travelled)
-        order = np.argsort(-votes, kind="stable")  # the older first among equals
-        most, here = SPARE * self._params.candidates, here[order]
-        taken = order[np.concatenate([np.flatnonzero(~here)[:most], np.flatnonzero(here)[:most]])]
-        taken = taken[self._spread(where[taken], when[taken])]
+        votes = votes * self._likelihood(when[:, 1], where[:, 3], sightings[0])
+        ranked = np.argsort(-votes, kind="stable")[:RANKED]  # the older first among equals
+        taken = ranked[self._turns(where[ranked], when[ranked], votes[ranked])[: SPARE * self._params.candidates]]
         chosen = zip(when[taken].tolist(), votes[taken].tolist(), strict=True)
         return [CandidateKeyframe(number, stamp_ns, vote) for (stamp_ns, _, number, _), vote in chosen]
 
@@ -87,15 +104,24 @@ class Index:
         rarity = math.log(2.0 + stored / max(len(block), 1))
         return block.where[rows], block.when[rows], rarity * np.exp(-halves / VOTE_DISTANCE**2)
 
-    def _spread(self, where: Array, when: Array) -> Array:
-        """The order in which to try: the best of each pass by here, then the next best of each, this very pass last.
+    def _likelihood(self, session: Array, travelled: Array, asked: Sighting) -> Array:
+        """How much likelier than in a session that may be anywhere a place is before anything is seen of it, (K,)."""
+        here = self._same_pass(session, travelled, asked.session, asked.travelled)
+        together = np.isin(session, list(self._met.get(asked.session, (asked.session,))))
+        return np.where(together, SAME_PLACE, 1.0) * np.where(here, THIS_PASS, 1.0)
 
-        Neighbours of a chosen keyframe come after every other place.
+    def _turns(self, where: Array, when: Array, votes: Array) -> Array:
+        """The order in which to try: the best of each pass by here before what is not much less likely of the same.
+
+        Neighbours of a chosen keyframe come after other places that are not much less likely.
         """
         stamp_ns, session, travelled = when[:, 0], when[:, 1], where[:, 3]
-        near = np.abs(stamp_ns[:, None] - stamp_ns) < round(1e9 * self._params.thin_seconds)
+        near = (session[:, None] == session) & (
+            np.abs(stamp_ns[:, None] - stamp_ns) < round(1e9 * self._params.thin_seconds)
+        )
         same = self._same_pass(session[:, None], travelled[:, None], session, travelled)
-        return np.argsort(_turns(near, same), kind="stable")
+        worth = np.where(near, NEIGHBOUR, 1.0) * np.where(same, NEXT_OF_PASS, 1.0)
+        return np.asarray(_in_turn(votes, worth))
 
     def _same_pass(
         self, session: Array, travelled: Array, other_session: Array | int, other_travelled: Array | float
@@ -107,26 +133,54 @@ class Index:
 
 
 @numba.njit(cache=True, nogil=True)
-def _tally(keyframe_ids, ballots, votes):  # type: ignore[no-untyped-def]
-    """A row of each keyframe, the oldest first, and its votes: of each ballot the first, its nearest object's."""
+def _tally(keyframe_ids, ballots, votes, xyz, asked_xyz):  # type: ignore[no-untyped-def]
+    """A row of each keyframe, the oldest first, and its votes: of each ballot the first, its nearest object's.
+
+    And those of pairs of objects that are as far from each other as the two that were asked for.
+    """
     order = np.argsort(keyframe_ids, kind="mergesort")
-    first, total, found = np.empty(len(order), np.int64), np.zeros(len(order)), 0
-    for k, row in enumerate(order):
-        before = order[k - 1]
-        new = k == 0 or keyframe_ids[row] != keyframe_ids[before]
-        if new:
-            first[found] = row
-            found += 1
-        if new or ballots[row] != ballots[before]:
-            total[found - 1] += votes[row]
+    first, total, found, start = np.empty(len(order), np.int64), np.zeros(len(order)), 0, 0
+    while start < len(order):
+        stop = start + 1
+        while stop < len(order) and keyframe_ids[order[stop]] == keyframe_ids[order[start]]:
+            stop += 1
+        rows = order[start:stop]
+        first[found] = rows[0]
+        for k, row in enumerate(rows):
+            if k == 0 or ballots[row] != ballots[rows[k - 1]]:
+                total[found] += votes[row]
+        total[found] += _arranged(ballots[rows], votes[rows], xyz[rows], asked_xyz)
+        found, start = found + 1, stop
     return first[:found], total[:found]
 
 
 @numba.njit(cache=True, nogil=True)
-def _turns(near, same):  # type: ignore[no-untyped-def]
-    """In which turn each place comes: so many of its pass were chosen before it; after all turns what is near one."""
-    chosen, turns = np.zeros(len(near), np.bool_), np.zeros(len(near), np.int64)
-    for i in range(len(near)):
-        chosen[i] = not (near[i] & chosen).any()
-        turns[i] = (same[i, :i] & chosen[:i]).sum() if chosen[i] else len(near)
-    return turns
+def _arranged(ballots, votes, xyz, asked_xyz):  # type: ignore[no-untyped-def]
+    """The votes of pairs of one keyframe's objects: each object has as much to give as by itself, over all others."""
+    if len(votes) < 2 or ballots[0] == ballots[-1]:
+        return 0.0
+    objects = len(asked_xyz)
+    best = np.zeros((objects, objects))
+    for i in range(len(votes)):
+        for j in range(i):
+            a, b = ballots[j], ballots[i]
+            gap = np.sqrt(np.sum((xyz[i] - xyz[j]) ** 2))
+            if a == b or gap == 0.0:  # two answers to one object, or one to two
+                continue
+            off = (gap - np.sqrt(np.sum((asked_xyz[a] - asked_xyz[b]) ** 2))) / GAP_SIGMA_M
+            best[a, b] = max(best[a, b], np.sqrt(votes[i] * votes[j]) * np.exp(-0.5 * off * off))
+    return best.sum() / (objects - 1)
+
+
+@numba.njit(cache=True, nogil=True)
+def _in_turn(votes, worth):  # type: ignore[no-untyped-def]
+    """The order of places: always the one with the most votes; each lowers those of the others by its row."""
+    left, order = votes.copy(), np.empty(len(votes), np.int64)
+    for turn in range(len(votes)):
+        best = np.argmax(left)
+        order[turn] = best
+        left *= worth[best]
+        left[best] = -1.0
+        for k in order[:turn]:
+            left[k] = -1.0
+    return order

@@ -278,6 +278,8 @@ class Registrar:
         self._store.add(keyframe, named, closures, merged)
         self._landmarks.add(named, merged)
         self._index.add(named)
+        for item in accepted:
+            self._index.meet(keyframe.session, item.target.session)
         with suppress(StoreError):  # the keyframe is stored: what is left now goes another time
             self._forget_surplus(named)
         return closures, named

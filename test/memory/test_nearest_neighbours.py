@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.random import Generator
 
-from objreg_ros.memory.descriptor import SIZE
+from objreg_ros.memory.descriptor import EMPHASIS, SIZE
 from objreg_ros.memory.nearest_neighbours import LANES, Block
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.registration.params import RegistrarParams
@@ -45,7 +45,9 @@ def _brute_force(stored: list[Sighting], row: Sighting) -> list[int]:
         bound = other.session == row.session and other.by_odometry and row.by_odometry
         if bound and np.linalg.norm(other.position - row.position) > reach:
             continue
-        halves[other.keyframe_id] = 0.5 * float(np.sum((other.descriptor.astype(float) - row.descriptor) ** 2))
+        halves[other.keyframe_id] = 0.5 * float(
+            np.sum((EMPHASIS * (other.descriptor.astype(float) - row.descriptor)) ** 2)
+        )
     ranked = sorted(halves, key=lambda number: (halves[number], number))[:MOST]
     return [number for number in ranked if halves[number] < halves[ranked[0]] + MARGIN]
 
@@ -60,7 +62,7 @@ def test_a_scan_finds_what_brute_force_finds(seed: int) -> None:
     for row in (_sighting(9999, draw) for _ in range(10)):
         rows, halves = block.nearest(row, PARAMS, MOST, MARGIN)
         assert block.when[rows, 2].tolist() == _brute_force(stored, row)
-        exact = [0.5 * np.sum((stored[k].descriptor - row.descriptor) ** 2) for k in block.when[rows, 2]]
+        exact = [0.5 * np.sum((EMPHASIS * (stored[k].descriptor - row.descriptor)) ** 2) for k in block.when[rows, 2]]
         assert np.allclose(halves, exact, atol=1e-4)
 
 

@@ -10,7 +10,7 @@ import pytest
 from registration.samples import box, keyframe, moved
 
 from objreg_ros.data import ObjectCloud
-from objreg_ros.memory.retrieval import Index, _tally, _turns
+from objreg_ros.memory.retrieval import Index, _in_turn, _tally
 from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.registration.params import RegistrarParams
 
@@ -78,14 +78,58 @@ def test_an_object_of_another_size_or_colour_gets_a_lower_vote() -> None:
 
 def test_an_object_votes_once_for_a_keyframe_by_the_likest_that_it_shows_and_all_votes_add_up() -> None:
     numbers, ballots = np.array([7, 3, 7, 3, 7]), np.array([0, 0, 0, 1, 1])
-    first, votes = _tally(numbers, ballots, np.array([0.9, 0.8, 0.5, 0.4, 0.1]))
+    alone = np.zeros((5, 3)), np.zeros((2, 3))  # all objects at one point: no pair of them
+    first, votes = _tally(numbers, ballots, np.array([0.9, 0.8, 0.5, 0.4, 0.1]), *alone)
     assert first.tolist() == [1, 0] and votes == pytest.approx([1.2, 1.0])
 
 
-def test_what_is_near_another_place_takes_no_turn_of_its_pass() -> None:
-    near = np.eye(3, dtype=bool)
-    near[0, 1] = near[1, 0] = True
-    assert _turns(near, np.ones((3, 3), bool)).tolist() == [0, 3, 1]
+@pytest.mark.parametrize(("gap", "more"), [(0.5, 1.0), (0.58, np.exp(-0.5)), (1.5, 0.0)])
+def test_two_objects_as_far_from_each_other_as_those_asked_for_vote_together_too(gap: float, more: float) -> None:
+    stored, asked = np.array([[0.0, 0, 0], [0.0, gap, 0]]), np.array([[2.0, 0, 0], [2.5, 0, 0]])
+    _, votes = _tally(np.array([7, 7]), np.array([0, 1]), np.ones(2), stored, asked)
+    assert votes == pytest.approx([2.0 + more], abs=1e-6)
+
+
+def test_of_two_places_with_the_same_objects_that_with_their_arrangement_comes_first() -> None:
+    apart = box("book", (1.3, 0, 1), 0.2)
+    index = _index(_seen(1, 0, CUP, apart), _seen(2, 10, CUP, BOOK, session=1))
+    found = index.query(_seen(9, 100, CUP, BOOK, session=2))
+    assert [candidate.keyframe_id for candidate in found] == [2, 1] and found[0].votes > 1.3 * found[1].votes
+
+
+def test_the_place_with_the_most_votes_is_next_and_lowers_those_of_its_pass() -> None:
+    worth = np.array([[1, 0.5, 1], [0.5, 1, 1], [1, 1, 1]])
+    assert _in_turn(np.array([1.0, 0.9, 0.6]), worth).tolist() == [0, 2, 1]
+    assert _in_turn(np.array([1.0, 0.9, 0.3]), worth).tolist() == [0, 1, 2]
+    assert _in_turn(np.zeros(3), worth).tolist() == [0, 1, 2]
+
+
+def test_fifty_other_rooms_with_things_as_alike_do_not_crowd_out_the_place_where_odometry_is() -> None:
+    rooms = [_seen(k, float(k), CUP, session=k) for k in range(1, 51)]
+    here = [_seen(51 + k, 100.0 + 20 * k, CUP, session=51) for k in range(2)]
+    found = _index(*rooms, *here).query(_seen(99, 200, CUP, session=51))
+    assert {52, 51} <= {candidate.keyframe_id for candidate in found[: PARAMS.candidates]}
+
+
+def test_a_session_that_met_the_one_that_goes_on_comes_before_other_rooms_and_so_do_those_that_it_met() -> None:
+    rooms = [_seen(k, 10.0 * k, CUP, session=k) for k in range(1, 11)]
+    index, asked = _index(*rooms), _seen(99, 300, CUP, session=20)
+    assert [candidate.keyframe_id for candidate in index.query(asked)[:3]] == [1, 2, 3]
+    index.meet(7, 4)
+    index.meet(20, 7)
+    found = index.query(asked)
+    assert [candidate.keyframe_id for candidate in found[:3]] == [4, 7, 1]
+    assert found[0].votes > 2 * found[2].votes and found[0].votes == found[1].votes
+
+
+def test_stored_sessions_with_a_landmark_in_common_have_met_and_what_has_no_landmark_has_met_nothing() -> None:
+    rooms = [_seen(k, 10.0 * k, CUP, session=k) for k in range(1, 4)]
+    named = [x.of_landmark(number, np.eye(3)) for (x,), number in zip(rooms, (5, 6, 5), strict=True)]
+    index = Index(PARAMS)
+    index.add(named)
+    assert [candidate.keyframe_id for candidate in index.query(_seen(99, 300, CUP, session=1))] == [1, 3, 2]
+    unnamed = _index(*rooms).query(_seen(99, 300, CUP, session=3))
+    assert [candidate.keyframe_id for candidate in unnamed] == [3, 1, 2]
 
 
 def test_neighbours_of_a_chosen_keyframe_give_way_to_other_moments() -> None:
