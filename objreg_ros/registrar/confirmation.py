@@ -76,7 +76,8 @@ class Confirmation:
         number = self._consistency.add(_statement(tried, candidate))
         support = self._consistency.support(number)
         if accepted:
-            return Held(number, item, _opposition(support)) if _opposed(support) else item
+            waits = _by_odometry(tried) and _opposed(support)
+            return Held(number, item, _opposition(support)) if waits else item
         if odds_of(candidate) < LEAST_ODDS:
             return _refused(tried)
         return replace(item, support=support) if _confirmed(support) else Held(number, item, _refusal(tried))
@@ -117,6 +118,11 @@ def _confirmed(support: Support) -> bool:
 
 def _opposed(support: Support) -> bool:
     return support.heard >= HEARD and support.share < OPPOSED_SHARE
+
+
+def _by_odometry(tried: Tried) -> bool:
+    """Whether odometry told both poses: where our own tracking slipped, right poses contradict each other."""
+    return tried.source.by_odometry and tried.target.by_odometry
 
 
 def _statement(tried: Tried, candidate: Candidate) -> Statement:

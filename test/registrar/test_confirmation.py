@@ -23,16 +23,13 @@ THINGS = (box("cup", (0.0, 0.0, 1.0)), box("book", (0.3, 0.0, 1.0), instance=2))
 DOUBTFUL = {"texture": 0.1, "tested": 2000, "perturbation_margin": 0.1}
 
 
-def tried(at_m: float, T: Array = TRUE, seconds: float | None = None, **evidence: object) -> Tried:
+def tried(at_m: float, T: Array = TRUE, by_odometry: bool = True, **evidence: object) -> Tried:
     """The pair at a place of the corridor, judged by the gate."""
     found = candidate(T, **evidence)
     verdict = judge((found,))
     source, target = (
-        replace(keyframe(number, when, THINGS, T_odom_camera=moved(at_m)), travelled=way)
-        for number, when, way in (
-            (2, 100 + at_m if seconds is None else seconds, 100 + at_m),
-            (1, at_m, at_m),
-        )
+        replace(keyframe(number, way, THINGS, T_odom_camera=moved(at_m)), travelled=way, by_odometry=by_odometry)
+        for number, way in ((2, 100 + at_m), (1, at_m))
     )
     if isinstance(verdict, tuple):
         told = Registration(accepted=False, reason=verdict[0], detail=verdict[1], candidate=found)
@@ -96,6 +93,14 @@ def test_an_accepted_pose_that_its_neighbours_contradict_is_not_published() -> N
     hold(confirmation, false, confirmation.hear(false))
     confirmed, (refused,) = confirmation.settle(None)
     assert confirmed == [] and refused.reason is Reason.NEIGHBOURS and "0.00 < 0.5" in refused.detail
+
+
+def test_our_own_tracking_confirms_and_contradicts_nothing() -> None:
+    confirmation = Confirmation(PARAMS)
+    for at_m in (0.0, 0.2, 0.4):
+        confirmation.hear(tried(at_m, by_odometry=False))
+    assert isinstance(confirmation.hear(tried(0.5, by_odometry=False, **DOUBTFUL)), Accepted)
+    assert isinstance(confirmation.hear(tried(0.6, ASIDE, by_odometry=False)), Accepted)
 
 
 def test_an_accepted_pose_that_was_contradicted_by_false_ones_is_published_when_others_come() -> None:
