@@ -179,11 +179,12 @@ def _about(pair: Pair, best: list[Hypothesis], proposed: list[Hypothesis]) -> li
     source, target = pair.source, pair.target
     if not proposed or not (source.sight.textured and target.sight.textured):
         return []
-    T = _poses(proposed)
-    V = score_views(source.sight, target.sight, T, RANKING_POINTS)
+    T, V = _poses(proposed), np.full(len(proposed), WORST)
+    about = [near(T, found.T_target_source, source.middle, PROPOSED_FROM) for found in best]
+    some = np.any(about, axis=0)
+    V[some] = score_views(source.sight, target.sight, T[some], RANKING_POINTS)
     chosen: dict[int, Hypothesis] = {}
-    for found in best:
-        close = np.flatnonzero(near(T, found.T_target_source, source.middle, PROPOSED_FROM))
+    for close in map(np.flatnonzero, about):
         chosen |= {k: proposed[k] for k in close[distinct(T[close], V[close], source.middle, ANCHORED, PROPOSED)]}
     return list(chosen.values())
 
