@@ -29,11 +29,14 @@ from objreg_ros.registrar import registrar as facade
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
 from objreg_ros.registration import engine
+from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.certainty import observability
+from objreg_ros.registration.gate.refusal import Refusal
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare import prepared
 from objreg_ros.registration.propose import competing_hypotheses, evidence, hypotheses, object_poses, refinement
 from objreg_ros.registration.propose import shortlist as shortlisting
+from objreg_ros.registration.propose.prior import Prior
 from objreg_ros.registration.refine import batch_icp, photometric_icp
 
 STEPS: dict[str, tuple[Any, str]] = {
@@ -131,9 +134,9 @@ def run(frames: Sequence[Frame], params: RegistrarParams, profile: Profile) -> d
     method, tracked, searched, accepted = Watched(params, profile), [], [], []
     gate = registration.gate_of(params)
 
-    def judged(candidates: Any, prior: Any) -> Any:
+    def judged(candidates: Sequence[Candidate], prior: Prior | None = None) -> Candidate | Refusal:
         verdict = gate(candidates, prior)
-        accepted.append(not isinstance(verdict, tuple))
+        accepted.append(isinstance(verdict, Candidate))
         return verdict
 
     registrar = Registrar(params, method, judged)

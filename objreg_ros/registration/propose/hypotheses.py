@@ -20,10 +20,11 @@ from objreg_ros.registration.propose.pose_voting import Matches, poses
 from objreg_ros.registration.score.view_score import score_views
 from objreg_ros.registration.shapes.upright_search import COARSE_POINTS
 
-FEATURE_MATCHES = 900  # most putative matches of features
+FEATURE_MATCHES = 600  # most putative matches of features
 CENTROID_TOLERANCE_M = 0.12  # how far the centroid of one object may differ between views, which see other sides of it
 HYPOTHESES_PER_PROPOSER = 120  # most; more find no more
 YAW_STEPS = 36  # of one object upon another without shapes: each 10 deg
+MOST_ALIKE = 10  # pairs of objects whose shapes are laid upon each other: those of the most alike size
 HYPOTHESES_PER_OBJECT = 60  # most of single objects, whose poses are many
 
 
@@ -77,7 +78,7 @@ def from_objects(source: Prepared, target: Prepared) -> list[Hypothesis]:
     """Poses that lay one object upon one of its kind and turn about gravity, every yaw; the best view scores."""
     if source.up is None or target.up is None:
         return []
-    i, j = np.array(look_alikes(source, target), int).reshape(-1, 2).T
+    i, j = np.array(most_alike(source, target), int).reshape(-1, 2).T
     yaws = np.linspace(0.0, 2.0 * np.pi, YAW_STEPS, endpoint=False)
     R = rotation_from_vector(yaws[:, None] * target.up) @ rotation_between(source.up, target.up)
     moved = np.einsum("kab,ib->ika", R, source.centroids[i])
@@ -90,6 +91,24 @@ def from_objects(source: Prepared, target: Prepared) -> list[Hypothesis]:
 def look_alikes(source: Prepared, target: Prepared) -> list[tuple[int, int]]:
     """Indices of all objects of source and target that a detector may call by one name."""
     return [(i, j) for i, a in enumerate(source.groups) for j, b in enumerate(target.groups) if a == b]
+
+
+def most_alike(source: Prepared, target: Prepared) -> list[tuple[int, int]]:
+    """At most `MOST_ALIKE` of the look-alikes: every object's best partner first, then those of the most alike size."""
+    pairs = look_alikes(source, target)
+    if len(pairs) <= MOST_ALIKE:
+        return pairs
+    unlike = [abs(float(np.log(source.extents[i] / target.extents[j]))) for i, j in pairs]
+    best, met = [], (set[int](), set[int]())
+    ranked = sorted(range(len(pairs)), key=unlike.__getitem__)
+    for k in ranked:
+        i, j = pairs[k]
+        if i not in met[0] or j not in met[1]:
+            best.append(k)
+            met[0].add(i)
+            met[1].add(j)
+    chosen = dict.fromkeys([*best, *ranked])
+    return [pairs[k] for k in sorted(list(chosen)[:MOST_ALIKE])]
 
 
 def from_prior(T_target_source: Array | None) -> list[Hypothesis]:

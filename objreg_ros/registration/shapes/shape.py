@@ -199,9 +199,9 @@ def _rim(values: Array) -> tuple[float, float]:
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)
 def _level(xyz, normals, R, within, beyond, low, high):  # type: ignore[no-untyped-def]
-    """The points (n, 3) float32 of level surfaces in upright axes: within one box (2, 2), beyond another, between heights.
+    """The points (n, 3) float32 of level surfaces in upright axes: within a box, beyond another, between two heights.
 
-    A box is the least and the most of x and y.
+    A box (2, 2) is the least and the most of x and y.
     """
     found, n = np.empty((len(xyz), 3), np.float32), 0
     for i in range(len(xyz)):
