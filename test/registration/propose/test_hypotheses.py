@@ -15,12 +15,14 @@ from objreg_ros.registration.prepare.prepared import Prepared, prepare
 from objreg_ros.registration.propose import hypotheses
 from objreg_ros.registration.propose.hypotheses import (
     HYPOTHESES_PER_OBJECT,
+    MOST_ALIKE,
     YAW_STEPS,
     from_centroids,
     from_features,
     from_objects,
     from_prior,
     look_alikes,
+    most_alike,
 )
 from registration.rooms import ROOM, keyframe, seen_from
 from registration.samples import moved
@@ -152,6 +154,18 @@ def test_objects_look_alike_where_a_detector_may_call_them_by_one_name(room: tup
     source, target = (without(each, groups=groups) for each, groups in zip(room, ("aba", "cab"), strict=True))
     assert look_alikes(source, target) == [(0, 1), (1, 2), (2, 1)]
     assert look_alikes(source, without(target, objects=None)) == []
+
+
+def test_of_many_look_alikes_few_are_laid_upon_each_other_and_every_object_upon_the_one_of_its_size(
+    room: tuple[Prepared, Prepared],
+) -> None:
+    count = 7
+    sizes = 0.1 * 1.3 ** np.arange(count)
+    source = without(room[0], groups=("a",) * count, extents=sizes)
+    target = without(room[1], groups=("a",) * count, extents=sizes[::-1])
+    few = most_alike(source, target)
+    assert len(few) == MOST_ALIKE < len(look_alikes(source, target))
+    assert {(k, count - 1 - k) for k in range(count)} <= set(few)
 
 
 def test_confusable_labels_are_of_one_group() -> None:
