@@ -56,9 +56,7 @@ FIRST_LOOK = (150, 5, 150)  # points, iterations and points of the views a side,
 LOOKED_AT_AGAIN = 12  # hypotheses of each proposer that get more points
 BASIN_POINTS = 500  # that bring a hypothesis to its basin
 ANCHORED = 2  # hypotheses about each of the best that grey holds where they were proposed
-HOPELESS = (
-    -0.35
-)  # best total score below which one hypothesis is finished: -0.1 was the least of what came to be accepted
+HOPELESS = -0.35  # best total score below which one hypothesis is finished; accepted ones have -0.1 and more
 TILTED = 5.5  # deviations of gravity: what is not refined; photometric ICP may bring it to what the gate allows
 
 

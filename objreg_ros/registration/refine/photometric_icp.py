@@ -22,10 +22,8 @@ from objreg_ros.sensor import depth_tolerance
 
 GREY_SIGMA = 0.7  # difference of the high-passed grey that weighs a quarter, in its deviations
 SURFACE_SIGMA_M = 0.03  # distance from a surface that weighs as much as one deviation of grey
-BAND_POINTS = 1000, 1600  # a side, of the views, that the coarse and the fine band ask
-SHAPE_POINTS = 1000  # of the surface, beside them
 STEPS = 8  # a level
-SETTLED = 1e-3, 2e-4  # length of the last step of either band, metres and radians
+SETTLED = 2e-4  # length of a last step, metres and radians
 
 
 def finish(source: Prepared, target: Prepared, T_target_source: Array) -> tuple[Array, Array]:
@@ -34,40 +32,23 @@ def finish(source: Prepared, target: Prepared, T_target_source: Array) -> tuple[
     The information (6, 6) is of a left step [t r], in the units of `icp.fit`: 1 is a point that holds its plane.
     Both views must have grey.
     """
-    some = slice(SHAPE_POINTS)
-    shape = (source.xyz[some], source.normals[some], *target.surface.grid)
+    few, shape = slice(PHOTOMETRIC_POINTS), (source.xyz, source.normals, *target.surface.grid)
     a, b = source.sight, target.sight
     slops = depth_tolerance(a.noise, b.noise)
     T, K = np.ascontiguousarray(T_target_source, np.float64).copy(), np.zeros((6, 6))
-    for most, settled, here, there in zip(BAND_POINTS, SETTLED, a.bands, b.bands, strict=True):  # the coarse one first
-        few = slice(most)
-        weights = (
-            _weight(SHAPE_POINTS, len(source.xyz), source.xyz),
-            _weight(most, PHOTOMETRIC_POINTS, a.points, b.points),
-        )
+    for here, there in zip(a.bands, b.bands, strict=True):  # the coarse one first
         _finish(
             shape, T, REACHES_M[-1],
             (a.points[few], here.shades[few]), (a.near, a.far, here.detail, a.camera),
             (b.points[few], there.shades[few]), (b.near, b.far, there.detail, b.camera),
-            GREY_SIGMA, SURFACE_SIGMA_M, slops, weights, settled, K,
+            GREY_SIGMA, SURFACE_SIGMA_M, slops, K,
         )  # fmt: skip
     return T, K * SURFACE_SIGMA_M**2
 
 
-def _weight(asked: int, most: int, *points: Array) -> float:
-    """What each of the ``asked`` first points counts, so that all together count as ``most`` would."""
-    return sum(min(len(one), most) for one in points) / max(1, sum(min(len(one), asked) for one in points))
-
-
 @numba.njit(cache=True, nogil=True)
-def _finish(  # type: ignore[no-untyped-def]
-    shape, T, reach, own, image, others, other_image, grey_sigma, shape_sigma, slops, weights, settled, K
-):
-    """Gauss-Newton on one band: moves ``T`` (4, 4) and fills ``K`` (6, 6), the information of the grey.
-
-    ``weights`` are those of a point of the shape and of the grey.
-    """
-    surface, grey = weights[0] / shape_sigma**2, weights[1]
+def _finish(shape, T, reach, own, image, others, other_image, grey_sigma, shape_sigma, slops, K):  # type: ignore[no-untyped-def]
+    """Gauss-Newton on one band: moves ``T`` (4, 4) and fills ``K`` (6, 6), the information of the grey."""
     P, N, Q, M, closest, low, cell = shape
     H, g, k = np.zeros((6, 6)), np.zeros(6), np.zeros(6)
     back = np.eye(4)
@@ -79,12 +60,11 @@ def _finish(  # type: ignore[no-untyped-def]
         _add_grey(others, back, image, T, True, grey_sigma, slops, K, k)
         for i in range(6):
             for j in range(6):
-                K[i, j] *= grey
-                H[i, j] = surface * H[i, j] + K[i, j]
+                H[i, j] = H[i, j] / shape_sigma**2 + K[i, j]
             H[i, i] += 1.0 + 1e-6 * H[i, i]
-            k[i] = -(surface * g[i] + grey * k[i])
+            k[i] = -(g[i] / shape_sigma**2 + k[i])
         solve(H, k)
-        if move(T, k) < settled:
+        if move(T, k) < SETTLED:
             break
 
 
