@@ -23,6 +23,7 @@ class Nearness(NamedTuple):
 
 PROPOSED = Nearness(np.radians(4.0), 0.04)  # hypotheses, before ICP
 BASIN = Nearness(np.radians(5.0), 0.10)  # hypotheses in their basins
+SHARED = Nearness(np.radians(4.0), 0.05)  # hypotheses that the whole shape is taken to settle at one place
 REFINED = Nearness(np.radians(0.5), 0.01)  # hypotheses after ICP
 STARTS = Nearness(np.radians(4.0), 0.06)  # where the search for competing hypotheses begins
 AGREEING = Nearness(np.radians(5.0), 0.15)  # what independent proposers came to, and what the gate sees

@@ -154,6 +154,20 @@ def _neighbours(xyz, i, order, first, low, shape, cell, radius, found, squared):
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
+def _angle(y, x):  # type: ignore[no-untyped-def]
+    """The angle of (x, y) in rad, to 3e-4: a bin is two thousand times as wide."""
+    a, b = abs(x), abs(y)
+    slope = min(a, b) / max(a, b, np.float32(1e-12))
+    q = slope * slope
+    angle = ((np.float32(-0.0464965) * q + np.float32(0.1593142)) * q - np.float32(0.3276228)) * q * slope + slope
+    if b > a:
+        angle = np.float32(0.5 * np.pi) - angle
+    if x < 0:
+        angle = np.float32(np.pi) - angle
+    return -angle if y < 0 else angle
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
 def _bins(p, n, q, m, distance):  # type: ignore[no-untyped-def]
     """The bins (of 11 each) of the three Darboux angles of two oriented points, the same from either side.
 
@@ -170,7 +184,7 @@ def _bins(p, n, q, m, distance):  # type: ignore[no-untyped-def]
         return -1, 0, 0
     alpha = (vx * w[0] + vy * w[1] + vz * w[2]) / length
     sine = (u[1] * vz - u[2] * vy) * w[0] + (u[2] * vx - u[0] * vz) * w[1] + (u[0] * vy - u[1] * vx) * w[2]
-    theta = np.arctan2(sine / length, u[0] * w[0] + u[1] * w[1] + u[2] * w[2])
+    theta = _angle(sine / length, u[0] * w[0] + u[1] * w[1] + u[2] * w[2])
     return (
         min(10, int(11.0 * (theta + np.pi) / (2.0 * np.pi))),
         max(0, min(10, int(11.0 * (alpha + 1.0) * 0.5))),

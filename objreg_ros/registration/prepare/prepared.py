@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import TypeVar, overload
 
 import numpy as np
 
@@ -25,7 +27,7 @@ from objreg_ros.sensor import session_gravity_sigma_deg
 
 FEATURE_VOXEL_M = 0.07  # distance of the points that carry an FPFH feature
 FEATURE_RADIUS_M = 0.35  # radius of an FPFH feature: five voxels, as its authors use
-FEATURE_POINTS = 800  # most points that are matched by their features: the most salient
+FEATURE_POINTS = 600  # most points that are matched by their features: the most salient
 SHAPE_POINTS = 400  # most points of an object's shape
 SCENE_POINTS = 800  # most points of all objects as one shape
 SURFACE_VOXEL_M = 0.03  # distance of the points of a surface that others are aligned to
@@ -33,23 +35,53 @@ OBJECT_VOXEL_M = 0.012  # distance of the points of objects, which are aligned t
 OBJECT_POINTS = 400  # most of all objects that are aligned: as many as of the surface about them
 GRID_CELL_M = 0.05  # of the grid that knows the closest point
 GRID_REACH_M = 0.2  # how far from a surface its grid reaches: as far as ICP looks at first
+PREPARED = 64  # keyframes that are kept ready: as many as the store keeps decoded; about 6 MB each
+
+Made = TypeVar("Made")
+
+
+class AtNeed(Sequence[Made]):
+    """So many things that are made when they are first asked for: most objects meet none of their kind.
+
+    For several threads: two that ask at once may both make a thing, and it is the same.
+    """
+
+    def __init__(self, count: int, make: Callable[[int], Made]) -> None:
+        self._count, self._make = count, make
+        self._made: dict[int, Made] = {}
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, index: int) -> Made: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Made]: ...
+    def __getitem__(self, index: int | slice) -> Made | Sequence[Made]:
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(self._count))]
+        if not 0 <= index < self._count:
+            raise IndexError(index)
+        if index not in self._made:
+            self._made[index] = self._make(index)
+        return self._made[index]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Prepared:
-    """All that was seen, thinned: ``sight`` and, at half its size, ``coarse`` to look with.
+    """All that was seen, thinned: ``sight`` to look with and, at half its size, the one in ``halves``.
 
     ``surface`` to be aligned to, ``xyz`` and ``normals (M, 3)`` to align with; ``up (3,)`` is against gravity, or None,
     ``up_weight`` 0..1 how much was seen that tells it, and
     ``up_sigma_deg`` the standard deviation of either tilt of it; ``groups`` the confusable group of each object,
     ``centroids (K, 3)`` their middles and ``extents (K,)`` m, ``shapes`` what is laid upon others and ``yaw_known``
-    whether that tells a turn; ``own`` is where the view shows each (h, w) bool; ``scene`` is all of them as one shape;
-    ``middle (3,)`` that of everything: where poses are compared.
+    whether that tells a turn; ``own`` is where the view shows each (h, w) bool; ``together`` holds all of them as one
+    shape; ``middle (3,)`` that of everything: where poses are compared.
     """
 
     keyframe: Keyframe
     sight: Sight
-    coarse: Sight
+    halves: Sequence[Sight]
     surface: Surface
     features: Features
     xyz: Array
@@ -58,13 +90,23 @@ class Prepared:
     up_weight: float
     up_sigma_deg: float
     groups: tuple[str, ...]
-    yaw_known: tuple[bool, ...]
-    shapes: tuple[Shape | None, ...]
-    own: tuple[Array, ...]
-    scene: Shape | None
+    yaw_known: Sequence[bool]
+    shapes: Sequence[Shape | None]
+    own: Sequence[Array]
+    together: Sequence[Shape | None]
     centroids: Array
     extents: Array
     middle: Array
+
+    @property
+    def coarse(self) -> Sight:
+        """What was seen at half its size."""
+        return self.halves[0]
+
+    @property
+    def scene(self) -> Shape | None:
+        """All objects as one shape."""
+        return self.together[0]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -78,7 +120,8 @@ class Pair:
 def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
     """Everything about one keyframe that does not depend on its partner.
 
-    Surface and features are made beside the rest: they take as long as all of it, and let go of the interpreter.
+    Surface and features are made beside the rest: they let go of the interpreter. What is told of single objects is
+    made when it is asked for.
     """
     fine = thin(*seen(keyframe, params), SURFACE_VOXEL_M)
     coarse = thin(*fine, FEATURE_VOXEL_M)
@@ -90,23 +133,21 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
         surface = beside.submit(prepare_surface, *joined(fine, things), GRID_CELL_M, GRID_REACH_M)
         features = beside.submit(describe, *coarse, FEATURE_RADIUS_M)
         sight = prepare_sight(keyframe.view, *seeing)
-        each, drawn = range(len(keyframe.objects)), (params.seed, sight.noise)
-        shapes = tuple(prepare_shape(keyframe, [i], SHAPE_POINTS, *drawn) for i in each)
+        objects, drawn = keyframe.objects, (params.seed, sight.noise)
+        shapes = AtNeed(len(objects), lambda i: prepare_shape(keyframe, [i], SHAPE_POINTS, *drawn))
         return Prepared(
             keyframe=keyframe,
             sight=sight,
-            coarse=prepare_sight(halved(keyframe.view), *seeing),
+            halves=AtNeed(1, lambda _: prepare_sight(halved(keyframe.view), *seeing)),
             **_shuffled(*joined(coarse, sampled(things, OBJECT_POINTS, params.seed)), params.seed),
             up=up,
             up_weight=keyframe.gravity_confidence,
             up_sigma_deg=session_gravity_sigma_deg(keyframe.gravity_confidence),
             groups=tuple(groups.of(label) for label in keyframe.labels),
-            yaw_known=tuple(
-                tells_yaw(item.cloud, up, shape) for item, shape in zip(keyframe.objects, shapes, strict=True)
-            ),
+            yaw_known=AtNeed(len(objects), lambda i: tells_yaw(objects[i].cloud, up, shapes[i])),
             shapes=shapes,
-            own=tuple(own_pixels(item, sight) for item in keyframe.objects),
-            scene=prepare_shape(keyframe, each, SCENE_POINTS, *drawn),
+            own=AtNeed(len(objects), lambda i: own_pixels(objects[i], sight)),
+            together=AtNeed(1, lambda _: prepare_shape(keyframe, range(len(objects)), SCENE_POINTS, *drawn)),
             centroids=np.array([item.centroid for item in keyframe.objects]).reshape(-1, 3),
             extents=np.array([item.extent for item in keyframe.objects]),
             middle=np.asarray(coarse[0].mean(axis=0) if len(coarse[0]) else np.zeros(3), float),
@@ -156,7 +197,7 @@ def _shuffled(xyz: Array, normals: Array, seed: int) -> dict[str, Array]:
 class PreparedCache:
     """The last ``size`` keyframes that were made ready; for several threads."""
 
-    def __init__(self, params: RegistrarParams, size: int = 32) -> None:
+    def __init__(self, params: RegistrarParams, size: int = PREPARED) -> None:
         self._params = params
         self._size = size
         self._lock = threading.Lock()

@@ -20,12 +20,13 @@ from objreg_ros.registration.propose.pose_voting import Matches, poses
 from objreg_ros.registration.score.view_score import score_views
 from objreg_ros.registration.shapes.upright_search import COARSE_POINTS
 
-FEATURE_MATCHES = 900  # most putative matches of features
+FEATURE_MATCHES = 600  # most putative matches of features
 CENTROID_TOLERANCE_M = 0.12  # how far the centroid of one object may differ between views, which see other sides of it
 HYPOTHESES_PER_PROPOSER = 120  # most; more find no more
 YAW_STEPS = 36  # of one object upon another without shapes: each 10 deg
 UNNAMED_PAIRS = 6  # most objects without a name that are laid upon each other
 UNNAMED_SIZES = 0.65  # least ratio of their sizes
+MOST_ALIKE = 10  # pairs of objects whose shapes are laid upon each other: those of the most alike size
 HYPOTHESES_PER_OBJECT = 60  # most of single objects, whose poses are many
 
 
@@ -79,7 +80,7 @@ def from_objects(source: Prepared, target: Prepared) -> list[Hypothesis]:
     """Poses that lay one object upon one of its kind and turn about gravity, every yaw; the best view scores."""
     if source.up is None or target.up is None:
         return []
-    i, j = np.array(look_alikes(source, target), int).reshape(-1, 2).T
+    i, j = np.array(most_alike(source, target), int).reshape(-1, 2).T
     yaws = np.linspace(0.0, 2.0 * np.pi, YAW_STEPS, endpoint=False)
     R = rotation_from_vector(yaws[:, None] * target.up) @ rotation_between(source.up, target.up)
     moved = np.einsum("kab,ib->ika", R, source.centroids[i])
@@ -100,6 +101,24 @@ def look_alikes(source: Prepared, target: Prepared) -> list[tuple[int, int]]:
     sizes = {(i, j): min(a[i], b[j]) / max(a[i], b[j], 1e-9) for i, j in unnamed}
     alike = sorted((pair for pair in unnamed if sizes[pair] > UNNAMED_SIZES), key=lambda pair: -sizes[pair])
     return [pair for pair in pairs if pair not in sizes or pair in alike[:UNNAMED_PAIRS]]
+
+
+def most_alike(source: Prepared, target: Prepared) -> list[tuple[int, int]]:
+    """At most `MOST_ALIKE` of the look-alikes: every object's best partner first, then those of the most alike size."""
+    pairs = look_alikes(source, target)
+    if len(pairs) <= MOST_ALIKE:
+        return pairs
+    unlike = [abs(float(np.log(source.extents[i] / target.extents[j]))) for i, j in pairs]
+    best, met = [], (set[int](), set[int]())
+    ranked = sorted(range(len(pairs)), key=unlike.__getitem__)
+    for k in ranked:
+        i, j = pairs[k]
+        if i not in met[0] or j not in met[1]:
+            best.append(k)
+            met[0].add(i)
+            met[1].add(j)
+    chosen = dict.fromkeys([*best, *ranked])
+    return [pairs[k] for k in sorted(list(chosen)[:MOST_ALIKE])]
 
 
 def from_prior(T_target_source: Array | None) -> list[Hypothesis]:

@@ -16,7 +16,7 @@ from objreg_ros.geometry import transform
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.prepare.prepared import Prepared
 from objreg_ros.registration.propose.fine_search import FineSearch
-from objreg_ros.registration.propose.hypotheses import CENTROID_TOLERANCE_M, Hypothesis, from_centroids, look_alikes
+from objreg_ros.registration.propose.hypotheses import CENTROID_TOLERANCE_M, Hypothesis, from_centroids, most_alike
 from objreg_ros.registration.refine.batch_icp import REACHES_M, align
 from objreg_ros.registration.score.total_score import TotalScore
 from objreg_ros.registration.shapes.shape import Shape, turned_half, upright_motion, upright_pose
@@ -127,8 +127,8 @@ def register_scenes(source: Prepared, target: Prepared) -> list[ScoredPose]:
 
 
 def shape_pairs(source: Prepared, target: Prepared) -> list[tuple[Shape, Shape]]:
-    """The shapes of all objects that a detector may call by one name."""
-    pairs = ((source.shapes[i], target.shapes[j]) for i, j in look_alikes(source, target))
+    """The shapes of the most alike objects that a detector may call by one name."""
+    pairs = ((source.shapes[i], target.shapes[j]) for i, j in most_alike(source, target))
     return [(a, b) for a, b in pairs if a is not None and b is not None]
 
 

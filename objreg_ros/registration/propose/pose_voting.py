@@ -17,7 +17,7 @@ from objreg_ros.data import Array
 from objreg_ros.registration.kernels.projection import FAST
 from objreg_ros.registration.kernels.same_pose import VOTES_ANGLE, VOTES_TOLERANCES, Nearness, distinct
 
-MOST_PAIRS = 6000  # of matches that agree, each of which gives a pose to weigh
+MOST_PAIRS = 4000  # of matches that agree, each of which gives a pose to weigh
 ASIDE = 1e-8  # the square of 0.1 mm: a baseline that is no farther aside of its direction fixes no pose with it
 
 

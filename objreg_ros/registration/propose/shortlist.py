@@ -16,7 +16,16 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.registration.candidate import Score
 from objreg_ros.registration.certainty.gravity_update import gravity_error
-from objreg_ros.registration.kernels.same_pose import AGREEING, BASIN, PROPOSED, PROPOSED_FROM, REFINED, distinct, near
+from objreg_ros.registration.kernels.same_pose import (
+    AGREEING,
+    BASIN,
+    PROPOSED,
+    PROPOSED_FROM,
+    REFINED,
+    SHARED,
+    distinct,
+    near,
+)
 from objreg_ros.registration.prepare.prepared import Pair
 from objreg_ros.registration.propose.evidence import FINISHED_MARGIN, score_objects
 from objreg_ros.registration.propose.fine_search import score_views_sharply
@@ -41,11 +50,13 @@ from objreg_ros.registration.score.view_score import (
 )
 
 REFINED_PER_PROPOSER = 5  # hypotheses that ICP runs to the end
+SETTLED = 16  # hypotheses of all proposers, of the best view score, that the whole shape settles
 FINISHED = 3  # hypotheses of all proposers that photometric ICP finishes and the gate sees
 FIRST_LOOK = (150, 5, 150)  # points, iterations and points of the views a side, for all hypotheses
-LOOKED_AT_AGAIN = 24  # hypotheses of each proposer that get more points
+LOOKED_AT_AGAIN = 12  # hypotheses of each proposer that get more points
 BASIN_POINTS = 500  # that bring a hypothesis to its basin
 ANCHORED = 2  # hypotheses about each of the best that grey holds where they were proposed
+HOPELESS = -0.35  # best total score below which one hypothesis is finished; accepted ones have -0.1 and more
 TILTED = 5.5  # deviations of gravity: what is not refined; photometric ICP may bring it to what the gate allows
 
 
@@ -70,6 +81,8 @@ def shortlist(pair: Pair, T_target_source_prior: Array | None) -> Shortlist:
     if not hypotheses:
         return Shortlist((), ())
     best = _best(pair, hypotheses)
+    if _total(best[0]) < HOPELESS:
+        return Shortlist(tuple(best[:1]), tuple(hypotheses))
     about = _about(pair, best, [hypothesis for proposed in proposers for hypothesis in proposed])
     anchored = _anchored(pair, about)
     return Shortlist(tuple(_best(pair, best + anchored)), (*hypotheses, *about))
@@ -118,12 +131,27 @@ def _drawn(pair: Pair, T: Array, points: int, iterations: int, sample: int) -> t
 
 
 def _settled(pair: Pair, hypotheses: list[Hypothesis]) -> list[Hypothesis]:
-    """The hypotheses where the shape alone brings them, each with its score of views and objects."""
+    """The hypotheses where the shape alone brings them; those that are ahead with their score of views and objects.
+
+    What is in the basin of a better one goes where that goes.
+    """
     if not hypotheses:
         return []
-    T, firm = settle(pair.source, pair.target, _poses(hypotheses))
-    settled = [replace(hypothesis, T_target_source=pose) for hypothesis, pose in zip(hypotheses, T, strict=True)]
-    return _scored(pair, _hopeful(pair, settled, firm))
+    source, target = pair.source, pair.target
+    T = _poses(hypotheses)
+    V = score_views(source.sight, target.sight, T, RANKING_POINTS)
+    ahead = distinct(T, V, source.middle, SETTLED, SHARED)
+    poses, firm = settle(source, target, T[ahead])
+    settled = [replace(hypotheses[k], T_target_source=pose) for k, pose in zip(ahead, poses, strict=True)]
+    good = _hopeful(pair, settled, firm)
+    left, behind = np.ones(len(T), bool), []
+    left[ahead] = False
+    for k, leader in zip(ahead, settled, strict=True):
+        follows = np.flatnonzero(left & near(T, T[k], source.middle, SHARED))
+        left[follows] = False
+        if leader in good:
+            behind += [replace(hypotheses[m], T_target_source=leader.T_target_source) for m in follows]
+    return _scored(pair, good) + behind
 
 
 def _hopeful(pair: Pair, hypotheses: list[Hypothesis], firm: Array) -> list[Hypothesis]:
@@ -179,11 +207,12 @@ def _about(pair: Pair, best: list[Hypothesis], proposed: list[Hypothesis]) -> li
     source, target = pair.source, pair.target
     if not proposed or not (source.sight.textured and target.sight.textured):
         return []
-    T = _poses(proposed)
-    V = score_views(source.sight, target.sight, T, RANKING_POINTS)
+    T, V = _poses(proposed), np.full(len(proposed), WORST)
+    about = [near(T, found.T_target_source, source.middle, PROPOSED_FROM) for found in best]
+    some = np.any(about, axis=0)
+    V[some] = score_views(source.sight, target.sight, T[some], RANKING_POINTS)
     chosen: dict[int, Hypothesis] = {}
-    for found in best:
-        close = np.flatnonzero(near(T, found.T_target_source, source.middle, PROPOSED_FROM))
+    for close in map(np.flatnonzero, about):
         chosen |= {k: proposed[k] for k in close[distinct(T[close], V[close], source.middle, ANCHORED, PROPOSED)]}
     return list(chosen.values())
 

@@ -20,6 +20,7 @@ from objreg_ros.registration.prepare.prepared import Prepared
 
 REACHES_M = (0.2, 0.1, 0.06)  # distance of a pair at first, in the basin, at the end
 ITERATIONS = 15  # most of one round of ICP
+SETTLING, SETTLING_POINTS = 8, 1000  # most iterations, and points, of the last one, of poses in their basins
 LEAST_PAIRS = 60  # least number of paired points that hold a pose: ten times its freedoms
 FACING = 0.6  # cosine between the normals of a pair, at least
 
@@ -150,5 +151,7 @@ def _align(P, N, Q, M, closest, low, cell, poses, reach, last_reach, iterations)
 def settle(source: Prepared, target: Prepared, T_target_source: Array) -> tuple[Array, Array]:
     """Poses (K, 4, 4) in their basins, brought to where the whole shape holds them, and whether it does (K,)."""
     _, reach, last = REACHES_M
-    T, share, _ = align(source.xyz, source.normals, target.surface, T_target_source, reach, last, ITERATIONS)
+    some = slice(SETTLING_POINTS)
+    asked = source.xyz[some], source.normals[some], target.surface
+    T, share, _ = align(*asked, T_target_source, reach, last, SETTLING)
     return T, share * len(source.xyz) >= LEAST_PAIRS

@@ -9,11 +9,13 @@ from functools import cached_property
 from typing import Any
 
 import cv2
+import numba
 import numpy as np
 
 from objreg_ros.data import Array, PointFlag
 from objreg_ros.geometry import pose
 from objreg_ros.registration.kernels.closest_points import Surface, prepare_surface
+from objreg_ros.registration.kernels.projection import FAST
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.shapes.silhouette import Silhouette, draw
 
@@ -28,6 +30,8 @@ BESIDE, AROUND = 0.02, 0.25  # m beyond the object: nearer points may be its own
 WIDE = 0.6  # m beyond the object: what lies there in the same plane tells which way is up
 THICK = (0.03, 0.02, 0.015, 0.015)  # m beside a plane, round by round
 PLANE = 60  # points that make one
+RIM = 0.02, 0.98  # of the points: between these an object is as wide as it looks
+NOWHERE = np.array([[np.inf, np.inf], [-np.inf, -np.inf]], np.float32)  # a box that holds nothing
 MOST_TILT = 4.0  # degrees between gravity and the normal of what things stand on
 
 
@@ -90,7 +94,7 @@ def prepare_shape(
     R = upright_axes(standing(keyframe, indices, -np.asarray(keyframe.gravity, float)))
     feet = [footing(keyframe, i, R) for i in indices]
     upright = xyz @ R.T.astype(np.float32)
-    low, high = np.percentile(upright[:, :2], (2, 98), axis=0)
+    low, high = np.transpose([_rim(upright[:, axis]) for axis in (0, 1)])
     origin = np.array([*(low + high) / 2.0, np.median(feet)])
     order = np.random.default_rng(seed).permutation(np.flatnonzero(firm))
     points = np.ascontiguousarray(upright[order] - origin.astype(np.float32))
@@ -134,29 +138,30 @@ def standing(keyframe: Keyframe, indices: Sequence[int], up: Array) -> Array:
     The planes under several objects are parallel. ``up`` itself where too little of them is seen, or they tilt.
     """
     R = upright_axes(up)
-    around = keyframe.context.xyz @ R.T.astype(np.float32)
-    level = around[keyframe.context.normals @ R[2].astype(np.float32) > LEVEL]
-    layers = [_layer(keyframe, i, R, level) for i in indices]
+    layers = [_layer(keyframe, i, R) for i in indices]
     points = np.concatenate([np.zeros((0, 3)), *(layer for layer in layers if len(layer) >= PLANE)])
     slope = np.zeros(2)
     for thickness in THICK:
         kept = np.abs(points[:, 2] - points[:, :2] @ slope) < thickness
         if kept.sum() < PLANE:
             return up
-        slope, *_ = np.linalg.lstsq(points[kept, :2], points[kept, 2], rcond=None)
+        level, height = points[kept, :2], points[kept, 2]
+        slope, *_ = np.linalg.lstsq(level.T @ level, level.T @ height, rcond=None)
     if np.hypot(*slope) > np.tan(np.radians(MOST_TILT)):
         return up
     normal = R.T @ np.array([-slope[0], -slope[1], 1.0])
     return np.asarray(normal / np.linalg.norm(normal))
 
 
-def _layer(keyframe: Keyframe, index: int, R_upright_camera: Array, level: Array) -> Array:
+def _layer(keyframe: Keyframe, index: int, R_upright_camera: Array) -> Array:
     """Level points (N, 3) around an object at the height that it stands on, about their own middle."""
-    points = keyframe.objects[index].cloud.xyz @ R_upright_camera.T.astype(np.float32)
-    foot = footing(keyframe, index, R_upright_camera)
-    (x, y, z), middle = level.T, points.mean(axis=0)
-    beside = np.maximum(np.abs(x - middle[0]), np.abs(y - middle[1])) < WIDE
-    layer = level[beside & (np.abs(z - foot) < THICK[0])]
+    R = R_upright_camera.astype(np.float32)
+    points = keyframe.objects[index].cloud.xyz @ R.T
+    foot = _footing(keyframe, points, R)
+    middle = points.mean(axis=0)
+    beside = np.array([middle[:2] - WIDE, middle[:2] + WIDE], np.float32)
+    around = keyframe.context.xyz, keyframe.context.normals, R
+    layer = _level(*around, beside, NOWHERE, foot - THICK[0], foot + THICK[0])
     return np.asarray(layer - np.median(layer, axis=0) if len(layer) else layer, float)
 
 
@@ -165,20 +170,50 @@ def footing(keyframe: Keyframe, index: int, R_upright_camera: Array) -> float:
 
     Around, not within: a seat is level too.
     """
-    points = keyframe.objects[index].cloud.xyz @ R_upright_camera.T.astype(np.float32)
-    lowest = float(np.percentile(points[:, 2], 2))
-    around = keyframe.context.xyz @ R_upright_camera.T.astype(np.float32)
-    level = keyframe.context.normals @ R_upright_camera[2].astype(np.float32) > LEVEL
-    (x, y, z), (a, b, _) = around.T, points.T
-    beyond = np.maximum(np.maximum(a.min() - x, x - a.max()), np.maximum(b.min() - y, y - b.max()))
-    near = (beyond > BESIDE) & (beyond < AROUND)
-    heights = np.sort(z[level & near & (z < lowest + CLEAR)])
+    R = R_upright_camera.astype(np.float32)
+    return _footing(keyframe, keyframe.objects[index].cloud.xyz @ R.T, R)
+
+
+def _footing(keyframe: Keyframe, points: Array, R: Array) -> float:
+    """The footing of an object's points (N, 3) in upright axes ``R (3, 3)``, float32 both."""
+    lowest = float(_rim(points[:, 2])[0])
+    level = np.ascontiguousarray(points[:, :2].T)
+    box = np.array([level.min(axis=1), level.max(axis=1)])
+    grown = (box + np.array([[-AROUND], [AROUND]], np.float32)), (box + np.array([[-BESIDE], [BESIDE]], np.float32))
+    around = _level(keyframe.context.xyz, keyframe.context.normals, R, *grown, -np.inf, lowest + CLEAR)
+    heights = np.sort(around[:, 2])
     within = np.arange(1, len(heights) + 1) - np.searchsorted(heights, heights - STEP, side="right")
     layers = np.flatnonzero(within >= max(SEEN, LAYER * within.max(initial=0)))
     if len(layers) == 0:
         return lowest
     last = int(layers[-1])  # the highest, not the widest: a shelf
     return float(np.median(heights[last + 1 - within[last] : last + 1]))
+
+
+def _rim(values: Array) -> tuple[float, float]:
+    """The 2nd and the 98th percentile of values (N,)."""
+    ordered = np.sort(values)
+    low, high = np.interp(np.array(RIM) * (len(ordered) - 1), np.arange(len(ordered)), ordered)
+    return float(low), float(high)
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
+def _level(xyz, normals, R, within, beyond, low, high):  # type: ignore[no-untyped-def]
+    """The points (n, 3) float32 of level surfaces in upright axes: within a box, beyond another, between two heights.
+
+    A box (2, 2) is the least and the most of x and y.
+    """
+    found, n = np.empty((len(xyz), 3), np.float32), 0
+    for i in range(len(xyz)):
+        if R[2, 0] * normals[i, 0] + R[2, 1] * normals[i, 1] + R[2, 2] * normals[i, 2] <= LEVEL:
+            continue
+        for k in range(3):
+            found[n, k] = R[k, 0] * xyz[i, 0] + R[k, 1] * xyz[i, 1] + R[k, 2] * xyz[i, 2]
+        x, y, z = found[n, 0], found[n, 1], found[n, 2]
+        inside = (x > within[0, 0]) & (y > within[0, 1]) & (x < within[1, 0]) & (y < within[1, 1])
+        outside = (x < beyond[0, 0]) | (y < beyond[0, 1]) | (x > beyond[1, 0]) | (y > beyond[1, 1])
+        n += inside & outside & (z > low) & (z < high)
+    return found[:n]
 
 
 def upright_pose(source: Shape, target: Shape, motion: Array) -> Array:

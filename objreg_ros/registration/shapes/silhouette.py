@@ -78,10 +78,7 @@ def _inward(mask: Array) -> Array:
     if not mask.any():
         return np.zeros((*mask.shape, 2), np.int16)
     _, nearest = cv2.distanceTransformWithLabels(1 - mask, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
-    held, pixels = np.nonzero(mask), np.indices(mask.shape)[::-1]
-    lookup = np.zeros((2, int(nearest.max()) + 1), np.int16)
-    lookup[:, nearest[held]] = held[::-1]
-    return np.ascontiguousarray(np.moveaxis(lookup[:, nearest] - pixels, 0, -1), np.int16)
+    return np.asarray(_ways(mask, nearest, int(nearest.max()) + 1))
 
 
 def _scale(xyz: Array, view: View) -> float:
@@ -126,6 +123,22 @@ def _background(view: View, mask: Array, scale: float, corner: tuple[int, int]) 
         lookup[nearest[own == 0]] = seen[own == 0]
         seen = np.where(own > 0, lookup[nearest], seen)
     return np.ascontiguousarray(seen[np.ix_(rows - top, columns - left)], np.float32)
+
+
+@numba.njit(cache=True, nogil=True)
+def _ways(mask, nearest, labels):  # type: ignore[no-untyped-def]
+    """(h, w, 2) int16: from each pixel to the one of the mask that has its label."""
+    lookup, ways = np.zeros((labels, 2), np.int16), np.empty((*mask.shape, 2), np.int16)
+    for row in range(mask.shape[0]):
+        for column in range(mask.shape[1]):
+            if mask[row, column]:
+                at = nearest[row, column]
+                lookup[at, 0], lookup[at, 1] = column, row
+    for row in range(mask.shape[0]):
+        for column in range(mask.shape[1]):
+            at = nearest[row, column]
+            ways[row, column, 0], ways[row, column, 1] = lookup[at, 0] - column, lookup[at, 1] - row
+    return ways
 
 
 @numba.njit(cache=True, nogil=True)

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.registration.prepare.prepared import PreparedCache, prepare
+from objreg_ros.registration.prepare.prepared import AtNeed, PreparedCache, prepare
 from registration.rooms import keyframe, seen_from
 
 PARAMS = RegistrarParams()
@@ -28,6 +28,14 @@ def test_every_object_has_a_shape_and_a_middle_and_all_of_them_one_together() ->
     ready = prepare(HERE, PARAMS)
     assert len(ready.shapes) == len(ready.centroids) == len(ready.extents) == len(HERE.objects) > 1
     assert ready.scene is not None and None not in ready.shapes
+
+
+def test_what_is_told_of_single_objects_is_made_once_and_when_it_is_asked_for() -> None:
+    asked: list[int] = []
+    things = AtNeed(3, lambda k: (asked.append(k), 10 * k)[1])
+    assert len(things) == 3 and asked == []
+    assert (things[2], things[2], asked) == (20, 20, [2])
+    assert list(things) == [0, 10, 20] and list(things[:2]) == [0, 10] and asked == [2, 0, 1]
 
 
 def test_the_first_points_are_a_fair_sample_of_all() -> None:

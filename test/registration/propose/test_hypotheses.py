@@ -16,12 +16,14 @@ from objreg_ros.registration.prepare.prepared import Prepared, prepare
 from objreg_ros.registration.propose import hypotheses
 from objreg_ros.registration.propose.hypotheses import (
     HYPOTHESES_PER_OBJECT,
+    MOST_ALIKE,
     YAW_STEPS,
     from_centroids,
     from_features,
     from_objects,
     from_prior,
     look_alikes,
+    most_alike,
 )
 from registration.rooms import ROOM, keyframe, seen_from
 from registration.samples import moved
@@ -165,6 +167,18 @@ def test_of_objects_without_a_name_the_few_of_the_most_alike_sizes_are_tried(
     assert look_alikes(source, target) == [(0, 0), (0, 1), (2, 2)]
     monkeypatch.setattr(hypotheses, "UNNAMED_PAIRS", 1)
     assert look_alikes(source, target) == [(0, 1), (2, 2)]
+
+
+def test_of_many_look_alikes_few_are_laid_upon_each_other_and_every_object_upon_the_one_of_its_size(
+    room: tuple[Prepared, Prepared],
+) -> None:
+    count = 7
+    sizes = 0.1 * 1.3 ** np.arange(count)
+    source = without(room[0], groups=("a",) * count, extents=sizes)
+    target = without(room[1], groups=("a",) * count, extents=sizes[::-1])
+    few = most_alike(source, target)
+    assert len(few) == MOST_ALIKE < len(look_alikes(source, target))
+    assert {(k, count - 1 - k) for k in range(count)} <= set(few)
 
 
 def test_confusable_labels_are_of_one_group() -> None:

@@ -16,7 +16,7 @@ from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Pair, prepare
 from objreg_ros.registration.propose.evidence import FINISHED_MARGIN
 from objreg_ros.registration.propose.hypotheses import Hypothesis
-from objreg_ros.registration.propose.shortlist import FINISHED, TILTED, _hopeful, shortlist
+from objreg_ros.registration.propose.shortlist import FINISHED, HOPELESS, TILTED, _hopeful, _total, shortlist
 from objreg_ros.sensor import session_gravity_sigma_deg
 from registration.rooms import keyframe, look_at, seen_from
 
@@ -84,6 +84,15 @@ def test_what_is_held_and_keeps_gravity_about_as_well_as_the_gate_wants_it_goes_
     for firm, hopeful in (((1, 1, 1), (0, 1)), ((0, 1, 1), (1,)), ((0, 0, 1), (0, 1, 2)), ((0, 0, 0), (0, 1, 2))):
         found = _hopeful(pair_of(seen, seen), hypotheses, np.array(firm, bool))
         assert [id(hypothesis) for hypothesis in found] == [id(hypotheses[k]) for k in hopeful]
+
+
+def test_one_hypothesis_is_finished_where_none_is_hopeful(monkeypatch: pytest.MonkeyPatch) -> None:
+    pair = pair_of(keyframe(seen_from(0.0)), keyframe(seen_from(30.0)))
+    best, known = shortlist(pair, None)
+    assert _total(best[0]) > HOPELESS
+    monkeypatch.setattr("objreg_ros.registration.propose.shortlist.HOPELESS", np.inf)
+    (one,), fewer = shortlist(pair, None)
+    assert len(fewer) <= len(known) and one.score is not None
 
 
 def test_nothing_is_short_listed_where_no_proposer_proposes_anything() -> None:
