@@ -55,7 +55,7 @@ ROUND = 24  # poses of the odometry that a map is made of
 
 def detect_attempt(_: Path) -> Attempt:
     """An image through the project's own model."""
-    detector = Detector.of(DetectorParams(threads=1, threshold=0.01), share.model)
+    detector = Detector.of(DetectorParams(model=share.EMBEDDED, threads=1, threshold=0.01), share.model)
     names = dict(enumerate(detector.labels))
 
     def use(message: Any) -> None:

@@ -62,7 +62,7 @@ class Asked:
 
     def tag(self) -> str:
         """What the figures depend on, as a part of a file's name."""
-        usual = DetectorParams()
+        usual = detector_of()
         model = "default" if self.detector.model == usual.model else Path(self.detector.model).stem
         parts = [code(), model, f"{self.candidates}", f"{self.seed}"]
         parts += [f"{self.detector.threshold:g}"] if self.detector.threshold != usual.threshold else []

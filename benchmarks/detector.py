@@ -192,7 +192,7 @@ def load(path: Path, params: DetectorParams) -> Detector:
 @click.option("--seed", type=int, default=1, help="Another seed gives other scenes.")
 @click.option("--json", "out", type=click.Path(path_type=Path), required=True, help="Where the figures go.")
 @click.option("--quick", is_flag=True, help="Fewer pictures: within 50 s.")
-@click.option("--model", default=DetectorParams().model, callback=model_file, help="The model that is measured.")
+@click.option("--model", default=share.EMBEDDED, callback=model_file, help="The model that is measured.")
 @click.option(
     "--coco", metavar="MODEL", callback=model_file, help="A COCO model to compare with; default: one at hand."
 )

@@ -156,8 +156,7 @@ def _frames(recording: Recording, asked: DetectorParams) -> tuple[list[Frame], d
 
 def detector_of(model: str = "", threshold: float = 0.5) -> DetectorParams:
     """A detector of a model, the embedded one by default."""
-    params = DetectorParams(threshold=threshold)
-    return params.replaced(model=model) if model else params
+    return DetectorParams(model=model or share.EMBEDDED, threshold=threshold)
 
 
 def with_drift(frames: list[Frame], truth: Truth, seed: int, drift: float = 1.0) -> list[Frame]:

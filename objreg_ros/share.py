@@ -9,6 +9,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 NAME = "objreg_ros"
+AUTO = "auto"
+EMBEDDED = "objreg_ssd.onnx"
+COCO = ("ssd_mobilenet_v1_12.onnx", "ssd_mobilenet_v1_12-int8.onnx")  # as `objreg fetch-model` brings them
 
 
 def folders() -> Iterator[Path]:
@@ -41,7 +44,12 @@ def user_models() -> Path:
 
 
 def model(name: str) -> Path:
-    """A model by its path, or by its file name in the user's data folder or in models/; else FileNotFoundError."""
+    """A model by its path, or by its file name in the user's data folder or in models/; else FileNotFoundError.
+
+    `AUTO` is a COCO model that the user fetched, or the embedded one.
+    """
+    if name == AUTO:
+        name = next((coco for coco in COCO if (user_models() / coco).is_file()), EMBEDDED)
     path = Path(name).expanduser()
     if path.is_file():
         return path

@@ -8,6 +8,7 @@ the whole session.
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Iterable
 from importlib.util import find_spec
 from pathlib import Path
@@ -19,6 +20,9 @@ from hypothesis import settings
 settings.register_profile("desk", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "desk")
+
+# A model that somebody fetched for themselves changes no test.
+os.environ["XDG_DATA_HOME"] = tempfile.mkdtemp(prefix="objreg_data_")
 
 RUN_AT_LEAST = 1500  # of more than twice as many; without ROS, onnx, torch and recordings it is still fewer that skip
 OPTIONAL = {"rclpy", "launch_ros", "onnx", "torch"}

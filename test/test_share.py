@@ -64,6 +64,19 @@ def test_a_model_is_a_path_or_a_name_in_the_users_folder_or_ours(
     assert share.model(str(ours)) == ours
 
 
+def test_without_a_name_a_fetched_model_of_coco_comes_before_the_embedded_one(
+    elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_DATA_HOME", str(elsewhere / "share"))
+    embedded = put(elsewhere / "prefix", f"models/{share.EMBEDDED}")
+    put(elsewhere, "models/other.onnx")
+    assert share.model(share.AUTO) == embedded
+    for name in reversed(share.COCO):  # the int8 one first
+        fetched = share.user_models() / name
+        fetched.touch()
+        assert share.model(share.AUTO) == fetched
+
+
 def test_a_model_of_a_name_that_is_nowhere_is_refused_with_how_to_get_one(
     elsewhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -180,7 +180,7 @@ def gather(told: Told) -> Rows:
             params = RegistrarParams().replaced(**EAGER)
             recorder = Recorder(params, Truth.of(recording, inputs.ground_truth))
             registrar = Registrar(params, method=recorder, gate=recorder.judge)
-            detecting = DetectorParams(threshold=THRESHOLD)
+            detecting = DetectorParams(model=share.EMBEDDED, threshold=THRESHOLD)
             detector = Detector(detecting, share.model(detecting.model))
             rooms = Rooms(detector, Segmenter(SegmenterParams()), registrar, organise)
             run_offline(recording.records(set(inputs.chosen().values())), rooms, inputs)

@@ -12,6 +12,7 @@ from typing import Any
 
 import click
 
+from objreg_ros import share
 from objreg_ros.bridge import from_msg
 from objreg_ros.cli import live_table, options
 from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
@@ -27,7 +28,8 @@ from objreg_ros.report.write import write_report
 from objreg_ros.segmenter.params import SegmenterNodeParams
 from objreg_ros.truth import Truth, summarise
 
-CALIBRATION = "registrar.covariance_calibration"
+SIMULATED = {"registrar.covariance_calibration": "0.01", "detector.model": share.EMBEDDED}
+"""The camera is as its calibration says, and a model knows the objects."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,10 +97,12 @@ def run(asked: Asked) -> None:
 
 
 def calibrated(asked: Asked) -> Asked:
-    """What is asked of a simulated room: its camera is as its calibration says, unless something else is asked for."""
-    if asked.params_file is not None or any(change.startswith(CALIBRATION) for change in asked.changes):
+    """What is asked of a simulated room: what is so in simulation, unless something else is asked for."""
+    if asked.params_file is not None:
         return asked
-    return replace(asked, changes=(f"{CALIBRATION}=0.01", *asked.changes))
+    changed = {change.partition("=")[0] for change in asked.changes} | ({"detector.model"} if asked.model else set())
+    known = (f"{name}={value}" for name, value in SIMULATED.items() if name not in changed)
+    return replace(asked, changes=(*known, *asked.changes))
 
 
 def _inputs(recording: Path, asked: Asked) -> Inputs:

@@ -12,7 +12,11 @@ from objreg_ros.params import Params, param
 class DetectorParams(Params):
     """What the detector runs and which of its boxes go on."""
 
-    model: str = param("objreg_ssd.onnx", "ONNX model: a path, or a file name in models/ or in the user's data folder")
+    model: str = param(
+        "auto",
+        "ONNX model: a path, or a file name in models/ or in the user's data folder; auto: a COCO model that `objreg "
+        "fetch-model` brought, else objreg_ssd.onnx",
+    )
     labels: str = param("", "file of one label a line; empty: from the model's metadata, or a file beside the model")
     label_offset: str = param(
         "auto", "number of the first class: 0 (converted TFLite), 1 (TF detection API)", choices=("auto", "0", "1")

@@ -24,11 +24,13 @@ ASKED = Asked(
 INPUTS = Inputs(image="/a", depth="/d", camera_info="/i", odom="/o")
 
 
-def test_a_simulated_camera_is_as_its_calibration_says_unless_something_else_is_asked_for() -> None:
-    assert calibrated(ASKED).changes == ("registrar.covariance_calibration=0.01",)
-    others = {"changes": ("registrar.covariance_calibration=0.02",)}, {"params_file": Path("own.yaml")}
-    for asked in (replace(ASKED, **other) for other in others):
-        assert calibrated(asked) == asked
+def test_a_simulated_room_has_its_calibration_and_its_model_unless_something_else_is_asked_for() -> None:
+    camera, model = "registrar.covariance_calibration=0.01", "detector.model=objreg_ssd.onnx"
+    assert calibrated(ASKED).changes == (camera, model)
+    assert calibrated(replace(ASKED, model="my.onnx")).changes == (camera,)
+    own = ("registrar.covariance_calibration=0.02",)
+    assert calibrated(replace(ASKED, changes=own)).changes == (model, *own)
+    assert calibrated(replace(ASKED, params_file=Path("own.yaml"))).changes == ()
 
 
 def test_without_options_the_nodes_run_with_their_own_defaults_at_the_recordings_pace() -> None:

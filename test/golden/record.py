@@ -105,7 +105,7 @@ def _model(source: runs.Source, shared: Path) -> Detector:
     """The model that saw the recording: the COCO model where it is real, the embedded one where it is simulated."""
     if isinstance(source, runs.Real):
         return Detector(DetectorParams(threshold=COCO_THRESHOLD), shared / COCO)
-    return Detector.of(DetectorParams(), share.model)
+    return Detector.of(DetectorParams(model=share.EMBEDDED), share.model)
 
 
 if __name__ == "__main__":
