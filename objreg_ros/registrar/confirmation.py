@@ -24,8 +24,8 @@ from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.propose.prior import Prior
 from objreg_ros.registration.result import Registration
 
-LEAST_ODDS = 3.0  # of what waits: with even odds slides of 15 to 20 cm confirm each other
-SUPPORTERS = 2  # that agree with it and each other
+LEAST_ODDS = 5.0  # of what waits: with even odds slides of 15 to 20 cm confirm each other
+SUPPORTERS = 3  # that agree with it and each other
 LEAST_SHARE = 0.85  # of what is said of its place, that agrees
 OPPOSED_SHARE = 0.5  # what the gate accepts waits below
 HEARD = 1.0  # what weighs less opposes nothing: one that is certain

@@ -53,24 +53,25 @@ def test_an_accepted_pose_is_of_the_stored_keyframe_and_does_not_wait() -> None:
     assert verdict.target is one.target and verdict.candidate is one.registration.candidate
 
 
-def test_a_doubtful_pose_waits_until_two_sure_ones_agree_and_keeps_its_own_stamps() -> None:
+def test_a_doubtful_pose_waits_until_three_sure_ones_agree_and_keeps_its_own_stamps() -> None:
     confirmation, first = Confirmation(PARAMS), tried(0.0, **DOUBTFUL)
     hold(confirmation, first, confirmation.hear(first))
-    confirmation.hear(tried(0.2))
+    for at_m in (0.1, 0.2):
+        confirmation.hear(tried(at_m))
     assert confirmation.settle(first.source.stamp_ns) == ([], []) and len(confirmation) == 1
     confirmation.hear(tried(0.4))
     (late,), refused = confirmation.settle(first.source.stamp_ns)
     assert refused == [] and len(confirmation) == 0
     assert (late.closure.from_ns, late.closure.to_ns) == (first.target.stamp_ns, first.source.stamp_ns)
-    assert late.closure.evidence["agreeing"] == 2 and late.closure.evidence["agreeing_share"] > 0.99
+    assert late.closure.evidence["agreeing"] == 3 and late.closure.evidence["agreeing_share"] > 0.99
 
 
 def test_a_doubtful_pose_that_others_confirmed_before_does_not_wait() -> None:
     confirmation = Confirmation(PARAMS)
-    for at_m in (0.0, 0.2):
+    for at_m in (0.0, 0.2, 0.3):
         confirmation.hear(tried(at_m))
     verdict = confirmation.hear(tried(0.4, **DOUBTFUL))
-    assert isinstance(verdict, Accepted) and verdict.support is not None and verdict.support.agreeing == 2
+    assert isinstance(verdict, Accepted) and verdict.support is not None and verdict.support.agreeing == 3
 
 
 def test_a_doubtful_pose_that_slides_is_refused_in_the_end_with_the_gate_s_reason() -> None:
@@ -120,7 +121,7 @@ def test_an_accepted_pose_that_was_contradicted_by_false_ones_is_published_when_
 )
 def test_what_is_impossible_or_unlikely_never_waits(evidence: dict[str, object]) -> None:
     confirmation = Confirmation(PARAMS)
-    for at_m in (0.0, 0.2):
+    for at_m in (0.0, 0.2, 0.3):
         confirmation.hear(tried(at_m))
     poor = {"perturbation_margin": 0.0, "information": np.diag([1e2] * 6), **evidence}
     assert isinstance(confirmation.hear(tried(0.4, **poor)), Rejected)
@@ -128,7 +129,7 @@ def test_what_is_impossible_or_unlikely_never_waits(evidence: dict[str, object])
 
 def test_nothing_waits_where_no_time_is_given() -> None:
     confirmation = Confirmation(PARAMS.replaced(confirm_seconds=0.0))
-    for at_m in (0.0, 0.2):
+    for at_m in (0.0, 0.2, 0.3):
         confirmation.hear(tried(at_m))
     assert isinstance(confirmation.hear(tried(0.4, **DOUBTFUL)), Rejected)
     assert isinstance(confirmation.hear(tried(0.6, ASIDE)), Accepted)

@@ -355,13 +355,13 @@ def _passes(*sides: float) -> list[Frame]:
 def test_what_a_keyframe_cannot_prove_is_published_late_with_its_own_stamps_when_others_agree() -> None:
     params = PARAMS.replaced(thin_seconds=0.1, closures=1, candidates=1)
     registrar = Registrar(params, method=Odometrical(30))
-    outcomes = [registrar.process(frame) for frame in _passes(-1.0, 0.0, 1.0)] + [registrar.finish()]
+    outcomes = [registrar.process(frame) for frame in _passes(-1.0, 0.0, 1.0, 2.0)] + [registrar.finish()]
     by_keyframe = {o.keyframe_ns: [c.to_ns for c in o.closures] for o in outcomes if o.keyframe_ns is not None}
-    first, second, third = (round(1e9 * seconds) for seconds in (30, 31, 32))
-    assert by_keyframe[first] == [] and by_keyframe[second] == [second]
-    assert sorted(by_keyframe[third]) == [first, third]
+    first, second, third, fourth = (round(1e9 * seconds) for seconds in (30, 31, 32, 33))
+    assert by_keyframe[first] == [] and by_keyframe[second] == [second] and by_keyframe[third] == [third]
+    assert sorted(by_keyframe[fourth]) == [first, fourth]
     (late,) = [c for o in outcomes for c in o.closures if c.to_ns == first]
-    assert late.evidence["agreeing"] == 2 and registrar.waiting == 0
+    assert late.evidence["agreeing"] == 3 and registrar.waiting == 0
     known = {landmark.landmark for landmark in registrar.landmarks}
     assert late.matches and {match.object_id for match in late.matches} <= known
     assert registrar.counts()["closures"] == sum(len(o.closures) for o in outcomes)
