@@ -131,7 +131,8 @@ class Timing:
     """How the inputs are brought together, as the nodes' parameters say; ``T_base_camera`` as the registrar's.
 
     With ``level_odom`` the segmenter takes gravity from the odometry, and ``T_level_camera`` is its T_base_camera.
-    ``max_rate`` is the detector's; 0, as it is here, is every picture. ``T_camera_imu`` is the segmenter's, and ``find_pose`` what it asks without one: (camera's frame, IMU's) → the same.
+    ``max_rate`` is the detector's; 0, as it is here, is every picture. ``T_camera_imu`` is the segmenter's,
+    and ``find_pose`` what it asks without one: (camera's frame, IMU's) → the same.
     """
 
     slop_ns: int = 20_000_000
