@@ -208,10 +208,17 @@ def measure(objects: int, frames: int, seed: int, node_args: Mapping[str, list[s
         return {"end_to_end_ms": latency, "constraint_ms": told, "books": books_of(live), "usage": usage}
 
 
+def totals(usage: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
+    """The three nodes together."""
+    names = ("cpu_percent", "memory_mb")
+    return {name: round(sum(figures.get(name, 0.0) for figures in usage.values()), 1) for name in names}
+
+
 def line_of(row: Mapping[str, Any]) -> str:
     """One run in a line."""
     end_to_end, told = row["end_to_end_ms"]["registrar"], row["constraint_ms"]
-    return f"end to end {end_to_end}, constraints {told}, usage {row['usage']}"
+    usage = f"usage {row['usage']}, together {totals(row['usage'])}"
+    return f"end to end {end_to_end}, constraints {told}, {usage}"
 
 
 @click.command()
@@ -219,12 +226,15 @@ def line_of(row: Mapping[str, Any]) -> str:
 @click.option("--frames", default=300, show_default=True, help="Frames of a run, at 30 a second.")
 @click.option("--seed", default=0, show_default=True, help="Seed of the simulated recordings.")
 @click.option("--model", default="", help="ONNX model of the detector, if not the default.")
+@click.option("--max-rate", type=float, help="The detector's max_rate, if not the default.")
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
-def main(objects: str, frames: int, seed: int, model: str, json_file: Path | None) -> None:
+def main(objects: str, frames: int, seed: int, model: str, max_rate: float | None, json_file: Path | None) -> None:
     """Measure the live graph's latency."""
     os.environ.setdefault("ROS_DOMAIN_ID", str(random.randint(1, 100)))  # the witness listens there too
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    node_args = {"detector": ["-p", f"model:={model}"]} if model else {}
+    changes = {"model": model or None, "max_rate": max_rate}
+    words = [word for name, value in changes.items() if value is not None for word in ("-p", f"{name}:={value}")]
+    node_args = {"detector": words} if words else {}
     rows = {}
     for count in (int(text) for text in objects.split(",")):
         rows[str(count)] = measure(count, frames, seed, node_args)

@@ -18,7 +18,8 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from objreg_ros.bridge import from_msg, lenses
-from objreg_ros.bridge.sync import Match, Need, Stream, Synchroniser
+from objreg_ros.bridge.pace import Pace
+from objreg_ros.bridge.sync import Drop, Match, Need, Stream, Synchroniser
 from objreg_ros.data import (
     Array,
     ColourImage,
@@ -45,6 +46,7 @@ from objreg_ros.truth import Truth, summarise
 
 Word = TypeVar("Word")
 
+LEFT_OUT = f"depth_{Drop.SURPLUS.value}"
 ODOM_DEPTH = 1000  # odometry is small and many times as frequent as frames
 
 
@@ -129,7 +131,8 @@ class Timing:
     """How the inputs are brought together, as the nodes' parameters say; ``T_base_camera`` as the registrar's.
 
     With ``level_odom`` the segmenter takes gravity from the odometry, and ``T_level_camera`` is its T_base_camera.
-    ``T_camera_imu`` is the segmenter's, and ``find_pose`` what it asks without one: (camera's frame, IMU's) → the same.
+    ``max_rate`` is the detector's; 0, as it is here, is every picture. ``T_camera_imu`` is the segmenter's,
+    and ``find_pose`` what it asks without one: (camera's frame, IMU's) → the same.
     """
 
     slop_ns: int = 20_000_000
@@ -141,6 +144,7 @@ class Timing:
     rectified: str = "auto"  # whether pictures come without the distortion of their lens, as the segmenter's parameter
     T_camera_imu: Array | None = None
     find_pose: FindPose = lambda camera, imu: None
+    max_rate: float = 0.0
 
 
 @dataclass
@@ -238,6 +242,7 @@ class Line:
         self._from_points = inputs.points is not None
         self._raw = lenses.raw_pictures(timing.rectified, inputs.depth or inputs.points, inputs.image)
         self._camera_info: Any = None
+        self._pace = Pace(timing.max_rate)
         self._imu = Imu(timing.T_camera_imu, timing.find_pose)
         self.run.imu_passed_over = self._imu.counts
         self._labels: dict[int, tuple[str, ...]] = {}  # what was detected in the frames that are under way
@@ -300,6 +305,10 @@ class Line:
         return self.run
 
     def _take_image(self, stamp_ns: int, message: Any) -> None:
+        if not self._pace.admits(stamp_ns):
+            self._feed("image", stamp_ns, message)
+            self._feed("detections", stamp_ns, Drop.SURPLUS)
+            return
         detections = self._kept("image", partial(self._detect, message))
         if detections is not None:
             self._feed("image", stamp_ns, message)
@@ -317,6 +326,9 @@ class Line:
 
     def _segment(self, matches: Iterable[Match]) -> None:
         for match in matches:
+            if match.is_surplus:
+                self.run.dropped[LEFT_OUT] += 1
+                continue
             frame = self._kept("depth", partial(self._frame, match))
             if frame is not None:
                 self.run.detections += len(match["detections"])
@@ -405,14 +417,14 @@ def run_offline(
 ) -> Run:
     """Drive the rooms with a recording's records, to their end or to ``max_frames``; what came out.
 
-    ``on_frame`` hears how many frames are through.
+    ``on_frame`` hears how many frames are through, those that were left out among them.
     """
     line = Line(rooms, inputs, timing or Timing(), max_frames)
     name_of = {topic: name for name, topic in inputs.chosen().items()}
     for record in records:
         if record.topic in name_of:
             line.take_record(name_of[record.topic], record)
-            on_frame(line.run.frames)
+            on_frame(line.run.frames + line.run.dropped[LEFT_OUT])
         if line.full:
             break
     return line.finish()

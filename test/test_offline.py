@@ -61,6 +61,33 @@ def test_a_run_can_stop_early() -> None:
     assert run.frames == len(chain.frames) == 4 and chain.finished
 
 
+def at_30_hz(count: int, depth_late_ms: float = 0.0) -> list[Record]:
+    """Pictures 33 ms apart, and depth that was exposed a little later."""
+    found = []
+    for record in records(count):
+        k = (record.stamp_ns - 1000 * MS) // (100 * MS)
+        late_ms = depth_late_ms if record.topic == "/depth/image" else 0.0
+        stamp_ns = 1000 * MS + round((k * 1000 / 30 + late_ms) * MS)
+        message = record.message
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, 10**9)
+        found.append(Record.of(record.topic, message, stamp_ns))
+    return sorted(found, key=lambda record: record.stamp_ns)
+
+
+@pytest.mark.parametrize("depth_late_ms", [0.0, 9.0, 15.0, -9.0])
+def test_pictures_that_come_faster_than_they_are_wanted_are_surplus_with_their_depth(depth_late_ms: float) -> None:
+    rooms, chain = simple_rooms()
+    run = run_offline(at_30_hz(12, depth_late_ms), rooms, INPUTS, Timing(max_rate=10.0))
+    taken = [round((frame.stamp_ns / MS - 1000 - depth_late_ms) * 30 / 1000) for frame in chain.frames]
+    assert taken == [0, 3, 6, 9] and run.dropped == {"depth_surplus": 8}
+
+
+def test_surplus_pictures_are_not_decoded() -> None:
+    rooms, _ = simple_rooms()
+    run = run_offline(at_30_hz(12), rooms, INPUTS, Timing(max_rate=10.0))
+    assert len(run.stage_s["detect"]) == len(run.stage_s["segment"]) == 4
+
+
 def without(topic: str, stamp_ns: int) -> Iterator[Record]:
     return (record for record in records(4) if (record.topic, record.stamp_ns) != (topic, stamp_ns))
 

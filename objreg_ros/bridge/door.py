@@ -198,10 +198,14 @@ class Door(OverridableNode):
 
     def drop(self, stamp_ns: int, reason: str, text: str = "") -> None:
         """The frame ends here: counted by reason, receipted, and logged (throttled) if there is a ``text``."""
-        self.ledger.drop(stamp_ns, reason)
         self._drops.drop("frames", reason, text)
         if text:
             self.throttled.warn(reason, f"frame dropped, {reason.replace('_', ' ')}: {text}")
+        self.leave_out(stamp_ns, reason)
+
+    def leave_out(self, stamp_ns: int, reason: str) -> None:
+        """The frame ends here on purpose: counted by reason and receipted, and no trouble."""
+        self.ledger.drop(stamp_ns, reason)
         self._finished.publish(to_msg.finished(self.get_name(), stamp_ns, reason))
 
     def read(self, topic: str, decode: Callable[..., Any], *messages: Any) -> Any:

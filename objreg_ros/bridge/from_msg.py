@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from objreg_ros import limits
-from objreg_ros.bridge.layout import SUPPORT_ID, SUPPORT_LABEL, UNNAMED_ID, columns, table, whole_numbers
+from objreg_ros.bridge.layout import SUPPORT_ID, SUPPORT_LABEL, SURPLUS, UNNAMED_ID, columns, table, whole_numbers
 from objreg_ros.bridge.pictures import colour_pixels, depth_metres, unpack_rgb
 from objreg_ros.data import (
     SURROGATE,
@@ -345,6 +345,11 @@ def _label(name: Any) -> str:
     if not isinstance(name, str) or SURROGATE.search(name):
         raise ValueError(f"expected a name that UTF-8 can write, got {ascii(name)[:80]}")
     return _name(name, "label")
+
+
+def is_surplus(message: Any) -> bool:
+    """Whether a ``detections_table`` says that its picture was left out to keep a pace."""
+    return tuple(field.name for field in message.fields) == SURPLUS.names
 
 
 def detections(message: Any, names: Mapping[int, str], image_hw: tuple[int, int] = (1, 1)) -> Detections:

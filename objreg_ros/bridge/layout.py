@@ -34,6 +34,7 @@ DETECTIONS = np.dtype(
         ("image_height", "<u2"),
     ]
 )
+SURPLUS = np.dtype([("surplus", "u1")])  # instead, of a picture that was left out to keep a pace; it has no rows
 
 # rgb is 0x00RRGGBB; the wire calls it FLOAT32, as PCL and RViz do.
 OBJECTS = np.dtype(

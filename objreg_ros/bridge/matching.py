@@ -18,6 +18,8 @@ ALONE_S = 0.5  # after once to twice this a stamp that has leapt alone is believ
 QUIET_S = 5.0  # where no stream has spoken for so long, what waits for an optional one goes without
 EARLY = 30  # messages of a stream that are kept until it is known how they are matched
 
+SURPLUS_ADVICE = "each is of a picture that detector.max_rate leaves out; set that to 0"
+
 Early = tuple[int, str, int, Any]  # order of arrival, stream, stamp, payload
 
 
@@ -80,7 +82,15 @@ class MatchingDoor(Door):
 
     def _hand_over(self, matches: Iterable[Match]) -> None:
         for match in matches:
-            self.worker.put((match.stamp_ns, match))
+            if match.is_surplus:
+                self._pass_over(match.stamp_ns)
+            else:
+                self.worker.put((match.stamp_ns, match))
+
+    def _pass_over(self, stamp_ns: int) -> None:
+        """End a frame whose picture was left out: no trouble, unless that is so of every frame."""
+        self.leave_out(stamp_ns, Drop.SURPLUS.value)
+        self._drops.drop("frames", Drop.SURPLUS.value, SURPLUS_ADVICE)
 
     def _unmatched(self, name: str, stamp_ns: int, why: str) -> None:
         if name == self._reference:

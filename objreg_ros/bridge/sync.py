@@ -40,6 +40,7 @@ class Drop(Enum):
     TIME_JUMP = "time_jump"  # time jumped back and left it in the future
     LATE = "late"  # one of its stream with a later stamp was there before it
     ODD_STAMP = "odd_stamp"  # its stamp leapt far away, and the next one's did not
+    SURPLUS = "surplus"  # its picture was left out to keep a pace; a stream that has it as a payload says so
 
 
 @dataclass(slots=True)
@@ -84,6 +85,11 @@ class Match:
 
     def __getitem__(self, name: str) -> Any:
         return self.payloads[name]
+
+    @property
+    def is_surplus(self) -> bool:
+        """Whether it is of what was left out on purpose: it is to be dropped as `Drop.SURPLUS`."""
+        return any(payload is Drop.SURPLUS for payload in self.payloads.values())
 
 
 @dataclass(slots=True)

@@ -121,7 +121,9 @@ def _inputs(source: Recording, remaps: tuple[str, ...], odometry: str | None, de
 
 
 def _run(source: Recording, inputs: Inputs, settings: Settings, max_frames: int | None, odometry: str | None) -> Run:
-    timing = replace(_timing(settings, odometry), find_pose=static_frames(source).between)
+    max_rate = settings.of("detector", DetectorParams).max_rate
+    find_pose = static_frames(source).between
+    timing = replace(_timing(settings, odometry), find_pose=find_pose, max_rate=max_rate)
     click.echo(f"preparing the rooms ({FIRST_TIME})", err=True)
     rooms, close = build_rooms(
         settings.of("detector", DetectorParams),

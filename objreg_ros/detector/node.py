@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from typing import Any
 
 from sensor_msgs.msg import CompressedImage, Image, PointCloud2
@@ -12,7 +13,10 @@ from std_msgs.msg import String
 from objreg_ros import share
 from objreg_ros.bridge import from_msg, qos, to_msg
 from objreg_ros.bridge.door import Door
+from objreg_ros.bridge.pace import Pace
 from objreg_ros.bridge.spin import run
+from objreg_ros.bridge.sync import Drop
+from objreg_ros.bridge.turns import Turns
 from objreg_ros.data import ColourImage
 from objreg_ros.detector.mobilenet_ssd import Detector
 from objreg_ros.detector.params import DetectorParams
@@ -21,12 +25,16 @@ IMAGES = {"image": Image, "image/compressed": CompressedImage}
 
 
 class DetectorNode(Door):
-    """Detects the objects of the newest image; a table goes out for every image, empty if it shows no object."""
+    """Detects the objects of the newest image of those that keep the pace; the others are surplus and not decoded.
+
+    A table goes out for every image, empty if it shows no object, and of a kind of its own if it is surplus.
+    """
 
     def __init__(self) -> None:
         super().__init__("detector", DetectorParams)
         params = self.settings.of(DetectorParams)
         self._detector = Detector.of(params, share.model)
+        self._pace, self._turns = Pace(params.max_rate), Turns(self._leave_out)
         self._names = dict(enumerate(self._detector.labels))
         self._table = self.create_publisher(PointCloud2, "detections_table", qos.room())
         self._array = self.create_publisher(to_msg.Detection2DArray, "detections", qos.room()) if self._vision else None
@@ -48,7 +56,25 @@ class DetectorNode(Door):
     def _hear(self, _: str, message: Any) -> None:
         stamp_ns = from_msg.stamp_ns(message)
         self.accept(stamp_ns)
-        self.worker.put((stamp_ns, message))
+        if self._pace.admits(stamp_ns):
+            self._turns.begin(stamp_ns)
+            self.worker.put((stamp_ns, message))
+        else:
+            self._turns.put_off(stamp_ns, message.header.frame_id)
+
+    def _leave_out(self, stamp_ns: int, frame_id: str) -> None:
+        """Tell of a surplus image, after the tables of those before it."""
+        self._table.publish(to_msg.surplus(stamp_ns, frame_id))
+        self.leave_out(stamp_ns, Drop.SURPLUS.value)
+
+    def conclude(self, stamp_ns: int, work: Callable[[], bool]) -> None:
+        """As any door; those behind it have their turn."""
+        super().conclude(stamp_ns, work)
+        self._turns.end(stamp_ns)
+
+    def _overtaken(self, job: tuple[int, Any]) -> None:
+        super()._overtaken(job)
+        self._turns.end(job[0])
 
     def compute(self, stamp_ns: int, payload: Any) -> bool:
         """One image."""

@@ -26,7 +26,7 @@ from objreg_ros.bridge.matching import MatchingDoor
 from objreg_ros.bridge.overridable import FIXED
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.static_frames import StaticFrames
-from objreg_ros.bridge.sync import Match, Need, Stream
+from objreg_ros.bridge.sync import Drop, Match, Need, Stream
 from objreg_ros.data import Array, ColourImage, DepthImage, Detections, FeltGravity, Frame, PointCloud
 from objreg_ros.segmenter.doubts import range_doubt, registration_doubt
 from objreg_ros.segmenter.imu import Imu
@@ -162,7 +162,7 @@ class SegmenterNode(MatchingDoor):
         self.conclude(stamp_ns, lambda: self.read(name, self._decode_depth, topic, message) is not None)
 
     def _hear_detections(self, message: Any) -> None:
-        self.feed("detections", from_msg.stamp_ns(message), message)
+        self.feed("detections", from_msg.stamp_ns(message), Drop.SURPLUS if from_msg.is_surplus(message) else message)
 
     def _choose(self, topic: str) -> None:
         """Depth has spoken, or comes by another topic now: it is known what goes with it."""

@@ -14,6 +14,7 @@ from objreg_ros.bridge.sync import (
     MOST_BYTES,
     PATIENCE_NS,
     SILENCE_NS,
+    Drop,
     Match,
     Need,
     Stream,
@@ -55,6 +56,22 @@ def test_the_nearest_within_the_slop_is_taken_once_it_is_known() -> None:
     assert pairs(sync.add("depth", 105, "later"), "depth") == [("near",)]
     assert sync.queues["depth"].dropped == {"unmatched": 1} and sync.queues["depth"].waiting == 1
     assert accounts_hold(sync)
+
+
+def test_what_was_left_out_is_matched_like_the_rest_and_says_so() -> None:
+    sync = Synchroniser((Stream("image"), Stream("boxes", slop_ns=10)))
+    found = []
+    for stamp_ns, word in ((100, "b"), (133, Drop.SURPLUS), (166, Drop.SURPLUS), (200, "b")):
+        found += sync.add("boxes", stamp_ns, word)
+        found += sync.add("image", stamp_ns + 5, "i")
+    found += sync.flush()
+    assert [(match.stamp_ns, match.is_surplus) for match in found] == [
+        (105, False),
+        (138, True),
+        (171, True),
+        (205, False),
+    ]
+    assert accounts_hold(sync) and not any(queue.dropped for queue in sync.queues.values())
 
 
 def test_nothing_within_the_slop_is_no_match() -> None:

@@ -153,6 +153,16 @@ def test_no_detection_gives_an_empty_table_with_the_header_of_the_image() -> Non
     assert len(from_msg.detections(message, NAMES)) == 0
 
 
+def test_the_table_of_a_surplus_picture_says_so_and_no_other_does() -> None:
+    message = to_msg.surplus(STAMP, "kinect")
+    assert from_msg.is_surplus(message) and from_msg.stamp_ns(message) == STAMP
+    assert (message.header.frame_id, message.width, len(message.data)) == ("kinect", 0, 0)
+    assert not from_msg.is_surplus(to_msg.PointCloud2())
+    empty = np.zeros((0, 4), np.float32)
+    none = Detections(xyxy=empty, score=empty[:, 0], label=(), image_hw=(480, 640), stamp_ns=STAMP)
+    assert not from_msg.is_surplus(to_msg.detections_table(none, NAMES))
+
+
 def test_a_box_of_vision_msgs_has_its_middle_and_its_size(monkeypatch: pytest.MonkeyPatch) -> None:
     def made(**fields: object) -> SimpleNamespace:
         bbox = SimpleNamespace(center=SimpleNamespace(position=SimpleNamespace()))

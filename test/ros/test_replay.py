@@ -63,6 +63,19 @@ def test_a_lossless_replay_brings_every_frame_through_every_node(
         assert (books.published, books.dropped, books.lost) == (12, {}, {})
 
 
+@pytest.mark.parametrize("lag", [0.0, 0.004])
+def test_a_lossless_replay_of_a_camera_that_is_too_fast_ends_with_a_surplus(
+    lag: float, fresh: Graph, tiny_model: Path, tmp_path: Path
+) -> None:
+    start(fresh, tiny_model, "-p max_rate:=5.0")
+    folder = tum_folder(tmp_path / "tum", frames=12, lag=lag)
+    output = objreg(fresh, "replay", str(folder), "--lossless", "--wait", str(START_S), "--patience", "60")
+    assert "registrar: 6 published\n" in output
+    assert "detector: 6 dropped surplus, 6 published\n" in output
+    assert fresh.balance("/detector", received=12).dropped == {"surplus": 6}
+    assert "surplus" not in fresh.log("detector") + fresh.log("segmenter")  # which would be a warning
+
+
 def test_depth_with_stamps_of_its_own_goes_through_but_for_the_last(
     fresh: Graph, tiny_model: Path, tmp_path: Path
 ) -> None:
@@ -125,7 +138,7 @@ def test_a_recording_gives_the_same_constraints_live_and_offline(fresh: Graph, s
     kitchen, model = shared / "data/redkitchen_a", shared / "models/ssd_mobilenet_v1_coco_int8.onnx"
     fresh.hear(Odometry, "constraints", qos.latched(qos.KEPT_CONSTRAINTS))
     start(fresh, model, "-p threshold:=0.4")
-    objreg(fresh, "replay", str(kitchen), "--lossless", "--end", "4", "--wait", str(START_S))
+    objreg(fresh, "replay", str(kitchen), "--lossless", "--end", "8", "--wait", str(START_S))
     end_keyframe(fresh)
     words = ("offline", str(kitchen), "--model", str(model), "--set", "detector.threshold=0.4", "--max-frames", "60")
     objreg(fresh, *words, "--json", str(tmp_path / "out.json"))
