@@ -42,7 +42,7 @@ from objreg_ros.segmenter.organise import organise
 
 SMALL = Intrinsics(fx=35.0, fy=35.0, cx=19.5, cy=14.5, width=40, height=30)
 SECOND = 1_000_000_000
-NAMES = {0: "cup", 1: "tv", 2: "book", 65_534: "last"}
+NAMES = {0: "cup", 1: "tv", 2: "book", 65_533: "last"}
 DEEP = 100_000
 MOST_WRITTEN = 1 << 20  # pixels: more of them only cost time
 BIG = "{" + ", ".join(f'"{k}": "x"' for k in range(DEEP)) + "}"
@@ -162,7 +162,23 @@ def clouds(word: DepthImage) -> list[Any]:
 
 def any_labels(draw: random.Random) -> String:
     """JSON that is a table of labels, almost is, or is none."""
-    keys = ("0", "-1", "1", "65534", "65535", "65536", "70000", "2147483648", "1e400", "NaN", "", "x", "9" * 5000, "٣")
+    keys = (
+        "0",
+        "-1",
+        "1",
+        "65533",
+        "65534",
+        "65535",
+        "65536",
+        "70000",
+        "2147483648",
+        "1e400",
+        "NaN",
+        "",
+        "x",
+        "9" * 5000,
+        "٣",
+    )
     values = ('"cup"', '"\\ud800"', '"\\udfff\\ud800"', '""', "null", "1e400", "[]", "{}", "NaN", f'"{"x" * 10_000}"',
               '"support"', '"7"', '"65535"', '"99999"', '"cup\\u0000"', '"' + "9" * 5000 + '"', "9" * 5000)  # fmt: skip
     deep = ("[" * DEEP, '{"0":' * DEEP, '{"0":' + "[" * DEEP + "]" * DEEP + "}", "{" * DEEP, BIG)

@@ -29,6 +29,7 @@ from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.result import Registration
 from objreg_ros.segmenter.organise import organise
+from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
 
 NO_DEPTH_MM = 65535  # what drivers send where nothing was measured, beside 0
@@ -194,6 +195,7 @@ def _segment(
     image: DepthImage, rgb: Array | None, known: Found | None, detector: Detects | None, lens: Lens | None = None
 ) -> Frame:
     """The frame of an image, rectified after detection; ``rgb`` is its colour as it came: a detector may know it."""
+    named = known is not None  # then these are the objects, and there are no others
     if known is None:
         if rgb is None:
             raise ValueError("rgb: expected uint8 of shape (H, W, 3) to detect objects in, got None")
@@ -202,14 +204,14 @@ def _segment(
     if lens is not None:
         image, detections = lens.rectify(image), lens.rectify_detections(detections)
         masks = masks and [None if mask is None else lens.rectify_mask(mask) for mask in masks]
-    segmenter = _segmenter()
+    segmenter = _segmenter(not named)
     segmenter.forget()  # each call stands for itself
     return segmenter.segment(detections, image, masks=masks)
 
 
 @cache
-def _segmenter() -> Segmenter:
-    return Segmenter()
+def _segmenter(unnamed: bool) -> Segmenter:
+    return Segmenter(SegmenterParams(unnamed=unnamed))
 
 
 @cache

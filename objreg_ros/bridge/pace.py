@@ -5,23 +5,36 @@ from __future__ import annotations
 
 from objreg_ros.data import JUMP_NS
 
-TOLERANCE = 0.1  # of the period: 30 Hz with jitter give every third picture at 10 Hz, never every second or fourth
+EARLY = 0.1  # of the period: so much before it is due a picture may come
+TURN = 6  # pictures that go on; then one is left out that is due
 
 
 class Pace:
-    """Lets at most ``max_rate`` pictures a second through, by their stamps; 0: every one.
+    """Lets ``max_rate`` pictures a second through on average, by their stamps; 0: every one.
 
-    A clock that jumps back begins anew. One that stands still tells no pace, so that every picture goes on.
+    After every `TURN` one more is left out where some are: depth that comes with every third picture would else always
+    come with one that is left out. A clock that jumps back begins anew. One that stands still tells no pace, so that
+    every picture goes on.
     """
 
     def __init__(self, max_rate: float) -> None:
-        self._least_ns = round((1.0 - TOLERANCE) * 1e9 / max_rate) if max_rate > 0 else 0
-        self._last_ns: int | None = None  # of the last picture that went on
+        self._period_ns = round(1e9 / max_rate) if max_rate > 0 else 0
+        self._due_ns: int | None = None  # when the next one is
+        self._last_ns = 0  # of the last picture that went on
+        self._left_out, self._through = False, 0  # whether some were since, and how many went on in this turn
 
     def admits(self, stamp_ns: int) -> bool:
         """Whether the picture of a stamp goes on; to be asked once a picture, as they come."""
-        passed_ns = None if self._last_ns is None else stamp_ns - self._last_ns
-        if passed_ns is not None and -JUMP_NS < passed_ns < self._least_ns and passed_ns != 0:
+        if self._due_ns is None or stamp_ns - self._last_ns <= -JUMP_NS:
+            self._due_ns = stamp_ns
+        late_ns = stamp_ns - self._due_ns
+        if late_ns < -EARLY * self._period_ns and stamp_ns != self._last_ns:
+            self._left_out = True
             return False
-        self._last_ns = stamp_ns
+        if self._left_out and self._through >= TURN:
+            self._due_ns, self._left_out, self._through = None, False, 0  # the next one is, and sets the time
+            return False
+        self._due_ns = (self._due_ns if late_ns < self._period_ns else stamp_ns) + self._period_ns
+        self._last_ns, self._left_out = stamp_ns, False
+        self._through += 1
         return True

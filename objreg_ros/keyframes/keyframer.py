@@ -273,8 +273,7 @@ class Keyframer:
         window.T_first_last = T_first_frame
         if not frame.objects or len(window.frames) >= MOST_FRAMES:
             return
-        share = 1.0 / MOST_FRAMES
-        if not window.frames or self._moved(inverse(window.motions[-1]) @ T_first_frame, share):
+        if not window.frames or self._moved(inverse(window.motions[-1]) @ T_first_frame, 1.0 / MOST_FRAMES):
             window.frames.append(frame)
             window.motions.append(T_first_frame)
 

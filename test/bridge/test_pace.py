@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Streams of pictures by their stamps, and which of them go on."""
+
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from objreg_ros.bridge.pace import Pace
+from objreg_ros.bridge.pace import TURN, Pace
 
 MS = 1_000_000
 
@@ -15,8 +17,21 @@ def admitted(pace: Pace, stamps_ms: np.ndarray) -> list[int]:
 
 @pytest.mark.parametrize("jitter_ms", [0.0, 2.0, 4.0])
 def test_thirty_pictures_a_second_give_every_third(jitter_ms: float) -> None:
-    jitter = np.random.default_rng(1).uniform(-jitter_ms, jitter_ms, 90)
-    assert admitted(Pace(10.0), 1000 + np.arange(90) * 1000 / 30 + jitter) == list(range(0, 90, 3))
+    jitter = np.random.default_rng(1).uniform(-jitter_ms, jitter_ms, 3 * TURN)
+    assert admitted(Pace(10.0), 1000 + np.arange(3 * TURN) * 1000 / 30 + jitter) == list(range(0, 3 * TURN, 3))
+
+
+def test_fifteen_pictures_a_second_give_two_of_three() -> None:
+    chosen = admitted(Pace(10.0), 1000 + np.arange(150) * 1000 / 15)
+    assert 85 <= len(chosen) <= 100 and max(np.diff(chosen)) <= 3
+
+
+@pytest.mark.parametrize("every", [2, 3])
+def test_depth_that_comes_with_every_second_or_third_picture_meets_some_that_go_on(every: int) -> None:
+    for first in range(every):
+        chosen = admitted(Pace(10.0), 1000 + np.arange(300) * 1000 / 30)
+        met = [k for k in chosen if k % every == first]
+        assert len(met) > 0.2 * len(chosen)
 
 
 @pytest.mark.parametrize("rate", [1.0, 7.5, 10.0])
