@@ -33,7 +33,7 @@ class DetectorParams(Params):
     min_side: float = param(8.0, "least width and height of a box", unit="px", ge=0.0, live=True)
     max_area: float = param(1.0, "largest share of the image that a box may cover", ge=0.0, le=1.0, live=True)
     max_rate: float = param(
-        10.0, "most pictures a second that are looked at, by their stamps; those between are surplus; 0: every picture",
+        15.0, "most pictures a second that are looked at, by their stamps; those between are surplus; 0: every picture",
         unit="Hz", ge=0.0, le=1000.0,
     )  # fmt: skip
     threads: int = param(2, "threads of the inference, which never spin while idle", ge=1, le=64)
