@@ -29,7 +29,9 @@ class DetectorParams(Params):
     )  # fmt: skip
     max_detections: int = param(30, "most detections of one image", ge=1, le=1000, live=True)
     max_candidates: int = param(300, "most boxes that enter the suppression of overlaps", ge=1, le=10000)
-    ignore: tuple[str, ...] = param(("dining table", "person"), "labels that are never passed on", live=True)
+    ignore: tuple[str, ...] = param(
+        ("dining table",), "labels that are never passed on; not people: the segmenter leaves them out", live=True
+    )
     min_side: float = param(8.0, "least width and height of a box", unit="px", ge=0.0, live=True)
     max_area: float = param(1.0, "largest share of the image that a box may cover", ge=0.0, le=1.0, live=True)
     max_rate: float = param(

@@ -13,7 +13,7 @@ import numpy as np
 from objreg_ros import limits
 from objreg_ros.data import UNNAMED, Array, DepthImage, Detections, Frame, Intrinsics, ObjectCloud, PointFlag
 from objreg_ros.segmenter import boxes, paper
-from objreg_ros.segmenter.boxes import Box
+from objreg_ros.segmenter.boxes import NOTHING, Box
 from objreg_ros.segmenter.depth_to_colour import warm as warm_offset
 from objreg_ros.segmenter.extract import Pixels, cell_points, colours
 from objreg_ros.segmenter.gravity import camera_up, estimate_up, known_normals
@@ -86,7 +86,8 @@ class Segmenter:
         the same field of view. ``gravity (3,)`` is the way things fall in the camera frame where an odometry or an IMU
         knows it. With ``gravity_sigma_deg``, the standard deviation of its tilts, it is handed on where it is surer
         than what the frame shows; without, in any case and with confidence 1. Where there is none it is estimated from
-        the frame. A box without an object of `min_points` gives none; instances count the objects from 1.
+        the frame. A box without an object of `min_points` gives none, and so does that of a person, who is no part of a
+        place; instances count the objects from 1.
         Objects without a name come last, with `UNNAMED` for a label, where the parameter `unnamed` asks for them.
         ``T_odom_camera`` is None.
 
@@ -100,7 +101,9 @@ class Segmenter:
         ground = self._ground(depth, gravity, gravity_sigma_deg)
         taken = np.zeros(ground.surface.depth.shape, np.bool_)
         asked = boxes.pixel_boxes(detections, *depth.depth.shape)
-        found = self._cut_all(depth, asked, outlines, ground)
+        people = [box for box, label in zip(asked, detections.label, strict=True) if label == PERSON]
+        things = [NOTHING if label == PERSON else box for box, label in zip(asked, detections.label, strict=True)]
+        found = self._cut_all(depth, things, outlines, ground)
         objects: list[ObjectCloud] = []
         for k in sorted(found):
             cut = found[k]
@@ -109,7 +112,6 @@ class Segmenter:
             if len(cut.pixels) >= params.min_points:
                 label, score = detections.label[k], float(detections.score[k])
                 objects.append(_object(label, score, len(objects) + 1, cut.pixels, cut.flags))
-        people = [box for box, label in zip(asked, detections.label, strict=True) if label == PERSON]
         objects += self._things(depth, ground, taken, people, len(objects))
         return Frame(
             objects=tuple(objects),

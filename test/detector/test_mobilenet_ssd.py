@@ -59,7 +59,9 @@ def test_detections_come_best_first_and_overlaps_of_one_label_are_suppressed(tmp
 
 
 def test_ignored_and_unnamed_labels_do_not_go_on(tmp_path: Path) -> None:
-    seen = detector(tmp_path, [BOX, [0, 0, 0.2, 0.2], [0, 0.7, 0.2, 1]], [1, 3, 0], [0.9, 0.9, 0.8]).detect(picture())
+    seen = detector(
+        tmp_path, [BOX, [0, 0, 0.2, 0.2], [0, 0.7, 0.2, 1]], [1, 3, 0], [0.9, 0.9, 0.8], ignore=("person",)
+    ).detect(picture())
     assert seen.label == ("book",)
 
 
