@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Between gate and publication: what one pair of keyframes cannot prove waits for others that agree.
 
-A pose that is likely right, and that no rule makes impossible, waits until `SUPPORTERS` others agree
-with it by way of odometry, and little disagrees. What the gate accepts is published at once, unless more disagrees than
-agrees: then it waits as well. What waits longer than ``confirm_seconds``, or beyond the reach of odometry, is refused.
+A pose that is likely right, and that no rule makes impossible, waits until `SUPPORTERS` others agree with it by way of
+odometry, and little disagrees. What the gate accepts is published at once, unless more disagrees than agrees: then it
+waits as well. What waits longer than ``confirm_seconds``, or beyond the reach of odometry, is refused.
 """
 
 from __future__ import annotations
