@@ -138,7 +138,7 @@ def test_a_recording_gives_the_same_constraints_live_and_offline(fresh: Graph, s
     kitchen, model = shared / "data/redkitchen_a", shared / "models/ssd_mobilenet_v1_coco_int8.onnx"
     fresh.hear(Odometry, "constraints", qos.latched(qos.KEPT_CONSTRAINTS))
     start(fresh, model, "-p threshold:=0.4")
-    objreg(fresh, "replay", str(kitchen), "--lossless", "--end", "8", "--wait", str(START_S))
+    objreg(fresh, "replay", str(kitchen), "--lossless", "--end", "4", "--wait", str(START_S))
     end_keyframe(fresh)
     words = ("offline", str(kitchen), "--model", str(model), "--set", "detector.threshold=0.4", "--max-frames", "60")
     objreg(fresh, *words, "--json", str(tmp_path / "out.json"))
