@@ -25,14 +25,16 @@ class Pace:
 
     def admits(self, stamp_ns: int) -> bool:
         """Whether the picture of a stamp goes on; to be asked once a picture, as they come."""
+        if self._period_ns == 0:
+            return True
         if self._due_ns is None or stamp_ns - self._last_ns <= -JUMP_NS:
-            self._due_ns = stamp_ns
+            self._due_ns, self._left_out, self._through = stamp_ns, False, 0
         late_ns = stamp_ns - self._due_ns
         if late_ns < -EARLY * self._period_ns and stamp_ns != self._last_ns:
             self._left_out = True
             return False
         if self._left_out and self._through >= TURN:
-            self._due_ns, self._left_out, self._through = None, False, 0  # the next one is, and sets the time
+            self._due_ns = None  # the next one is, and sets the time
             return False
         self._due_ns = (self._due_ns if late_ns < self._period_ns else stamp_ns) + self._period_ns
         self._last_ns, self._left_out = stamp_ns, False

@@ -42,6 +42,13 @@ def test_a_slow_camera_gives_all(rate: float) -> None:
 
 def test_a_rate_of_nothing_gives_all() -> None:
     assert admitted(Pace(0.0), np.arange(20) * 5.0) == list(range(20))
+    assert admitted(Pace(0.0), np.array([500.0, 400.0, 450.0, 1e9, 10.0])) == list(range(5))
+
+
+def test_the_first_picture_after_a_jump_goes_on_whatever_was_left_out_before() -> None:
+    pace = Pace(10.0)
+    admitted(pace, 90_000 + np.arange(3 * TURN - 1) * 1000 / 30)
+    assert pace.admits(1000 * MS)
 
 
 def test_a_clock_that_jumps_back_begins_anew() -> None:
