@@ -178,7 +178,7 @@ def _require_own_names(names: Sequence[str]) -> None:
 @click.option("--frames", default=600, show_default=True, help="Frames of a simulated recording.")
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
 @click.option("--figure", type=click.Path(dir_okay=False, path_type=Path), help="Draw them here (svg, png).")
-@click.option("--model", default="", help="ONNX model; `truth` takes the true boxes of a simulated recording.")
+@click.option("--model", default="", help="ONNX model; `truth`: a simulation's boxes; `nothing`: none.")
 @click.option("--threshold", default=0.5, show_default=True, help="Least score of a detection; COCO models want 0.4.")
 @click.option(
     "--peers", "names", default="orb_pnp,fpfh_icp,paper", show_default=True, callback=named, help="Compared with these."

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data import UNNAMED, Array
 from objreg_ros.geometry import inverse, rotation_angle, transform
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.labels import LabelGroups
@@ -71,7 +71,8 @@ class Truths:
         """The pair if it is one or the other kind, None if it is neither or the moments are too near."""
         if abs(self._keyframes[i].stamp_ns - self._keyframes[j].stamp_ns) < APART_NS:
             return None
-        same = self._groups[i][:, None] == self._groups[j][None]
+        named = self._groups[i][:, None] != UNNAMED  # a detector says that these are the same
+        same = (self._groups[i][:, None] == self._groups[j][None]) & named
         if not same.any():
             return None
         gaps = np.linalg.norm(self._places[i][:, None] - self._places[j][None], axis=-1)

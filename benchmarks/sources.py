@@ -29,7 +29,7 @@ from objreg_ros.simulation.params import OdometryParams
 from objreg_ros.simulation.truth import read_truth
 from objreg_ros.truth import Truth
 
-TRUE_BOXES = "truth"  # in a model's stead
+TRUE_BOXES, NO_BOXES = "truth", "nothing"  # in a model's stead
 SIMULATED = {"covariance_calibration": 0.01}  # such a camera is as its calibration says: see config/covariance.yaml
 LEAST_VISIBLE = 0.3
 
@@ -95,6 +95,21 @@ class TrueBoxes:
         )
 
 
+class NoBoxes:
+    """In the detector's stead: it sees nothing, so that objects without a name are all there is."""
+
+    def detect(self, image: ColourImage) -> Detections:
+        """None."""
+        return Detections(
+            xyxy=np.zeros((0, 4), np.float32),
+            score=np.zeros(0, np.float32),
+            label=(),
+            image_hw=image.rgb.shape[:2],
+            stamp_ns=image.stamp_ns,
+            frame_id=image.frame_id,
+        )
+
+
 @dataclass
 class Source:
     """A recording with its frames, its truth, its pictures, and the registrar's parameters that its camera asks for."""
@@ -145,13 +160,17 @@ def _is_simulated(path: Path) -> bool:
 
 def _frames(recording: Recording, asked: DetectorParams) -> tuple[list[Frame], dict[int, Detections]]:
     inputs = choose_inputs(recording.topics)
-    detector = Remembered(
-        TrueBoxes(recording.path) if asked.model == TRUE_BOXES else Detector(asked, share.model(asked.model))
-    )
+    detector = Remembered(_detector(recording, asked))
     collector, segmenter = Collector(), Segmenter(SegmenterParams())
     records = recording.records(set(inputs.chosen().values()))
     run_offline(records, Rooms(detector, segmenter, collector, organise), inputs)
     return collector.frames, detector.seen
+
+
+def _detector(recording: Recording, asked: DetectorParams) -> TrueBoxes | NoBoxes | Detector:
+    if asked.model == NO_BOXES:
+        return NoBoxes()
+    return TrueBoxes(recording.path) if asked.model == TRUE_BOXES else Detector(asked, share.model(asked.model))
 
 
 def detector_of(model: str = "", threshold: float = 0.5) -> DetectorParams:
