@@ -141,6 +141,7 @@ class Detections:
 
     ``xyxy (N, 4) float32`` pixels of the full image, half open (x_max and y_max are outside); ``score (N,) float32``
     in 0..1; ``label`` N names; ``image_hw`` the image's height and width. An image with no object gives N = 0.
+    ``ids`` are what the detector, or a tracker in it, calls each of them; none where it does not.
     """
 
     xyxy: Array
@@ -149,9 +150,11 @@ class Detections:
     image_hw: tuple[int, int]
     stamp_ns: int
     frame_id: str = "camera"
+    ids: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         sizes = {"N": len(self.label)}
+        _require(self, len(self.ids) in (0, len(self)), f"no ids, or one for each of {len(self)} boxes", len(self.ids))
         _hold(self, "xyxy", np.float32, ("N", 4), sizes)
         _hold(self, "score", np.float32, ("N",), sizes)
         _require(self, bool(np.isfinite(self.xyxy).all()), "finite boxes", self.xyxy)
@@ -234,7 +237,8 @@ class ObjectCloud:
     (0 0 0 where unknown);
     ``label`` is `UNNAMED` where the detector has no name for it;
     ``rgb (M, 3) uint8`` or None; ``flags (M,) uint16`` of `PointFlag`; ``density`` measured points per square metre of
-    surface; ``instance`` counts the objects of the frame from 1 (0 is the support surface).
+    surface; ``instance`` counts the objects of the frame from 1 (0 is the support surface); ``detection_id`` is what
+    the detector calls it, empty where it does not.
     """
 
     label: str
@@ -245,6 +249,7 @@ class ObjectCloud:
     rgb: Array | None
     flags: Array
     density: float
+    detection_id: str = ""
 
     def __post_init__(self) -> None:
         sizes: dict[str, int] = {}

@@ -9,6 +9,7 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -149,11 +150,12 @@ class Door(OverridableNode):
         decode: Callable[[str, Any], object],
         heard: Callable[[str, Any], None],
         profile: QoSProfile,
+        profiles: Mapping[str, QoSProfile] = MappingProxyType({}),
     ) -> None:
         """Subscribe to topics that carry the same thing; the first is `taken` that sends a message that decodes.
 
         The others are closed until that one has been silent for the parameter ``silence``. ``heard`` is given the topic
-        and the message, those too that come before one is taken.
+        and the message, those too that come before one is taken. ``profiles`` are those of topics that have another.
         """
 
         def hear(topic: str, message: Any) -> None:
@@ -161,7 +163,7 @@ class Door(OverridableNode):
                 heard(topic, message)
 
         def subscribe(topic: str) -> Subscription:
-            return self.listen(topics[topic], topic, partial(hear, topic), profile, watched=name)
+            return self.listen(topics[topic], topic, partial(hear, topic), profiles.get(topic, profile), watched=name)
 
         silence_s = self.settings.of(DoorParams).silence
         is_valid = partial(_decodes, decode)

@@ -68,7 +68,8 @@ def _name(text: str, of: str) -> str:
     return text
 
 
-def _when_and_where(message: Any) -> dict[str, Any]:
+def when_and_where(message: Any) -> dict[str, Any]:
+    """``stamp_ns`` and ``frame_id`` of a message with a header, as words take them."""
     return {"stamp_ns": stamp_ns(message), "frame_id": _name(message.header.frame_id, "frame_id")}
 
 
@@ -77,7 +78,7 @@ def _when_and_where(message: Any) -> dict[str, Any]:
 
 def image(message: Any, most_pixels: int = limits.MOST_PIXELS_OF_PICTURE) -> ColourImage:
     """A sensor_msgs Image (rgb8 bgr8 rgba8 bgra8 mono8 mono16 8UC1 8UC3 8UC4) or CompressedImage (jpeg, png)."""
-    return ColourImage(rgb=colour_pixels(message, most_pixels), **_when_and_where(message))
+    return ColourImage(rgb=colour_pixels(message, most_pixels), **when_and_where(message))
 
 
 def depth(message: Any, most_pixels: int = limits.MOST_PIXELS_OF_PICTURE) -> Array:
@@ -99,7 +100,7 @@ def depth_image(
         raise ValueError(f"depth: expected camera_info's size {camera.width} × {camera.height}, got {got} pixels")
     rgb = None if colour is None else image(colour, most_pixels).rgb
     rgb = rgb if rgb is not None and rgb.shape[:2] == metres.shape else None
-    return DepthImage(depth=metres, rgb=rgb, intrinsics=camera, **_when_and_where(depth_message))
+    return DepthImage(depth=metres, rgb=rgb, intrinsics=camera, **when_and_where(depth_message))
 
 
 def intrinsics(message: Any) -> Intrinsics:
@@ -183,7 +184,7 @@ def point_cloud(message: Any) -> PointCloud:
     if not finite.all():
         measured = finite[..., 0] & finite[..., 1] & finite[..., 2]
         xyz += np.where(measured, np.float32(0), np.float32(np.nan))[..., None]
-    return PointCloud(xyz=xyz, rgb=_colours(records), **_when_and_where(message))
+    return PointCloud(xyz=xyz, rgb=_colours(records), **when_and_where(message))
 
 
 def _colours(records: Array) -> Array | None:
@@ -200,7 +201,7 @@ def odometry(message: Any) -> Odometry:
     return Odometry(
         T_odom_body=_pose(message),
         child_frame_id=_name(getattr(message, "child_frame_id", ""), "child_frame_id"),
-        **_when_and_where(message),
+        **when_and_where(message),
     )
 
 
@@ -242,7 +243,7 @@ def imu(message: Any) -> ImuSample:
         angular_velocity=_measured(message.angular_velocity, "xyz", message.angular_velocity_covariance),
         orientation=_orientation(message),
         orientation_sigma_deg=_tilt_deg(message.orientation_covariance),
-        **_when_and_where(message),
+        **when_and_where(message),
     )
 
 
@@ -328,7 +329,7 @@ def labels(message: Any) -> dict[int, str]:
         raise ValueError(f"labels: expected at most {limits.MOST_LABELS_TEXT} characters, got {len(message.data)}")
     try:
         told = json.loads(message.data).items()
-        return {_class_id(number): _label(name) for number, name in told}
+        return {_class_id(number): checked_label(name) for number, name in told}
     except (ValueError, AttributeError, RecursionError) as error:
         got = f"{message.data[:80]!r} ({error})"
         raise ValueError(f'labels: expected JSON like {{"0": "cup"}}, got {got}') from error
@@ -341,7 +342,8 @@ def _class_id(text: str) -> int:
     return number
 
 
-def _label(name: Any) -> str:
+def checked_label(name: Any) -> str:
+    """The name of a class, or what a detector calls one of its boxes; ValueError for one that cannot be passed on."""
     if not isinstance(name, str) or SURROGATE.search(name):
         raise ValueError(f"expected a name that UTF-8 can write, got {ascii(name)[:80]}")
     return _name(name, "label")
@@ -364,7 +366,7 @@ def detections(message: Any, names: Mapping[int, str], image_hw: tuple[int, int]
         score=np.ascontiguousarray(score[order]),
         label=tuple(label[i] for i in order),
         image_hw=told_hw or image_hw,
-        **_when_and_where(message),
+        **when_and_where(message),
     )
 
 
@@ -477,5 +479,5 @@ def frame(
         gravity=falls,
         gravity_confidence=confidence,
         T_odom_camera=T_odom_camera,
-        **_when_and_where(objects_message),
+        **when_and_where(objects_message),
     )

@@ -70,6 +70,14 @@ def detections(found: Detections, camera_info: Any, raw: Raw = Raw(), cloud: Poi
     return found if lens is None else lens.rectify_detections(found)
 
 
+def instances(numbers: np.ndarray, camera_info: Any, raw: Raw = Raw(), cloud: PointCloud | None = None) -> np.ndarray:
+    """A picture of masks (H, W), rectified where `detections` are; 0 where no raw pixel shows the place."""
+    if camera_info is None or not raw.colour or (cloud is not None and cloud.organised):
+        return numbers
+    lens = lens_of(camera_info, raw)
+    return numbers if lens is None else lens.rectify_depth(numbers)
+
+
 def describe(camera_info: Any, raw: Raw = Raw(), points: bool = False) -> str:
     """What is assumed of the lens of a camera, for a user; ValueError for a lens that cannot be undone."""
     if not is_distorted(camera_info):

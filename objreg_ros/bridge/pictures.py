@@ -34,6 +34,7 @@ COLOUR: dict[str, tuple[str, int, int | None]] = {
     "8UC4": ("u1", 4, cv2.COLOR_BGRA2RGB),
 }
 DEPTH = {"16UC1": "u2", "mono16": "u2", "32FC1": "f4"}
+INSTANCES = {"mono8": "u1", "8UC1": "u1", "mono16": "u2", "16UC1": "u2"}
 AS_STORED = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION  # depth knows nothing of how a jpeg is to be held
 PNG, CHUNK = b"\x89PNG\r\n\x1a\n", 12  # how a png begins, and the bytes of a chunk beside its data
 COMPRESSED_DEPTH_HEADER = 12  # compressed_depth_image_transport: an enum and two floats before the PNG
@@ -67,6 +68,17 @@ def depth_metres(message: Any, most_pixels: int = limits.MOST_PIXELS_OF_PICTURE)
         raise ValueError(f"depth: expected an encoding of {', '.join(DEPTH)}, got {message.encoding!r}")
     pixels = _pixels(message, DEPTH[message.encoding], 1, most_pixels)
     return _metres(pixels) if pixels.dtype == np.uint16 else _measured(pixels.astype(np.float32))
+
+
+def instance_numbers(message: Any, most_pixels: int = limits.MOST_PIXELS_OF_PICTURE) -> Array:
+    """(H, W) uint16 of an Image of masks: each pixel has the number of its instance, 0 is none's.
+
+    ValueError for an encoding that is no mask's, and for more than so many pixels.
+    """
+    encoding = getattr(message, "encoding", getattr(message, "format", ""))
+    if encoding not in INSTANCES:
+        raise ValueError(f"masks: expected an encoding of {', '.join(INSTANCES)}, got {encoding!r}")
+    return _pixels(message, INSTANCES[encoding], 1, most_pixels).astype(np.uint16)
 
 
 def unpack_rgb(packed: Array) -> Array:

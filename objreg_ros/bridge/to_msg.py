@@ -49,11 +49,6 @@ from objreg_ros.data import (
 )
 from objreg_ros.geometry import quaternion_from_rotation
 
-try:
-    from vision_msgs.msg import Detection2D, Detection2DArray, ObjectHypothesisWithPose
-except ImportError:  # optional: the table carries the same
-    Detection2DArray = None
-
 Array = NDArray[Any]
 
 Labels = Mapping[int, str]
@@ -215,27 +210,6 @@ def detections_table(detections: Detections, names: Labels) -> PointCloud2:
 def surplus(stamp_ns: int, frame_id: str) -> PointCloud2:
     """What the ``detections_table`` of a picture is that nobody looked at, to keep a pace: one column, without rows."""
     return _table(np.zeros((0, 0), SURPLUS), stamp_ns, frame_id)
-
-
-def detection_array(detections: Detections) -> Any:
-    """Detections as a vision_msgs/Detection2DArray, ``class_id`` the name; None where vision_msgs is not installed."""
-    if Detection2DArray is None:
-        return None
-    message = Detection2DArray(header=header(detections.stamp_ns, detections.frame_id))
-    for box, score, label in zip(detections.xyxy.tolist(), detections.score.tolist(), detections.label, strict=True):
-        message.detections.append(_detection(box, score, label, message.header))
-    return message
-
-
-def _detection(xyxy: list[float], score: float, label: str, head: Header) -> Any:
-    x_min, y_min, x_max, y_max = xyxy
-    detection = Detection2D(header=head)
-    detection.bbox.center.position.x, detection.bbox.center.position.y = (x_min + x_max) / 2, (y_min + y_max) / 2
-    detection.bbox.size_x, detection.bbox.size_y = x_max - x_min, y_max - y_min
-    hypothesis = ObjectHypothesisWithPose()
-    hypothesis.hypothesis.class_id, hypothesis.hypothesis.score = label, score
-    detection.results.append(hypothesis)
-    return detection
 
 
 def objects(frame: Frame, names: Labels) -> PointCloud2:

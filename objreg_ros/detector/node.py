@@ -11,7 +11,7 @@ from sensor_msgs.msg import CompressedImage, Image, PointCloud2
 from std_msgs.msg import String
 
 from objreg_ros import share
-from objreg_ros.bridge import from_msg, qos, to_msg
+from objreg_ros.bridge import from_msg, qos, to_msg, vision_to_msg
 from objreg_ros.bridge.door import Door
 from objreg_ros.bridge.pace import Pace
 from objreg_ros.bridge.spin import run
@@ -37,14 +37,11 @@ class DetectorNode(Door):
         self._pace, self._turns = Pace(params.max_rate), Turns(self._leave_out)
         self._names = dict(enumerate(self._detector.labels))
         self._table = self.create_publisher(PointCloud2, "detections_table", qos.room())
-        self._array = self.create_publisher(to_msg.Detection2DArray, "detections", qos.room()) if self._vision else None
+        array = vision_to_msg.Detection2DArray
+        self._array = None if array is None else self.create_publisher(array, "detections", qos.room())
         self._labels = self.create_publisher(String, "labels", qos.latched())
         self._labels.publish(to_msg.labels(self._names))
         self.listen_to_first("image", IMAGES, self._decode, self._hear, self.sensor())
-
-    @property
-    def _vision(self) -> bool:
-        return to_msg.Detection2DArray is not None
 
     def adopt(self) -> None:
         """Live parameters hold from the next image on."""
@@ -83,7 +80,7 @@ class DetectorNode(Door):
             detections = self._detector.detect(image)
         self._table.publish(to_msg.detections_table(detections, self._names))
         if self._array is not None:
-            self._array.publish(to_msg.detection_array(detections))
+            self._array.publish(vision_to_msg.detections(detections))
         return True
 
 

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The door of the segmenter: ``points``, or ``depth/image`` with ``camera_info`` and ``image``, and
-``detections_table`` and ``labels`` in, and ``imu``, or ``odom`` where gravity comes from it; ``objects``, ``view``,
-``view/camera_info`` and ``gravity`` out."""
+"""The door of the segmenter: depth and detections in, objects and views out.
+
+In: ``points``, or ``depth/image`` with ``camera_info`` and ``image``; ``detections_table`` with ``labels``, or
+``detections_in``, or ``masks``; ``imu``, or ``odom`` where gravity comes from it. Out: ``objects``, ``detections_3d``,
+``view``, ``view/camera_info`` and ``gravity``.
+"""
 
 from __future__ import annotations
 
@@ -18,15 +21,15 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import DurabilityPolicy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from sensor_msgs.msg import Imu as ImuMessage
-from std_msgs.msg import String
 
-from objreg_ros.bridge import from_msg, lenses, qos, to_msg
+from objreg_ros.bridge import from_msg, lenses, qos, to_msg, vision_to_msg
+from objreg_ros.bridge.detections_in import DetectionsIn
 from objreg_ros.bridge.lifetime import await_kernels
 from objreg_ros.bridge.matching import MatchingDoor
 from objreg_ros.bridge.overridable import FIXED
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.static_frames import StaticFrames
-from objreg_ros.bridge.sync import Drop, Match, Need, Stream
+from objreg_ros.bridge.sync import Match, Need, Stream
 from objreg_ros.data import Array, ColourImage, DepthImage, Detections, FeltGravity, Frame, PointCloud
 from objreg_ros.segmenter.doubts import range_doubt, registration_doubt
 from objreg_ros.segmenter.imu import Imu
@@ -68,10 +71,11 @@ class SegmenterNode(MatchingDoor):
         self._view = self.create_publisher(PointCloud2, "view", qos.room())
         self._view_info = self.create_publisher(CameraInfo, "view/camera_info", qos.room())
         self._gravity = self.create_publisher(Vector3Stamped, "gravity", qos.room())
+        solids = vision_to_msg.Detection3DArray
+        self._solids = None if solids is None else self.create_publisher(solids, "detections_3d", qos.room())
         self._listen()
 
     def _listen(self) -> None:
-        self.listen(String, "labels", self._hear_labels, qos.latched())
         self.listen(CameraInfo, "camera_info", self._hear_camera, self.sensor(), watched="camera_info")
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._look = self.create_timer(LOOK_S, self._look_for_kept_camera, clock=steady)
@@ -83,8 +87,7 @@ class SegmenterNode(MatchingDoor):
             self.listen(Odometry, "odom", self._hear_odom, self.sensor(qos.ODOMETRY))
         else:
             self._listen_for_imu()
-        self.listen(PointCloud2, "detections_table", self._hear_detections, qos.room(), watched="detections_table")
-        self.expect("detections_table", "detections_table")
+        self._detections = DetectionsIn(self, self._inputs.detections)
 
     def _listen_for_imu(self) -> None:
         self.listen(ImuMessage, "imu", self._hear_imu, self.sensor(qos.ODOMETRY))
@@ -115,11 +118,6 @@ class SegmenterNode(MatchingDoor):
         self._segmenter.params = self.settings.of(SegmenterParams)
 
     # Hear
-
-    def _hear_labels(self, message: Any) -> None:
-        names = self.read_aside("labels", from_msg.labels, message)
-        if names is not None:
-            self.feed("labels", 0, names)
 
     def _hear_camera(self, message: Any) -> None:
         self._camera_info = message
@@ -161,9 +159,6 @@ class SegmenterNode(MatchingDoor):
         name = "depth" if topic in DEPTH else "points"
         self.conclude(stamp_ns, lambda: self.read(name, self._decode_depth, topic, message) is not None)
 
-    def _hear_detections(self, message: Any) -> None:
-        self.feed("detections", from_msg.stamp_ns(message), Drop.SURPLUS if from_msg.is_surplus(message) else message)
-
     def _choose(self, topic: str) -> None:
         """Depth has spoken, or comes by another topic now: it is known what goes with it."""
         slop_ns = round(self._inputs.slop * 1e9)
@@ -192,21 +187,14 @@ class SegmenterNode(MatchingDoor):
         """One depth image or cloud with its detections."""
         raw = self._raw_pictures()
         depth, cloud = self._depth(payload, raw)
-        names = payload["labels"]
-        shape = depth.depth.shape
-        seen = self.read("detections", from_msg.detections, payload["detections"], names, shape)
-        detections = self.read("camera_info", lenses.detections, seen, self._camera_of(payload), raw, cloud)
+        asked = self._detections.read(payload, depth, self._camera_of(payload), raw, cloud)
         gravity, felt = self._level_gravity(payload), self._felt_gravity(payload, depth.frame_id)
         with self.ledger.timed("segment"):
-            if felt is None:
-                frame = self._segmenter.segment(detections, depth, gravity)
-            else:
-                frame = self._segmenter.segment(
-                    detections, depth, felt.gravity, gravity_sigma_deg=felt.gravity_sigma_deg
-                )
+            told = (gravity, None) if felt is None else (felt.gravity, felt.gravity_sigma_deg)
+            frame = self._segmenter.segment(asked.detections, depth, told[0], asked.masks, told[1])
         self._note_gravity()
-        self._doubt(detections, depth, frame)
-        self._publish(frame, names)
+        self._doubt(asked.detections, depth, frame)
+        self._publish(frame, asked.names)
         return True
 
     def _level_gravity(self, match: Match) -> Array | None:
@@ -290,6 +278,8 @@ class SegmenterNode(MatchingDoor):
 
     def _publish(self, frame: Frame, names: to_msg.Labels) -> None:
         self._objects.publish(to_msg.objects(frame, names))
+        if self._solids is not None and self._solids.get_subscription_count():
+            self._solids.publish(vision_to_msg.objects(frame))
         self._view.publish(to_msg.view(frame))
         self._view_info.publish(to_msg.view_camera_info(frame))
         self._gravity.publish(to_msg.gravity(frame))

@@ -64,6 +64,12 @@ class SegmenterNodeParams(Params):
     source: str = param(
         "auto", "where depth comes from; auto takes whichever publishes first", choices=("auto", "points", "depth")
     )
+    detections: str = param(
+        "auto",
+        "who says where objects are: our detector's table, vision_msgs of any other by `detections_in`, or a picture "
+        "of masks by `masks`; auto takes whichever publishes first",
+        choices=("auto", "table", "vision_msgs", "masks"),
+    )
     slop: float = param(0.02, "largest distance in time between depth and what goes with it", "s", ge=0.0)
     rectified: str = param(
         "auto",

@@ -111,7 +111,8 @@ class Segmenter:
                 mark(taken, cut.cells, ground)
             if len(cut.pixels) >= params.min_points:
                 label, score = detections.label[k], float(detections.score[k])
-                objects.append(_object(label, score, len(objects) + 1, cut.pixels, cut.flags))
+                name = detections.ids[k] if detections.ids else ""
+                objects.append(_object(label, score, len(objects) + 1, cut.pixels, cut.flags, name))
         objects += self._things(depth, ground, taken, people, len(objects))
         return Frame(
             objects=tuple(objects),
@@ -224,7 +225,9 @@ def _direction(gravity: Array) -> Array:
     return np.asarray(gravity, np.float64) / length
 
 
-def _object(label: str, score: float, instance: int, pixels: Pixels, flags: PointFlag) -> ObjectCloud:
+def _object(
+    label: str, score: float, instance: int, pixels: Pixels, flags: PointFlag, detection_id: str = ""
+) -> ObjectCloud:
     return ObjectCloud(
         label=label,
         score=score,
@@ -234,6 +237,7 @@ def _object(label: str, score: float, instance: int, pixels: Pixels, flags: Poin
         rgb=pixels.rgb,
         flags=pixels.edge | np.uint16(flags),
         density=len(pixels) / max(pixels.area, 1e-9),
+        detection_id=detection_id,
     )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 import json
 from array import array
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -161,24 +160,6 @@ def test_the_table_of_a_surplus_picture_says_so_and_no_other_does() -> None:
     empty = np.zeros((0, 4), np.float32)
     none = Detections(xyxy=empty, score=empty[:, 0], label=(), image_hw=(480, 640), stamp_ns=STAMP)
     assert not from_msg.is_surplus(to_msg.detections_table(none, NAMES))
-
-
-def test_a_box_of_vision_msgs_has_its_middle_and_its_size(monkeypatch: pytest.MonkeyPatch) -> None:
-    def made(**fields: object) -> SimpleNamespace:
-        bbox = SimpleNamespace(center=SimpleNamespace(position=SimpleNamespace()))
-        return SimpleNamespace(bbox=bbox, hypothesis=SimpleNamespace(), results=[], detections=[], **fields)
-
-    for name in ("Detection2D", "Detection2DArray", "ObjectHypothesisWithPose"):
-        monkeypatch.setattr(to_msg, name, made, raising=False)
-    boxes, score = np.array([[10, 20, 40, 100]], np.float32), np.array([0.5], np.float32)
-    word = Detections(xyxy=boxes, score=score, label=("tv",), image_hw=(480, 640), stamp_ns=STAMP, frame_id="kinect")
-    message = to_msg.detection_array(word)
-    (found,) = message.detections
-    (result,) = found.results
-    assert (found.bbox.center.position.x, found.bbox.center.position.y) == (25.0, 60.0)
-    assert (found.bbox.size_x, found.bbox.size_y) == (30.0, 80.0)
-    assert (result.hypothesis.class_id, result.hypothesis.score) == ("tv", 0.5)
-    assert from_msg.stamp_ns(message) == from_msg.stamp_ns(found) == STAMP
 
 
 def test_a_label_that_was_not_published_is_refused_with_its_name() -> None:

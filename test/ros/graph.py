@@ -107,7 +107,7 @@ class Graph:
     def publish(self, topic: str, message: Any, listeners: int = 1) -> None:
         """Publish once the nodes listen: each end of a connection has to know of the other."""
         if topic not in self.publishers:
-            reliable = qos.latched() if topic.endswith(("labels", "constraints")) else qos.room()
+            reliable = qos.latched() if topic.endswith(("labels", "label_info", "constraints")) else qos.room()
             publisher = self.publishers[topic] = self.node.create_publisher(type(message), topic, reliable)
 
             def there() -> bool:
