@@ -40,7 +40,8 @@ def test_a_closure_names_each_label_once_and_the_farthest_of_several_that_moved(
 def test_a_closure_and_a_refusal_name_the_sessions_of_their_moments_as_far_as_they_are_known() -> None:
     here, refusal = replace(NEW, session=4), (Reason.OVER_BUDGET, "0 s")
     sightings = [seen.of_landmark(7, np.eye(3)) for seen in sightings_of(here)]
-    closure = closure_of(here, sightings, Accepted(target=STORED, candidate=candidate()), PARAMS)
+    accepted = Accepted(target=STORED, candidate=candidate(matched=(ObjectPair(0, 0, "cup"),)))
+    closure = closure_of(here, sightings, accepted, PARAMS)
     assert (closure.from_session, closure.to_session) == (STORED.session, 4)
     told, unread = rejected(1, here, refusal, STORED), rejected(1, here, refusal)
     assert (told.from_session, told.from_frame_id, told.to_session) == (STORED.session, STORED.frame_id, 4)
