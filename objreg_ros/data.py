@@ -445,7 +445,8 @@ class LoopClosure:
 
     ``covariance (6, 6) float64`` in ROS order [tx ty tz rx ry rz], of the pose in the *from* frame; ``labels`` of the
     objects that closed it; ``matches`` those with their landmarks; ``evidence`` named numbers of the verification;
-    ``from_frame_id`` and ``to_frame_id`` the names of the two cameras, which may be two of one robot.
+    ``from_frame_id`` and ``to_frame_id`` the names of the two cameras, which may be two of one robot; ``from_session``
+    and ``to_session`` the runs of odometry that the moments belong to, None where it is not known.
     """
 
     from_ns: int
@@ -457,6 +458,8 @@ class LoopClosure:
     evidence: dict[str, float] = field(default_factory=dict)
     from_frame_id: str = "camera"
     to_frame_id: str = "camera"
+    from_session: int | None = None
+    to_session: int | None = None
 
     def __post_init__(self) -> None:
         _hold_pose(self, "T_from_to")
@@ -506,7 +509,8 @@ class Rejected:
     """A refused closure: the reason, and the numbers behind it in ``detail``.
 
     ``T_from_to (4, 4)`` is the pose that was turned down, unchecked, for a look at it and nothing else; None where none
-    was found.
+    was found. ``evidence`` are named numbers of it. The frames and sessions are as in `LoopClosure`, empty and None
+    where they are not known.
     """
 
     reason: Reason
@@ -514,3 +518,8 @@ class Rejected:
     to_ns: int
     detail: str
     T_from_to: Array | None = None
+    evidence: dict[str, float] = field(default_factory=dict)
+    from_frame_id: str = ""
+    to_frame_id: str = ""
+    from_session: int | None = None
+    to_session: int | None = None

@@ -17,6 +17,8 @@ MOST_RECORD = 65536  # bytes of one point of a cloud
 MOST_FIELDS = 200  # of one point of a cloud
 MOST_DETECTIONS = 1000  # boxes of one image
 MOST_OBJECTS = 500  # objects of one frame
+MOST_EVIDENCE = 1000  # named numbers of one closure
+MOST_DETAIL = 10_000  # characters of why something was refused
 
 MOST_SIDE = 65535  # pixels of a picture: a table of detections has 16 bits for it
 MOST_PIXELS_OF_PICTURE = 50_000_000  # unless a parameter says otherwise

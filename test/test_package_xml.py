@@ -22,6 +22,8 @@ RELEASED_IN_JAZZY = {
     "builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "launch", "launch_ros", "nav_msgs", "rcl_interfaces",
     "rclpy", "rosgraph_msgs", "sensor_msgs", "std_msgs", "std_srvs", "tf2_ros_py", "vision_msgs", "visualization_msgs",
 }  # fmt: skip
+BUILDS_MESSAGES = {"ament_cmake", "rosidl_default_generators", "rosidl_default_runtime"}  # released in Jazzy too
+HERE = {"objreg_msgs"}  # in this repository: rosdep and colcon are told of its folder
 IN_NOBLE = {  # key → what it leads to: a package of Ubuntu with its version, or one of PyPI
     "python3-click": "python3-click 8.1.6",
     "python3-hypothesis": "python3-hypothesis 6.98.15",
@@ -69,7 +71,11 @@ def version(text: str) -> tuple[int, ...]:
 
 def test_no_key_is_named_that_nobody_has_looked_up_and_none_twice(repository: Path) -> None:
     named = keys(repository)
-    assert sorted(named) == sorted(RELEASED_IN_JAZZY | set(IN_NOBLE))
+    assert sorted(named) == sorted(RELEASED_IN_JAZZY | HERE | set(IN_NOBLE))
+
+
+def test_messages_need_only_what_jazzy_has_released(repository: Path) -> None:
+    assert set(keys(repository / "objreg_msgs")) <= RELEASED_IN_JAZZY | BUILDS_MESSAGES
 
 
 def test_whatever_setup_py_asks_for_comes_with_a_robot_too(repository: Path) -> None:

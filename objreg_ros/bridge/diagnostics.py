@@ -62,8 +62,13 @@ def refusal_of(status: DiagnosticStatus) -> Rejected:
     values = {pair.key: pair.value for pair in status.values}
     reason, _, detail = status.message.partition(": ")
     pose = json.loads(values["T_from_to"])
-    moments = {"from_ns": int(values["from [ns]"]), "to_ns": int(values["to [ns]"])}
-    return Rejected(reason=Reason(reason), **moments, detail=detail, T_from_to=None if pose is None else np.array(pose))
+    return Rejected(
+        reason=Reason(reason),
+        from_ns=int(values["from [ns]"]),
+        to_ns=int(values["to [ns]"]),
+        detail=detail,
+        T_from_to=None if pose is None else np.array(pose),
+    )
 
 
 def _counts(balance: Balance, rate_hz: float) -> dict[str, object]:

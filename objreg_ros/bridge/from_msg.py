@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages to words. The only place that knows the fields of a message on its way in.
+"""Messages to words. The only place that knows the fields of a message on its way in, but for `closures_msg`.
 
 Reads attributes only, so the messages of rclpy and of rosbags (ROS 1 and 2) both fit. Pixels are in `pictures`, records
 in `layout`. A message that breaks its contract raises ValueError with what was expected and what came.
@@ -62,15 +62,16 @@ def _stamp_within_limits(stamp_ns: int) -> int:
     return stamp_ns
 
 
-def _name(text: str, of: str) -> str:
-    if len(text) > limits.MOST_NAME:
-        raise ValueError(f"{of}: expected at most {limits.MOST_NAME} characters, got {len(text)}: {text[:40]!r}…")
+def bounded(text: str, of: str, most: int = limits.MOST_NAME) -> str:
+    """The text; ValueError where it is longer than ``most`` characters."""
+    if len(text) > most:
+        raise ValueError(f"{of}: expected at most {most} characters, got {len(text)}: {text[:40]!r}…")
     return text
 
 
 def when_and_where(message: Any) -> dict[str, Any]:
     """``stamp_ns`` and ``frame_id`` of a message with a header, as words take them."""
-    return {"stamp_ns": stamp_ns(message), "frame_id": _name(message.header.frame_id, "frame_id")}
+    return {"stamp_ns": stamp_ns(message), "frame_id": bounded(message.header.frame_id, "frame_id")}
 
 
 # ------------------------------------------------------------------------------------------------------------- cameras
@@ -199,8 +200,8 @@ def _colours(records: Array) -> Array | None:
 def odometry(message: Any) -> Odometry:
     """An Odometry, PoseStamped, PoseWithCovarianceStamped or TransformStamped; ValueError without a rotation."""
     return Odometry(
-        T_odom_body=_pose(message),
-        child_frame_id=_name(getattr(message, "child_frame_id", ""), "child_frame_id"),
+        T_odom_body=motion(message),
+        child_frame_id=bounded(getattr(message, "child_frame_id", ""), "child_frame_id"),
         **when_and_where(message),
     )
 
@@ -286,7 +287,8 @@ def gravity_at(moment_ns: int, words: Sequence[FeltGravity]) -> FeltGravity:
     )
 
 
-def _pose(message: Any) -> Array:
+def motion(message: Any) -> Array:
+    """The (4, 4) motion of a message with a ``transform`` or a ``pose``, with covariance or without."""
     if hasattr(message, "transform"):
         where, turn = message.transform.translation, message.transform.rotation
     else:
@@ -303,7 +305,7 @@ def loop_closure(message: Any) -> LoopClosure:
     return LoopClosure(
         from_ns=from_ns,
         to_ns=to_ns,
-        T_from_to=_pose(message),
+        T_from_to=motion(message),
         covariance=np.asarray(message.pose.covariance, np.float64).reshape(6, 6),
         labels=(),
         from_frame_id=from_frame_id,
@@ -313,7 +315,7 @@ def loop_closure(message: Any) -> LoopClosure:
 
 def moment(frame_id: str) -> tuple[str, int]:
     """The frame, of whatever name, and the time in ns of ``name@sec.nsec`` with nine digits behind the point."""
-    found = MOMENT.fullmatch(_name(frame_id, "constraint"))
+    found = MOMENT.fullmatch(bounded(frame_id, "constraint"))
     if found is None:
         raise ValueError(f"constraint: expected a frame_id like camera@12.000000034, got {frame_id!r}")
     seconds, nanoseconds = int(found["seconds"]), int(found["nanoseconds"])
@@ -346,7 +348,7 @@ def checked_label(name: Any) -> str:
     """The name of a class, or what a detector calls one of its boxes; ValueError for one that cannot be passed on."""
     if not isinstance(name, str) or SURROGATE.search(name):
         raise ValueError(f"expected a name that UTF-8 can write, got {ascii(name)[:80]}")
-    return _name(name, "label")
+    return bounded(name, "label")
 
 
 def is_surplus(message: Any) -> bool:

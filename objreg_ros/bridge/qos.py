@@ -8,6 +8,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 ODOMETRY = 1000  # words of odometry, some seconds of the fastest
 KEPT_CONSTRAINTS = 1000  # of the latched constraints: what a mapper that comes late still gets
 REFUSALS = 100  # messages, one a searched keyframe
+SINGLE_REFUSALS = 1000  # messages, one a refusal
 
 
 def sensor(reliable: bool, depth: int = 10) -> QoSProfile:

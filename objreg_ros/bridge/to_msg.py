@@ -254,6 +254,12 @@ def _number(label: str, numbers: Mapping[str, int]) -> int:
     return UNNAMED_ID if label == UNNAMED else numbers[label] if label in numbers else int(label)
 
 
+def class_id(label: str, names: Labels) -> int | None:
+    """The number of a label in the tables; None for one that ``names`` does not hold."""
+    numbers = _numbers(names)
+    return _number(label, numbers) if _is_numbered(label, numbers) else None
+
+
 def view(frame: Frame) -> PointCloud2:
     """The reduced view, organised; rgb is the grey, and missing where there is none."""
     grey = frame.view.grey

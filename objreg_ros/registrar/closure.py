@@ -62,16 +62,34 @@ class Waiting:
     def refused(self, refusal: Refusal) -> Rejected:
         """The refusal that it comes to."""
         reason, detail = refusal
-        moments = self.closure.from_ns, self.closure.to_ns
+        closure = self.closure
         return Rejected(
-            reason=reason, from_ns=moments[0], to_ns=moments[1], detail=detail, T_from_to=self.closure.T_from_to
+            reason=reason,
+            from_ns=closure.from_ns,
+            to_ns=closure.to_ns,
+            detail=detail,
+            T_from_to=closure.T_from_to,
+            evidence=closure.evidence,
+            from_frame_id=closure.from_frame_id,
+            to_frame_id=closure.to_frame_id,
+            from_session=closure.from_session,
+            to_session=closure.to_session,
         )
 
 
-def rejected(from_ns: int, keyframe: Keyframe, refusal: Refusal, T_from_to: Array | None = None) -> Rejected:
-    """A refusal as it is published; ``T_from_to (4, 4)`` is the best pose that was refused, if any."""
+def rejected(from_ns: int, keyframe: Keyframe, refusal: Refusal, target: Keyframe | None = None) -> Rejected:
+    """A refusal as it is published, without a pose; ``target`` is the keyframe at ``from_ns``, None if not read."""
     reason, detail = refusal
-    return Rejected(reason=reason, from_ns=from_ns, to_ns=keyframe.stamp_ns, detail=detail, T_from_to=T_from_to)
+    return Rejected(
+        reason=reason,
+        from_ns=from_ns,
+        to_ns=keyframe.stamp_ns,
+        detail=detail,
+        from_frame_id="" if target is None else target.frame_id,
+        to_frame_id=keyframe.frame_id,
+        from_session=None if target is None else target.session,
+        to_session=keyframe.session,
+    )
 
 
 def redundant(seconds: float) -> Refusal:
@@ -97,6 +115,8 @@ def closure_of(
         evidence=evidence_of(candidate) | _moved(keyframe, item) | support_evidence(item.support),
         from_frame_id=item.target.frame_id,
         to_frame_id=keyframe.frame_id,
+        from_session=item.target.session,
+        to_session=keyframe.session,
     )
 
 

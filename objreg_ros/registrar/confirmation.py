@@ -143,9 +143,10 @@ def _refusal(tried: Tried) -> Refusal:
 
 
 def _refused(tried: Tried) -> Rejected:
-    best = tried.registration.candidate
+    best, target = tried.registration.candidate, tried.target
     pose = None if best is None else best.T_target_source
-    return rejected(tried.target.stamp_ns, tried.source, _refusal(tried), pose)
+    told = rejected(target.stamp_ns, tried.source, _refusal(tried), target)
+    return replace(told, T_from_to=pose, evidence=tried.registration.evidence)
 
 
 def _opposition(support: Support) -> Refusal:

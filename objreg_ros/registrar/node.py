@@ -11,16 +11,15 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from typing import Any, NamedTuple
 
-from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import TransformStamped, Vector3Stamped
+from geometry_msgs.msg import Vector3Stamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, PointCloud2
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
-from visualization_msgs.msg import MarkerArray
 
-from objreg_ros.bridge import from_msg, qos, to_msg
-from objreg_ros.bridge.diagnostics import REJECTED, refusals
+from objreg_ros.bridge import from_msg, qos
+from objreg_ros.bridge.announcements import Announcements
+from objreg_ros.bridge.diagnostics import REJECTED
 from objreg_ros.bridge.door import DroppedError
 from objreg_ros.bridge.lifetime import await_kernels
 from objreg_ros.bridge.markers import Scene
@@ -72,16 +71,9 @@ class RegistrarNode(MatchingDoor):
         self.searcher: Backlog[Job] = Backlog(
             self._search, self._keep, self.fail, limit, lambda job: job.window.nbytes, GIVING_WAY
         )
-        self._announce()
+        self._announcements = Announcements(self)
         self._serve()
         self._listen(round(inputs.odom_slop * 1e9))
-
-    def _announce(self) -> None:
-        self._constraints = self.create_publisher(Odometry, "constraints", qos.latched(qos.KEPT_CONSTRAINTS))
-        self._refusals = self.create_publisher(DiagnosticArray, "refusals", qos.room(qos.REFUSALS))
-        self._transforms = self.create_publisher(TransformStamped, "transforms", qos.room(depth=100))
-        self._landmarks = self.create_publisher(PointCloud2, "landmarks", qos.room(depth=100))
-        self._markers = self.create_publisher(MarkerArray, "markers", qos.latched())
 
     def _serve(self) -> None:
         self.create_service(Trigger, "~/reset", self._reset, callback_group=self.apart)
@@ -170,21 +162,17 @@ class RegistrarNode(MatchingDoor):
             self._tell(outcome)
 
     def _tell(self, outcome: Outcome) -> None:
+        self._announcements.closures(outcome.closures)
         for closure in outcome.closures:
-            self._constraints.publish(to_msg.constraint(closure))
-            for transform in to_msg.transforms(closure):
-                self._transforms.publish(transform)
             self._last_moved = closure.moved or self._last_moved
         self._published.update("agreeing" in closure.evidence for closure in outcome.closures)
         self._refused.update(refusal.reason.value for refusal in outcome.rejected)
         self._last_refusals.update((refusal.reason.value, refusal.detail) for refusal in outcome.rejected)
-        if outcome.rejected:
-            node, now = self.get_fully_qualified_name(), self.get_clock().now().to_msg()
-            self._refusals.publish(refusals(node, now, outcome.rejected))
+        self._announcements.refusals(outcome.rejected)
         self._count()
         if outcome.keyframe_ns is not None:
             seen = outcome.observations, outcome.keyframe_ns, outcome.frame_id
-            self._landmarks.publish(to_msg.landmarks(*seen, self._names))
+            self._announcements.landmarks(*seen, self._names, outcome.session)
             self._scene.settle(outcome.keyframe_ns, outcome.closures, outcome.rejected)
             self._show(outcome.keyframe_ns)
 
@@ -201,7 +189,7 @@ class RegistrarNode(MatchingDoor):
 
     def _show(self, stamp_ns: int) -> None:
         objects = [(known.landmark, known.label, known.position) for known in self._registrar.landmarks_here]
-        self._markers.publish(self._scene.markers(objects, stamp_ns, self._odom_frame))
+        self._announcements.markers(self._scene.markers(objects, stamp_ns, self._odom_frame))
 
     def extra_diagnostics(self) -> Mapping[str, object]:
         """What is stored, accepted and refused by reason, the last refusal of each, and what moved last."""

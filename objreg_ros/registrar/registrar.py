@@ -50,7 +50,7 @@ RECENT = 500  # landmarks that are told of after every keyframe
 class Outcome:
     """What became of a frame: accepted closures, refusals with reasons, and the keyframe that it completed, if any.
 
-    With the objects of that keyframe under the ids of their landmarks.
+    With the objects of that keyframe under the ids of their landmarks, its camera and its session.
     """
 
     closures: tuple[LoopClosure, ...] = ()
@@ -58,6 +58,7 @@ class Outcome:
     keyframe_ns: int | None = None
     observations: tuple[Observation, ...] = ()
     frame_id: str = "camera"
+    session: int | None = None
 
     def with_late(self, late: Outcome) -> Outcome:
         """With what became of earlier keyframes' poses; a late constraint keeps its own stamps."""
@@ -177,6 +178,7 @@ class Registrar:
                 keyframe_ns=keyframe.stamp_ns,
                 observations=observations(keyframe, named),
                 frame_id=keyframe.frame_id,
+                session=keyframe.session,
             )
             return outcome.with_late(self._settled(keyframe.stamp_ns))
 
@@ -225,14 +227,14 @@ class Registrar:
         self._clock, self._thinning, self._since = clock, Thinning(self.params.thin_seconds), last + 1
         began = f"{1e-9 * clock.began_ns:.3f} s"
         refusal = Reason.CLOCK, f"the clock began anew at {began}; sessions up to {last} had seen that time before"
-        return given_up if last < 0 else (*given_up, rejected(keyframe.stamp_ns, keyframe, refusal))
+        return given_up if last < 0 else (*given_up, rejected(keyframe.stamp_ns, keyframe, refusal, keyframe))
 
     def _find_closures(self, keyframe: Keyframe, sightings: Sequence[Sighting], budget: Budget) -> Found:
         """What the stored keyframes that may show the same place come to; a refusal where none may."""
         candidates = self._index.query(sightings, self._since)
         if not candidates:
             refusal = Reason.NO_CANDIDATE, f"none of {len(self._index)} stored objects is alike and may be here"
-            return Found([], [], [rejected(keyframe.stamp_ns, keyframe, refusal)])
+            return Found([], [], [rejected(keyframe.stamp_ns, keyframe, refusal, keyframe)])
         means = Means(self._store, self._method, self._gate, self._confirmation, self._pool())
         return Search(keyframe, self._thinning, budget, means, self.params).run(candidates)
 

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from registration.samples import box, candidate, keyframe
 
+from objreg_ros.data import Reason
 from objreg_ros.memory.sighting import sightings_of
-from objreg_ros.registrar.closure import Accepted, closure_of, links_of, observations
+from objreg_ros.registrar.closure import Accepted, closure_of, links_of, observations, rejected
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.params import RegistrarParams
 
@@ -34,6 +35,17 @@ def test_a_closure_names_each_label_once_and_the_farthest_of_several_that_moved(
     assert closure.moved == {"cup": pytest.approx(0.5)}
     assert (closure.from_ns, closure.to_ns) == (there.stamp_ns, here.stamp_ns)
     assert (closure.from_frame_id, closure.to_frame_id) == ("front", "camera")
+
+
+def test_a_closure_and_a_refusal_name_the_sessions_of_their_moments_as_far_as_they_are_known() -> None:
+    here, refusal = replace(NEW, session=4), (Reason.OVER_BUDGET, "0 s")
+    sightings = [seen.of_landmark(7, np.eye(3)) for seen in sightings_of(here)]
+    accepted = Accepted(target=STORED, candidate=candidate(matched=(ObjectPair(0, 0, "cup"),)))
+    closure = closure_of(here, sightings, accepted, PARAMS)
+    assert (closure.from_session, closure.to_session) == (STORED.session, 4)
+    told, unread = rejected(1, here, refusal, STORED), rejected(1, here, refusal)
+    assert (told.from_session, told.from_frame_id, told.to_session) == (STORED.session, STORED.frame_id, 4)
+    assert (unread.from_session, unread.from_frame_id, unread.to_frame_id) == (None, "", here.frame_id)
 
 
 def test_a_link_says_which_stored_object_an_object_is_and_how_it_is_turned() -> None:

@@ -82,7 +82,8 @@ def test_a_doubtful_pose_that_slides_is_refused_in_the_end_with_the_gate_s_reaso
     assert confirmation.settle(slid.source.stamp_ns + 10 * 10**9) == ([], [])
     accepted, (refused,) = confirmation.settle(slid.source.stamp_ns + 10 * 10**9 + 1)
     assert accepted == [] and (refused.reason, refused.detail) == waiting.refusal
-    assert np.allclose(refused.T_from_to, ASIDE)
+    assert np.allclose(refused.T_from_to, ASIDE) and refused.evidence == waiting.closure.evidence
+    assert (refused.from_session, refused.to_session) == (slid.target.session, slid.source.session)
 
 
 def test_an_accepted_pose_that_its_neighbours_contradict_is_not_published() -> None:
@@ -140,7 +141,9 @@ def test_a_refusal_tells_its_reason_its_moments_and_the_pose_that_was_refused() 
     verdict = Confirmation(PARAMS).hear(one)
     assert isinstance(verdict, Rejected) and verdict.reason is Reason.FREE_SPACE
     assert (verdict.from_ns, verdict.to_ns) == (one.target.stamp_ns, one.source.stamp_ns)
-    assert np.array_equal(verdict.T_from_to, TRUE)
+    assert np.array_equal(verdict.T_from_to, TRUE) and verdict.evidence == one.registration.evidence
+    assert (verdict.from_frame_id, verdict.from_session) == (one.target.frame_id, one.target.session)
+    assert (verdict.to_frame_id, verdict.to_session) == (one.source.frame_id, one.source.session)
 
 
 def test_a_gate_that_refuses_without_a_reason_is_an_error() -> None:

@@ -82,11 +82,11 @@ def test_refusals_have_a_topic_of_their_own_and_their_counts_are_in_the_diagnost
     make: Making, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     node, told, status = make(), [], []
-    monkeypatch.setattr(node._refusals, "publish", told.append)
+    monkeypatch.setattr(node._announcements._refusals, "publish", told.append)
     monkeypatch.setattr(node._diagnostics, "publish", status.append)
     turned_down = Rejected(reason=Reason.NO_CANDIDATE, from_ns=5, to_ns=9, detail="none of 3")
     node._publish(Outcome(rejected=(turned_down,)))
-    assert node._refusals.topic_name == "/test_node/refusals" and status == []
+    assert node._announcements._refusals.topic_name == "/test_node/refusals" and status == []
     (message,) = told
     assert [refusal_of(one).detail for one in message.status] == ["none of 3"]
     node._report()

@@ -12,13 +12,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from recording.folders import robot_bag, tum_folder
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Image
 from std_srvs.srv import Trigger
 
-from objreg_ros.bridge import from_msg, qos
+from objreg_ros.bridge import closures_msg, from_msg, qos
+from objreg_ros.bridge.diagnostics import refusal_of
 
 from .graph import START_S, Graph
 
@@ -149,3 +151,32 @@ def test_a_recording_gives_the_same_constraints_live_and_offline(fresh: Graph, s
     for mine, theirs in zip(live, offline, strict=True):
         assert np.allclose(mine.T_from_to, theirs["T_from_to"], atol=1e-9)
         assert np.allclose(mine.covariance, theirs["covariance"], rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_objreg_msgs_tell_the_same_as_the_topics_of_common_interfaces_and_more(fresh: Graph, shared: Path) -> None:
+    if closures_msg.LoopClosureMsg is None:
+        pytest.skip("objreg_msgs is not installed: colcon builds it from this repository")
+    kitchen, model = shared / "data/redkitchen_a", shared / "models/ssd_mobilenet_v1_coco_int8.onnx"
+    kept = qos.latched(qos.KEPT_CONSTRAINTS)
+    fresh.hear(Odometry, "constraints", kept)
+    fresh.hear(DiagnosticArray, "refusals")
+    fresh.hear(closures_msg.Refusal, "closure_refusals")
+    fresh.hear(closures_msg.ObjectLandmarks, "object_landmarks")
+    start(fresh, model, "-p threshold:=0.4")
+    objreg(fresh, "replay", str(kitchen), "--lossless", "--end", "4", "--wait", str(START_S))
+    end_keyframe(fresh)
+    fresh.hear(closures_msg.LoopClosureMsg, "loop_closures", kept)  # it comes late
+    constraints = [from_msg.loop_closure(message) for message in fresh.heard["constraints"]]
+    messages = fresh.heard["loop_closures"]
+    fresh.wait_for(lambda: len(messages) == len(constraints) > 0, what="the closures that were kept")
+    assert len({message.id for message in messages}) == len(messages)
+    for mine, theirs in zip(map(closures_msg.read_loop_closure, messages), constraints, strict=True):
+        assert (mine.from_ns, mine.to_ns) == (theirs.from_ns, theirs.to_ns)
+        assert (mine.from_frame_id, mine.to_frame_id) == (theirs.from_frame_id, theirs.to_frame_id)
+        assert np.array_equal(mine.T_from_to, theirs.T_from_to) and np.array_equal(mine.covariance, theirs.covariance)
+        assert mine.evidence["odds"] > 1 and mine.matches and (mine.from_session, mine.to_session) == (0, 0)
+    told = [refusal_of(status) for message in fresh.heard["refusals"] for status in message.status]
+    whole = [closures_msg.read_refusal(message) for message in fresh.heard["closure_refusals"]]
+    assert [(w.reason, w.to_ns, w.detail) for w in whole] == [(t.reason, t.to_ns, t.detail) for t in told]
+    assert fresh.heard["object_landmarks"][0].session == "0" and fresh.heard["object_landmarks"][0].landmarks
