@@ -43,7 +43,6 @@ class Asked:
     recording: Path | None
     model: str | None
     labels: str | None
-    camera: str
     params_file: Path | None
     changes: tuple[str, ...]
     remaps: tuple[str, ...]
@@ -51,6 +50,7 @@ class Asked:
     rate: float
     lossless: bool
     out: Path
+    camera: str = ""
 
 
 @click.command()
@@ -84,17 +84,17 @@ def run(asked: Asked) -> None:
     """The whole demo; ValueError or OSError if it cannot be, or if the books do not balance."""
     asked = asked if asked.recording else calibrated(asked)
     recording = asked.recording or simulated_room(asked.out)
-    inputs = _inputs(recording, asked)
+    inputs, camera = _inputs(recording, asked), camera_asked(asked)
     bag = as_rosbag2(recording, inputs, asked.out, asked.seconds)
     with open_recording(bag) as opened:
-        source = with_camera(opened, camera_asked(asked), inputs.outright)
+        source = with_camera(opened, camera, inputs.outright)
         T_base_camera = mounting_of(asked) or _mounting_by_tf(source, inputs)
-        live = run_live(bag, setup_of(asked, inputs), asked.out / "logs", _say)
+        live = run_live(bag, setup_of(asked, inputs, camera), asked.out / "logs", _say)
         truth = Truth.of(source, inputs.ground_truth)
         for note in truth.notes:
             _say(f"! {note}")
         told = {"recording": str(bag.resolve()), "name": recording.resolve().name, "inputs": inputs.outright,
-                "camera": absolute(camera_asked(asked))}  # fmt: skip
+                "camera": absolute(camera)}  # fmt: skip
         _write(asked.out / "demo.json", {**told, "T_base_camera": T_base_camera}, live, truth)
         _draw(asked.out, live, truth, source, inputs)
         sent = _sent(source, inputs, asked.seconds, live)
@@ -134,8 +134,8 @@ def _say(text: str) -> None:
     click.echo(text, err=True)
 
 
-def setup_of(asked: Asked, inputs: Inputs) -> Setup:
-    """The arguments of the nodes and of the player, which plays just these inputs."""
+def setup_of(asked: Asked, inputs: Inputs, camera: str = "") -> Setup:
+    """The arguments of the nodes and of the player, which plays just these inputs, with the ``camera`` if told."""
     everywhere = [] if asked.params_file is None else ["--params-file", str(asked.params_file)]
     node_args = {room: list(everywhere) for room in ROOMS}
     named = {"model": asked.model, "labels": asked.labels}
@@ -146,7 +146,7 @@ def setup_of(asked: Asked, inputs: Inputs) -> Setup:
             raise ValueError(f"--set: expected a node of the demo ({', '.join(ROOMS)}), got {room}; leave it out")
         node_args[room] += _override(room, ros_argument(name, value))
     replay = ["--lossless"] if asked.lossless else ["--rate", str(asked.rate)]
-    replay += ["--camera", camera] if (camera := camera_asked(asked)) else []
+    replay += ["--camera", camera] if camera else []
     replay += [] if asked.seconds is None else ["--end", str(asked.seconds)]
     remaps = [f"{name}:={topic}" for name, topic in inputs.outright.items()]
     return Setup(node_args, [*replay, *(word for remap in remaps for word in ("--remap", remap))])
