@@ -118,14 +118,16 @@ def size_of(message: Any) -> tuple[int, int]:
     return _size_in_file(data[COMPRESSED_DEPTH_HEADER:] if "compressedDepth" in message.format else data)
 
 
-def _size_in_file(data: Any, formats: tuple[str, ...] = ("JPEG", "PNG")) -> tuple[int, int]:
-    """Width and height by the header of a file."""
+def _size_in_file(
+    data: Any, formats: tuple[str, ...] = ("JPEG", "PNG"), most_pixels: int = limits.MOST_PIXELS_OF_PICTURE
+) -> tuple[int, int]:
+    """Width and height by the header of a file; ValueError where it does not begin as one, or is beyond all measure."""
     wanted = " or ".join(name.lower() for name in formats)
     try:
         with Image.open(io.BytesIO(data), formats=formats) as picture:
             return picture.size
     except Image.DecompressionBombError as error:  # Pillow has a limit of its own, of some 180 megapixels
-        raise ValueError(f"compressed image: expected less than 180 megapixels, got more: {error}") from error
+        raise ValueError(f"compressed image: expected at most {most_pixels} pixels, got more: {error}") from error
     except (OSError, SyntaxError, ValueError, EOFError) as error:
         got = f"{len(data)} bytes that do not begin so"
         raise ValueError(f"compressed image: expected {wanted}, got {got}") from error
@@ -133,7 +135,7 @@ def _size_in_file(data: Any, formats: tuple[str, ...] = ("JPEG", "PNG")) -> tupl
 
 def require_picture(data: Any, formats: tuple[str, ...], most_pixels: int) -> None:
     """ValueError unless ``data`` begins as a picture of one of Pillow's ``formats``, of at most so many pixels."""
-    width, height = _size_in_file(data, formats)
+    width, height = _size_in_file(data, formats, most_pixels)
     _require_size(width, height, most_pixels)
     if bytes(data[:4]) == PNG[:4]:
         _require_whole_chunks(memoryview(data))

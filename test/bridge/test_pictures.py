@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from objreg_ros.bridge.pictures import colour_pixels, depth_metres, unpack_rgb
+from objreg_ros.bridge.pictures import colour_pixels, depth_metres, size_of, unpack_rgb
 
 from . import messages
 
@@ -362,3 +362,13 @@ def test_a_colour_png_is_no_depth() -> None:
 
 def test_packed_colours_come_apart() -> None:
     assert unpack_rgb(np.array([[0xFF010203, 0x000A0B0C]], "u4")).tolist() == [[[1, 2, 3], [10, 11, 12]]]
+
+
+@pytest.mark.parametrize("kind", [".jpg", ".png"])
+def test_the_size_is_told_before_any_pixel_is_decoded(kind: str) -> None:
+    data = cv2.imencode(kind, np.zeros((4, 6, 3), np.uint8))[1].tobytes()
+    assert size_of(messages.image(flat(1, 2, 3), "rgb8")) == size_of(messages.compressed(data, "jpeg")) == (6, 4)
+    depth = bytes(12) + cv2.imencode(".png", np.zeros((4, 6), np.uint16))[1].tobytes()
+    assert size_of(messages.compressed(depth, "16UC1; compressedDepth png")) == (6, 4)
+    with pytest.raises(ValueError, match="expected jpeg or png, got 3 bytes that do not begin so"):
+        size_of(messages.compressed(b"abc", "jpeg"))
