@@ -19,6 +19,7 @@ import numpy as np
 
 from objreg_ros.bridge import from_msg, lenses
 from objreg_ros.bridge.pace import Pace
+from objreg_ros.bridge.static_frames import FindPose, Mount
 from objreg_ros.bridge.sync import Drop, Match, Need, Stream, Synchroniser
 from objreg_ros.data import (
     Array,
@@ -39,7 +40,7 @@ from objreg_ros.recording.record import Record
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.report.export import constraint
 from objreg_ros.segmenter.gravity_choice import GravityChoice
-from objreg_ros.segmenter.imu import FindPose, Imu
+from objreg_ros.segmenter.imu import Imu
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.sensor_estimate import Lag, SensorEstimate
 from objreg_ros.truth import Truth, summarise
@@ -131,8 +132,8 @@ class Timing:
     """How the inputs are brought together, as the nodes' parameters say; ``T_base_camera`` as the registrar's.
 
     With ``level_odom`` the segmenter takes gravity from the odometry, and ``T_level_camera`` is its T_base_camera.
-    ``max_rate`` is the detector's; 0, as it is here, is every picture. ``T_camera_imu`` is the segmenter's,
-    and ``find_pose`` what it asks without one: (camera's frame, IMU's) → the same.
+    ``max_rate`` is the detector's; 0, as it is here, is every picture. ``T_camera_imu`` is the segmenter's.
+    ``find_pose`` is asked for each of these that is None: (one frame, another) → how the other sits on the one.
     """
 
     slop_ns: int = 20_000_000
@@ -143,7 +144,7 @@ class Timing:
     T_level_camera: Array | None = None
     rectified: str = "auto"  # whether pictures come without the distortion of their lens, as the segmenter's parameter
     T_camera_imu: Array | None = None
-    find_pose: FindPose = lambda camera, imu: None
+    find_pose: FindPose = lambda a, b: None
     max_rate: float = 0.0
 
 
@@ -155,6 +156,7 @@ class Run:
     detections: int = 0
     objects: int = 0
     lens: str = ""  # what was assumed of it; empty where no camera_info came
+    mount: str = ""  # what was assumed of how the camera sits on the body of the odometry; empty where it is told
     closures: list[LoopClosure] = field(default_factory=list)
     rejected: Counter[str] = field(default_factory=Counter)
     refusals: list[Rejected] = field(default_factory=list)
@@ -244,6 +246,8 @@ class Line:
         self._camera_info: Any = None
         self._pace = Pace(timing.max_rate)
         self._imu = Imu(timing.T_camera_imu, timing.find_pose)
+        self._mount = Mount(timing.T_base_camera, timing.find_pose, self._hear_of_mount)
+        self._level_mount = Mount(timing.T_level_camera, timing.find_pose)
         self.run.imu_passed_over = self._imu.counts
         self._labels: dict[int, tuple[str, ...]] = {}  # what was detected in the frames that are under way
         self._views = Synchroniser(self._streams(), self._unmatched)
@@ -339,7 +343,9 @@ class Line:
     def _frame(self, match: Match) -> Frame:
         with self._timed("decode"):
             depth, detections = self._depth(match)
-            gravity = from_msg.level_gravity(match.stamp_ns, match.payloads.get("odom"), self._timing.T_level_camera)
+            odom = match.payloads.get("odom")
+            T_body_camera = self._level_mount.T_body_camera(odom, depth.frame_id)
+            gravity = from_msg.level_gravity(match.stamp_ns, odom, T_body_camera)
             felt = self._felt_gravity(match, depth.frame_id)
         with self._timed("segment"):
             sigma_deg = None if felt is None else felt.gravity_sigma_deg
@@ -375,12 +381,16 @@ class Line:
             if self.full:
                 return
             labels = self._labels.pop(match.stamp_ns, ())
-            frame = with_odometry(match["frame"], match["odom"], self._timing.T_base_camera)
+            T_body_camera = self._mount.T_body_camera(match["odom"], match["frame"].frame_id)
+            frame = with_odometry(match["frame"], match["odom"], T_body_camera)
             self.run.frames += 1
             self.run.glimpses.append(glimpse(frame, labels))
             with self._timed("register"):
                 outcome = self._rooms.registrar.process(frame)
             self._note(outcome)
+
+    def _hear_of_mount(self, text: str) -> None:
+        self.run.mount = text
 
     def _note(self, outcome: Outcome) -> None:
         self.run.closures += outcome.closures

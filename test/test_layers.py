@@ -28,7 +28,18 @@ FLOORS = (
 )
 ROS = {"rclpy", "launch", "launch_ros", "tf2_ros", "ament_index_python", "rosgraph_msgs"}
 FREE_BRIDGE = tuple(
-    f"bridge.{name}" for name in ("from_msg", "course", "sync", "pace", "layout", "lenses", "pictures", "static_frames")
+    f"bridge.{name}"
+    for name in (
+        "calibration",
+        "from_msg",
+        "course",
+        "sync",
+        "pace",
+        "layout",
+        "lenses",
+        "pictures",
+        "static_frames",
+    )
 )
 CORE = ("limits", "sensor", "data", "lens", "geometry", "params", "share")
 HOUSE = ("offline", "truth", "report")

@@ -427,3 +427,43 @@ def test_a_run_whose_frames_tell_nothing_of_their_sensor_says_none() -> None:
     told = SimpleNamespace(segment=rooms.segmenter.segment, choice=rooms.segmenter.choice, sensor=SensorEstimate())
     summary = run_offline(records(2), replace(rooms, segmenter=told), INPUTS).summary(Truth([]))
     assert summary["depth_noise"] is None and summary["depth_lag"] is None
+
+
+def test_the_cameras_place_on_the_body_is_asked_for_by_the_names_of_their_frames_unless_it_is_told() -> None:
+    place, asked = turned_about_x(0.3), list[tuple[str, str]]()
+
+    def found(body: str, camera: str) -> np.ndarray:
+        asked.append((body, camera))
+        return place
+
+    (rooms, chain), (told_rooms, told_chain) = simple_rooms(), simple_rooms()
+    run = run_offline(map(other_body, records(2)), rooms, INPUTS, Timing(find_pose=found))
+    run_offline(
+        map(other_body, records(2)), told_rooms, INPUTS, Timing(find_pose=lambda *_: np.eye(4), T_base_camera=place)
+    )
+    assert set(asked) == {("base", "camera")} and "/tf_static has the camera's 'camera'" in run.mount
+    for frame, told in zip(chain.frames, told_chain.frames, strict=True):
+        np.testing.assert_array_equal(frame.T_odom_camera, told.T_odom_camera)
+        np.testing.assert_allclose(frame.T_odom_camera[:3, :3], place[:3, :3])
+
+
+def test_gravity_of_a_level_odometry_is_turned_by_the_same_place() -> None:
+    place = pose(np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]]), np.zeros(3))
+
+    rooms, chain = simple_rooms()
+    run_offline(map(other_body, records(2)), rooms, INPUTS, Timing(level_odom=True, find_pose=lambda *_: place))
+    for frame in chain.frames:
+        np.testing.assert_allclose(frame.gravity, [0, 1, 0], atol=1e-6)
+
+
+def test_odometry_of_a_body_that_nothing_ties_to_the_camera_is_taken_as_the_cameras_and_said() -> None:
+    rooms, _ = simple_rooms()
+    run = run_offline(map(other_body, records(2)), rooms, INPUTS)
+    assert "taken to be one place; set T_base_camera" in run.mount
+
+
+def other_body(record: Record) -> Record:
+    message = record.message
+    if record.topic == "/odom":
+        message.child_frame_id = "base"
+    return Record.of(record.topic, message, record.stamp_ns)

@@ -78,7 +78,7 @@ def when_and_where(message: Any) -> dict[str, Any]:
 
 
 def image(message: Any, most_pixels: int = limits.MOST_PIXELS_OF_PICTURE) -> ColourImage:
-    """A sensor_msgs Image (rgb8 bgr8 rgba8 bgra8 mono8 mono16 8UC1 8UC3 8UC4) or CompressedImage (jpeg, png)."""
+    """A sensor_msgs Image (of an encoding in `pictures.COLOUR` or `PLANES`) or CompressedImage (jpeg, png)."""
     return ColourImage(rgb=colour_pixels(message, most_pixels), **when_and_where(message))
 
 

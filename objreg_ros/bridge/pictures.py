@@ -22,6 +22,8 @@ DEPTH_SCALE = 0.001  # metres of one step of 16UC1, REP-118
 NO_DEPTH = 65535  # some drivers write it where they measured nothing
 
 # encoding: (dtype, channels, OpenCV's conversion to RGB). OpenCV's plain 8UC3 and 8UC4 are BGR by its own convention.
+# The names of Bayer's patterns are those of the first two rows, in ROS and in OpenCV's aliases alike; OpenCV's older
+# names, like BayerBG for RGGB, begin elsewhere.
 COLOUR: dict[str, tuple[str, int, int | None]] = {
     "rgb8": ("u1", 3, None),
     "bgr8": ("u1", 3, cv2.COLOR_BGR2RGB),
@@ -32,6 +34,33 @@ COLOUR: dict[str, tuple[str, int, int | None]] = {
     "8UC1": ("u1", 1, cv2.COLOR_GRAY2RGB),
     "8UC3": ("u1", 3, cv2.COLOR_BGR2RGB),
     "8UC4": ("u1", 4, cv2.COLOR_BGRA2RGB),
+    "rgb16": ("u2", 3, None),
+    "bgr16": ("u2", 3, cv2.COLOR_BGR2RGB),
+    "yuv422": ("u1", 2, cv2.COLOR_YUV2RGB_UYVY),
+    "uyvy": ("u1", 2, cv2.COLOR_YUV2RGB_UYVY),
+    "yuv422_yuy2": ("u1", 2, cv2.COLOR_YUV2RGB_YUY2),
+    "yuyv": ("u1", 2, cv2.COLOR_YUV2RGB_YUY2),
+    "bayer_rggb8": ("u1", 1, cv2.COLOR_BayerRGGB2RGB),
+    "bayer_bggr8": ("u1", 1, cv2.COLOR_BayerBGGR2RGB),
+    "bayer_gbrg8": ("u1", 1, cv2.COLOR_BayerGBRG2RGB),
+    "bayer_grbg8": ("u1", 1, cv2.COLOR_BayerGRBG2RGB),
+    "bayer_rggb16": ("u2", 1, cv2.COLOR_BayerRGGB2RGB),
+    "bayer_bggr16": ("u2", 1, cv2.COLOR_BayerBGGR2RGB),
+    "bayer_gbrg16": ("u2", 1, cv2.COLOR_BayerGBRG2RGB),
+    "bayer_grbg16": ("u2", 1, cv2.COLOR_BayerGRBG2RGB),
+}
+# Brightness for every pixel, and behind all of it colour in pairs, in as many rows of as many bytes to one of
+# brightness. encoding: (rows, bytes a pixel, OpenCV's conversion to RGB). NV24 has no conversion of its own.
+PLANES: dict[str, tuple[float, int, int]] = {
+    "nv12": (0.5, 1, cv2.COLOR_YUV2RGB_NV12),
+    "nv21": (0.5, 1, cv2.COLOR_YUV2RGB_NV21),
+    "nv24": (1.0, 2, cv2.COLOR_YUV2RGB_YUY2),
+}
+# Pixels across and down that share one colour: a picture is made of whole ones.
+BLOCKS = {
+    **dict.fromkeys(("yuv422", "uyvy", "yuv422_yuy2", "yuyv"), (2, 1)),
+    **dict.fromkeys((name for name in COLOUR if name.startswith("bayer")), (2, 2)),
+    **dict.fromkeys(("nv12", "nv21"), (2, 2)),
 }
 DEPTH = {"16UC1": "u2", "mono16": "u2", "32FC1": "f4"}
 INSTANCES = {"mono8": "u1", "8UC1": "u1", "mono16": "u2", "16UC1": "u2"}
@@ -48,8 +77,11 @@ def colour_pixels(message: Any, most_pixels: int = limits.MOST_PIXELS_OF_PICTURE
     if hasattr(message, "format"):
         require_picture(message.data, ("JPEG", "PNG"), most_pixels)
         return _decoded(message.data, AS_STORED, cv2.COLOR_BGR2RGB, "a jpeg or png")
+    _require_whole_blocks(message)
+    if message.encoding in PLANES:
+        return _of_planes(message, most_pixels)
     if message.encoding not in COLOUR:
-        raise ValueError(f"image: expected an encoding of {', '.join(COLOUR)}, got {message.encoding!r}")
+        raise ValueError(f"image: expected an encoding of {', '.join((*COLOUR, *PLANES))}, got {message.encoding!r}")
     dtype, channels, conversion = COLOUR[message.encoding]
     pixels = _pixels(message, dtype, channels, most_pixels)
     if dtype == "u2":
@@ -87,17 +119,35 @@ def unpack_rgb(packed: Array) -> Array:
     return cv2.cvtColor(bgra, cv2.COLOR_BGRA2RGB).reshape(*packed.shape, 3)
 
 
-def require_picture(data: Any, formats: tuple[str, ...], most_pixels: int) -> None:
-    """ValueError unless ``data`` begins as a picture of one of Pillow's ``formats``, of at most so many pixels."""
+def size_of(message: Any) -> tuple[int, int]:
+    """Width and height of an Image, a CompressedImage or a compressedDepth, before its pixels are decoded.
+
+    ValueError where it is of no size, or does not begin as a picture. A cloud's are those of its rows and columns.
+    """
+    if not hasattr(message, "format"):
+        return int(message.width), int(message.height)
+    data = bytes(message.data)
+    return _size_in_file(data[COMPRESSED_DEPTH_HEADER:] if "compressedDepth" in message.format else data)
+
+
+def _size_in_file(
+    data: Any, formats: tuple[str, ...] = ("JPEG", "PNG"), most_pixels: int = limits.MOST_PIXELS_OF_PICTURE
+) -> tuple[int, int]:
+    """Width and height by the header of a file; ValueError where it does not begin as one, or is beyond all measure."""
     wanted = " or ".join(name.lower() for name in formats)
     try:
         with Image.open(io.BytesIO(data), formats=formats) as picture:
-            width, height = picture.size
+            return picture.size
     except Image.DecompressionBombError as error:  # Pillow has a limit of its own, of some 180 megapixels
         raise ValueError(f"compressed image: expected at most {most_pixels} pixels, got more: {error}") from error
     except (OSError, SyntaxError, ValueError, EOFError) as error:
         got = f"{len(data)} bytes that do not begin so"
         raise ValueError(f"compressed image: expected {wanted}, got {got}") from error
+
+
+def require_picture(data: Any, formats: tuple[str, ...], most_pixels: int) -> None:
+    """ValueError unless ``data`` begins as a picture of one of Pillow's ``formats``, of at most so many pixels."""
+    width, height = _size_in_file(data, formats, most_pixels)
     _require_size(width, height, most_pixels)
     if bytes(data[:4]) == PNG[:4]:
         _require_whole_chunks(memoryview(data))
@@ -110,6 +160,36 @@ def _require_whole_chunks(png: memoryview) -> None:
         at += CHUNK + int.from_bytes(png[at : at + 4], "big")
     if at > len(png):
         raise ValueError(f"compressed image: expected a png of {at} bytes, got {len(png)}; truncated?")
+
+
+def _require_whole_blocks(message: Any) -> None:
+    """ValueError for a size that leaves half a pair of pixels that share their colour."""
+    across, down = BLOCKS.get(message.encoding, (1, 1))
+    if int(message.width) % across or int(message.height) % down:
+        wanted = "an even width" if down == 1 else "an even width and height"
+        got = f"{message.width} × {message.height}"
+        raise ValueError(f"image: expected {wanted} for {message.encoding}, got {got}")
+
+
+def _of_planes(message: Any, most_pixels: int) -> Array:
+    """(H, W, 3) RGB of a picture whose brightness comes before its colour; a row of that is as long as its share."""
+    rows, width_of_colour, conversion = PLANES[message.encoding]
+    height, width, step = int(message.height), int(message.width), int(message.step)
+    _require_size(width, height, most_pixels)
+    if step < width:
+        raise ValueError(f"image: expected a step of at least {width} bytes for {message.encoding}, got {step}")
+    data, expected = (
+        np.frombuffer(message.data, np.uint8),
+        height * step + round(height * rows) * width_of_colour * step,
+    )
+    if data.size < expected:
+        raise ValueError(f"image: expected {expected} bytes for {width} × {height}, got {data.size}; truncated?")
+    bright = data[: height * step].reshape(height, step)[:, :width]
+    colour = data[height * step : expected].reshape(round(height * rows), -1)[:, : width * width_of_colour]
+    if width_of_colour == 1:
+        return cv2.cvtColor(np.vstack([bright, colour]), conversion)
+    pairs = np.stack([bright, colour[:, ::2], bright, colour[:, 1::2]], axis=-1)  # each pixel twice: two share a colour
+    return np.ascontiguousarray(cv2.cvtColor(pairs.reshape(height, 2 * width, 2), conversion)[:, ::2])
 
 
 def _require_size(width: int, height: int, most_pixels: int) -> None:

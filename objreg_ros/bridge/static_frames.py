@@ -1,20 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the parts of a robot sit on each other, as /tf_static says: the little of tf2 that a mounted IMU needs.
+"""Where the parts of a robot sit on each other, as /tf_static says: the little of tf2 that a camera and an IMU need.
 
 Reads attributes only, so the messages of rclpy and of rosbags (tf2_msgs/TFMessage of ROS 1 and 2) both fit.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from objreg_ros import limits
-from objreg_ros.data import Array
+from objreg_ros.data import Array, Odometry
 from objreg_ros.geometry import inverse, pose, rotation_from_quaternion
 
 MOST_FRAMES = 10_000  # what says more is no robot
+
+
+FindPose = Callable[[str, str], Array | None]  # (a, b) -> T_a_b, None where unknown
 
 
 class StaticFrames:
@@ -52,3 +56,37 @@ class StaticFrames:
             T = T_parent_child @ T
             found[name] = T
         return found
+
+
+class Mount:
+    """Where the camera sits on the body that odometry speaks of.
+
+    ``told`` is what a parameter says, which wins; ``find`` is asked without one. What that does not know either is
+    taken to be one place, as for odometry of the camera itself. ``say`` hears what is assumed, and hears it again only
+    where that changes.
+    """
+
+    def __init__(self, told: Array | None, find: FindPose, say: Callable[[str], None] = lambda text: None) -> None:
+        self._told, self._find, self._say, self._said = told, find, say, ""
+
+    def T_body_camera(self, words: Sequence[Odometry] | None, camera_frame: str) -> Array | None:
+        """The pose (4, 4) of the camera on the body of these words of odometry; None where the two are one."""
+        if self._told is not None or not words:
+            return self._told
+        body, camera = words[0].child_frame_id.lstrip("/"), camera_frame.lstrip("/")
+        if body == camera:
+            return None
+        T = self._find(body, camera) if body and camera else None
+        self._tell(body, camera, T)
+        return T
+
+    def _tell(self, body: str, camera: str, T: Array | None) -> None:
+        if T is None:
+            what = f"nothing on /tf_static ties the odometry's {body!r} to the camera's {camera!r}"
+            text = f"{what}: taken to be one place; set T_base_camera where they are not"
+        else:
+            where = " ".join(f"{metres:.3f}" for metres in T[:3, 3])
+            text = f"/tf_static has the camera's {camera!r} on the odometry's {body!r} at {where} m"
+        if text != self._said:
+            self._said = text
+            self._say(text)

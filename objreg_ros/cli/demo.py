@@ -14,14 +14,18 @@ import click
 
 from objreg_ros import share
 from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.calibration import absolute
 from objreg_ros.cli import live_table, options
 from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
 from objreg_ros.cli.played import as_rosbag2, simulated_room
 from objreg_ros.cli.settings import parse_change, read_settings, ros_argument, tell_ignored
 from objreg_ros.data import ColourImage, Intrinsics
+from objreg_ros.geometry import quaternion_from_rotation
 from objreg_ros.offline import constraint_with_error, refusal
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
+from objreg_ros.recording.mounts import TRANSFORMS, camera_on_body
+from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.registration.params import RegistrarNodeParams
 from objreg_ros.report.live_pictures import draw_sight, draw_way
 from objreg_ros.report.write import write_report
@@ -46,12 +50,14 @@ class Asked:
     rate: float
     lossless: bool
     out: Path
+    camera: str = ""
 
 
 @click.command()
 @click.argument("recording", type=click.Path(path_type=Path), required=False)
 @options.model
 @options.labels
+@options.camera
 @options.params
 @options.change
 @options.remap
@@ -78,15 +84,17 @@ def run(asked: Asked) -> None:
     """The whole demo; ValueError or OSError if it cannot be, or if the books do not balance."""
     asked = asked if asked.recording else calibrated(asked)
     recording = asked.recording or simulated_room(asked.out)
-    inputs = _inputs(recording, asked)
-    T_base_camera = mounting_of(asked)
+    inputs, camera = _inputs(recording, asked), camera_asked(asked)
     bag = as_rosbag2(recording, inputs, asked.out, asked.seconds)
-    with open_recording(bag) as source:
-        live = run_live(bag, setup_of(asked, inputs), asked.out / "logs", _say)
+    with open_recording(bag) as opened:
+        source = with_camera(opened, camera, inputs.outright)
+        T_base_camera = mounting_of(asked) or _mounting_by_tf(source, inputs)
+        live = run_live(bag, setup_of(asked, inputs, camera), asked.out / "logs", _say)
         truth = Truth.of(source, inputs.ground_truth)
         for note in truth.notes:
             _say(f"! {note}")
-        told = {"recording": str(bag.resolve()), "name": recording.resolve().name, "inputs": inputs.outright}
+        told = {"recording": str(bag.resolve()), "name": recording.resolve().name, "inputs": inputs.outright,
+                "camera": absolute(camera)}  # fmt: skip
         _write(asked.out / "demo.json", {**told, "T_base_camera": T_base_camera}, live, truth)
         _draw(asked.out, live, truth, source, inputs)
         sent = _sent(source, inputs, asked.seconds, live)
@@ -109,10 +117,12 @@ def _inputs(recording: Path, asked: Asked) -> Inputs:
     settings = read_settings(asked.params_file, asked.changes)
     tell_ignored(settings)
     depth_source = settings.of("segmenter", SegmenterNodeParams).source
-    with open_recording(recording) as source:
+    remaps = parse_remaps(asked.remaps)
+    with open_recording(recording) as opened:
+        source = with_camera(opened, camera_asked(asked), remaps, depth_source)
         for note in source.notes:
             _say(f"! {note}")
-        inputs = choose_inputs(source.topics, parse_remaps(asked.remaps), depth_source)
+        inputs = choose_inputs(source.topics, remaps, depth_source)
         if inputs.complete:
             return inputs
         wanted = inputs.wanted(depth_source)
@@ -124,8 +134,8 @@ def _say(text: str) -> None:
     click.echo(text, err=True)
 
 
-def setup_of(asked: Asked, inputs: Inputs) -> Setup:
-    """The arguments of the nodes and of the player, which plays just these inputs."""
+def setup_of(asked: Asked, inputs: Inputs, camera: str = "") -> Setup:
+    """The arguments of the nodes and of the player, which plays just these inputs, with the ``camera`` if told."""
     everywhere = [] if asked.params_file is None else ["--params-file", str(asked.params_file)]
     node_args = {room: list(everywhere) for room in ROOMS}
     named = {"model": asked.model, "labels": asked.labels}
@@ -136,6 +146,7 @@ def setup_of(asked: Asked, inputs: Inputs) -> Setup:
             raise ValueError(f"--set: expected a node of the demo ({', '.join(ROOMS)}), got {room}; leave it out")
         node_args[room] += _override(room, ros_argument(name, value))
     replay = ["--lossless"] if asked.lossless else ["--rate", str(asked.rate)]
+    replay += ["--camera", camera] if camera else []
     replay += [] if asked.seconds is None else ["--end", str(asked.seconds)]
     remaps = [f"{name}:={topic}" for name, topic in inputs.outright.items()]
     return Setup(node_args, [*replay, *(word for remap in remaps for word in ("--remap", remap))])
@@ -164,6 +175,20 @@ def _sent(source: Recording, inputs: Inputs, seconds: float | None, live: Live) 
 def mounting_of(asked: Asked) -> tuple[float, ...]:
     """The registrar's ``T_base_camera``: x y z qx qy qz qw, or nothing."""
     return read_settings(asked.params_file, asked.changes).of("registrar", RegistrarNodeParams).T_base_camera
+
+
+def _mounting_by_tf(source: Recording, inputs: Inputs) -> tuple[float, ...]:
+    """The same by the recording's /tf_static, where the nodes hear it."""
+    from objreg_ros.bridge.player import is_installed
+
+    T = camera_on_body(source, inputs)[2] if is_installed(TRANSFORMS) else None
+    return () if T is None else (*T[:3, 3].tolist(), *map(float, quaternion_from_rotation(T[:3, :3])))
+
+
+def camera_asked(asked: Asked) -> str:
+    """The camera that is told, by its option or by the segmenter's parameter; empty where none is."""
+    told = read_settings(asked.params_file, asked.changes).of("segmenter", SegmenterNodeParams).camera
+    return asked.camera or told
 
 
 def _write(file: Path, told: Mapping[str, Any], live: Live, truth: Truth) -> None:

@@ -14,6 +14,7 @@ from objreg_ros.memory.store_file import is_store
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import GRAPH_TOPICS, Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.summary import describe_lens, describe_topics, warnings
+from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.report.live_pictures import write_picture
 from objreg_ros.report.store_summary import describe, draw, survey
 from objreg_ros.truth import Truth
@@ -22,8 +23,9 @@ from objreg_ros.truth import Truth
 @click.command()
 @options.recording
 @options.remap
+@options.camera
 @click.option("--picture", type=click.Path(dir_okay=False, path_type=Path), help="Draw the objects of a store (PNG).")
-def command(recording: Path, remaps: tuple[str, ...], picture: Path | None) -> None:
+def command(recording: Path, remaps: tuple[str, ...], camera: str, picture: Path | None) -> None:
     """Say what is in RECORDING, which topics the graph would use, and what would go wrong.
 
     RECORDING may also be a store of the registrar: then its sessions, labels and objects are told.
@@ -33,8 +35,10 @@ def command(recording: Path, remaps: tuple[str, ...], picture: Path | None) -> N
         return
     if picture is not None:
         raise ValueError(f"--picture: expected a store of the registrar, whose objects it draws, got {recording}")
-    with open_recording(recording) as source:
-        inputs = choose_inputs(source.topics, parse_remaps(remaps))
+    asked = parse_remaps(remaps)
+    with open_recording(recording) as opened:
+        source = with_camera(opened, camera, asked)
+        inputs = choose_inputs(source.topics, asked)
         _say_what_it_is(source)
         _say_topics(source)
         _say_inputs(inputs)

@@ -9,8 +9,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import click
+import numpy as np
 from tqdm import tqdm
 
+from objreg_ros.bridge.calibration import absolute
 from objreg_ros.cli import FIRST_TIME, options
 from objreg_ros.cli.options import require_writable
 from objreg_ros.cli.settings import Settings, read_settings, tell_ignored
@@ -20,6 +22,7 @@ from objreg_ros.recording import Record, Recording, open_recording
 from objreg_ros.recording.drift import ODOM, with_drifting_odometry
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.mounts import static_frames
+from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_ros.truth import Truth
@@ -35,6 +38,7 @@ CAMERAS_OWN = (
 @options.recording
 @options.model
 @options.labels
+@options.camera
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the outcome here.")
 @click.option("--max-frames", type=click.IntRange(min=1), help="Stop after this many frames.")
 @click.option(
@@ -49,6 +53,7 @@ def command(
     recording: Path,
     model: str | None,
     labels: str | None,
+    camera: str,
     json_file: Path | None,
     max_frames: int | None,
     odometry: str | None,
@@ -64,10 +69,12 @@ def command(
     if json_file is not None:
         require_writable("--json", json_file)
     _require_seed(odometry)
-    settings = read_settings(params_file, [*changes, *_model_changes(model, labels)])
+    settings = read_settings(params_file, [*changes, *_named(model, labels, camera)])
     tell_ignored(settings)
-    with open_recording(recording) as source:
-        inputs = _inputs(source, remaps, odometry, settings.of("segmenter", SegmenterNodeParams).source)
+    told = settings.of("segmenter", SegmenterNodeParams)
+    with open_recording(recording) as opened:
+        source = with_camera(opened, told.camera, parse_remaps(remaps), told.source)
+        inputs = _inputs(source, remaps, odometry, told.source)
         truth = Truth.of(source, inputs.ground_truth)
         for note in (*source.notes, *truth.notes):
             click.echo(f"! {note}", err=True)
@@ -75,13 +82,14 @@ def command(
     summary = run.summary(truth)
     _say(run, summary)
     if json_file is not None:
-        told = {
+        about = {
             "recording": str(recording.resolve()),
             "inputs": inputs.outright,
             "odometry": inputs.odom,
-            "rectified": settings.of("segmenter", SegmenterNodeParams).rectified,
+            "rectified": told.rectified,
+            "camera": absolute(told.camera),
         }
-        json_file.write_text(json.dumps({**told, **summary}, indent=1))
+        json_file.write_text(json.dumps({**about, **summary}, indent=1))
 
 
 def _require_seed(odometry: str | None) -> None:
@@ -95,8 +103,8 @@ def _drifts(odometry: str | None) -> bool:
     return (odometry or "").startswith(DRIFT)
 
 
-def _model_changes(model: str | None, labels: str | None) -> list[str]:
-    named = {"detector.model": model, "detector.labels": labels}
+def _named(model: str | None, labels: str | None, camera: str) -> list[str]:
+    named = {"detector.model": model, "detector.labels": labels, "segmenter.camera": camera}
     return [f"{name}={value}" for name, value in named.items() if value]
 
 
@@ -146,7 +154,8 @@ def _timing(settings: Settings, odometry: str | None) -> Timing:
         if registrar.mounting is not None or segmenter.level_odom:
             click.echo(f"! {CAMERAS_OWN.format(odometry)}", err=True)
         imu = segmenter.imu_mounting
-        return Timing(slop_ns, odom_slop_ns, colour=segmenter.colour, rectified=segmenter.rectified, T_camera_imu=imu)
+        here, colour, rectified = np.eye(4), segmenter.colour, segmenter.rectified
+        return Timing(slop_ns, odom_slop_ns, here, colour, rectified=rectified, T_camera_imu=imu)
     return Timing(
         slop_ns=slop_ns,
         odom_slop_ns=odom_slop_ns,
@@ -172,6 +181,8 @@ def _say(run: Run, summary: dict) -> None:
     )
     if run.lens:
         click.echo(f"  lens: {run.lens}")
+    if run.mount:
+        click.echo(f"  camera: {run.mount}")
     if run.depth_to_colour:
         click.echo(f"  depth is turned against colour by {run.depth_to_colour}; undone")
     if run.depth_lag is not None:

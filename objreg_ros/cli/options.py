@@ -26,6 +26,12 @@ params = click.option(
     help="ROS 2 parameter file, like config/objreg.yaml.",
 )
 change = click.option("--set", "changes", multiple=True, metavar="NODE.NAME=VALUE", help="Change one parameter.")
+camera = click.option(
+    "--camera",
+    default="",
+    metavar="FX,FY,CX,CY[,W,H]|FILE",
+    help="The camera in place of camera_info: pixels, or a YAML file as camera_calibration writes it.",
+)
 model = click.option("--model", help="ONNX model: a path or the name of an installed one.")
 labels = click.option("--labels", help="Text file of labels, one a line.")
 

@@ -15,6 +15,7 @@ from tqdm import tqdm
 
 from objreg_ros.recording import open_recording, write_rosbag2
 from objreg_ros.recording.inputs import Inputs
+from objreg_ros.recording.mounts import static_topics
 
 SCENARIO, SEED, FRAMES, RATE_HZ = "loop", 1, 600, 30.0
 
@@ -35,8 +36,8 @@ def simulated_room(out: Path) -> Path:
 
 def as_rosbag2(recording: Path, inputs: Inputs, out: Path, seconds: float | None) -> Path:
     """The recording itself if it is a rosbag2, else a copy of the first ``seconds`` of its inputs as one, made once."""
-    topics = set(inputs.chosen().values())
     with open_recording(recording) as source:
+        topics = {*(set(inputs.chosen().values()) & source.topics.keys()), *static_topics(source)}
         if source.kind.startswith("rosbag2"):
             return recording
         part = "" if seconds is None else f"_{seconds:g}s"

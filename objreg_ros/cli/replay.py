@@ -18,6 +18,7 @@ from objreg_ros.recording.inputs import SOURCES, Inputs, choose_inputs, parse_re
 from objreg_ros.recording.messages import header_stamp_ns
 from objreg_ros.recording.mounts import TRANSFORMS, static_topics
 from objreg_ros.recording.replay import Selection, graph_names, read_ahead, recorded_names
+from objreg_ros.recording.told_camera import with_camera
 
 if TYPE_CHECKING:
     from objreg_ros.bridge.player import Item, Player
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     help="Seconds for one frame if lossless.",
 )
 @options.remap
+@options.camera
 @click.option(
     "--source", "depth_source", type=click.Choice(SOURCES), default="auto", help="Which depth, as segmenter.source."
 )
@@ -57,6 +59,7 @@ def command(
     wait: float,
     patience: float,
     remaps: tuple[str, ...],
+    camera: str,
     depth_source: str,
     ros_args: tuple[str, ...],
 ) -> None:
@@ -69,10 +72,12 @@ def command(
     from objreg_ros.bridge.lifetime import begin, shutdown_as_interrupt
     from objreg_ros.bridge.player import Player
 
-    with open_recording(recording) as source:
+    asked = parse_remaps(remaps)
+    with open_recording(recording) as opened:
+        source = with_camera(opened, camera, asked, depth_source)
         for note in source.notes:
             click.echo(f"! {note}", err=True)
-        inputs = choose_inputs(source.topics, parse_remaps(remaps), depth_source)
+        inputs = choose_inputs(source.topics, asked, depth_source)
         names = playable_names(source, inputs) if everything else {**graph_names(source, inputs), **_mounts(source)}
         if not names:
             raise ValueError(f"{recording}: expected topics that the graph can use, got {', '.join(source.topics)}")
@@ -105,7 +110,7 @@ def _begun(player: Player) -> Iterator[Player]:
 
 
 def _mounts(source: Recording) -> dict[str, str]:
-    """The recording's /tf_static, by which the segmenter knows how an IMU is mounted, where its type is installed."""
+    """The recording's /tf_static, which says how camera and IMU are mounted, where its type is installed."""
     from objreg_ros.bridge.player import is_installed
 
     return {topic: "/tf_static" for topic in static_topics(source)[:1] if is_installed(TRANSFORMS)}

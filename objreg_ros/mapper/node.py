@@ -18,6 +18,7 @@ from std_srvs.srv import SetBool, Trigger
 from objreg_ros.bridge import from_msg, qos, to_msg
 from objreg_ros.bridge.door import Door, DroppedError
 from objreg_ros.bridge.spin import run
+from objreg_ros.bridge.transforms import hear_mount
 from objreg_ros.data import JUMP_NS, LoopClosure, Odometry
 from objreg_ros.mapper.adapters.g2o import graph_text
 from objreg_ros.mapper.optimisation import load
@@ -48,6 +49,8 @@ class MapperNode(Door):
         self._odometry_count = self._passed_over_count = 0
         self._ended_ns = 0  # the last moment of the run of the clock before this one
         self._riding: list[tuple[int, LoopClosure | None]] = []  # jobs that the next solution settles too
+        self._mount = hear_mount(self, self._inputs.mounting)
+        self._newest: Odometry | None = None
         self._restart = self._watch_odometry()
         self._begin()
         self._path = self.create_publisher(PathMsg, "path", qos.latched())
@@ -66,7 +69,7 @@ class MapperNode(Door):
         self.create_service(SetBool, "~/enable", self._enable)
 
     def _begin(self) -> None:
-        self._graph = PoseGraph(self.settings.of(MapperParams), self._inputs.mounting)
+        self._graph = PoseGraph(self.settings.of(MapperParams))
         self._summary = Summary((), ())
 
     def _start_anew(self, reason: str) -> None:
@@ -105,7 +108,7 @@ class MapperNode(Door):
 
     def _follow(self, odometry: Odometry) -> None:
         self._odometry_count += 1
-        self._odom_frame = odometry.frame_id
+        self._odom_frame, self._newest = odometry.frame_id, odometry
         with self._graph_lock:
             new_keyframe = self._graph.add_odometry(odometry)
         if new_keyframe:
@@ -155,8 +158,10 @@ class MapperNode(Door):
 
     def _tie(self, closure: LoopClosure) -> None:
         """Into the graph, or back to what waits; ValueError if it is implausible or not of one run of the clock."""
+        words = [] if self._newest is None else [self._newest]
+        T_body_camera = self._mount.T_body_camera(words, closure.to_frame_id)
         with self._graph_lock:
-            tied = self._graph.add_closure(closure)
+            tied = self._graph.add_closure(closure, T_body_camera)
         if tied:
             self.worker.put((closure.to_ns, closure))
         elif self._graph.in_gap(closure):

@@ -66,7 +66,9 @@ class MapperNodeParams(Params):
 
     map_frame: str = param("map", "the frame of the corrected map")
     T_base_camera: tuple[float, ...] = param(
-        (), "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: the odometry is the camera's"
+        (),
+        "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: as /tf_static says, or the "
+        "odometry is the camera's",
     )
     publish_tf: bool = param(True, "whether the correction is broadcast on /tf, where tf2_ros is installed")
     graph_path: str = param("objreg_map.g2o", "where ~/save writes the pose graph")
@@ -76,7 +78,6 @@ class MapperNodeParams(Params):
         mounting(self.T_base_camera)
 
     @property
-    def mounting(self) -> Array:
-        """``T_base_camera`` as a (4, 4) pose."""
-        T = mounting(self.T_base_camera)
-        return np.eye(4) if T is None else T
+    def mounting(self) -> Array | None:
+        """``T_base_camera`` as a (4, 4) pose, None where none is set."""
+        return mounting(self.T_base_camera)

@@ -167,13 +167,11 @@ class ImplausibleError(ValueError):
 class PoseGraph:
     """Keyframes, the odometry between them and the closures; `optimise` makes them agree.
 
-    ``T_body_camera`` is where the camera of the closures sits on the body of the odometry. ``odometry`` gives back what
-    was added to within 1 mm and 0.05°, and the poses of keyframes exactly.
+    ``odometry`` gives back what was added to within 1 mm and 0.05°, and the poses of keyframes exactly.
     """
 
-    def __init__(self, params: MapperParams | None = None, T_body_camera: Array | None = None) -> None:
+    def __init__(self, params: MapperParams | None = None) -> None:
         self.params = params or MapperParams()
-        self.T_body_camera = np.eye(4) if T_body_camera is None else T_body_camera
         self.odometry = SparseTrajectory()
         self.keyframes = Trajectory()  # T_odom_body
         self.ties: list[Tie] = []
@@ -192,10 +190,11 @@ class PoseGraph:
             self.ties.append(self._step())
         return True
 
-    def add_closure(self, closure: LoopClosure) -> bool:
+    def add_closure(self, closure: LoopClosure, T_body_camera: Array | None = None) -> bool:
         """Tie the two keyframes nearest to the closure's moments; False if odometry does not cover both (yet).
 
-        Moments nearest to one and the same keyframe tie nothing, which is True too.
+        Moments nearest to one and the same keyframe tie nothing, which is True too. ``T_body_camera`` is where the
+        camera of the closure sits on the body of the odometry; the same place if None.
 
         In a gap of the odometry it never will (`in_gap`): where the camera was by then nobody knows. ValueError for a
         closure whose *from* is not before its *to*: the registrar looks back, so its moments are of two runs of the
@@ -210,11 +209,12 @@ class PoseGraph:
         if not (self.odometry.covers(closure.from_ns) and self.odometry.covers(closure.to_ns)):
             return False
         k1, k2 = (self.keyframes.nearest(stamp) for stamp in (closure.from_ns, closure.to_ns))
+        T_body_camera = np.eye(4) if T_body_camera is None else T_body_camera
         if k1 != k2:
             k1_ns, k2_ns = self.keyframes.stamps_ns[k1], self.keyframes.stamps_ns[k2]
             moments, sigmas = (k1_ns, k2_ns), self.params.odometry_sigmas
             with np.errstate(over="ignore", invalid="ignore"):  # what is no number then is refused
-                constraint = between_keyframes(closure, self.odometry, *moments, self.T_body_camera, sigmas)
+                constraint = between_keyframes(closure, self.odometry, *moments, T_body_camera, sigmas)
             self._refuse_implausible(k1, k2, constraint)
             covariance = floored(constraint.covariance, self.params.least_sigmas)
             self.ties.append(Tie(k1, k2, constraint._replace(covariance=covariance), closure))

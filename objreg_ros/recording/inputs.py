@@ -138,7 +138,7 @@ class Inputs:
         if self.points is None and self.depth is None:
             lacks.append("points or a depth image")
         elif self.points is None and self.camera_info is None:
-            lacks.append("the camera_info of the depth image")
+            lacks.append("the camera_info of the depth image (or --camera fx,fy,cx,cy)")
         return " and ".join(lacks)
 
     def wanted(self, source: str) -> str:

@@ -15,6 +15,7 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
+from objreg_ros.bridge.calibration import Calibration
 from objreg_ros.bridge.layout import fields_of
 from objreg_ros.data import Intrinsics
 from objreg_ros.geometry import quaternion_from_rotation
@@ -184,19 +185,25 @@ def image(pixels: Array, encoding: str, stamp_ns: int, frame_id: str) -> Any:
 
 def camera_info(camera: Intrinsics, stamp_ns: int, frame_id: str, distortion: Sequence[float] = (0,) * 5) -> Any:
     """sensor_msgs/CameraInfo of a pinhole camera with plumb-bob distortion."""
-    K = [camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1]
-    P = [camera.fx, 0, camera.cx, 0, 0, camera.fy, camera.cy, 0, 0, 0, 1, 0]
+    K = (camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0)
+    P = (camera.fx, 0.0, camera.cx, 0.0, 0.0, camera.fy, camera.cy, 0.0, 0.0, 0.0, 1.0, 0.0)
+    told = Calibration(k=K, p=P, width=camera.width, height=camera.height, d=tuple(distortion))
+    return told_camera_info(told, stamp_ns, frame_id)
+
+
+def told_camera_info(camera: Calibration, stamp_ns: int, frame_id: str) -> Any:
+    """sensor_msgs/CameraInfo of a camera that somebody names."""
     roi = message("sensor_msgs/RegionOfInterest", x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
     return message(
         "sensor_msgs/CameraInfo",
         header=header(stamp_ns, frame_id),
         height=camera.height,
         width=camera.width,
-        distortion_model="plumb_bob",
-        d=np.array(distortion, np.float64),
-        k=np.array(K, np.float64),
-        r=np.eye(3).ravel(),
-        p=np.array(P, np.float64),
+        distortion_model=camera.distortion_model,
+        d=np.array(camera.d, np.float64),
+        k=np.array(camera.k, np.float64),
+        r=np.array(camera.r, np.float64),
+        p=np.array(camera.p, np.float64),
         binning_x=0,
         binning_y=0,
         roi=roi,

@@ -15,7 +15,7 @@ from objreg_ros.bridge import from_msg, lenses
 from objreg_ros.bridge.layout import table
 from objreg_ros.data import Intrinsics
 from objreg_ros.recording.inputs import Inputs
-from objreg_ros.recording.mounts import static_frames
+from objreg_ros.recording.mounts import camera_on_body, first_readable, frame_of, static_frames
 from objreg_ros.recording.record import Record, Recording
 
 SAMPLE = 60  # messages of colour and depth whose stamps are compared
@@ -125,7 +125,7 @@ def warnings(recording: Recording, inputs: Inputs) -> list[str]:
         found.append("no odometry: the registrar follows the camera by itself, and the gate is less strict")
     if inputs.ground_truth is None:
         found.append("no ground truth: the true error of constraints cannot be told")
-    found += _mount_of_imu(recording, inputs)
+    found += [*_mount_of_camera(recording, inputs), *_mount_of_imu(recording, inputs)]
     return [*found, *_first_messages(recording, inputs), *_frames(recording, inputs), *_stamps(recording, inputs)]
 
 
@@ -174,6 +174,17 @@ def _frames(recording: Recording, inputs: Inputs) -> list[str]:
     ]
 
 
+def _mount_of_camera(recording: Recording, inputs: Inputs) -> list[str]:
+    """Whether it is known how the camera sits on the body of the odometry."""
+    body, camera, T_body_camera = camera_on_body(recording, inputs)
+    if body == camera or T_body_camera is not None:
+        return []
+    return [
+        f"odometry is of {body} and depth in {camera}, and no /tf_static ties them: they are taken to be one place; "
+        "set T_base_camera of registrar and mapper where they are not"
+    ]
+
+
 def _mount_of_imu(recording: Recording, inputs: Inputs) -> list[str]:
     """Whether it is known how the IMU sits on the camera."""
     camera, imu = (_frame_id(recording, topic) for topic in (inputs.depth or inputs.points, inputs.imu))
@@ -187,9 +198,7 @@ def _mount_of_imu(recording: Recording, inputs: Inputs) -> list[str]:
 
 def _frame_id(recording: Recording, topic: str | None) -> str:
     """The frame of a topic's first message; empty if it tells none."""
-    record = _first(recording, topic)
-    message = None if record is None else record.read()
-    return "" if message is None else str(message.header.frame_id).lstrip("/")
+    return frame_of(first_readable(recording, topic))
 
 
 def _stamps(recording: Recording, inputs: Inputs) -> list[str]:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The camera of a TUM RGB-D folder: ``camera.yaml``, and what is assumed where that says nothing.
 
+The file has the keys below, or is one of ROS's camera_calibration, to which ``depth_scale`` may be added.
+
 The benchmark's own advice for sequences without calibration is ROS's default camera, 525 px for pictures that are 640
 wide, and depth in steps of 0.2 mm. See Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM Systems" (2012).
 """
@@ -14,6 +16,7 @@ from typing import Any
 
 import yaml
 
+from objreg_ros.bridge.calibration import of_mapping
 from objreg_ros.data import Intrinsics
 from objreg_ros.lens import require_model
 from objreg_ros.recording.text import SETTINGS_BYTES, read_text
@@ -73,6 +76,8 @@ def _told(file: Path) -> dict[str, Any]:
     if not isinstance(values, dict):
         raise ValueError(f"{file}: expected a mapping like fx: 525.0, got {type(values).__name__}")
     told = {str(key): value for key, value in values.items() if value is not None}
+    if "camera_matrix" in told:
+        return _of_calibration(file, told)
     if not any(name in told for name in PINHOLE):
         got = ", ".join(told) or "nothing"
         raise ValueError(
@@ -80,6 +85,22 @@ def _told(file: Path) -> dict[str, Any]:
             "name them so, or remove the file for the benchmark's default camera"
         )
     return told
+
+
+def _of_calibration(file: Path, told: Mapping[str, Any]) -> dict[str, Any]:
+    """The keys of ours for a file of camera_calibration."""
+    try:
+        camera = of_mapping(told)
+    except ValueError as error:
+        raise ValueError(f"{file}: {error}") from error
+    if any(camera.d) and camera.distortion_model != "plumb_bob":
+        raise ValueError(
+            f"{file}: expected the model plumb_bob, got {camera.distortion_model}; name this file with --camera instead"
+        )
+    found = dict(zip(PINHOLE, (camera.k[0], camera.k[4], camera.k[2], camera.k[5]), strict=True))
+    size = {"width": camera.width, "height": camera.height} if camera.width else {}
+    scale = {"depth_scale": told["depth_scale"]} if "depth_scale" in told else {}
+    return {**found, **size, **scale, **({"distortion": list(camera.d)} if camera.d else {})}
 
 
 def _notes(file: Path, told: Mapping[str, Any], assumed: Mapping[str, float]) -> list[str]:

@@ -26,6 +26,7 @@ from objreg_ros.bridge.markers import Scene
 from objreg_ros.bridge.matching import MatchingDoor
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.sync import Match, Need, Stream
+from objreg_ros.bridge.transforms import hear_mount
 from objreg_ros.bridge.worker import Backlog, Limit
 from objreg_ros.data import Frame
 from objreg_ros.registrar.registrar import FrameWindow, Outcome, Registrar
@@ -56,7 +57,7 @@ class RegistrarNode(MatchingDoor):
     def __init__(self) -> None:
         super().__init__("registrar", RegistrarParams, RegistrarNodeParams)
         inputs = self.settings.of(RegistrarNodeParams)
-        self._T_base_camera, self._seconds = inputs.mounting, inputs.limit
+        self._mount, self._seconds = hear_mount(self, inputs.mounting), inputs.limit
         await_kernels(lambda: warm(self.settings.of(RegistrarParams)), self.get_logger().info)
         self._registrar = Registrar(self.settings.of(RegistrarParams))
         self._tracking, self._telling = threading.Lock(), threading.Lock()
@@ -124,12 +125,12 @@ class RegistrarNode(MatchingDoor):
         return window is None
 
     def _frame(self, match: Match) -> Frame:
-        odom = match["odom"]
+        odom, camera = match["odom"], match["objects"].header.frame_id
         self._without_odometry += odom is None
-        if odom:
-            self._odom_frame = odom[0].frame_id
+        self._odom_frame = odom[0].frame_id if odom else self._odom_frame
         topics = ("objects", "view", "view/camera_info", "gravity", "labels", "odom")
-        return self.read("frame", from_msg.frame, *(match[topic] for topic in topics), self._T_base_camera)
+        T_body_camera = self._mount.T_body_camera(odom, camera)
+        return self.read("frame", from_msg.frame, *(match[topic] for topic in topics), T_body_camera)
 
     def _watch_camera(self, frame_id: str) -> None:
         """Say so where the frames of two cameras come in turn."""

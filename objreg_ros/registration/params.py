@@ -92,7 +92,9 @@ class RegistrarNodeParams(Params):
         ge=0.0,
     )
     T_base_camera: tuple[float, ...] = param(
-        (), "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: the odometry is the camera's"
+        (),
+        "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: as /tf_static says, or the "
+        "odometry is the camera's",
     )
     search_seconds: float = param(0.0, "longest search for one keyframe; 0: as long as it takes", "s", ge=0.0)
     waiting_megabytes: int = param(200, "most memory of the keyframes that wait for a search", "MB", ge=1)

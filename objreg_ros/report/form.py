@@ -71,6 +71,7 @@ FIELDS: dict[str, tuple[str, Check]] = {
     "lens": ("text", _is_text),
     "rectified": ("auto, all or none", lambda value: value in ("auto", "all", "none")),
     "inputs": ("an object of topics by input", _each(_is_text)),
+    "camera": ("text", _is_text),
     "T_base_camera": ("seven numbers or none", _is_mounting),
     "frames": ("a count", _is_count),
     "detections": ("a count", _is_count),

@@ -23,24 +23,21 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from sensor_msgs.msg import Imu as ImuMessage
 
 from objreg_ros.bridge import from_msg, lenses, qos, to_msg, vision_to_msg
+from objreg_ros.bridge.calibration import fitted, read_calibration
 from objreg_ros.bridge.detections_in import DetectionsIn
 from objreg_ros.bridge.lifetime import await_kernels
 from objreg_ros.bridge.matching import MatchingDoor
 from objreg_ros.bridge.overridable import FIXED
 from objreg_ros.bridge.spin import run
-from objreg_ros.bridge.static_frames import StaticFrames
+from objreg_ros.bridge.static_frames import Mount
 from objreg_ros.bridge.sync import Match, Need, Stream
+from objreg_ros.bridge.transforms import hear_static_frames
 from objreg_ros.data import Array, ColourImage, DepthImage, Detections, FeltGravity, Frame, PointCloud
 from objreg_ros.segmenter.doubts import range_doubt, registration_doubt
 from objreg_ros.segmenter.imu import Imu
 from objreg_ros.segmenter.organise import organise
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
-
-try:
-    from tf2_msgs.msg import TFMessage
-except ImportError:  # no message of common_interfaces
-    TFMessage = None
 
 POINTS = {"points": PointCloud2}
 DEPTH = {"depth/image": Image, "depth/image/compressedDepth": CompressedImage}
@@ -60,9 +57,11 @@ class SegmenterNode(MatchingDoor):
         self._inputs = self.settings.of(SegmenterNodeParams)
         self._segmenter = Segmenter(self.settings.of(SegmenterParams))
         await_kernels(self._segmenter.warm, self.get_logger().info)
-        self._camera_info: Any = None
-        self._frames = StaticFrames()
-        self._imu = Imu(self._inputs.imu_mounting, self._frames.between)
+        self._camera_info: Any = read_calibration(self._inputs.camera) if self._inputs.camera else None
+        mounting = self._inputs.mounting if self._inputs.level_odom else self._inputs.imu_mounting
+        frames = hear_static_frames(self, mounting is None)
+        self._imu = Imu(self._inputs.imu_mounting, frames.between)
+        self._mount = Mount(self._inputs.mounting, frames.between, self.get_logger().info)
         self._told: Counter[str] = Counter()  # frames by who told their gravity
         self._apart_deg: deque[float] = deque(maxlen=COMPARED)
         self._source: str | None = None  # the topic that depth comes by
@@ -76,9 +75,7 @@ class SegmenterNode(MatchingDoor):
         self._listen()
 
     def _listen(self) -> None:
-        self.listen(CameraInfo, "camera_info", self._hear_camera, self.sensor(), watched="camera_info")
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._look = self.create_timer(LOOK_S, self._look_for_kept_camera, clock=steady)
+        self._listen_for_camera()
         if self._inputs.source != "points":
             self._listen_for_colour()
         sources = SOURCES[self._inputs.source]
@@ -86,13 +83,17 @@ class SegmenterNode(MatchingDoor):
         if self._inputs.level_odom:
             self.listen(Odometry, "odom", self._hear_odom, self.sensor(qos.ODOMETRY))
         else:
-            self._listen_for_imu()
+            self.listen(ImuMessage, "imu", self._hear_imu, self.sensor(qos.ODOMETRY))
         self._detections = DetectionsIn(self, self._inputs.detections)
 
-    def _listen_for_imu(self) -> None:
-        self.listen(ImuMessage, "imu", self._hear_imu, self.sensor(qos.ODOMETRY))
-        if TFMessage is not None and self._inputs.imu_mounting is None:
-            self.listen(TFMessage, "/tf_static", self._frames.hear, qos.latched(depth=100))
+    def _listen_for_camera(self) -> None:
+        """The camera of the parameter where there is one, and no camera_info is awaited."""
+        if self._camera_info is not None:
+            self.feed("camera_info", 0, self._camera_info)
+            return
+        self.listen(CameraInfo, "camera_info", self._hear_camera, self.sensor(), watched="camera_info")
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._look = self.create_timer(LOOK_S, self._look_for_kept_camera, clock=steady)
 
     def _listen_for_colour(self) -> None:
         if self._inputs.colour:
@@ -186,8 +187,9 @@ class SegmenterNode(MatchingDoor):
     def compute(self, stamp_ns: int, payload: Match) -> bool:
         """One depth image or cloud with its detections."""
         raw = self._raw_pictures()
-        depth, cloud = self._depth(payload, raw)
-        asked = self._detections.read(payload, depth, self._camera_of(payload), raw, cloud)
+        camera_info = self.read("camera_info", fitted, self._camera_of(payload), payload["depth"])
+        depth, cloud = self._depth(payload, camera_info, raw)
+        asked = self._detections.read(payload, depth, camera_info, raw, cloud)
         gravity, felt = self._level_gravity(payload), self._felt_gravity(payload, depth.frame_id)
         with self.ledger.timed("segment"):
             told = (gravity, None) if felt is None else (felt.gravity, felt.gravity_sigma_deg)
@@ -198,7 +200,9 @@ class SegmenterNode(MatchingDoor):
         return True
 
     def _level_gravity(self, match: Match) -> Array | None:
-        gravity = from_msg.level_gravity(match.stamp_ns, match.payloads.get("odom"), self._inputs.mounting)
+        odom = match.payloads.get("odom")
+        T_body_camera = self._mount.T_body_camera(odom, match["depth"].header.frame_id)
+        gravity = from_msg.level_gravity(match.stamp_ns, odom, T_body_camera)
         if gravity is None and self._inputs.level_odom:
             self.throttled.remind(
                 "level_odom", "expected odometry around a frame, as level_odom is on, got none: gravity is estimated; "
@@ -264,15 +268,15 @@ class SegmenterNode(MatchingDoor):
             self._lens = lens
             self.get_logger().info(f"lens: {lens}")
 
-    def _depth(self, match: Match, raw: lenses.Raw) -> tuple[DepthImage, PointCloud | None]:
+    def _depth(self, match: Match, camera_info: Any, raw: lenses.Raw) -> tuple[DepthImage, PointCloud | None]:
         """The depth image, and the cloud where it comes of one."""
         if "camera_info" in match.payloads:
-            messages = match["depth"], match["camera_info"], match["image"]
+            messages = match["depth"], camera_info, match["image"]
             depth = self.read("depth", lenses.depth_image, *messages, self.most_pixels, raw)
-            self._tell_lens(match["camera_info"], raw)
+            self._tell_lens(camera_info, raw)
             return depth, None
         cloud = self.read("points", from_msg.point_cloud, match["depth"])
-        camera = self.read("camera_info", from_msg.camera_of_cloud, self._camera_info, cloud, self.most_pixels)
+        camera = self.read("camera_info", from_msg.camera_of_cloud, camera_info, cloud, self.most_pixels)
         with self.ledger.timed("organise"):
             return organise(cloud, camera), cloud
 

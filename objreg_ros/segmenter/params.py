@@ -77,12 +77,19 @@ class SegmenterNodeParams(Params):
         "rect in its name; the others are rectified here",
         choices=("auto", "all", "none"),
     )
+    camera: str = param(
+        "",
+        "the camera in place of camera_info: fx,fy,cx,cy[,width,height] in pixels, or a file as camera_calibration "
+        "writes it; of another size of the same shape it is scaled",
+    )
     colour: bool = param(True, "take the colour of the points from `image` when depth comes as an image")
     level_odom: bool = param(
         False, "take gravity from `odom`, whose frame an IMU keeps level with z up; frames are no more often than it"
     )
     T_base_camera: tuple[float, ...] = param(
-        (), "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: the odometry is the camera's"
+        (),
+        "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: as /tf_static says, or the "
+        "odometry is the camera's",
     )
 
     T_camera_imu: tuple[float, ...] = param(

@@ -5,12 +5,13 @@ import array
 import struct
 import tracemalloc
 import zlib
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
-from objreg_ros.bridge.pictures import colour_pixels, depth_metres, unpack_rgb
+from objreg_ros.bridge.pictures import colour_pixels, depth_metres, size_of, unpack_rgb
 
 from . import messages
 
@@ -45,6 +46,117 @@ def test_grey_has_three_equal_channels(encoding: str, value: int, big: bool) -> 
     assert (colour_pixels(messages.image(pixels, encoding, 2, big)) == 7).all()
 
 
+@pytest.mark.parametrize("big", [False, True])
+@pytest.mark.parametrize(("encoding", "order"), [("rgb16", (0, 1, 2)), ("bgr16", (2, 1, 0))])
+def test_colour_of_16_bits_keeps_the_upper_eight(encoding: str, order: tuple[int, ...], big: bool) -> None:
+    pixels = (flat(*RED).astype("u2")[..., order] << 8) + 77
+    assert (colour_pixels(messages.image(pixels, encoding, 2, big)) == RED).all()
+
+
+def quarters() -> np.ndarray:
+    """Red, green, blue and grey, in a quarter of the picture (16, 24) each."""
+    rgb = np.zeros((16, 24, 3), np.uint8)
+    rgb[:8, :12], rgb[:8, 12:], rgb[8:, :12], rgb[8:, 12:] = (200, 30, 10), (20, 180, 40), (10, 20, 210), (90, 90, 90)
+    return rgb
+
+
+def mosaic(rgb: np.ndarray, pattern: str) -> np.ndarray:
+    """What a sensor behind a filter of four letters, those of its first two rows, measures of a picture."""
+    raw = np.zeros(rgb.shape[:2], np.uint8)
+    for i, letter in enumerate(pattern):
+        y, x = divmod(i, 2)
+        raw[y::2, x::2] = rgb[y::2, x::2, "rgb".index(letter)]
+    return raw
+
+
+def within_quarters(rgb: np.ndarray) -> np.ndarray:
+    """The pixels that do not mix with those of another quarter, (4, 6, 10, 3)."""
+    halves = rgb.reshape(2, 8, 2, 12, 3).swapaxes(1, 2).reshape(4, 8, 12, 3)
+    return halves[:, 1:-1, 1:-1].astype(int)
+
+
+@pytest.mark.parametrize("pad", [0, 4])
+@pytest.mark.parametrize("bits", [8, 16])
+@pytest.mark.parametrize("pattern", ["rggb", "bggr", "gbrg", "grbg"])
+def test_a_bayer_picture_gives_the_colours_that_its_sensor_saw(pattern: str, bits: int, pad: int) -> None:
+    raw = mosaic(quarters(), pattern)
+    pixels = raw if bits == 8 else raw.astype("u2") << 8
+    rgb = colour_pixels(messages.image(pixels, f"bayer_{pattern}{bits}", pad))
+    assert rgb.shape == (16, 24, 3) and rgb.dtype == np.uint8
+    np.testing.assert_array_equal(within_quarters(rgb), within_quarters(quarters()))
+
+
+def bt601(rgb: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Y, U and V of ITU-R BT.601 in the range of video, (H, W) each."""
+    turn = np.array([[65.481, 128.553, 24.966], [-37.797, -74.203, 112.0], [112.0, -93.786, -18.214]])
+    yuv = np.rint(rgb / 255.0 @ turn.T + (16, 128, 128)).astype(np.uint8)
+    return yuv[..., 0], yuv[..., 1], yuv[..., 2]
+
+
+def interleaved(rgb: np.ndarray, order: str) -> np.ndarray:
+    """(H, W, 2): brightness and, in turn, U and V, in the order of ``uyvy`` or ``yuyv``."""
+    y, u, v = bt601(rgb)
+    chroma = np.where(np.arange(rgb.shape[1]) % 2 == 0, u, v)
+    return np.stack([chroma, y] if order == "uyvy" else [y, chroma], axis=-1)
+
+
+@pytest.mark.parametrize("pad", [0, 6])
+@pytest.mark.parametrize(
+    ("encoding", "order"), [("yuv422", "uyvy"), ("uyvy", "uyvy"), ("yuv422_yuy2", "yuyv"), ("yuyv", "yuyv")]
+)
+def test_a_yuv_picture_gives_the_colours_that_were_put_in(encoding: str, order: str, pad: int) -> None:
+    rgb = colour_pixels(messages.image(interleaved(quarters(), order), encoding, pad))
+    np.testing.assert_allclose(rgb.astype(int), quarters(), atol=3)
+
+
+def planes(encoding: str, pad: int = 0) -> Any:
+    """`quarters` as brightness and, behind it, pairs of colour; ``pad`` bytes behind each row."""
+    y, u, v = bt601(quarters())
+    every = 1 if encoding == "nv24" else 2
+    pairs = np.stack([c[::every, ::every] for c in ((v, u) if encoding == "nv21" else (u, v))], axis=-1)
+    message = messages.image(y, encoding, pad)
+    rows = pairs.reshape(len(pairs), -1)
+    behind = pad * rows.shape[1] // y.shape[1]
+    message.data += np.pad(rows, ((0, 0), (0, behind)), constant_values=77).tobytes()
+    return message
+
+
+@pytest.mark.parametrize("pad", [0, 8])
+@pytest.mark.parametrize("encoding", ["nv12", "nv21", "nv24"])
+def test_a_picture_whose_colour_comes_behind_its_brightness_gives_what_was_put_in(encoding: str, pad: int) -> None:
+    rgb = colour_pixels(planes(encoding, pad))
+    assert rgb.shape == (16, 24, 3) and rgb.flags.c_contiguous
+    np.testing.assert_allclose(rgb.astype(int), quarters(), atol=3)
+
+
+@pytest.mark.parametrize("encoding", ["nv12", "nv24"])
+def test_planes_that_are_cut_off_or_overlap_are_refused(encoding: str) -> None:
+    message = planes(encoding)
+    whole, message.data = len(message.data), message.data[:-1]
+    with pytest.raises(ValueError, match=f"expected {whole} bytes for 24 × 16, got {whole - 1}; truncated"):
+        colour_pixels(message)
+    message.step = 20
+    with pytest.raises(ValueError, match=f"expected a step of at least 24 bytes for {encoding}, got 20"):
+        colour_pixels(message)
+    message.width = message.step = 2**30
+    with pytest.raises(ValueError, match="expected at most"):
+        colour_pixels(message)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "width", "height", "wanted"),
+    [
+        ("yuyv", 5, 4, "an even width"),
+        ("bayer_grbg8", 5, 4, "an even width and height"),
+        ("nv21", 4, 5, "an even width and height"),
+    ],
+)
+def test_a_size_that_leaves_half_a_colour_is_refused(encoding: str, width: int, height: int, wanted: str) -> None:
+    message = messages.image(np.zeros((height, width, 2), np.uint8), encoding)
+    with pytest.raises(ValueError, match=f"expected {wanted} for {encoding}, got {width} × {height}"):
+        colour_pixels(message)
+
+
 @pytest.mark.parametrize("holder", [bytes, lambda data: array.array("B", data), lambda d: np.frombuffer(d, np.uint8)])
 def test_the_data_may_be_of_any_kind_of_buffer(holder: object) -> None:
     message = messages.image(flat(200, 30, 10), "rgb8")
@@ -53,8 +165,8 @@ def test_the_data_may_be_of_any_kind_of_buffer(holder: object) -> None:
 
 
 def test_an_unknown_encoding_is_named() -> None:
-    with pytest.raises(ValueError, match="got 'bayer_rggb16'"):
-        colour_pixels(messages.image(flat(1), "bayer_rggb16"))
+    with pytest.raises(ValueError, match="got 'bayer'"):
+        colour_pixels(messages.image(flat(1), "bayer"))
     with pytest.raises(ValueError, match="depth: expected an encoding of 16UC1, mono16, 32FC1, got 'rgb8'"):
         depth_metres(messages.image(flat(1, 2, 3), "rgb8"))
 
@@ -250,3 +362,13 @@ def test_a_colour_png_is_no_depth() -> None:
 
 def test_packed_colours_come_apart() -> None:
     assert unpack_rgb(np.array([[0xFF010203, 0x000A0B0C]], "u4")).tolist() == [[[1, 2, 3], [10, 11, 12]]]
+
+
+@pytest.mark.parametrize("kind", [".jpg", ".png"])
+def test_the_size_is_told_before_any_pixel_is_decoded(kind: str) -> None:
+    data = cv2.imencode(kind, np.zeros((4, 6, 3), np.uint8))[1].tobytes()
+    assert size_of(messages.image(flat(1, 2, 3), "rgb8")) == size_of(messages.compressed(data, "jpeg")) == (6, 4)
+    depth = bytes(12) + cv2.imencode(".png", np.zeros((4, 6), np.uint16))[1].tobytes()
+    assert size_of(messages.compressed(depth, "16UC1; compressedDepth png")) == (6, 4)
+    with pytest.raises(ValueError, match="expected jpeg or png, got 3 bytes that do not begin so"):
+        size_of(messages.compressed(b"abc", "jpeg"))

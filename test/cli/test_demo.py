@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from recording.folders import CAMERA, records, tum_folder, uncalibrated
 
-from objreg_ros.cli.demo import Asked, _draw, calibrated, camera_of, mounting_of, run, setup_of
+from objreg_ros.cli.demo import Asked, _draw, calibrated, camera_asked, camera_of, mounting_of, run, setup_of
 from objreg_ros.recording import open_recording, write_rosbag2
 from objreg_ros.recording.inputs import Inputs, parse_remaps
 from objreg_ros.truth import Truth
@@ -141,3 +141,9 @@ def test_a_picture_that_needs_what_is_not_installed_is_left_out_and_the_demo_say
     _draw(tmp_path, live, Truth([(0, np.eye(4)), (1, np.eye(4))]), source, Inputs(image="/a"))
     (line,) = capsys.readouterr().err.splitlines()
     assert "did not draw" in line and "pip install 'objreg_ros[simulation]'" in line
+
+
+def test_a_camera_that_is_told_reaches_the_player_by_its_option_or_by_the_segmenters_parameter() -> None:
+    assert camera_asked(replace(ASKED, camera="5,5,2,1")) == "5,5,2,1" and camera_asked(ASKED) == ""
+    assert camera_asked(replace(ASKED, changes=("segmenter.camera=6,6,2,1",))) == "6,6,2,1"
+    assert setup_of(ASKED, INPUTS, "5,5,2,1").replay_args[2:4] == ["--camera", "5,5,2,1"]

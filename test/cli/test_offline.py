@@ -166,3 +166,20 @@ def test_the_segmenters_colour_reaches_the_run(
     monkeypatch.setattr("objreg_ros.cli.offline.run_offline", lambda *words: seen.append(words[3]) or Run())
     offline(tum_folder(tmp_path), "--model", model, "--set", f"segmenter.colour={str(colour).lower()}")
     assert seen[0].colour is colour
+
+
+def test_a_camera_that_is_told_takes_the_place_of_the_recordings_and_is_named_in_the_json(
+    model: Path, tmp_path: Path
+) -> None:
+    folder, file = tum_folder(tmp_path / "tum", frames=2), tmp_path / "out.json"
+    bare = tmp_path / "bare"
+    write_rosbag2(bare, [r for r in read(folder) if r.topic != "/camera_info"])
+    with pytest.raises(ValueError, match=r"expected the camera_info of the depth image \(or --camera fx,fy,cx,cy\)"):
+        offline(bare, "--model", model)
+    output = offline(bare, "--model", model, "--json", file, "--camera", "50,50,31.5,23.5")
+    summary = json.loads(file.read_text())
+    assert "2 frames" in output and summary["camera"] == "50,50,31.5,23.5"
+    assert summary["inputs"]["camera_info"] == "/told/camera_info" and not summary["dropped"]
+    assert "2 frames" in offline(folder, "--model", model, "--set", "segmenter.camera=100,100,63.5,47.5,128,96")
+    with pytest.raises(ValueError, match="expected a picture of 640 × 360 or of that shape, got 64 × 48"):
+        offline(folder, "--model", model, "--camera", "500,500,320,180,640,360")

@@ -259,3 +259,10 @@ def test_an_input_that_cannot_be_played_is_refused(tmp_path: Path) -> None:
         ),
     ):
         playable_names(source, Inputs(image="/image", points="/meta"))
+
+
+def test_a_camera_that_is_told_goes_out_once_and_is_kept_for_who_comes_late(stage: Stage, folder: Path) -> None:
+    replay(folder, "--camera", "100,100,63.5,47.5,128,96", "--start", "0.1")
+    ((_, _, items),) = stage.plays
+    assert [item.topic for item in items].count("camera_info") == 1 and items[0].topic == "camera_info"
+    assert "camera_info" in stage.latched and items[0].stamp_ns == STEP_NS

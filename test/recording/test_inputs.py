@@ -270,7 +270,10 @@ def test_an_empty_topic_is_no_input() -> None:
 
 def test_what_is_missing_is_said() -> None:
     assert choose_inputs(topics("/odom:odom")).missing == "a colour image and points or a depth image"
-    assert choose_inputs(topics("/image /depth/image")).missing == "the camera_info of the depth image"
+    assert (
+        choose_inputs(topics("/image /depth/image")).missing
+        == "the camera_info of the depth image (or --camera fx,fy,cx,cy)"
+    )
     assert choose_inputs(topics("/image /points:points")).missing == ""
 
 

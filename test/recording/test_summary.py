@@ -59,7 +59,9 @@ def test_a_good_recording_has_no_warning_but_of_its_missing_truth(tmp_path: Path
 
 def test_what_keeps_the_graph_from_running_is_said(tmp_path: Path) -> None:
     recording = bag(tmp_path / "bag", [r for r in records() if r.topic in ("/image", "/depth/image")])
-    assert "the graph cannot run: expected the camera_info of the depth image" in said(recording)
+    assert "the graph cannot run: expected the camera_info of the depth image (or --camera fx,fy,cx,cy)" in said(
+        recording
+    )
 
 
 def test_depth_that_does_not_fit_its_camera_is_said(tmp_path: Path) -> None:

@@ -78,3 +78,26 @@ def test_yaml_that_nests_or_says_what_no_reader_takes_is_refused_in_one_line(tex
 def test_distortion_that_is_no_lens_of_a_plumb_bob_is_refused(value: str, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"camera\.yaml: .*expected (4 or 5|finite) coefficients of plumb_bob, got"):
         camera(tmp_path, f"{WHOLE}\ndistortion: {value}")
+
+
+CALIBRATED = (
+    "image_width: 640\nimage_height: 480\ncamera_name: kinect\n"
+    "camera_matrix: {rows: 3, cols: 3, data: [585, 0, 320, 0, 580, 240, 0, 0, 1]}\n"
+    "distortion_model: plumb_bob\ndistortion_coefficients: {rows: 1, cols: 5, data: [0.1, 0, 0, 0, 0.2]}\n"
+)
+
+
+def test_a_file_of_camera_calibration_will_do_and_depth_scale_may_be_added(tmp_path: Path) -> None:
+    read = camera(tmp_path, f"{CALIBRATED}depth_scale: 1000")
+    assert pinhole(read) == (585, 580, 320, 240) and (read.intrinsics.width, read.intrinsics.height) == (640, 480)
+    assert (read.depth_scale, read.distortion, read.notes) == (1000, (0.1, 0, 0, 0, 0.2), ())
+    (note,) = camera(tmp_path, CALIBRATED).notes
+    assert note.endswith("assumed: depth_scale 5000")
+
+
+def test_a_calibration_that_is_none_or_of_a_lens_that_the_folder_cannot_have_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"camera\.yaml: expected 9 numbers in camera_matrix, got 8"):
+        camera(tmp_path, CALIBRATED.replace("585, ", ""))
+    fish = CALIBRATED.replace("plumb_bob", "equidistant").replace("0.1, 0, 0, 0, 0.2", "0.1, 0, 0, 0")
+    with pytest.raises(ValueError, match="expected the model plumb_bob, got equidistant; name this file with --camera"):
+        camera(tmp_path, fish)

@@ -47,7 +47,7 @@ class Camera:
         self.executor.add_node(self.door)
         self.executor.add_node(self.node)
         self.wait(lambda: min(p.get_subscription_count() for p in (self.depth, self.table, self.labels)) > 0)
-        self.wait(lambda: len(self.door.connected) >= 4)
+        self.wait(lambda: len(self.door.connected) >= (3 if self.door._inputs.camera else 4))
 
     def wait(self, done: Callable[[], Any], seconds: float = 20.0) -> None:
         end = time.monotonic() + seconds
@@ -74,10 +74,12 @@ class Camera:
 
 
 @pytest.fixture
-def made(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[bool], Camera]]:
+def made(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Iterator[Callable[[bool], Camera]]:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     monkeypatch.setattr(Segmenter, "warm", lambda self: None)
-    rclpy.init(args=["--ros-args", "-p", "colour:=false"], domain_id=100 + os.getpid() % 100)
+    rclpy.init(
+        args=["--ros-args", "-p", "colour:=false", *getattr(request, "param", ())], domain_id=100 + os.getpid() % 100
+    )
     cameras: list[Camera] = []
 
     def make(kept: bool = True, **lens: Any) -> Camera:
@@ -196,3 +198,17 @@ def test_a_frame_of_a_lens_that_nobody_knows_is_dropped_and_counted(made: Callab
     (line,) = camera.said
     assert 'expected a distortion model of plumb_bob, rational_polynomial, equidistant, got "nobody\'s"' in line
     assert "set segmenter.rectified to all" in line
+
+
+@pytest.mark.parametrize("made", [("-p", 'camera:="600,600,320,240,640,480"')], indirect=True)  # of twice the size
+def test_the_camera_of_the_parameter_holds_and_no_camera_info_is_heard(
+    monkeypatch: pytest.MonkeyPatch, made: Callable[..., Camera]
+) -> None:
+    camera = made()
+    met = spied(camera, monkeypatch)
+    camera.see(1.2, "eye", "eye")
+    ((_, depth),) = met
+    assert camera.said == []
+    told = depth.intrinsics
+    assert (told.fx, told.fy, told.cx, told.cy, told.width) == (300, 300, 159.75, 119.75, 320)
+    assert "/camera_info" not in camera.door.connected and not camera.door.watch.silent()

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A recording with the camera that its user tells, in place of every camera_info that it holds.
+
+So the graph, a replay of it and the pages about it take the camera as they take any camera_info.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from itertools import chain
+from typing import Any
+
+from rosbags.interfaces import Qos
+
+from objreg_ros.bridge.calibration import Calibration, fitted, read_calibration
+from objreg_ros.recording import messages
+from objreg_ros.recording.inputs import CAMERA_INFO, choose_inputs
+from objreg_ros.recording.record import Record, Recording, Topic
+
+TOLD = "/told/camera_info"  # the topic that it comes by
+
+
+class ToldCamera(Recording):
+    """The recording ``of``, with one camera_info on `TOLD` before everything else, which late subscribers get too."""
+
+    def __init__(self, of: Recording, camera: Calibration, frame_id: str) -> None:
+        self._of, self._camera, self._frame_id = of, camera, frame_id
+        self.path, self.kind = of.path, of.kind
+        others = sorted(of.topics.keys() - _without_cameras(of).keys())
+        self.notes = [*of.notes, *([f"not used, as a camera is told: {', '.join(others)}"] if others else [])]
+        self.start_ns, self.end_ns = of.start_ns, of.end_ns
+        self.topics = {**_without_cameras(of), TOLD: Topic(TOLD, CAMERA_INFO, 1)}
+
+    def records(
+        self, topics: Collection[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
+    ) -> Iterator[Record]:
+        """See `Recording.records`."""
+        wanted = set(self.topics if topics is None else topics)
+        within = (start_ns is None or start_ns <= self.start_ns) and (end_ns is None or end_ns > self.start_ns)
+        told = [Record.made(TOLD, CAMERA_INFO, self.start_ns, self._message)] if within and TOLD in wanted else []
+        others = (wanted & self.topics.keys()) - {TOLD}
+        return chain(told, self._of.records(others, start_ns, end_ns) if others else ())
+
+    def obstacles(self, shipped_only: bool = True) -> dict[str, str]:
+        """See `Recording.obstacles`; the camera has none."""
+        return {name: why for name, why in self._of.obstacles(shipped_only).items() if name in self.topics}
+
+    def offered_qos(self) -> dict[str, list[Qos]]:
+        """See `Recording.offered_qos`."""
+        return {name: offers for name, offers in self._of.offered_qos().items() if name in self.topics}
+
+    @property
+    def latched(self) -> dict[str, int]:
+        """See `Recording.latched`; the camera is."""
+        return {**{name: depth for name, depth in self._of.latched.items() if name in self.topics}, TOLD: 1}
+
+    def _message(self) -> Any:
+        return messages.told_camera_info(self._camera, self.start_ns, self._frame_id)
+
+    def close(self) -> None:
+        """Let go of the files."""
+        self._of.close()
+
+
+def with_camera(
+    recording: Recording, told: str, remaps: Mapping[str, str] | None = None, source: str = "auto"
+) -> Recording:
+    """The recording with the camera that ``told`` names, see `read_calibration`; as it is where that is empty.
+
+    ``remaps`` and ``source`` say which pictures the camera is of, as to `choose_inputs`. ValueError for what is no
+    camera, and for one of pictures of another shape.
+    """
+    if not told:
+        return recording
+    camera = read_calibration(told)
+    asked = {name: topic for name, topic in (remaps or {}).items() if name != "camera_info"}
+    topics = {**_without_cameras(recording), TOLD: Topic(TOLD, CAMERA_INFO, 1)}
+    inputs = choose_inputs(topics, asked, source)
+    picture = inputs.depth or inputs.points or inputs.image
+    read = (record.read() for record in recording.records([picture])) if picture else iter(())
+    first = next((message for message in read if message is not None), None)
+    if first is None:
+        return ToldCamera(recording, camera, "")
+    try:
+        return ToldCamera(recording, fitted(camera, first), str(first.header.frame_id))
+    except ValueError as error:
+        raise ValueError(f"{recording.path}: {picture}: {error}") from error
+
+
+def _without_cameras(recording: Recording) -> dict[str, Topic]:
+    return {name: topic for name, topic in recording.topics.items() if topic.msgtype != CAMERA_INFO}

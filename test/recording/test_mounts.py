@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from objreg_ros.geometry import pose, rotation_from_vector
+from objreg_ros.recording import Record, messages, open_recording, write_rosbag2
+from objreg_ros.recording.inputs import choose_inputs
+from objreg_ros.recording.mounts import TRANSFORMS, camera_on_body, static_frames, static_topics
+from objreg_ros.recording.summary import warnings
+
+from .folders import CAMERA
+
+T_BODY_CAMERA = pose(rotation_from_vector(np.array([0.1, -1.2, 0.3])), np.array([0.2, 0.0, 0.5]))
+
+
+def static(parent: str, child: str, T_parent_child: np.ndarray, stamp_ns: int, topic: str = "/tf_static") -> Record:
+    moved = messages.pose(T_parent_child)
+    place = messages.message("geometry_msgs/Vector3", x=moved.position.x, y=moved.position.y, z=moved.position.z)
+    transform = messages.message("geometry_msgs/Transform", translation=place, rotation=moved.orientation)
+    head = messages.header(stamp_ns, parent)
+    one = messages.message("geometry_msgs/TransformStamped", header=head, child_frame_id=child, transform=transform)
+    return Record.of(topic, messages.message("tf2_msgs/TFMessage", transforms=[one]), stamp_ns)
+
+
+def bag(place: Path, *more: Record, child: str = "base", camera: str = "eye") -> Path:
+    """Depth of a camera and odometry of a body, and more."""
+    odometry = messages.odometry(np.eye(4), np.eye(6), 1, "odom", child)
+    depth = messages.image(np.full((48, 64), 1000, np.uint16), "16UC1", 1, camera)
+    told = messages.camera_info(CAMERA, 1, camera)
+    said = {"/odom": odometry, "/depth/image": depth, "/camera_info": told}
+    write_rosbag2(place, [*(Record.of(topic, message, 1) for topic, message in said.items()), *more])
+    return place
+
+
+def test_the_camera_on_the_body_of_the_odometry_is_what_tf_static_says_whenever(tmp_path: Path) -> None:
+    late = static("/base", "/eye", T_BODY_CAMERA, 99, "/robot/tf_static")
+    with open_recording(bag(tmp_path / "bag", late)) as source:
+        assert static_topics(source) == ["/robot/tf_static"] and source.topics["/robot/tf_static"].msgtype == TRANSFORMS
+        body, camera, T = camera_on_body(source, choose_inputs(source.topics))
+        assert (body, camera) == ("base", "eye") and pytest.approx(T_BODY_CAMERA, abs=1e-9) == T
+        assert not [text for text in warnings(source, choose_inputs(source.topics)) if "tf_static" in text]
+
+
+def test_a_body_that_nothing_ties_to_the_camera_is_told_with_what_to_do(tmp_path: Path) -> None:
+    with open_recording(bag(tmp_path / "bag")) as source:
+        assert camera_on_body(source, choose_inputs(source.topics)) == ("base", "eye", None)
+        assert static_frames(source).between("base", "eye") is None
+        (text,) = [text for text in warnings(source, choose_inputs(source.topics)) if "tf_static" in text]
+        assert text.startswith("odometry is of base and depth in eye") and "set T_base_camera" in text
+
+
+@pytest.mark.parametrize("names", [{"child": ""}, {"camera": ""}, {"child": "eye"}])
+def test_odometry_of_the_camera_itself_and_frames_without_a_name_are_no_trouble(
+    names: dict[str, str], tmp_path: Path
+) -> None:
+    with open_recording(bag(tmp_path / "bag", **names)) as source:
+        assert not [text for text in warnings(source, choose_inputs(source.topics)) if "tf_static" in text]
