@@ -25,6 +25,7 @@ from objreg_ros.registration.propose.prior import Prior
 from objreg_ros.registration.result import Registration
 
 LEAST_ODDS = 5.0  # of what waits: with even odds slides of 15 to 20 cm confirm each other
+LEAST_MARGIN = 0.02  # of the view score over a perturbation: where nothing holds a pose, its neighbours slide alike
 SUPPORTERS = 3  # that agree with it and each other
 LEAST_SHARE = 0.85  # of what is said of its place, that agrees
 OPPOSED_SHARE = 0.5  # what the gate accepts waits below
@@ -105,7 +106,9 @@ class Confirmation:
         return confirmed, refused
 
     def _possible(self, candidate: Candidate, prior: Prior | None) -> bool:
-        return check_possible(candidate, prior, self._limits) is None
+        margin = candidate.perturbation_margin
+        held = margin is None or margin >= LEAST_MARGIN
+        return held and check_possible(candidate, prior, self._limits) is None
 
     def _settled(self, waiting: Waiting, support: Support) -> bool:
         """Whether it is published after all."""

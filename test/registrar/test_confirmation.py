@@ -128,6 +128,12 @@ def test_what_is_impossible_or_unlikely_never_waits(evidence: dict[str, object])
     assert isinstance(confirmation.hear(tried(0.4, **poor)), Rejected)
 
 
+@pytest.mark.parametrize(("margin", "kind"), [(0.01, Rejected), (0.03, Held)])
+def test_what_nothing_holds_is_not_confirmed_by_neighbours_that_slide_alike(margin: float, kind: type) -> None:
+    loose = {**DOUBTFUL, "texture": 0.3, "perturbation_margin": margin}
+    assert isinstance(Confirmation(PARAMS).hear(tried(0.4, **loose)), kind)
+
+
 def test_nothing_waits_where_no_time_is_given() -> None:
     confirmation = Confirmation(PARAMS.replaced(confirm_seconds=0.0))
     for at_m in (0.0, 0.2, 0.3):

@@ -6,11 +6,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from objreg_ros.data import UNNAMED, Reason
-from objreg_ros.registration.candidate import Candidate, ObjectPair
+from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.gate.refusal import Refusal
 
 SEVERAL = 2  # matched objects; fewer tell where one thing is, and not which way the camera looked at it
-PROPOSERS = 2  # independent, that make up for a second object
 LEAST_UNNAMED = 3  # matched objects without a name that make up for one with a name
 UNNAMED_COUNTS = 0.5  # of what an object with a name counts: any two of these may be taken for one
 SAME_EVIDENCE = {"centroids": "objects", "odometry": "objects"}
@@ -18,9 +17,9 @@ SAME_EVIDENCE = {"centroids": "objects", "odometry": "objects"}
 drifting odometry expects is refined to whatever the objects fit nearby, right or wrong."""
 
 
-def is_lone(candidate: Candidate) -> bool:
-    """Whether no second object and too few independent proposers confirm the pose."""
-    return counted(candidate.matched) < SEVERAL and independent(candidate.agreeing_proposers) < PROPOSERS
+def is_lone(matched: Sequence[ObjectPair]) -> bool:
+    """Whether no second object speaks for the pose: what moved alone agrees with itself, whoever proposed it."""
+    return counted(matched) < SEVERAL
 
 
 def independent(proposers: Iterable[str]) -> int:

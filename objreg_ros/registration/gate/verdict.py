@@ -86,7 +86,9 @@ def check_alone(one: Candidate, limits: Limits = LIMITS) -> Refusal | None:
     labels = [pair.label for pair in one.matched]
     return (
         objects.check_matched(one.matched, limits.unnamed)
-        or surroundings.check(one.surroundings, one.verification, labels, objects.is_lone(one), limits.surroundings)
+        or surroundings.check(
+            one.surroundings, one.verification, labels, objects.is_lone(one.matched), limits.surroundings
+        )
         or competing.check(one.margin_over_competing, limits.score_margin)
         or observability.check(len(one.alignment.degenerate))
     )
