@@ -22,9 +22,7 @@ class Limits(NamedTuple):
     tested: int = 600  # least number of pixels of both views that land in the other one
     inliers: float = 0.35  # least share of those whose depth agrees
     correlation_loss: float = 0.25  # largest, from the whole views to the surroundings
-    score: float = (
-        0.25  # least view score around a lone object: five false ones had less, and a fifth of the right ones
-    )
+    score: float = 0.25  # least view score around a lone object: five of five false ones had less, 45 of 321 right ones
 
 
 LIMITS = Limits()
