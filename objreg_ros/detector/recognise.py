@@ -34,14 +34,20 @@ def recognise(graph: Graph, named: str = "auto") -> Contract:
     sizes = any(port.name == SIZES for port in graph.inputs)
     if set(TOLD) <= set(graph.probe) and (named == "detr" or (named == "auto" and sizes)):
         return DetrTold.of(graph)
-    if named == "tf_detection" or (named == "auto" and (graph.head is None or (len(graph.probe) > 1 + bool(graph.masks)
-                                                        and graph.probe[graph.head].shape[2] == 4))):  # fmt: skip
+    if named == "tf_detection" or (named == "auto" and _is_tf_detection(graph)):
         return TfDetection.of(graph)
     return _of_head(graph, named)
 
 
 def _is_raw_ssd(graph: Graph) -> bool:
     return "objreg.contract" in graph.metadata or {"loc", "logits"} <= set(graph.probe)
+
+
+def _is_tf_detection(graph: Graph) -> bool:
+    """Whether outputs are several and boxes one of them, or none is a head: what else may be absent is told there."""
+    several = len(graph.probe) > 1 + bool(graph.masks)
+    boxes = any(value.ndim == 3 and value.shape[2] == 4 for value in graph.probe.values())
+    return graph.head is None or (several and boxes)
 
 
 def _of_head(graph: Graph, named: str) -> Contract:

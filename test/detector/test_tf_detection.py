@@ -92,7 +92,8 @@ def test_names_tell_even_where_the_values_do_not(names: tuple[str, ...], swapped
 
 
 def test_raw_outputs_of_a_tf_graph_are_no_detections() -> None:
-    outputs = {"raw_detection_boxes": np.zeros((1, 50, 4))} | tf_outputs([BOX], [3], [0.9], names=TF_API)
+    raw = {"detection_multiclass_scores": np.zeros((1, 1, 6)), "raw_detection_boxes": np.zeros((1, 50, 4))}
+    outputs = raw | tf_outputs([BOX], [3], [0.9], names=TF_API)
     assert classes_of(tf(outputs), outputs) == [2]
 
 
