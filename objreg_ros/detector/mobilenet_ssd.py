@@ -10,34 +10,35 @@ import numpy as np
 
 from objreg_ros.data import Array, ColourImage, Detections
 from objreg_ros.detector.boxes import area, clip, suppress
-from objreg_ros.detector.contract import Candidates, RawSsd, recognise
+from objreg_ros.detector.contract import Candidates, Graph
 from objreg_ros.detector.labels import UNNAMED, find_labels
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.detector.picture import Picture
+from objreg_ros.detector.recognise import recognise
 from objreg_ros.detector.runtime import Runtime
-
-PROBE_SIZE = (480, 640)
-"""Height and width of the test picture of a model that takes any size."""
+from objreg_ros.detector.tf_detection import TfDetection
 
 
 class Detector:
-    """Any SSD-style ONNX model behind one verb.
+    """Any ONNX detection model behind one verb.
 
-    A model that keeps none of the two contracts (post-processed TF detection, or raw SSD heads with priors in the
-    metadata) is refused here: ValueError with expected, got, and what to do. The model has run once when this returns.
+    A model that keeps none of the contracts (docs/models-contract.md) is refused here: ValueError with expected, got,
+    and what to do. The model has run once when this returns.
     """
 
     def __init__(self, params: DetectorParams, model_path: Path, labels_path: Path | None = None):
         self.params = params
         self._runtime = Runtime(Path(model_path), params.threads)
         self.labels = find_labels(Path(model_path), labels_path, self._runtime.metadata)
-        self._picture = Picture.of(self._runtime.inputs, self._runtime.metadata)
-        self._contract = recognise(
-            self._runtime.inputs, self._runtime.outputs, self._runtime.metadata, self._probe(),
-            len(self.labels), params.label_offset,
-        )  # fmt: skip
-        if isinstance(self._contract, RawSsd):  # whose priors are for pictures of one size
-            self._picture = self._picture.sized(*PROBE_SIZE)
+        runtime = self._runtime
+        self._picture = Picture.of(runtime.inputs, runtime.metadata)
+        hw = self._picture.usual_hw(runtime.metadata)
+        graph = Graph(runtime.inputs, runtime.outputs, runtime.metadata, self._probe(hw), len(self.labels),
+                      params.label_offset, hw)  # fmt: skip
+        self._contract = recognise(graph, params.contract)
+        if not isinstance(self._contract, TfDetection):  # others are for pictures of one size
+            self._picture = self._picture.sized(*hw)
+        self._picture = self._picture.asked(self._contract.look, runtime.metadata)
 
     @classmethod
     def of(cls, params: DetectorParams, find_model: Callable[[str], Path]) -> Detector:
@@ -50,9 +51,9 @@ class Detector:
         height, width = image.rgb.shape[:2]
         if height == 0 or width == 0:
             raise ValueError(f"image: expected at least one pixel, got {width} x {height}")
-        outputs = self._runtime.run(self._picture.tensor(image.rgb), self._contract.names)
+        outputs = self._run(image.rgb, self._contract.names)
         candidates = self._contract.read(outputs, self.params.threshold)
-        scaled = candidates.xyxy * np.array([width, height, width, height], np.float32)
+        scaled = self._picture.place(image.rgb).to_image(candidates.xyxy)
         xyxy = clip(scaled, height, width).astype(np.float32)
         chosen = self._choose(xyxy, candidates, height * width)
         return Detections(
@@ -76,9 +77,13 @@ class Detector:
         kept = suppress(xyxy[rows], candidates.index[rows], p.nms_iou, p.cross_label_iou)
         return rows[kept][: p.max_detections]
 
-    def _probe(self) -> dict[str, Array]:
+    def _run(self, rgb: Array, names: tuple[str, ...]) -> list[Array]:
+        """The named outputs for a picture; half floats become whole ones."""
+        tensor = self._picture.tensor(rgb)
+        outputs = map(np.asarray, self._runtime.run(tensor, names, self._picture.extra(tensor)))
+        return [value.astype(np.float32) if value.dtype == np.float16 else value for value in outputs]
+
+    def _probe(self, hw: tuple[int, int]) -> dict[str, Array]:
         """The model's answer to a grey picture, by output. Running it also warms the model up."""
-        size = (self._picture.height or PROBE_SIZE[0], self._picture.width or PROBE_SIZE[1])
         names = tuple(port.name for port in self._runtime.outputs)
-        answer = self._runtime.run(self._picture.tensor(np.full((*size, 3), 127, np.uint8)), names)
-        return dict(zip(names, (np.asarray(value) for value in answer), strict=True))
+        return dict(zip(names, self._run(np.full((*hw, 3), 127, np.uint8), names), strict=True))

@@ -21,6 +21,10 @@ class DetectorParams(Params):
     label_offset: str = param(
         "auto", "number of the first class: 0 (converted TFLite), 1 (TF detection API)", choices=("auto", "0", "1")
     )
+    contract: str = param(
+        "auto", "what the model's outputs mean; auto: told by their names and shapes and the number of labels",
+        choices=("auto", "tf_detection", "ssd_raw", "yolov5", "yolov8", "end_to_end", "yolox", "nanodet", "detr"),
+    )  # fmt: skip
     threshold: float = param(0.5, "least score of a detection", ge=0.0, le=1.0, live=True)
     nms_iou: float = param(0.5, "two boxes of one label that overlap more are one object", ge=0.0, le=1.0, live=True)
     cross_label_iou: float = param(

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 import onnxruntime
 
@@ -46,10 +48,12 @@ class Runtime:
         self.outputs = tuple(_port(node) for node in self._session.get_outputs())
         self.metadata: dict[str, str] = dict(self._session.get_modelmeta().custom_metadata_map)
 
-    def run(self, tensor: Array, outputs: tuple[str, ...]) -> list[Array]:
-        """The named outputs for the one input; ValueError where the graph does not compute with it."""
+    def run(
+        self, tensor: Array, outputs: tuple[str, ...], extra: Mapping[str, Array] = MappingProxyType({})
+    ) -> list[Array]:
+        """The named outputs for the picture and ``extra`` inputs; ValueError where the graph does not compute them."""
         try:
-            return list(self._session.run(list(outputs), {self.inputs[0].name: tensor}))
+            return list(self._session.run(list(outputs), {self.inputs[0].name: tensor, **extra}))
         except Exception as error:  # onnxruntime's errors share no base of their own
             raise ValueError(
                 f"model: expected it to run on a picture {list(tensor.shape)}, as its input is {self.inputs[0]}, "

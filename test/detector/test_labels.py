@@ -37,7 +37,7 @@ def test_a_named_file_wins_over_metadata_and_metadata_over_a_file_beside_the_mod
 
 
 def test_no_labels_at_all_are_refused_with_the_places_that_were_searched(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"expected objreg.labels .* got neither; name a file"):
+    with pytest.raises(ValueError, match=r"expected objreg.labels or names .* got neither; name a file"):
         find_labels(tmp_path / "m.onnx", None, {})
 
 
@@ -69,3 +69,21 @@ def test_a_file_that_is_too_long_for_labels_is_refused_unread(tmp_path: Path, mo
     monkeypatch.setattr(labels, "FILE_BYTES", 5)
     with pytest.raises(ValueError, match="one label a line, at most 5 bytes, got 6 bytes"):
         read_labels(tmp_path / "labels.txt")
+
+
+@pytest.mark.parametrize("text", ["{0: 'cup', 1: 'tea pot'}", "{1: 'tea pot', 0: 'cup'}", "['cup', 'tea pot']"])
+def test_names_that_ultralytics_wrote_are_read(text: str, tmp_path: Path) -> None:
+    assert find_labels(tmp_path / "m.onnx", None, {"names": text}) == ("cup", "tea pot")
+    (tmp_path / "mine.txt").write_text("named")
+    assert find_labels(tmp_path / "m.onnx", tmp_path / "mine.txt", {"names": text}) == ("named",)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "{}", "[]", "{1: 'a'}", "{0: 1}", "{0: ' '}", "__import__('os')", "(" * 9000, "-" * 90_000 + "1", "{[]: 1}",
+     "['" + "a" * 300_000 + "']", "5"],
+)  # fmt: skip
+def test_names_of_another_kind_are_refused(text: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="expected a dict of class numbers from 0 and names") as refusal:
+        find_labels(tmp_path / "m.onnx", None, {"names": text})
+    assert len(str(refusal.value)) < 400

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import ColourImage
-from objreg_ros.detector.mobilenet_ssd import PROBE_SIZE, Detector
+from objreg_ros.detector.mobilenet_ssd import Detector
 from objreg_ros.detector.params import DetectorParams
+from objreg_ros.detector.picture import USUAL_HW
 from objreg_ros.detector.runtime import Runtime
 
 from .tiny_model import TF_API, onnx, raw_metadata, save_constant_model, tf_outputs
@@ -111,12 +112,12 @@ def test_raw_heads_of_open_input_size_always_see_pictures_of_the_size_of_their_p
     path = save_constant_model(tmp_path / "raw.onnx", heads, (1, "h", "w", 3), metadata=metadata)
     shapes, run = [], Runtime.run
     monkeypatch.setattr(
-        Runtime, "run", lambda self, tensor, names: shapes.append(tensor.shape) or run(self, tensor, names)
+        Runtime, "run", lambda self, tensor, *rest: shapes.append(tensor.shape) or run(self, tensor, *rest)
     )
     one = Detector(DetectorParams(), path)
     small = ColourImage(rgb=np.zeros((240, 320, 3), np.uint8), stamp_ns=0)
     assert one.detect(small).xyxy[0] == pytest.approx([224, 168, 256, 192], abs=1e-3)
-    assert set(shapes) == {(1, *PROBE_SIZE, 3)}
+    assert set(shapes) == {(1, *USUAL_HW, 3)}
 
 
 @pytest.mark.parametrize(
