@@ -19,7 +19,9 @@ SAYS = {
     "own_detector.py": "masks: moved",
     "own_gate.py": "several: Reason.FEW_OBJECTS",
     "consume_constraints.py": "EDGE_SE3:QUAT 0 1",
+    "objreg_to_gtsam.py": "solved: the second camera is at [0.1, 0.0, 0.02] m",
 }
+NEEDS = {"consume_constraints.py": "rclpy", "objreg_to_gtsam.py": "gtsam"}
 MOST_LINES = 40
 MOST_BYTES = 400_000  # of the notebook with its pictures
 PATIENCE_S = 900  # where every kernel has to be compiled first
@@ -53,8 +55,9 @@ def test_an_example_is_short(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SAYS)
 def test_an_example_runs_and_says_what_it_found(name: str) -> None:
-    if name == "consume_constraints.py" and find_spec("rclpy") is None:
-        pytest.skip(f"{name} needs rclpy, which is not installed")
+    needed = NEEDS.get(name)
+    if needed is not None and find_spec(needed) is None:
+        pytest.skip(f"{name} needs {needed}, which is not installed")
     assert SAYS[name] in run(str(EXAMPLES / name))
 
 

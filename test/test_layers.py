@@ -109,6 +109,8 @@ def allowed(importer: str, imported: str) -> bool:
         )
     if room in ROOMS:
         return below(imported, room, "data", "geometry", "params")
+    if room == "adapters":
+        return below(imported, "adapters", "mapper", "bridge", *CORE) and imported != "mapper.node"
     if importer in FREE_BRIDGE:
         return below(imported, "data", "lens", "geometry", *FREE_BRIDGE)
     if room == "bridge":
@@ -125,7 +127,8 @@ def allowed(importer: str, imported: str) -> bool:
 
 
 def may_use_ros(module: str) -> bool:
-    return module.endswith(".node") or below(module, "cli") or (below(module, "bridge") and module not in FREE_BRIDGE)
+    is_pure = module in (*FREE_BRIDGE, "adapters.params", "adapters.rtabmap_nodes")
+    return module.endswith(".node") or (below(module, "cli", "adapters", "bridge") and not is_pure)
 
 
 @pytest.mark.parametrize("module", sorted(MODULES))
@@ -164,6 +167,8 @@ def test_the_law_can_be_broken() -> None:
     assert not allowed("offline", "registrar.node")
     assert not allowed("registrar.node", "geometry")
     assert allowed("registrar.node", "bridge.to_msg")
+    assert allowed("adapters.g2o", "mapper.pose_graph") and not allowed("adapters.g2o", "mapper.node")
+    assert not allowed("mapper.node", "adapters.g2o")
     assert allowed("lens", "data") and not allowed("data", "lens") and not allowed("segmenter.segment", "lens")
     assert not allowed("registration.score.view_score", "registration.refine.batch_icp")
     assert not allowed("registration.propose.shortlist", "memory.store")

@@ -11,6 +11,14 @@ from typing import Any, TypeVar
 import click
 import yaml
 
+from objreg_ros.adapters.params import (
+    AdapterParams,
+    BodyParams,
+    ToG2oParams,
+    ToHydraParams,
+    ToLioSamParams,
+    ToRtabmapParams,
+)
 from objreg_ros.bridge.params import DoorParams
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.mapper.params import MapperNodeParams, MapperParams
@@ -26,6 +34,10 @@ NODES: dict[str, tuple[type[Params], ...]] = {
     "segmenter": (SegmenterParams, SegmenterNodeParams, DoorParams),
     "registrar": (RegistrarParams, RegistrarNodeParams, DoorParams),
     "mapper": (MapperParams, MapperNodeParams, DoorParams),
+    "objreg_to_rtabmap": (ToRtabmapParams, BodyParams, AdapterParams, DoorParams),
+    "objreg_to_lio_sam": (ToLioSamParams, AdapterParams, DoorParams),
+    "objreg_to_hydra": (ToHydraParams, BodyParams, AdapterParams, DoorParams),
+    "objreg_to_g2o": (ToG2oParams, BodyParams, AdapterParams, DoorParams),
 }
 KEY, ALL = "ros__parameters", "/**"
 EVERYWHERE = ("use_sim_time",)  # what rclpy itself declares

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``objreg_to_g2o``: a file of odometry and constraints, whole at any moment, for whoever reads g2o's text."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+from std_srvs.srv import Trigger
+
+from objreg_ros.adapters.adapter import Adapter, Key, key_of
+from objreg_ros.adapters.body import Body
+from objreg_ros.adapters.odometry_in import OdometryIn
+from objreg_ros.adapters.params import BodyParams, ToG2oParams
+from objreg_ros.bridge.door import DroppedError
+from objreg_ros.bridge.spin import run
+from objreg_ros.data import LoopClosure, Odometry
+from objreg_ros.mapper.adapters.g2o import graph_text
+from objreg_ros.mapper.params import MapperParams
+from objreg_ros.mapper.pose_graph import ImplausibleError, PoseGraph
+from objreg_ros.mapper.restart import Anew
+
+
+class ToG2o(Adapter):
+    """Keeps a pose graph that nobody solves, and writes it every period and at the end."""
+
+    def __init__(self) -> None:
+        super().__init__("objreg_to_g2o", ToG2oParams, BodyParams)
+        self._params_g2o = self.settings.of(ToG2oParams)
+        self._path = Path(self._params_g2o.graph_path).expanduser().absolute()
+        if not self._path.parent.is_dir():
+            raise ValueError(f"graph_path: expected a file in a folder that is there, got {self._path}")
+        self._maps = 0
+        self._graph, self._has_news = self._empty(), False
+        self._body = Body(self)
+        self._odom = OdometryIn(self, self._follow, self._begin_anew)
+        self.create_service(Trigger, "~/save", self._save)
+        self.create_timer(self._params_g2o.period, self._write_news, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.expect("odom", "odom")
+        self.listen_for_closures()
+
+    def _empty(self) -> PoseGraph:
+        of = self._params_g2o
+        return PoseGraph(
+            MapperParams(keyframe_translation=of.keyframe_translation, keyframe_rotation=of.keyframe_rotation)
+        )
+
+    @property
+    def path(self) -> Path:
+        """The file of the map that is made now."""
+        return self._path.with_stem(f"{self._path.stem}_{self._maps}") if self._maps else self._path
+
+    def _follow(self, odometry: Odometry) -> None:
+        self._has_news = self._graph.add_odometry(odometry) or self._has_news
+
+    def _begin_anew(self, anew: Anew) -> None:
+        """Nothing ties what comes to what was: the old map's file stays, and what waits for it goes."""
+        self._write_news()
+        self._maps += 1
+        self._graph = self._empty()
+        for key in list(self.waiting):
+            self.end(key, anew.value)
+
+    def hand_over(self, closure: LoopClosure) -> bool:
+        """An edge between the two nearest vertices, once odometry covers both moments."""
+        T_body_camera = self._body.of(closure, self._odom.newest)
+        if self._odom.newest is None or T_body_camera is None:
+            return False
+        try:
+            tied = self._graph.add_closure(closure, T_body_camera)
+        except ImplausibleError as error:
+            raise DroppedError("implausible", str(error)) from error
+        except ValueError as error:
+            raise DroppedError("two_clocks", str(error)) from error
+        if not tied and self._graph.in_gap(closure):
+            raise DroppedError("odometry_gap", "no odometry came around a moment of the constraint")
+        if not tied and closure.from_ns < self._graph.odometry.stamps_ns[0]:
+            raise DroppedError("before_odometry", "odometry begins after the first moment of the constraint")
+        self._has_news = tied or self._has_news
+        return tied
+
+    def take_back(self, key: Key) -> bool:
+        """Leave the edge out of the file from now on."""
+        self._graph.ties = [tie for tie in self._graph.ties if tie.closure is None or key_of(tie.closure) != key]
+        self._has_news = True
+        return True
+
+    # The file
+
+    def _write_news(self) -> None:
+        if not self._has_news:
+            return
+        try:
+            self.write()
+        except OSError as error:
+            self.throttled.warn("unwritable", f"the graph is not written, and will be tried again: {error}")
+
+    def write(self) -> None:
+        """Write the file whole, then put it in the place of the one before. OSError where that cannot be."""
+        part = self.path.with_name(f".{self.path.name}.part")
+        poses = [T for _, T in self._graph.path()]
+        edges = [(tie.k1, tie.k2, tie.constraint) for tie in self._graph.ties]
+        part.write_text(graph_text(poses, edges), encoding="ascii")
+        os.replace(part, self.path)
+        self._has_news = False
+
+    def _save(self, _: Any, response: Any) -> Any:
+        try:
+            self.write()
+        except OSError as error:
+            response.success, response.message = False, str(error)
+        else:
+            response.success, response.message = True, str(self.path)
+        return response
+
+    def extra_diagnostics(self) -> Mapping[str, object]:
+        """And what the file has."""
+        edges = sum(tie.closure is not None for tie in self._graph.ties)
+        return {**super().extra_diagnostics(), "vertices": len(self._graph.keyframes), "constraints in the file": edges}
+
+    def close(self) -> None:
+        """Write what is new, then end."""
+        try:
+            if self._has_news:
+                self.write()
+        finally:
+            super().close()
+
+
+def main() -> int:
+    """The executable ``objreg_to_g2o``."""
+    return run(ToG2o)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

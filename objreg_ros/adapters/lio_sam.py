@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``objreg_to_lio_sam``: pairs of moments for LIO-SAM, at the pace at which it takes them.
+
+LIO-SAM drops pairs of less than 30 s and all but the last five that it has not looked at, and looks at one a second;
+its subscription keeps one and is best effort. So what is too near is dropped here, and the others go one a period.
+"""
+
+from __future__ import annotations
+
+import sys
+
+from std_msgs.msg import Float64MultiArray
+
+from objreg_ros.adapters.adapter import Adapter, seconds
+from objreg_ros.adapters.params import ToLioSamParams
+from objreg_ros.bridge import qos
+from objreg_ros.bridge.door import DroppedError
+from objreg_ros.bridge.spin import run
+from objreg_ros.data import LoopClosure
+from objreg_ros.mapper.adapters.lio_sam import fill_loop
+
+TOPIC = "lio_loop/loop_closure_detection"
+
+
+class ToLioSam(Adapter):
+    """Tells LIO-SAM which of its keyframes to register."""
+
+    def __init__(self) -> None:
+        super().__init__("objreg_to_lio_sam", ToLioSamParams)
+        self._pace = self.settings.of(ToLioSamParams)
+        self._sent_at = -float("inf")
+        self._loops = self.create_publisher(Float64MultiArray, TOPIC, qos.room())
+        self.get_logger().info(
+            f"pairs nearer than {self._pace.least_seconds:g} s are dropped, for LIO-SAM does; of others one goes every "
+            f"{self._pace.period:g} s, for LIO-SAM keeps five and drops older ones"
+        )
+        self.listen_for_closures()
+
+    def hand_over(self, closure: LoopClosure) -> bool:
+        """Publish it, if LIO-SAM listens and is through with the last; `DroppedError` for a pair that is too near."""
+        apart_s = 1e-9 * abs(closure.to_ns - closure.from_ns)
+        if apart_s < self._pace.least_seconds:
+            text = f"expected moments at least {self._pace.least_seconds:g} s apart, got {apart_s:.3f} s"
+            raise DroppedError("too_near", text)
+        if not self._loops.get_subscription_count() or seconds() - self._sent_at < self._pace.period:
+            return False
+        self._sent_at = seconds()
+        self._loops.publish(fill_loop(Float64MultiArray(), closure))
+        return True
+
+
+def main() -> int:
+    """The executable ``objreg_to_lio_sam``."""
+    return run(ToLioSam)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The odometry of a consumer's body, held as the mapper holds it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from nav_msgs.msg import Odometry as OdometryMsg
+
+from objreg_ros.bridge import from_msg, qos
+from objreg_ros.bridge.door import Door
+from objreg_ros.data import Odometry
+from objreg_ros.mapper.params import MapperParams
+from objreg_ros.mapper.restart import Anew, Restart
+
+
+class OdometryIn:
+    """Hears ``odom``; ``follow`` is given every pose that goes on, ``anew`` why it began elsewhere, before that."""
+
+    def __init__(self, door: Door, follow: Callable[[Odometry], object], anew: Callable[[Anew], object]) -> None:
+        self.newest: Odometry | None = None
+        self.passed_over = 0
+        self._door, self._follow, self._anew = door, follow, anew
+        self._restart = Restart(MapperParams().max_speed, self._pass_over)
+        door.listen(OdometryMsg, "odom", self._hear, door.sensor(qos.ODOMETRY), watched="odom")
+
+    def _hear(self, message: Any) -> None:
+        odometry = self._door.read_aside("odom", from_msg.odometry, message)
+        if odometry is None:
+            return
+        course = self._restart.admit(odometry)
+        if course.anew is not None:
+            self._door.throttled.warn("new_map", f"odometry began anew ({course.anew.value})")
+            self._anew(course.anew)
+        for admitted in course.poses:
+            self.newest = admitted
+            self._follow(admitted)
+
+    def _pass_over(self, _: Odometry) -> None:
+        self.passed_over += 1

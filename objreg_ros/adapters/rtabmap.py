@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``objreg_to_rtabmap``: links between RTAB-Map's own nodes, by its service ``add_link``.
+
+A constraint waits for RTAB-Map and for the nodes around its moments. One link is on its way at a time; one that is not
+answered is asked again. RTAB-Map answers without a word, so what it refuses itself is in its log.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Mapping
+from functools import partial
+from typing import Any, NamedTuple
+
+from rclpy.task import Future
+
+from objreg_ros.adapters.adapter import Adapter, Key, key_of, require, seconds
+from objreg_ros.adapters.body import Body
+from objreg_ros.adapters.odometry_in import OdometryIn
+from objreg_ros.adapters.params import BodyParams, ToRtabmapParams
+from objreg_ros.adapters.rtabmap_nodes import RtabmapNodes
+from objreg_ros.bridge import qos
+from objreg_ros.bridge.door import DroppedError
+from objreg_ros.bridge.spin import run
+from objreg_ros.data import LoopClosure, Odometry
+from objreg_ros.mapper.adapters.rtabmap import fill_link
+from objreg_ros.mapper.restart import Anew
+from objreg_ros.mapper.sparse import SparseTrajectory
+
+try:
+    from rtabmap_msgs.msg import MapData
+    from rtabmap_msgs.srv import AddLink, GetMap
+except ImportError:  # only who has RTAB-Map has it
+    MapData = AddLink = GetMap = None
+
+INSTALL = "apt install ros-$ROS_DISTRO-rtabmap-msgs"
+
+
+class _Asked(NamedTuple):
+    """The link that is on its way."""
+
+    key: Key
+    future: Future
+    since: float
+
+
+class ToRtabmap(Adapter):
+    """Snaps constraints to nodes of RTAB-Map and links these."""
+
+    def __init__(self) -> None:
+        require(AddLink, "rtabmap_msgs", INSTALL)
+        super().__init__("objreg_to_rtabmap", ToRtabmapParams, BodyParams)
+        self._limits = self.settings.of(ToRtabmapParams)
+        self._nodes, self._odometry = RtabmapNodes(), SparseTrajectory()
+        self._asked: _Asked | None = None
+        self._attempts: Counter[Key] = Counter()
+        self._since: dict[Key, float] = {}  # when a constraint first found RTAB-Map without the nodes that it needs
+        self._databases = 0
+        self._body = Body(self)
+        self._odom = OdometryIn(self, self._follow, self._begin_anew)
+        self._add = self.create_client(AddLink, "rtabmap/add_link")
+        self._get = self.create_client(GetMap, "rtabmap/get_map_data")
+        self._wants_graph = True
+        self.listen(MapData, "mapData", self._hear_map, qos.room(depth=10))
+        self.listen_for_closures()
+
+    # What RTAB-Map and odometry tell
+
+    def _follow(self, odometry: Odometry) -> None:
+        self._odometry.append(odometry.stamp_ns, odometry.T_odom_body)
+
+    def _begin_anew(self, _: Anew) -> None:
+        self._odometry = SparseTrajectory()
+
+    def _hear_map(self, message: Any) -> None:
+        is_other = self.read_aside("mapData", self._nodes.hear, message)
+        if is_other:
+            self._databases += 1
+            self._wants_graph = True
+            self._since.clear()
+            self.get_logger().warning("RTAB-Map began another database: its former nodes are forgotten")
+
+    def go_through(self) -> None:
+        """As any adapter, while RTAB-Map is there; what is not answered is given up first."""
+        if self._asked is not None and seconds() - self._asked.since > self._limits.answer_within:
+            self._give_up(self._asked)
+        if not self._add.service_is_ready():
+            self._await_rtabmap()
+            return
+        if self._wants_graph and self._get.service_is_ready():
+            self._ask_for_graph()
+        if self._asked is None:
+            super().go_through()
+
+    def _await_rtabmap(self) -> None:
+        """It may come back with another database, so nothing that is known of its nodes holds."""
+        self._nodes.forget()
+        self._since.clear()
+        self._wants_graph = True
+
+    def _ask_for_graph(self) -> None:
+        """The nodes from before this node was there; ``mapData`` has the newest only."""
+        self._wants_graph = False
+        request = GetMap.Request(global_map=True, optimized=False, graph_only=True)
+        self._get.call_async(request).add_done_callback(self._hear_graph)
+
+    def _hear_graph(self, future: Future) -> None:
+        if future.exception() is None and future.result() is not None:
+            self._hear_map(future.result().data)
+
+    # What it is told
+
+    def hand_over(self, closure: LoopClosure) -> bool:
+        """Ask for the link, if no other is on its way and the nodes are known; it is settled by the answer."""
+        if self._asked is not None or not len(self._nodes):
+            return False
+        T_base_camera = self._body.of(closure, self._odom.newest)
+        if T_base_camera is None:
+            return False
+        tied = self._nodes.tied(closure, self._odometry, T_base_camera) if self._has_nodes(closure) else None
+        if tied is None:
+            self._be_patient(closure)
+            return False
+        from_id, to_id, constraint = tied
+        if from_id == to_id:
+            raise DroppedError("same_node", f"both moments are nearest to node {from_id} of RTAB-Map")
+        request = AddLink.Request()
+        fill_link(request.link, constraint, from_id, to_id)
+        self._ask(key_of(closure), request)
+        return False
+
+    def _offset_s(self, closure: LoopClosure) -> float:
+        """How far the worse of the two moments is from its node."""
+        moments = closure.from_ns, closure.to_ns
+        return 1e-9 * max(abs(self._nodes.nearest(stamp_ns).stamp_ns - stamp_ns) for stamp_ns in moments)
+
+    def _has_nodes(self, closure: LoopClosure) -> bool:
+        return self._offset_s(closure) <= self._limits.max_offset
+
+    def _be_patient(self, closure: LoopClosure) -> None:
+        """`DroppedError` where a constraint has waited for its nodes for too long."""
+        since = self._since.setdefault(key_of(closure), seconds())
+        if seconds() - since < self._limits.patience:
+            return
+        if self._has_nodes(closure):
+            raise DroppedError("no_way", "neither odometry nor nodes of one map lead from its moments to their nodes")
+        raise DroppedError(
+            "no_node",
+            f"expected nodes of RTAB-Map within {self._limits.max_offset:g} s of both moments, got one "
+            f"{self._offset_s(closure):.3f} s away",
+        )
+
+    def _ask(self, key: Key, request: Any) -> None:
+        self._attempts[key] += 1
+        future = self._add.call_async(request)
+        self._asked = _Asked(key, future, seconds())
+        future.add_done_callback(partial(self._hear_answer, self._asked))
+
+    def _hear_answer(self, asked: _Asked, future: Future) -> None:
+        if self._asked is None or self._asked.future is not future or future.cancelled():
+            return
+        self._asked = None
+        if future.exception() is None:
+            self.settle(asked.key)
+
+    def _give_up(self, asked: _Asked) -> None:
+        """Ask again later, or never: RTAB-Map is gone, or is busy with its map."""
+        self._asked = None
+        self._add.remove_pending_request(asked.future)
+        asked.future.cancel()
+        if asked.key in self.waiting and self._attempts[asked.key] >= self._limits.most_attempts:
+            self.end(asked.key, "unanswered", f"add_link was asked {self._attempts[asked.key]} times")
+
+    def forget(self, key: Key) -> None:
+        """Its patience and its attempts are over."""
+        self._since.pop(key, None)
+        self._attempts.pop(key, None)
+
+    def extra_diagnostics(self) -> Mapping[str, object]:
+        """And what is known of RTAB-Map."""
+        known = {"nodes of rtabmap": len(self._nodes), "other databases": self._databases}
+        return {**super().extra_diagnostics(), **known, "add_link": self._add.service_is_ready()}
+
+
+def main() -> int:
+    """The executable ``objreg_to_rtabmap``."""
+    return run(ToRtabmap)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Who says where the camera sits, and how long one waits for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from objreg_ros.adapters import body
+from objreg_ros.adapters.body import Body
+from objreg_ros.adapters.params import BodyParams
+from objreg_ros.bridge import qos, to_msg, transforms
+from objreg_ros.bridge.door import Door
+from objreg_ros.data import Odometry
+
+from .standing_by import AHEAD, AHEAD_TEXT, Around, closure
+
+
+def made(graph: Around) -> Body:
+    door = Door("somebody", BodyParams)
+    graph.doors.append(door)  # type: ignore[arg-type]
+    graph.executor.add_node(door)
+    return Body(door)
+
+
+def test_the_parameter_counts_more_than_anything(around: Callable[..., Any]) -> None:
+    T = made(around(f"T_base_camera:={AHEAD_TEXT}")).of(closure())
+    np.testing.assert_allclose(T, AHEAD, atol=1e-9)
+
+
+def test_a_camera_that_is_the_body_sits_where_the_body_is(around: Callable[..., Any]) -> None:
+    np.testing.assert_array_equal(made(around("base_frame:=camera")).of(closure()), np.eye(4))
+
+
+def test_tf_static_is_awaited_and_then_nothing_is_assumed_but_one_place(
+    around: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if transforms.TFMessage is None:
+        pytest.skip("tf2_msgs is not installed")
+    where = made(around())
+    assert where.of(closure()) is None
+    monkeypatch.setattr(body, "TF_WAIT_S", 0.0)
+    np.testing.assert_array_equal(where.of(closure()), np.eye(4))
+
+
+def test_tf_static_says_it_for_the_body_that_odometry_speaks_of(around: Callable[..., Any]) -> None:
+    if transforms.TFMessage is None:
+        pytest.skip("tf2_msgs is not installed")
+    graph = around()
+    where = made(graph)
+    teller = graph.node.create_publisher(transforms.TFMessage, "/tf_static", qos.latched())
+    teller.publish(transforms.TFMessage(transforms=[to_msg.transform(AHEAD, 0, "hull", "camera")]))
+    word = Odometry(T_odom_body=np.eye(4), stamp_ns=0, child_frame_id="hull")
+    graph.wait(lambda: where.of(closure(), word) is not None)
+    np.testing.assert_allclose(where.of(closure(), word), AHEAD, atol=1e-9)
+    assert where.of(closure()) is None  # of base_link nothing is known

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a stand-in for RTAB-Map is asked, with its real messages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+import pytest
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.task import Future
+
+from objreg_ros.adapters import rtabmap
+from objreg_ros.adapters.rtabmap import ToRtabmap
+from objreg_ros.bridge import from_msg, to_msg
+from objreg_ros.geometry import inverse
+from objreg_ros.mapper.constraint import Constraint, compensated, local_information
+
+from .standing_by import AHEAD, AHEAD_TEXT, COVARIANCE, MEASURED, Around, body_at, closure
+
+needs_messages = pytest.mark.skipif(find_spec("rtabmap_msgs") is None, reason="no rtabmap_msgs here")
+STAMPS = (1.5, 2.5, 62.25, 63.25)
+
+
+class StandIn:
+    """Offers add_link and get_map_data and publishes mapData, as RTAB-Map's node does."""
+
+    def __init__(self, around: Around, stamps: Sequence[float] = STAMPS) -> None:
+        self.links: list[Any] = []
+        self.stamps = stamps
+        self._executor: SingleThreadedExecutor = around.executor
+        self.node = rclpy.create_node("rtabmap")
+        self.node.create_service(rtabmap.AddLink, "rtabmap/add_link", self._add)
+        self.node.create_service(rtabmap.GetMap, "rtabmap/get_map_data", self._get)
+        self.maps = self.node.create_publisher(rtabmap.MapData, "mapData", 1)
+        around.executor.add_node(self.node)
+
+    def _add(self, request: Any, response: Any) -> Any:
+        self.links.append(request.link)
+        return response
+
+    def _get(self, request: Any, response: Any) -> Any:
+        assert request.graph_only and request.global_map
+        response.data = self.map()
+        return response
+
+    def map(self, first: int = 1) -> Any:
+        from rtabmap_msgs.msg import Node
+
+        nodes = []
+        for k, stamp in enumerate(self.stamps):
+            nodes.append(Node(id=first + k, stamp=stamp))
+            nodes[-1].pose = to_msg.pose(body_at(stamp))
+        return rtabmap.MapData(nodes=nodes)
+
+    def end(self) -> None:
+        self._executor.remove_node(self.node)
+        self.node.destroy_node()
+
+
+@needs_messages
+def test_a_link_between_the_nodes_of_both_moments_arrives_field_by_field(around: Callable[..., Any]) -> None:
+    graph = around(f"T_base_camera:={AHEAD_TEXT}")
+    door = graph.start(ToRtabmap)
+    graph.send(closure())
+    graph.wait(lambda: door.ledger.balance().waiting == 1)
+    graph.pass_time(0.5)
+    stand_in = StandIn(graph)
+    graph.wait(lambda: door.ledger.balance().published == 1)
+    (link,) = stand_in.links
+    assert (link.from_id, link.to_id, link.type) == (1, 4, 4)
+    expected = compensated(Constraint(MEASURED, COVARIANCE), AHEAD, inverse(AHEAD))
+    np.testing.assert_allclose(from_msg.motion(link), expected.T_from_to, atol=1e-9)
+    information = np.reshape(link.information, (6, 6))
+    np.testing.assert_allclose(information, local_information(expected), rtol=1e-9, atol=1e-5)
+    stand_in.end()
+
+
+@needs_messages
+def test_moments_between_nodes_are_carried_to_them_by_odometry(around: Callable[..., Any]) -> None:
+    graph = around(f"T_base_camera:={AHEAD_TEXT}")
+    door = graph.start(ToRtabmap)
+    graph.drive(door, 0.0, 64.0)
+    stand_in = StandIn(graph)
+    graph.send(closure(2.0, 63.0))
+    graph.wait(lambda: door.ledger.balance().published == 1)
+    (link,) = stand_in.links
+    assert (link.from_id, link.to_id) in {(1, 4), (2, 4)}
+    at = {1: 1.5, 2: 2.5, 4: 63.25}[link.from_id]
+    T_from_to = AHEAD @ MEASURED @ inverse(AHEAD)
+    there, back = inverse(body_at(at)) @ body_at(2.0), inverse(body_at(63.0)) @ body_at(63.25)
+    np.testing.assert_allclose(from_msg.motion(link), there @ T_from_to @ back, atol=1e-9)
+    stand_in.end()
+
+
+@needs_messages
+def test_it_outlives_rtabmap_and_forgets_the_nodes_of_a_database_that_is_gone(around: Callable[..., Any]) -> None:
+    graph = around(f"T_base_camera:={AHEAD_TEXT}", "patience:=0.3")
+    door = graph.start(ToRtabmap)
+    first = StandIn(graph)
+    graph.send(closure())
+    graph.wait(lambda: door.ledger.balance().published == 1)
+    first.end()
+    graph.wait(lambda: not door.extra_diagnostics()["add_link"])
+    graph.send(closure(1.5, 62.25))
+    graph.pass_time(0.5)
+    assert door.ledger.balance().waiting == 1
+    second = StandIn(graph, stamps=(101.5, 163.25))
+    graph.send(closure(101.5, 163.25))
+    graph.wait(lambda: door.ledger.balance().waiting == 0)
+    assert [(link.from_id, link.to_id) for link in second.links] == [(1, 2)]
+    assert door.ledger.balance().dropped == {"no_node": 1}
+    second.end()
+
+
+@needs_messages
+def test_a_moment_far_from_every_node_is_dropped_after_its_patience(around: Callable[..., Any]) -> None:
+    graph = around(f"T_base_camera:={AHEAD_TEXT}", "patience:=0.3")
+    door = graph.start(ToRtabmap)
+    stand_in = StandIn(graph)
+    graph.send(closure(30.0, 63.25), closure(1.5, 1.6))
+    graph.wait(lambda: door.ledger.balance().dropped == {"no_node": 1, "same_node": 1})
+    assert not stand_in.links
+    stand_in.end()
+
+
+@needs_messages
+def test_a_link_that_nobody_answers_is_asked_again_and_then_given_up(
+    around: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    graph = around(f"T_base_camera:={AHEAD_TEXT}", "answer_within:=0.2", "most_attempts:=3")
+    door = graph.start(ToRtabmap)
+    asked: list[Any] = []
+
+    def ask(request: Any) -> Future:
+        asked.append(request)
+        return Future()  # as of a process that is gone by now
+
+    monkeypatch.setattr(door._add, "call_async", ask)
+    stand_in = StandIn(graph)
+    graph.send(closure())
+    graph.wait(lambda: door.ledger.balance().dropped == {"unanswered": 1})
+    assert len(asked) == 3 and asked[0] == asked[2]
+    stand_in.end()
+
+
+@needs_messages
+def test_news_of_another_database_in_map_data_alone_is_seen(around: Callable[..., Any]) -> None:
+    graph = around(f"T_base_camera:={AHEAD_TEXT}")
+    door = graph.start(ToRtabmap)
+    stand_in = StandIn(graph)
+    graph.wait(lambda: door.extra_diagnostics()["nodes of rtabmap"] == len(STAMPS))
+    graph.wait(stand_in.maps.get_subscription_count)
+    stand_in.stamps = (101.5, 163.25)
+    stand_in.maps.publish(stand_in.map())
+    graph.wait(lambda: door.extra_diagnostics()["other databases"] == 1)
+    graph.wait(lambda: door.extra_diagnostics()["nodes of rtabmap"] == 2)
+    stand_in.end()
+
+
+@needs_messages
+def test_a_map_that_is_none_is_counted_and_ends_nothing(around: Callable[..., Any]) -> None:
+    graph = around(f"T_base_camera:={AHEAD_TEXT}")
+    door = graph.start(ToRtabmap)
+    stand_in = StandIn(graph)
+    graph.wait(lambda: door.extra_diagnostics()["nodes of rtabmap"] == len(STAMPS))
+    graph.wait(stand_in.maps.get_subscription_count)
+    stand_in.stamps = (-5.0,)
+    stand_in.maps.publish(stand_in.map(first=9))
+    graph.wait(lambda: door._ignored["malformed mapData"] == 1)
+    graph.send(closure())
+    graph.wait(lambda: door.ledger.balance().published == 1)
+    stand_in.end()
+
+
+def test_without_its_messages_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rtabmap, "AddLink", None)
+    with pytest.raises(ValueError, match=r"rtabmap_msgs.*apt install"):
+        ToRtabmap()
