@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import click
 import yaml
 
-from objreg_ros.bridge.params import DoorParams
+from objreg_ros.bridge.params import DoorParams, RelocalisedParams
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.mapper.params import MapperNodeParams, MapperParams
 from objreg_ros.params import Declaration, Params
@@ -24,7 +24,7 @@ Kind = TypeVar("Kind", bound=Params)
 NODES: dict[str, tuple[type[Params], ...]] = {
     "detector": (DetectorParams, DoorParams),
     "segmenter": (SegmenterParams, SegmenterNodeParams, DoorParams),
-    "registrar": (RegistrarParams, RegistrarNodeParams, DoorParams),
+    "registrar": (RegistrarParams, RegistrarNodeParams, RelocalisedParams, DoorParams),
     "mapper": (MapperParams, MapperNodeParams, DoorParams),
 }
 KEY, ALL = "ros__parameters", "/**"
