@@ -32,7 +32,7 @@ from closure import simulated, stories
 from command_line import quick_values
 from sources import detector_of, read_source
 
-from objreg_ros.data import UNNAMED, Array, Frame
+from objreg_ros.data import UNNAMED, Array, Frame, LoopClosure
 from objreg_ros.geometry import inverse, pose_error, transform
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
@@ -122,13 +122,14 @@ def wake(
         "answers": 0,
         "false": 0,
         "worst": [0.0, 0.0],
-        "closures": 0,
+        "closures": [],
     }
     began_ns, seen_ns, known_ns, last = frames[0].stamp_ns, None, None, 0
     with closing(Registrar(params.replaced(store=str(store)))) as registrar:
         for frame in begun_anew(frames):
             last = frame.stamp_ns - LATER_NS
-            row["closures"] += len(registrar.process(frame).closures)
+            closures = registrar.process(frame).closures
+            row["closures"] += [told_of(one, truth) for one in closures if one.from_ns < LATER_NS]
             T = truth.at(last)
             if T is None:
                 continue
@@ -145,6 +146,12 @@ def wake(
         row["after_s"] = round(1e-9 * (known_ns - (known_ns if seen_ns is None else seen_ns)), 2)
     row["counts"] = known_ns is not None or (seen_ns is not None and last - seen_ns >= 1e9 * WITHIN_S)
     return row
+
+
+def told_of(closure: LoopClosure, truth: Truth) -> dict[str, Any]:
+    """What a closure to the earlier session says of itself, and its true error in degrees and centimetres."""
+    evidence = {name: round(closure.evidence[name], 2) for name in ("odds", "agreeing") if name in closure.evidence}
+    return evidence | {"error": truth.error(replace(closure, to_ns=closure.to_ns - LATER_NS))}
 
 
 def _judge(row: dict[str, Any], error: tuple[float, float]) -> None:

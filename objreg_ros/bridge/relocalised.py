@@ -48,21 +48,24 @@ class Whereabouts:
         serve = (Trigger, self._trigger) if Relocalise is None else (Relocalise, self._relocalise)
         door.create_service(serve[0], "~/relocalise", serve[1], callback_group=door.apart)
 
-    def look(self, T_body_camera: Array | None) -> None:
-        """After a frame, with where the camera sits on the body (None: they are one): publish what has become known."""
+    def mounted(self, T_body_camera: Array | None) -> None:
+        """Where the camera of the newest frame sits on the body (4, 4); None where they are one."""
         self._T_body_camera = T_body_camera
-        found, reason = self._ask()
-        if found is not None and not self._known:
-            self._door.get_logger().info(f"relocalised in the map of session {found.session}: {reason}")
-            self._tell(found)
-        self._known = found is not None
+
+    def look(self) -> None:
+        """After a frame, and after a search: publish what has become known. For two threads."""
+        with self._lock:
+            found, reason = self._ask()
+            if found is not None and not self._known:
+                self._door.get_logger().info(f"relocalised in the map of session {found.session}: {reason}")
+                self._tell(found)
+            self._known = found is not None
 
     def _tell(self, found: Relocalised) -> PoseWithCovarianceStamped:
         message = with_covariance(*_of_body(found, self._T_body_camera), found.stamp_ns, self._params.map_frame)
-        with self._lock:
-            self._publisher.publish(message)
-            if self._initial is not None:
-                self._initial.publish(on_plane(message))
+        self._publisher.publish(message)
+        if self._initial is not None:
+            self._initial.publish(on_plane(message))
         return message
 
     async def _trigger(self, _: Any, response: Any) -> Any:

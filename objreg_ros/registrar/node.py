@@ -126,7 +126,8 @@ class RegistrarNode(MatchingDoor):
                 window = self._registrar.track(frame)
             if window is not None:
                 self.searcher.put(Job(stamp_ns, window, time.monotonic()))
-        self._whereabouts.look(T_body_camera)
+        self._whereabouts.mounted(T_body_camera)
+        self._whereabouts.look()
         return window is None
 
     def _frame(self, match: Match) -> tuple[Frame, Array | None]:
@@ -178,6 +179,7 @@ class RegistrarNode(MatchingDoor):
         self._last_refusals.update((refusal.reason.value, refusal.detail) for refusal in outcome.rejected)
         self._announcements.refusals(outcome.rejected)
         self._count()
+        self._whereabouts.look()
         if outcome.keyframe_ns is not None:
             seen = outcome.observations, outcome.keyframe_ns, outcome.frame_id
             self._announcements.landmarks(*seen, self._names, outcome.session)
