@@ -5,8 +5,8 @@ The first half of a recording is the earlier session. The later sessions begin a
 each beside a copy of the store, in odometry that begins anew at the camera. A known object is seen once one that the
 earlier session stored is (by label and true place, within 30 cm). Told is the share of starts that saw one for five
 seconds and were relocated by then, the time that it took, and false answers: worse than 8 degrees or 15 cm (FALSE),
-against the pose of the camera beside the stored keyframe that is truly nearest. So the earlier session's own drift
-is no error, and that of the way since is.
+in the earlier session's odometry as it was at any pose within a metre of there. For where that session passed a place
+twice, its drift gives the place two positions in its map, and either is right. The drift of the way since is an error.
 
     python benchmarks/relocalisation.py --quick
     python benchmarks/relocalisation.py --simulate moved:0,1,2,3,4 --simulate loop:0,1,2,3,4 --starts 4 --json OUT
@@ -41,6 +41,7 @@ from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.truth import FALSE, Truth, within
 
 WITHIN_S = 5.0
+BESIDE_M = 1.0  # poses of the earlier session so near say where a place is in its map
 NEAR_M = 0.3  # an object that is known stands no farther from where it stood
 LATER_NS = 10**15  # the later sessions' clock goes on long after the earlier one
 QUICK = {"frames": 160, "starts": 1}
@@ -73,11 +74,12 @@ class Earlier:
             label == name and np.linalg.norm(xyz - at) < NEAR_M for label, xyz in seen for name, at in self.objects
         )
 
-    def T_map_camera(self, T_world_camera: Array) -> Array:
-        """Where a true pose is in its map, by the pose of it that is truly nearest."""
+    def T_map_cameras(self, T_world_camera: Array) -> Array:
+        """(N, 4, 4) where a true pose is in its map, by each pose of it within `BESIDE_M`, else by the nearest."""
         eyes = np.array([T[:3, 3] for T in self.T_world_camera])
-        k = int(np.argmin(np.linalg.norm(eyes - T_world_camera[:3, 3], axis=1)))
-        return np.asarray(self.T_odom_camera[k] @ inverse(self.T_world_camera[k]) @ T_world_camera)
+        metres = np.linalg.norm(eyes - T_world_camera[:3, 3], axis=1)
+        near = np.flatnonzero(metres <= max(BESIDE_M, metres.min()))
+        return np.array([self.T_odom_camera[k] @ inverse(self.T_world_camera[k]) @ T_world_camera for k in near])
 
 
 def objects_of(frame: Frame, T_world_camera: Array) -> list[tuple[str, Array]]:
@@ -129,7 +131,7 @@ def wake(
         for frame in begun_anew(frames):
             last = frame.stamp_ns - LATER_NS
             closures = registrar.process(frame).closures
-            row["closures"] += [told_of(one, truth) for one in closures if one.from_ns < LATER_NS]
+            row["closures"] += [told_of(one, truth) for one in closures if one.from_session != one.to_session]
             T = truth.at(last)
             if T is None:
                 continue
@@ -139,7 +141,8 @@ def wake(
             if found is not None and found.stamp_ns == frame.stamp_ns:
                 if known_ns is None:
                     known_ns = last
-                _judge(row, pose_error(found.T_map_camera, earlier.T_map_camera(T)))
+                errors = [pose_error(found.T_map_camera, true) for true in earlier.T_map_cameras(T)]
+                _judge(row, min(errors, key=lambda error: max(np.divide(error, FALSE))))
             if known_ns is not None and last - known_ns > 1e9 * WITHIN_S:
                 break
     if known_ns is not None:

@@ -18,14 +18,15 @@ DRIFT = pose(rotation_from_vector(np.array([0.0, 0.0, 0.3])), np.array([5.0, 1.0
 SECOND = 1_000_000_000
 
 
-def test_an_object_is_known_where_it_stood_and_a_pose_is_told_beside_the_nearest_of_the_earlier_session() -> None:
+def test_an_object_is_known_where_it_stood_and_a_pose_is_told_by_those_of_the_earlier_session_beside_it() -> None:
     from relocalisation import Earlier
 
     truth = Truth((k * SECOND // 10, moved(0.1 * k)) for k in range(11))
     shown = [replace(frame(0.1 * k, (CUP,)), T_odom_camera=DRIFT @ moved(0.1 * k)) for k in range(3)]
     earlier = Earlier.of(shown, truth)
     assert earlier.knows(shown[0], moved(0.05)) and not earlier.knows(shown[0], moved(2.0))
-    assert np.allclose(earlier.T_map_camera(moved(0.1, 0.2)), DRIFT @ moved(0.1, 0.2))
+    assert len(earlier.T_map_cameras(moved(0.1, 0.2))) == 3 and len(earlier.T_map_cameras(moved(5.0))) == 1
+    assert np.allclose(earlier.T_map_cameras(moved(0.1, 0.2)), DRIFT @ moved(0.1, 0.2))
 
 
 def test_a_later_session_begins_long_after_at_an_upright_origin() -> None:
