@@ -51,14 +51,17 @@ class Tie(NamedTuple):
         one = self.statement
         return one.target.T_session_camera @ one.T_target_source @ inverse(one.source.T_session_camera)
 
-    def carried(self, here: Standpoint) -> tuple[Array, Array]:
-        """The camera ``here`` in the map (4, 4) by this tie and odometry, and the covariance of that (6, 6)."""
+    def carried(self, here: Standpoint, metres: float) -> tuple[Array, Array]:
+        """The camera ``here`` in the map (4, 4) by this tie and odometry, and the covariance of that (6, 6).
+
+        ``metres`` is the way from the tie to there, in both sessions together: the earlier one has drifted too.
+        """
         one = self.statement
         T_map_here = self.T_map_odom @ here.T_session_camera
         R = np.kron(np.eye(2), one.target.T_session_camera[:3, :3])
         at = one.target.T_session_camera @ one.T_target_source
         covariance = turned_about(R @ self.covariance @ R.T, T_map_here[:3, 3] - at[:3, 3])
-        return T_map_here, covariance + drift(abs(here.travelled - one.source.travelled))
+        return T_map_here, covariance + drift(metres)
 
 
 def drift(metres: float) -> Array:
@@ -131,15 +134,15 @@ class Relocalisation:
         statements = [one.statement for one in others]
         metres = np.array([path_m(one, tie.statement) for one in statements])
         agrees = agree(statements, tie.statement, metres)
-        agreeing = [one for one, yes in zip(others, agrees, strict=True) if yes]
-        supporters = sum(_distinct(one.statement, tie.statement) for one in agreeing)
+        agreeing = [(one, float(way)) for one, way, yes in zip(others, metres, agrees, strict=True) if yes]
+        supporters = sum(_distinct(one.statement, tie.statement) for one, _ in agreeing)
         opponents = int(np.sum((metres <= NEAR_M) & ~agrees))
         alone = tie.confirmed or tie.statement.odds >= ALONE_ODDS
         if supporters + alone <= opponents:
             return
         self._map, self._agreeing = target, 1 + len(agreeing)
         here = tie.statement.source
-        T_map_here, self._covariance = fused([one.carried(here) for one in (*agreeing, tie)])
+        T_map_here, self._covariance = fused([one.carried(here, way) for one, way in (*agreeing, (tie, 0.0))])
         self._T_map_odom = rigid(T_map_here @ inverse(here.T_session_camera))
         self._origin, self._path = here.T_session_camera[:3, 3], TravelledPath(here.T_session_camera)
 
