@@ -16,7 +16,8 @@ from sources import Source
 from objreg_ros.data import UNTRIED, Array, Frame, LoopClosure, Odometry
 from objreg_ros.geometry import inverse, rotation_angle
 from objreg_ros.mapper.pose_graph import PoseGraph
-from objreg_ros.registrar.registrar import Outcome, Registrar
+from objreg_ros.registrar.outcome import Outcome
+from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.report.export import constraint

@@ -477,6 +477,28 @@ class LoopClosure:
         return {name["label"]: metres for name, metres in found if name}
 
 
+@word
+class Relocalised:
+    """Where the camera is in the map of an earlier ``session``: the frame that the poses of its keyframes are in.
+
+    ``T_map_odom`` maps the odometry of now into it, ``T_map_camera`` is the camera of the frame at ``stamp_ns``;
+    ``covariance (6, 6) float64`` of that in ROS order, along the map's axes; ``closures`` that agree tell it.
+    """
+
+    stamp_ns: int
+    session: int
+    T_map_odom: Array
+    T_map_camera: Array
+    covariance: Array
+    closures: int
+
+    def __post_init__(self) -> None:
+        _hold_pose(self, "T_map_odom")
+        _hold_pose(self, "T_map_camera")
+        _hold(self, "covariance", np.float64, (6, 6), {})
+        _require(self, bool(np.isfinite(self.covariance).all()), "a finite covariance", self.covariance.tolist())
+
+
 class Reason(Enum):
     """Why something was refused. The value is what diagnostics and JSON show."""
 

@@ -151,6 +151,16 @@ def pose_error(T_estimated: Array, T_true: Array) -> tuple[float, float]:
     return float(rotation), float(100.0 * np.linalg.norm(T_estimated[:3, 3] - T_true[:3, 3]))
 
 
+def turned_about(covariance: Array, lever: Array) -> Array:
+    """The covariance (6, 6) [tx ty tz rx ry rz] of a point that is ``lever (3,)`` away on the same rigid body.
+
+    Both in the same fixed axes: what the rotation is unsure of moves the point.
+    """
+    J = np.eye(6)
+    J[:3, 3:] = -skew(lever)
+    return np.asarray(J @ covariance @ J.T)
+
+
 def leaps(T_odom_before: Array, T_odom_after: Array, seconds: float, max_speed: float, T_odom_first: Array) -> bool:
     """Whether odometry has begun anew between two poses (4, 4): no body moves so within that time.
 

@@ -197,3 +197,10 @@ def test_back_projection_knows_its_pixels() -> None:
     points = g.back_project(depth, fx=4.0, fy=5.0, cx=1.0, cy=2.0)
     assert points.shape == (3, 4, 3) and points.dtype == np.float32
     assert np.allclose(points[2, 1], [0, 0, 2]) and np.allclose(points[0, 3], [1, -0.8, 2])
+
+
+def test_a_point_on_a_lever_moves_as_the_rotation_is_unsure() -> None:
+    covariance = np.diag([0.0, 0.0, 0.0, 0.0, 0.0, 0.01])
+    at = g.turned_about(covariance, np.array([2.0, 0.0, 5.0]))
+    assert np.allclose(np.diag(at), [0.0, 0.04, 0.0, 0.0, 0.0, 0.01])  # about z: x goes along y
+    assert at[1, 5] == pytest.approx(0.02) and np.allclose(at, at.T)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The parameters that every node has."""
+"""The parameters that every node has, and those of what only the border knows."""
 
 from __future__ import annotations
 
@@ -35,3 +35,13 @@ class DoorParams(Params):
     def most_pixels(self) -> int:
         """`max_megapixels` as a number of pixels."""
         return round(1e6 * self.max_megapixels)
+
+
+@dataclass(frozen=True)
+class RelocalisedParams(Params):
+    """How the registrar tells where it is in the map of an earlier session."""
+
+    map_frame: str = param(
+        "earlier_map", "name of the frame of an earlier session's map, in which `relocalised` is; for Nav2: map"
+    )
+    initialpose: bool = param(False, "tell it on `initialpose` too, projected to the plane, as AMCL takes it")

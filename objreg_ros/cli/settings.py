@@ -19,7 +19,7 @@ from objreg_ros.adapters.params import (
     ToLioSamParams,
     ToRtabmapParams,
 )
-from objreg_ros.bridge.params import DoorParams
+from objreg_ros.bridge.params import DoorParams, RelocalisedParams
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.mapper.params import MapperNodeParams, MapperParams
 from objreg_ros.params import Declaration, Params
@@ -32,7 +32,7 @@ Kind = TypeVar("Kind", bound=Params)
 NODES: dict[str, tuple[type[Params], ...]] = {
     "detector": (DetectorParams, DoorParams),
     "segmenter": (SegmenterParams, SegmenterNodeParams, DoorParams),
-    "registrar": (RegistrarParams, RegistrarNodeParams, DoorParams),
+    "registrar": (RegistrarParams, RegistrarNodeParams, RelocalisedParams, DoorParams),
     "mapper": (MapperParams, MapperNodeParams, DoorParams),
     "objreg_to_rtabmap": (ToRtabmapParams, BodyParams, AdapterParams, DoorParams),
     "objreg_to_lio_sam": (ToLioSamParams, AdapterParams, DoorParams),

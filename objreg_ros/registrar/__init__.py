@@ -2,8 +2,8 @@
 """Room 3: Frames in, LoopClosures out, and a reason for every closure that was refused.
 
 `registrar` is the facade over `objreg_ros.keyframes`, `objreg_ros.memory` and `objreg_ros.registration`: `track` for
-every frame, `search` for every keyframe, `process` for both. A `candidate_search` tries stored keyframes; what a
-registered pair comes to is a `closure` or a refusal, or waits for its `confirmation` by others whose `consistency`
-with it odometry tells. `warm` compiles every kernel before the first frame comes; `node`
-is the door.
+every frame, `search` for every keyframe, `process` for both, with an `outcome` each. A `candidate_search` tries stored
+keyframes; what a registered pair comes to is a `closure` or a refusal, or waits for its `confirmation` by others whose
+`consistency` with it odometry tells. `relocalisation` says where the camera is in the map of an earlier session. `warm`
+compiles every kernel before the first frame comes; `node` is the door.
 """

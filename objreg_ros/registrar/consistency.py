@@ -89,8 +89,8 @@ class Consistency:
         self._forget(statement.source)
         number, self._next = self._next, self._next + 1
         others = [n for n, other in self._statements.items() if _same_sessions(other, statement)]
-        metres = np.array([_path_m(self._statements[n], statement) for n in others])
-        agrees = _agree([self._statements[n] for n in others], statement, metres)
+        metres = np.array([path_m(self._statements[n], statement) for n in others])
+        agrees = agree([self._statements[n] for n in others], statement, metres)
         self._statements[number] = statement
         self._agree[number] = {n for n, yes in zip(others, agrees, strict=True) if yes}
         self._near[number] = {n for n, way in zip(others, metres, strict=True) if way <= NEAR_M}
@@ -141,13 +141,13 @@ def _same_sessions(one: Statement, other: Statement) -> bool:
     return (one.source.session, one.target.session) == (other.source.session, other.target.session)
 
 
-def _path_m(one: Statement, other: Statement) -> float:
+def path_m(one: Statement, other: Statement) -> float:
     """The camera's path from one pair of keyframes to the other, at both ends together."""
     source = abs(one.source.travelled - other.source.travelled)
     return source + abs(one.target.travelled - other.target.travelled)
 
 
-def _agree(others: Sequence[Statement], one: Statement, metres: Array) -> Array:
+def agree(others: Sequence[Statement], one: Statement, metres: Array) -> Array:
     """(N,) bool: whether odometry carries the pose of ``one`` to where each of ``others`` is, or back."""
     if not others:
         return np.zeros(0, bool)

@@ -24,12 +24,15 @@ from objreg_ros.bridge.door import DroppedError
 from objreg_ros.bridge.lifetime import await_kernels
 from objreg_ros.bridge.markers import Scene
 from objreg_ros.bridge.matching import MatchingDoor
+from objreg_ros.bridge.params import RelocalisedParams
+from objreg_ros.bridge.relocalised import Whereabouts
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.sync import Match, Need, Stream
 from objreg_ros.bridge.transforms import hear_mount
 from objreg_ros.bridge.worker import Backlog, Limit
-from objreg_ros.data import Frame
-from objreg_ros.registrar.registrar import FrameWindow, Outcome, Registrar
+from objreg_ros.data import Array, Frame
+from objreg_ros.registrar.outcome import Outcome
+from objreg_ros.registrar.registrar import FrameWindow, Registrar
 from objreg_ros.registrar.warm import warm
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 
@@ -55,7 +58,7 @@ class RegistrarNode(MatchingDoor):
     """
 
     def __init__(self) -> None:
-        super().__init__("registrar", RegistrarParams, RegistrarNodeParams)
+        super().__init__("registrar", RegistrarParams, RegistrarNodeParams, RelocalisedParams)
         inputs = self.settings.of(RegistrarNodeParams)
         self._mount, self._seconds = hear_mount(self, inputs.mounting), inputs.limit
         await_kernels(lambda: warm(self.settings.of(RegistrarParams)), self.get_logger().info)
@@ -73,6 +76,7 @@ class RegistrarNode(MatchingDoor):
             self._search, self._keep, self.fail, limit, lambda job: job.window.nbytes, GIVING_WAY
         )
         self._announcements = Announcements(self)
+        self._whereabouts = Whereabouts(self, lambda: (self._registrar.relocalised, self._registrar.whereabouts))
         self._serve()
         self._listen(round(inputs.odom_slop * 1e9))
 
@@ -114,7 +118,7 @@ class RegistrarNode(MatchingDoor):
         """Follow one frame; a keyframe goes on to the searcher."""
         if not self._enabled:
             raise DroppedError("disabled", "")
-        frame = self._frame(payload)
+        frame, T_body_camera = self._frame(payload)
         self._watch_camera(frame.frame_id)
         self._scene.see(frame)
         with self._tracking:  # until it waits: none that a service ends comes before it
@@ -122,15 +126,19 @@ class RegistrarNode(MatchingDoor):
                 window = self._registrar.track(frame)
             if window is not None:
                 self.searcher.put(Job(stamp_ns, window, time.monotonic()))
+        self._whereabouts.mounted(T_body_camera)
+        self._whereabouts.look()
         return window is None
 
-    def _frame(self, match: Match) -> Frame:
+    def _frame(self, match: Match) -> tuple[Frame, Array | None]:
+        """With where the camera sits on the body of its odometry."""
         odom, camera = match["odom"], match["objects"].header.frame_id
         self._without_odometry += odom is None
         self._odom_frame = odom[0].frame_id if odom else self._odom_frame
         topics = ("objects", "view", "view/camera_info", "gravity", "labels", "odom")
         T_body_camera = self._mount.T_body_camera(odom, camera)
-        return self.read("frame", from_msg.frame, *(match[topic] for topic in topics), T_body_camera)
+        frame = self.read("frame", from_msg.frame, *(match[topic] for topic in topics), T_body_camera)
+        return frame, T_body_camera
 
     def _watch_camera(self, frame_id: str) -> None:
         """Say so where the frames of two cameras come in turn."""
@@ -171,6 +179,7 @@ class RegistrarNode(MatchingDoor):
         self._last_refusals.update((refusal.reason.value, refusal.detail) for refusal in outcome.rejected)
         self._announcements.refusals(outcome.rejected)
         self._count()
+        self._whereabouts.look()
         if outcome.keyframe_ns is not None:
             seen = outcome.observations, outcome.keyframe_ns, outcome.frame_id
             self._announcements.landmarks(*seen, self._names, outcome.session)

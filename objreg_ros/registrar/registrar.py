@@ -14,11 +14,10 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass, replace
 
 import numpy as np
 
-from objreg_ros.data import Frame, LoopClosure, Observation, Reason, Rejected
+from objreg_ros.data import Frame, LoopClosure, Reason, Rejected, Relocalised
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import Clock, FrameWindow, Keyframer
 from objreg_ros.memory.landmarks import Landmark, Landmarks, Link
@@ -38,31 +37,14 @@ from objreg_ros.registrar.closure import (
     waiting_of,
 )
 from objreg_ros.registrar.confirmation import Confirmation
+from objreg_ros.registrar.outcome import Outcome
+from objreg_ros.registrar.relocalisation import Relocalisation
 from objreg_ros.registration import gate_of, method_of
 from objreg_ros.registration.api import Gate, Method
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
 
 RECENT = 500  # landmarks that are told of after every keyframe
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Outcome:
-    """What became of a frame: accepted closures, refusals with reasons, and the keyframe that it completed, if any.
-
-    With the objects of that keyframe under the ids of their landmarks, its camera and its session.
-    """
-
-    closures: tuple[LoopClosure, ...] = ()
-    rejected: tuple[Rejected, ...] = ()
-    keyframe_ns: int | None = None
-    observations: tuple[Observation, ...] = ()
-    frame_id: str = "camera"
-    session: int | None = None
-
-    def with_late(self, late: Outcome) -> Outcome:
-        """With what became of earlier keyframes' poses; a late constraint keeps its own stamps."""
-        return replace(self, closures=self.closures + late.closures, rejected=self.rejected + late.rejected)
 
 
 class Registrar:
@@ -96,6 +78,7 @@ class Registrar:
         self._thinning = Thinning(self.params.thin_seconds)  # of what was accepted in it
         self._confirmation = Confirmation(self.params.replaced(confirm_seconds=self._confirm_seconds))
         self._since = 0  # the first session whose stamps are not of this run too
+        self._relocalisation = Relocalisation()
         self._session: int | None = None  # the one that goes on, None before the first keyframe
 
     @property
@@ -114,6 +97,16 @@ class Registrar:
     def waiting(self) -> int:
         """How many poses wait for other keyframes to confirm them."""
         return len(self._confirmation)
+
+    @property
+    def relocalised(self) -> Relocalised | None:
+        """Where the newest frame is in the map of an earlier session of the store; None as `whereabouts` says."""
+        return self._relocalisation.relocalised
+
+    @property
+    def whereabouts(self) -> str:
+        """By what `relocalised` is known, or why it is not."""
+        return self._relocalisation.reason
 
     def counts(self) -> dict[str, int]:
         """How many ``keyframes``, ``objects``, ``landmarks``, ``sessions`` and ``closures`` the store holds.
@@ -139,7 +132,9 @@ class Registrar:
 
     def track(self, frame: Frame) -> FrameWindow | None:
         """Follow the camera; returns the frame window that became a keyframe with this one, mostly None."""
-        return self._keyframer.add(frame)
+        window = self._keyframer.add(frame)
+        self._relocalisation.follow(frame, self._keyframer.next_session - 1)
+        return window
 
     def search(
         self, window: FrameWindow, seconds: float = np.inf, hurried: Callable[[], bool] = lambda: False
@@ -253,7 +248,7 @@ class Registrar:
 
     def _remember_late(self, waiting: Waiting) -> LoopClosure:
         """Write a late constraint down, and merge the landmarks that it says are one. It holds without that, too."""
-        with suppress(StoreError):
+        with suppress(StoreError, KeyError):  # the store fails, or has forgotten a keyframe of it meanwhile
             here, there = (
                 {sighting.instance: sighting for sighting in self._store.sightings(number)}
                 for number in (waiting.source_id, waiting.target_id)
@@ -265,6 +260,8 @@ class Registrar:
             joined = {old: merge.into for old, merge in merged.items()}
             names = {instance: joined.get(seen.landmark, seen.landmark) for instance, seen in here.items()}
             waiting = waiting.renamed(names)
+            ends = self._store.keyframe(waiting.source_id), self._store.keyframe(waiting.target_id)
+            self._relocalisation.hear(waiting.closure, *ends)
         return waiting.closure
 
     def _remember(
@@ -280,8 +277,9 @@ class Registrar:
         self._store.add(keyframe, named, closures, merged)
         self._landmarks.add(named, merged)
         self._index.add(named)
-        for item in accepted:
+        for item, closure in zip(accepted, closures, strict=True):
             self._index.meet(keyframe.session, item.target.session)
+            self._relocalisation.hear(closure, keyframe, item.target)
         with suppress(StoreError):  # the keyframe is stored: what is left now goes another time
             self._forget_surplus(named)
         return closures, named

@@ -21,7 +21,7 @@ from objreg_ros.data import Reason, Rejected
 from objreg_ros.keyframes.keyframer import FrameWindow
 from objreg_ros.memory.store import Store
 from objreg_ros.registrar.node import Job, RegistrarNode
-from objreg_ros.registrar.registrar import Outcome
+from objreg_ros.registrar.outcome import Outcome
 
 CUP = (box("cup", (0, 0, 1)),)
 Making = Callable[[], RegistrarNode]

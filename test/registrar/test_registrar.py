@@ -118,6 +118,26 @@ def test_a_store_brings_an_earlier_session_back(tmp_path: Path) -> None:
     assert later.counts()["sessions"] == 2 and later.counts()["closures"] == 1
 
 
+def test_a_later_session_says_where_it_is_in_the_map_of_the_earlier_one(tmp_path: Path) -> None:
+    params = PARAMS.replaced(store=str(tmp_path / "place.db"))
+    earlier = Registrar(params)
+    _run(earlier, *(_frame(10 + 3 * k, T, True) for k, T in enumerate((HERE, BESIDE))))
+    earlier.close()
+    later, T_odom_map = (
+        Registrar(params),
+        pose(rotation_from_vector(np.array([0.0, 0.0, 0.8])), np.array([1.0, 2.0, 0])),
+    )
+    assert later.relocalised is None and later.whereabouts == "no closure to an earlier session yet"
+    seen = (_frame(100 + 3 * k, T, True) for k, T in enumerate((BESIDE, HERE)))
+    _run(later, *(replace(f, T_odom_camera=T_odom_map @ f.T_odom_camera) for f in seen))
+    found = later.relocalised
+    assert found is not None and found.session == 0 and found.stamp_ns == 103_000_000_000, later.whereabouts
+    rotation, distance = pose_error(found.T_map_camera, HERE)
+    assert rotation < 1.0 and distance < 2.0
+    later.reset()
+    assert later.relocalised is None
+
+
 def test_a_search_without_time_refuses_as_over_budget_and_remembers_the_keyframe() -> None:
     registrar = Registrar(PARAMS)
     _run(registrar, _frame(0, HERE))

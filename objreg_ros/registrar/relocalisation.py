@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the camera is in the map of an earlier session: the frame that the poses of its keyframes are in.
+
+A closure to a keyframe of an earlier session ties the odometry of now to that map. One alone is believed where its odds
+are high or other keyframes confirmed it; else two must agree by way of odometry (`consistency`). What agrees is
+averaged by its information on SE(3), where the camera of the newest was (Barfoot and Furgale, "Associating uncertainty
+with three-dimensional poses for use in estimation problems", 2014). From there odometry goes on.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from objreg_ros.data import Array, Frame, LoopClosure, Relocalised
+from objreg_ros.geometry import inverse, pose, rigid, rotation_from_vector, turned_about, vector_from_rotation
+from objreg_ros.keyframes.keyframer import SILENCE_S
+from objreg_ros.keyframes.odometry import TravelledPath
+from objreg_ros.registrar.confirmation import SUPPORTERS
+from objreg_ros.registrar.consistency import (
+    NEAR_M,
+    ROTATION_GROWTH_DEG_M,
+    TRANSLATION_GROWTH,
+    Standpoint,
+    Statement,
+    agree,
+    path_m,
+)
+from objreg_ros.registration.keyframe import Keyframe
+
+ALONE_ODDS = 1000.0  # of a closure that is believed by itself
+MOST = 64  # ties that are kept, the newest
+STEP = 0.05, 3.0  # m, degrees: less is no way, but the noise of odometry
+ROUNDS = 4  # of averaging rotations: the mean of poses that agree has settled by then
+
+
+class Tie(NamedTuple):
+    """A closure to an earlier session, with the ``covariance`` (6, 6) of its pose."""
+
+    statement: Statement
+    covariance: Array
+    confirmed: bool
+
+    @property
+    def T_map_odom(self) -> Array:
+        """(4, 4) from the odometry of now into the earlier session's."""
+        one = self.statement
+        return one.target.T_session_camera @ one.T_target_source @ inverse(one.source.T_session_camera)
+
+    def carried(self, here: Standpoint, metres: float) -> tuple[Array, Array]:
+        """The camera ``here`` in the map (4, 4) by this tie and odometry, and the covariance of that (6, 6).
+
+        ``metres`` is the way from the tie to there, in both sessions together: the earlier one has drifted too.
+        """
+        one = self.statement
+        T_map_here = self.T_map_odom @ here.T_session_camera
+        R = np.kron(np.eye(2), one.target.T_session_camera[:3, :3])
+        at = one.target.T_session_camera @ one.T_target_source
+        covariance = turned_about(R @ self.covariance @ R.T, T_map_here[:3, 3] - at[:3, 3])
+        return T_map_here, covariance + drift(metres)
+
+
+def drift(metres: float) -> Array:
+    """The covariance (6, 6) of so much way by odometry: what `consistency` allows is two deviations."""
+    sigma = 0.5 * metres * np.array([TRANSLATION_GROWTH] * 3 + [np.radians(ROTATION_GROWTH_DEG_M)] * 3)
+    return np.diag(sigma**2)
+
+
+class Relocalisation:
+    """Hears of every frame and every closure; `relocalised` says where the camera is, `reason` why that is not known.
+
+    It stays with the session in whose map it was sure first. All is forgotten where odometry begins anew, or may have
+    in a silence. For several threads.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._last_ns = 0
+        self._begin(-1, 0)
+
+    def _begin(self, session: int, began_ns: int) -> None:
+        """Forget everything: the frames from ``began_ns`` on are in odometry of their own."""
+        self._session, self._began_ns = session, began_ns
+        self._ties: list[Tie] = []
+        self._heard = Counter[int]()  # closures, by the earlier session
+        self._camera: tuple[int, Array] | None = None  # the newest: stamp and T_odom_camera
+        self._map: int | None = None  # the session in whose map the camera is
+        self._T_map_odom: Array = np.eye(4)
+        self._covariance: Array = np.eye(6)  # of the camera where the last tie was
+        self._origin: Array = np.zeros(3)  # of that, in odometry
+        self._path = TravelledPath(np.eye(4))
+        self._agreeing = 0
+
+    def follow(self, frame: Frame, session: int) -> None:
+        """Go on to a frame of this session."""
+        with self._lock:
+            silent_s = 1e-9 * (frame.stamp_ns - self._last_ns)
+            if session == self._session and silent_s <= 0.0:  # late: passed over
+                return
+            self._last_ns = frame.stamp_ns
+            if session != self._session or silent_s > SILENCE_S:
+                self._begin(session, frame.stamp_ns)
+            if frame.T_odom_camera is not None:
+                self._go(frame.stamp_ns, frame.T_odom_camera)
+
+    def _go(self, stamp_ns: int, T_odom_camera: Array) -> None:
+        self._camera = stamp_ns, T_odom_camera
+        if not self._path.is_near(T_odom_camera, *STEP):
+            self._path.go(T_odom_camera)
+
+    def hear(self, closure: LoopClosure, source: Keyframe, target: Keyframe) -> None:
+        """Take in a closure of these keyframes, the later one first; those of one session tell nothing."""
+        with self._lock:
+            is_of_now = source.session == self._session and source.stamp_ns >= self._began_ns
+            if not is_of_now or target.session >= source.session:
+                return
+            if self._camera is None or not source.by_odometry:  # our own tracking tells no frame between keyframes
+                self._go(source.stamp_ns, _pose_of(source))
+            self._heard[target.session] += 1
+            tie = _tie(closure, source, target)
+            self._weigh(tie)
+            self._ties = [*self._ties, tie][-MOST:]
+
+    def _weigh(self, tie: Tie) -> None:
+        """Renew the answer with a tie, if it is believed."""
+        target = tie.statement.target.session
+        if self._map not in (None, target):
+            return
+        others = [one for one in self._ties if one.statement.target.session == target]
+        statements = [one.statement for one in others]
+        metres = np.array([path_m(one, tie.statement) for one in statements])
+        agrees = agree(statements, tie.statement, metres)
+        agreeing = [(one, float(way)) for one, way, yes in zip(others, metres, agrees, strict=True) if yes]
+        supporters = sum(_distinct(one.statement, tie.statement) for one, _ in agreeing)
+        opponents = int(np.sum((metres <= NEAR_M) & ~agrees))
+        alone = tie.confirmed or tie.statement.odds >= ALONE_ODDS
+        if supporters + alone <= opponents:
+            return
+        self._map, self._agreeing = target, 1 + len(agreeing)
+        here = tie.statement.source
+        T_map_here, self._covariance = fused([one.carried(here, way) for one, way in (*agreeing, (tie, 0.0))])
+        self._T_map_odom = rigid(T_map_here @ inverse(here.T_session_camera))
+        self._origin, self._path = here.T_session_camera[:3, 3], TravelledPath(here.T_session_camera)
+
+    @property
+    def relocalised(self) -> Relocalised | None:
+        """Where the newest frame's camera is; None where it is not known."""
+        with self._lock:
+            if self._map is None or self._camera is None:
+                return None
+            stamp_ns, T_odom_camera = self._camera
+            T_map_camera = self._T_map_odom @ T_odom_camera
+            way = self._T_map_odom[:3, :3] @ (T_odom_camera[:3, 3] - self._origin)
+            return Relocalised(
+                stamp_ns=stamp_ns,
+                session=self._map,
+                T_map_odom=self._T_map_odom,
+                T_map_camera=T_map_camera,
+                covariance=turned_about(self._covariance, way) + drift(self._path.travelled),
+                closures=self._agreeing,
+            )
+
+    @property
+    def reason(self) -> str:
+        """Why it is not known, or by how many closures it is."""
+        with self._lock:
+            if self._map is not None:
+                return f"{self._agreeing} closures that agree, to session {self._map}"
+            if not self._heard:
+                return "no closure to an earlier session yet"
+            heard = ", ".join(f"{count} to session {session}" for session, count in sorted(self._heard.items()))
+            return f"closures so far: {heard}; expected two that agree, or one with odds of {ALONE_ODDS:g}"
+
+
+def fused(poses: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """The mean of poses (4, 4) with covariances (6, 6), weighted by their information, and its covariance."""
+    information = [np.linalg.inv(covariance) for _, covariance in poses]
+    covariance = np.linalg.inv(sum(information))
+    T = poses[-1][0]
+    for _ in range(ROUNDS):
+        apart = [
+            weight @ np.concatenate([one[:3, 3] - T[:3, 3], vector_from_rotation(one[:3, :3] @ T[:3, :3].T)])
+            for weight, (one, _) in zip(information, poses, strict=True)
+        ]
+        step = covariance @ sum(apart)
+        T = pose(rotation_from_vector(step[3:]) @ T[:3, :3], T[:3, 3] + step[:3])
+    return T, np.asarray(0.5 * (covariance + covariance.T))
+
+
+def _tie(closure: LoopClosure, source: Keyframe, target: Keyframe) -> Tie:
+    odds = closure.evidence.get("odds", 0.0)
+    confirmed = closure.evidence.get("agreeing", 0.0) >= SUPPORTERS
+    statement = Statement(Standpoint.of(source), Standpoint.of(target), closure.T_from_to, odds, True)
+    return Tie(statement, closure.covariance, confirmed)
+
+
+def _distinct(one: Statement, other: Statement) -> bool:
+    """Whether two are of two keyframes each: those of one see the same, and err together."""
+    return one.source.stamp_ns != other.source.stamp_ns and one.target.stamp_ns != other.target.stamp_ns
+
+
+def _pose_of(keyframe: Keyframe) -> Array:
+    return np.eye(4) if keyframe.T_odom_camera is None else keyframe.T_odom_camera

@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the registrar says of a frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from objreg_ros.data import LoopClosure, Reason, Rejected
+from objreg_ros.registrar.outcome import Outcome
+
+
+def test_what_becomes_of_earlier_keyframes_is_told_after_what_became_of_this_one() -> None:
+    early, late = (
+        LoopClosure(from_ns=0, to_ns=k, T_from_to=np.eye(4), covariance=np.eye(6), labels=()) for k in (1, 2)
+    )
+    refused = Rejected(reason=Reason.LOW_OVERLAP, from_ns=0, to_ns=1, detail="")
+    told = Outcome(closures=(early,), keyframe_ns=7, session=3).with_late(
+        Outcome(closures=(late,), rejected=(refused,))
+    )
+    assert told.closures == (early, late) and told.rejected == (refused,)
+    assert (told.keyframe_ns, told.session) == (7, 3)
