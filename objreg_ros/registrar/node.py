@@ -71,11 +71,15 @@ class RegistrarNode(MatchingDoor):
         self._names, self._scene, self._odom_frame = dict[int, str](), Scene(), "odom"
         limit = Limit(WAITING_KEYFRAMES, inputs.waiting_megabytes * 1_000_000, PATIENCE_S)
         self.searcher: Backlog[Job] = Backlog(
-            self._search, self._keep, self.fail, limit, lambda job: job.window.nbytes, GIVING_WAY
+            self._search, self._keep, self.fail, limit, lambda job: job.window.nbytes, self._niceness()
         )
         self._announcements = Announcements(self)
         self._serve()
         self._listen(round(inputs.odom_slop * 1e9))
+
+    def _niceness(self) -> int:
+        """None where other rooms share Python's lock: a nice thread that holds it and has no processor holds up all."""
+        return 0 if self.indoors.offers(self.resolve_topic_name("objects")) else GIVING_WAY
 
     def _serve(self) -> None:
         self.create_service(Trigger, "~/reset", self._reset, callback_group=self.apart)
