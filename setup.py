@@ -60,6 +60,7 @@ setup(
     entry_points={
         "console_scripts": [
             "objreg = objreg_ros.cli:main",
+            "objreg_graph = objreg_ros.graph:main",
             "detector = objreg_ros.detector.node:main",
             "segmenter = objreg_ros.segmenter.node:main",
             "registrar = objreg_ros.registrar.node:main",

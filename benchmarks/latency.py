@@ -7,6 +7,7 @@ search for loops. A constraint's latency is from the arrival of the image that i
 complete (a second at most), searched for and told. The books say what every node dropped and why: in = out + dropped.
 
     python benchmarks/latency.py --json latency.json
+    python benchmarks/latency.py --objects 4 --composed 3     three processes and one in turn, three times each
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from tables import RATE_HZ, table_story
 from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
 from objreg_ros.simulation.write import write_story
 
+PROGRAMS = {**{room: f"objreg_ros.{room}.node" for room in ROOMS}, "graph": "objreg_ros.graph"}
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
@@ -112,7 +114,7 @@ class Meter:
     """The processor time and the memory of the node processes that this one started, sampled each second."""
 
     def __init__(self) -> None:
-        self.samples: dict[str, list[tuple[float, float, float]]] = {room: [] for room in ROOMS}
+        self.samples: dict[str, list[tuple[float, float, float, float]]] = {name: [] for name in PROGRAMS}
         self._open = True
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
@@ -120,23 +122,27 @@ class Meter:
     def _run(self) -> None:
         while self._open:
             for pid in _children(os.getpid()):
-                room = next((room for room in ROOMS if f"objreg_ros.{room}.node" in _command(pid)), None)
+                room = next((name for name, module in PROGRAMS.items() if module in _command(pid)), None)
                 sample = _sample(pid)
                 if room is not None and sample is not None:
                     self.samples[room].append((time.monotonic(), *sample))
             time.sleep(1.0)
 
     def figures(self, start: float, stop: float) -> dict[str, dict[str, float]]:
-        """Room → share of one core between the two moments, and the largest memory in MB."""
+        """Process → share of one core between the two moments, and the largest memory in MB.
+
+        ``pss_mb`` counts what processes share once.
+        """
         self._open = False
         self._thread.join()
         out = {}
         for room, rows in self.samples.items():
             if len(rows) < 2:
                 continue
-            at, seconds, memory = np.array(rows).T
+            at, seconds, memory, fair = np.array(rows).T
             cpu = 100 * np.diff(np.interp((start, stop), at, seconds))[0] / (stop - start)
-            out[room] = {"cpu_percent": round(float(cpu), 1), "memory_mb": round(float(memory.max()), 1)}
+            most = {"memory_mb": round(float(memory.max()), 1), "pss_mb": round(float(fair.max()), 1)}
+            out[room] = {"cpu_percent": round(float(cpu), 1), **most}
         return out
 
 
@@ -160,14 +166,16 @@ def _command(pid: int) -> str:
         return ""
 
 
-def _sample(pid: int) -> tuple[float, float] | None:
-    """Processor seconds and resident megabytes; None for a process that has ended."""
+def _sample(pid: int) -> tuple[float, float, float] | None:
+    """Processor seconds, resident megabytes and proportional ones; None for a process that has ended."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
         pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+        shares = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
     except OSError:
         return None
-    return (int(fields[11]) + int(fields[12])) / TICKS, pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+    fair = next((1.024e-3 * int(line.split()[1]) for line in shares if line.startswith("Pss:")), 0.0)
+    return (int(fields[11]) + int(fields[12])) / TICKS, pages * os.sysconf("SC_PAGE_SIZE") / 1e6, fair
 
 
 @contextmanager
@@ -194,12 +202,12 @@ def books_of(live: Live) -> dict[str, Any]:
     }
 
 
-def measure(objects: int, frames: int, seed: int, node_args: Mapping[str, list[str]]) -> dict[str, Any]:
+def measure(path: Path, setup: Setup) -> dict[str, Any]:
     """One recording through the live graph."""
-    with recorded(objects, frames, seed) as path, tempfile.TemporaryDirectory() as logs:
+    with tempfile.TemporaryDirectory() as logs:
         witness, meter = Witness(), Meter()
         try:
-            live = run_live(path, Setup(node_args=node_args), Path(logs), lambda words: click.echo(words, err=True))
+            live = run_live(path, setup, Path(logs), lambda words: click.echo(words, err=True))
             usage = meter.figures(*witness.span)
             latency = {node: witness.latency_ms(node) for node in ROOMS}
             told = witness.constraint_ms()
@@ -210,7 +218,7 @@ def measure(objects: int, frames: int, seed: int, node_args: Mapping[str, list[s
 
 def totals(usage: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
     """The three nodes together."""
-    names = ("cpu_percent", "memory_mb")
+    names = ("cpu_percent", "memory_mb", "pss_mb")
     return {name: round(sum(figures.get(name, 0.0) for figures in usage.values()), 1) for name in names}
 
 
@@ -221,14 +229,34 @@ def line_of(row: Mapping[str, Any]) -> str:
     return f"end to end {end_to_end}, constraints {told}, {usage}"
 
 
+def compare(path: Path, node_args: Mapping[str, list[str]], rounds: int) -> dict[str, Any]:
+    """Three processes and one in turn, so that what else the machine does weighs on both; and the median ratios."""
+    runs: dict[str, list[dict[str, Any]]] = {"three": [], "one": []}
+    for _ in range(rounds):
+        for name, found in runs.items():
+            found.append(measure(path, Setup(node_args=node_args, composed=name == "one")))
+            click.echo(f"{name}: {line_of(found[-1])}")
+    pairs = [(_figures(one), _figures(three)) for one, three in zip(runs["one"], runs["three"], strict=True)]
+    ratios = {name: [round(one[name] / three[name], 3) for one, three in pairs] for name in pairs[0][0]}
+    return {**runs, "ratios": ratios, "median": {name: float(np.median(found)) for name, found in ratios.items()}}
+
+
+def _figures(row: Mapping[str, Any]) -> dict[str, float]:
+    end_to_end = row["end_to_end_ms"]["registrar"]
+    return {**totals(row["usage"]), "p50_ms": end_to_end["p50"], "p95_ms": end_to_end["p95"]}
+
+
 @click.command()
 @click.option("--objects", default="1,4,8", show_default=True, help="Objects in view, one run each.")
 @click.option("--frames", default=300, show_default=True, help="Frames of a run, at 30 a second.")
 @click.option("--seed", default=0, show_default=True, help="Seed of the simulated recordings.")
 @click.option("--model", default="", help="ONNX model of the detector, if not the default.")
 @click.option("--max-rate", type=float, help="The detector's max_rate, if not the default.")
+@click.option("--composed", default=0, help="Compare so many runs in three processes and in one, in turn.")
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
-def main(objects: str, frames: int, seed: int, model: str, max_rate: float | None, json_file: Path | None) -> None:
+def main(
+    objects: str, frames: int, seed: int, model: str, max_rate: float | None, composed: int, json_file: Path | None
+) -> None:
     """Measure the live graph's latency."""
     os.environ.setdefault("ROS_DOMAIN_ID", str(random.randint(1, 100)))  # the witness listens there too
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
@@ -237,8 +265,13 @@ def main(objects: str, frames: int, seed: int, model: str, max_rate: float | Non
     node_args = {"detector": words} if words else {}
     rows = {}
     for count in (int(text) for text in objects.split(",")):
-        rows[str(count)] = measure(count, frames, seed, node_args)
-        click.echo(f"{count} objects: {line_of(rows[str(count)])}")
+        with recorded(count, frames, seed) as path:
+            if composed:
+                rows[str(count)] = compare(path, node_args, composed)
+                click.echo(f"{count} objects, one process over three: {rows[str(count)]['median']}")
+            else:
+                rows[str(count)] = measure(path, Setup(node_args=node_args))
+                click.echo(f"{count} objects: {line_of(rows[str(count)])}")
     if json_file is not None:
         json_file.write_text(json.dumps({"rate_hz": RATE_HZ, "objects": rows}, indent=1))
 

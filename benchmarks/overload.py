@@ -187,7 +187,7 @@ def measure(path: Path, seconds: float, speed: float, cores: int, keyframes: int
         "unaccounted": books,
         "usage": usage,
         "slope_mb_per_hour": {room: slope_mb_per_hour(meter.samples[room], warm) for room in ROOMS},
-        "memory_mb": {room: [(at - start, mb) for at, _, mb in meter.samples[room]] for room in ROOMS},
+        "memory_mb": {room: [(at - start, mb) for at, _, mb, _ in meter.samples[room]] for room in ROOMS},
         "rows": [{"at": at - start, **{key: told.get(key) for key in TOLD}} for at, told in gauge.rows if at >= start],
     }
 

@@ -1,17 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """The nodes: ``ros2 launch objreg_ros objreg.launch.py image:=/kinect/rgb points:=/kinect/points``.
 
-Every argument is optional; ``mapper:=true`` starts the reference mapper beside the three rooms. No parameter's default
-is repeated here; what is not said is as in the code. In a namespace, /tf and /tf_static are those of the namespace.
+Every argument is optional; ``mapper:=true`` starts the reference mapper beside the three rooms, ``composed:=true`` all
+of them in one process. Where another detector says what is where, ours is not started. No parameter's default is
+repeated here; what is not said is as in the code. In a namespace, /tf and /tf_static are those of the namespace.
 """
 
+import json
 import sys
+from tempfile import NamedTemporaryFile
 
+from ament_index_python.packages import get_package_prefix
 from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
+from objreg_ros import share
 from objreg_ros.bridge import profile
 
 ROOMS = ("detector", "segmenter", "registrar")
@@ -23,6 +28,9 @@ TOPICS = {
     "camera_info": "camera of the depth image",
     "odom": "odometry of the camera's body",
     "imu": "IMU of the camera",
+    "detections_in": "boxes of another detector, vision_msgs/Detection2DArray",
+    "masks": "picture of instances of another detector",
+    "label_info": "names of the classes of another detector, vision_msgs/LabelInfo",
 }
 REMAPPED = {  # what the nodes listen to → the argument that says where it is, and what is added to it
     "image": ("image", ""),
@@ -33,6 +41,9 @@ REMAPPED = {  # what the nodes listen to → the argument that says where it is,
     "camera_info": ("camera_info", ""),
     "odom": ("odom", ""),
     "imu": ("imu", ""),
+    "detections_in": ("detections_in", ""),
+    "masks": ("masks", ""),
+    "label_info": ("label_info", ""),
 }
 TF = [("/tf", "tf"), ("/tf_static", "tf_static")]  # robots in namespaces of their own have frames of the same names
 
@@ -40,46 +51,108 @@ OPTIONS = {
     "params_file": "YAML of parameters, in the form of config/objreg.yaml",
     "namespace": "namespace of the nodes and of their topics",
     "model": "ONNX model of the detector",
-    "source": "where the segmenter takes depth from: auto, points or depth",
+    "source": "where the segmenter takes depth from",
+    "detections": "who says where objects are; with vision_msgs or masks our detector is not started",
+    "camera": "the camera where nobody publishes camera_info: fx,fy,cx,cy or a calibration YAML",
+    "T_base_camera": "where the camera sits on the body of odom, seven numbers with commas; else /tf_static is asked",
     "use_sim_time": "true to follow /clock",
     "reliable": "true to ask cameras for reliable delivery",
     "mapper": "true to start the reference mapper too, which publishes path and correction",
+    "composed": "true for all nodes in one process, which takes half of the memory",
+    "respawn": "true to start a process again that has ended with an error or was killed",
+    "rviz": "true to start RViz too, where it is installed",
+    "log_level": "how much the nodes log",
 }
+SWITCH = ("", "true", "false", "True", "False")
+CHOICES = {
+    "source": ("", "auto", "points", "depth"),
+    "detections": ("", "auto", "table", "vision_msgs", "masks"),
+    "log_level": ("", "debug", "info", "warn", "error", "fatal"),
+    **dict.fromkeys(("use_sim_time", "reliable", "mapper", "composed", "respawn", "rviz"), SWITCH),
+}
+FOREIGN = ("vision_msgs", "masks")  # detections that are another detector's
+RESPAWN_S = 2.0
+OWN = {"detector": ("model",), "segmenter": ("source", "detections", "camera"), "registrar": (), "mapper": ()}
 
 
 def generate_launch_description() -> LaunchDescription:
     """Arguments, a line about the transport, and the nodes."""
     said = {**OPTIONS, **TOPICS}
-    arguments = [DeclareLaunchArgument(name, default_value="", description=text) for name, text in said.items()]
+    arguments = [
+        DeclareLaunchArgument(name, default_value="", description=text, choices=CHOICES.get(name))
+        for name, text in said.items()
+    ]
     return LaunchDescription([*arguments, LogInfo(msg=profile.apply()), OpaqueFunction(function=_nodes)])
 
 
 def _nodes(context: LaunchContext) -> list[Node]:
     said = {name: LaunchConfiguration(name).perform(context) for name in (*OPTIONS, *TOPICS)}
-    return [
-        Node(
-            executable=sys.executable,
-            arguments=["-m", f"objreg_ros.{room}.node"],
-            name=room,
-            namespace=said["namespace"],
-            parameters=_parameters(room, said),
-            remappings=[*TF, *_remappings(said)],
-            output="screen",
-        )
-        for room in _rooms(said)
-    ]
+    rooms = _rooms(said)
+    alike = {
+        "namespace": said["namespace"],
+        "remappings": [*TF, *_remappings(said)],
+        "output": "screen",
+        "ros_arguments": ["--log-level", said["log_level"]] if said["log_level"] else [],
+        "respawn": _is_true(said["respawn"]),
+        "respawn_delay": RESPAWN_S,
+    }
+    if _is_true(said["composed"]):
+        nodes = [_together(rooms, said, alike)]
+    else:
+        nodes = [_alone(room, said, alike) for room in rooms]
+    return [*nodes, *_rviz(said)]
+
+
+def _alone(room: str, said: dict[str, str], alike: dict) -> Node:
+    words = ["-m", f"objreg_ros.{room}.node"]
+    return Node(executable=sys.executable, arguments=words, name=room, parameters=_parameters(room, said), **alike)
+
+
+def _together(rooms: tuple[str, ...], said: dict[str, str], alike: dict) -> Node:
+    """One process; launch names no node of it, and so a file says whose each parameter is."""
+    words = ["-m", "objreg_ros.graph", *rooms]
+    return Node(
+        executable=sys.executable, arguments=words, exec_name="objreg_graph", parameters=_shared(rooms, said), **alike
+    )
+
+
+def _shared(rooms: tuple[str, ...], said: dict[str, str]) -> list[str]:
+    """The user's file, and over it one of what was said on the command line."""
+    values = {room: _parameters(room, {**said, "params_file": ""}) for room in rooms}
+    owned = {f"/**/{room}": {"ros__parameters": given[0]} for room, given in values.items() if given}
+    if not owned:
+        return [said["params_file"]] if said["params_file"] else []
+    with NamedTemporaryFile("w", prefix="objreg_", suffix=".yaml", delete=False) as file:
+        json.dump(owned, file)  # which is YAML
+    return [given for given in (said["params_file"], file.name) if given]
+
+
+def _rviz(said: dict[str, str]) -> list[Node]:
+    """RViz where it is asked for and installed."""
+    if not _is_true(said["rviz"]):
+        return []
+    try:
+        get_package_prefix("rviz2")
+    except LookupError:
+        return [LogInfo(msg="rviz: expected rviz2 to be installed, got none; the nodes run without it")]
+    return [Node(package="rviz2", executable="rviz2", arguments=["-d", str(share.find("config/objreg.rviz"))])]
 
 
 def _rooms(said: dict[str, str]) -> tuple[str, ...]:
-    return (*ROOMS, "mapper") if said["mapper"].lower() == "true" else ROOMS
+    rooms = tuple(room for room in ROOMS if room != "detector" or said["detections"] not in FOREIGN)
+    return (*rooms, "mapper") if _is_true(said["mapper"]) else rooms
+
+
+def _is_true(text: str) -> bool:
+    return text.lower() == "true"
 
 
 def _parameters(room: str, said: dict[str, str]) -> list:
     """The user's file, and over it what was said on the command line."""
-    values: dict = {name: said[name].lower() == "true" for name in ("use_sim_time", "reliable") if said[name]}
-    for owner, name in (("detector", "model"), ("segmenter", "source")):
-        if room == owner and said[name]:
-            values[name] = said[name]
+    values: dict = {name: _is_true(said[name]) for name in ("use_sim_time", "reliable") if said[name]}
+    values |= {name: said[name] for name in OWN[room] if said[name]}
+    if said["T_base_camera"] and room != "detector":
+        values["T_base_camera"] = [float(number) for number in said["T_base_camera"].split(",")]
     return [given for given in (said["params_file"], values) if given]
 
 

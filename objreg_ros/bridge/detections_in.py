@@ -11,6 +11,7 @@ from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import String
 
 from objreg_ros.bridge import from_msg, lenses, qos, to_msg, vision_from_msg
+from objreg_ros.bridge.indoors import Surplus
 from objreg_ros.bridge.label_table import LabelTable
 from objreg_ros.bridge.layout import table
 from objreg_ros.bridge.matching import MatchingDoor
@@ -68,13 +69,13 @@ class DetectionsIn:
 
     def _decode(self, topic: str, message: Any) -> object:
         if topic in TABLE:
-            return table(message)
+            return isinstance(message, Detections | Surplus) or table(message)
         return self._boxes(message, (1, 1)) if topic in BOXES else self._numbers(message)
 
     def _hear(self, topic: str, message: Any) -> None:
         if topic not in TABLE:
             self._door.feed("labels", 0, self._labels.names)  # it needs no table, so nothing waits for one
-        surplus = topic in TABLE and from_msg.is_surplus(message)
+        surplus = isinstance(message, Surplus) or (topic in TABLE and _is_surplus(message))
         self._door.feed("detections", from_msg.stamp_ns(message), Drop.SURPLUS if surplus else message)
 
     # Read
@@ -84,7 +85,7 @@ class DetectionsIn:
     ) -> Asked:
         """The boxes and masks of a match, in the picture of ``depth``; `DroppedError` for a message that has none."""
         message, lens = match["detections"], (camera_info, raw, cloud)
-        if isinstance(message, PointCloud2):
+        if isinstance(message, Detections | PointCloud2):
             names = match["labels"]
             seen = self._door.read("detections", from_msg.detections, message, names, depth.depth.shape)
             return Asked(self._door.read("camera_info", lenses.detections, seen, *lens), None, names)
@@ -115,6 +116,10 @@ class DetectionsIn:
             self._out = self._door.create_publisher(String, "labels", qos.latched())
         self._out.publish(to_msg.labels(self._labels.names))
         self._out.wait_for_all_acked(Duration(seconds=HEARD_S))
+
+
+def _is_surplus(message: Any) -> bool:
+    return isinstance(message, PointCloud2) and from_msg.is_surplus(message)
 
 
 def _size(image: Any) -> tuple[int, int] | None:

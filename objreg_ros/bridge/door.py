@@ -27,6 +27,7 @@ from objreg_ros.bridge import qos, to_msg
 from objreg_ros.bridge.choice import Choice
 from objreg_ros.bridge.diagnostics import CONNECTED, diagnostic
 from objreg_ros.bridge.drops import Drops
+from objreg_ros.bridge.indoors import Ear, Indoors, Inlet, Outlet
 from objreg_ros.bridge.ledger import Ledger
 from objreg_ros.bridge.log import ThrottledLog
 from objreg_ros.bridge.missed import Missed
@@ -51,15 +52,18 @@ class Door(OverridableNode):
 
     A subclass listens, calls `accept` once for each frame, and hands it to ``worker`` as (stamp_ns, payload) when it is
     complete. The worker calls `compute`; what that drops or refuses is counted, logged and leaves the node running.
+    ``indoors`` is what the nodes of this process hand over to each other; nothing if None.
     """
 
-    def __init__(self, name: str, *kinds: type[Params]) -> None:
+    def __init__(self, name: str, *kinds: type[Params], indoors: Indoors | None = None) -> None:
         super().__init__(name)
+        self.indoors = Indoors() if indoors is None else indoors
+        self._inlet = Inlet(self)
         self.settings = Parameters(self, *kinds, DoorParams)
         self.settings.changed = self.adopt
         self.ledger = Ledger()
         self.connected: dict[str, int] = {}  # full topic name → publishers that DDS has connected us to
-        self._choices: dict[str, Choice[Subscription]] = {}  # by the input of `listen_to_first`
+        self._choices: dict[str, Choice[Subscription | Ear]] = {}  # by the input of `listen_to_first`
         self._bugs: set[str] = set()  # that the log has told of
         self._ignored: Counter[str] = Counter()  # messages that are no frame by themselves, by what is wrong with them
         self.apart = ReentrantCallbackGroup()  # of services that wait for work that is done `aside`
@@ -95,9 +99,14 @@ class Door(OverridableNode):
 
     def listen(
         self, kind: type, topic: str, heard: Callable[[Any], None], profile: QoSProfile, watched: str = ""
-    ) -> Subscription:
-        """Subscribe; ``watched`` is the input of `expect` that this topic belongs to."""
+    ) -> Subscription | Ear:
+        """Subscribe; ``watched`` is the input of `expect` that this topic belongs to.
 
+        Where a node of this process offers the topic, ``heard`` is given its words instead of messages.
+        """
+        full = self.resolve_topic_name(topic)
+        if self.indoors.offers(full):
+            return self._listen_indoors(full, topic, heard, watched)
         missed = Missed()
 
         def hear(message: Any, info: Mapping[str, Any]) -> None:
@@ -105,9 +114,22 @@ class Door(OverridableNode):
             self.watch.hear(watched)
             self._pass(topic, heard, message)
 
-        full = self.resolve_topic_name(topic)
         events = SubscriptionEventCallbacks(matched=partial(self._note_match, full))
         return self.create_subscription(kind, topic, hear, profile, event_callbacks=events)  # type: ignore[arg-type]
+
+    def _listen_indoors(self, full: str, topic: str, heard: Callable[[Any], None], watched: str) -> Ear:
+        def hear(word: Any) -> None:
+            self.watch.hear(watched)
+            self._pass(topic, heard, word)
+
+        ear = Ear(full, self._inlet, hear)
+        self.indoors.add(ear)
+        self.connected[full] = 1
+        return ear
+
+    def offer(self, kind: type, topic: str, profile: QoSProfile) -> Outlet:
+        """A topic of which the nodes of this process get the words themselves."""
+        return Outlet(self.create_publisher(kind, topic, profile), self.indoors)
 
     def _pass(self, topic: str, heard: Callable[[Any], None], message: Any) -> None:
         """Hand a message on. None ends the node: what breaks its contract already here is counted, and logged."""
@@ -162,7 +184,7 @@ class Door(OverridableNode):
             if self._choices[name].hear(topic, message):
                 heard(topic, message)
 
-        def subscribe(topic: str) -> Subscription:
+        def subscribe(topic: str) -> Subscription | Ear:
             return self.listen(topics[topic], topic, partial(hear, topic), profiles.get(topic, profile), watched=name)
 
         silence_s = self.settings.of(DoorParams).silence
@@ -170,9 +192,12 @@ class Door(OverridableNode):
         self._choices[name] = Choice(topics, subscribe, self._unsubscribe, is_valid, silence_s)
         self.expect(name, *topics)
 
-    def _unsubscribe(self, subscription: Subscription) -> None:
+    def _unsubscribe(self, subscription: Subscription | Ear) -> None:
         self.connected.pop(subscription.topic_name, None)
-        self.destroy_subscription(subscription)
+        if isinstance(subscription, Ear):
+            self.indoors.remove(subscription)
+        else:
+            self.destroy_subscription(subscription)
 
     def taken(self, name: str) -> str | None:
         """The topic that an input of `listen_to_first` comes by; None before a valid message, or after a silence."""

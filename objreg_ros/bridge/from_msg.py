@@ -11,6 +11,7 @@ import itertools
 import json
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -45,10 +46,12 @@ MOMENT = re.compile(r"(?P<name>.*)@(?P<seconds>-?[0-9]{1,10})\.(?P<nanoseconds>[
 
 
 def stamp_ns(message: Any) -> int:
-    """The time of a message with a header, of a Header or of a Time, in integer nanoseconds.
+    """The time of a message with a header, of a Header, of a Time or of a word, in integer nanoseconds.
 
     ValueError for one that a ROS 2 message cannot carry: seconds of more than 32 bits, a second of nanoseconds.
     """
+    if hasattr(message, "stamp_ns"):
+        return int(message.stamp_ns)
     stamp = getattr(message, "header", message)
     stamp = getattr(stamp, "stamp", stamp)
     if not 0 <= stamp.nanosec < limits.NANOSECONDS:
@@ -69,6 +72,11 @@ def bounded(text: str, of: str, most: int = limits.MOST_NAME) -> str:
     return text
 
 
+def frame_id(message: Any) -> str:
+    """The frame of a message with a header, or of a word."""
+    return str(getattr(message, "header", message).frame_id)
+
+
 def when_and_where(message: Any) -> dict[str, Any]:
     """``stamp_ns`` and ``frame_id`` of a message with a header, as words take them."""
     return {"stamp_ns": stamp_ns(message), "frame_id": bounded(message.header.frame_id, "frame_id")}
@@ -78,7 +86,9 @@ def when_and_where(message: Any) -> dict[str, Any]:
 
 
 def image(message: Any, most_pixels: int = limits.MOST_PIXELS_OF_PICTURE) -> ColourImage:
-    """A sensor_msgs Image (of an encoding in `pictures.COLOUR` or `PLANES`) or CompressedImage (jpeg, png)."""
+    """An Image (of an encoding in `pictures.COLOUR` or `PLANES`) or CompressedImage (jpeg, png), or its word."""
+    if isinstance(message, ColourImage):
+        return message
     return ColourImage(rgb=colour_pixels(message, most_pixels), **when_and_where(message))
 
 
@@ -357,10 +367,12 @@ def is_surplus(message: Any) -> bool:
 
 
 def detections(message: Any, names: Mapping[int, str], image_hw: tuple[int, int] = (1, 1)) -> Detections:
-    """A ``detections_table``. A class without a name is called by its number.
+    """A ``detections_table``, or a word. A class without a name is called by its number.
 
     ``image_hw`` is what to believe where the message does not tell: an empty table.
     """
+    if isinstance(message, Detections):
+        return message
     xyxy, score, label, told_hw = _rows_of_table(message, names)
     order = np.argsort(-score, kind="stable")
     return Detections(
@@ -471,15 +483,22 @@ def frame(
         raise ValueError(f"frame: expected objects, view, camera_info and gravity of one stamp, got {stamps} ns")
     clouds, support = objects(objects_message, names)
     falls, confidence = gravity(gravity_message)
-    T_odom_camera = pose_at(stamps[0], odometry_words) if odometry_words else None
-    if T_odom_camera is not None and T_body_camera is not None:
-        T_odom_camera = T_odom_camera @ T_body_camera
     return Frame(
         objects=clouds,
         support=support,
         view=view(view_message, view_info),
         gravity=falls,
         gravity_confidence=confidence,
-        T_odom_camera=T_odom_camera,
+        T_odom_camera=_camera_pose(stamps[0], odometry_words, T_body_camera),
         **when_and_where(objects_message),
     )
+
+
+def followed(word: Frame, odometry_words: Sequence[Odometry] | None, T_body_camera: Array | None = None) -> Frame:
+    """The segmenter's own word of a moment, with the odometry around it as in `frame`."""
+    return replace(word, T_odom_camera=_camera_pose(word.stamp_ns, odometry_words, T_body_camera))
+
+
+def _camera_pose(moment_ns: int, words: Sequence[Odometry] | None, T_body_camera: Array | None) -> Array | None:
+    T_odom_body = pose_at(moment_ns, words) if words else None
+    return T_odom_body if T_odom_body is None or T_body_camera is None else T_odom_body @ T_body_camera

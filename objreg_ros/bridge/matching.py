@@ -11,6 +11,7 @@ from typing import Any
 from rclpy.clock import Clock, ClockType
 
 from objreg_ros.bridge.door import Door
+from objreg_ros.bridge.indoors import Indoors
 from objreg_ros.bridge.sync import Drop, Match, Need, Stream, Synchroniser
 from objreg_ros.params import Params
 
@@ -30,8 +31,8 @@ class MatchingDoor(Door):
     each stream was fed before then wait.
     """
 
-    def __init__(self, name: str, *kinds: type[Params]) -> None:
-        super().__init__(name, *kinds)
+    def __init__(self, name: str, *kinds: type[Params], indoors: Indoors | None = None) -> None:
+        super().__init__(name, *kinds, indoors=indoors)
         self._early: defaultdict[str, deque[Early]] = defaultdict(lambda: deque(maxlen=EARLY))
         self._order = count()
         self._sync: Synchroniser | None = None

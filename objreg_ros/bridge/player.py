@@ -14,6 +14,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 
@@ -24,6 +25,7 @@ QUEUE = 20  # messages of a topic that wait in DDS for a slow reader
 LATCHED = 100  # messages of a latched topic that are kept: a recording has those of all its publishers in one
 ASK_AGAIN_S = 2.0  # how often a play that waits looks whether the nodes are still there
 START_S = 300.0  # how long the start of a node may take
+PARTICIPANT = 12  # bytes
 INPUTS = {  # what a node hears of the nodes before it
     "segmenter": ("detections_table", "labels"),
     "registrar": ("objects", "view", "view/camera_info", "gravity", "labels"),
@@ -110,7 +112,16 @@ class Player(Node):
 
     def _deaf(self, nodes: Iterable[str]) -> list[str]:
         """What the nodes should listen to and do not yet."""
-        return [topic for node in nodes for topic in INPUTS.get(node, ()) if node not in self._listeners(topic)]
+        return [topic for node in nodes for topic in INPUTS.get(node, ()) if not self._is_heard(topic, node)]
+
+    def _is_heard(self, topic: str, node: str) -> bool:
+        return node in self._listeners(topic) or self._at_home(node, topic)
+
+    def _at_home(self, node: str, topic: str) -> bool:
+        """Whether a topic comes from the very process of a node, which hands it over without DDS."""
+        receipts = self.get_publishers_info_by_topic(self.resolve_topic_name("finished"))
+        mine = {_process(info) for info in receipts if info.node_name == node}
+        return any(_process(info) in mine for info in self.get_publishers_info_by_topic(self.resolve_topic_name(topic)))
 
     def _listeners(self, topic: str) -> set[str]:
         return {info.node_name for info in self.get_subscriptions_info_by_topic(self.resolve_topic_name(topic))}
@@ -197,6 +208,11 @@ class Player(Node):
         """End the node."""
         self.destroy_node()
         self._executor.shutdown()  # last: the thread that heard a signal may still ring the bell that this takes down
+
+
+def _process(info: TopicEndpointInfo) -> tuple[int, ...]:
+    """The participant of an endpoint: what its GUID begins with, as DDS has it."""
+    return tuple(info.endpoint_gid[:PARTICIPANT])
 
 
 def is_installed(kind: str) -> bool:

@@ -30,6 +30,11 @@ def run(make: Callable[[], Door], args: Sequence[str] | None = None) -> int:
     stderr and status 1. A bug propagates. A signal while kernels compile ends the process here.
     For the main thread of a process that ends with it: signals stay unheard.
     """
+    return run_together((make,), args)
+
+
+def run_together(makes: Sequence[Callable[[], Door]], args: Sequence[str] | None = None) -> int:
+    """Run nodes in one executor, as `run` does one; made and closed in this order, and ended together."""
     first_signal = hear_first_signal()
     share_arenas()
     transport = profile.apply()
@@ -39,7 +44,7 @@ def run(make: Callable[[], Door], args: Sequence[str] | None = None) -> int:
         return _refuse(error)
     try:
         with shutdown_as_interrupt():
-            return _serve(make, transport, first_signal)
+            return _serve(makes, transport, first_signal)
     except Abandoned:
         rclpy.try_shutdown()
         return _leave()
@@ -69,43 +74,58 @@ def _settle() -> None:
     gc.freeze()
 
 
-def _serve(make: Callable[[], Door], transport: str, first_signal: FirstSignal) -> int:
-    executor = SingleThreadedExecutor()
+def _serve(makes: Sequence[Callable[[], Door]], transport: str, first_signal: FirstSignal) -> int:
+    executor, doors = SingleThreadedExecutor(), list[Door]()
     try:
         try:
-            door = make()
-        except (ValueError, OSError) as error:
-            return _refuse(error)
-        try:
-            _spin(door, executor, transport)
+            refused = _make(makes, doors)
+            if refused is None:
+                _spin(doors, executor, transport)
         except BaseException:
             first_signal.deafen()
-            _close(door)
+            _close(doors)
             raise
         first_signal.deafen()
-        return _close(door)
+        return max(_close(doors), 0 if refused is None else _refuse(refused))
     finally:
         executor.shutdown()  # last: the thread that heard the signal may still ring the bell that this takes down
 
 
-def _spin(door: Door, executor: SingleThreadedExecutor, transport: str) -> None:
+def _make(makes: Sequence[Callable[[], Door]], doors: list[Door]) -> Exception | None:
+    """Make every node, into ``doors``; what one was refused for."""
+    try:
+        for make in makes:
+            doors.append(make())
+    except (ValueError, OSError) as error:
+        return error
+    return None
+
+
+def _spin(doors: Sequence[Door], executor: SingleThreadedExecutor, transport: str) -> None:
     """Until a signal; what ended the worker is raised."""
     try:
         with shutdown_as_interrupt():
-            door.get_logger().info(transport)
+            doors[0].get_logger().info(transport)
             _settle()
-            executor.add_node(door)
+            for door in doors:
+                executor.add_node(door)
             # Not `spin_until_future_complete`: it keeps a callback of every round for ever, 100 MB an hour. What broke
             # a worker is seen with the next round, at the latest that of the diagnostics.
-            while rclpy.ok() and not door.failure.done():
+            while rclpy.ok() and not any(door.failure.done() for door in doors):
                 executor.spin_once()
     except KeyboardInterrupt:
         return
-    if rclpy.ok() and door.failure.done():
-        door.failure.result()
+    for door in doors:
+        if rclpy.ok() and door.failure.done():
+            door.failure.result()
 
 
-def _close(door: Door) -> int:
+def _close(doors: Sequence[Door]) -> int:
+    """The exit status of all; who speaks ends before who hears it."""
+    return max([_close_one(door) for door in doors], default=0)
+
+
+def _close_one(door: Door) -> int:
     """The exit status; what cannot be written any more is said, since nobody else would."""
     name = door.get_name()
     try:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A recording through the live graph: three node processes, a player process, and a subscriber in this one."""
+"""A recording through the live graph: node processes, a player process, and a subscriber in this one."""
 
 from __future__ import annotations
 
@@ -39,19 +39,19 @@ class Live:
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """How the graph is started: ROS arguments of each node, and the player's options."""
+    """How the graph is started: ROS arguments of each node, the player's options, and whether in one process."""
 
     node_args: Mapping[str, Sequence[str]] = field(default_factory=dict)
     replay_args: Sequence[str] = ()
+    composed: bool = False
 
 
 def run_live(recording: Path, setup: Setup, folder: Path, say: Callable[[str], None]) -> Live:
     """Play a recording through the graph on a ROS domain of its own; ValueError if a process fails."""
     environment = private_environment()
     with Processes(folder, environment) as processes, _listening(environment) as collector:
-        for room in ROOMS:
-            arguments = ["--ros-args", *setup.node_args.get(room, ())] if setup.node_args.get(room) else []
-            processes.start(room, f"objreg_ros.{room}.node", arguments)
+        for name, module, arguments in _programs(setup):
+            processes.start(name, module, arguments)
         say(f"starting three nodes ({FIRST_TIME})")
         _wait_for_nodes(collector, processes)
         say("playing")
@@ -66,6 +66,20 @@ def run_live(recording: Path, setup: Setup, folder: Path, say: Callable[[str], N
         glimpses = tuple(glimpse for _, glimpse in sorted(collector.glimpses.items()))
         closures, refusals = tuple(collector.closures), tuple(collector.refusals)
         return Live(books, collector.rejected, closures, collector.sight, refusals, glimpses)
+
+
+def _programs(setup: Setup) -> list[tuple[str, str, list[str]]]:
+    """What is to be started: the name of its log, its module and its arguments."""
+    words = {room: list(setup.node_args.get(room, ())) for room in ROOMS}
+    if setup.composed:
+        own = [_addressed(room, word) for room in ROOMS for word in words[room]]
+        return [("graph", "objreg_ros.graph", ["--ros-args", *own] if own else [])]
+    return [(room, f"objreg_ros.{room}.node", ["--ros-args", *own] if own else []) for room, own in words.items()]
+
+
+def _addressed(room: str, word: str) -> str:
+    """A parameter or remap for one of several nodes of a process."""
+    return f"{room}:{word}" if ":=" in word else word
 
 
 def private_environment() -> dict[str, str]:

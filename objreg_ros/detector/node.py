@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from sensor_msgs.msg import CompressedImage, Image, PointCloud2
@@ -13,6 +14,7 @@ from std_msgs.msg import String
 from objreg_ros import share
 from objreg_ros.bridge import from_msg, qos, to_msg, vision_to_msg
 from objreg_ros.bridge.door import Door
+from objreg_ros.bridge.indoors import Indoors, Surplus
 from objreg_ros.bridge.pace import Pace
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.sync import Drop
@@ -30,18 +32,20 @@ class DetectorNode(Door):
     A table goes out for every image, empty if it shows no object, and of a kind of its own if it is surplus.
     """
 
-    def __init__(self) -> None:
-        super().__init__("detector", DetectorParams)
+    def __init__(self, indoors: Indoors | None = None) -> None:
+        super().__init__("detector", DetectorParams, indoors=indoors)
         params = self.settings.of(DetectorParams)
         self._detector = Detector.of(params, share.model)
         self._pace, self._turns = Pace(params.max_rate), Turns(self._leave_out)
         self._names = dict(enumerate(self._detector.labels))
-        self._table = self.create_publisher(PointCloud2, "detections_table", qos.room())
+        self._table = self.offer(PointCloud2, "detections_table", qos.room())
         array = vision_to_msg.Detection2DArray
         self._array = None if array is None else self.create_publisher(array, "detections", qos.room())
         self._labels = self.create_publisher(String, "labels", qos.latched())
         self._labels.publish(to_msg.labels(self._names))
         self.listen_to_first("image", IMAGES, self._decode, self._hear, self.sensor())
+        for topic in IMAGES:  # after it has listened: what it has decoded is not decoded again next door
+            self.indoors.offer(self.resolve_topic_name(topic))
 
     def adopt(self) -> None:
         """Live parameters hold from the next image on."""
@@ -61,7 +65,9 @@ class DetectorNode(Door):
 
     def _leave_out(self, stamp_ns: int, frame_id: str) -> None:
         """Tell of a surplus image, after the tables of those before it."""
-        self._table.publish(to_msg.surplus(stamp_ns, frame_id))
+        word = Surplus(stamp_ns, frame_id)
+        self._hand_over_picture(word)
+        self._table.tell(word, partial(to_msg.surplus, *word))
         self.leave_out(stamp_ns, Drop.SURPLUS.value)
 
     def conclude(self, stamp_ns: int, work: Callable[[], bool]) -> None:
@@ -76,12 +82,18 @@ class DetectorNode(Door):
     def compute(self, stamp_ns: int, payload: Any) -> bool:
         """One image."""
         image = self.read("image", from_msg.image, payload, self.most_pixels)
+        self._hand_over_picture(image)
         with self.ledger.timed("detect"):
             detections = self._detector.detect(image)
-        self._table.publish(to_msg.detections_table(detections, self._names))
-        if self._array is not None:
+        self._table.tell(detections, partial(to_msg.detections_table, detections, self._names))
+        if self._array is not None and self._array.get_subscription_count():
             self._array.publish(vision_to_msg.detections(detections))
         return True
+
+    def _hand_over_picture(self, word: ColourImage | Surplus) -> None:
+        topic = self.taken("image")
+        if topic is not None:
+            self.indoors.hand_over(self.resolve_topic_name(topic), word)
 
 
 def main() -> int:

@@ -17,6 +17,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from objreg_ros.bridge import from_msg, qos, to_msg
 from objreg_ros.bridge.door import Door, DroppedError
+from objreg_ros.bridge.indoors import Indoors
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.transforms import hear_mount
 from objreg_ros.data import JUMP_NS, LoopClosure, Odometry
@@ -40,8 +41,8 @@ class MapperNode(Door):
     The worker solves a snapshot, so that odometry never waits; ``_graph_lock`` guards what both threads touch.
     """
 
-    def __init__(self) -> None:
-        super().__init__("mapper", MapperParams, MapperNodeParams)
+    def __init__(self, indoors: Indoors | None = None) -> None:
+        super().__init__("mapper", MapperParams, MapperNodeParams, indoors=indoors)
         self._inputs = self.settings.of(MapperNodeParams)
         self._graph_lock = threading.Lock()
         self._waiting: list[LoopClosure] = []

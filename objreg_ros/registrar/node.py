@@ -21,6 +21,7 @@ from objreg_ros.bridge import from_msg, qos
 from objreg_ros.bridge.announcements import Announcements
 from objreg_ros.bridge.diagnostics import REJECTED
 from objreg_ros.bridge.door import DroppedError
+from objreg_ros.bridge.indoors import Indoors
 from objreg_ros.bridge.lifetime import await_kernels
 from objreg_ros.bridge.markers import Scene
 from objreg_ros.bridge.matching import MatchingDoor
@@ -57,8 +58,8 @@ class RegistrarNode(MatchingDoor):
     is followed while too many wait.
     """
 
-    def __init__(self) -> None:
-        super().__init__("registrar", RegistrarParams, RegistrarNodeParams, RelocalisedParams)
+    def __init__(self, indoors: Indoors | None = None) -> None:
+        super().__init__("registrar", RegistrarParams, RegistrarNodeParams, RelocalisedParams, indoors=indoors)
         inputs = self.settings.of(RegistrarNodeParams)
         self._mount, self._seconds = hear_mount(self, inputs.mounting), inputs.limit
         await_kernels(lambda: warm(self.settings.of(RegistrarParams)), self.get_logger().info)
@@ -73,12 +74,16 @@ class RegistrarNode(MatchingDoor):
         self._names, self._scene, self._odom_frame = dict[int, str](), Scene(), "odom"
         limit = Limit(WAITING_KEYFRAMES, inputs.waiting_megabytes * 1_000_000, PATIENCE_S)
         self.searcher: Backlog[Job] = Backlog(
-            self._search, self._keep, self.fail, limit, lambda job: job.window.nbytes, GIVING_WAY
+            self._search, self._keep, self.fail, limit, lambda job: job.window.nbytes, self._niceness()
         )
         self._announcements = Announcements(self)
         self._whereabouts = Whereabouts(self, lambda: (self._registrar.relocalised, self._registrar.whereabouts))
         self._serve()
         self._listen(round(inputs.odom_slop * 1e9))
+
+    def _niceness(self) -> int:
+        """None where other rooms share Python's lock: a nice thread that holds it and has no processor holds up all."""
+        return 0 if self.indoors.offers(self.resolve_topic_name("objects")) else GIVING_WAY
 
     def _serve(self) -> None:
         self.create_service(Trigger, "~/reset", self._reset, callback_group=self.apart)
@@ -86,7 +91,9 @@ class RegistrarNode(MatchingDoor):
         self.create_service(SetBool, "~/enable", self._enable)
 
     def _listen(self, odom_slop_ns: int) -> None:
-        room = {"objects": PointCloud2, "view": PointCloud2, "view/camera_info": CameraInfo, "gravity": Vector3Stamped}
+        room: dict[str, type] = {"objects": PointCloud2}
+        if not self.indoors.offers(self.resolve_topic_name("objects")):  # else the word holds these too
+            room |= {"view": PointCloud2, "view/camera_info": CameraInfo, "gravity": Vector3Stamped}
         self.listen(String, "labels", self._hear_labels, qos.latched())
         self.listen(Odometry, "odom", self._hear_odom, self.sensor(qos.ODOMETRY))
         for topic, kind in room.items():
@@ -132,13 +139,14 @@ class RegistrarNode(MatchingDoor):
 
     def _frame(self, match: Match) -> tuple[Frame, Array | None]:
         """With where the camera sits on the body of its odometry."""
-        odom, camera = match["odom"], match["objects"].header.frame_id
+        odom, camera = match["odom"], from_msg.frame_id(match["objects"])
         self._without_odometry += odom is None
         self._odom_frame = odom[0].frame_id if odom else self._odom_frame
-        topics = ("objects", "view", "view/camera_info", "gravity", "labels", "odom")
         T_body_camera = self._mount.T_body_camera(odom, camera)
-        frame = self.read("frame", from_msg.frame, *(match[topic] for topic in topics), T_body_camera)
-        return frame, T_body_camera
+        if isinstance(match["objects"], Frame):
+            return self.read("frame", from_msg.followed, match["objects"], odom, T_body_camera), T_body_camera
+        topics = ("objects", "view", "view/camera_info", "gravity", "labels", "odom")
+        return self.read("frame", from_msg.frame, *(match[topic] for topic in topics), T_body_camera), T_body_camera
 
     def _watch_camera(self, frame_id: str) -> None:
         """Say so where the frames of two cameras come in turn."""

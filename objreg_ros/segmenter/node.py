@@ -11,6 +11,7 @@ from __future__ import annotations
 import sys
 from collections import Counter, deque
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,12 +26,13 @@ from sensor_msgs.msg import Imu as ImuMessage
 from objreg_ros.bridge import from_msg, lenses, qos, to_msg, vision_to_msg
 from objreg_ros.bridge.calibration import fitted, read_calibration
 from objreg_ros.bridge.detections_in import DetectionsIn
+from objreg_ros.bridge.indoors import Indoors, Surplus
 from objreg_ros.bridge.lifetime import await_kernels
 from objreg_ros.bridge.matching import MatchingDoor
 from objreg_ros.bridge.overridable import FIXED
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.static_frames import Mount
-from objreg_ros.bridge.sync import Match, Need, Stream
+from objreg_ros.bridge.sync import Drop, Match, Need, Stream
 from objreg_ros.bridge.transforms import hear_static_frames
 from objreg_ros.data import Array, ColourImage, DepthImage, Detections, FeltGravity, Frame, PointCloud
 from objreg_ros.segmenter.doubts import range_doubt, registration_doubt
@@ -52,8 +54,8 @@ IMAGES = {"image": Image, "image/compressed": CompressedImage}
 class SegmenterNode(MatchingDoor):
     """Segments every depth image or cloud that has detections; a frame goes out also where there is no object."""
 
-    def __init__(self) -> None:
-        super().__init__("segmenter", SegmenterParams, SegmenterNodeParams)
+    def __init__(self, indoors: Indoors | None = None) -> None:
+        super().__init__("segmenter", SegmenterParams, SegmenterNodeParams, indoors=indoors)
         self._inputs = self.settings.of(SegmenterNodeParams)
         self._segmenter = Segmenter(self.settings.of(SegmenterParams))
         await_kernels(self._segmenter.warm, self.get_logger().info)
@@ -66,7 +68,7 @@ class SegmenterNode(MatchingDoor):
         self._apart_deg: deque[float] = deque(maxlen=COMPARED)
         self._source: str | None = None  # the topic that depth comes by
         self._lens = ""  # what was said of it
-        self._objects = self.create_publisher(PointCloud2, "objects", qos.room())
+        self._objects = self.offer(PointCloud2, "objects", qos.room())
         self._view = self.create_publisher(PointCloud2, "view", qos.room())
         self._view_info = self.create_publisher(CameraInfo, "view/camera_info", qos.room())
         self._gravity = self.create_publisher(Vector3Stamped, "gravity", qos.room())
@@ -126,7 +128,8 @@ class SegmenterNode(MatchingDoor):
         self.feed("camera_info", from_msg.stamp_ns(message), message)
 
     def _hear_image(self, _: str, message: Any) -> None:
-        self.feed("image", from_msg.stamp_ns(message), message)
+        surplus = isinstance(message, Surplus)
+        self.feed("image", from_msg.stamp_ns(message), Drop.SURPLUS if surplus else message)
 
     def _hear_odom(self, message: Any) -> None:
         odometry = self.read_aside("odom", from_msg.odometry, message)
@@ -281,12 +284,13 @@ class SegmenterNode(MatchingDoor):
             return organise(cloud, camera), cloud
 
     def _publish(self, frame: Frame, names: to_msg.Labels) -> None:
-        self._objects.publish(to_msg.objects(frame, names))
+        self._objects.tell(frame, partial(to_msg.objects, frame, names))
         if self._solids is not None and self._solids.get_subscription_count():
             self._solids.publish(vision_to_msg.objects(frame))
-        self._view.publish(to_msg.view(frame))
-        self._view_info.publish(to_msg.view_camera_info(frame))
-        self._gravity.publish(to_msg.gravity(frame))
+        parts = {self._view: to_msg.view, self._view_info: to_msg.view_camera_info, self._gravity: to_msg.gravity}
+        for publisher, write in parts.items():
+            if publisher.get_subscription_count():
+                publisher.publish(write(frame))
 
 
 def main() -> int:

@@ -60,9 +60,16 @@ class Graph:
 
     def start(self, name: str, room: str, *ros_args: str) -> None:
         """Start a node as a process; its output goes to `log`."""
+        self._start(name, self.command(room, *ros_args))
+
+    def start_composed(self, *words: str) -> None:
+        """Start all nodes in one process, called ``graph``."""
+        self._start("graph", [sys.executable, "-m", "objreg_ros.graph", *words])
+
+    def _start(self, name: str, command: list[str]) -> None:
         with self._log(name).open("wb") as log:
             self.processes[name] = subprocess.Popen(
-                self.command(room, *ros_args), env=self.environment(), stdout=log, stderr=log, cwd=self.folder
+                command, env=self.environment(), stdout=log, stderr=log, cwd=self.folder
             )
 
     def log(self, name: str) -> str:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import runpy
 import signal
 import subprocess
@@ -62,6 +63,30 @@ def test_the_mapper_comes_along_when_it_is_asked_for(repository: Path, said: dic
     rooms = launch_file(repository)["_rooms"]
     assert rooms(said) == ("detector", "segmenter", "registrar")
     assert rooms({**said, "mapper": "True"}) == ("detector", "segmenter", "registrar", "mapper")
+
+
+@pytest.mark.parametrize(("detections", "first"), [("table", "detector"), ("masks", "segmenter")])
+def test_our_detector_stays_at_home_where_another_one_speaks(
+    detections: str, first: str, repository: Path, said: dict[str, Any]
+) -> None:
+    file = launch_file(repository)
+    given = {**said, "detections": detections, "camera": "500,500,320,240", "T_base_camera": "0,0,1,0,0,0,1"}
+    assert file["_rooms"](given)[0] == first
+    place = {"T_base_camera": [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]}
+    assert file["_parameters"]("segmenter", given) == [{"detections": detections, "camera": "500,500,320,240", **place}]
+    assert file["_parameters"]("registrar", given) == [place] and file["_parameters"]("detector", given) == []
+
+
+def test_the_nodes_of_one_process_each_get_their_own_parameters(repository: Path, said: dict[str, Any]) -> None:
+    file = launch_file(repository)
+    given = {**said, "model": "my.onnx", "source": "points", "params_file": "my.yaml"}
+    users, ours = file["_shared"](file["ROOMS"], given)
+    told = json.loads(Path(ours).read_text())
+    assert users == "my.yaml" and told == {
+        "/**/detector": {"ros__parameters": {"model": "my.onnx"}},
+        "/**/segmenter": {"ros__parameters": {"source": "points"}},
+    }
+    assert file["_shared"](file["ROOMS"], said) == []
 
 
 def test_an_image_is_remapped_with_its_compressed_form(repository: Path, said: dict[str, Any]) -> None:
@@ -144,6 +169,25 @@ def test_the_nodes_of_a_launch_live_in_its_namespace_and_end_with_it(
         launched.wait(START_S)
     said = (tmp_path / "log").read_text()
     assert said.count("process has finished cleanly") == 4, said
+
+
+def test_one_process_is_launched_in_a_namespace_with_the_parameters_of_each_node(
+    graph: Graph, repository: Path, tiny_model: Path, tmp_path: Path
+) -> None:
+    command = [sys.executable, "-c", PROGRAM, str(repository / "launch" / "objreg.launch.py"), "composed:=true"]
+    with (tmp_path / "log").open("w") as log:
+        launched = subprocess.Popen(
+            [*command, "namespace:=house", f"model:={tiny_model}", "mapper:=true", "respawn:=true", "log_level:=info"],
+            env={**graph.environment(), "ROS_LOG_DIR": str(tmp_path)}, cwd=repository, stdout=log, stderr=log,
+        )  # fmt: skip
+    try:
+        names = {f"/house/{room}" for room in ("detector", "segmenter", "registrar", "mapper")}
+        graph.wait_for(lambda: names <= set(graph.books), START_S, f"diagnostics of {names}")
+    finally:
+        launched.send_signal(signal.SIGINT)
+        launched.wait(START_S)
+    said = (tmp_path / "log").read_text()
+    assert said.count("process has finished cleanly") == 1 and "objreg_graph" in said and "ignored" not in said, said
 
 
 def test_a_replay_brings_every_frame_through_the_nodes_and_ends_the_launch(

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""All nodes in one process: ``objreg_graph [detector] [segmenter] [registrar] [mapper] --ros-args …``.
+
+Without names it is the three rooms. Between detector, segmenter and registrar no picture and no cloud goes through DDS:
+each hands the next one its words. Topics are published as by nodes of their own, where somebody listens. A parameter or
+a remap for one of them bears its name: ``-p detector:threshold:=0.4``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from objreg_ros.bridge.door import Door
+from objreg_ros.bridge.indoors import Indoors
+from objreg_ros.bridge.spin import run_together
+from objreg_ros.detector.node import DetectorNode
+from objreg_ros.mapper.node import MapperNode
+from objreg_ros.registrar.node import RegistrarNode
+from objreg_ros.segmenter.node import SegmenterNode
+
+# In the order in which a frame comes to them: who offers a topic is made before who listens to it.
+NODES: dict[str, Callable[[Indoors], Door]] = {
+    "detector": DetectorNode,
+    "segmenter": SegmenterNode,
+    "registrar": RegistrarNode,
+    "mapper": MapperNode,
+}
+ROOMS = ("detector", "segmenter", "registrar")
+
+
+def chosen(words: Sequence[str]) -> list[str]:
+    """The nodes that a command line asks for, in order; ends the process with status 2 for one that there is not."""
+    own = list(words[: words.index("--ros-args")] if "--ros-args" in words else words)
+    parser = argparse.ArgumentParser("objreg_graph", description="The nodes of objreg_ros in one process.")
+    parser.add_argument("nodes", nargs="*", metavar="node", help=f"of {', '.join(NODES)}; the first three if none")
+    asked = parser.parse_args(own).nodes or ROOMS
+    for name in asked:
+        if name not in NODES:
+            parser.error(f"expected nodes of {', '.join(NODES)}, got {name}")
+    return [name for name in NODES if name in asked]
+
+
+def main() -> int:
+    """The executable ``objreg_graph``."""
+    indoors = Indoors()
+    return run_together([partial(NODES[name], indoors) for name in chosen(sys.argv[1:])])
+
+
+if __name__ == "__main__":
+    sys.exit(main())
