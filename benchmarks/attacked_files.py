@@ -27,7 +27,7 @@ from store import make_keyframe
 from trials import Attempt, Target, WrongAnswerError
 
 from objreg_ros.data import ColourImage, LoopClosure
-from objreg_ros.detector.mobilenet_ssd import Detector
+from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store

@@ -36,7 +36,7 @@ from trials import Attempt, Target, WrongAnswerError
 from objreg_ros import share
 from objreg_ros.bridge import from_msg, to_msg
 from objreg_ros.data import DepthImage, Detections, Frame, Intrinsics
-from objreg_ros.detector.mobilenet_ssd import Detector
+from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.mapper.optimisation import load
 from objreg_ros.mapper.pose_graph import PoseGraph

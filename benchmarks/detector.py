@@ -38,7 +38,7 @@ from objreg_ros import share  # noqa: E402
 from objreg_ros.cli.fetch_model import MODELS  # noqa: E402
 from objreg_ros.data import Array, ColourImage, Detections  # noqa: E402
 from objreg_ros.detector.boxes import iou  # noqa: E402
-from objreg_ros.detector.mobilenet_ssd import Detector  # noqa: E402
+from objreg_ros.detector.detector import Detector  # noqa: E402
 from objreg_ros.detector.params import DetectorParams  # noqa: E402
 from training.validation import EVERYTHING, LARGE, RANKING, REASONABLE, Labelled, look, pictures, precisions  # noqa: E402
 

@@ -14,7 +14,7 @@ from peers import Shot
 
 from objreg_ros import share
 from objreg_ros.data import Array, ColourImage, Detections, Frame, LoopClosure, Rejected
-from objreg_ros.detector.mobilenet_ssd import Detector
+from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import pose, rotation_between
 from objreg_ros.offline import Rooms, run_offline

@@ -17,7 +17,7 @@ import numpy as np
 
 from objreg_ros import share
 from objreg_ros.data import Array, ColourImage, DepthImage, Detections, Frame, Intrinsics, PointCloud
-from objreg_ros.detector.mobilenet_ssd import Detector
+from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import inverse
 from objreg_ros.keyframes.fusion import fuse, reference_index

@@ -113,7 +113,7 @@ def build_rooms(
 ) -> tuple[Rooms, Callable[[], None]]:
     """The rooms by their parameters, and what closes them. OSError and ValueError as the rooms raise them."""
     from objreg_ros import share
-    from objreg_ros.detector.mobilenet_ssd import Detector
+    from objreg_ros.detector.detector import Detector
     from objreg_ros.registrar.registrar import Registrar
     from objreg_ros.registrar.warm import warm
     from objreg_ros.segmenter.organise import organise

@@ -19,7 +19,7 @@ import numpy as np
 from objreg_ros import share
 from objreg_ros.cli.simulate import camera_of, distortion_of, sensors_of
 from objreg_ros.data import Array
-from objreg_ros.detector.mobilenet_ssd import Detector
+from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import pose_error
 from objreg_ros.offline import Rooms, run_offline

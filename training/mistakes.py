@@ -16,7 +16,7 @@ import numpy as np
 
 from objreg_ros.data import Array, ColourImage, Detections
 from objreg_ros.detector.boxes import iou
-from objreg_ros.detector.mobilenet_ssd import Detector
+from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from training.augment import cut
 from training.labels import LABELS

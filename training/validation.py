@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from objreg_ros.data import Array, ColourImage, Detections
-from objreg_ros.detector.mobilenet_ssd import Detector
+from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.report.average_precision import TrueBoxes, average_precision
 from objreg_ros.simulation.render import Rendering, render

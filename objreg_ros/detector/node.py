@@ -20,7 +20,7 @@ from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.sync import Drop
 from objreg_ros.bridge.turns import Turns
 from objreg_ros.data import ColourImage
-from objreg_ros.detector.mobilenet_ssd import Detector
+from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 
 IMAGES = {"image": Image, "image/compressed": CompressedImage}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import ColourImage
-from objreg_ros.detector.mobilenet_ssd import Detector
+from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 
 from .tiny_model import centred, save_constant_model, save_seeing_model

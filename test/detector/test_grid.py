@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import ColourImage
+from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.grid import cells, grid, strides_of
-from objreg_ros.detector.mobilenet_ssd import Detector
 from objreg_ros.detector.params import DetectorParams
 
 from .tiny_model import save_constant_model

@@ -30,7 +30,7 @@ from golden import files, runs  # noqa: E402
 from golden.comparison import differences  # noqa: E402
 
 from objreg_ros import share  # noqa: E402
-from objreg_ros.detector.mobilenet_ssd import Detector  # noqa: E402
+from objreg_ros.detector.detector import Detector  # noqa: E402
 from objreg_ros.detector.params import DetectorParams  # noqa: E402
 
 SHARED = Path(os.environ.get("OBJREG_SHARED", TEST.parents[1] / "shared"))

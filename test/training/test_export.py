@@ -10,7 +10,7 @@ import onnx  # noqa: F401  (the export needs it)
 import torch
 
 from objreg_ros.data import ColourImage
-from objreg_ros.detector.mobilenet_ssd import Detector
+from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from training.export import export
 from training.labels import LABELS

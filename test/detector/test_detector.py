@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import ColourImage
-from objreg_ros.detector.mobilenet_ssd import Detector
+from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.detector.picture import USUAL_HW
 from objreg_ros.detector.runtime import Runtime
