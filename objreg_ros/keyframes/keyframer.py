@@ -165,7 +165,7 @@ class Keyframer:
     """
 
     def __init__(self, params: RegistrarParams, next_session: int = 0) -> None:
-        self._params = params
+        self.params = params
         self.next_session = next_session
         self._clock = Clock(0, next_session)
         self._last_ns: int | None = None  # of the last frame
@@ -185,7 +185,7 @@ class Keyframer:
         if last_ns is None or frame.stamp_ns < last_ns or (last_ns == UNSET_NS and frame.stamp_ns > JUMP_NS):
             self._clock = Clock(frame.stamp_ns, self.next_session)
             return self._start(frame)
-        if session is None or not session.goes_on(frame) or session.leaps(frame, self._params.max_speed):
+        if session is None or not session.goes_on(frame) or session.leaps(frame, self.params.max_speed):
             return self._start(frame)
         T_session_frame = self._follow(frame)
         if T_session_frame is None:
@@ -193,7 +193,7 @@ class Keyframer:
         silent_s = session.silent_s(frame)
         ended = self._end() if silent_s > SILENCE_S or self._is_over(frame, T_session_frame) else None
         if silent_s > SILENCE_S:
-            session.lose(silent_s, self._params.max_speed)
+            session.lose(silent_s, self.params.max_speed)
         session.follow(frame)
         frame = _with_session_gravity(session, frame)
         if self._open is None:
@@ -267,7 +267,7 @@ class Keyframer:
 
     def _may_come_back(self, session: _Session, frame: Frame) -> bool:
         """Whether odometry is only a moment late: such a frame is passed over."""
-        return session.in_odometry and 1e-9 * (frame.stamp_ns - session.last_ns) < self._params.keyframe_seconds
+        return session.in_odometry and 1e-9 * (frame.stamp_ns - session.last_ns) < self.params.keyframe_seconds
 
     def _collect(self, window: _Open, frame: Frame, T_first_frame: Array) -> None:
         window.T_first_last = T_first_frame
@@ -285,7 +285,7 @@ class Keyframer:
         lasted = 1e-9 * (frame.stamp_ns - window.first.stamp_ns)
         back = frame.T_odom_camera is not None and window.session.in_odometry and not window.by_odometry
         moved = self._moved(inverse(window.T_session_first) @ T_session_frame, 1.0)
-        return back or moved or lasted > self._params.keyframe_seconds
+        return back or moved or lasted > self.params.keyframe_seconds
 
     def _is_news(self, window: _Open, labels: Counter[str]) -> bool:
         if self._last is None or self._last[0] != window.session.number:
@@ -296,5 +296,5 @@ class Keyframer:
     def _moved(self, T: Array, share: float) -> bool:
         """Whether a motion exceeds ``share`` of what ends a keyframe."""
         metres, degrees = float(np.linalg.norm(T[:3, 3])), float(np.degrees(rotation_angle(T[:3, :3])))
-        most = self._params
+        most = self.params
         return metres > share * most.keyframe_translation or degrees > share * most.keyframe_rotation

@@ -81,6 +81,12 @@ class MapperNode(Door):
         for closure in waiting:
             self.drop(closure.to_ns, reason)
 
+    def adopt(self) -> None:
+        """Live parameters hold from the next odometry, constraint, solution and save on."""
+        self._inputs = self.settings.of(MapperNodeParams)
+        with self._graph_lock:
+            self._graph.params = self.settings.of(MapperParams)
+
     # Odometry
 
     def _hear_odometry(self, message: Any) -> None:
@@ -219,7 +225,8 @@ class MapperNode(Door):
     def _publish_correction(self, stamp_ns: int) -> None:
         message = self._correction_message(stamp_ns)
         self._correction.publish(message)
-        if self._broadcaster is not None:
+        if self._inputs.publish_tf and TransformBroadcaster is not None:
+            self._broadcaster = self._broadcaster or TransformBroadcaster(self)
             self._broadcaster.sendTransform(message)
 
     def _correction_message(self, stamp_ns: int) -> TransformStamped:

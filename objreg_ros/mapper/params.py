@@ -17,8 +17,10 @@ from objreg_ros.params import Params, param
 class MapperParams(Params):
     """Everything that a user may set in this room."""
 
-    keyframe_translation: float = param(0.25, "motion after which odometry becomes a keyframe", "m", ge=0.01)
-    keyframe_rotation: float = param(15.0, "rotation after which odometry becomes a keyframe", "deg", ge=0.1, le=180.0)
+    keyframe_translation: float = param(0.25, "motion after which odometry becomes a keyframe", "m", ge=0.01, live=True)
+    keyframe_rotation: float = param(
+        15.0, "rotation after which odometry becomes a keyframe", "deg", ge=0.1, le=180.0, live=True
+    )
 
     # How odometry is believed: errors grow with the square root of the way, so a steady bias fits in over a long way.
     odometry_translation_error: float = param(
@@ -28,20 +30,35 @@ class MapperParams(Params):
         1.0, "error of rotation after one metre or one radian, one sigma", "deg", ge=1e-3
     )
     # And its steady error, which the closures tell; 0 is never any.
-    steady_heading: float = param(1.0, "error of heading that every metre adds alike, one sigma", "deg/m", ge=0.0)
-    steady_distance: float = param(0.02, "error of position that every metre adds alike, one sigma", "m/m", ge=0.0)
+    steady_heading: float = param(
+        1.0, "error of heading that every metre adds alike, one sigma", "deg/m", ge=0.0, live=True
+    )
+    steady_distance: float = param(
+        0.02, "error of position that every metre adds alike, one sigma", "m/m", ge=0.0, live=True
+    )
     max_speed: float = param(5.0, "odometry that leaps faster than this has begun anew: a new map", "m/s", ge=0.1)
     min_sigma_translation: float = param(
-        0.001, "a constraint that claims to know its position better is believed no better than this", "m", ge=1e-4
+        0.001,
+        "a constraint that claims to know its position better is believed no better than this",
+        "m",
+        ge=1e-4,
+        live=True,
     )
     min_sigma_rotation: float = param(
-        0.025, "a constraint that claims to know its rotation better is believed no better than this", "deg", ge=1e-3
+        0.025,
+        "a constraint that claims to know its rotation better is believed no better than this",
+        "deg",
+        ge=1e-3,
+        live=True,
     )
     max_stretch: float = param(
-        1.5, "a constraint over more than so many times the way of odometry, and a metre, is implausible", ge=1.0
+        1.5,
+        "a constraint over more than so many times the way of odometry, and a metre, is implausible",
+        ge=1.0,
+        live=True,
     )
     max_residual: float = param(
-        5.0, "a constraint farther than this from all the others is pruned", "standard deviations", ge=1.0
+        5.0, "a constraint farther than this from all the others is pruned", "standard deviations", ge=1.0, live=True
     )
 
     @property
@@ -70,8 +87,8 @@ class MapperNodeParams(Params):
         "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: as /tf_static says, or the "
         "odometry is the camera's",
     )
-    publish_tf: bool = param(True, "whether the correction is broadcast on /tf, where tf2_ros is installed")
-    graph_path: str = param("objreg_map.g2o", "where ~/save writes the pose graph")
+    publish_tf: bool = param(True, "whether the correction is broadcast on /tf, where tf2_ros is installed", live=True)
+    graph_path: str = param("objreg_map.g2o", "where ~/save writes the pose graph", live=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()

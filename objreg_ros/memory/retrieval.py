@@ -51,7 +51,7 @@ class Index:
     """The objects of a store in memory, about 200 bytes each."""
 
     def __init__(self, params: RegistrarParams) -> None:
-        self._params = params
+        self.params = params
         self._groups = LabelGroups(params.label_groups)
         self._blocks: dict[str, Block] = {}
         self._rows: dict[int, list[tuple[Block, int]]] = {}  # of each keyframe
@@ -93,14 +93,14 @@ class Index:
         where, when = where[first], when[first]
         votes = votes * self._likelihood(when[:, 1], where[:, 3], sightings[0])
         ranked = np.argsort(-votes, kind="stable")[:RANKED]  # the older first among equals
-        taken = ranked[self._turns(where[ranked], when[ranked], votes[ranked])[: SPARE * self._params.candidates]]
+        taken = ranked[self._turns(where[ranked], when[ranked], votes[ranked])[: SPARE * self.params.candidates]]
         chosen = zip(when[taken].tolist(), votes[taken].tolist(), strict=True)
         return [CandidateKeyframe(number, stamp_ns, vote) for (stamp_ns, _, number, _), vote in chosen]
 
     def _ballot(self, sighting: Sighting, stored: int, since: int) -> tuple[Array, Array, Array]:
         """Where and when the objects were seen that look most like this one, the nearest first, and their votes."""
         block = self._blocks.get(self._groups.of(sighting.label), EMPTY)
-        rows, halves = block.nearest(sighting, self._params, SHORTLIST, VOTE_CUTOFF, since)
+        rows, halves = block.nearest(sighting, self.params, SHORTLIST, VOTE_CUTOFF, since)
         rarity = math.log(2.0 + stored / max(len(block), 1))
         return block.where[rows], block.when[rows], rarity * np.exp(-halves / VOTE_DISTANCE**2)
 
@@ -117,7 +117,7 @@ class Index:
         """
         stamp_ns, session, travelled = when[:, 0], when[:, 1], where[:, 3]
         near = (session[:, None] == session) & (
-            np.abs(stamp_ns[:, None] - stamp_ns) < round(1e9 * self._params.thin_seconds)
+            np.abs(stamp_ns[:, None] - stamp_ns) < round(1e9 * self.params.thin_seconds)
         )
         same = self._same_pass(session[:, None], travelled[:, None], session, travelled)
         worth = np.where(near, NEIGHBOUR, 1.0) * np.where(same, NEXT_OF_PASS, 1.0)
@@ -127,7 +127,7 @@ class Index:
         self, session: Array, travelled: Array, other_session: Array | int, other_travelled: Array | float
     ) -> Array:
         """Whether odometry is certain of the motion between the two."""
-        params, way = self._params, np.abs(travelled - other_travelled)
+        params, way = self.params, np.abs(travelled - other_travelled)
         sigma = params.odometry_translation_noise + params.odometry_drift * way
         return np.asarray((session == other_session) & (sigma <= TIGHT_TRANSLATION_M))
 

@@ -81,6 +81,11 @@ class RegistrarNode(MatchingDoor):
         self._serve()
         self._listen(round(inputs.odom_slop * 1e9))
 
+    def adopt(self) -> None:
+        """Live parameters hold from the next frame and the next search on."""
+        self._registrar.adopt(self.settings.of(RegistrarParams))
+        self._seconds = self.settings.of(RegistrarNodeParams).limit
+
     def _niceness(self) -> int:
         """None where other rooms share Python's lock: a nice thread that holds it and has no processor holds up all."""
         return 0 if self.indoors.offers(self.resolve_topic_name("objects")) else GIVING_WAY

@@ -20,7 +20,7 @@ import numpy as np
 from objreg_ros.data import Frame, LoopClosure, Reason, Rejected, Relocalised
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import Clock, FrameWindow, Keyframer
-from objreg_ros.memory.landmarks import Landmark, Landmarks, Link
+from objreg_ros.memory.landmarks import Landmark, Landmarks
 from objreg_ros.memory.retrieval import Index
 from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.memory.store import Store, StoreError
@@ -56,11 +56,10 @@ class Registrar:
     """
 
     def __init__(self, params: RegistrarParams, method: Method | None = None, gate: Gate | None = None) -> None:
-        self.params = params
-        self._method, self._gate = method or method_of(params), gate or gate_of(params)
+        self.params = self._adopted = params
+        self._method, self._gate = method or method_of(params), gate
         self._confirm_seconds = params.confirm_seconds if gate is None else 0.0
-        self._store = Store(params.store)
-        self._lock = threading.RLock()
+        self._store, self._lock = Store(params.store), threading.RLock()
         self._pools: dict[int, ThreadPoolExecutor] = {}
         try:
             self._start(self._store.next_session())
@@ -130,8 +129,13 @@ class Registrar:
         """The frame window that was still being collected, None if it shows nothing new."""
         return self._keyframer.finish()
 
+    def adopt(self, params: RegistrarParams) -> None:
+        """Take what is live of the parameters, from the next frame and the next search on."""
+        self._adopted = params
+
     def track(self, frame: Frame) -> FrameWindow | None:
         """Follow the camera; returns the frame window that became a keyframe with this one, mostly None."""
+        self._keyframer.params = self._adopted
         window = self._keyframer.add(frame)
         self._relocalisation.follow(frame, self._keyframer.next_session - 1)
         return window
@@ -151,6 +155,7 @@ class Registrar:
         with self._lock:
             if window.session < self._first_session:  # `reset` came first
                 return Outcome()
+            self.params = self._index.params = self._adopted
             fused = fuse(window, self.params)
             if not fused.objects:
                 return Outcome()
@@ -230,7 +235,7 @@ class Registrar:
         if not candidates:
             refusal = Reason.NO_CANDIDATE, f"none of {len(self._index)} stored objects is alike and may be here"
             return Found([], [], [rejected(keyframe.stamp_ns, keyframe, refusal, keyframe)])
-        means = Means(self._store, self._method, self._gate, self._confirmation, self._pool())
+        means = Means(self._store, self._method, self._gate or gate_of(self.params), self._confirmation, self._pool())
         return Search(keyframe, self._thinning, budget, means, self.params).run(candidates)
 
     def _settled(self, now_ns: int | None) -> Outcome:
@@ -271,7 +276,8 @@ class Registrar:
 
         Returns the closures, and the sightings with their landmarks.
         """
-        links = [link for item in accepted for link in self._links(keyframe, item)]
+        stored = [list(self._store.sightings(item.target.keyframe_id)) for item in accepted]
+        links = [link for item, seen in zip(accepted, stored, strict=True) for link in links_of(keyframe, item, seen)]
         named, merged = self._landmarks.assign(sightings, links)
         closures = tuple(closure_of(keyframe, named, item, self.params) for item in accepted)
         self._store.add(keyframe, named, closures, merged)
@@ -292,6 +298,3 @@ class Registrar:
             self._store.remove(spare, forgotten=len(beyond))
             self._index.remove(spare)
             self._landmarks.forget(spare)
-
-    def _links(self, keyframe: Keyframe, item: Accepted) -> list[Link]:
-        return links_of(keyframe, item, list(self._store.sightings(item.target.keyframe_id)))

@@ -27,9 +27,9 @@ class RegistrarParams(Params):
     max_keyframes: int = param(20000, "most keyframes that are kept; the oldest go first", ge=1)
 
     # What becomes a keyframe, and what it keeps.
-    keyframe_translation: float = param(0.15, "motion that ends a keyframe", "m", ge=0.0)
-    keyframe_rotation: float = param(8.0, "rotation that ends a keyframe", "deg", ge=0.0, le=180.0)
-    keyframe_seconds: float = param(1.0, "longest time that a keyframe spans", "s", ge=0.0)
+    keyframe_translation: float = param(0.15, "motion that ends a keyframe", "m", ge=0.0, live=True)
+    keyframe_rotation: float = param(8.0, "rotation that ends a keyframe", "deg", ge=0.0, le=180.0, live=True)
+    keyframe_seconds: float = param(1.0, "longest time that a keyframe spans", "s", ge=0.0, live=True)
     max_speed: float = param(5.0, "odometry that leaps faster than this has begun anew: another session", "m/s", ge=0.1)
     context_range: float = param(4.0, "context farther from the camera is left out", "m", ge=0.5)
 
@@ -38,9 +38,9 @@ class RegistrarParams(Params):
         ("cup mouse bottle", "book remote cell_phone", "tv laptop"),
         "labels that detectors confuse: one group an item, spaces between (an underscore for a space in a name)",
     )
-    min_gap: float = param(2.0, "least time between the two moments of a constraint", "s", ge=0.0)
+    min_gap: float = param(2.0, "least time between the two moments of a constraint", "s", ge=0.0, live=True)
     odometry_radius: float = param(
-        1.0, "stored objects of the session that odometry puts farther away are not tried", "m", ge=0.0
+        1.0, "stored objects of the session that odometry puts farther away are not tried", "m", ge=0.0, live=True
     )
     odometry_translation_noise: float = param(
         0.03, "standard deviation of odometry's position over no distance", "m", ge=0.0
@@ -55,13 +55,17 @@ class RegistrarParams(Params):
         0.05, "growth of the deviation of odometry's rotation with each degree turned", "deg/deg", ge=0.0
     )
     thin_seconds: float = param(1.0, "two closures are one if both their ends are nearer than this", "s", ge=0.0)
-    closures: int = param(2, "accepted closures of one keyframe that end its search", ge=1)
+    closures: int = param(2, "accepted closures of one keyframe that end its search", ge=1, live=True)
     threads: int = param(2, "stored keyframes that are tried at once", ge=1, le=16)
-    candidates: int = param(4, "stored keyframes that are tried for each new one, best first", ge=1, le=100)
+    candidates: int = param(4, "stored keyframes that are tried for each new one, best first", ge=1, le=100, live=True)
 
     # What decides a closure.
     least_odds: float = param(
-        75.0, "right poses for each false one, among poses as sure as the least sure that is accepted", ge=1.0, le=1e6
+        75.0,
+        "right poses for each false one, among poses as sure as the least sure that is accepted",
+        ge=1.0,
+        le=1e6,
+        live=True,
     )
     confirm_seconds: float = param(
         10.0,
@@ -96,7 +100,9 @@ class RegistrarNodeParams(Params):
         "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: as /tf_static says, or the "
         "odometry is the camera's",
     )
-    search_seconds: float = param(0.0, "longest search for one keyframe; 0: as long as it takes", "s", ge=0.0)
+    search_seconds: float = param(
+        0.0, "longest search for one keyframe; 0: as long as it takes", "s", ge=0.0, live=True
+    )
     waiting_megabytes: int = param(200, "most memory of the keyframes that wait for a search", "MB", ge=1)
 
     def __post_init__(self) -> None:

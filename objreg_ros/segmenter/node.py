@@ -116,10 +116,6 @@ class SegmenterNode(MatchingDoor):
             options = {"event_callbacks": quiet, "qos_overriding_options": FIXED}  # overrides are of the one above
             self.create_subscription(CameraInfo, "camera_info", self._hear_camera, qos.latched(), **options)
 
-    def adopt(self) -> None:
-        """Live parameters hold from the next frame on."""
-        self._segmenter.params = self.settings.of(SegmenterParams)
-
     # Hear
 
     def _hear_camera(self, message: Any) -> None:
@@ -188,7 +184,8 @@ class SegmenterNode(MatchingDoor):
     # Compute
 
     def compute(self, stamp_ns: int, payload: Match) -> bool:
-        """One depth image or cloud with its detections."""
+        """One depth image or cloud with its detections, by the parameters as they are now."""
+        self._segmenter.params = self.settings.of(SegmenterParams)
         raw = self._raw_pictures()
         camera_info = self.read("camera_info", fitted, self._camera_of(payload), payload["depth"])
         depth, cloud = self._depth(payload, camera_info, raw)

@@ -17,17 +17,23 @@ class SegmenterParams(Params):
     """What a user may change in the segmenter."""
 
     preset: str = param("default", "the method; paper is the founding filter of each box", choices=("default", "paper"))
-    z_min: float = param(0.2, "nearest depth that is believed", "m", ge=0.0)
+    z_min: float = param(0.2, "nearest depth that is believed", "m", ge=0.0, live=True)
     z_max: float = param(4.0, "farthest depth that is believed (1.75 in preset paper)", "m", ge=0.1, live=True)
-    y_max: float = param(100.0, "farthest point below or above the camera's axis (0.75 in preset paper)", "m", ge=0.0)
+    y_max: float = param(
+        100.0, "farthest point below or above the camera's axis (0.75 in preset paper)", "m", ge=0.0, live=True
+    )
     min_points: int = param(80, "an object of fewer points is not published", ge=1, live=True)
-    unnamed: bool = param(True, "what stands on a support or apart from everything is an object without a name")
-    margin: float = param(0.15, "how far around a box is looked at, of the box's size", ge=0.0, le=1.0)
-    jump: float = param(0.012, "depth step that ends an object, at the camera", "m", ge=0.001)
-    jump_z2: float = param(0.012, "how the depth step grows with squared depth", "1/m", ge=0.0)
-    crease: float = param(20.0, "a concave bend sharper than this separates two things", "deg", ge=5.0, le=90.0)
+    unnamed: bool = param(
+        True, "what stands on a support or apart from everything is an object without a name", live=True
+    )
+    margin: float = param(0.15, "how far around a box is looked at, of the box's size", ge=0.0, le=1.0, live=True)
+    jump: float = param(0.012, "depth step that ends an object, at the camera", "m", ge=0.001, live=True)
+    jump_z2: float = param(0.012, "how the depth step grows with squared depth", "1/m", ge=0.0, live=True)
+    crease: float = param(
+        20.0, "a concave bend sharper than this separates two things", "deg", ge=5.0, le=90.0, live=True
+    )
     height: float = param(
-        0.0005, "a point this far above the support still belongs to it, if there were no noise", "m", ge=0.0
+        0.0005, "a point this far above the support still belongs to it, if there were no noise", "m", ge=0.0, live=True
     )
     roll: float = param(
         0.0,
@@ -37,7 +43,7 @@ class SegmenterParams(Params):
         le=360.0,
     )
     up_tilt: float = param(75.0, "most tilt of the camera from upright, apart from `roll`", "deg", ge=5.0, le=89.0)
-    support_area: float = param(0.02, "least visible area of a support surface", "m²", ge=0.0)
+    support_area: float = param(0.02, "least visible area of a support surface", "m²", ge=0.0, live=True)
     view_step: int = param(
         4,
         "the view keeps one pixel of so many in each row and column; a smaller step is taken where less than 160 "

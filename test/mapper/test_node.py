@@ -18,6 +18,7 @@ from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry as OdometryMsg
 from nav_msgs.msg import Path as PathMsg
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
 
 from objreg_ros.bridge import from_msg, qos, to_msg
@@ -130,6 +131,17 @@ def test_a_wrong_constraint_is_pruned_and_told(outside: Outside) -> None:
     outside.send([*ROUND_TRIP, closure(TRUE, 10, 90, off)])
     outside.wait(lambda: outside.door.extra_diagnostics()["constraints pruned"] == 1)
     assert outside.door.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP)
+
+
+def test_a_live_parameter_holds_from_the_next_solution_on(outside: Outside) -> None:
+    off = pose(rotation_from_vector(np.array([0.0, 0.0, 1.2])), np.array([0.8, 0.6, 0.0]))
+    outside.door.set_parameters([Parameter("max_residual", value=1e6)])
+    outside.drive(BENT)
+    outside.send([*ROUND_TRIP, closure(TRUE, 10, 90, off)])
+    outside.wait(lambda: outside.door.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP) + 1)
+    outside.door.set_parameters([Parameter("max_residual", value=5.0)])
+    outside.send([closure(TRUE, 11, 11 + HALF)])
+    outside.wait(lambda: outside.door.extra_diagnostics()["constraints pruned"] == 1)
 
 
 def test_what_cannot_be_used_is_dropped_by_reason(outside: Outside) -> None:
@@ -343,7 +355,10 @@ class Broadcaster:
         self.sent.append(transform)
 
 
-def test_every_odometry_that_is_not_late_brings_the_correction_to_tf(outside: Outside) -> None:
+def test_every_odometry_that_is_not_late_brings_the_correction_to_tf(
+    outside: Outside, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("objreg_ros.mapper.node.TransformBroadcaster", Broadcaster)
     broadcaster = outside.door._broadcaster = Broadcaster(outside.door)
     for word in odometry(BENT[:3]):
         outside.door._hear_odometry(to_msg.odometry(word))
@@ -352,10 +367,31 @@ def test_every_odometry_that_is_not_late_brings_the_correction_to_tf(outside: Ou
     assert {(m.header.frame_id, m.child_frame_id) for m in broadcaster.sent} == {("map", "odom")}
 
 
-def test_the_correction_is_of_the_frame_that_odometry_is_in(outside: Outside) -> None:
+def test_the_correction_is_of_the_frame_that_odometry_is_in(outside: Outside, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("objreg_ros.mapper.node.TransformBroadcaster", Broadcaster)
     broadcaster = outside.door._broadcaster = Broadcaster(outside.door)
     outside.door._hear_odometry(to_msg.odometry(replace(odometry(BENT)[0], frame_id="world")))
     assert [(m.header.frame_id, m.child_frame_id) for m in broadcaster.sent] == [("map", "world")]
+
+
+def test_the_broadcast_is_switched_off_and_on_while_the_node_runs(
+    outside: Outside, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("objreg_ros.mapper.node.TransformBroadcaster", Broadcaster)
+    outside.door._broadcaster = None
+    sent: list[int] = []
+    for k, publish_tf in enumerate((False, True, False)):
+        outside.door.set_parameters([Parameter("publish_tf", value=publish_tf)])
+        outside.door._hear_odometry(to_msg.odometry(odometry(BENT)[k]))
+        sent.append(len(outside.door._broadcaster.sent) if outside.door._broadcaster else 0)
+    assert sent == [0, 1, 1]
+
+
+def test_a_save_goes_where_the_parameter_says_by_then(outside: Outside, tmp_path: Path) -> None:
+    outside.drive(BENT[:20])
+    outside.door.set_parameters([Parameter("graph_path", value=str(tmp_path / "other.g2o"))])
+    answer = outside.door._save(None, Trigger.Response())
+    assert answer.success and answer.message == str(tmp_path / "other.g2o") and (tmp_path / "other.g2o").is_file()
 
 
 @pytest.mark.parametrize("publish_tf", [True, False])

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 import rclpy
+from rclpy.parameter import Parameter
 from registration.samples import SECOND, box, frame
 from std_srvs.srv import Trigger
 
@@ -266,3 +267,18 @@ def test_a_node_ends_at_once_in_the_middle_of_a_search_and_stores_everything(
     stored = Store(tmp_path / "place.db", read_only=True)
     assert [stored.keyframe(k).stamp_ns // SECOND for k in stored.keyframe_ids()] == [0, 10, 20, 30]
     stored.close()
+
+
+def test_a_running_node_takes_live_parameters_and_refuses_the_others(make: Making) -> None:
+    node = make()
+    node._registrar.search(window_at(node, 0))
+    (result,) = node.set_parameters([Parameter("min_gap", value=60)])
+    assert result.successful, result.reason
+    (refusal,) = node._registrar.search(window_at(node, 30)).rejected
+    assert refusal.reason is Reason.NO_CANDIDATE
+    node.set_parameters([Parameter("min_gap", value=2.0), Parameter("search_seconds", value=1e-9)])
+    node._find(window_at(node, 45), "search", node._seconds)
+    assert node._refused[Reason.OVER_BUDGET.value] > 0
+    (result,) = node.set_parameters([Parameter("store", value="other.db")])
+    assert not result.successful
+    node.close()

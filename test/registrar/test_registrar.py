@@ -417,3 +417,31 @@ def test_a_moment_of_which_fusion_leaves_no_object_is_no_keyframe(monkeypatch: p
     registrar = Registrar(PARAMS)
     assert _run(registrar, _frame(0, HERE, True), _frame(30, BESIDE, True)) == ([], [])
     assert registrar.landmarks == ()
+
+
+def test_live_parameters_hold_from_the_next_frame_and_the_next_search_on() -> None:
+    registrar = Registrar(PARAMS)
+    registrar.adopt(PARAMS.replaced(keyframe_translation=9.0, keyframe_rotation=180.0, keyframe_seconds=99.0))
+    assert registrar.track(_frame(0, HERE, True)) is None and registrar.track(_frame(1, AWAY, True)) is None
+    registrar.adopt(PARAMS)
+    window = registrar.track(_frame(2, BESIDE, True))
+    assert window is not None
+    registrar.search(window)
+    registrar.adopt(PARAMS.replaced(min_gap=60.0))
+    closures, rejected = _run(registrar, _frame(50, HERE, True))
+    assert not closures and {refusal.reason for refusal in rejected} == {Reason.NO_CANDIDATE}
+
+
+def test_odds_that_are_asked_for_live_hold_for_our_gate_and_leave_one_of_ones_own() -> None:
+    asked: list[int] = []
+
+    def welcoming(candidates: Any, prior: Any) -> Any:
+        asked.append(len(candidates))
+        return candidates[0]
+
+    for gate, found in ((None, 0), (welcoming, 1)):
+        registrar = Registrar(PARAMS, gate=gate)
+        registrar.process(_frame(0, HERE))
+        registrar.adopt(PARAMS.replaced(least_odds=1e6))
+        assert len(_run(registrar, _frame(30, BESIDE))[0]) == found
+    assert asked

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import String
 
@@ -212,3 +213,22 @@ def test_the_camera_of_the_parameter_holds_and_no_camera_info_is_heard(
     told = depth.intrinsics
     assert (told.fx, told.fy, told.cx, told.cy, told.width) == (300, 300, 159.75, 119.75, 320)
     assert "/camera_info" not in camera.door.connected and not camera.door.watch.silent()
+
+
+@pytest.mark.parametrize(("z_min", "seen"), [(0.2, True), (1.5, False)])
+def test_a_live_parameter_holds_from_the_next_frame_on(
+    z_min: float, seen: bool, made: Callable[..., Camera], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    camera = made()
+    frames: list[Any] = []
+    monkeypatch.setattr(camera.door, "_publish", lambda frame, names: frames.append(frame))
+    (result,) = camera.door.set_parameters([Parameter("z_min", value=z_min)])
+    assert result.successful, result.reason
+    camera.see(1.2, "eye", "eye")
+    (frame,) = frames
+    assert bool(np.any(np.isfinite(frame.view.xyz) & (frame.view.xyz != 0))) == seen
+
+
+def test_a_live_parameter_that_contradicts_another_is_refused(made: Callable[..., Camera]) -> None:
+    (result,) = made().door.set_parameters([Parameter("z_min", value=9.0)])
+    assert not result.successful and "z_max: expected more than z_min" in result.reason
