@@ -100,7 +100,7 @@ def _nodes(context: LaunchContext) -> list[Node]:
         nodes = [_together(rooms, said, alike)]
     else:
         nodes = [_alone(room, said, alike) for room in rooms]
-    return [*nodes, *_rviz(said)]
+    return [*nodes, *_rviz(said, alike)]
 
 
 def _alone(room: str, said: dict[str, str], alike: dict) -> Node:
@@ -127,15 +127,25 @@ def _shared(rooms: tuple[str, ...], said: dict[str, str]) -> list[str]:
     return [given for given in (said["params_file"], file.name) if given]
 
 
-def _rviz(said: dict[str, str]) -> list[Node]:
-    """RViz where it is asked for and installed."""
+def _rviz(said: dict[str, str], alike: dict) -> list[Node]:
+    """RViz where it is asked for and installed, with the nodes' namespace and topics; its own log level and end."""
     if not _is_true(said["rviz"]):
         return []
     try:
         get_package_prefix("rviz2")
     except LookupError:
         return [LogInfo(msg="rviz: expected rviz2 to be installed, got none; the nodes run without it")]
-    return [Node(package="rviz2", executable="rviz2", arguments=["-d", str(share.find("config/objreg.rviz"))])]
+    layout = ["-d", str(share.find("config/objreg.rviz"))]
+    return [
+        Node(
+            package="rviz2",
+            executable="rviz2",
+            arguments=layout,
+            namespace=alike["namespace"],
+            remappings=alike["remappings"],
+            parameters=[{"use_sim_time": True}] if _is_true(said["use_sim_time"]) else [],
+        )
+    ]
 
 
 def _rooms(said: dict[str, str]) -> tuple[str, ...]:
