@@ -19,8 +19,9 @@ from xml.etree import ElementTree
 import pytest
 
 RELEASED_IN_JAZZY = {
-    "builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "launch", "launch_ros", "nav_msgs", "rcl_interfaces",
-    "rclpy", "rosgraph_msgs", "sensor_msgs", "std_msgs", "std_srvs", "tf2_ros_py", "vision_msgs", "visualization_msgs",
+    "ament_index_python", "builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "launch", "launch_ros", "nav_msgs",
+    "rcl_interfaces", "rclpy", "rosgraph_msgs", "sensor_msgs", "std_msgs", "std_srvs", "tf2_msgs", "tf2_ros_py",
+    "vision_msgs", "visualization_msgs",
 }  # fmt: skip
 BUILDS_MESSAGES = {"ament_cmake", "rosidl_default_generators", "rosidl_default_runtime"}  # released in Jazzy too
 HERE = {"objreg_msgs"}  # in this repository: rosdep and colcon are told of its folder

@@ -20,6 +20,7 @@ from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import StoreError
 from objreg_ros.registrar import registrar as module
+from objreg_ros.registrar.closure import links_of
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.engine import Engine
@@ -222,11 +223,11 @@ def test_a_closure_says_how_far_an_object_has_moved() -> None:
 def test_a_link_turns_what_is_here_into_the_frame_of_the_session_there() -> None:
     yaws = (0.3, 0.5, 1.1)  # of the camera there, of the closure, of the camera here
     there_camera, T, here_camera = (pose(rotation_from_vector(np.array([0.0, yaw, 0.0])), np.ones(3)) for yaw in yaws)
-    registrar, there = Registrar(PARAMS), keyframe(1, T_odom_camera=there_camera)
+    there = keyframe(1, T_odom_camera=there_camera)
     (known,) = sightings_of(there)
-    registrar._store.add(there, [known.of_landmark(7, np.eye(3))])
     accepted: Any = SimpleNamespace(target=there, candidate=candidate(T, matched=(ObjectPair(0, 0, "cup"),)))
-    (link,) = registrar._links(keyframe(2, 30.0, T_odom_camera=here_camera), accepted)
+    here = keyframe(2, 30.0, T_odom_camera=here_camera)
+    (link,) = links_of(here, accepted, [known.of_landmark(7, np.eye(3))])
     assert (link.index, link.of.landmark) == (0, 7)
     np.testing.assert_allclose(
         link.R_there_here, rotation_from_vector(np.array([0.0, 0.3 + 0.5 - 1.1, 0.0])), atol=1e-9
