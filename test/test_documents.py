@@ -17,11 +17,12 @@ DOCUMENTS = (
     "README.md",
     "ARCHITECTURE.md",
     "CHANGELOG.md",
+    "QUALITY_DECLARATION.md",
     "models/README.md",
     *sorted(str(path.relative_to(REPOSITORY)) for path in (REPOSITORY / "docs").glob("*.md")),
 )
 ROOTS = ("", "objreg_ros", "objreg_ros/registration")  # below which a document names files
-NAMED_FILE = re.compile(r"`((?:[\w.-]+/)+[\w.-]+\.(?:py|md|yaml|toml|xml|txt|lock|onnx|rviz))[^`]*`")
+NAMED_FILE = re.compile(r"`((?:[\w.-]+/)+[\w.-]+\.(?:py|md|yaml|toml|xml|txt|lock|onnx|rviz|json))[^`]*`")
 NAMED_FOLDER = re.compile(r"`((?:[a-z_]+/)+)`")
 MADE = ("out/", "my_bag/", "OUT/")  # what a command makes or a user has
 MOST_LINES = 200
