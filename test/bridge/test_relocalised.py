@@ -23,7 +23,13 @@ from objreg_ros.geometry import pose, rotation_from_vector
 
 AT = pose(rotation_from_vector(np.array([0.0, 0.0, 0.5])), np.array([1.0, 2.0, 3.0]))
 FOUND = Relocalised(
-    stamp_ns=7, session=4, T_map_odom=AT, T_map_camera=AT, covariance=np.diag([1.0, 2, 3, 4, 5, 6]), closures=2
+    stamp_ns=7,
+    session=4,
+    target_ns=3,
+    T_map_odom=AT,
+    T_map_camera=AT,
+    covariance=np.diag([1.0, 2, 3, 4, 5, 6]),
+    closures=2,
 )
 ON_BODY = pose(np.eye(3), np.array([0.5, 0.0, 0.0]))
 UNKNOWN: Answer = None, "no closure to an earlier session yet"
