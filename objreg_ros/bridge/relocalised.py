@@ -36,11 +36,11 @@ Answer = tuple[Relocalised | None, str]  # where it is, and by what that is know
 class Whereabouts:
     """Publishes `relocalised`, and `initialpose` where that is wanted, once as soon as ``ask`` knows, and when asked.
 
-    After the answer has become unknown it is published once again.
+    After the answer has become unknown nobody who comes late gets the old one, and the next is published once again.
     """
 
     def __init__(self, door: Door, ask: Callable[[], Answer]) -> None:
-        self._door, self._ask, self._lock = door, ask, threading.Lock()
+        self._door, self._ask, self._lock = door, ask, threading.RLock()
         self._params = door.settings.of(RelocalisedParams)
         self._T_body_camera: Array | None = None
         self._known, self._waiting = False, 0
@@ -60,11 +60,15 @@ class Whereabouts:
             if found is not None and not self._known:
                 self._door.get_logger().info(f"relocalised in the map of session {found.session}: {reason}")
                 self._tell(found)
+            elif found is None and self._known:
+                self._door.destroy_publisher(self._publisher)  # and with it what it keeps for who comes late
+                self._publisher = _publisher(self._door, "relocalised")
             self._known = found is not None
 
     def _tell(self, found: Relocalised) -> PoseWithCovarianceStamped:
         message = with_covariance(*_of_body(found, self._T_body_camera), found.stamp_ns, self._params.map_frame)
-        self._publisher.publish(message)
+        with self._lock:  # a service's thread, too
+            self._publisher.publish(message)
         if self._initial is not None:
             self._initial.publish(on_plane(message))
         return message

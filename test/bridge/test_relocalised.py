@@ -159,3 +159,18 @@ def test_who_finds_too_many_waiting_is_answered_at_once_and_costs_no_thread(make
         except StopIteration as end:
             answered.append(end.value.message)
     assert threading.active_count() - before == relocalised.MOST_WAITING and answered == [UNKNOWN[1]] * 3
+
+
+def test_who_comes_after_it_has_become_unknown_gets_no_pose_of_before(make: Making) -> None:
+    door, answers = make(), [KNOWN]
+    where = Whereabouts(door, lambda: answers[-1])
+    before = hear(door, "relocalised")
+    where.look()
+    assert wait_for(door, lambda: len(before) == 1)
+    answers.append(UNKNOWN)
+    where.look()
+    late = hear(door, "relocalised")
+    assert not wait_for(door, lambda: bool(late), 1.0)
+    answers.append(KNOWN)
+    where.look()
+    assert wait_for(door, lambda: len(late) == 1 and len(before) == 2)
