@@ -5,7 +5,7 @@ The first half of a recording is the earlier session. The later sessions begin a
 each beside a copy of the store, in odometry that begins anew at the camera. A known object is seen once one that the
 earlier session stored is (by label and true place, within 30 cm). Told is the share of starts that saw one for five
 seconds and were relocated by then, the time that it took, and false starts: a first answer that is worse than 8 degrees
-or 15 cm (FALSE) in the earlier session's odometry, as that was at the keyframe that the newest closure is to. For where
+or 15 cm (FALSE) in the earlier session's odometry, as that was at the keyframe that the answer is by. For where
 that session passed a place twice, its drift gives the place two positions in its map. Later answers are judged alike
 and counted apart as drifted: between two closures both sessions' odometry drifts, as the covariance of an answer says.
 
@@ -124,14 +124,12 @@ def wake(
         "worst": [0.0, 0.0],
         "closures": [],
     }
-    began_ns, seen_ns, known_ns, last, beside_ns = frames[0].stamp_ns, None, None, 0, 0
+    began_ns, seen_ns, known_ns, last = frames[0].stamp_ns, None, None, 0
     with closing(Registrar(params.replaced(store=str(store)))) as registrar:
         for frame in begun_anew(frames):
             last = frame.stamp_ns - LATER_NS
             closures = registrar.process(frame).closures
-            ties = [one for one in closures if one.from_session != one.to_session]
-            row["closures"] += [told_of(one, truth) for one in ties]
-            beside_ns = ties[-1].from_ns if ties else beside_ns
+            row["closures"] += [told_of(one, truth) for one in closures if one.from_session != one.to_session]
             T = truth.at(last)
             if T is None:
                 continue
@@ -141,7 +139,7 @@ def wake(
             if found is not None and found.stamp_ns == frame.stamp_ns:
                 if known_ns is None:
                     known_ns = last
-                _judge(row, pose_error(found.T_map_camera, earlier.T_map_camera(T, beside_ns)))
+                _judge(row, pose_error(found.T_map_camera, earlier.T_map_camera(T, found.target_ns)))
             if known_ns is not None and last - known_ns > 1e9 * WITHIN_S:
                 break
     if known_ns is not None:

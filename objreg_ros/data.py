@@ -482,11 +482,13 @@ class Relocalised:
     """Where the camera is in the map of an earlier ``session``: the frame that the poses of its keyframes are in.
 
     ``T_map_odom`` maps the odometry of now into it, ``T_map_camera`` is the camera of the frame at ``stamp_ns``;
-    ``covariance (6, 6) float64`` of that in ROS order, along the map's axes; ``closures`` that agree tell it.
+    ``covariance (6, 6) float64`` of that in ROS order, along the map's axes; ``closures`` that agree tell it, the
+    newest to the keyframe of ``target_ns``: where that session's odometry has drifted, its map holds around there.
     """
 
     stamp_ns: int
     session: int
+    target_ns: int
     T_map_odom: Array
     T_map_camera: Array
     covariance: Array

@@ -233,7 +233,7 @@ def test_a_view_that_no_registrar_would_take_is_refused_where_it_is_made() -> No
 
 def test_a_place_in_an_earlier_map_has_rigid_poses_and_a_finite_covariance() -> None:
     good = {"T_map_odom": np.eye(4), "T_map_camera": np.eye(4), "covariance": np.eye(6)}
-    assert data.Relocalised(stamp_ns=1, session=0, closures=2, **good).covariance.shape == (6, 6)
+    assert data.Relocalised(stamp_ns=1, session=0, target_ns=0, closures=2, **good).covariance.shape == (6, 6)
     for name, bad in (("T_map_odom", 2 * np.eye(4)), ("covariance", np.full((6, 6), np.nan))):
         with pytest.raises(ValueError, match="Relocalised"):
-            data.Relocalised(stamp_ns=1, session=0, closures=2, **good | {name: bad})
+            data.Relocalised(stamp_ns=1, session=0, target_ns=0, closures=2, **good | {name: bad})

@@ -117,7 +117,11 @@ class Adapter(Door):
         self._retracted += 1
         if key in self.waiting:
             self.end(key, "retracted")
-        elif key is not None and self._taken.pop(key, False) and not self.take_back(key):
+            return
+        if key is None or not self._taken.get(key, False):
+            return
+        self._taken[key] = False  # it came: by whatever topic it comes again, it stays out
+        if not self.take_back(key):
             self._retracted_late += 1
             self.throttled.warn("retracted_late", "a constraint is withdrawn that its consumer has and cannot give up")
 

@@ -14,6 +14,7 @@ from objreg_ros.bridge import from_msg
 from objreg_ros.data import Array, LoopClosure
 from objreg_ros.mapper.constraint import Constraint, between_keyframes
 from objreg_ros.mapper.params import MapperParams
+from objreg_ros.mapper.sparse import SparseTrajectory
 from objreg_ros.mapper.trajectory import Trajectory
 
 MOST_NODES = 1_000_000
@@ -98,21 +99,27 @@ class RtabmapNodes:
         return trajectory
 
     def tied(
-        self, closure: LoopClosure, odometry: Trajectory, T_base_camera: Array
+        self, closure: LoopClosure, odometry: SparseTrajectory, T_base_camera: Array
     ) -> tuple[int, int, Constraint] | None:
         """The nodes nearest to the closure's moments, and the constraint between their base frames.
 
-        By ``odometry`` where it covers the ways from the moments to the nodes, else by the nodes around the moments.
-        None where neither does (yet).
+        By ``odometry`` where it covers the ways from the moments to the nodes and was not silent on them, else by the
+        nodes around the moments. None where neither does (yet).
         """
         k1, k2 = self.nearest(closure.from_ns), self.nearest(closure.to_ns)
         moments = (closure.from_ns, closure.to_ns)
-        covered = all(odometry.covers(stamp_ns) for stamp_ns in (k1.stamp_ns, k2.stamp_ns, *moments))
-        way = odometry if covered else self.way(moments)
+        ways = zip(moments, (k1.stamp_ns, k2.stamp_ns), strict=True)
+        covered = all(_is_known(odometry, *sorted(ends)) for ends in ways)
+        way: Trajectory | None = odometry if covered else self.way(moments)
         if way is None:
             return None
         between = between_keyframes(closure, way, k1.stamp_ns, k2.stamp_ns, T_base_camera, WANDERING)
         return k1.number, k2.number, between
+
+
+def _is_known(odometry: SparseTrajectory, first_ns: int, last_ns: int) -> bool:
+    """Whether odometry leads from a moment to another: in a silence between them it may have begun anew."""
+    return odometry.covers(first_ns) and odometry.covers(last_ns) and odometry.silent_s(first_ns, last_ns) == 0.0
 
 
 def _has_pose(message: Any) -> bool:
@@ -124,4 +131,7 @@ def _node(message: Any) -> RtabmapNode:
     seconds = float(message.stamp)
     if not (np.isfinite(seconds) and 0.0 <= seconds <= 1e-9 * limits.MOST_STAMP_NS):
         raise ValueError(f"mapData: expected a stamp of seconds, got {seconds} of node {message.id}")
-    return RtabmapNode(round(1e9 * seconds), int(message.id), int(message.map_id), from_msg.motion(message))
+    T = from_msg.motion(message)
+    if not np.abs(T[:3, 3]).max() <= limits.MOST_DISTANCE:
+        raise ValueError(f"mapData: expected a pose within {limits.MOST_DISTANCE:g} m, got one at {T[:3, 3].tolist()}")
+    return RtabmapNode(round(1e9 * seconds), int(message.id), int(message.map_id), T)

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
+from reprlib import repr as brief
 from types import SimpleNamespace
 from typing import Any
 
@@ -130,7 +131,7 @@ def of_mapping(values: Mapping[str, Any]) -> Calibration:
         k=matrices["camera_matrix"],
         width=_pixels(values, "image_width"),
         height=_pixels(values, "image_height"),
-        distortion_model=str(values.get("distortion_model") or "plumb_bob"),
+        distortion_model=_model(values.get("distortion_model") or "plumb_bob"),
         d=_matrix_of(values, "distortion_coefficients") if values.get("distortion_coefficients") is not None else (),
         r=matrices.get("rectification_matrix", UPRIGHT),
         p=matrices.get("projection_matrix", (0.0,) * 12),
@@ -204,7 +205,7 @@ def _matrix_of(values: Mapping[str, Any], name: str, count: int | None = None) -
     told = values[name]
     data = told.get("data") if isinstance(told, Mapping) else told
     if not isinstance(data, list) or not all(isinstance(value, int | float) for value in data):
-        raise ValueError(f"expected {name} with its numbers as data: [1.0, 0.0, …], got {str(told)[:80]}")
+        raise ValueError(f"expected {name} with its numbers as data: [1.0, 0.0, …], got {brief(told)[:80]}")
     if count is not None and len(data) != count:
         raise ValueError(f"expected {count} numbers in {name}, got {len(data)}")
     try:
@@ -213,8 +214,14 @@ def _matrix_of(values: Mapping[str, Any], name: str, count: int | None = None) -
         raise ValueError(f"expected numbers in {name} that are not too long, got: {error}") from error
 
 
+def _model(told: Any) -> str:
+    if not isinstance(told, str):
+        raise ValueError(f"expected a name as distortion_model, got {brief(told)[:80]}")
+    return told
+
+
 def _pixels(values: Mapping[str, Any], name: str) -> int:
     value = values.get(name, 0)
     if not isinstance(value, int) or value < 0:
-        raise ValueError(f"expected whole pixels as {name}, got {str(value)[:80]}")
+        raise ValueError(f"expected whole pixels as {name}, got {brief(value)[:80]}")
     return value

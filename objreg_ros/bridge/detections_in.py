@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from rclpy.duration import Duration
@@ -18,7 +19,7 @@ from objreg_ros.bridge.matching import MatchingDoor
 from objreg_ros.bridge.pictures import instance_numbers
 from objreg_ros.bridge.sync import Drop, Match
 from objreg_ros.bridge.vision_to_msg import Detection2DArray, LabelInfo
-from objreg_ros.data import Array, DepthImage, Detections, PointCloud
+from objreg_ros.data import Array, ColourImage, DepthImage, Detections, PointCloud
 
 TABLE, BOXES, MASKS = {"detections_table": PointCloud2}, {"detections_in": Detection2DArray}, {"masks": Image}
 SOURCES = {"auto": {**TABLE, **BOXES, **MASKS}, "table": TABLE, "vision_msgs": BOXES, "masks": MASKS}
@@ -49,6 +50,7 @@ class DetectionsIn:
             )
         self._door, self._labels = door, LabelTable()
         self._out: Publisher | None = None
+        self._told: Mapping[int, str] = {}  # the table that was heard or published last: all that the next room knows
         self._names: dict[int, str] = {}  # of the numbers that a foreign detector tells
         door.listen(String, "labels", self._hear_labels, qos.latched())
         if LabelInfo is not None and topics.keys() - TABLE.keys():
@@ -62,6 +64,7 @@ class DetectionsIn:
         told = self._door.read_aside("labels", from_msg.labels, message)
         if told is not None:
             self._labels.adopt(told)
+            self._told = told
             self._door.feed("labels", 0, self._labels.names)
 
     def _hear_names(self, message: Any) -> None:
@@ -90,9 +93,11 @@ class DetectionsIn:
             seen = self._door.read("detections", from_msg.detections, message, names, depth.depth.shape)
             return Asked(self._door.read("camera_info", lenses.detections, seen, *lens), None, names)
         seen, masks = self._door.read("detections", self._foreign, message, match.payloads.get("image"), depth, lens)
-        if self._labels.include(seen.label) or self._out is None:  # the next room waits for a table, if of nothing
-            self._tell()
-        return Asked(seen, masks, self._labels.names)
+        self._labels.include(seen.label)
+        names = self._labels.names
+        if names != self._told or self._out is None:  # the next room waits for a table, if of nothing
+            self._tell(names)
+        return Asked(seen, masks, names)
 
     def _foreign(
         self, message: Any, image: Any, depth: DepthImage, lens: tuple[Any, ...]
@@ -110,11 +115,12 @@ class DetectionsIn:
     def _numbers(self, message: Any) -> Array:
         return instance_numbers(message, self._door.most_pixels)
 
-    def _tell(self) -> None:
+    def _tell(self, names: to_msg.Labels) -> None:
         """Publish the table of names, and wait until it is there: what is sent next needs it."""
         if self._out is None:
             self._out = self._door.create_publisher(String, "labels", qos.latched())
-        self._out.publish(to_msg.labels(self._labels.names))
+        self._told = names
+        self._out.publish(to_msg.labels(names))
         self._out.wait_for_all_acked(Duration(seconds=HEARD_S))
 
 
@@ -123,5 +129,7 @@ def _is_surplus(message: Any) -> bool:
 
 
 def _size(image: Any) -> tuple[int, int] | None:
-    """Height and width of a raw picture; None where there is none, or a compressed one."""
+    """Height and width of a picture that is raw or decoded; None where there is none, or a compressed one."""
+    if isinstance(image, ColourImage):
+        return image.rgb.shape[:2]
     return (int(image.height), int(image.width)) if isinstance(image, Image) else None

@@ -58,7 +58,7 @@ class Door(OverridableNode):
     def __init__(self, name: str, *kinds: type[Params], indoors: Indoors | None = None) -> None:
         super().__init__(name)
         self.indoors = Indoors() if indoors is None else indoors
-        self._inlet = Inlet(self)
+        self._inlet, self._passed_on = Inlet(self), set[str]()
         self.settings = Parameters(self, *kinds, DoorParams)
         self.settings.changed = self.adopt
         self.ledger = Ledger()
@@ -105,7 +105,7 @@ class Door(OverridableNode):
         Where a node of this process offers the topic, ``heard`` is given its words instead of messages.
         """
         full = self.resolve_topic_name(topic)
-        if self.indoors.offers(full):
+        if self.indoors.offers(full) and full not in self._passed_on:
             return self._listen_indoors(full, topic, heard, watched)
         missed = Missed()
 
@@ -130,6 +130,11 @@ class Door(OverridableNode):
     def offer(self, kind: type, topic: str, profile: QoSProfile) -> Outlet:
         """A topic of which the nodes of this process get the words themselves."""
         return Outlet(self.create_publisher(kind, topic, profile), self.indoors)
+
+    def pass_on(self, topic: str) -> None:
+        """Offer to the nodes of this process the words of a topic that this node itself hears from outside."""
+        self._passed_on.add(self.resolve_topic_name(topic))
+        self.indoors.offer(self.resolve_topic_name(topic))
 
     def _pass(self, topic: str, heard: Callable[[Any], None], message: Any) -> None:
         """Hand a message on. None ends the node: what breaks its contract already here is counted, and logged."""

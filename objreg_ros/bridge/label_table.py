@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterable, Mapping
 
+from objreg_ros import limits
 from objreg_ros.data import UNNAMED
 
 MOST_MET = 4096  # names that are met: a detector with more has put something else into its names
@@ -13,28 +15,37 @@ MOST_MET = 4096  # names that are met: a detector with more has put something el
 class LabelTable:
     """Keeps the numbers of the names that were told, and gives a number to every other name that is met.
 
-    ``names`` is the whole table, number → name. It is replaced, never changed, so whoever holds one keeps it.
+    ``names`` is the whole table, number → name. It is replaced, never changed, so whoever holds one keeps it. For two
+    threads: tables are told to one, names are met by the other.
     """
 
     def __init__(self) -> None:
         self.names: Mapping[int, str] = {}
+        self._lock = threading.Lock()
         self._met: list[str] = []
 
     def adopt(self, told: Mapping[int, str]) -> None:
         """Take a table that was told; names that were met and that it lacks get new numbers."""
-        self.names = dict(told)
-        self._number(self._met)
+        with self._lock:
+            self.names = self._with(dict(told), self._met)
 
     def include(self, labels: Iterable[str]) -> bool:
         """Give a number to each name that has none; whether there was such a one. ValueError for too many names."""
-        new = sorted(set(labels) - set(self.names.values()) - {UNNAMED})
-        if len(self._met) + len(new) > MOST_MET:
-            raise ValueError(f"labels: expected at most {MOST_MET} names of classes, got {new[0][:40]!r} beside these")
-        self._met += new
-        self._number(new)
-        return bool(new)
+        with self._lock:
+            new = sorted(set(labels) - set(self.names.values()) - {UNNAMED})
+            if len(self._met) + len(new) > MOST_MET:
+                raise ValueError(
+                    f"labels: expected at most {MOST_MET} names of classes, got {new[0][:40]!r} beside these"
+                )
+            self.names = self._with(self.names, new)
+            self._met += new
+            return bool(new)
 
-    def _number(self, labels: Iterable[str]) -> None:
-        known = set(self.names.values())
-        first = max(self.names, default=-1) + 1
-        self.names = {**self.names, **dict(enumerate((name for name in labels if name not in known), start=first))}
+    @staticmethod
+    def _with(names: Mapping[int, str], more: Iterable[str]) -> Mapping[int, str]:
+        """Numbers behind those that are used; ValueError where class ids have no such number."""
+        known, first = set(names.values()), max(names, default=-1) + 1
+        added = dict(enumerate((name for name in more if name not in known), start=first))
+        if max(added, default=0) > limits.MOST_CLASS_ID:
+            raise ValueError(f"labels: expected numbers of at most {limits.MOST_CLASS_ID}, got {max(added)}")
+        return {**names, **added}

@@ -125,7 +125,10 @@ def size_of(message: Any) -> tuple[int, int]:
     ValueError where it is of no size, or does not begin as a picture. A cloud's are those of its rows and columns.
     """
     if not hasattr(message, "format"):
-        return int(message.width), int(message.height)
+        width, height = int(message.width), int(message.height)
+        if min(width, height) <= 0:
+            raise ValueError(f"image: expected pixels, got {width} × {height}")
+        return width, height
     data = bytes(message.data)
     return _size_in_file(data[COMPRESSED_DEPTH_HEADER:] if "compressedDepth" in message.format else data)
 

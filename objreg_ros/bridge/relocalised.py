@@ -27,6 +27,7 @@ except ImportError:  # optional: std_srvs asks as well
 
 LONGEST_WAIT_S = 60.0  # of the service
 LOOK_S = 0.05  # so often it looks meanwhile
+MOST_WAITING = 16  # who call the service; each has a thread, and beyond them what is known now is told
 PLANE = (0, 1, 5)  # x, y and yaw of a covariance in ROS order
 
 Answer = tuple[Relocalised | None, str]  # where it is, and by what that is known or why it is not
@@ -35,14 +36,14 @@ Answer = tuple[Relocalised | None, str]  # where it is, and by what that is know
 class Whereabouts:
     """Publishes `relocalised`, and `initialpose` where that is wanted, once as soon as ``ask`` knows, and when asked.
 
-    After the answer has become unknown it is published once again.
+    After the answer has become unknown nobody who comes late gets the old one, and the next is published once again.
     """
 
     def __init__(self, door: Door, ask: Callable[[], Answer]) -> None:
-        self._door, self._ask, self._lock = door, ask, threading.Lock()
+        self._door, self._ask, self._lock = door, ask, threading.RLock()
         self._params = door.settings.of(RelocalisedParams)
         self._T_body_camera: Array | None = None
-        self._known = False
+        self._known, self._waiting = False, 0
         self._publisher = _publisher(door, "relocalised")
         self._initial = _publisher(door, "initialpose") if self._params.initialpose else None
         serve = (Trigger, self._trigger) if Relocalise is None else (Relocalise, self._relocalise)
@@ -59,11 +60,15 @@ class Whereabouts:
             if found is not None and not self._known:
                 self._door.get_logger().info(f"relocalised in the map of session {found.session}: {reason}")
                 self._tell(found)
+            elif found is None and self._known:
+                self._door.destroy_publisher(self._publisher)  # and with it what it keeps for who comes late
+                self._publisher = _publisher(self._door, "relocalised")
             self._known = found is not None
 
     def _tell(self, found: Relocalised) -> PoseWithCovarianceStamped:
         message = with_covariance(*_of_body(found, self._T_body_camera), found.stamp_ns, self._params.map_frame)
-        self._publisher.publish(message)
+        with self._lock:  # a service's thread, too
+            self._publisher.publish(message)
         if self._initial is not None:
             self._initial.publish(on_plane(message))
         return message
@@ -84,11 +89,22 @@ class Whereabouts:
             response.success = False
             response.message = f"wait_seconds: expected 0 to {LONGEST_WAIT_S:g}, got {seconds:g}"
             return response
-        found, response.message = await self._door.aside(lambda: self._await(seconds))
+        found, response.message = await self._awaited(seconds)
         response.success = found is not None
         if found is not None:
             response.pose, response.session = self._tell(found), str(found.session)
         return response
+
+    async def _awaited(self, seconds: float) -> Answer:
+        """As `_await`, by a thread of its own; at once for who need not wait, or finds too many waiting."""
+        if seconds == 0.0 or self._waiting >= MOST_WAITING:
+            return self._ask()
+        self._waiting += 1
+        try:
+            answer: Answer = await self._door.aside(lambda: self._await(seconds))
+        finally:
+            self._waiting -= 1
+        return answer
 
     def _await(self, seconds: float) -> Answer:
         """The answer as soon as it is known, at most so much later."""

@@ -43,9 +43,9 @@ class DetectorNode(Door):
         self._array = None if array is None else self.create_publisher(array, "detections", qos.room())
         self._labels = self.create_publisher(String, "labels", qos.latched())
         self._labels.publish(to_msg.labels(self._names))
+        for topic in IMAGES:  # what it has decoded is not decoded again next door
+            self.pass_on(topic)
         self.listen_to_first("image", IMAGES, self._decode, self._hear, self.sensor())
-        for topic in IMAGES:  # after it has listened: what it has decoded is not decoded again next door
-            self.indoors.offer(self.resolve_topic_name(topic))
 
     def adopt(self) -> None:
         """Live parameters hold from the next image on."""

@@ -78,7 +78,9 @@ class RegistrarNode(MatchingDoor):
         )
         self._announcements = Announcements(self)
         self._whereabouts = Whereabouts(self, lambda: (self._registrar.relocalised, self._registrar.whereabouts))
-        self._serve()
+        self.create_service(Trigger, "~/reset", self._reset, callback_group=self.apart)
+        self.create_service(Trigger, "~/save", self._save, callback_group=self.apart)
+        self.create_service(SetBool, "~/enable", self._enable)
         self._listen(round(inputs.odom_slop * 1e9))
 
     def adopt(self) -> None:
@@ -89,11 +91,6 @@ class RegistrarNode(MatchingDoor):
     def _niceness(self) -> int:
         """None where other rooms share Python's lock: a nice thread that holds it and has no processor holds up all."""
         return 0 if self.indoors.offers(self.resolve_topic_name("objects")) else GIVING_WAY
-
-    def _serve(self) -> None:
-        self.create_service(Trigger, "~/reset", self._reset, callback_group=self.apart)
-        self.create_service(Trigger, "~/save", self._save, callback_group=self.apart)
-        self.create_service(SetBool, "~/enable", self._enable)
 
     def _listen(self, odom_slop_ns: int) -> None:
         room: dict[str, type] = {"objects": PointCloud2}
@@ -197,7 +194,8 @@ class RegistrarNode(MatchingDoor):
             seen = outcome.observations, outcome.keyframe_ns, outcome.frame_id
             self._announcements.landmarks(*seen, self._names, outcome.session)
             self._scene.settle(outcome.keyframe_ns, outcome.closures, outcome.rejected)
-            self._show(outcome.keyframe_ns)
+            objects = [(known.landmark, known.label, known.position) for known in self._registrar.landmarks_here]
+            self._announcements.markers(self._scene.markers(objects, outcome.keyframe_ns, self._odom_frame))
 
     def _count(self) -> None:
         """Count what is stored, and say so where the oldest had to go."""
@@ -209,10 +207,6 @@ class RegistrarNode(MatchingDoor):
             f"the store is full: it keeps {self._counts['keyframes']} keyframes (max_keyframes), and has forgotten the "
             f"oldest {self._counts['forgotten']}; places that only they show are not recognised any more",
         )
-
-    def _show(self, stamp_ns: int) -> None:
-        objects = [(known.landmark, known.label, known.position) for known in self._registrar.landmarks_here]
-        self._announcements.markers(self._scene.markers(objects, stamp_ns, self._odom_frame))
 
     def extra_diagnostics(self) -> Mapping[str, object]:
         """What is stored, accepted and refused by reason, the last refusal of each, and what moved last."""
@@ -252,6 +246,7 @@ class RegistrarNode(MatchingDoor):
             self.drop(job.stamp_ns, "reset")
         with self._telling:
             self._scene.clear()
+        self._whereabouts.look()
         return True, "forgot every keyframe"
 
     async def _save(self, _: Any, response: Any) -> Any:

@@ -93,7 +93,7 @@ class Relocalisation:
         self._covariance: Array = np.eye(6)  # of the camera where the last tie was
         self._origin: Array = np.zeros(3)  # of that, in odometry
         self._path = TravelledPath(np.eye(4))
-        self._agreeing = 0
+        self._agreeing, self._target_ns = 0, 0
 
     def follow(self, frame: Frame, session: int) -> None:
         """Go on to a frame of this session."""
@@ -140,7 +140,7 @@ class Relocalisation:
         alone = tie.confirmed or tie.statement.odds >= ALONE_ODDS
         if supporters + alone <= opponents:
             return
-        self._map, self._agreeing = target, 1 + len(agreeing)
+        self._map, self._agreeing, self._target_ns = target, 1 + len(agreeing), tie.statement.target.stamp_ns
         here = tie.statement.source
         T_map_here, self._covariance = fused([one.carried(here, way) for one, way in (*agreeing, (tie, 0.0))])
         self._T_map_odom = rigid(T_map_here @ inverse(here.T_session_camera))
@@ -158,6 +158,7 @@ class Relocalisation:
             return Relocalised(
                 stamp_ns=stamp_ns,
                 session=self._map,
+                target_ns=self._target_ns,
                 T_map_odom=self._T_map_odom,
                 T_map_camera=T_map_camera,
                 covariance=turned_about(self._covariance, way) + drift(self._path.travelled),

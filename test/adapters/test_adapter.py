@@ -107,3 +107,17 @@ def test_what_is_withdrawn_while_it_waits_never_goes_and_later_it_is_told(around
     graph.wait(lambda: len(door.has) == 1)
     tell_whole(graph, closure(2.0), retracted=True)
     graph.wait(lambda: door.extra_diagnostics()["retracted too late"] == 1)
+
+
+def test_what_was_withdrawn_stays_out_when_the_other_topic_tells_it(around: Callable[..., Any]) -> None:
+    graph = around("input:=constraints")
+    door = graph.start(Shelf)
+    graph.send(closure())
+    graph.wait(lambda: len(door.has) == 1)
+    door._keys["its id"] = door.has[0]
+    for _ in range(2):
+        door._retract("its id")
+    assert door.extra_diagnostics()["retracted too late"] == 1
+    graph.send(closure(), closure(2.0))
+    graph.wait(lambda: len(door.has) == 2)
+    assert door.extra_diagnostics()["told again"] == 1

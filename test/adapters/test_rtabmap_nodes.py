@@ -12,7 +12,7 @@ import pytest
 from objreg_ros.adapters.rtabmap_nodes import RtabmapNodes
 from objreg_ros.data import Array, LoopClosure
 from objreg_ros.geometry import inverse, pose, quaternion_from_rotation, rotation_from_vector
-from objreg_ros.mapper.trajectory import Trajectory
+from objreg_ros.mapper.sparse import SparseTrajectory
 
 SECOND = 1_000_000_000
 MEASURED = pose(rotation_from_vector(np.array([0.1, -0.2, 0.3])), np.array([0.4, -0.1, 0.25]))
@@ -51,13 +51,13 @@ def expected(k1: float, from_s: float, to_s: float, k2: float) -> Array:
 
 
 def test_a_moment_of_a_node_ties_that_node_with_what_was_measured() -> None:
-    k1, k2, constraint = walk(1, 2, 61, 62).tied(closure(2.0, 61.0), Trajectory(), np.eye(4))  # type: ignore[misc]
+    k1, k2, constraint = walk(1, 2, 61, 62).tied(closure(2.0, 61.0), SparseTrajectory(), np.eye(4))  # type: ignore[misc]
     assert (k1, k2) == (2, 3)
     np.testing.assert_allclose(constraint.T_from_to, MEASURED, atol=1e-9)
 
 
 def test_between_nodes_the_nodes_own_odometry_leads_there_and_costs_certainty() -> None:
-    k1, k2, constraint = walk(1, 2, 61, 62).tied(closure(1.3, 61.6), Trajectory(), np.eye(4))  # type: ignore[misc]
+    k1, k2, constraint = walk(1, 2, 61, 62).tied(closure(1.3, 61.6), SparseTrajectory(), np.eye(4))  # type: ignore[misc]
     assert (k1, k2) == (1, 4)
     np.testing.assert_allclose(constraint.T_from_to, expected(1, 1.3, 61.6, 62), atol=1e-9)
     assert np.linalg.eigvalsh(constraint.covariance).min() > 1e-4
@@ -65,7 +65,7 @@ def test_between_nodes_the_nodes_own_odometry_leads_there_and_costs_certainty() 
 
 def test_odometry_that_covers_the_ways_counts_more_than_what_nodes_tell() -> None:
     nodes = told(node(1, 1.0, np.eye(4)), node(2, 61.0, np.eye(4)))  # as if the body had not moved
-    odometry = Trajectory()
+    odometry = SparseTrajectory()
     for tenth in range(800):
         odometry.append(tenth * SECOND // 10, body_at(tenth / 10))
     k1, k2, constraint = nodes.tied(closure(1.3, 60.8), odometry, np.eye(4))  # type: ignore[misc]
@@ -73,11 +73,20 @@ def test_odometry_that_covers_the_ways_counts_more_than_what_nodes_tell() -> Non
     np.testing.assert_allclose(constraint.T_from_to, expected(1, 1.3, 60.8, 61), atol=1e-9)
 
 
+def test_odometry_that_was_silent_on_the_way_leads_nowhere() -> None:
+    odometry = SparseTrajectory()
+    for tenth in (*range(10), *range(25, 800)):  # it may have begun anew between 0.9 and 2.5 s
+        odometry.append(tenth * SECOND // 10, body_at(tenth / 10))
+    nodes = told(node(1, 0.8, body_at(0.8)), node(2, 61.0, body_at(61), map_id=1))
+    assert nodes.tied(closure(0.7, 60.8), odometry, np.eye(4)) is not None
+    assert nodes.tied(closure(2.6, 60.8), odometry, np.eye(4)) is None
+
+
 @pytest.mark.parametrize("last_map", [0, 1])
 def test_no_way_leads_past_the_newest_node_or_from_one_map_to_another(last_map: int) -> None:
     nodes = told(node(1, 1.0, body_at(1)), node(2, 61.0, body_at(61)), node(3, 62.0, body_at(62), map_id=last_map))
-    assert (nodes.tied(closure(1.0, 61.4), Trajectory(), np.eye(4)) is None) == bool(last_map)
-    assert nodes.tied(closure(1.0, 62.4), Trajectory(), np.eye(4)) is None
+    assert (nodes.tied(closure(1.0, 61.4), SparseTrajectory(), np.eye(4)) is None) == bool(last_map)
+    assert nodes.tied(closure(1.0, 62.4), SparseTrajectory(), np.eye(4)) is None
 
 
 def test_a_number_with_another_stamp_is_of_another_database() -> None:
@@ -94,6 +103,12 @@ def test_intermediate_nodes_landmarks_and_nodes_without_odometry_are_left_out() 
 def test_a_stamp_that_is_none_is_refused(stamp: float) -> None:
     with pytest.raises(ValueError, match="mapData: expected a stamp"):
         told(node(1, stamp, np.eye(4)))
+
+
+@pytest.mark.parametrize("metres", [float("nan"), float("inf"), 1e9])
+def test_a_pose_that_is_none_is_refused(metres: float) -> None:
+    with pytest.raises(ValueError, match="mapData: expected a pose within"):
+        told(node(1, 1.0, pose(np.eye(3), np.array([0.0, metres, 0.0]))))
 
 
 def test_without_nodes_there_is_none_that_is_nearest() -> None:

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -111,7 +112,7 @@ def test_numbers_that_are_no_camera_are_refused(told: str, why: str) -> None:
         ({"data: [525.5, 0.": "data: [525.5"}, "expected 9 numbers in camera_matrix, got 8"),
         ({"data: [525.5": "data: [x"}, r"expected camera_matrix with its numbers as data"),
         ({"plumb_bob": "pinhole_radial"}, "lens: expected a distortion model of plumb_bob, .*got 'pinhole_radial'"),
-        ({"image_width: 640": "image_width: wide"}, "expected whole pixels as image_width, got wide"),
+        ({"image_width: 640": "image_width: wide"}, "expected whole pixels as image_width, got 'wide'"),
         ({"image_width: 640": "image_width: -640"}, "expected whole pixels as image_width, got -640"),
         (
             {"camera_matrix": "matrix"},
@@ -169,3 +170,18 @@ def test_a_file_is_named_by_its_whole_path_and_numbers_as_they_are(tmp_path: Pat
     monkeypatch.chdir(tmp_path)
     assert (absolute("camera.yaml"), absolute("1,2,3,4")) == (str(tmp_path / "camera.yaml"), "1,2,3,4")
     assert absolute("") == "" and Calibration(k=K) == Calibration(k=K)
+
+
+@pytest.mark.parametrize("name", ["camera_matrix", "image_width", "distortion_model"])
+def test_a_small_file_that_unfolds_to_a_large_one_is_refused_and_takes_no_memory(tmp_path: Path, name: str) -> None:
+    folds = ["a0: &a0 [x, x, x, x]"] + [f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 10)}]" for k in range(1, 30)]
+    file = tmp_path / "camera.yaml"
+    file.write_text("\n".join([*folds, "camera_matrix: [500, 0, 320, 0, 500, 240, 0, 0, 1]", f"{name}: *a29"]))
+    with pytest.raises(ValueError, match=f"expected .*{name}"):
+        read_calibration(str(file))
+
+
+def test_a_picture_without_a_size_is_refused() -> None:
+    camera = read_calibration("500,500,320,240,640,480")
+    with pytest.raises(ValueError, match="expected pixels, got 640 × 0"):
+        fitted(camera, SimpleNamespace(width=640, height=0, encoding="16UC1"))

@@ -14,7 +14,7 @@ from sensor_msgs.msg import Image
 from objreg_ros.bridge import detections_in, from_msg, lenses, to_msg, vision_from_msg
 from objreg_ros.bridge.detections_in import DetectionsIn
 from objreg_ros.bridge.sync import Drop, Match
-from objreg_ros.data import UNNAMED, DepthImage, Detections, Intrinsics
+from objreg_ros.data import UNNAMED, ColourImage, DepthImage, Detections, Intrinsics
 
 CAMERA = Intrinsics(fx=60.0, fy=60.0, cx=40.0, cy=30.0, width=80, height=60)
 DEPTH = DepthImage(depth=np.ones((60, 80), np.float32), rgb=None, intrinsics=CAMERA, stamp_ns=5)
@@ -119,7 +119,21 @@ def test_boxes_are_of_the_size_of_the_raw_picture_where_there_is_one(monkeypatch
     inputs = DetectionsIn(Door(), "auto")  # type: ignore[arg-type]
     read(inputs, SimpleNamespace())
     read(inputs, SimpleNamespace(), image=Image(height=120, width=160))
-    assert met == [(60, 80), (120, 160)]
+    read(inputs, SimpleNamespace(), image=ColourImage(rgb=np.zeros((90, 120, 3), np.uint8), stamp_ns=5))
+    assert met == [(60, 80), (120, 160), (90, 120)]
+
+
+def test_a_table_that_another_tells_meanwhile_is_told_again_with_the_names_that_were_met() -> None:
+    door = Door()
+    inputs = DetectionsIn(door, "auto")  # type: ignore[arg-type]
+    inputs._names = {4: "sofa"}
+    assert read(inputs, masks()).names == {0: "sofa"}
+    door.heard["labels"](to_msg.labels(NAMES))  # our own detector was started beside
+    assert read(inputs, masks()).names == {**NAMES, 2: "sofa"}
+    assert from_msg.labels(door.published[-1]) == {**NAMES, 2: "sofa"} and len(door.published) == 2
+    door.heard["labels"](door.published[-1])  # its own word
+    read(inputs, masks())
+    assert len(door.published) == 2
 
 
 def test_boxes_without_vision_msgs_are_refused_with_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:

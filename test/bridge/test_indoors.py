@@ -120,3 +120,19 @@ def test_a_topic_that_was_closed_is_heard_no_more(house: House) -> None:
 def test_a_topic_that_nobody_offers_here_is_subscribed_to(house: House) -> None:
     subscription = house.listener.listen(String, "far", house.heard.append, qos.room())
     assert house.listener.count_subscribers("/far") == 1 and subscription.topic_name == "/far"
+
+
+def test_who_passes_a_topic_on_hears_it_from_outside_also_when_it_is_opened_again_after_a_silence(house: House) -> None:
+    door, topics = house.speaker, {"raw": String, "packed": String}
+    for topic in topics:
+        door.pass_on(topic)
+    told = lambda _, message: house.heard.append(message.data)  # noqa: E731
+    door.listen_to_first("words", topics, lambda *_: None, told, qos.room())
+    senders = {topic: house.listener.create_publisher(String, topic, qos.room()) for topic in topics}
+    assert house.spin_until(lambda: door.count_publishers("/raw") == 1 and door.count_publishers("/packed") == 1)
+    assert house.spin_until(lambda: "a" in house.heard or bool(senders["raw"].publish(String(data="a"))))
+    assert door.taken("words") == "raw"
+    door._choices["words"]._silence_s = 0.0
+    door._choices["words"].look()
+    assert house.spin_until(lambda: "b" in house.heard or bool(senders["packed"].publish(String(data="b"))))
+    assert house.indoors.offers("/raw") and house.indoors.offers("/packed")

@@ -51,3 +51,11 @@ def test_a_detector_that_puts_something_else_into_its_names_is_refused_and_costs
     with pytest.raises(ValueError, match="expected at most 2 names of classes, got 'track 1'"):
         table.include(["track 1"])
     assert not table.include(["cup"])
+
+
+def test_a_number_that_no_class_can_have_is_refused_and_nothing_changes() -> None:
+    table = LabelTable()
+    table.adopt({65533: "cup"})
+    with pytest.raises(ValueError, match="expected numbers of at most 65533, got 65534"):
+        table.include(["tv"])
+    assert table.names == {65533: "cup"}

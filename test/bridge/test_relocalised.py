@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -23,7 +25,13 @@ from objreg_ros.geometry import pose, rotation_from_vector
 
 AT = pose(rotation_from_vector(np.array([0.0, 0.0, 0.5])), np.array([1.0, 2.0, 3.0]))
 FOUND = Relocalised(
-    stamp_ns=7, session=4, T_map_odom=AT, T_map_camera=AT, covariance=np.diag([1.0, 2, 3, 4, 5, 6]), closures=2
+    stamp_ns=7,
+    session=4,
+    target_ns=3,
+    T_map_odom=AT,
+    T_map_camera=AT,
+    covariance=np.diag([1.0, 2, 3, 4, 5, 6]),
+    closures=2,
 )
 ON_BODY = pose(np.eye(3), np.array([0.5, 0.0, 0.0]))
 UNKNOWN: Answer = None, "no closure to an earlier session yet"
@@ -144,3 +152,31 @@ def test_a_body_that_looks_straight_up_has_the_yaw_of_its_left() -> None:
     up = pose(np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]), np.zeros(3))
     turn = on_plane(with_covariance(up, np.eye(6), 0, "map")).pose.pose.orientation
     assert abs(turn.z) < 1e-9  # its y is the map's y
+
+
+def test_who_finds_too_many_waiting_is_answered_at_once_and_costs_no_thread(make: Making) -> None:
+    door = make()
+    where, before = Whereabouts(door, lambda: UNKNOWN), threading.active_count()
+    answered = []
+    asked = [where._relocalise(SimpleNamespace(wait_seconds=0.5), SimpleNamespace()) for _ in range(19)]
+    for one in asked:
+        try:
+            one.send(None)
+        except StopIteration as end:
+            answered.append(end.value.message)
+    assert threading.active_count() - before == relocalised.MOST_WAITING and answered == [UNKNOWN[1]] * 3
+
+
+def test_who_comes_after_it_has_become_unknown_gets_no_pose_of_before(make: Making) -> None:
+    door, answers = make(), [KNOWN]
+    where = Whereabouts(door, lambda: answers[-1])
+    before = hear(door, "relocalised")
+    where.look()
+    assert wait_for(door, lambda: len(before) == 1)
+    answers.append(UNKNOWN)
+    where.look()
+    late = hear(door, "relocalised")
+    assert not wait_for(door, lambda: bool(late), 1.0)
+    answers.append(KNOWN)
+    where.look()
+    assert wait_for(door, lambda: len(late) == 1 and len(before) == 2)

@@ -89,7 +89,7 @@ def test_two_that_agree_tell_where_the_camera_is_and_odometry_goes_on(walk: Pass
     walk.go(1.4)
     found = walk.relocalisation.relocalised
     assert first is not None and found is not None
-    assert found.session == EARLIER and found.closures == 2
+    assert found.session == EARLIER and found.closures == 2 and found.target_ns == round(10.4 * SECOND)
     assert found.stamp_ns == round(101.4 * SECOND)
     assert np.allclose(found.T_map_odom, T_MAP_ODOM, atol=1e-9)
     assert np.allclose(found.T_map_camera, T_MAP_ODOM @ moved(1.4), atol=1e-9)
