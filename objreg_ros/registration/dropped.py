@@ -64,7 +64,7 @@ CONSTANT_OF = {
     },
     "registration/gate/kinds.py": dict.fromkeys(
         (
-            *("min_tested_alone", "min_firmness_alone"),
+            *("min_tested_alone", "min_firmness_alone", "min_chains"),
             *("min_likeness_alone", "min_likeness_unrivalled", "min_texture_painted", "min_margin_painted"),
             *("min_likeness_several", "doubt_factor", "firm_margin", "max_slack_sigma", "far_range", "min_tested"),
             *("min_inliers", "min_texture", "min_score_doubtful", "max_violations_doubtful"),
@@ -72,14 +72,13 @@ CONSTANT_OF = {
         "KINDS",
     ),
     "registration/gate/objects.py": {
-        "min_chains": "PROPOSERS",
         "min_objects": "SEVERAL",
     },
     "registration/gate/odometry.py": {
         "odometry_sigmas": "SIGMAS",
     },
     "registration/gate/surroundings.py": {
-        "min_surroundings": "Limits.share",
+        "min_surroundings": "Limits.score",
         "max_fall_around": "Limits.correlation_loss",
     },
     "registration/kernels/same_pose.py": {
