@@ -25,7 +25,7 @@ from objreg_ros.bridge.indoors import Indoors
 from objreg_ros.bridge.lifetime import await_kernels
 from objreg_ros.bridge.markers import Scene
 from objreg_ros.bridge.matching import MatchingDoor
-from objreg_ros.bridge.params import RelocalisedParams
+from objreg_ros.bridge.params import ManagedParams, RelocalisedParams
 from objreg_ros.bridge.relocalised import Whereabouts
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.sync import Match, Need, Stream
@@ -59,11 +59,21 @@ class RegistrarNode(MatchingDoor):
     """
 
     def __init__(self, indoors: Indoors | None = None) -> None:
-        super().__init__("registrar", RegistrarParams, RegistrarNodeParams, RelocalisedParams, indoors=indoors)
+        kinds = RegistrarParams, RegistrarNodeParams, RelocalisedParams, ManagedParams
+        super().__init__("registrar", *kinds, indoors=indoors)
+
+    def open(self) -> None:
+        """Load the kernels, open the store, publish and listen."""
         inputs = self.settings.of(RegistrarNodeParams)
         self._mount, self._seconds = hear_mount(self, inputs.mounting), inputs.limit
         await_kernels(lambda: warm(self.settings.of(RegistrarParams)), self.get_logger().info)
         self._registrar = Registrar(self.settings.of(RegistrarParams))
+        with ExitStack() as refused:  # a store that stays open could not be opened again
+            refused.callback(self._registrar.close)
+            self._open_to(inputs, refused)
+            refused.pop_all()
+
+    def _open_to(self, inputs: RegistrarNodeParams, refused: ExitStack) -> None:
         self._tracking, self._telling = threading.Lock(), threading.Lock()
         self._enabled = True
         self._counts = dict(self._registrar.counts())
@@ -76,6 +86,7 @@ class RegistrarNode(MatchingDoor):
         self.searcher: Backlog[Job] = Backlog(
             self._search, self._keep, self.fail, limit, lambda job: job.window.nbytes, self._niceness()
         )
+        refused.callback(self.searcher.close)
         self._announcements = Announcements(self)
         self._whereabouts = Whereabouts(self, lambda: (self._registrar.relocalised, self._registrar.whereabouts))
         self._serve()
@@ -272,14 +283,13 @@ class RegistrarNode(MatchingDoor):
         response.success, response.message = True, "enabled" if request.data else "frames are dropped as disabled"
         return response
 
-    def close(self) -> None:
+    def shut(self) -> None:
         """End both workers, the search in hand early, store what they had not come to, let go of the store."""
         self.searcher.shut()
         self.end_aside()
-        self.worker.close()
+        self.end_work()
         self.searcher.close()
         with ExitStack() as ends:
-            ends.callback(super().close)
             ends.callback(self._registrar.close)
             self._store_the_rest()
 
