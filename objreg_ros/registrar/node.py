@@ -202,13 +202,12 @@ class RegistrarNode(MatchingDoor):
     def _count(self) -> None:
         """Count what is stored, and say so where the oldest had to go."""
         forgotten, self._counts = self._counts["forgotten"], dict(self._registrar.counts())
-        if self._counts["forgotten"] == forgotten:
-            return
-        self.throttled.warn(
-            "forgotten",
-            f"the store is full: it keeps {self._counts['keyframes']} keyframes (max_keyframes), and has forgotten the "
-            f"oldest {self._counts['forgotten']}; places that only they show are not recognised any more",
-        )
+        if self._counts["forgotten"] != forgotten:
+            self.throttled.warn(
+                "forgotten",
+                f"the store is full: it keeps {self._counts['keyframes']} keyframes (max_keyframes), and has forgotten "
+                f"the oldest {self._counts['forgotten']}; places that only they show are not recognised any more",
+            )
 
     def extra_diagnostics(self) -> Mapping[str, object]:
         """What is stored and what waits, and what was told of closures."""

@@ -278,7 +278,7 @@ def test_a_running_node_takes_live_parameters_and_refuses_the_others(make: Makin
     assert refusal.reason is Reason.NO_CANDIDATE
     node.set_parameters([Parameter("min_gap", value=2.0), Parameter("search_seconds", value=1e-9)])
     node._find(window_at(node, 45), "search", node._seconds)
-    assert node._refused[Reason.OVER_BUDGET.value] > 0
+    assert node._announcements._refused[Reason.OVER_BUDGET.value] > 0
     (result,) = node.set_parameters([Parameter("store", value="other.db")])
     assert not result.successful
     node.close()
