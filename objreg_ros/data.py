@@ -484,6 +484,7 @@ class Relocalised:
     ``T_map_odom`` maps the odometry of now into it, ``T_map_camera`` is the camera of the frame at ``stamp_ns``;
     ``covariance (6, 6) float64`` of that in ROS order, along the map's axes; ``closures`` that agree tell it, the
     newest to the keyframe of ``target_ns``: where that session's odometry has drifted, its map holds around there.
+    ``by_odometry`` says that odometry told both sessions' poses: the map is level then, else it is a camera's frame.
     """
 
     stamp_ns: int
@@ -493,6 +494,7 @@ class Relocalised:
     T_map_camera: Array
     covariance: Array
     closures: int
+    by_odometry: bool = True
 
     def __post_init__(self) -> None:
         _hold_pose(self, "T_map_odom")

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 
 from objreg_ros.adapters.params import BodyParams
@@ -12,11 +10,12 @@ from objreg_ros.bridge import transforms
 from objreg_ros.bridge.door import Door
 from objreg_ros.data import Array, LoopClosure, Odometry
 
-TF_WAIT_S = 5.0  # what /tf_static has not said by then it will not say: until then constraints wait
-
 
 class Body:
-    """Asks the parameter, then /tf_static for the frame of odometry, or ``base_frame`` where there is none."""
+    """Asks the parameter, then /tf_static for the frame of odometry, or ``base_frame`` where there is none.
+
+    Nothing is assumed of frames that nobody ties: a camera's axes are not a body's, and a mapper forgets no edge.
+    """
 
     def __init__(self, door: Door) -> None:
         params = door.settings.of(BodyParams)
@@ -24,25 +23,25 @@ class Body:
         self._frame = params.base_frame
         self._frames = transforms.hear_static_frames(door, self._told is None)
         self._mount = transforms.Mount(self._told, self._frames.between, door.get_logger().info)
-        self._since = time.monotonic()
+        self._remind = door.throttled.remind
 
     def T_body_camera(self, from_or_to: str, newest: Odometry | None = None) -> Array | None:
-        """The pose (4, 4) of a camera's frame on the body; None as long as /tf_static may yet say it.
+        """The pose (4, 4) of a camera's frame on the body; None as long as nobody has said it.
 
         ``newest`` is a word of odometry, whose body counts more than the parameter.
         """
         body = newest.child_frame_id if newest is not None and newest.child_frame_id else self._frame
         named = self._told is not None or from_or_to.lstrip("/") == body.lstrip("/")
-        if not named and transforms.TFMessage is not None and self._may_yet_come(body, from_or_to):
+        if not named and self._frames.between(body.lstrip("/"), from_or_to.lstrip("/")) is None:
+            self._remind(
+                "body", f"expected to know where {from_or_to!r} sits on {body!r}, got no word of it: constraints wait; "
+                "publish it on /tf_static with tf2_msgs installed, or set T_base_camera (0 0 0 0 0 0 1 if they are one)"
+            )  # fmt: skip
             return None
         words = [Odometry(T_odom_body=np.eye(4), stamp_ns=0, child_frame_id=body)]
         T = self._mount.T_body_camera(words, from_or_to)
         return np.eye(4) if T is None else T
 
     def of(self, closure: LoopClosure, newest: Odometry | None = None) -> Array | None:
-        """That of the camera which saw the place again; None as long as /tf_static may yet say it."""
+        """That of the camera which saw the place again; None as long as nobody has said it."""
         return self.T_body_camera(closure.to_frame_id, newest)
-
-    def _may_yet_come(self, body: str, camera: str) -> bool:
-        known = self._frames.between(body.lstrip("/"), camera.lstrip("/")) is not None
-        return not known and time.monotonic() - self._since < TF_WAIT_S

@@ -45,7 +45,7 @@ class Whereabouts:
         self._T_body_camera: Array | None = None
         self._known, self._waiting = False, 0
         self._publisher = _publisher(door, "relocalised")
-        self._initial = _publisher(door, "initialpose") if self._params.initialpose else None
+        self._initial: Any = _publisher(door, "initialpose") if self._params.initialpose else None
         serve = (Trigger, self._trigger) if Relocalise is None else (Relocalise, self._relocalise)
         door.create_service(serve[0], "~/relocalise", serve[1], callback_group=door.apart)
 
@@ -70,8 +70,18 @@ class Whereabouts:
         with self._lock:  # a service's thread, too
             self._publisher.publish(message)
         if self._initial is not None:
-            self._initial.publish(on_plane(message))
+            self._tell_plane(found, message)
         return message
+
+    def _tell_plane(self, found: Relocalised, message: PoseWithCovarianceStamped) -> None:
+        """On the plane of a level map, for a body whose x axis looks ahead; a camera's frames are neither."""
+        if found.by_odometry and self._T_body_camera is not None:
+            self._initial.publish(on_plane(message))
+            return
+        self._door.throttled.remind(
+            "initialpose", "expected odometry in both sessions, and to know where the camera sits on a body, got less; "
+            "none is told: publish odom, and set T_base_camera or have it on /tf_static"
+        )  # fmt: skip
 
     async def _trigger(self, _: Any, response: Any) -> Any:
         found, response.message = self._ask()

@@ -44,6 +44,7 @@ class Tie(NamedTuple):
     statement: Statement
     covariance: Array
     confirmed: bool
+    by_odometry: bool
 
     @property
     def T_map_odom(self) -> Array:
@@ -93,7 +94,7 @@ class Relocalisation:
         self._covariance: Array = np.eye(6)  # of the camera where the last tie was
         self._origin: Array = np.zeros(3)  # of that, in odometry
         self._path = TravelledPath(np.eye(4))
-        self._agreeing, self._target_ns = 0, 0
+        self._agreeing, self._target_ns, self._by_odometry = 0, 0, False
 
     def follow(self, frame: Frame, session: int) -> None:
         """Go on to a frame of this session."""
@@ -141,6 +142,7 @@ class Relocalisation:
         if supporters + alone <= opponents:
             return
         self._map, self._agreeing, self._target_ns = target, 1 + len(agreeing), tie.statement.target.stamp_ns
+        self._by_odometry = tie.by_odometry
         here = tie.statement.source
         T_map_here, self._covariance = fused([one.carried(here, way) for one, way in (*agreeing, (tie, 0.0))])
         self._T_map_odom = rigid(T_map_here @ inverse(here.T_session_camera))
@@ -163,6 +165,7 @@ class Relocalisation:
                 T_map_camera=T_map_camera,
                 covariance=turned_about(self._covariance, way) + drift(self._path.travelled),
                 closures=self._agreeing,
+                by_odometry=self._by_odometry,
             )
 
     @property
@@ -196,7 +199,7 @@ def _tie(closure: LoopClosure, source: Keyframe, target: Keyframe) -> Tie:
     odds = closure.evidence.get("odds", 0.0)
     confirmed = closure.evidence.get("agreeing", 0.0) >= SUPPORTERS
     statement = Statement(Standpoint.of(source), Standpoint.of(target), closure.T_from_to, odds, True)
-    return Tie(statement, closure.covariance, confirmed)
+    return Tie(statement, closure.covariance, confirmed, source.by_odometry and target.by_odometry)
 
 
 def _distinct(one: Statement, other: Statement) -> bool:

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from objreg_ros.adapters import body
 from objreg_ros.adapters.body import Body
 from objreg_ros.adapters.params import BodyParams
 from objreg_ros.bridge import qos, to_msg, transforms
@@ -35,15 +34,12 @@ def test_a_camera_that_is_the_body_sits_where_the_body_is(around: Callable[..., 
     np.testing.assert_array_equal(made(around("base_frame:=camera")).of(closure()), np.eye(4))
 
 
-def test_tf_static_is_awaited_and_then_nothing_is_assumed_but_one_place(
-    around: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if transforms.TFMessage is None:
-        pytest.skip("tf2_msgs is not installed")
+def test_nothing_is_assumed_of_frames_that_nobody_ties(around: Callable[..., Any]) -> None:
     where = made(around())
+    said: list[str] = []
+    where._remind = lambda _reason, text: said.append(text)  # type: ignore[method-assign, assignment]
     assert where.of(closure()) is None
-    monkeypatch.setattr(body, "TF_WAIT_S", 0.0)
-    np.testing.assert_array_equal(where.of(closure()), np.eye(4))
+    assert "expected to know where 'camera' sits on 'base_link'" in said[0] and "set T_base_camera" in said[0]
 
 
 def test_tf_static_says_it_for_the_body_that_odometry_speaks_of(around: Callable[..., Any]) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -99,11 +100,27 @@ def test_initialpose_is_told_where_it_is_asked_for_and_lies_on_the_plane(make: M
     heard = []
     door.create_subscription(PoseWithCovarianceStamped, "initialpose", heard.append, qos.room())
     telling = Whereabouts(door, lambda: KNOWN)
+    telling.mounted(ON_BODY)
     assert wait_for(door, lambda: door.count_subscribers("initialpose") == 1)
     wait_for(door, lambda: False, 0.5)
     telling.look()
     assert wait_for(door, lambda: bool(heard))
     assert heard[0].pose.pose.position.z == 0.0 and heard[0].header.frame_id == "earlier_map"
+
+
+@pytest.mark.parametrize(("by_odometry", "mount"), [(False, ON_BODY), (True, None)])
+def test_no_initialpose_is_told_of_a_map_that_may_be_tilted_or_of_a_camera(
+    by_odometry: bool, mount: np.ndarray | None, make: Making
+) -> None:
+    door, said, heard = make("initialpose:=true"), list[str](), list[object]()
+    door.throttled._write = said.append
+    door.create_subscription(PoseWithCovarianceStamped, "initialpose", heard.append, qos.room())
+    telling = Whereabouts(door, lambda: (replace(FOUND, by_odometry=by_odometry), "known"))
+    telling.mounted(mount)
+    assert wait_for(door, lambda: door.count_subscribers("initialpose") == 1)
+    telling.look()
+    assert not wait_for(door, lambda: bool(heard), 0.5)
+    assert "expected odometry in both sessions" in said[0] and "set T_base_camera" in said[0]
 
 
 def test_without_objreg_msgs_the_service_is_a_trigger_that_says_where_or_why_not(

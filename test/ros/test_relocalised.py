@@ -31,6 +31,9 @@ BESIDE = rooms.look_at((0.35, 0.25, 1.25), (1.8, 0.0, 0.75))
 T_ODOM_MAP = pose(rotation_from_vector(np.array([0.0, 0.0, 0.8])), np.array([1.0, 2.0, 0.0]))
 
 
+MOUNT = "-p T_base_camera:=[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]"
+
+
 @pytest.fixture
 def fresh(domain: int, tmp_path: Path) -> Iterator[Graph]:
     made = Graph(domain, tmp_path)
@@ -88,7 +91,7 @@ def test_a_registrar_with_the_store_of_an_earlier_session_tells_where_it_woke_up
     fresh.hear(Header, "finished")
     fresh.hear(PoseWithCovarianceStamped, "relocalised", qos.latched())
     fresh.hear(PoseWithCovarianceStamped, "initialpose")
-    parameters = (f"-p store:={store}", "-p map_frame:=map", "-p initialpose:=true", "-p reliable:=true")
+    parameters = (f"-p store:={store}", "-p map_frame:=map", "-p initialpose:=true", "-p reliable:=true", MOUNT)
     fresh.start("registrar", "registrar", *parameters)
     answer = ask(fresh, asking, "registrar/relocalise")
     assert not answer.success and answer.message == "no closure to an earlier session yet"
