@@ -48,7 +48,7 @@ def test_a_retraction_takes_the_edge_out_of_the_file_again(around: Callable[...,
     if closures_msg.LoopClosureMsg is None:
         pytest.skip("objreg_msgs is not installed: colcon builds it from this repository")
     path = tmp_path / "graph.g2o"
-    graph = around(f"graph_path:={path}", "period:=0.1")
+    graph = around(f"graph_path:={path}", "period:=0.1", f"T_base_camera:={AHEAD_TEXT}")
     door = graph.start(ToG2o)
     graph.send(closure(1.5, 9.0))
     message = closures_msg.loop_closure(closure(1.5, 9.0))
@@ -75,7 +75,7 @@ def test_odometry_that_begins_anew_begins_another_file(around: Callable[..., Any
 
 
 def test_what_cannot_be_tied_is_dropped_by_reason(around: Callable[..., Any], tmp_path: Path) -> None:
-    graph = around(f"graph_path:={tmp_path}/graph.g2o")
+    graph = around(f"graph_path:={tmp_path}/graph.g2o", f"T_base_camera:={AHEAD_TEXT}")
     door = graph.start(ToG2o)
     graph.drive(door, 5.0, 10.0)
     graph.send(closure(1.5, 9.0), closure(9.0, 6.0))
