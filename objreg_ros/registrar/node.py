@@ -64,11 +64,9 @@ class RegistrarNode(MatchingDoor):
         self._mount, self._seconds = hear_mount(self, inputs.mounting), inputs.limit
         await_kernels(lambda: warm(self.settings.of(RegistrarParams)), self.get_logger().info)
         self._registrar = Registrar(self.settings.of(RegistrarParams))
-        self._tracking, self._telling = threading.Lock(), threading.Lock()
-        self._enabled = True
-        self._counts = dict(self._registrar.counts())
-        self._unsearched, self._without_odometry, self._refused = 0, 0, Counter[str]()
-        self._published = Counter[bool]()  # constraints, by whether others confirmed them
+        self._tracking, self._telling, self._enabled = threading.Lock(), threading.Lock(), True
+        self._counts, self._unsearched, self._without_odometry = dict(self._registrar.counts()), 0, 0
+        self._refused, self._published = Counter[str](), Counter[bool]()  # by reason; by whether others confirmed them
         self._camera: str | None = None  # the frame_id of the last frame
         self._last_refusals, self._last_moved = dict[str, str](), dict[str, float]()  # by reason; m by label
         self._names, self._scene, self._odom_frame = dict[int, str](), Scene(), "odom"
@@ -82,11 +80,6 @@ class RegistrarNode(MatchingDoor):
         self.create_service(Trigger, "~/save", self._save, callback_group=self.apart)
         self.create_service(SetBool, "~/enable", self._enable)
         self._listen(round(inputs.odom_slop * 1e9))
-
-    def adopt(self) -> None:
-        """Live parameters hold from the next frame and the next search on."""
-        self._registrar.adopt(self.settings.of(RegistrarParams))
-        self._seconds = self.settings.of(RegistrarNodeParams).limit
 
     def _niceness(self) -> int:
         """None where other rooms share Python's lock: a nice thread that holds it and has no processor holds up all."""
@@ -124,7 +117,9 @@ class RegistrarNode(MatchingDoor):
     # Compute
 
     def compute(self, stamp_ns: int, payload: Match) -> bool:
-        """Follow one frame; a keyframe goes on to the searcher."""
+        """Follow one frame, by the parameters as they are now; a keyframe goes on to the searcher."""
+        self._registrar.adopt(self.settings.of(RegistrarParams))
+        self._seconds = self.settings.of(RegistrarNodeParams).limit
         if not self._enabled:
             raise DroppedError("disabled", "")
         frame, T_body_camera = self._frame(payload)
