@@ -13,7 +13,7 @@ from tempfile import NamedTemporaryFile
 from ament_index_python.packages import get_package_prefix
 from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
-from launch_ros.actions import Node
+from launch_ros.actions import LifecycleNode, Node
 
 from launch import LaunchContext, LaunchDescription
 from objreg_ros import share
@@ -59,16 +59,19 @@ OPTIONS = {
     "reliable": "true to ask cameras for reliable delivery",
     "mapper": "true to start the reference mapper too, which publishes path and correction",
     "composed": "true for all nodes in one process, which takes half of the memory",
+    "managed": "true for nodes with a life cycle (~/change_state); not with composed",
+    "autostart": "false to leave managed nodes unconfigured until somebody asks for more",
     "respawn": "true to start a process again that has ended with an error or was killed",
     "rviz": "true to start RViz too, where it is installed",
     "log_level": "how much the nodes log",
 }
+SWITCHES = ("use_sim_time", "reliable", "managed", "autostart")  # that are parameters of every node
 SWITCH = ("", "true", "false", "True", "False")
 CHOICES = {
     "source": ("", "auto", "points", "depth"),
     "detections": ("", "auto", "table", "vision_msgs", "masks"),
     "log_level": ("", "debug", "info", "warn", "error", "fatal"),
-    **dict.fromkeys(("use_sim_time", "reliable", "mapper", "composed", "respawn", "rviz"), SWITCH),
+    **dict.fromkeys((*SWITCHES, "mapper", "composed", "respawn", "rviz"), SWITCH),
 }
 FOREIGN = ("vision_msgs", "masks")  # detections that are another detector's
 RESPAWN_S = 2.0
@@ -105,7 +108,8 @@ def _nodes(context: LaunchContext) -> list[Node]:
 
 def _alone(room: str, said: dict[str, str], alike: dict) -> Node:
     words = ["-m", f"objreg_ros.{room}.node"]
-    return Node(executable=sys.executable, arguments=words, name=room, parameters=_parameters(room, said), **alike)
+    kind = LifecycleNode if _is_true(said["managed"]) else Node  # which events of a launch file around this one reach
+    return kind(executable=sys.executable, arguments=words, name=room, parameters=_parameters(room, said), **alike)
 
 
 def _together(rooms: tuple[str, ...], said: dict[str, str], alike: dict) -> Node:
@@ -159,7 +163,7 @@ def _is_true(text: str) -> bool:
 
 def _parameters(room: str, said: dict[str, str]) -> list:
     """The user's file, and over it what was said on the command line."""
-    values: dict = {name: _is_true(said[name]) for name in ("use_sim_time", "reliable") if said[name]}
+    values: dict = {name: _is_true(said[name]) for name in SWITCHES if said[name]}
     values |= {name: said[name] for name in OWN[room] if said[name]}
     if said["T_base_camera"] and room != "detector":
         values["T_base_camera"] = [float(number) for number in said["T_base_camera"].split(",")]

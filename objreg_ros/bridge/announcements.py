@@ -6,6 +6,7 @@ Those of common_interfaces are always there, those of objreg_msgs where that is 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -16,12 +17,12 @@ from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
 from objreg_ros.bridge import closures_msg, qos, to_msg
-from objreg_ros.bridge.diagnostics import refusals
+from objreg_ros.bridge.diagnostics import REJECTED, refusals
 from objreg_ros.data import LoopClosure, Observation, Rejected
 
 
 class Announcements:
-    """Publishes for ``node``, whose namespace is the name of the robot. Not for two threads at once."""
+    """Publishes for ``node``, whose namespace is the name of the robot, and counts. Not for two threads at once."""
 
     def __init__(self, node: Node) -> None:
         self._node, self._robot = node, node.get_namespace().strip("/")
@@ -31,10 +32,15 @@ class Announcements:
         self._landmarks = node.create_publisher(PointCloud2, "landmarks", qos.room(depth=100))
         self._markers = node.create_publisher(MarkerArray, "markers", qos.latched())
         self._whole = _Whole(node) if closures_msg.LoopClosureMsg is not None else None
+        self._published = Counter[bool]()  # constraints, by whether others confirmed them
+        self._refused, self._last_refusals = Counter[str](), dict[str, str]()  # by reason
+        self._last_moved = dict[str, float]()  # m by label
 
     def closures(self, closures: Sequence[LoopClosure]) -> None:
         """Tell constraints to the mapper and anyone."""
+        self._published.update("agreeing" in closure.evidence for closure in closures)
         for closure in closures:
+            self._last_moved = closure.moved or self._last_moved
             self._constraints.publish(to_msg.constraint(closure))
             for transform in to_msg.transforms(closure):
                 self._transforms.publish(transform)
@@ -43,6 +49,8 @@ class Announcements:
 
     def refusals(self, rejected: Sequence[Rejected]) -> None:
         """Tell what was refused; nothing where nothing was."""
+        self._refused.update(item.reason.value for item in rejected)
+        self._last_refusals.update((item.reason.value, item.detail) for item in rejected)
         if rejected:
             name, now = self._node.get_fully_qualified_name(), self._node.get_clock().now().to_msg()
             self._refusals.publish(refusals(name, now, rejected))
@@ -67,6 +75,14 @@ class Announcements:
     def markers(self, scene: MarkerArray) -> None:
         """Show the scene in RViz."""
         self._markers.publish(scene)
+
+    def told(self) -> dict[str, object]:
+        """For diagnostics: constraints, refusals by reason, the last refusal of each, and what moved last."""
+        confirmed = {"constraints": self._published.total(), "constraints confirmed by others": self._published[True]}
+        refused = {f"{REJECTED}{reason}": count for reason, count in sorted(self._refused.items())}
+        last = {f"last rejected: {reason}": detail for reason, detail in sorted(self._last_refusals.items())}
+        moved = {f"last moved: {label}": f"{metres:.2f} m" for label, metres in sorted(self._last_moved.items())}
+        return {**confirmed, **refused, **last, **moved}
 
 
 class _Whole:

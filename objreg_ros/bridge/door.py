@@ -30,13 +30,15 @@ from objreg_ros.bridge.drops import Drops
 from objreg_ros.bridge.indoors import Ear, Indoors, Inlet, Outlet
 from objreg_ros.bridge.ledger import Ledger
 from objreg_ros.bridge.log import ThrottledLog
+from objreg_ros.bridge.managed import ManagedNode
 from objreg_ros.bridge.missed import Missed
-from objreg_ros.bridge.overridable import OverridableNode
 from objreg_ros.bridge.parameters import Parameters
-from objreg_ros.bridge.params import DoorParams
+from objreg_ros.bridge.params import DoorParams, ManagedParams
 from objreg_ros.bridge.watch import Watch
 from objreg_ros.bridge.worker import Worker
 from objreg_ros.params import Params
+
+INACTIVE = "inactive"  # why a frame ends that came to a managed node that is not active
 
 
 class DroppedError(Exception):
@@ -47,37 +49,44 @@ class DroppedError(Exception):
         self.reason = reason
 
 
-class Door(OverridableNode):
+class Door(ManagedNode):
     """A node with declared parameters, one worker, books, diagnostics at 1 Hz and a receipt for every frame.
 
-    A subclass listens, calls `accept` once for each frame, and hands it to ``worker`` as (stamp_ns, payload) when it is
-    complete. The worker calls `compute`; what that drops or refuses is counted, logged and leaves the node running.
+    A subclass listens in `open`, calls `accept` once for each frame, and hands it to ``worker`` as (stamp_ns, payload)
+    when it is complete and was `let_in`. The worker calls `compute`; what that drops or refuses is counted, logged and
+    leaves the node running.
     ``indoors`` is what the nodes of this process hand over to each other; nothing if None.
     """
 
     def __init__(self, name: str, *kinds: type[Params], indoors: Indoors | None = None) -> None:
         super().__init__(name)
-        self.indoors = Indoors() if indoors is None else indoors
-        self._inlet, self._passed_on = Inlet(self), set[str]()
+        self._shared_indoors, self._inlet = indoors, Inlet(self)
         self.settings = Parameters(self, *kinds, DoorParams)
-        self.settings.changed = self.adopt
-        self.ledger = Ledger()
-        self.connected: dict[str, int] = {}  # full topic name → publishers that DDS has connected us to
-        self._choices: dict[str, Choice[Subscription | Ear]] = {}  # by the input of `listen_to_first`
+        self.settings.changed, self.settings.are_open = self._adopt_if_open, lambda: not self.is_open
         self._bugs: set[str] = set()  # that the log has told of
-        self._ignored: Counter[str] = Counter()  # messages that are no frame by themselves, by what is wrong with them
         self.apart = ReentrantCallbackGroup()  # of services that wait for work that is done `aside`
         self._aside: list[threading.Thread] = []
-        self.failure: Future = Future()
-        self.most_pixels = self.settings.of(DoorParams).most_pixels
         self.throttled = ThrottledLog(self.get_logger().warning)
-        self.watch = Watch(self.count_publishers, self.settings.of(DoorParams).silence)
-        self._drops = Drops(self.settings.of(DoorParams).silence)
-        self.worker: Worker[tuple[int, Any]] = Worker(self._work, self._overtaken, self.fail)
         self._finished = self.create_publisher(Header, "finished", qos.room(depth=1000))
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", qos.room())
-        self._last = (time.monotonic(), 0)
         self.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        life = self.settings.of(ManagedParams) if ManagedParams in kinds else ManagedParams()
+        if life.managed and indoors is not None:
+            raise ValueError(f"{name}: managed: expected false where all nodes are in one process, got true")
+        self.begin_life(life)
+
+    def prepare(self) -> None:
+        """Empty books, a new worker, and nothing that is listened to; by the parameters as they are now."""
+        params = self.settings.of(DoorParams)
+        self.indoors = Indoors() if self._shared_indoors is None else self._shared_indoors
+        self.ledger, self._last = Ledger(), (time.monotonic(), 0)
+        self.connected: dict[str, int] = {}  # full topic name → publishers that DDS has connected us to
+        self._choices: dict[str, Choice[Subscription | Ear]] = {}  # by the input of `listen_to_first`
+        self._passed_on = set[str]()
+        self._ignored: Counter[str] = Counter()  # messages that are no frame by themselves, by what is wrong with them
+        self.most_pixels = params.most_pixels
+        self.watch, self._drops = Watch(self.count_publishers, params.silence), Drops(params.silence)
+        self.worker: Worker[tuple[int, Any]] = Worker(self._work, self._overtaken, self.fail)
 
     # What a subclass fills in
 
@@ -90,6 +99,10 @@ class Door(OverridableNode):
 
     def adopt(self) -> None:
         """Live parameters have changed."""
+
+    def _adopt_if_open(self) -> None:
+        if self.is_open:
+            self.adopt()
 
     def extra_diagnostics(self) -> Mapping[str, object]:
         """What this node adds to its diagnostics."""
@@ -228,6 +241,12 @@ class Door(OverridableNode):
         """A frame came in; from now on it is in the books."""
         self.ledger.receive(stamp_ns)
 
+    def let_in(self, stamp_ns: int) -> bool:
+        """Whether a frame that was accepted goes on; else it ends here: a managed node lets none in while inactive."""
+        if not self.is_active:
+            self.leave_out(stamp_ns, INACTIVE)
+        return self.is_active
+
     def drop(self, stamp_ns: int, reason: str, text: str = "") -> None:
         """The frame ends here: counted by reason, receipted, and logged (throttled) if there is a ``text``."""
         self._drops.drop("frames", reason, text)
@@ -317,7 +336,7 @@ class Door(OverridableNode):
     def _report(self) -> None:
         for choice in self._choices.values():
             choice.look()
-        silent = self.watch.silent()
+        silent = self.watch.silent() if self.is_active else {}
         for name, advice in silent.items():
             self.throttled.remind(name, advice)
         balance = self.ledger.balance()
@@ -327,7 +346,8 @@ class Door(OverridableNode):
         stamp = self.get_clock().now().to_msg()
         name = self.get_fully_qualified_name()
         connected = {f"{CONNECTED}{topic}": count for topic, count in sorted(self.connected.items())}
-        extra = {**connected, **self._ignored, **self.extra_diagnostics()}
+        state = {"state": self.state} if self.is_managed else {}
+        extra = {**state, **connected, **self._ignored, **(self.extra_diagnostics() if self.is_open else {})}
         troubles = (*silent.values(), *self._drops.lasting().values())
         self._diagnostics.publish(diagnostic(name, stamp, balance, rate, troubles, extra))
 
@@ -342,16 +362,27 @@ class Door(OverridableNode):
         """One by one, each as in `set_parameters_atomically`."""
         return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
 
-    def fail(self, error: BaseException) -> None:
-        """A worker met a bug: end the node with it. What fails because ROS is already down is not one."""
-        if self.context.ok():
-            self.failure.set_exception(error)
+    def is_busy(self) -> bool:
+        """Whether something is done `aside`."""
+        return any(thread.is_alive() for thread in self._aside)
+
+    def end_work(self) -> None:
+        """End the worker."""
+        self.worker.close()
+
+    def shut(self) -> None:
+        """End what is done `aside`, and the worker."""
+        self.end_aside()
+        self.end_work()
 
     def close(self) -> None:
-        """End the worker and the node."""
-        self.end_aside()
-        self.worker.close()
-        self.destroy_node()
+        """End the work and the node."""
+        try:
+            if self.is_open:
+                self.shut()
+        finally:
+            self.end_work()
+            self.destroy_node()
 
 
 def _decodes(decode: Callable[[str, Any], object], topic: str, message: Any) -> bool:

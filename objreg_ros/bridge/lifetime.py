@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ctypes
+import gc
 import re
 import signal
 import threading
@@ -35,6 +36,12 @@ def share_arenas() -> None:
     """
     with suppress(AttributeError, OSError):
         ctypes.CDLL(None).mallopt(M_ARENA_MAX, ARENAS)
+
+
+def settle() -> None:
+    """What was made until now stays: no collection of garbage has to look through it between two frames."""
+    gc.collect()
+    gc.freeze()
 
 
 class FirstSignal:

@@ -11,9 +11,7 @@ from typing import Any
 from rclpy.clock import Clock, ClockType
 
 from objreg_ros.bridge.door import Door
-from objreg_ros.bridge.indoors import Indoors
 from objreg_ros.bridge.sync import Drop, Match, Need, Stream, Synchroniser
-from objreg_ros.params import Params
 
 ALONE_S = 0.5  # after once to twice this a stamp that has leapt alone is believed, later where the stream is slow
 QUIET_S = 5.0  # where no stream has spoken for so long, what waits for an optional one goes without
@@ -31,8 +29,9 @@ class MatchingDoor(Door):
     each stream was fed before then wait.
     """
 
-    def __init__(self, name: str, *kinds: type[Params], indoors: Indoors | None = None) -> None:
-        super().__init__(name, *kinds, indoors=indoors)
+    def prepare(self) -> None:
+        """As any door; nothing is matched yet."""
+        super().prepare()
         self._early: defaultdict[str, deque[Early]] = defaultdict(lambda: deque(maxlen=EARLY))
         self._order = count()
         self._sync: Synchroniser | None = None
@@ -85,7 +84,7 @@ class MatchingDoor(Door):
         for match in matches:
             if match.is_surplus:
                 self._pass_over(match.stamp_ns)
-            else:
+            elif self.let_in(match.stamp_ns):
                 self.worker.put((match.stamp_ns, match))
 
     def _pass_over(self, stamp_ns: int) -> None:

@@ -16,11 +16,13 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from objreg_ros.bridge.params import ManagedParams
 from objreg_ros.params import Declaration, Params
 
 Kind = TypeVar("Kind", bound=Params)
 
 OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides.")  # declared where ROS wants them
+FOR_LIFE = tuple(declaration.name for declaration in ManagedParams.declarations())  # never changed
 TYPES = {
     (bool, False): Parameter.Type.BOOL,
     (int, False): Parameter.Type.INTEGER,
@@ -37,15 +39,20 @@ class Parameters:
     """The declared parameters of ``node`` and their current values, one `Params` a class.
 
     ValueError at construction for a start value that is refused; a name that nobody declared is warned of.
-    ``changed`` is called after a live change.
+    ``changed`` is called after a change. Those of a managed node that are not live can be changed too, while
+    ``are_open`` is true.
     """
 
     def __init__(self, node: Node, *kinds: type[Params]) -> None:
         self.changed: Callable[[], None] = lambda: None
+        self.are_open: Callable[[], bool] = lambda: False
         self._declarations = {d.name: d for kind in kinds for d in kind.declarations()}
         try:
             start = {name: _declare(node, declaration) for name, declaration in self._declarations.items()}
             self._current = {kind: kind(**_part(kind, start)) for kind in kinds}
+            self._is_managed = ManagedParams in kinds and self.of(ManagedParams).managed
+            for declaration in self._declarations.values():
+                node.set_descriptor(declaration.name, descriptor(declaration, self._is_fixed(declaration)))
             _refuse_dropped(node, kinds)
         except ValueError as error:
             raise ValueError(f"{node.get_name()}: {error}") from error
@@ -61,7 +68,15 @@ class Parameters:
         values = {p.name: p.value for p in changes}
         for kind, current in self._current.items():
             current.replaced(**_part(kind, values))
+        if self._is_managed and not self.are_open():
+            for name in values:
+                if name in self._declarations and not self._declarations[name].live:
+                    raise ValueError(f"{name}: expected to be changed while unconfigured; clean the node up first")
         return [self._typed(change) for change in changes]
+
+    def _is_fixed(self, declaration: Declaration) -> bool:
+        """Whether ROS itself refuses every change."""
+        return not declaration.live and (not self._is_managed or declaration.name in FOR_LIFE)
 
     def _typed(self, change: Parameter) -> Parameter:
         declaration = self._declarations.get(change.name)
@@ -98,7 +113,7 @@ def _warn_of_unknown(node: Node, known: Sequence[str]) -> None:
 
 
 def _declare(node: Node, declaration: Declaration) -> Any:
-    """Declare without type and range, let `Params` judge what the user set, then fix the descriptor.
+    """Declare without type and range, and let `Params` judge what the user set; the descriptor is fixed afterwards.
 
     An empty list has no type to ROS, so it arrives as no value at all.
     """
@@ -107,7 +122,6 @@ def _declare(node: Node, declaration: Declaration) -> Any:
     given = node.declare_parameter(declaration.name, list(declared) if declaration.many else declared, loose).value
     value = declaration.check(given) if given is not None else () if declaration.many else declared
     Node.set_parameters(node, [_parameter(declaration, value)])  # rclpy's own: a Door's asks what we are making here
-    node.set_descriptor(declaration.name, descriptor(declaration))
     return value
 
 
@@ -116,15 +130,15 @@ def _parameter(declaration: Declaration, value: Any) -> Parameter:
     return Parameter(declaration.name, kind, list(value) if declaration.many else value)
 
 
-def descriptor(declaration: Declaration) -> ParameterDescriptor:
-    """What ``ros2 param describe`` shows of a declaration."""
+def descriptor(declaration: Declaration, read_only: bool | None = None) -> ParameterDescriptor:
+    """What ``ros2 param describe`` shows of a declaration; read-only if it is not live, where nothing else is said."""
     unit = f" [{declaration.unit}]" if declaration.unit else ""
     made = ParameterDescriptor(
         name=declaration.name,
         type=TYPES[declaration.kind, declaration.many].value,
         description=f"{declaration.doc}{unit}",
         additional_constraints=declaration.range_text,
-        read_only=not declaration.live,
+        read_only=not declaration.live if read_only is None else read_only,
     )
     if declaration.many or (declaration.ge is None and declaration.le is None):
         return made

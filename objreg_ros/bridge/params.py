@@ -38,6 +38,14 @@ class DoorParams(Params):
 
 
 @dataclass(frozen=True)
+class ManagedParams(Params):
+    """Whether a node has a life cycle."""
+
+    managed: bool = param(False, "be a managed (lifecycle) node: what is not live can then be set while unconfigured")
+    autostart: bool = param(True, "configure and activate a managed node as it starts")
+
+
+@dataclass(frozen=True)
 class RelocalisedParams(Params):
     """How the registrar tells where it is in the map of an earlier session."""
 

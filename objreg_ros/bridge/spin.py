@@ -18,6 +18,7 @@ from objreg_ros.bridge.lifetime import (
     FirstSignal,
     begin,
     hear_first_signal,
+    settle,
     share_arenas,
     shutdown_as_interrupt,
 )
@@ -68,12 +69,6 @@ def _leave() -> int:
     os._exit(0)
 
 
-def _settle() -> None:
-    """What was made at the start stays: no collection of garbage has to look through it between two frames."""
-    gc.collect()
-    gc.freeze()
-
-
 def _serve(makes: Sequence[Callable[[], Door]], transport: str, first_signal: FirstSignal) -> int:
     executor, doors = SingleThreadedExecutor(), list[Door]()
     try:
@@ -102,17 +97,19 @@ def _make(makes: Sequence[Callable[[], Door]], doors: list[Door]) -> Exception |
 
 
 def _spin(doors: Sequence[Door], executor: SingleThreadedExecutor, transport: str) -> None:
-    """Until a signal; what ended the worker is raised."""
+    """Until a signal, or until a managed node was shut down; what ended a worker is raised."""
     try:
         with shutdown_as_interrupt():
             doors[0].get_logger().info(transport)
-            _settle()
+            settle()
             for door in doors:
                 executor.add_node(door)
             # Not `spin_until_future_complete`: it keeps a callback of every round for ever, 100 MB an hour. What broke
             # a worker is seen with the next round, at the latest that of the diagnostics.
             while rclpy.ok() and not any(door.failure.done() for door in doors):
                 executor.spin_once()
+    except Abandoned:
+        raise
     except KeyboardInterrupt:
         return
     for door in doors:

@@ -19,7 +19,7 @@ from objreg_ros.adapters.params import (
     ToLioSamParams,
     ToRtabmapParams,
 )
-from objreg_ros.bridge.params import DoorParams, RelocalisedParams
+from objreg_ros.bridge.params import DoorParams, ManagedParams, RelocalisedParams
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.mapper.params import MapperNodeParams, MapperParams
 from objreg_ros.params import Declaration, Params
@@ -30,10 +30,10 @@ from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 Kind = TypeVar("Kind", bound=Params)
 
 NODES: dict[str, tuple[type[Params], ...]] = {
-    "detector": (DetectorParams, DoorParams),
-    "segmenter": (SegmenterParams, SegmenterNodeParams, DoorParams),
-    "registrar": (RegistrarParams, RegistrarNodeParams, RelocalisedParams, DoorParams),
-    "mapper": (MapperParams, MapperNodeParams, DoorParams),
+    "detector": (DetectorParams, ManagedParams, DoorParams),
+    "segmenter": (SegmenterParams, SegmenterNodeParams, ManagedParams, DoorParams),
+    "registrar": (RegistrarParams, RegistrarNodeParams, RelocalisedParams, ManagedParams, DoorParams),
+    "mapper": (MapperParams, MapperNodeParams, ManagedParams, DoorParams),
     "objreg_to_rtabmap": (ToRtabmapParams, BodyParams, AdapterParams, DoorParams),
     "objreg_to_lio_sam": (ToLioSamParams, AdapterParams, DoorParams),
     "objreg_to_hydra": (ToHydraParams, BodyParams, AdapterParams, DoorParams),

@@ -16,6 +16,7 @@ from objreg_ros.bridge import from_msg, qos, to_msg, vision_to_msg
 from objreg_ros.bridge.door import Door
 from objreg_ros.bridge.indoors import Indoors, Surplus
 from objreg_ros.bridge.pace import Pace
+from objreg_ros.bridge.params import ManagedParams
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.sync import Drop
 from objreg_ros.bridge.turns import Turns
@@ -33,7 +34,10 @@ class DetectorNode(Door):
     """
 
     def __init__(self, indoors: Indoors | None = None) -> None:
-        super().__init__("detector", DetectorParams, indoors=indoors)
+        super().__init__("detector", DetectorParams, ManagedParams, indoors=indoors)
+
+    def open(self) -> None:
+        """Load the model, tell its labels, and listen."""
         params = self.settings.of(DetectorParams)
         self._detector = Detector.of(params, share.model)
         self._pace, self._turns = Pace(params.max_rate), Turns(self._leave_out)
@@ -57,6 +61,8 @@ class DetectorNode(Door):
     def _hear(self, _: str, message: Any) -> None:
         stamp_ns = from_msg.stamp_ns(message)
         self.accept(stamp_ns)
+        if not self.let_in(stamp_ns):
+            return
         if self._pace.admits(stamp_ns):
             self._turns.begin(stamp_ns)
             self.worker.put((stamp_ns, message))

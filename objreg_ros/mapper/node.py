@@ -18,6 +18,7 @@ from std_srvs.srv import SetBool, Trigger
 from objreg_ros.bridge import from_msg, qos, to_msg
 from objreg_ros.bridge.door import Door, DroppedError
 from objreg_ros.bridge.indoors import Indoors
+from objreg_ros.bridge.params import ManagedParams
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.transforms import hear_mount
 from objreg_ros.data import JUMP_NS, LoopClosure, Odometry
@@ -42,7 +43,10 @@ class MapperNode(Door):
     """
 
     def __init__(self, indoors: Indoors | None = None) -> None:
-        super().__init__("mapper", MapperParams, MapperNodeParams, indoors=indoors)
+        super().__init__("mapper", MapperParams, MapperNodeParams, ManagedParams, indoors=indoors)
+
+    def open(self) -> None:
+        """Begin a map, publish and listen."""
         self._inputs = self.settings.of(MapperNodeParams)
         self._graph_lock = threading.Lock()
         self._waiting: list[LoopClosure] = []
@@ -146,7 +150,7 @@ class MapperNode(Door):
             self.drop(stamp_ns, "malformed_constraints")
         elif not self._enabled:
             self.drop(stamp_ns, "disabled")
-        else:
+        elif self.let_in(stamp_ns):
             self._waiting.append(closure)
             self._tie_what_waits()
 
@@ -218,11 +222,15 @@ class MapperNode(Door):
     # Publish
 
     def _publish_path(self, stamp_ns: int) -> None:
+        if not self.is_active:  # it follows odometry all the same, so that the map is whole
+            return
         with self._graph_lock:
             path = self._graph.path()
         self._path.publish(to_msg.path(path, stamp_ns, self._inputs.map_frame))
 
     def _publish_correction(self, stamp_ns: int) -> None:
+        if not self.is_active:
+            return
         message = self._correction_message(stamp_ns)
         self._correction.publish(message)
         if self._inputs.publish_tf and TransformBroadcaster is not None:

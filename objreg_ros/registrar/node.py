@@ -6,7 +6,6 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections import Counter
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from typing import Any, NamedTuple
@@ -19,13 +18,12 @@ from std_srvs.srv import SetBool, Trigger
 
 from objreg_ros.bridge import from_msg, qos
 from objreg_ros.bridge.announcements import Announcements
-from objreg_ros.bridge.diagnostics import REJECTED
 from objreg_ros.bridge.door import DroppedError
 from objreg_ros.bridge.indoors import Indoors
 from objreg_ros.bridge.lifetime import await_kernels
 from objreg_ros.bridge.markers import Scene
 from objreg_ros.bridge.matching import MatchingDoor
-from objreg_ros.bridge.params import RelocalisedParams
+from objreg_ros.bridge.params import ManagedParams, RelocalisedParams
 from objreg_ros.bridge.relocalised import Whereabouts
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.sync import Match, Need, Stream
@@ -59,27 +57,43 @@ class RegistrarNode(MatchingDoor):
     """
 
     def __init__(self, indoors: Indoors | None = None) -> None:
-        super().__init__("registrar", RegistrarParams, RegistrarNodeParams, RelocalisedParams, indoors=indoors)
+        kinds = RegistrarParams, RegistrarNodeParams, RelocalisedParams, ManagedParams
+        super().__init__("registrar", *kinds, indoors=indoors)
+
+    def open(self) -> None:
+        """Load the kernels, open the store, publish and listen."""
         inputs = self.settings.of(RegistrarNodeParams)
         self._mount, self._seconds = hear_mount(self, inputs.mounting), inputs.limit
         await_kernels(lambda: warm(self.settings.of(RegistrarParams)), self.get_logger().info)
         self._registrar = Registrar(self.settings.of(RegistrarParams))
-        self._tracking, self._telling, self._enabled = threading.Lock(), threading.Lock(), True
-        self._counts, self._unsearched, self._without_odometry = dict(self._registrar.counts()), 0, 0
-        self._refused, self._published = Counter[str](), Counter[bool]()  # by reason; by whether others confirmed them
+        with ExitStack() as refused:  # a store that stays open could not be opened again
+            refused.callback(self._registrar.close)
+            self._open_to(inputs, refused)
+            refused.pop_all()
+
+    def _open_to(self, inputs: RegistrarNodeParams, refused: ExitStack) -> None:
+        self._tracking, self._telling = threading.Lock(), threading.Lock()
+        self._enabled = True
+        self._counts = dict(self._registrar.counts())
+        self._unsearched, self._without_odometry = 0, 0
         self._camera: str | None = None  # the frame_id of the last frame
-        self._last_refusals, self._last_moved = dict[str, str](), dict[str, float]()  # by reason; m by label
         self._names, self._scene, self._odom_frame = dict[int, str](), Scene(), "odom"
         limit = Limit(WAITING_KEYFRAMES, inputs.waiting_megabytes * 1_000_000, PATIENCE_S)
         self.searcher: Backlog[Job] = Backlog(
             self._search, self._keep, self.fail, limit, lambda job: job.window.nbytes, self._niceness()
         )
+        refused.callback(self.searcher.close)
         self._announcements = Announcements(self)
         self._whereabouts = Whereabouts(self, lambda: (self._registrar.relocalised, self._registrar.whereabouts))
         self.create_service(Trigger, "~/reset", self._reset, callback_group=self.apart)
         self.create_service(Trigger, "~/save", self._save, callback_group=self.apart)
         self.create_service(SetBool, "~/enable", self._enable)
         self._listen(round(inputs.odom_slop * 1e9))
+
+    def adopt(self) -> None:
+        """Live parameters hold from the next frame and the next search on."""
+        self._registrar.adopt(self.settings.of(RegistrarParams))
+        self._seconds = self.settings.of(RegistrarNodeParams).limit
 
     def _niceness(self) -> int:
         """None where other rooms share Python's lock: a nice thread that holds it and has no processor holds up all."""
@@ -117,9 +131,7 @@ class RegistrarNode(MatchingDoor):
     # Compute
 
     def compute(self, stamp_ns: int, payload: Match) -> bool:
-        """Follow one frame, by the parameters as they are now; a keyframe goes on to the searcher."""
-        self._registrar.adopt(self.settings.of(RegistrarParams))
-        self._seconds = self.settings.of(RegistrarNodeParams).limit
+        """Follow one frame; a keyframe goes on to the searcher."""
         if not self._enabled:
             raise DroppedError("disabled", "")
         frame, T_body_camera = self._frame(payload)
@@ -177,11 +189,6 @@ class RegistrarNode(MatchingDoor):
 
     def _tell(self, outcome: Outcome) -> None:
         self._announcements.closures(outcome.closures)
-        for closure in outcome.closures:
-            self._last_moved = closure.moved or self._last_moved
-        self._published.update("agreeing" in closure.evidence for closure in outcome.closures)
-        self._refused.update(refusal.reason.value for refusal in outcome.rejected)
-        self._last_refusals.update((refusal.reason.value, refusal.detail) for refusal in outcome.rejected)
         self._announcements.refusals(outcome.rejected)
         self._count()
         self._whereabouts.look()
@@ -195,30 +202,24 @@ class RegistrarNode(MatchingDoor):
     def _count(self) -> None:
         """Count what is stored, and say so where the oldest had to go."""
         forgotten, self._counts = self._counts["forgotten"], dict(self._registrar.counts())
-        if self._counts["forgotten"] == forgotten:
-            return
-        self.throttled.warn(
-            "forgotten",
-            f"the store is full: it keeps {self._counts['keyframes']} keyframes (max_keyframes), and has forgotten the "
-            f"oldest {self._counts['forgotten']}; places that only they show are not recognised any more",
-        )
+        if self._counts["forgotten"] != forgotten:
+            self.throttled.warn(
+                "forgotten",
+                f"the store is full: it keeps {self._counts['keyframes']} keyframes (max_keyframes), and has forgotten "
+                f"the oldest {self._counts['forgotten']}; places that only they show are not recognised any more",
+            )
 
     def extra_diagnostics(self) -> Mapping[str, object]:
-        """What is stored, accepted and refused by reason, the last refusal of each, and what moved last."""
+        """What is stored and what waits, and what was told of closures."""
         stored = {f"stored {what}": count for what, count in self._counts.items() if what != "forgotten"}
-        refused = {f"{REJECTED}{reason}": count for reason, count in sorted(self._refused.items())}
         counts = {
-            "constraints": self._published.total(),
             "stored unsearched": self._unsearched,
             "forgotten keyframes": self._counts["forgotten"],
             "waiting keyframes": len(self.searcher),
             "waiting poses": self._registrar.waiting,
-            "constraints confirmed by others": self._published[True],
             "frames without odometry": self._without_odometry,
         }
-        last = {f"last rejected: {reason}": detail for reason, detail in sorted(self._last_refusals.items())}
-        moved = {f"last moved: {label}": f"{metres:.2f} m" for label, metres in sorted(self._last_moved.items())}
-        return {**super().extra_diagnostics(), **stored, **counts, **refused, **last, **moved}
+        return {**super().extra_diagnostics(), **stored, **counts, **self._announcements.told()}
 
     # Services
 
@@ -267,14 +268,13 @@ class RegistrarNode(MatchingDoor):
         response.success, response.message = True, "enabled" if request.data else "frames are dropped as disabled"
         return response
 
-    def close(self) -> None:
+    def shut(self) -> None:
         """End both workers, the search in hand early, store what they had not come to, let go of the store."""
         self.searcher.shut()
         self.end_aside()
-        self.worker.close()
+        self.end_work()
         self.searcher.close()
         with ExitStack() as ends:
-            ends.callback(super().close)
             ends.callback(self._registrar.close)
             self._store_the_rest()
 

@@ -30,6 +30,7 @@ from objreg_ros.bridge.indoors import Indoors, Surplus
 from objreg_ros.bridge.lifetime import await_kernels
 from objreg_ros.bridge.matching import MatchingDoor
 from objreg_ros.bridge.overridable import FIXED
+from objreg_ros.bridge.params import ManagedParams
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.static_frames import Mount
 from objreg_ros.bridge.sync import Drop, Match, Need, Stream
@@ -55,7 +56,10 @@ class SegmenterNode(MatchingDoor):
     """Segments every depth image or cloud that has detections; a frame goes out also where there is no object."""
 
     def __init__(self, indoors: Indoors | None = None) -> None:
-        super().__init__("segmenter", SegmenterParams, SegmenterNodeParams, indoors=indoors)
+        super().__init__("segmenter", SegmenterParams, SegmenterNodeParams, ManagedParams, indoors=indoors)
+
+    def open(self) -> None:
+        """Load the kernels, publish and listen."""
         self._inputs = self.settings.of(SegmenterNodeParams)
         self._segmenter = Segmenter(self.settings.of(SegmenterParams))
         await_kernels(self._segmenter.warm, self.get_logger().info)

@@ -286,15 +286,16 @@ def test_a_running_node_takes_live_parameters_and_refuses_the_others(
 
     see(0)
     see(30)
-    assert node._refused == {Reason.NO_CANDIDATE.value: 1}
+    assert node._announcements._refused == {Reason.NO_CANDIDATE.value: 1}
     (result,) = node.set_parameters([Parameter("min_gap", value=70)])
     assert result.successful, result.reason
     see(60)
-    assert node._refused == {Reason.NO_CANDIDATE.value: 2}
+    assert node._announcements._refused == {Reason.NO_CANDIDATE.value: 2}
     assert all(r.successful for r in node.set_parameters([Parameter("min_gap", value=2.0)]))
     assert all(r.successful for r in node.set_parameters([Parameter("search_seconds", value=1e-9)]))
     see(90)
-    assert node._refused[Reason.OVER_BUDGET.value] > 0 and node._refused[Reason.NO_CANDIDATE.value] == 2
+    refused = node._announcements._refused
+    assert refused[Reason.OVER_BUDGET.value] > 0 and refused[Reason.NO_CANDIDATE.value] == 2
     (result,) = node.set_parameters([Parameter("store", value="other.db")])
     assert not result.successful
     node.close()

@@ -14,6 +14,7 @@ from typing import Any
 
 import launch_ros  # noqa: F401  (the folder launch/ of the checkout would pass for launch)
 import pytest
+from launch_ros.actions import LifecycleNode
 from recording.folders import tum_folder
 
 from launch import LaunchContext
@@ -118,6 +119,39 @@ def test_what_is_said_goes_over_the_users_file_to_the_node_that_it_is_for(
     assert parameters("detector", given) == ["my.yaml", {"reliable": True, "model": "my.onnx"}]
     assert parameters("segmenter", given) == ["my.yaml", {"reliable": True, "source": "points"}]
     assert parameters("registrar", given) == ["my.yaml", {"reliable": True}]
+
+
+def test_managed_nodes_are_ones_that_launch_knows_the_state_of(repository: Path, said: dict[str, Any]) -> None:
+    file = launch_file(repository)
+    context = LaunchContext()
+    context.launch_configurations.update({**said, "managed": "true", "autostart": "false"})
+    assert [type(node) for node in file["_nodes"](context)] == [LifecycleNode] * 3
+    given = {**said, "managed": "true", "autostart": "false"}
+    assert file["_parameters"]("mapper", given) == [{"managed": True, "autostart": False}]
+
+
+@pytest.mark.parametrize(("autostart", "expected"), [("", "active"), ("false", "unconfigured")])
+def test_managed_nodes_are_launched_into_the_state_that_was_asked_for(
+    graph: Graph, repository: Path, tiny_model: Path, tmp_path: Path, autostart: str, expected: str
+) -> None:
+    command = [sys.executable, "-c", PROGRAM, str(repository / "launch" / "objreg.launch.py"), "managed:=true"]
+    with (tmp_path / "log").open("w") as log:
+        launched = subprocess.Popen(
+            [*command, f"namespace:=life_{expected}", f"model:={tiny_model}", f"autostart:={autostart}"],
+            env={**graph.environment(), "ROS_LOG_DIR": str(tmp_path)}, cwd=repository, stdout=log, stderr=log,
+        )  # fmt: skip
+
+    def states() -> list[str]:
+        told = [status for name, status in graph.status.items() if name.startswith(f"/life_{expected}/")]
+        return [pair.value for status in told for pair in status.values if pair.key == "state"]
+
+    try:
+        graph.wait_for(lambda: states() == [expected] * 3, START_S, f"three nodes that are {expected}")
+    finally:
+        launched.send_signal(signal.SIGINT)
+        launched.wait(START_S)
+    said = (tmp_path / "log").read_text()
+    assert said.count("process has finished cleanly") == 3 and "Traceback" not in said, said
 
 
 def test_every_node_has_the_transforms_of_its_namespace(
