@@ -11,6 +11,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import rclpy
 from rclpy.parameter import Parameter
@@ -19,6 +20,7 @@ from std_srvs.srv import Trigger
 
 from objreg_ros.bridge.diagnostics import refusal_of
 from objreg_ros.data import Reason, Rejected
+from objreg_ros.geometry import pose
 from objreg_ros.keyframes.keyframer import FrameWindow
 from objreg_ros.memory.store import Store
 from objreg_ros.registrar.node import Job, RegistrarNode
@@ -269,16 +271,31 @@ def test_a_node_ends_at_once_in_the_middle_of_a_search_and_stores_everything(
     stored.close()
 
 
-def test_a_running_node_takes_live_parameters_and_refuses_the_others(make: Making) -> None:
+def test_a_running_node_takes_live_parameters_and_refuses_the_others(
+    make: Making, monkeypatch: pytest.MonkeyPatch
+) -> None:
     node = make()
-    node._registrar.search(window_at(node, 0))
-    (result,) = node.set_parameters([Parameter("min_gap", value=60)])
+    monkeypatch.setattr(node, "_frame", lambda seen: (seen, None))
+
+    def see(seconds: int) -> None:
+        """One frame, which ends the keyframe of the one before; that one is searched for when this returns."""
+        node.accept(seconds * SECOND)
+        T_odom_camera = pose(np.eye(3), np.array([0.01 * seconds, 0.0, 0.0]))
+        node.compute(seconds * SECOND, frame(seconds, CUP, T_odom_camera))
+        node.searcher.drain()
+
+    see(0)
+    see(30)
+    assert node._announcements._refused == {Reason.NO_CANDIDATE.value: 1}
+    (result,) = node.set_parameters([Parameter("min_gap", value=70)])
     assert result.successful, result.reason
-    (refusal,) = node._registrar.search(window_at(node, 30)).rejected
-    assert refusal.reason is Reason.NO_CANDIDATE
-    node.set_parameters([Parameter("min_gap", value=2.0), Parameter("search_seconds", value=1e-9)])
-    node._find(window_at(node, 45), "search", node._seconds)
-    assert node._announcements._refused[Reason.OVER_BUDGET.value] > 0
+    see(60)
+    assert node._announcements._refused == {Reason.NO_CANDIDATE.value: 2}
+    assert all(r.successful for r in node.set_parameters([Parameter("min_gap", value=2.0)]))
+    assert all(r.successful for r in node.set_parameters([Parameter("search_seconds", value=1e-9)]))
+    see(90)
+    refused = node._announcements._refused
+    assert refused[Reason.OVER_BUDGET.value] > 0 and refused[Reason.NO_CANDIDATE.value] == 2
     (result,) = node.set_parameters([Parameter("store", value="other.db")])
     assert not result.successful
     node.close()

@@ -90,6 +90,17 @@ def test_the_nodes_of_one_process_each_get_their_own_parameters(repository: Path
     assert file["_shared"](file["ROOMS"], said) == []
 
 
+def test_rviz_gets_the_namespace_and_the_topics_of_the_nodes(repository: Path, said: dict[str, Any]) -> None:
+    rviz, made = launch_file(repository)["_rviz"], []
+    rviz.__globals__.update(get_package_prefix=lambda package: "/", Node=lambda **words: made.append(words))
+    alike = {"namespace": "robot", "remappings": [("/tf", "tf"), ("image", "/kinect/rgb")]}
+    assert rviz(said, alike) == [] and made == []
+    rviz({**said, "rviz": "true", "use_sim_time": "true"}, alike)
+    (words,) = made
+    assert words["arguments"] == ["-d", str(repository / "config/objreg.rviz")]
+    assert {**words, **alike, "parameters": [{"use_sim_time": True}]} == words
+
+
 def test_an_image_is_remapped_with_its_compressed_form(repository: Path, said: dict[str, Any]) -> None:
     rules = launch_file(repository)["_remappings"]({**said, "image": "/kinect/rgb", "depth": "/kinect/z"})
     assert rules == [
