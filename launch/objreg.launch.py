@@ -109,7 +109,14 @@ def _nodes(context: LaunchContext) -> list[Node]:
 def _alone(room: str, said: dict[str, str], alike: dict) -> Node:
     words = ["-m", f"objreg_ros.{room}.node"]
     kind = LifecycleNode if _is_true(said["managed"]) else Node  # which events of a launch file around this one reach
-    return kind(executable=sys.executable, arguments=words, name=room, parameters=_parameters(room, said), **alike)
+    return kind(
+        executable=sys.executable,
+        arguments=words,
+        name=room,
+        exec_name=room,
+        parameters=_parameters(room, said),
+        **alike,
+    )
 
 
 def _together(rooms: tuple[str, ...], said: dict[str, str], alike: dict) -> Node:
