@@ -18,6 +18,8 @@ import typing
 from collections.abc import Iterable, Mapping
 from typing import Any, Self
 
+from objreg_ros.geometry import Array, mounting
+
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Declaration:
@@ -127,6 +129,26 @@ class Params:
     def replaced(self, **values: Any) -> Self:
         """A copy with some values changed, checked again."""
         return type(self).from_mapping({**dataclasses.asdict(self), **values})
+
+
+@dataclasses.dataclass(frozen=True)
+class MountedParams(Params):
+    """Those of a node that reads where the camera is mounted."""
+
+    T_base_camera: tuple[float, ...] = param(
+        (),
+        "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: as /tf_static says, or the "
+        "odometry is the camera's",
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        mounting(self.T_base_camera)
+
+    @property
+    def mounting(self) -> Array | None:
+        """``T_base_camera`` as a (4, 4) pose, None where none is set."""
+        return mounting(self.T_base_camera)
 
 
 def _declaration(field: dataclasses.Field[Any], hint: Any) -> Declaration:

@@ -94,7 +94,7 @@ def allowed(importer: str, imported: str) -> bool:
     if importer == "":  # what `import objreg_ros` offers, loaded when it is asked for
         return imported == "library"
     if importer in CORE:
-        return (importer, imported) == ("lens", "data")
+        return (importer, imported) in (("lens", "data"), ("params", "geometry"))
     if importer == "library":
         return below(imported, "detector", "segmenter", "registration", "keyframes", *CORE) and not imported.endswith(
             ".node"

@@ -5,9 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from objreg_ros.data import Array
-from objreg_ros.geometry import mounting
-from objreg_ros.params import Params, param
+from objreg_ros.params import MountedParams, Params, param
 
 
 @dataclass(frozen=True)
@@ -25,24 +23,15 @@ class AdapterParams(Params):
 
 
 @dataclass(frozen=True)
-class BodyParams(Params):
+class BodyParams(MountedParams):
     """Where the camera sits on the body whose poses the consumer ties."""
 
     T_base_camera: tuple[float, ...] = param(
         (),
-        "the camera's optical frame on the consumer's body: x y z qx qy qz qw; empty: as /tf_static says, or they are "
-        "one place",
+        "the camera's optical frame on the consumer's body: x y z qx qy qz qw; empty: as /tf_static says, for "
+        "which constraints wait",
     )
     base_frame: str = param("base_link", "the consumer's body; what odometry says of its own counts more")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        mounting(self.T_base_camera)
-
-    @property
-    def mounting(self) -> Array | None:
-        """``T_base_camera`` as a (4, 4) pose, None where none is set."""
-        return mounting(self.T_base_camera)
 
 
 @dataclass(frozen=True)

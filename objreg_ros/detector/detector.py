@@ -11,7 +11,7 @@ import numpy as np
 from objreg_ros.data import Array, ColourImage, Detections
 from objreg_ros.detector.boxes import area, clip, suppress
 from objreg_ros.detector.contract import Candidates, Graph
-from objreg_ros.detector.labels import UNNAMED, find_labels
+from objreg_ros.detector.labels import NO_CLASS, find_labels
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.detector.picture import Picture
 from objreg_ros.detector.recognise import recognise
@@ -68,7 +68,7 @@ class Detector:
     def _choose(self, xyxy: Array, candidates: Candidates, image_area: int) -> Array:
         """The rows that go on, best first."""
         p = self.params
-        unwanted = [index for index, label in enumerate(self.labels) if label == UNNAMED or label in p.ignore]
+        unwanted = [index for index, label in enumerate(self.labels) if label == NO_CLASS or label in p.ignore]
         sides = xyxy[:, 2:] - xyxy[:, :2]
         good = np.isfinite(xyxy).all(axis=1) & (sides.min(axis=1, initial=np.inf) >= max(p.min_side, 1e-3))
         good &= (area(xyxy) <= p.max_area * image_area) & ~np.isin(candidates.index, unwanted)

@@ -8,7 +8,7 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-UNNAMED = "???"
+NO_CLASS = "???"
 """What a label file writes for the background and for a class without a name."""
 
 FILE_BYTES = 1 << 24
@@ -55,7 +55,7 @@ def read_labels(path: Path) -> tuple[str, ...]:
     names = [line.strip() for line in lines]
     while names and not names[-1]:
         names.pop()
-    labels = tuple(names[1:] if names and names[0] == UNNAMED else names)
+    labels = tuple(names[1:] if names and names[0] == NO_CLASS else names)
     if not labels or "" in labels:
         raise ValueError(f"labels {path}: expected one label a line, got {len(labels)} with an empty one or none")
     return labels

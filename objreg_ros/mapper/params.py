@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from objreg_ros.data import Array
-from objreg_ros.geometry import mounting
 from objreg_ros.mapper.steady import Steady
-from objreg_ros.params import Params, param
+from objreg_ros.params import MountedParams, Params, param
 
 
 @dataclass(frozen=True)
@@ -78,23 +76,9 @@ class MapperParams(Params):
 
 
 @dataclass(frozen=True)
-class MapperNodeParams(Params):
+class MapperNodeParams(MountedParams):
     """Frames and files of the mapper's node."""
 
     map_frame: str = param("map", "the frame of the corrected map")
-    T_base_camera: tuple[float, ...] = param(
-        (),
-        "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: as /tf_static says, or the "
-        "odometry is the camera's",
-    )
     publish_tf: bool = param(True, "whether the correction is broadcast on /tf, where tf2_ros is installed", live=True)
     graph_path: str = param("objreg_map.g2o", "where ~/save writes the pose graph", live=True)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        mounting(self.T_base_camera)
-
-    @property
-    def mounting(self) -> Array | None:
-        """``T_base_camera`` as a (4, 4) pose, None where none is set."""
-        return mounting(self.T_base_camera)

@@ -6,8 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from objreg_ros.geometry import Array, mounting
-from objreg_ros.params import Params, param
+from objreg_ros.params import MountedParams, Params, param
 from objreg_ros.registration.dropped import DROPPED
 
 
@@ -86,7 +85,7 @@ class RegistrarParams(Params):
 
 
 @dataclass(frozen=True)
-class RegistrarNodeParams(Params):
+class RegistrarNodeParams(MountedParams):
     """How the registrar's node brings its inputs together."""
 
     odom_slop: float = param(
@@ -95,24 +94,10 @@ class RegistrarNodeParams(Params):
         "s",
         ge=0.0,
     )
-    T_base_camera: tuple[float, ...] = param(
-        (),
-        "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: as /tf_static says, or the "
-        "odometry is the camera's",
-    )
     search_seconds: float = param(
         0.0, "longest search for one keyframe; 0: as long as it takes", "s", ge=0.0, live=True
     )
     waiting_megabytes: int = param(200, "most memory of the keyframes that wait for a search", "MB", ge=1)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        mounting(self.T_base_camera)
-
-    @property
-    def mounting(self) -> Array | None:
-        """``T_base_camera`` as a (4, 4) pose, None where none is set."""
-        return mounting(self.T_base_camera)
 
     @property
     def limit(self) -> float:

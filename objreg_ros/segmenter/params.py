@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import mounting
-from objreg_ros.params import Params, param
+from objreg_ros.params import MountedParams, Params, param
 
 PAPER_Z_MAX, PAPER_Y_MAX = 1.75, 0.75  # the passthrough limits of the founding method, metres
 
@@ -64,7 +64,7 @@ class SegmenterParams(Params):
 
 
 @dataclass(frozen=True)
-class SegmenterNodeParams(Params):
+class SegmenterNodeParams(MountedParams):
     """How the segmenter's node brings its inputs together."""
 
     source: str = param(
@@ -92,12 +92,6 @@ class SegmenterNodeParams(Params):
     level_odom: bool = param(
         False, "take gravity from `odom`, whose frame an IMU keeps level with z up; frames are no more often than it"
     )
-    T_base_camera: tuple[float, ...] = param(
-        (),
-        "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: as /tf_static says, or the "
-        "odometry is the camera's",
-    )
-
     T_camera_imu: tuple[float, ...] = param(
         (),
         "the IMU in the camera's optical frame: x y z qx qy qz qw; empty: as /tf_static says, or the optical frame "
@@ -106,13 +100,7 @@ class SegmenterNodeParams(Params):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        mounting(self.T_base_camera)
         mounting(self.T_camera_imu, "T_camera_imu")
-
-    @property
-    def mounting(self) -> Array | None:
-        """``T_base_camera`` as a (4, 4) pose, None where none is set."""
-        return mounting(self.T_base_camera)
 
     @property
     def imu_mounting(self) -> Array | None:

@@ -61,7 +61,7 @@ def call(node: RegistrarNode, service: str) -> Any:
     answer = client.call_async(Trigger.Request())
     heard: list[float] = []
     timer = node.create_timer(0.05, lambda: heard.append(time.monotonic()))
-    rclpy.spin_until_future_complete(node, answer, timeout_sec=30.0)
+    rclpy.spin_until_future_complete(node, answer, timeout_sec=300.0)
     node.destroy_timer(timer)
     return answer.result(), len(heard)
 

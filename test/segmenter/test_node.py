@@ -50,7 +50,7 @@ class Camera:
         self.wait(lambda: min(p.get_subscription_count() for p in (self.depth, self.table, self.labels)) > 0)
         self.wait(lambda: len(self.door.connected) >= (3 if self.door._inputs.camera else 4))
 
-    def wait(self, done: Callable[[], Any], seconds: float = 20.0) -> None:
+    def wait(self, done: Callable[[], Any], seconds: float = 300.0) -> None:
         end = time.monotonic() + seconds
         while not done():
             assert time.monotonic() < end, f"nothing came; the books say {self.door.ledger.balance()}"
