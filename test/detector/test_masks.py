@@ -12,53 +12,11 @@ from objreg_ros.data import ColourImage, Detections
 from objreg_ros.detector.contract import Candidates
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
-from objreg_ros.detector.picture import Place
 
+from .discs import DISCS, MODEL_HW, NAMES, heads, instances, row_of, save_disc_model
 from .tiny_model import save_constant_model
 
-MODEL_HW = 320, 320
-NAMES = {"names": "{0: 'cup', 1: 'pot', 2: 'book'}", "stride": "32", "task": "segment"}
 PICTURES = [(240, 320), (480, 640), (321, 211), (320, 320), (97, 533)]
-Disc = tuple[float, float, float]  # x, y and radius, shares of the picture's size (the radius of its lesser side)
-DISCS: list[Disc] = [(0.4, 0.5, 0.2), (0.55, 0.5, 0.25)]
-
-
-def pixels(hw: tuple[int, int], disc: Disc) -> tuple[float, float, float]:
-    return disc[0] * hw[1], disc[1] * hw[0], disc[2] * min(hw)
-
-
-def height_over(hw: tuple[int, int], disc: Disc, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """How far inside a disc points of a picture are, in its pixels; below 0 outside."""
-    x, y, radius = pixels(hw, disc)
-    return radius - np.hypot(columns[None] - x, rows[:, None] - y)
-
-
-def prototypes(hw: tuple[int, int], step: int = 4) -> np.ndarray:
-    """(1, 32, h, w): two discs in the picture that a letterbox of the model shows, each a prototype."""
-    place = Place.of(hw, MODEL_HW, "centre")
-    middles = [(np.arange(side // step) + 0.5) * step for side in MODEL_HW]
-    rows = (middles[0] - place.top) * hw[0] / place.height
-    columns = (middles[1] - place.left) * hw[1] / place.width
-    made = np.zeros((1, 32, *(side // step for side in MODEL_HW)), np.float32)
-    made[0, 5], made[0, 31] = (height_over(hw, disc, rows, columns) for disc in DISCS)
-    return made
-
-
-def row_of(hw: tuple[int, int], disc: Disc, margin: float = 1.2) -> list[float]:
-    """cx cy w h in pixels of the model's picture."""
-    place = Place.of(hw, MODEL_HW, "centre")
-    (x, y, radius), (sx, sy) = pixels(hw, disc), (place.width / hw[1], place.height / hw[0])
-    return [x * sx + place.left, y * sy + place.top, 2 * radius * margin * sx, 2 * radius * margin * sy]
-
-
-def heads(hw: tuple[int, int], kind: str, margin: float = 1.2) -> np.ndarray:
-    """The first output of a model of so many rows as its grid has cells: a cup of 0.9, a book of 0.8, and nothing."""
-    cells = sum((MODEL_HW[0] // stride) ** 2 for stride in (8, 16, 32)) * (3 if kind == "yolov5" else 1)
-    before = [1.0] if kind == "yolov5" else []
-    rows = np.zeros((cells, 4 + len(before) + 3 + 32), np.float32)
-    for k, (disc, number, scores) in enumerate(zip(DISCS, (5, 31), ([0.9, 0, 0], [0, 0, 0.8]), strict=True)):
-        rows[7 * k + 3] = [*row_of(hw, disc, margin), *before, *scores, *(np.arange(32) == number)]
-    return rows.T[None] if kind == "yolov8" else rows[None]
 
 
 def chosen(hw: tuple[int, int]) -> np.ndarray:
@@ -71,25 +29,16 @@ def chosen(hw: tuple[int, int]) -> np.ndarray:
     return rows
 
 
-def seen(
-    path: Path, head: np.ndarray, hw: tuple[int, int], proto: np.ndarray | None = None, contract: str = "auto"
-) -> Detections:
-    """What a model of these outputs sees in a picture."""
-    outputs = {"output0": head, "output1": prototypes(hw) if proto is None else proto}
-    model = save_constant_model(path / "m.onnx", outputs, (1, 3, *MODEL_HW), "images", 1, NAMES)
-    detector = Detector(DetectorParams(contract=contract), model)
+def seen(path: Path, head: np.ndarray, hw: tuple[int, int], step: int = 4, contract: str = "auto") -> Detections:
+    """What a model of this first output sees in a picture."""
+    detector = Detector(DetectorParams(contract=contract), save_disc_model(path / "m.onnx", hw, head, step))
     return detector.detect(ColourImage(rgb=np.zeros((*hw, 3), np.uint8), stamp_ns=7))
 
 
-def require_discs(hw: tuple[int, int], instances: np.ndarray | None, sure: float = 0.35) -> None:
-    """Each pixel is of the disc that covers its middle, of the better one where both do; none is asked at an edge."""
-    assert instances is not None and instances.shape == hw and instances.dtype == np.uint16
-    rows, columns = (np.arange(side) + 0.5 for side in hw)
-    first, second = (height_over(hw, disc, rows, columns) for disc in DISCS)
-    expected = np.where(first > 0, 1, np.where(second > 0, 2, 0))
-    edge = sure * max(1.0, max(hw) / MODEL_HW[0])  # pixels
-    known = (np.abs(first) > edge) & (np.abs(second) > edge)
-    np.testing.assert_array_equal(instances[known], expected[known])
+def require_discs(hw: tuple[int, int], found: np.ndarray | None) -> None:
+    assert found is not None and found.shape == hw and found.dtype == np.uint16
+    expected, known = instances(hw)
+    np.testing.assert_array_equal(found[known], expected[known])
     assert np.unique(expected[known]).tolist() == [0, 1, 2]
 
 
@@ -109,7 +58,7 @@ def test_a_head_that_has_chosen_already_tells_masks_too(tmp_path: Path) -> None:
 
 def test_prototypes_of_any_size_show_the_whole_picture_of_the_model(tmp_path: Path) -> None:
     hw = 240, 320
-    require_discs(hw, seen(tmp_path, heads(hw, "yolov8"), hw, prototypes(hw, step=2)).instances)
+    require_discs(hw, seen(tmp_path, heads(hw, "yolov8"), hw, step=2).instances)
 
 
 def test_a_mask_is_cut_to_its_box(tmp_path: Path) -> None:
