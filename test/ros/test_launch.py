@@ -262,7 +262,7 @@ def test_a_replay_brings_every_frame_through_the_nodes_and_ends_the_launch(
     folder = tum_folder(tmp_path / "tum", frames=5)
     launched = subprocess.run(
         [sys.executable, "-c", PROGRAM, str(repository / "launch" / "replay.launch.py"), f"recording:={folder}",
-         "lossless:=true", f"model:={tiny_model}", "image:=/kinect/rgb", "depth:=/kinect/z"],
+         "lossless:=true", f"model:={tiny_model}", "camera_name:=kinect", "image:=rgb", "depth:=/kinect/z"],
         env={**graph.environment(), "ROS_LOG_DIR": str(tmp_path)}, cwd=repository, timeout=3 * START_S,
         capture_output=True, text=True,
     )  # fmt: skip
