@@ -6,8 +6,10 @@ of them in one process. Where another detector says what is where, ours is not s
 repeated here; what is not said is as in the code. In a namespace, /tf and /tf_static are those of the namespace.
 """
 
+import atexit
 import json
 import sys
+from pathlib import Path
 from tempfile import NamedTemporaryFile
 
 from ament_index_python.packages import get_package_prefix
@@ -45,6 +47,7 @@ REMAPPED = {  # what the nodes listen to → the argument that says where it is,
     "masks": ("masks", ""),
     "label_info": ("label_info", ""),
 }
+OF_CAMERA = ("image", "points", "depth", "camera_info", "imu")  # the arguments that camera_name goes before
 TF = [("/tf", "tf"), ("/tf_static", "tf_static")]  # robots in namespaces of their own have frames of the same names
 
 OPTIONS = {
@@ -53,6 +56,8 @@ OPTIONS = {
     "model": "ONNX model of the detector",
     "source": "where the segmenter takes depth from",
     "detections": "who says where objects are; with vision_msgs or masks our detector is not started",
+    "camera_name": "namespace of the camera's topics, as its driver's: image, points, depth, camera_info and imu are "
+    "looked for in it, but for those that are given with a / in front",
     "camera": "the camera where nobody publishes camera_info: fx,fy,cx,cy or a calibration YAML",
     "T_base_camera": "where the camera sits on the body of odom, seven numbers with commas; else /tf_static is asked",
     "use_sim_time": "true to follow /clock",
@@ -128,13 +133,14 @@ def _together(rooms: tuple[str, ...], said: dict[str, str], alike: dict) -> Node
 
 
 def _shared(rooms: tuple[str, ...], said: dict[str, str]) -> list[str]:
-    """The user's file, and over it one of what was said on the command line."""
+    """The user's file, and over it one of what was said on the command line, which goes as the launch ends."""
     values = {room: _parameters(room, {**said, "params_file": ""}) for room in rooms}
     owned = {f"/**/{room}": {"ros__parameters": given[0]} for room, given in values.items() if given}
     if not owned:
         return [said["params_file"]] if said["params_file"] else []
     with NamedTemporaryFile("w", prefix="objreg_", suffix=".yaml", delete=False) as file:
         json.dump(owned, file)  # which is YAML
+    atexit.register(Path(file.name).unlink, missing_ok=True)  # no sooner: a node that respawns reads it again
     return [given for given in (said["params_file"], file.name) if given]
 
 
@@ -178,4 +184,12 @@ def _parameters(room: str, said: dict[str, str]) -> list:
 
 
 def _remappings(said: dict[str, str]) -> list[tuple[str, str]]:
-    return [(topic, f"{said[name]}{ending}") for topic, (name, ending) in REMAPPED.items() if said[name]]
+    """Each topic that is elsewhere than where the nodes listen, and where."""
+    rules = []
+    for topic, (name, ending) in REMAPPED.items():
+        where = f"{said[name]}{ending}" if said[name] else topic
+        if said["camera_name"] and name in OF_CAMERA and not where.startswith("/"):
+            where = f"{said['camera_name'].rstrip('/')}/{where}"
+        if where != topic:
+            rules.append((topic, where))
+    return rules

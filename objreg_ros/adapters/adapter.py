@@ -61,6 +61,10 @@ class Adapter(Door):
     def forget(self, key: Key) -> None:
         """A constraint no longer waits."""
 
+    def is_on_its_way(self, key: Key) -> bool:
+        """Whether the consumer is asked just now, and so may have a constraint that waits."""
+        return False
+
     # Inputs
 
     def listen_for_closures(self) -> None:
@@ -110,7 +114,8 @@ class Adapter(Door):
             del self._taken[next(iter(self._taken))]
         self.waiting[key_of(closure)] = closure
         while len(self.waiting) > self._params.most_waiting:
-            self.end(next(iter(self.waiting)), "queue_full", "its consumer is not there, or takes fewer than come")
+            oldest = next(key for key in self.waiting if not self.is_on_its_way(key))
+            self.end(oldest, "queue_full", "its consumer is not there, or takes fewer than come")
 
     def _retract(self, name: str) -> None:
         key = self._keys.get(name)
@@ -118,8 +123,11 @@ class Adapter(Door):
         if key in self.waiting:
             self.end(key, "retracted")
             return
-        if key is None or not self._taken.get(key, False):
-            return
+        if key is not None and self._taken.get(key, False):
+            self._withdraw(key)
+
+    def _withdraw(self, key: Key) -> None:
+        """Take back what was handed over, and say where that is too late."""
         self._taken[key] = False  # it came: by whatever topic it comes again, it stays out
         if not self.take_back(key):
             self._retracted_late += 1
@@ -145,12 +153,14 @@ class Adapter(Door):
         return done
 
     def settle(self, key: Key) -> None:
-        """The consumer has answered: a constraint that waited is handed over."""
+        """The consumer has a constraint that was on its way, which may have been withdrawn meanwhile."""
         closure = self.waiting.get(key)
-        if closure is not None:
-            self._leave(key)
-            self._taken[key] = True
-            self.conclude(closure.to_ns, lambda: True)
+        if closure is None:
+            self._withdraw(key)
+            return
+        self._leave(key)
+        self._taken[key] = True
+        self.conclude(closure.to_ns, lambda: True)
 
     def end(self, key: Key, reason: str, text: str = "") -> None:
         """Drop a constraint that waits."""

@@ -7,6 +7,7 @@ answered is asked again. RTAB-Map answers without a word, so what it refuses its
 
 from __future__ import annotations
 
+import math
 import sys
 from collections import Counter
 from collections.abc import Mapping
@@ -62,6 +63,8 @@ class ToRtabmap(Adapter):
         self._add = self.create_client(AddLink, "rtabmap/add_link")
         self._get = self.create_client(GetMap, "rtabmap/get_map_data")
         self._wants_graph = True
+        self._graph: Future | None = None
+        self._graph_since = -math.inf  # when it was asked for
         self.listen(MapData, "mapData", self._hear_map, qos.room(depth=10))
         self.listen_for_closures()
 
@@ -77,7 +80,7 @@ class ToRtabmap(Adapter):
         is_other = self.read_aside("mapData", self._nodes.hear, message)
         if is_other:
             self._databases += 1
-            self._wants_graph = True
+            self._want_graph()
             self._since.clear()
             self.get_logger().warning("RTAB-Map began another database: its former nodes are forgotten")
 
@@ -88,7 +91,8 @@ class ToRtabmap(Adapter):
         if not self._add.service_is_ready():
             self._await_rtabmap()
             return
-        if self._wants_graph and self._get.service_is_ready():
+        is_due = seconds() - self._graph_since > self._limits.answer_within
+        if self._wants_graph and is_due and self._get.service_is_ready():
             self._ask_for_graph()
         if self._asked is None:
             super().go_through()
@@ -97,16 +101,22 @@ class ToRtabmap(Adapter):
         """It may come back with another database, so nothing that is known of its nodes holds."""
         self._nodes.forget()
         self._since.clear()
-        self._wants_graph = True
+        self._want_graph()
+
+    def _want_graph(self) -> None:
+        self._wants_graph, self._graph_since = True, -math.inf
 
     def _ask_for_graph(self) -> None:
-        """The nodes from before this node was there; ``mapData`` has the newest only."""
-        self._wants_graph = False
+        """The nodes from before this node was there; ``mapData`` has the newest only. Again where no answer comes."""
+        if self._graph is not None:
+            self._get.remove_pending_request(self._graph)
         request = GetMap.Request(global_map=True, optimized=False, graph_only=True)
-        self._get.call_async(request).add_done_callback(self._hear_graph)
+        self._graph, self._graph_since = self._get.call_async(request), seconds()
+        self._graph.add_done_callback(self._hear_graph)
 
     def _hear_graph(self, future: Future) -> None:
         if future.exception() is None and future.result() is not None:
+            self._wants_graph = False
             self._hear_map(future.result().data)
 
     # What it is told
@@ -163,14 +173,24 @@ class ToRtabmap(Adapter):
         self._asked = None
         if future.exception() is None:
             self.settle(asked.key)
+        else:
+            self._end_hopeless(asked.key)
 
     def _give_up(self, asked: _Asked) -> None:
-        """Ask again later, or never: RTAB-Map is gone, or is busy with its map."""
+        """Ask again later: RTAB-Map is gone, or is busy with its map."""
         self._asked = None
         self._add.remove_pending_request(asked.future)
         asked.future.cancel()
-        if asked.key in self.waiting and self._attempts[asked.key] >= self._limits.most_attempts:
-            self.end(asked.key, "unanswered", f"add_link was asked {self._attempts[asked.key]} times")
+        self._end_hopeless(asked.key)
+
+    def _end_hopeless(self, key: Key) -> None:
+        """Never ask again what was asked too often."""
+        if key in self.waiting and self._attempts[key] >= self._limits.most_attempts:
+            self.end(key, "unanswered", f"add_link was asked {self._attempts[key]} times")
+
+    def is_on_its_way(self, key: Key) -> bool:
+        """Whether RTAB-Map was asked and has not answered."""
+        return self._asked is not None and self._asked.key == key
 
     def forget(self, key: Key) -> None:
         """Its patience and its attempts are over."""

@@ -67,7 +67,9 @@ class DetectionsIn:
             self._door.feed("labels", 0, self._labels.names)
 
     def _hear_names(self, message: Any) -> None:
-        self._names = self._door.read_aside("label_info", vision_from_msg.label_info, message) or self._names
+        told = self._door.read_aside("label_info", vision_from_msg.label_info, message)
+        if told is not None:
+            self._names = told
 
     def _decode(self, topic: str, message: Any) -> object:
         if topic in TABLE:

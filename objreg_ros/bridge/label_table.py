@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import threading
 from collections.abc import Iterable, Mapping
 
@@ -30,7 +31,10 @@ class LabelTable:
             self.names = self._with(dict(told), self._met)
 
     def include(self, labels: Iterable[str]) -> bool:
-        """Give a number to each name that has none; whether there was such a one. ValueError for too many names."""
+        """Give a number to each name that has none; whether there was such a one.
+
+        ValueError for too many names, and for names that are too long together.
+        """
         with self._lock:
             new = sorted(set(labels) - set(self.names.values()) - {UNNAMED})
             if len(self._met) + len(new) > MOST_MET:
@@ -43,9 +47,13 @@ class LabelTable:
 
     @staticmethod
     def _with(names: Mapping[int, str], more: Iterable[str]) -> Mapping[int, str]:
-        """Numbers behind those that are used; ValueError where class ids have no such number."""
+        """Numbers behind those that are used; ValueError beyond those of class ids, or for more text than is read."""
         known, first = set(names.values()), max(names, default=-1) + 1
         added = dict(enumerate((name for name in more if name not in known), start=first))
         if max(added, default=0) > limits.MOST_CLASS_ID:
             raise ValueError(f"labels: expected numbers of at most {limits.MOST_CLASS_ID}, got {max(added)}")
-        return {**names, **added}
+        table = {**names, **added}
+        length = len(json.dumps(table)) if added else 0
+        if length > limits.MOST_LABELS_TEXT:
+            raise ValueError(f"labels: expected names of at most {limits.MOST_LABELS_TEXT} characters, got {length}")
+        return table

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from objreg_ros import limits
+from objreg_ros.bridge import from_msg
 from objreg_ros.data import Array, Odometry
 from objreg_ros.geometry import inverse, pose, rotation_from_quaternion
 
@@ -30,7 +31,8 @@ class StaticFrames:
     def hear(self, message: Any) -> None:
         """Take a TFMessage in. ValueError for a transform without a rotation, or beyond all measure."""
         for one in message.transforms:
-            parent, child = one.header.frame_id.lstrip("/"), one.child_frame_id.lstrip("/")
+            names = one.header.frame_id, one.child_frame_id
+            parent, child = (from_msg.bounded(name, "tf_static").lstrip("/") for name in names)
             where, turn = one.transform.translation, one.transform.rotation
             t = np.array([where.x, where.y, where.z], float)
             if not np.abs(t).max() <= limits.MOST_DISTANCE:

@@ -10,7 +10,7 @@ with three-dimensional poses for use in estimation problems", 2014). From there 
 from __future__ import annotations
 
 import threading
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -35,6 +35,7 @@ from objreg_ros.registration.keyframe import Keyframe
 ALONE_ODDS = 1000.0  # of a closure that is believed by itself
 MOST = 64  # ties that are kept, the newest
 STEP = 0.05, 3.0  # m, degrees: less is no way, but the noise of odometry
+MOST_STEPS = 4096  # of way that are kept: a search of a keyframe ends later than the camera moves on
 ROUNDS = 4  # of averaging rotations: the mean of poses that agree has settled by then
 
 
@@ -94,6 +95,8 @@ class Relocalisation:
         self._covariance: Array = np.eye(6)  # of the camera where the last tie was
         self._origin: Array = np.zeros(3)  # of that, in odometry
         self._path = TravelledPath(np.eye(4))
+        self._steps = deque([(began_ns, 0.0)], maxlen=MOST_STEPS)  # stamp, and the way until then
+        self._way_until_tie = 0.0
         self._agreeing, self._target_ns, self._by_odometry = 0, 0, False
 
     def follow(self, frame: Frame, session: int) -> None:
@@ -112,6 +115,12 @@ class Relocalisation:
         self._camera = stamp_ns, T_odom_camera
         if not self._path.is_near(T_odom_camera, *STEP):
             self._path.go(T_odom_camera)
+            self._steps.append((stamp_ns, self._path.travelled))
+
+    def _way_until(self, stamp_ns: int) -> float:
+        """Metres from the first frame to a moment, or to the earliest step that is kept."""
+        before = (metres for step_ns, metres in reversed(self._steps) if step_ns <= stamp_ns)
+        return next(before, self._steps[0][1])
 
     def hear(self, closure: LoopClosure, source: Keyframe, target: Keyframe) -> None:
         """Take in a closure of these keyframes, the later one first; those of one session tell nothing."""
@@ -146,7 +155,7 @@ class Relocalisation:
         here = tie.statement.source
         T_map_here, self._covariance = fused([one.carried(here, way) for one, way in (*agreeing, (tie, 0.0))])
         self._T_map_odom = rigid(T_map_here @ inverse(here.T_session_camera))
-        self._origin, self._path = here.T_session_camera[:3, 3], TravelledPath(here.T_session_camera)
+        self._origin, self._way_until_tie = here.T_session_camera[:3, 3], self._way_until(here.stamp_ns)
 
     @property
     def relocalised(self) -> Relocalised | None:
@@ -163,7 +172,7 @@ class Relocalisation:
                 target_ns=self._target_ns,
                 T_map_odom=self._T_map_odom,
                 T_map_camera=T_map_camera,
-                covariance=turned_about(self._covariance, way) + drift(self._path.travelled),
+                covariance=turned_about(self._covariance, way) + drift(self._path.travelled - self._way_until_tie),
                 closures=self._agreeing,
                 by_odometry=self._by_odometry,
             )

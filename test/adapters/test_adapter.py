@@ -121,3 +121,22 @@ def test_what_was_withdrawn_stays_out_when_the_other_topic_tells_it(around: Call
     graph.send(closure(), closure(2.0))
     graph.wait(lambda: len(door.has) == 2)
     assert door.extra_diagnostics()["told again"] == 1
+
+
+def test_what_is_on_its_way_is_not_pushed_out_and_is_withdrawn_too_late(
+    around: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    graph = around("most_waiting:=1")
+    door = graph.start(Shelf)
+    door.is_open = False
+    asked = key_of(closure(1.0))
+    monkeypatch.setattr(door, "is_on_its_way", lambda key: key == asked)
+    graph.send(closure(1.0), closure(2.0))
+    graph.wait(lambda: door.ledger.balance().dropped == {"queue_full": 1})
+    assert list(door.waiting) == [asked]
+    door._keys["its id"] = asked
+    door._retract("its id")
+    assert door.extra_diagnostics()["retracted too late"] == 0
+    door.settle(asked)
+    assert door.extra_diagnostics()["retracted too late"] == 1
+    assert door.ledger.balance().dropped == {"queue_full": 1, "retracted": 1}

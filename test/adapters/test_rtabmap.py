@@ -14,6 +14,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.task import Future
 
 from objreg_ros.adapters import rtabmap
+from objreg_ros.adapters.adapter import key_of
 from objreg_ros.adapters.rtabmap import ToRtabmap
 from objreg_ros.bridge import from_msg, to_msg
 from objreg_ros.geometry import inverse
@@ -144,6 +145,65 @@ def test_a_link_that_nobody_answers_is_asked_again_and_then_given_up(
     graph.send(closure())
     graph.wait(lambda: door.ledger.balance().dropped == {"unanswered": 1})
     assert len(asked) == 3 and asked[0] == asked[2]
+    stand_in.end()
+
+
+@needs_messages
+def test_a_link_whose_answer_is_an_error_is_given_up_too(
+    around: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    graph = around(f"T_base_camera:={AHEAD_TEXT}", "most_attempts:=3")
+    door = graph.start(ToRtabmap)
+    asked: list[Any] = []
+
+    def ask(request: Any) -> Future:
+        asked.append(request)
+        future = Future()
+        future.set_exception(RuntimeError("no answer that can be read"))
+        return future
+
+    monkeypatch.setattr(door._add, "call_async", ask)
+    stand_in = StandIn(graph)
+    graph.send(closure())
+    graph.wait(lambda: door.ledger.balance().dropped == {"unanswered": 1})
+    graph.pass_time(0.3)
+    assert len(asked) == 3
+    stand_in.end()
+
+
+@needs_messages
+def test_a_link_that_is_withdrawn_on_its_way_is_counted_once_rtabmap_has_it(
+    around: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    graph = around(f"T_base_camera:={AHEAD_TEXT}", "most_waiting:=1")
+    door = graph.start(ToRtabmap)
+    answer = Future(executor=graph.executor)
+    monkeypatch.setattr(door._add, "call_async", lambda _request: answer)
+    stand_in = StandIn(graph)
+    graph.send(closure())
+    graph.wait(lambda: door._asked is not None)
+    graph.send(closure(1.5, 62.25))
+    graph.wait(lambda: door.ledger.balance().dropped == {"queue_full": 1})
+    assert list(door.waiting) == [key_of(closure())]
+    door._keys["its id"] = key_of(closure())
+    door._retract("its id")
+    answer.set_result(rtabmap.AddLink.Response())
+    graph.wait(lambda: door.extra_diagnostics()["retracted too late"] == 1)
+    assert door.ledger.balance().dropped == {"queue_full": 1, "retracted": 1}
+    stand_in.end()
+
+
+@needs_messages
+def test_a_graph_that_nobody_answers_with_is_asked_for_again(
+    around: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    graph = around(f"T_base_camera:={AHEAD_TEXT}", "answer_within:=0.2")
+    door = graph.start(ToRtabmap)
+    silent, ask = [Future()], door._get.call_async
+    monkeypatch.setattr(door._get, "call_async", lambda request: silent.pop() if silent else ask(request))
+    stand_in = StandIn(graph)
+    graph.wait(lambda: door.extra_diagnostics()["nodes of rtabmap"] == len(STAMPS))
+    assert not silent and not door._wants_graph
     stand_in.end()
 
 

@@ -158,3 +158,11 @@ def test_a_picture_that_is_no_mask_is_not_taken() -> None:
     DetectionsIn(door, "masks")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="expected an encoding of mono8"):
         door.decode("masks", Image(height=1, width=1, step=3, encoding="rgb8", data=b"abc"))
+
+
+def test_names_that_a_foreign_detector_takes_back_are_gone() -> None:
+    inputs = DetectionsIn(Door(), "auto")  # type: ignore[arg-type]
+    inputs._hear_names(SimpleNamespace(class_map=[SimpleNamespace(class_id=4, class_name="cup")]))
+    assert read(inputs, masks()).detections.label == ("cup",)
+    inputs._hear_names(SimpleNamespace(class_map=[]))
+    assert read(inputs, masks()).detections.label == (UNNAMED,)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import pytest
 
+from objreg_ros import limits
 from objreg_ros.bridge import label_table
 from objreg_ros.bridge.label_table import LabelTable
 from objreg_ros.data import UNNAMED
@@ -59,3 +60,12 @@ def test_a_number_that_no_class_can_have_is_refused_and_nothing_changes() -> Non
     with pytest.raises(ValueError, match="expected numbers of at most 65533, got 65534"):
         table.include(["tv"])
     assert table.names == {65533: "cup"}
+
+
+def test_names_that_are_too_long_together_are_refused_and_nothing_changes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limits, "MOST_LABELS_TEXT", 40)
+    table = LabelTable()
+    assert table.include(["cup"])
+    with pytest.raises(ValueError, match="expected names of at most 40 characters, got"):
+        table.include(["a" * 40])
+    assert table.names == {0: "cup"} and table.include(["tv"])

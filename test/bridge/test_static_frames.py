@@ -71,6 +71,14 @@ def test_a_transform_that_is_none_is_refused(wrong: str) -> None:
     assert frames.between("a", "b") is None
 
 
+@pytest.mark.parametrize("names", [("a", "b" * 1001), ("a" * 1001, "b")])
+def test_a_name_that_is_too_long_is_refused(names: tuple[str, str]) -> None:
+    frames = StaticFrames()
+    with pytest.raises(ValueError, match="tf_static: expected at most 1000 characters, got 1001"):
+        frames.hear(said(transform(*names, moved(1))))
+    assert frames.between(*names) is None
+
+
 def words(child: str) -> list[Odometry]:
     return [Odometry(T_odom_body=np.eye(4), child_frame_id=child, stamp_ns=1, frame_id="odom")]
 

@@ -165,6 +165,19 @@ def test_a_search_that_ends_after_a_silence_tells_of_odometry_that_is_over(walk:
     assert walk.relocalisation.relocalised is None
 
 
+def test_the_way_since_the_keyframe_counts_when_its_search_ends_later(walk: Pass) -> None:
+    for step, metres in enumerate((0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 4.0, 3.0, 2.0, 1.0, 1.0)):
+        walk.go(metres, seconds=100.0 + step)
+    source, target = place(NOW, 101.0, moved(1.0), 1.0), place(EARLIER, 10.0, T_MAP_ODOM @ moved(1.0), 1.0)
+    walk.relocalisation.hear(closure(source, target, np.eye(4), ALONE_ODDS), source, target)
+    found = walk.relocalisation.relocalised
+    assert found is not None and np.allclose(np.diag(found.covariance), np.diag(TIGHT + drift(8.0)))
+    for step in range(1, 6):
+        walk.go(1.0 + step, seconds=110.0 + step)
+    found = walk.relocalisation.relocalised
+    assert found is not None and found.covariance[5, 5] == pytest.approx((TIGHT + drift(13.0))[5, 5])
+
+
 def test_without_odometry_the_newest_keyframe_is_told() -> None:
     relocalisation = Relocalisation()
     relocalisation.follow(frame(100.0, None), NOW)

@@ -111,6 +111,22 @@ def test_an_image_is_remapped_with_its_compressed_form(repository: Path, said: d
     ]
 
 
+def test_the_name_of_the_camera_goes_before_its_topics_but_not_before_others(
+    repository: Path, said: dict[str, Any]
+) -> None:
+    given = {**said, "camera_name": "front", "image": "color/image_raw", "points": "/lidar", "odom": "wheels"}
+    assert launch_file(repository)["_remappings"](given) == [
+        ("image", "front/color/image_raw"),
+        ("image/compressed", "front/color/image_raw/compressed"),
+        ("points", "/lidar"),
+        ("depth/image", "front/depth/image"),
+        ("depth/image/compressedDepth", "front/depth/image/compressedDepth"),
+        ("camera_info", "front/camera_info"),
+        ("odom", "wheels"),
+        ("imu", "front/imu"),
+    ]
+
+
 def test_what_is_said_goes_over_the_users_file_to_the_node_that_it_is_for(
     repository: Path, said: dict[str, Any]
 ) -> None:
@@ -220,17 +236,22 @@ def test_one_process_is_launched_in_a_namespace_with_the_parameters_of_each_node
     graph: Graph, repository: Path, tiny_model: Path, tmp_path: Path
 ) -> None:
     command = [sys.executable, "-c", PROGRAM, str(repository / "launch" / "objreg.launch.py"), "composed:=true"]
+    passing = tmp_path / "passing"
+    passing.mkdir()
     with (tmp_path / "log").open("w") as log:
         launched = subprocess.Popen(
             [*command, "namespace:=house", f"model:={tiny_model}", "mapper:=true", "respawn:=true", "log_level:=info"],
-            env={**graph.environment(), "ROS_LOG_DIR": str(tmp_path)}, cwd=repository, stdout=log, stderr=log,
+            env={**graph.environment(), "ROS_LOG_DIR": str(tmp_path), "TMPDIR": str(passing)},
+            cwd=repository, stdout=log, stderr=log,
         )  # fmt: skip
     try:
         names = {f"/house/{room}" for room in ("detector", "segmenter", "registrar", "mapper")}
         graph.wait_for(lambda: names <= set(graph.books), START_S, f"diagnostics of {names}")
+        assert list(passing.glob("objreg_*.yaml"))
     finally:
         launched.send_signal(signal.SIGINT)
         launched.wait(START_S)
+    assert not list(passing.glob("objreg_*.yaml"))
     said = (tmp_path / "log").read_text()
     assert said.count("process has finished cleanly") == 1 and "objreg_graph" in said and "ignored" not in said, said
 
@@ -241,7 +262,7 @@ def test_a_replay_brings_every_frame_through_the_nodes_and_ends_the_launch(
     folder = tum_folder(tmp_path / "tum", frames=5)
     launched = subprocess.run(
         [sys.executable, "-c", PROGRAM, str(repository / "launch" / "replay.launch.py"), f"recording:={folder}",
-         "lossless:=true", f"model:={tiny_model}", "image:=/kinect/rgb", "depth:=/kinect/z"],
+         "lossless:=true", f"model:={tiny_model}", "camera_name:=kinect", "image:=rgb", "depth:=/kinect/z"],
         env={**graph.environment(), "ROS_LOG_DIR": str(tmp_path)}, cwd=repository, timeout=3 * START_S,
         capture_output=True, text=True,
     )  # fmt: skip
