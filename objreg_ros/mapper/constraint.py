@@ -31,20 +31,21 @@ EXACT = (0.0, 0.0)
 
 def between_keyframes(
     closure: LoopClosure,
-    odometry: Trajectory,
-    k1_ns: int,
-    k2_ns: int,
+    odometry: tuple[Trajectory, Trajectory],
+    keyframes_ns: tuple[int, int],
     T_body_camera: Array,
     sigmas: tuple[float, float] = EXACT,
 ) -> Constraint:
     """The closure as a constraint between the bodies at a consumer's own keyframes, near *from* and near *to*.
 
     ``T_k1_k2 = O(k1)^-1 O(from) T_from_to O(to)^-1 O(k2)`` with O the odometry of the camera at the closure's moments
-    and of the body at the keyframes. ``sigmas`` m and rad are how that wanders over one metre or one radian: a closure
-    is known less well where it was not measured. ValueError for a moment that odometry does not cover.
+    and of the body at the keyframes; that of *from* and that of *to*, which may be two sessions. ``sigmas`` m and rad
+    are how it wanders over one metre or one radian: a closure is known less well where it was not measured. ValueError
+    for a moment that odometry does not cover.
     """
-    O_k1, O_from, O_to, O_k2 = (odometry.at(stamp) for stamp in (k1_ns, closure.from_ns, closure.to_ns, k2_ns))
-    T_k1_body, T_k2_body = inverse(O_k1) @ O_from, inverse(O_k2) @ O_to  # at the closure's moments
+    (of_from, of_to), (k1_ns, k2_ns) = odometry, keyframes_ns
+    T_k1_body = inverse(of_from.at(k1_ns)) @ of_from.at(closure.from_ns)  # at the closure's moments
+    T_k2_body = inverse(of_to.at(k2_ns)) @ of_to.at(closure.to_ns)
     measured = Constraint(closure.T_from_to, closure.covariance)
     moved = compensated(measured, T_k1_body @ T_body_camera, inverse(T_k2_body @ T_body_camera))
     turned = _turning(moved.T_from_to[:3, 3] - T_k1_body[:3, 3])
@@ -118,11 +119,6 @@ def local_information(constraint: Constraint) -> Array:
     return (information + information.T) / 2
 
 
-def open3d_information(constraint: Constraint) -> Array:
-    """The (6, 6) information of an Open3D ``PoseGraphEdge(source=to, target=from, T_from_to)``: rotation first.
-
-    Open3D's registration gives its information about the target's origin, yet its optimiser applies what it is given
-    to ``T_target_source^-1 T_target^-1 T_source``, which is an error in the *source's* axes (GlobalOptimization.cpp).
-    Given the former the optimum is off as soon as the two frames are not close, so this is the latter.
-    """
-    return ROTATION_FIRST @ local_information(constraint) @ ROTATION_FIRST.T
+def rotation_first(matrix: Array) -> Array:
+    """A (6, 6) of the error [t r], ROS's order, as one of [r t], GTSAM's."""
+    return np.roll(matrix, 3, axis=(0, 1))

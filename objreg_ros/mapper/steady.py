@@ -9,15 +9,16 @@ bend the trajectory say so at every step, and what they say of all steps togethe
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from objreg_ros.data import Array
-from objreg_ros.geometry import inverse, pose, rotation_angle, rotation_from_vector, vector_from_rotation
+from objreg_ros.geometry import inverses
 
 UP = np.array([0.0, 0.0, 1.0])  # of the frame of odometry (REP-103)
+LEAST_VARIANCE = 1e-12  # m^2 and rad^2 of a step: one at rest tells nothing, and does not divide by nothing
 QUARTER_TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
 
@@ -29,46 +30,44 @@ class Steady(NamedTuple):
     across: float = 0.0
 
 
-def step(T_odom_1: Array, T_odom_2: Array, steady: Steady) -> Array:
-    """``T_1_2 (4, 4)`` of two poses of odometry, corrected."""
-    way = T_odom_2[:3, 3] - T_odom_1[:3, 3]
-    turned = steady.heading * float(np.linalg.norm(way)) * UP
-    right = rotation_from_vector(0.5 * turned) @ ((1.0 + steady.along) * way + steady.across * (QUARTER_TURN @ way))
-    R_1_odom = T_odom_1[:3, :3].T
-    return pose(R_1_odom @ rotation_from_vector(turned) @ T_odom_2[:3, :3], R_1_odom @ right)
+def corrected_steps(T_odom_body: Array, steady: Steady) -> Array:
+    """``T_1_2 (n - 1, 4, 4)`` from each of n poses of odometry to the next, corrected."""
+    first, second = T_odom_body[:-1], T_odom_body[1:]
+    ways = second[:, :3, 3] - first[:, :3, 3]
+    turns = steady.heading * np.linalg.norm(ways, axis=1)[:, None] * UP
+    stretched = (1.0 + steady.along) * ways + steady.across * ways @ QUARTER_TURN.T
+    R_1_odom = first[:, :3, :3].transpose(0, 2, 1)
+    T = np.tile(np.eye(4), (len(ways), 1, 1))
+    T[:, :3, :3] = R_1_odom @ Rotation.from_rotvec(turns).as_matrix() @ second[:, :3, :3]
+    halfway = Rotation.from_rotvec(0.5 * turns).apply(stretched) if len(turns) else stretched
+    T[:, :3, 3] = np.einsum("mij,mj->mi", R_1_odom, halfway)
+    return T
 
 
-def estimate(
-    T_odom_body: Sequence[Array], T_map_body: Sequence[Array], sigmas: tuple[float, float], expected: Steady
-) -> Steady:
+def estimate(T_odom_body: Array, T_map_body: Array, variances: Array, expected: Steady) -> Steady:
     """The steady part of how the map's steps differ from those of odometry, by weighted least squares.
 
-    ``sigmas`` are odometry's wandering errors in m and rad after one metre or radian, growing with the root of the way;
-    ``expected`` are the standard deviations of what is steady: 0 where nothing is, and nothing is estimated then.
+    Of n poses (n, 4, 4) in both; ``variances (n - 1, 2)`` of each step's position and rotation, m^2 and rad^2 in every
+    axis. ``expected`` are the standard deviations of what is steady: 0 where nothing is, and nothing is estimated then.
     """
     spread = np.array(expected)
-    information, total = np.eye(3), np.zeros(3)  # of the answer in units of what is expected
-    for k in range(len(T_odom_body) - 1):
-        motion = inverse(T_odom_body[k]) @ T_odom_body[k + 1]
-        mapped = inverse(T_map_body[k]) @ T_map_body[k + 1]
-        length = float(np.linalg.norm(motion[:3, 3])) + rotation_angle(motion[:3, :3])
-        if length < 1e-6:
-            continue
-        error, A = _difference(T_odom_body[k][:3, :3], motion, mapped)
-        weight = np.repeat(3.0 / (np.square(sigmas) * length), 3)[:, None]
-        B = A * spread
-        information += B.T @ (weight * B)
-        total += B.T @ (weight[:, 0] * error)
+    errors, A = _differences(T_odom_body, T_map_body)
+    weights = np.repeat(1.0 / np.maximum(variances, LEAST_VARIANCE), 3, axis=1)
+    B = A * spread  # the answer is in units of what is expected
+    information = np.eye(3) + np.einsum("mij,mi,mik->jk", B, weights, B)
+    total = np.einsum("mij,mi,mi->j", B, weights, errors)
     return Steady(*(spread * np.linalg.solve(information, total)).tolist())
 
 
-def _difference(R_odom_1: Array, motion: Array, mapped: Array) -> tuple[Array, Array]:
-    """How one step of the map differs from odometry's, [t r] in the axes of odometry, and how by each steady error."""
-    shift = R_odom_1 @ (mapped[:3, 3] - motion[:3, 3])
-    turn = R_odom_1 @ vector_from_rotation(mapped[:3, :3] @ motion[:3, :3].T)
-    way = R_odom_1 @ motion[:3, 3]
-    length = float(np.linalg.norm(way))
-    A = np.zeros((6, 3))
-    A[:3, 0], A[3:, 0] = 0.5 * length * (QUARTER_TURN @ way), length * UP
-    A[:3, 1], A[:3, 2] = way, QUARTER_TURN @ way
-    return np.concatenate([shift, turn]), A
+def _differences(T_odom_body: Array, T_map_body: Array) -> tuple[Array, Array]:
+    """How steps of the map differ from odometry's, [t r] (m, 6) in the axes of odometry, and how by what is steady."""
+    R_odom_1 = T_odom_body[:-1, :3, :3]
+    motion, mapped = (inverses(T[:-1]) @ T[1:] for T in (T_odom_body, T_map_body))
+    shifts = np.einsum("mij,mj->mi", R_odom_1, mapped[:, :3, 3] - motion[:, :3, 3])
+    turns = Rotation.from_matrix(mapped[:, :3, :3] @ motion[:, :3, :3].transpose(0, 2, 1)).as_rotvec()
+    ways = T_odom_body[1:, :3, 3] - T_odom_body[:-1, :3, 3]
+    lengths, left = np.linalg.norm(ways, axis=1)[:, None], ways @ QUARTER_TURN.T
+    A = np.zeros((len(ways), 6, 3))
+    A[:, :3, 0], A[:, 3:, 0] = 0.5 * lengths * left, lengths * UP
+    A[:, :3, 1], A[:, :3, 2] = ways, left
+    return np.hstack([shifts, np.einsum("mij,mj->mi", R_odom_1, turns)]), A

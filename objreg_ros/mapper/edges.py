@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Edges of a pose graph in arrays, and how far poses are from what they say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from objreg_ros.data import Array
+from objreg_ros.geometry import inverses, skew
+from objreg_ros.mapper.constraint import Constraint, local_information, rotation_first
+
+
+@dataclass(frozen=True, slots=True)
+class Edges:
+    """``T_1_2 (m, 4, 4)`` between nodes ``k1 (m,)`` and ``k2 (m,)``, and the ``whitening (m, 6, 6)`` of their errors.
+
+    The error [r t] is that of ``T_1_2^-1`` times what poses say, in the axes of *2*. Whitened by an upper triangle it
+    is in standard deviations. Both are GTSAM's order and axes.
+    """
+
+    k1: Array
+    k2: Array
+    T_1_2: Array
+    whitening: Array
+
+    def __len__(self) -> int:
+        return len(self.k1)
+
+    def taken(self, which: Array | slice) -> Edges:
+        """Those of these numbers, or of this mask."""
+        return Edges(self.k1[which], self.k2[which], self.T_1_2[which], self.whitening[which])
+
+    def joined(self, more: Edges) -> Edges:
+        """These, and then those."""
+        parts = ((self.k1, more.k1), (self.k2, more.k2), (self.T_1_2, more.T_1_2), (self.whitening, more.whitening))
+        return Edges(*(np.concatenate(pair) for pair in parts))
+
+
+def edges_of(rows: Sequence[tuple[int, int, Constraint]]) -> Edges:
+    """The arrays of constraints between nodes."""
+    k1, k2 = (np.array([row[side] for row in rows], int) for side in (0, 1))
+    T_1_2 = np.array([row[2].T_from_to for row in rows]).reshape(-1, 4, 4)
+    information = np.array([rotation_first(local_information(row[2])) for row in rows]).reshape(-1, 6, 6)
+    return Edges(k1, k2, T_1_2, np.linalg.cholesky(information).transpose(0, 2, 1))
+
+
+def whitened_errors(poses: Array, edges: Edges) -> Array:
+    """(m, 6): how far ``poses (n, 4, 4)`` are from what each edge says, in standard deviations."""
+    error = inverses(edges.T_1_2) @ inverses(poses[edges.k1]) @ poses[edges.k2]
+    turns = Rotation.from_matrix(error[:, :3, :3]).as_rotvec()
+    return np.einsum("mij,mj->mi", edges.whitening, np.hstack([turns, error[:, :3, 3]]))
+
+
+def squared_residuals(poses: Array, edges: Edges) -> Array:
+    """(m,): the squares of the same, summed up."""
+    return np.square(whitened_errors(poses, edges)).sum(axis=1)
+
+
+def error_jacobians(poses: Array, edge: Edges) -> tuple[Array, Array]:
+    """Two (6, 6): how the whitened error of one edge changes with its two nodes, each moved by [r t] in its own axes.
+
+    ``T_2^-1 T_1 exp(x) = exp(Ad x) T_2^-1 T_1``, and the error is in the axes of *2*.
+    """
+    T_2_1 = inverses(poses[edge.k2]) @ poses[edge.k1]
+    R, t = T_2_1[0, :3, :3], T_2_1[0, :3, 3]
+    adjoint = np.zeros((6, 6))
+    adjoint[:3, :3] = adjoint[3:, 3:] = R
+    adjoint[3:, :3] = skew(t) @ R
+    return -edge.whitening[0] @ adjoint, edge.whitening[0]

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A pose graph that is solved as it grows, by GTSAM's iSAM2.
+
+Kaess et al., "iSAM2: Incremental Smoothing and Mapping Using the Bayes Tree" (2012).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.mapper.edges import Edges, error_jacobians
+
+RELINEARISED = 0.05  # rad and m: a node that moves farther is linearised anew
+HELD_SIGMA = 1e-2  # rad and m; how fast the first node is held moves nothing, as nothing else holds it
+MOST_UPDATES = 3
+INSTALL = "expected gtsam, which solves the map, got none: pip install --no-deps gtsam (or objreg_ros[mapper])"
+
+
+def load() -> Any:
+    """GTSAM, imported now: it takes a moment, in which nothing else runs. ValueError where it is not installed."""
+    try:
+        return import_module("gtsam")
+    except ImportError as error:
+        raise ValueError(INSTALL) from error
+
+
+class IncrementalGraph:
+    """Nodes by number from 0, of which the first is held at a pose; edges by the numbers that come back for them.
+
+    RuntimeError where GTSAM finds no solution; the graph is of no use then.
+    """
+
+    def __init__(self, T_map_first: Array) -> None:
+        self._gtsam = load()
+        self._isam = self._gtsam.ISAM2(self._params())
+        self.count = 1
+        first, noise = self._gtsam.Pose3(T_map_first), self._gtsam.noiseModel.Isotropic.Sigma(6, HELD_SIGMA)
+        factors, values = self._gtsam.NonlinearFactorGraph(), self._gtsam.Values()
+        factors.add(self._gtsam.PriorFactorPose3(0, first, noise))
+        values.insert(0, first)
+        self._isam.update(factors, values)
+
+    def _params(self) -> Any:
+        params = self._gtsam.ISAM2Params()
+        params.setRelinearizeThreshold(RELINEARISED)
+        params.relinearizeSkip = 1
+        params.setFactorization("QR")  # a lie that claims a micrometre among odometry of metres: no Cholesky stands it
+        return params
+
+    def copied(self) -> IncrementalGraph:
+        """The same once more, to try something on."""
+        other = object.__new__(IncrementalGraph)
+        other._gtsam, other.count, other._isam = self._gtsam, self.count, self._gtsam.ISAM2(self._isam)
+        return other
+
+    def grow(self, poses: Array, edges: Edges, gone: Sequence[int] = ()) -> list[int]:
+        """Add nodes at ``poses (n, 4, 4)``, by the next numbers, and the edges that tie them; take out those gone."""
+        values = self._gtsam.Values()
+        for k, T in enumerate(poses, self.count):
+            values.insert(k, self._gtsam.Pose3(T))
+        self.count += len(poses)
+        return self._update(edges, values, gone)
+
+    def add(self, edges: Edges) -> list[int]:
+        """Tie nodes that are there."""
+        return self._update(edges, self._gtsam.Values())
+
+    def remove(self, numbers: Sequence[int]) -> None:
+        """Take edges out."""
+        self._isam.update(self._gtsam.NonlinearFactorGraph(), self._gtsam.Values(), list(numbers))
+
+    def settle(self) -> None:
+        """Go on until no node moves far any more."""
+        for _ in range(MOST_UPDATES):
+            if self._isam.update().getVariablesRelinearized() == 0:
+                break
+
+    def poses(self) -> Array:
+        """(n, 4, 4) of all nodes."""
+        rows = self._gtsam.utilities.extractPose3(self._isam.calculateEstimate())
+        T = np.tile(np.eye(4), (len(rows), 1, 1))
+        T[:, :3, :3], T[:, :3, 3] = rows[:, :9].reshape(-1, 3, 3), rows[:, 9:]
+        return T
+
+    def expected_covariance(self, poses: Array, edge: Edges) -> Array:
+        """The covariance (6, 6) of the error of one whitened edge, [r t], as the graph without it knows its nodes."""
+        keys = [int(edge.k1[0]), int(edge.k2[0])]
+        joint = self._isam.jointMarginalCovariance(keys)
+        blocks = np.block([[joint.at(a, b) for b in keys] for a in keys])
+        J = np.hstack(error_jacobians(poses, edge))
+        return J @ blocks @ J.T + np.eye(6)
+
+    def _update(self, edges: Edges, values: Any, gone: Sequence[int] = ()) -> list[int]:
+        gtsam, factors = self._gtsam, self._gtsam.NonlinearFactorGraph()
+        for k1, k2, T, W in zip(edges.k1.tolist(), edges.k2.tolist(), edges.T_1_2, edges.whitening, strict=True):
+            noise = gtsam.noiseModel.Gaussian.SqrtInformation(W, False)
+            factors.add(gtsam.BetweenFactorPose3(k1, k2, gtsam.Pose3(T), noise))
+        return list(self._isam.update(factors, values, list(gone)).getNewFactorsIndices())

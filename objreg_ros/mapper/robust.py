@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which closures can be believed: those with which the truncated squares of all residuals are least.
+
+A closure that is left out costs as much as one at the limit, and no more (Yang et al., "Graduated Non-Convexity for
+Robust Spatial Perception", 2020, equation 4). Closures come one by one into a map that those before have made, so the
+least is looked for from there: with a closure, without it, with it in the place of those that contradict it, and
+without one that was doubtful when it came.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from objreg_ros.data import Array
+from objreg_ros.geometry import inverses
+from objreg_ros.mapper.edges import Edges, edges_of, squared_residuals, whitened_errors
+from objreg_ros.mapper.incremental import IncrementalGraph
+
+ROUNDS = 5  # most times that closures go in and out until none wants to
+LINEAR = 10.0  # a closure that is expected to cost so many limits is not tried: it is not for want of linearity
+DOUBTFUL = 12.6  # what one right closure in a hundred costs: chi-squared of six freedoms
+MOST_DOUBTED = 5
+NEAR_M = 10.0  # between the ends of two closures that may agree,
+AGREEING_M, AGREEING_SHARE = 0.1, 0.05  # and how far they may be from that, with every metre between them
+
+
+@dataclass(frozen=True, slots=True)
+class _State:
+    """A solved graph, the factors of closures in it (-1: left out), and what poses, residuals and costs come of it."""
+
+    graph: IncrementalGraph
+    factors: Array
+    poses: Array
+    residuals: Array
+    cost: float
+
+    @property
+    def kept(self) -> Array:
+        return self.factors >= 0
+
+
+class RobustGraph:
+    """Nodes, steps of odometry between them, and closures of which some may be false.
+
+    ``limit`` is the squared residual from which on a closure is left out. GTSAM's RuntimeError where steps alone have
+    no solution; a closure with which there is none is left out.
+    """
+
+    def __init__(self, T_map_first: Array, limit: float) -> None:
+        self.limit = limit
+        self.steps = self.closures = edges_of(())
+        self._step_factors = np.zeros(0, int)
+        self._expected = np.zeros(0)  # what each closure was expected to cost when it came
+        graph = IncrementalGraph(T_map_first)
+        self._state = _State(graph, np.zeros(0, int), graph.poses(), np.zeros(0), 0.0)
+
+    @property
+    def poses(self) -> Array:
+        """(n, 4, 4) of the nodes."""
+        return self._state.poses
+
+    @property
+    def kept(self) -> Array:
+        """(m,) of bool: the closures that are believed."""
+        return self._state.kept
+
+    @property
+    def residuals(self) -> Array:
+        """(m,): squared, of all closures."""
+        return self._state.residuals
+
+    @property
+    def cost(self) -> float:
+        """The truncated squares of all residuals."""
+        return self._state.cost
+
+    def grow(self, poses: Array, steps: Edges, instead_of: tuple[int, int] | None = None) -> None:
+        """Add nodes at poses, and the steps that tie them; ``instead_of`` the step between two nodes, if so."""
+        graph, out = self._state.graph, list[int]()
+        if instead_of is not None:
+            gone = (self.steps.k1 == instead_of[0]) & (self.steps.k2 == instead_of[1])
+            out = self._step_factors[gone].tolist()
+            self.steps, self._step_factors = self.steps.taken(~gone), self._step_factors[~gone]
+        self._step_factors = np.append(self._step_factors, graph.grow(poses, steps, out))
+        self.steps = self.steps.joined(steps)
+        self._state = replace(self._state, poses=np.concatenate([self._state.poses, poses]))
+
+    def believe(self, closures: Edges, kept: Array) -> None:
+        """Take in closures of which it is known whether they were believed; then those go in and out that want to."""
+        self.closures, self._expected = closures, np.zeros(len(closures))
+        graph, factors = self._state.graph, np.full(len(closures), -1)
+        factors[kept] = graph.add(closures.taken(kept))
+        graph.settle()
+        self._state = self._sorted_out(self._weighed(graph, factors))
+
+    def close(self, closure: Edges) -> None:
+        """Take in one more; `kept` says whether it is believed, and what became of the others."""
+        before, self.closures = self._state, self.closures.joined(closure)
+        expected = self._expected_cost(closure)
+        self._expected = np.append(self._expected, expected)
+        residual = squared_residuals(before.poses, closure)
+        self._state = replace(
+            before,
+            factors=np.append(before.factors, -1),
+            residuals=np.append(before.residuals, residual),
+            cost=before.cost + self.limit,
+        )
+        newest = len(self.closures) - 1
+        if expected < LINEAR * self.limit or self._is_agreed(newest):
+            self._take(self._sorted_out(self._changed(self._state, [newest], []), stays_in=newest))
+            self._take(self._sorted_out(self._state))
+        if self._state.cost - before.cost > DOUBTFUL:
+            self._doubt()
+
+    def withdraw(self, number: int) -> None:
+        """A closure is left out from now on, whatever it costs."""
+        if self.kept[number]:
+            self._state = self._changed(self._state, [], [number])
+        self.closures.whitening[number] = 0.0
+
+    def _take(self, state: _State) -> None:
+        """The better one of two."""
+        if state.cost < self._state.cost:
+            self._state = state
+
+    def _expected_cost(self, closure: Edges) -> float:
+        """What it will cost to believe a closure, were all of it linear: its error as the map expects it."""
+        state = self._state
+        covariance = state.graph.expected_covariance(state.poses, closure)
+        error = whitened_errors(state.poses, closure)[0]
+        return float(error @ np.linalg.solve(covariance, error))
+
+    def _is_agreed(self, number: int) -> bool:
+        """Whether another closure that is left out says the same of the same two places, as far as the map knows."""
+        one, others = self.closures.taken(slice(number, number + 1)), self.closures.taken(~self.kept)
+        T = inverses(self.poses)
+        there = T[one.k1] @ self.poses[others.k1]
+        back = T[others.k2] @ self.poses[one.k2]
+        apart = inverses(one.T_1_2) @ there @ others.T_1_2 @ back
+        ways = np.linalg.norm(there[:, :3, 3], axis=1) + np.linalg.norm(back[:, :3, 3], axis=1)
+        near = (ways < NEAR_M) & (np.linalg.norm(apart[:, :3, 3], axis=1) < AGREEING_M + AGREEING_SHARE * ways)
+        near[-1] = False  # that is itself
+        return bool(near.any())
+
+    def _doubt(self) -> None:
+        """Leave out, one by one, those that were the most doubtful when they came, where all else is better then."""
+        kept = np.flatnonzero(self.kept)
+        for k in kept[np.argsort(-self._expected[kept])][:MOST_DOUBTED].tolist():
+            if self.kept[k]:
+                self._take(self._sorted_out(self._changed(self._state, [], [k]), stays_out=k))
+
+    def _sorted_out(self, state: _State, stays_in: int = -1, stays_out: int = -1) -> _State:
+        """Closures go in and out until none wants to. The best state on the way."""
+        best = state
+        for _ in range(ROUNDS):
+            out, into = state.kept & (state.residuals > self.limit), ~state.kept & (state.residuals <= self.limit)
+            if stays_in >= 0:
+                out[stays_in] = False
+            if stays_out >= 0:
+                into[stays_out] = False
+            if not out.any() and not into.any():
+                break
+            state = self._changed(state, np.flatnonzero(into).tolist(), np.flatnonzero(out).tolist())
+            if state.cost < best.cost:
+                best = state
+        return best
+
+    def _changed(self, state: _State, into: list[int], out: list[int]) -> _State:
+        """With other closures in it; one that costs infinitely where that has no solution."""
+        graph, factors = state.graph.copied(), state.factors.copy()
+        try:
+            if out:
+                graph.remove(factors[out].tolist())
+                factors[out] = -1
+            if into:
+                factors[into] = graph.add(self.closures.taken(np.array(into)))
+            graph.settle()
+        except RuntimeError:
+            return replace(state, cost=np.inf)
+        return self._weighed(graph, factors)
+
+    def _weighed(self, graph: IncrementalGraph, factors: Array) -> _State:
+        poses = graph.poses()
+        residuals = squared_residuals(poses, self.closures)
+        cost = squared_residuals(poses, self.steps).sum() + np.where(factors >= 0, residuals, self.limit).sum()
+        return _State(graph, factors, poses, residuals, float(cost) if np.isfinite(cost) else np.inf)

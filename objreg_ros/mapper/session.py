@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One run of one robot's odometry: the poses, and those of them that are keyframes of the map."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from objreg_ros.data import Array, Odometry
+from objreg_ros.geometry import inverse, rotation_angle
+from objreg_ros.mapper.constraint import Constraint, unseen, wandering
+from objreg_ros.mapper.params import MapperParams
+from objreg_ros.mapper.sparse import SparseTrajectory
+from objreg_ros.mapper.trajectory import Trajectory
+
+
+class Session:
+    """Its ``odometry`` gives back what was added to within 1 mm and 0.05°, and the poses of ``keyframes`` exactly.
+
+    ``name`` is the session that closures tell of its moments, None until one did. Everything grows at the end alone, so
+    a length tells what was there at one moment.
+    """
+
+    def __init__(self, name: int | None = None) -> None:
+        self.name = name
+        self.odometry, self.keyframes = SparseTrajectory(), Trajectory()
+        self.variances: list[tuple[float, float]] = []  # of each step between keyframes: m^2 and rad^2 in every axis
+        self._way = [0.0]
+
+    def add(self, odometry: Odometry, params: MapperParams) -> bool:
+        """Take the next pose; whether it became a keyframe. ValueError if time does not advance."""
+        self.odometry.append(odometry.stamp_ns, odometry.T_odom_body)
+        if not self._moved_on(odometry.T_odom_body, params):
+            return False
+        self.odometry.pin()
+        self.keyframes.append(odometry.stamp_ns, odometry.T_odom_body)
+        if len(self.keyframes) > 1:
+            self._step(params)
+        return True
+
+    def covers(self, stamp_ns: int) -> bool:
+        """Whether its odometry tells where the body was at a moment."""
+        return self.odometry.covers(stamp_ns)
+
+    def step(self, k: int) -> Constraint:
+        """What odometry says from the keyframe before to this one."""
+        T_1_2 = inverse(self.keyframes.poses[k - 1]) @ self.keyframes.poses[k]
+        return Constraint(T_1_2, np.diag(np.repeat(self.variances[k - 1], 3)))
+
+    def way_m(self, k1: int, k2: int) -> float:
+        """How far odometry went between two keyframes."""
+        return abs(self._way[k2] - self._way[k1])
+
+    def silent_s(self, k1: int, k2: int) -> float:
+        """For how long odometry said nothing between two keyframes."""
+        return self.odometry.silent_s(*sorted((self.keyframes.stamps_ns[k1], self.keyframes.stamps_ns[k2])))
+
+    def _moved_on(self, T_odom_body: Array, params: MapperParams) -> bool:
+        if not self.keyframes.poses:
+            return True
+        T_last_body = inverse(self.keyframes.poses[-1]) @ T_odom_body
+        turned = np.degrees(rotation_angle(T_last_body[:3, :3])) >= params.keyframe_rotation
+        return bool(turned or np.linalg.norm(T_last_body[:3, 3]) >= params.keyframe_translation)
+
+    def _step(self, params: MapperParams) -> None:
+        """What odometry says between the two newest keyframes: next to nothing where it was silent meanwhile."""
+        first, second = self.keyframes.poses[-2:]
+        self._way.append(self._way[-1] + float(np.linalg.norm(second[:3, 3] - first[:3, 3])))
+        silent_s = self.silent_s(len(self.keyframes) - 2, len(self.keyframes) - 1)
+        C = wandering(inverse(first) @ second, params.odometry_sigmas) + unseen(silent_s, params.max_speed)
+        self.variances.append((float(C[0, 0]), float(C[3, 3])))
+
+
+def stacked(poses: Sequence[Array]) -> Array:
+    """(n, 4, 4), of none too."""
+    return np.array(poses).reshape(-1, 4, 4)

@@ -1,0 +1,312 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From sessions and the closures between their keyframes to the keyframes' poses in one map.
+
+The graph has a node where a closure holds a keyframe, and in between what `Chain` says. What is steadily wrong with
+odometry is taken out where that explains as much more as three more numbers must (Schwarz, "Estimating the dimension of
+a model", 1978): a few closures that are all a little wrong one way are no evidence of it.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from objreg_ros.data import Array, LoopClosure
+from objreg_ros.geometry import inverse, inverses
+from objreg_ros.mapper.chain import Chain
+from objreg_ros.mapper.constraint import Constraint, inverted
+from objreg_ros.mapper.edges import edges_of
+from objreg_ros.mapper.params import MapperParams
+from objreg_ros.mapper.robust import RobustGraph
+from objreg_ros.mapper.session import Session, stacked
+from objreg_ros.mapper.steady import Steady, estimate
+
+FREEDOMS = 6  # of a closure
+ROUNDS = 4  # most times that odometry is corrected
+SETTLED = 5e-4  # rad/m and m/m: a change of its steady error that matters no more
+GROWTH = 1.1  # so many times the closures there were, and what is steady is looked at again
+TIES = 2  # closures that have to agree on where a session is in the map
+AGREEING_M, AGREEING_SHARE = 0.3, 0.05  # how far they may be from that, and with every metre of odometry between them
+LOOSE = np.diag(np.repeat([1e4, 10.0], 3) ** 2)  # m and rad: what ties a session that only closures hold
+
+
+class End(NamedTuple):
+    """A keyframe of a session, both by number."""
+
+    session: int
+    keyframe: int
+
+
+class Tie(NamedTuple):
+    """A constraint between two keyframes; ``closure`` is what it was made of, None for odometry."""
+
+    end1: End
+    end2: End
+    constraint: Constraint
+    closure: LoopClosure | None = None
+
+
+class Problem(NamedTuple):
+    """What there is to solve at one moment, as numbers of what is there by then, since all of it only grows."""
+
+    solver: Solver
+    sessions: Sequence[Session]
+    keyframes: tuple[int, ...]  # of each session
+    ties: Sequence[Tie]  # of closures alone
+    tie_count: int
+    withdrawn: frozenset[int]  # numbers of ties
+    params: MapperParams
+
+    def solve(self) -> Solution:
+        """The courses with which all that can be believed agrees best."""
+        return self.solver.solve(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """A session in the map: its chain, and ``T_map_body (m, 4, 4)`` of those keyframes that are ``nodes``."""
+
+    chain: Chain
+    nodes: tuple[int, ...]
+    T_map_body: Array
+
+    def of(self, keyframes: Array | None = None) -> Array:
+        """``T_map_body (n, 4, 4)`` of keyframes that the chain has; of all of them if None."""
+        return self.chain.spread(self.nodes, self.T_map_body, keyframes)
+
+    def __len__(self) -> int:
+        return len(self.chain)
+
+
+class Solution(NamedTuple):
+    """The course of each session, None for one that nothing ties to the first; which ties are ``kept``, and residuals.
+
+    Residuals are in standard deviations.
+    """
+
+    courses: tuple[Course | None, ...]
+    kept: Array
+    residuals: Array
+
+
+@dataclass(slots=True)
+class _Route:
+    """A session in the graph: its chain, the keyframes that are nodes in order, and the nodes' numbers there."""
+
+    chain: Chain
+    keyframes: list[int]
+    nodes: dict[int, int]
+
+
+class Solver:
+    """Solves the problems of one `PoseGraph`, each from where the one before ended. Not for two threads at once."""
+
+    def __init__(self) -> None:
+        self._forget(None)
+
+    def _forget(self, params: MapperParams | None) -> None:
+        self._params = params
+        self._robust: RobustGraph | None = None
+        self._routes: dict[int, _Route] = {}
+        self._taken = 0  # ties
+        self._numbers: dict[int, int] = {}  # of ties in the graph, by theirs
+        self._untied: list[int] = []  # ties of sessions that are not in the graph
+        self._tethers: list[tuple[int, int, Constraint]] = []  # what holds sessions, next to nothing, but for closures
+        self._due = 1
+
+    def solve(self, problem: Problem) -> Solution:
+        """See `Problem.solve`."""
+        if problem.params != self._params:
+            self._forget(problem.params)
+        if problem.keyframes and problem.keyframes[0] and self._robust is None:
+            self._begin(problem)
+        for number in range(self._taken, problem.tie_count):
+            self._take(problem, number)
+        self._taken = problem.tie_count
+        self._withdraw(problem.withdrawn)
+        if len(self._numbers) >= self._due:
+            self._due = max(len(self._numbers) + 1, int(GROWTH * len(self._numbers)))
+            self._calibrate(problem)
+        return self._solution(problem)
+
+    def _begin(self, problem: Problem) -> None:
+        first = problem.sessions[0].keyframes.poses[0]
+        self._robust = RobustGraph(first, problem.params.max_residual**2)
+        self._routes[0] = _Route(Chain(first, Steady()), [0], {0: 0})
+
+    # Closures
+
+    def _take(self, problem: Problem, number: int) -> None:
+        tie = problem.ties[number]
+        if tie.end1.session in self._routes and tie.end2.session in self._routes:
+            self._close(problem, number)
+        else:
+            self._untied.append(number)
+            for session in {tie.end1.session, tie.end2.session} - set(self._routes):
+                self._join(problem, session)
+
+    def _close(self, problem: Problem, number: int) -> None:
+        assert self._robust is not None
+        tie = problem.ties[number]
+        k1, k2 = (self._node(problem, end) for end in (tie.end1, tie.end2))
+        self._numbers[number] = len(self._robust.closures)
+        self._robust.close(edges_of([(k1, k2, tie.constraint)]))
+
+    def _node(self, problem: Problem, end: End) -> int:
+        """The node of a keyframe, which becomes one if it is none; so do some on the way there from the last."""
+        route = self._routes[end.session]
+        self._extend(problem, end.session)
+        while (between := route.chain.straight_until(route.keyframes[-1])) < end.keyframe:
+            self._insert(route, between)
+        if end.keyframe not in route.nodes:
+            self._insert(route, end.keyframe)
+        return route.nodes[end.keyframe]
+
+    def _insert(self, route: _Route, k: int) -> None:
+        """A keyframe becomes a node, after the last one or between two."""
+        assert self._robust is not None
+        node, at = len(self._robust.poses), bisect_left(route.keyframes, k)
+        before, after = route.keyframes[at - 1], route.keyframes[at : at + 1]
+        steps = [(route.nodes[before], node, route.chain.between(before, k))]
+        steps += [(node, route.nodes[b], route.chain.between(k, b)) for b in after]
+        places = self._robust.poses[[route.nodes[known] for known in (before, *after)]]
+        T_map_body = route.chain.spread((before, *after), places, np.array([k]))
+        self._robust.grow(T_map_body, edges_of(steps), (route.nodes[before], route.nodes[after[0]]) if after else None)
+        route.keyframes.insert(at, k)
+        route.nodes[k] = node
+
+    def _extend(self, problem: Problem, session: int) -> None:
+        """Bring the chain to the keyframes that the problem has."""
+        route, known = self._routes[session], problem.sessions[session]
+        begin, end = len(route.chain), problem.keyframes[session]
+        if end > begin:
+            poses = stacked(known.keyframes.poses[begin - 1 : end])
+            route.chain.extend(poses, np.array(known.variances[begin - 1 : end - 1]))
+
+    def _withdraw(self, withdrawn: frozenset[int]) -> None:
+        for number in withdrawn & self._numbers.keys():
+            assert self._robust is not None
+            self._robust.withdraw(self._numbers[number])
+        self._untied = [number for number in self._untied if number not in withdrawn]
+
+    # Sessions
+
+    def _join(self, problem: Problem, session: int) -> None:
+        """Take a session into the graph where closures agree on where it is."""
+        found = self._place_of(problem, session)
+        if found is None:
+            return
+        assert self._robust is not None
+        T_map_first, chain = found
+        node = len(self._robust.poses)
+        self._tethers.append((0, node, Constraint(inverse(self._robust.poses[0]) @ T_map_first, LOOSE)))
+        self._robust.grow(T_map_first[None], edges_of(self._tethers[-1:]))
+        self._routes[session] = _Route(chain, [0], {0: node})
+        again, self._untied = self._untied, []
+        for number in again:
+            self._take(problem, number)
+
+    def _place_of(self, problem: Problem, session: int) -> tuple[Array, Chain] | None:
+        """``T_map_first`` of a session by most of its closures to sessions in the graph, if `TIES` agree; its chain."""
+        known, count = problem.sessions[session], problem.keyframes[session]
+        chain = Chain(known.keyframes.poses[0], Steady())
+        chain.extend(stacked(known.keyframes.poses[:count]), np.array(known.variances[: count - 1]).reshape(-1, 2))
+        ends, places = [], []
+        for number in self._untied:
+            tie = problem.ties[number]
+            there, here, T = tie.end1, tie.end2, tie.constraint.T_from_to
+            if there.session == session:
+                there, here, T = here, there, inverted(tie.constraint).T_from_to
+            if here.session == session and there.session in self._routes:
+                self._extend(problem, there.session)
+                ends.append(here.keyframe)
+                places.append(self._course(there.session).of(np.array([there.keyframe]))[0] @ T)
+        if len(ends) < TIES:
+            return None
+        T_chain_end, T_map_end = chain.T_chain_body[ends], np.array(places)
+        T_map_chain = T_map_end @ inverses(T_chain_end)
+        apart = np.linalg.norm((T_map_chain[:, None] @ T_chain_end[None])[..., :3, 3] - T_map_end[None, :, :3, 3], axis=2)
+        ways = np.array([[known.way_m(a, b) for b in ends] for a in ends])
+        votes = (apart < AGREEING_M + AGREEING_SHARE * ways).sum(axis=1)
+        best = int(votes.argmax())
+        return (T_map_chain[best] @ chain.T_chain_body[0], chain) if votes[best] >= TIES else None
+
+    # What is steadily wrong
+
+    def _calibrate(self, problem: Problem) -> None:
+        """Take what is steadily wrong out of odometry, or leave it in, whichever explains more."""
+        assert self._robust is not None
+        expected = problem.params.steady
+        if not any(expected):
+            return
+        plain = self._rebuilt(problem, {session: Steady() for session in self._routes}) if self._is_corrected() else self
+        found, best = plain._steady(problem), plain
+        for _ in range(ROUNDS):
+            best = best._rebuilt(problem, found)
+            known, found = found, best._steady(problem)
+            if np.allclose([*found.values()], [*known.values()], atol=SETTLED):
+                break
+        steady = [route.chain.steady for route in best._routes.values()]
+        unexpected = sum(np.square([part / sigma for part, sigma in zip(one, expected, strict=True) if sigma]).sum() for one in steady)
+        gain = plain._cost() - best._cost() - unexpected
+        chosen = best if gain > sum(map(len, steady)) * np.log(FREEDOMS * len(self._numbers)) else plain
+        self._robust, self._routes = chosen._robust, chosen._routes
+
+    def _cost(self) -> float:
+        assert self._robust is not None
+        return self._robust.cost
+
+    def _is_corrected(self) -> bool:
+        return any(route.chain.steady != Steady() for route in self._routes.values())
+
+    def _steady(self, problem: Problem) -> dict[int, Steady]:
+        """What each session's map says is steadily wrong with its odometry, as far as closures hold it."""
+        found = {}
+        for session, route in self._routes.items():
+            first, last = route.keyframes[0], route.keyframes[-1]
+            odom = stacked(problem.sessions[session].keyframes.poses[first : last + 1])
+            variances = np.array(problem.sessions[session].variances[first:last]).reshape(-1, 2)
+            mapped = self._course(session).of(np.arange(first, last + 1))
+            found[session] = estimate(odom, mapped, variances, problem.params.steady)
+        return found
+
+    def _rebuilt(self, problem: Problem, steady: dict[int, Steady]) -> Solver:
+        """The same nodes and closures, with odometry corrected otherwise."""
+        assert self._robust is not None
+        other = copy(self)
+        other._routes, rows = {}, []
+        for session, route in self._routes.items():
+            known, count = problem.sessions[session], len(route.chain)
+            chain = Chain(known.keyframes.poses[0], steady[session])
+            chain.extend(stacked(known.keyframes.poses[:count]), np.array(known.variances[: count - 1]).reshape(-1, 2))
+            other._routes[session] = _Route(chain, list(route.keyframes), dict(route.nodes))
+            pairs = zip(route.keyframes, route.keyframes[1:], strict=False)
+            rows += [(route.nodes[a], route.nodes[b], chain.between(a, b)) for a, b in pairs]
+        other._robust = RobustGraph(self._robust.poses[0], self._robust.limit)
+        if len(self._robust.poses) > 1:
+            other._robust.grow(self._robust.poses[1:], edges_of([*self._tethers, *rows]))
+            other._robust.believe(self._robust.closures, self._robust.kept)
+        return other
+
+    # What comes of it
+
+    def _course(self, session: int) -> Course:
+        assert self._robust is not None
+        route = self._routes[session]
+        nodes = [route.nodes[k] for k in route.keyframes]
+        return Course(copy(route.chain), tuple(route.keyframes), self._robust.poses[nodes])
+
+    def _solution(self, problem: Problem) -> Solution:
+        kept, residuals = np.zeros(problem.tie_count, bool), np.full(problem.tie_count, np.inf)
+        if self._robust is not None:
+            numbers = list(self._numbers)
+            places = list(self._numbers.values())
+            kept[numbers] = self._robust.kept[places]
+            residuals[numbers] = np.sqrt(self._robust.residuals[places])
+        courses = [self._course(s) if s in self._routes else None for s in range(len(problem.keyframes))]
+        return Solution(tuple(courses), kept, residuals)
