@@ -7,6 +7,7 @@ Kaess et al., "iSAM2: Incremental Smoothing and Mapping Using the Bayes Tree" (2
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from importlib import import_module
 from typing import Any
 
@@ -18,6 +19,7 @@ from objreg_ros.mapper.edges import Edges, error_jacobians
 RELINEARISED = 0.05  # rad and m: a node that moves farther is linearised anew
 HELD_SIGMA = 1e-2  # rad and m; how fast the first node is held moves nothing, as nothing else holds it
 MOST_UPDATES = 3
+FEW = 0.05  # of all nodes
 INSTALL = "expected gtsam, which solves the map, got none: pip install --no-deps gtsam (or objreg_ros[mapper])"
 
 
@@ -32,18 +34,26 @@ def load() -> Any:
 class IncrementalGraph:
     """Nodes by number from 0, of which the first is held at a pose; edges by the numbers that come back for them.
 
+    What is asked for waits for the next look at the graph, and is done at once.
     RuntimeError where GTSAM finds no solution; the graph is of no use then.
     """
 
     def __init__(self, T_map_first: Array) -> None:
         self._gtsam = load()
         self._isam = self._gtsam.ISAM2(self._params())
+        self._factors: list[int] = []  # GTSAM's numbers of the edges, by ours
         self.count = 1
+        self._clear()
         first, noise = self._gtsam.Pose3(T_map_first), self._gtsam.noiseModel.Isotropic.Sigma(6, HELD_SIGMA)
-        factors, values = self._gtsam.NonlinearFactorGraph(), self._gtsam.Values()
-        factors.add(self._gtsam.PriorFactorPose3(0, first, noise))
-        values.insert(0, first)
-        self._isam.update(factors, values)
+        self._new_factors.add(self._gtsam.PriorFactorPose3(0, first, noise))
+        self._new_values.insert(0, first)
+        self._isam.update(self._new_factors, self._new_values)
+        self._clear()
+
+    def _clear(self) -> None:
+        """Nothing waits for the next update."""
+        self._new_factors, self._new_values = self._gtsam.NonlinearFactorGraph(), self._gtsam.Values()
+        self._gone: list[int] = []
 
     def _params(self) -> Any:
         params = self._gtsam.ISAM2Params()
@@ -54,34 +64,52 @@ class IncrementalGraph:
 
     def copied(self) -> IncrementalGraph:
         """The same once more, to try something on."""
-        other = object.__new__(IncrementalGraph)
-        other._gtsam, other.count, other._isam = self._gtsam, self.count, self._gtsam.ISAM2(self._isam)
+        self._update()
+        other = copy(self)
+        other._isam, other._factors = self._gtsam.ISAM2(self._isam), list(self._factors)
+        other._clear()
         return other
 
     def grow(self, poses: Array, edges: Edges, gone: Sequence[int] = ()) -> list[int]:
         """Add nodes at ``poses (n, 4, 4)``, by the next numbers, and the edges that tie them; take out those gone."""
-        values = self._gtsam.Values()
         for k, T in enumerate(poses, self.count):
-            values.insert(k, self._gtsam.Pose3(T))
+            self._new_values.insert(k, self._gtsam.Pose3(T))
         self.count += len(poses)
-        return self._update(edges, values, gone)
+        numbers = self.add(edges)
+        self.remove(gone)
+        return numbers
 
     def add(self, edges: Edges) -> list[int]:
         """Tie nodes that are there."""
-        return self._update(edges, self._gtsam.Values())
+        gtsam = self._gtsam
+        for k1, k2, T, W in zip(edges.k1.tolist(), edges.k2.tolist(), edges.T_1_2, edges.whitening, strict=True):
+            noise = gtsam.noiseModel.Gaussian.SqrtInformation(W, False)
+            self._new_factors.add(gtsam.BetweenFactorPose3(k1, k2, gtsam.Pose3(T), noise))
+        first = len(self._factors) + self._new_factors.size() - len(edges)
+        return list(range(first, first + len(edges)))
 
     def remove(self, numbers: Sequence[int]) -> None:
         """Take edges out."""
-        self._isam.update(self._gtsam.NonlinearFactorGraph(), self._gtsam.Values(), list(numbers))
+        if any(number >= len(self._factors) for number in numbers):
+            self._update()
+        self._gone += [self._factors[number] for number in numbers]
 
     def settle(self) -> None:
-        """Go on until no node moves far any more."""
+        """Go on until few nodes move far any more."""
+        self._update()
         for _ in range(MOST_UPDATES):
-            if self._isam.update().getVariablesRelinearized() == 0:
+            if self._isam.update().getVariablesRelinearized() <= FEW * self.count:
                 break
+
+    def _update(self) -> None:
+        if self._new_factors.size() or self._gone:
+            result = self._isam.update(self._new_factors, self._new_values, self._gone)
+            self._factors += list(result.getNewFactorsIndices())
+            self._clear()
 
     def poses(self) -> Array:
         """(n, 4, 4) of all nodes."""
+        self._update()
         rows = self._gtsam.utilities.extractPose3(self._isam.calculateEstimate())
         T = np.tile(np.eye(4), (len(rows), 1, 1))
         T[:, :3, :3], T[:, :3, 3] = rows[:, :9].reshape(-1, 3, 3), rows[:, 9:]
@@ -89,15 +117,9 @@ class IncrementalGraph:
 
     def expected_covariance(self, poses: Array, edge: Edges) -> Array:
         """The covariance (6, 6) of the error of one whitened edge, [r t], as the graph without it knows its nodes."""
+        self._update()
         keys = [int(edge.k1[0]), int(edge.k2[0])]
         joint = self._isam.jointMarginalCovariance(keys)
         blocks = np.block([[joint.at(a, b) for b in keys] for a in keys])
         J = np.hstack(error_jacobians(poses, edge))
         return J @ blocks @ J.T + np.eye(6)
-
-    def _update(self, edges: Edges, values: Any, gone: Sequence[int] = ()) -> list[int]:
-        gtsam, factors = self._gtsam, self._gtsam.NonlinearFactorGraph()
-        for k1, k2, T, W in zip(edges.k1.tolist(), edges.k2.tolist(), edges.T_1_2, edges.whitening, strict=True):
-            noise = gtsam.noiseModel.Gaussian.SqrtInformation(W, False)
-            factors.add(gtsam.BetweenFactorPose3(k1, k2, gtsam.Pose3(T), noise))
-        return list(self._isam.update(factors, values, list(gone)).getNewFactorsIndices())

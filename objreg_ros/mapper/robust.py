@@ -20,8 +20,8 @@ from objreg_ros.mapper.incremental import IncrementalGraph
 
 ROUNDS = 5  # most times that closures go in and out until none wants to
 LINEAR = 10.0  # a closure that is expected to cost so many limits is not tried: it is not for want of linearity
-DOUBTFUL = 12.6  # what one right closure in a hundred costs: chi-squared of six freedoms
-MOST_DOUBTED = 5
+DOUBTFUL = 12.6  # what one right closure in twenty costs: chi-squared of six freedoms
+MOST_DOUBTED, MOST_RETRIED = 5, 5
 NEAR_M = 10.0  # between the ends of two closures that may agree,
 AGREEING_M, AGREEING_SHARE = 0.1, 0.05  # and how far they may be from that, with every metre between them
 
@@ -87,18 +87,18 @@ class RobustGraph:
         self.steps = self.steps.joined(steps)
         self._state = replace(self._state, poses=np.concatenate([self._state.poses, poses]))
 
-    def believe(self, closures: Edges, kept: Array) -> None:
-        """Take in closures of which it is known whether they were believed; then those go in and out that want to."""
-        self.closures, self._expected = closures, np.zeros(len(closures))
-        graph, factors = self._state.graph, np.full(len(closures), -1)
-        factors[kept] = graph.add(closures.taken(kept))
+    def believe(self, other: RobustGraph) -> None:
+        """Take in the closures of another graph of these nodes, as it does; then those go in and out that want to."""
+        self.closures, self._expected = other.closures, other._expected
+        graph, factors = self._state.graph, np.full(len(other.closures), -1)
+        factors[other.kept] = graph.add(other.closures.taken(other.kept))
         graph.settle()
         self._state = self._sorted_out(self._weighed(graph, factors))
 
     def close(self, closure: Edges) -> None:
         """Take in one more; `kept` says whether it is believed, and what became of the others."""
         before, self.closures = self._state, self.closures.joined(closure)
-        expected = self._expected_cost(closure)
+        expected = self._expected_cost(before, closure)
         self._expected = np.append(self._expected, expected)
         residual = squared_residuals(before.poses, closure)
         self._state = replace(
@@ -125,9 +125,8 @@ class RobustGraph:
         if state.cost < self._state.cost:
             self._state = state
 
-    def _expected_cost(self, closure: Edges) -> float:
+    def _expected_cost(self, state: _State, closure: Edges) -> float:
         """What it will cost to believe a closure, were all of it linear: its error as the map expects it."""
-        state = self._state
         covariance = state.graph.expected_covariance(state.poses, closure)
         error = whitened_errors(state.poses, closure)[0]
         return float(error @ np.linalg.solve(covariance, error))
@@ -149,7 +148,18 @@ class RobustGraph:
         kept = np.flatnonzero(self.kept)
         for k in kept[np.argsort(-self._expected[kept])][:MOST_DOUBTED].tolist():
             if self.kept[k]:
-                self._take(self._sorted_out(self._changed(self._state, [], [k]), stays_out=k))
+                without = self._sorted_out(self._changed(self._state, [], [k]), stays_out=k)
+                self._take(without)
+                self._take(self._tried_again(without, k))
+
+    def _tried_again(self, state: _State, stays_out: int) -> _State:
+        """With a closure back in that fits a map which one less holds; others follow it by themselves."""
+        left_out = np.flatnonzero(~state.kept)
+        left_out = left_out[left_out != stays_out]
+        for k in left_out[np.argsort(state.residuals[left_out])][:MOST_RETRIED].tolist():
+            if not state.kept[k] and self._expected_cost(state, self.closures.taken(slice(k, k + 1))) <= self.limit:
+                state = self._sorted_out(self._changed(state, [k], []), stays_out=stays_out)
+        return state
 
     def _sorted_out(self, state: _State, stays_in: int = -1, stays_out: int = -1) -> _State:
         """Closures go in and out until none wants to. The best state on the way."""

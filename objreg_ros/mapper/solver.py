@@ -290,7 +290,7 @@ class Solver:
         other._robust = RobustGraph(self._robust.poses[0], self._robust.limit)
         if len(self._robust.poses) > 1:
             other._robust.grow(self._robust.poses[1:], edges_of([*self._tethers, *rows]))
-            other._robust.believe(self._robust.closures, self._robust.kept)
+            other._robust.believe(self._robust)
         return other
 
     # What comes of it
