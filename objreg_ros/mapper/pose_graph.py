@@ -173,7 +173,7 @@ class PoseGraph:
         kept, pruned = [], []
         for k, (is_kept, residual) in enumerate(zip(solution.kept, solution.residuals, strict=True)):
             closure = self._closures[k].closure
-            if closure is not None and k not in problem.withdrawn:
+            if closure is not None and k not in problem.withdrawn and not np.isnan(residual):
                 (kept if is_kept else pruned).append((closure, float(residual)))
         return Summary(tuple(row[0] for row in kept), tuple(row[0] for row in pruned), tuple(row[1] for row in pruned))
 

@@ -44,14 +44,15 @@ class _State:
 class RobustGraph:
     """Nodes, steps of odometry between them, and closures of which some may be false.
 
-    ``limit`` is the squared residual from which on a closure is left out. GTSAM's RuntimeError where steps alone have
-    no solution; a closure with which there is none is left out.
+    ``limit`` is the squared residual from which on a closure is left out. RuntimeError where GTSAM finds no solution;
+    a closure with which it finds none is left out where that shows in time.
     """
 
     def __init__(self, T_map_first: Array, limit: float) -> None:
         self.limit = limit
         self.steps = self.closures = edges_of(())
         self._step_factors = np.zeros(0, int)
+        self._withdrawn: list[int] = []  # closures
         self._expected = np.zeros(0)  # what each closure was expected to cost when it came
         graph = IncrementalGraph(T_map_first)
         self._state = _State(graph, np.zeros(0, int), graph.poses(), np.zeros(0), 0.0)
@@ -89,7 +90,7 @@ class RobustGraph:
 
     def believe(self, other: RobustGraph) -> None:
         """Take in the closures of another graph of these nodes, as it does; then those go in and out that want to."""
-        self.closures, self._expected = other.closures, other._expected
+        self.closures, self._expected, self._withdrawn = other.closures, other._expected, list(other._withdrawn)
         graph, factors = self._state.graph, np.full(len(other.closures), -1)
         factors[other.kept] = graph.add(other.closures.taken(other.kept))
         graph.settle()
@@ -116,9 +117,9 @@ class RobustGraph:
 
     def withdraw(self, number: int) -> None:
         """A closure is left out from now on, whatever it costs."""
+        self._withdrawn.append(number)
         if self.kept[number]:
-            self._state = self._changed(self._state, [], [number])
-        self.closures.whitening[number] = 0.0
+            self._state = self._sorted_out(self._changed(self._state, [], [number]))
 
     def _take(self, state: _State) -> None:
         """The better one of two."""
@@ -154,8 +155,7 @@ class RobustGraph:
 
     def _tried_again(self, state: _State, stays_out: int) -> _State:
         """With a closure back in that fits a map which one less holds; others follow it by themselves."""
-        left_out = np.flatnonzero(~state.kept)
-        left_out = left_out[left_out != stays_out]
+        left_out = np.setdiff1d(np.flatnonzero(~state.kept), [stays_out, *self._withdrawn])
         for k in left_out[np.argsort(state.residuals[left_out])][:MOST_RETRIED].tolist():
             if not state.kept[k] and self._expected_cost(state, self.closures.taken(slice(k, k + 1))) <= self.limit:
                 state = self._sorted_out(self._changed(state, [k], []), stays_out=stays_out)
@@ -166,6 +166,7 @@ class RobustGraph:
         best = state
         for _ in range(ROUNDS):
             out, into = state.kept & (state.residuals > self.limit), ~state.kept & (state.residuals <= self.limit)
+            into[self._withdrawn] = False
             if stays_in >= 0:
                 out[stays_in] = False
             if stays_out >= 0:

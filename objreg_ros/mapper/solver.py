@@ -86,7 +86,8 @@ class Course:
 class Solution(NamedTuple):
     """The course of each session, None for one that nothing ties to the first; which ties are ``kept``, and residuals.
 
-    Residuals are in standard deviations.
+    Residuals are in standard deviations: nan of a tie to a session that is not in the map yet, inf of one with which
+    there is no solution.
     """
 
     courses: tuple[Course | None, ...]
@@ -107,6 +108,7 @@ class Solver:
     """Solves the problems of one `PoseGraph`, each from where the one before ended. Not for two threads at once."""
 
     def __init__(self) -> None:
+        self._unsolvable: set[int] = set()  # ties
         self._forget(None)
 
     def _forget(self, params: MapperParams | None) -> None:
@@ -114,20 +116,33 @@ class Solver:
         self._robust: RobustGraph | None = None
         self._routes: dict[int, _Route] = {}
         self._taken = 0  # ties
+        self._at: int | None = None  # the tie that is being taken in
         self._numbers: dict[int, int] = {}  # of ties in the graph, by theirs
         self._untied: list[int] = []  # ties of sessions that are not in the graph
         self._tethers: list[tuple[int, int, Constraint]] = []  # what holds sessions, next to nothing, but for closures
+        self._gone = frozenset[int]()  # ties that are withdrawn
         self._due = 1
 
     def solve(self, problem: Problem) -> Solution:
-        """See `Problem.solve`."""
+        """See `Problem.solve`. A closure with which GTSAM finds no solution is left out for good."""
+        while True:
+            try:
+                return self._solved(problem)
+            except RuntimeError:
+                if self._at is None:
+                    raise
+                self._unsolvable.add(self._at)
+                self._forget(None)
+
+    def _solved(self, problem: Problem) -> Solution:
         if problem.params != self._params:
             self._forget(problem.params)
-        if problem.keyframes and problem.keyframes[0] and self._robust is None:
+        if problem.keyframes[0] and self._robust is None:
             self._begin(problem)
         for number in range(self._taken, problem.tie_count):
+            self._at = number
             self._take(problem, number)
-        self._taken = problem.tie_count
+        self._at, self._taken = None, problem.tie_count
         self._withdraw(problem.withdrawn)
         if len(self._numbers) >= self._due:
             self._due = max(len(self._numbers) + 1, int(GROWTH * len(self._numbers)))
@@ -143,6 +158,8 @@ class Solver:
 
     def _take(self, problem: Problem, number: int) -> None:
         tie = problem.ties[number]
+        if number in self._unsolvable or number in problem.withdrawn:
+            return
         if tie.end1.session in self._routes and tie.end2.session in self._routes:
             self._close(problem, number)
         else:
@@ -189,9 +206,10 @@ class Solver:
             route.chain.extend(poses, np.array(known.variances[begin - 1 : end - 1]))
 
     def _withdraw(self, withdrawn: frozenset[int]) -> None:
-        for number in withdrawn & self._numbers.keys():
+        for number in (withdrawn - self._gone) & self._numbers.keys():
             assert self._robust is not None
             self._robust.withdraw(self._numbers[number])
+        self._gone = withdrawn
         self._untied = [number for number in self._untied if number not in withdrawn]
 
     # Sessions
@@ -303,6 +321,7 @@ class Solver:
 
     def _solution(self, problem: Problem) -> Solution:
         kept, residuals = np.zeros(problem.tie_count, bool), np.full(problem.tie_count, np.inf)
+        residuals[self._untied] = np.nan
         if self._robust is not None:
             numbers = list(self._numbers)
             places = list(self._numbers.values())
