@@ -10,4 +10,4 @@ from objreg_ros.data import Array
 
 def trajectory_text(poses: Iterable[Array]) -> str:
     """The file: a line of twelve numbers for each ``T_map_body (4, 4)``, row by row without the last; m."""
-    return "".join(" ".join(f"{value:.9f}" for value in T[:3].flat) + "\n" for T in poses)
+    return "".join(" ".join(f"{value:z.9f}" for value in T[:3].flat) + "\n" for T in poses)

@@ -23,4 +23,4 @@ def _seconds(stamp_ns: int) -> str:
 
 
 def _pose_text(T: Array) -> str:
-    return " ".join(f"{value:.9f}" for value in (*T[:3, 3], *quaternion_from_rotation(T[:3, :3])))
+    return " ".join(f"{value:z.9f}" for value in (*T[:3, 3], *quaternion_from_rotation(T[:3, :3])))

@@ -28,6 +28,12 @@ def test_stamps_before_the_epoch_are_written_too(stamp_ns: int, seconds: str) ->
     assert trajectory_text([(stamp_ns, np.eye(4))]).split()[0] == seconds
 
 
+def test_zero_has_no_sign() -> None:
+    back = np.eye(4)
+    back[:3, 3] = -1e-12
+    assert "-" not in trajectory_text([(0, back)])
+
+
 def test_no_poses_are_an_empty_file() -> None:
     assert trajectory_text([]) == ""
 
