@@ -9,6 +9,7 @@ A failure is None, a `Rejected` or an exception. It is never a pose.
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass, field
 from enum import Enum, IntFlag
@@ -135,13 +136,19 @@ class ColourImage:
         _hold(self, "rgb", np.uint8, (None, None, 3), {})
 
 
+def _span(low: float, high: float, size: int) -> slice:
+    first, end = (min(max(edge, 0), size) for edge in (math.floor(low), math.ceil(high)))
+    return slice(first, max(first, end))
+
+
 @word
 class Detections:
     """What the detector saw in one image: N boxes, best first, with the score and the label of each.
 
     ``xyxy (N, 4) float32`` pixels of the full image, half open (x_max and y_max are outside); ``score (N,) float32``
     in 0..1; ``label`` N names; ``image_hw`` the image's height and width. An image with no object gives N = 0.
-    ``ids`` are what the detector, or a tracker in it, calls each of them; none where it does not.
+    ``ids`` are what the detector, or a tracker in it, calls each of them; none where it does not. ``instances (H, W)
+    uint16`` shows the same field of view in any size: k + 1 where the k-th object is, 0 where none; None for no masks.
     """
 
     xyxy: Array
@@ -151,6 +158,7 @@ class Detections:
     stamp_ns: int
     frame_id: str = "camera"
     ids: tuple[str, ...] = ()
+    instances: Array | None = None
 
     def __post_init__(self) -> None:
         sizes = {"N": len(self.label)}
@@ -161,9 +169,25 @@ class Detections:
         _require(self, bool(((self.score >= 0) & (self.score <= 1)).all()), "scores in 0..1", self.score)
         _require(self, min(self.image_hw) > 0, "an image size above 0 px", self.image_hw)
         _require(self, len(self) <= limits.MOST_DETECTIONS, f"at most {limits.MOST_DETECTIONS} boxes", len(self))
+        if self.instances is not None:
+            _hold(self, "instances", np.uint16, (None, None), {})
+            _require(self, min(self.instances.shape) > 0, "instances of a size above 0 px", self.instances.shape)
 
     def __len__(self) -> int:
         return len(self.label)
+
+    def instances_at(self, hw: tuple[int, int]) -> Array | None:
+        """``instances`` in a picture of another height and width, by the nearest pixel."""
+        if self.instances is None or self.instances.shape == hw:
+            return self.instances
+        pairs = zip(self.instances.shape, hw, strict=True)
+        rows, columns = ((2 * np.arange(size) + 1) * own // (2 * size) for own, size in pairs)
+        return self.instances[np.ix_(rows, columns)]
+
+    def touched(self, k: int) -> tuple[slice, slice]:
+        """Rows and columns of the picture's pixels that the k-th box touches; empty where it lies outside."""
+        (height, width), (x_min, y_min, x_max, y_max) = self.image_hw, self.xyxy[k].tolist()
+        return _span(y_min, y_max, height), _span(x_min, x_max, width)
 
 
 @word

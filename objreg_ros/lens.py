@@ -107,7 +107,9 @@ class Lens:
         height, width = detections.image_hw
         scale = np.array([self.raw.width / width, self.raw.height / height] * 2)
         xyxy = self.rectify_xyxy(detections.xyxy * scale) / scale
-        return replace(detections, xyxy=xyxy.astype(np.float32))
+        numbers = detections.instances_at((self.raw.height, self.raw.width))
+        instances = None if numbers is None else self.rectify_depth(numbers)
+        return replace(detections, xyxy=xyxy.astype(np.float32), instances=instances)
 
     def rectify_xyxy(self, xyxy: Array) -> Array:
         """The boxes (N, 4), half open, around the rectified outlines of boxes of the raw picture.

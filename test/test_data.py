@@ -131,6 +131,8 @@ NOT_SYMMETRIC = np.eye(6) + np.eye(6, k=1)
         (frame, {"gravity": floats(3)}, "Frame.gravity: expected float64 of shape (3,)"),
         (frame, {"T_odom_camera": R_MIRRORED}, "Frame.T_odom_camera: expected a rigid motion"),
         (frame, {"T_odom_camera": np.full((4, 4), np.nan)}, "expected a rigid motion"),
+        (detections, {"instances": floats(3, 4)}, "Detections.instances: expected uint16 of shape (any, any)"),
+        (detections, {"instances": np.zeros((0, 4), np.uint16)}, "Detections: expected instances of a size above 0 px"),
         (detections, {"score": floats(3)}, "Detections.score: expected float32 of shape (N,) with {'N': 2}"),
         (detections, {"xyxy": np.full((2, 4), NAN)}, "expected finite boxes"),
         (detections, {"score": np.array([0.5, 1.5], np.float32)}, "expected scores in 0..1"),
@@ -237,3 +239,20 @@ def test_a_place_in_an_earlier_map_has_rigid_poses_and_a_finite_covariance() -> 
     for name, bad in (("T_map_odom", 2 * np.eye(4)), ("covariance", np.full((6, 6), np.nan))):
         with pytest.raises(ValueError, match="Relocalised"):
             data.Relocalised(stamp_ns=1, session=0, target_ns=0, closures=2, **good | {name: bad})
+
+
+def test_a_picture_of_instances_is_shown_in_another_size_by_the_nearest_pixel() -> None:
+    numbers = np.arange(12, dtype=np.uint16).reshape(3, 4)
+    one = detections(instances=numbers)
+    assert one.instances_at((3, 4)) is one.instances and detections().instances_at((3, 4)) is None
+    np.testing.assert_array_equal(one.instances_at((6, 8)), numbers.repeat(2, axis=0).repeat(2, axis=1))
+    np.testing.assert_array_equal(one.instances_at((1, 4)), numbers[1:2])
+    np.testing.assert_array_equal(detections(instances=numbers.repeat(3, 0).repeat(3, 1)).instances_at((3, 4)), numbers)
+
+
+def test_a_box_touches_the_pixels_that_it_covers_in_part_and_none_outside_the_picture() -> None:
+    xyxy = np.array([[1.2, 2.0, 3.1, 4.0], [-5, 40, 1e30, 60], [70, -9, 80, -3]], np.float32)
+    three = detections(xyxy=xyxy, score=floats(3), label=("a", "b", "c"))
+    assert [three.touched(k) for k in range(3)] == [
+        (slice(2, 4), slice(1, 4)), (slice(40, 48), slice(0, 64)), (slice(0, 0), slice(64, 64))
+    ]  # fmt: skip

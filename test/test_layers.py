@@ -37,6 +37,7 @@ FREE_BRIDGE = tuple(
         "pace",
         "layout",
         "lenses",
+        "masks",
         "pictures",
         "static_frames",
     )

@@ -124,6 +124,18 @@ def test_boxes_of_a_picture_of_another_size_are_rectified_at_that_size() -> None
     assert np.abs(two.xyxy - 2 * one.xyxy).max() < 1e-3 and two.image_hw == (480, 640) and two.label == ("cup",)
 
 
+@pytest.mark.parametrize("scale", [1, 2])
+def test_masks_are_rectified_as_depth_is_whatever_their_size(scale: int) -> None:
+    of = lens("plumb_bob")
+    numbers = np.zeros((240 * scale, 320 * scale), np.uint16)
+    numbers[60 * scale : 200 * scale, 30 * scale : 130 * scale] = 1
+    told = Detections(xyxy=np.array([[30, 60, 130, 200]], np.float32) * scale, score=np.ones(1, np.float32),
+                      label=("cup",), image_hw=numbers.shape, stamp_ns=5, instances=numbers)  # fmt: skip
+    found = of.rectify_detections(told).instances
+    np.testing.assert_array_equal(found, of.rectify_depth(np.ascontiguousarray(numbers[::scale, ::scale])))
+    assert not np.array_equal(found, numbers[::scale, ::scale])
+
+
 def test_no_boxes_stay_none_and_a_box_beside_the_picture_stays_empty() -> None:
     of = lens("plumb_bob")
     assert of.rectify_xyxy(np.zeros((0, 4))).shape == (0, 4)

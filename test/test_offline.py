@@ -4,6 +4,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,11 +15,14 @@ from simple_rooms import simple_rooms
 
 from objreg_ros.bridge import from_msg
 from objreg_ros.data import DepthImage, Detections, Frame
+from objreg_ros.detector.detector import Detector
+from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import back_project, pose, rotation_from_vector
 from objreg_ros.offline import Timing, as_sent, run_offline
 from objreg_ros.recording import Record, messages
 from objreg_ros.recording.inputs import Inputs
 from objreg_ros.segmenter.organise import organise
+from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.segmenter.sensor_estimate import Lag, SensorEstimate
 from objreg_ros.truth import Truth
 
@@ -467,3 +471,14 @@ def other_body(record: Record) -> Record:
     if record.topic == "/odom":
         message.child_frame_id = "base"
     return Record.of(record.topic, message, record.stamp_ns)
+
+
+def test_what_the_masks_of_a_model_cover_is_the_objects(tmp_path: Path) -> None:
+    pytest.importorskip("onnx")
+    from detector.discs import require_objects, save_disc_model
+
+    rooms, chain = simple_rooms()
+    detector = Detector(DetectorParams(), save_disc_model(tmp_path / "m.onnx", (CAMERA.height, CAMERA.width)))
+    run_offline(records(2), replace(rooms, detector=detector, segmenter=Segmenter()), INPUTS)
+    for frame in chain.frames:
+        require_objects(CAMERA, frame.objects)

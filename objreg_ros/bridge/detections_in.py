@@ -27,10 +27,9 @@ HEARD_S = 1.0  # most that a new name waits until everybody has it
 
 
 class Asked(NamedTuple):
-    """What is to be segmented: boxes, a mask (H, W) bool for each or None, and the numbers of all names."""
+    """What is to be segmented, and the numbers of all names."""
 
     detections: Detections
-    masks: tuple[Array, ...] | None
     names: to_msg.Labels
 
 
@@ -93,23 +92,20 @@ class DetectionsIn:
         if isinstance(message, Detections | PointCloud2):
             names = match["labels"]
             seen = self._door.read("detections", from_msg.detections, message, names, depth.depth.shape)
-            return Asked(self._door.read("camera_info", lenses.detections, seen, *lens), None, names)
-        seen, masks = self._door.read("detections", self._foreign, message, match.payloads.get("image"), depth, lens)
+            return Asked(self._door.read("camera_info", lenses.detections, seen, *lens), names)
+        seen = self._door.read("detections", self._foreign, message, match.payloads.get("image"), depth)
+        seen = self._door.read("camera_info", lenses.detections, seen, *lens)
         self._labels.include(seen.label)
         names = self._labels.names
         if names != self._told or self._out is None:  # the next room waits for a table, if of nothing
             self._tell(names)
-        return Asked(seen, masks, names)
+        return Asked(seen, names)
 
-    def _foreign(
-        self, message: Any, image: Any, depth: DepthImage, lens: tuple[Any, ...]
-    ) -> tuple[Detections, tuple[Array, ...] | None]:
+    def _foreign(self, message: Any, image: Any, depth: DepthImage) -> Detections:
         if not isinstance(message, Image):
-            seen = self._boxes(message, _size(image) or depth.depth.shape)
-            return lenses.detections(seen, *lens), None
-        numbers = vision_from_msg.fitted(self._numbers(message), depth.depth.shape)
+            return self._boxes(message, _size(image) or depth.depth.shape)
         where = from_msg.when_and_where(message)
-        return vision_from_msg.instances(lenses.instances(numbers, *lens), self._names, **where)
+        return vision_from_msg.instances(self._numbers(message), self._names, **where)
 
     def _boxes(self, message: Any, image_hw: tuple[int, int]) -> Detections:
         return vision_from_msg.boxes(message, self._names, image_hw)

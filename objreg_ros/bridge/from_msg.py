@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from objreg_ros import limits
+from objreg_ros.bridge import masks
 from objreg_ros.bridge.layout import SUPPORT_ID, SUPPORT_LABEL, SURPLUS, UNNAMED_ID, columns, table, whole_numbers
 from objreg_ros.bridge.pictures import colour_pixels, depth_metres, unpack_rgb
 from objreg_ros.data import (
@@ -375,13 +376,14 @@ def detections(message: Any, names: Mapping[int, str], image_hw: tuple[int, int]
         return message
     xyxy, score, label, told_hw = _rows_of_table(message, names)
     order = np.argsort(-score, kind="stable")
-    return Detections(
+    found = Detections(
         xyxy=np.ascontiguousarray(xyxy[order]),
         score=np.ascontiguousarray(score[order]),
         label=tuple(label[i] for i in order),
         image_hw=told_hw or image_hw,
         **when_and_where(message),
     )
+    return replace(found, instances=masks.read_masks(table(message).reshape(-1)[order], found))
 
 
 Rows = tuple[Array, Array, list[str], tuple[int, int] | None]

@@ -34,6 +34,7 @@ DETECTIONS = np.dtype(
         ("image_height", "<u2"),
     ]
 )
+MASK = "mask"  # the column behind these where masks are told: of each box a PNG of 0 and 255, zeros behind it
 SURPLUS = np.dtype([("surplus", "u1")])  # instead, of a picture that was left out to keep a pace; it has no rows
 
 # rgb is 0x00RRGGBB; the wire calls it FLOAT32, as PCL and RViz do.
@@ -68,7 +69,7 @@ def fields_of(layout: np.dtype[Any]) -> list[tuple[str, int, int]]:
     """(name, offset, datatype) of each field of a layout, as sensor_msgs/PointField wants them."""
     assert layout.fields is not None
     placed = [(name, *layout.fields[name][:2]) for name in layout.names or ()]
-    return [(name, offset, DATATYPES["f4" if name in PACKED else kind.str[1:]]) for name, kind, offset in placed]
+    return [(name, offset, DATATYPES["f4" if name in PACKED else kind.base.str[1:]]) for name, kind, offset in placed]
 
 
 def table(cloud: Any, *required: str) -> Array:

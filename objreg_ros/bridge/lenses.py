@@ -63,19 +63,11 @@ def depth_image(
 
 
 def detections(found: Detections, camera_info: Any, raw: Raw = Raw(), cloud: PointCloud | None = None) -> Detections:
-    """The boxes in the rectified picture; as they came where there is no camera_info or lens, or an organised cloud."""
+    """Boxes and masks in the rectified picture; as they came where is no camera_info or lens, or an organised cloud."""
     if camera_info is None or not raw.colour or (cloud is not None and cloud.organised):
         return found
     lens = lens_of(camera_info, raw)
     return found if lens is None else lens.rectify_detections(found)
-
-
-def instances(numbers: np.ndarray, camera_info: Any, raw: Raw = Raw(), cloud: PointCloud | None = None) -> np.ndarray:
-    """A picture of masks (H, W), rectified where `detections` are; 0 where no raw pixel shows the place."""
-    if camera_info is None or not raw.colour or (cloud is not None and cloud.organised):
-        return numbers
-    lens = lens_of(camera_info, raw)
-    return numbers if lens is None else lens.rectify_depth(numbers)
 
 
 def describe(camera_info: Any, raw: Raw = Raw(), points: bool = False) -> str:

@@ -8,6 +8,7 @@ tables mean is in `layout`.
 from __future__ import annotations
 
 import json
+import math
 from array import array
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -23,6 +24,7 @@ from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
 from std_msgs.msg import Header, String
 
 from objreg_ros import limits
+from objreg_ros.bridge import masks
 from objreg_ros.bridge.layout import (
     DETECTIONS,
     LANDMARKS,
@@ -164,7 +166,10 @@ def _without_rgb(layout: np.dtype[Any]) -> np.dtype[Any]:
 
 def _table(records: Array, stamp_ns: int, frame_id: str) -> PointCloud2:
     height, width = records.shape
-    fields = [PointField(name=n, offset=o, datatype=d, count=1) for n, o, d in fields_of(records.dtype)]
+    fields = [
+        PointField(name=name, offset=offset, datatype=kind, count=math.prod(records.dtype[name].shape))
+        for name, offset, kind in fields_of(records.dtype)
+    ]
     return PointCloud2(
         header=header(stamp_ns, frame_id),
         height=height,
@@ -192,7 +197,7 @@ def labels(names: Labels) -> String:
 def detections_table(detections: Detections, names: Labels) -> PointCloud2:
     """Detections as a typed table, one record a box; ValueError for a label that ``names`` does not hold.
 
-    And for a picture whose size does not fit into 16 bits.
+    And for a picture whose size does not fit into 16 bits. Masks are one more column (`masks`).
     """
     size = detections.image_hw
     if max(size) > MOST_WHOLE:
@@ -204,7 +209,7 @@ def detections_table(detections: Detections, names: Labels) -> PointCloud2:
     records["score"] = detections.score
     records["class_id"] = [_number(label, numbers) for label in detections.label]
     records["image_height"], records["image_width"] = detections.image_hw
-    return _table(records, detections.stamp_ns, detections.frame_id)
+    return _table(masks.with_masks(records, detections), detections.stamp_ns, detections.frame_id)
 
 
 def surplus(stamp_ns: int, frame_id: str) -> PointCloud2:

@@ -11,7 +11,6 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import find_objects
@@ -21,8 +20,6 @@ from objreg_ros.bridge import from_msg
 from objreg_ros.data import UNNAMED, Detections
 
 Array = NDArray[Any]
-
-MOST_BYTES = 200_000_000  # of the masks of one picture, a byte for each pixel of each
 
 
 def label_info(message: Any) -> dict[int, str]:
@@ -87,25 +84,18 @@ def _xyxy(bbox: Any) -> tuple[float, float, float, float]:
     return x - w, y - h, x + w, y + h
 
 
-def fitted(numbers: Array, shape: tuple[int, int]) -> Array:
-    """A picture of masks (H, W) uint16 at the size of the depth image, by the nearest pixel."""
-    height, width = shape
-    return numbers if numbers.shape == shape else cv2.resize(numbers, (width, height), interpolation=cv2.INTER_NEAREST)
-
-
-def instances(
-    numbers: Array, names: Mapping[int, str], stamp_ns: int, frame_id: str
-) -> tuple[Detections, tuple[Array, ...]]:
-    """The box and the mask (H, W) bool of every instance in ``numbers (H, W) uint16``, 0 for none.
+def instances(numbers: Array, names: Mapping[int, str], stamp_ns: int, frame_id: str) -> Detections:
+    """The box and the mask of every instance in ``numbers (H, W) uint16``, 0 for none.
 
     An instance without a name is `UNNAMED`: its number tells no class. A mask has no score of its own, so 1 is taken.
     """
     places = {number: place for number, place in enumerate(find_objects(numbers), start=1) if place is not None}
-    most = min(limits.MOST_DETECTIONS, MOST_BYTES // numbers.size)
-    if len(places) > most:
-        raise ValueError(f"masks: expected at most {most} instances in {numbers.size} pixels, got {len(places)}")
+    if len(places) > limits.MOST_DETECTIONS:
+        raise ValueError(f"masks: expected at most {limits.MOST_DETECTIONS} instances, got {len(places)}")
     corners = [(x.start, y.start, x.stop, y.stop) for y, x in places.values()]
-    found = Detections(
+    place_of = np.zeros(max(places, default=0) + 1, np.uint16)
+    place_of[list(places)] = np.arange(1, len(places) + 1)
+    return Detections(
         xyxy=np.array(corners, np.float32).reshape(-1, 4),
         score=np.ones(len(places), np.float32),
         label=tuple(names.get(number, UNNAMED) for number in places),
@@ -113,5 +103,5 @@ def instances(
         image_hw=numbers.shape,
         stamp_ns=stamp_ns,
         frame_id=frame_id,
+        instances=place_of[numbers],
     )
-    return found, tuple(numbers == number for number in places)

@@ -18,12 +18,15 @@ from objreg_ros.detector.runtime import Port
 class Candidates:
     """Boxes before suppression, ``xyxy (N, 4)`` in 0..1 of the model's picture: 0 and 1 are its outer edges.
 
-    ``score (N,)`` is as the model gives it, ``index (N,)`` that of the class, from 0.
+    ``score (N,)`` is as the model gives it, ``index (N,)`` that of the class, from 0. A segmentation head tells masks:
+    ``coefficients (N, M)`` of the ``prototypes (M, h, w)``, which show the model's picture; else both are None.
     """
 
     xyxy: Array
     score: Array
     index: Array
+    coefficients: Array | None = None
+    prototypes: Array | None = None
 
 
 class Contract(Protocol):
@@ -62,10 +65,19 @@ class Graph:
         return next((name for name, value in self.probe.items() if value.ndim == 3 and len(value) == 1), None)
 
     @property
+    def prototypes(self) -> str | None:
+        """The name of the one other output, ``[1,M,h,w]``, of a segmentation head; None where there is none."""
+        square = [name for name, value in self.probe.items() if value.ndim == 4 and len(value) == 1]
+        return square[0] if len(square) == 1 and len(self.probe) == 2 else None
+
+    @property
     def masks(self) -> int:
-        """How many numbers tell a box's mask, by the prototypes ``[1,M,h,w]`` of a segmentation head; 0 without."""
-        square = [value.shape[1] for value in self.probe.values() if value.ndim == 4 and len(value) == 1]
-        return int(square[0]) if len(square) == 1 and len(self.probe) == 2 else 0
+        """How many numbers tell a box's mask, by the prototypes of a segmentation head; 0 without."""
+        return 0 if self.prototypes is None else int(self.probe[self.prototypes].shape[1])
+
+    def names(self, head: str) -> tuple[str, ...]:
+        """The outputs to read: the head, and the prototypes where there are."""
+        return (head,) if self.prototypes is None else (head, self.prototypes)
 
 
 def class_index(classes: Array, first: int, labels: int) -> Array:

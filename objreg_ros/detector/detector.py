@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The detector: a picture goes in, named boxes come out."""
+"""The detector: a picture goes in, named boxes come out, with masks where the model makes them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from objreg_ros.data import Array, ColourImage, Detections
 from objreg_ros.detector.boxes import area, clip, suppress
 from objreg_ros.detector.contract import Candidates, Graph
 from objreg_ros.detector.labels import NO_CLASS, find_labels
+from objreg_ros.detector.masks import draw_masks
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.detector.picture import Picture
 from objreg_ros.detector.recognise import recognise
@@ -53,10 +55,10 @@ class Detector:
             raise ValueError(f"image: expected at least one pixel, got {width} x {height}")
         outputs = self._run(image.rgb, self._contract.names)
         candidates = self._contract.read(outputs, self.params.threshold)
-        scaled = self._picture.place(image.rgb).to_image(candidates.xyxy)
-        xyxy = clip(scaled, height, width).astype(np.float32)
+        place = self._picture.place(image.rgb)
+        xyxy = clip(place.to_image(candidates.xyxy), height, width).astype(np.float32)
         chosen = self._choose(xyxy, candidates, height * width)
-        return Detections(
+        found = Detections(
             xyxy=xyxy[chosen],
             score=np.clip(candidates.score[chosen], 0, 1).astype(np.float32),
             label=tuple(self.labels[index] for index in candidates.index[chosen]),
@@ -64,6 +66,7 @@ class Detector:
             stamp_ns=image.stamp_ns,
             frame_id=image.frame_id,
         )
+        return replace(found, instances=draw_masks(found, candidates, chosen, place))
 
     def _choose(self, xyxy: Array, candidates: Candidates, image_area: int) -> Array:
         """The rows that go on, best first."""

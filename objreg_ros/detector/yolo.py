@@ -23,6 +23,16 @@ def in_shares(xyxy: Array, hw: tuple[int, int]) -> Array:
     return (xyxy / np.array([hw[1], hw[0]] * 2, np.float32)).astype(np.float32)
 
 
+def masks_of(outputs: list[Array], coefficients: Array) -> tuple[Array, Array] | tuple[()]:
+    """Coefficients and prototypes of the boxes ``(N, M)`` that are read; nothing for a head without prototypes."""
+    if len(outputs) == 1:
+        return ()
+    if outputs[1].ndim != 4 or outputs[1].shape[:2] != (1, coefficients.shape[1]):
+        expected = f"[1, {coefficients.shape[1]}, h, w]"
+        raise ValueError(f"prototypes of the model: expected {expected}, got {list(outputs[1].shape)}; export it again")
+    return coefficients, outputs[1][0]
+
+
 @dataclass(frozen=True)
 class YoloV5:
     """Rows ``[1,N,5+C]`` of cx cy w h, objectness and class scores; YOLOv6 and YOLOv7 as well. Masks may follow."""
@@ -36,7 +46,7 @@ class YoloV5:
     @classmethod
     def of(cls, graph: Graph, head: str) -> YoloV5:
         """The contract of that output."""
-        return cls((head,), graph.labels, graph.probe[head].shape, graph.hw)
+        return cls(graph.names(head), graph.labels, graph.probe[head].shape, graph.hw)
 
     @staticmethod
     def fits(graph: Graph, shape: tuple[int, ...]) -> bool:
@@ -49,7 +59,8 @@ class YoloV5:
         row = outputs[0][0]
         likely = row[row[:, 4] >= threshold]
         rows, score, index = best_class((likely[:, 5 : 5 + self.labels] * likely[:, 4:5]).T, threshold)
-        return Candidates(in_shares(corners(likely[rows, :4]), self.hw), score, index)
+        told = masks_of(outputs, likely[rows, 5 + self.labels :])
+        return Candidates(in_shares(corners(likely[rows, :4]), self.hw), score, index, *told)
 
 
 @dataclass(frozen=True)
@@ -67,7 +78,7 @@ class YoloV8:
     def of(cls, graph: Graph, head: str) -> YoloV8:
         """The contract of that output."""
         shape = graph.probe[head].shape
-        return cls((head,), graph.labels, shape, graph.hw, shape[1] != 4 + graph.labels + graph.masks)
+        return cls(graph.names(head), graph.labels, shape, graph.hw, shape[1] != 4 + graph.labels + graph.masks)
 
     @staticmethod
     def fits(graph: Graph, shape: tuple[int, ...]) -> bool:
@@ -79,7 +90,8 @@ class YoloV8:
         require_rows(outputs[0], self.shape)
         column = outputs[0][0].T if self.by_row else outputs[0][0]
         rows, score, index = best_class(column[4 : 4 + self.labels], threshold)
-        return Candidates(in_shares(corners(column[:4, rows].T), self.hw), score, index)
+        told = masks_of(outputs, column[4 + self.labels :, rows].T)
+        return Candidates(in_shares(corners(column[:4, rows].T), self.hw), score, index, *told)
 
 
 @dataclass(frozen=True)
@@ -94,7 +106,7 @@ class EndToEnd:
     @classmethod
     def of(cls, graph: Graph, head: str) -> EndToEnd:
         """The contract of that output."""
-        return cls((head,), graph.labels, graph.hw)
+        return cls(graph.names(head), graph.labels, graph.hw)
 
     @staticmethod
     def fits(graph: Graph, shape: tuple[int, ...]) -> bool:
@@ -108,4 +120,5 @@ class EndToEnd:
         row = outputs[0][0]
         row = row[row[:, 4] >= threshold]
         index = class_index(row[:, 5], 0, self.labels)
-        return Candidates(in_shares(row[:, :4], self.hw), row[:, 4].astype(np.float32), index)
+        told = masks_of(outputs, row[:, 6:])
+        return Candidates(in_shares(row[:, :4], self.hw), row[:, 4].astype(np.float32), index, *told)

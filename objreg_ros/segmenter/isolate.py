@@ -63,8 +63,15 @@ def isolate(image: DepthImage, box: Box, ground: Ground, params: SegmenterParams
     return Isolated(pixels, flags, Cells(chosen, crop, grid.step))
 
 
-def cut_out(image: DepthImage, box: Box, mask: Array, ground: Ground, params: SegmenterParams) -> Isolated:
-    """What ``mask (H, W) bool`` of the picture covers within ``box``, taken at its word but for what is not measured.
+class Outline(NamedTuple):
+    """The pixels of the picture where ``numbers (H, W)`` are ``own``: a mask, of bool or of instances."""
+
+    numbers: Array
+    own: int = 1
+
+
+def cut_out(image: DepthImage, box: Box, mask: Outline, ground: Ground, params: SegmenterParams) -> Isolated:
+    """What ``mask`` of the picture covers within ``box``, taken at its word but for what is not measured.
 
     A pixel belongs to the mask by its cell, and by its depth: what the mask's edge takes of the background is left out
     as far as it is another cell's.
@@ -75,9 +82,9 @@ def cut_out(image: DepthImage, box: Box, mask: Array, ground: Ground, params: Se
     around, (left, top, right, bottom) = grid.crop(crop), crop
     rows, columns = (
         np.minimum(np.arange(first, end) * grid.step + grid.step // 2, size - 1)
-        for first, end, size in zip((top, left), (bottom, right), mask.shape, strict=True)
+        for first, end, size in zip((top, left), (bottom, right), mask.numbers.shape, strict=True)
     )
-    chosen = mask[np.ix_(rows, columns)] & (around.depth > 0)
+    chosen = (mask.numbers[np.ix_(rows, columns)] == mask.own) & (around.depth > 0)
     pixels = extract(image, box, around, chosen, jump)
     flags = whole_flags(image, pixels, around, chosen, (0, 0, right - left, bottom - top))
     return Isolated(pixels, flags, Cells(chosen, crop, grid.step))

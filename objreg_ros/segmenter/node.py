@@ -197,7 +197,7 @@ class SegmenterNode(MatchingDoor):
         gravity, felt = self._level_gravity(payload), self._felt_gravity(payload, depth.frame_id)
         with self.ledger.timed("segment"):
             told = (gravity, None) if felt is None else (felt.gravity, felt.gravity_sigma_deg)
-            frame = self._segmenter.segment(asked.detections, depth, told[0], asked.masks, told[1])
+            frame = self._segmenter.segment(asked.detections, depth, told[0], gravity_sigma_deg=told[1])
         self._note_gravity()
         self._doubt(asked.detections, depth, frame)
         self._publish(frame, asked.names)

@@ -18,7 +18,7 @@ from objreg_ros.segmenter.depth_to_colour import warm as warm_offset
 from objreg_ros.segmenter.extract import Pixels, cell_points, colours
 from objreg_ros.segmenter.gravity import camera_up, estimate_up, known_normals
 from objreg_ros.segmenter.gravity_choice import GravityChoice, choose_gravity
-from objreg_ros.segmenter.isolate import Isolated, cut_out, isolate, mark
+from objreg_ros.segmenter.isolate import Isolated, Outline, cut_out, isolate, mark
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.sensor_estimate import SensorEstimate
 from objreg_ros.segmenter.support import Ground, find_supports
@@ -91,10 +91,11 @@ class Segmenter:
         Objects without a name come last, with `UNNAMED` for a label, where the parameter `unnamed` asks for them.
         ``T_odom_camera`` is None.
 
-        ``masks`` has for each box a mask (H, W) bool of the depth image, or None: what it covers is the object, instead
-        of what stands in the box. ValueError for masks of another number, type or shape.
+        What a mask covers is the object, instead of what stands in the box: that of ``detections.instances``, or of
+        ``masks``, which has for each box a mask (H, W) bool of the depth image, or None. ValueError for masks of
+        another number, type or shape.
         """
-        params, outlines = self.params, _outlines(masks, len(detections), depth)
+        params, outlines = self.params, _outlines(masks, detections, depth)
         depth = self.sensor.register(_plain(depth))
         seen = (depth, step_for(depth.depth.shape[1], params.view_step), params.z_min, params.limits[0])
         view = self._beside.submit(reduced_view, *seen)
@@ -135,7 +136,7 @@ class Segmenter:
         return [_object(UNNAMED, one.own, named + k, one.pixels, one.flags) for k, one in enumerate(found, start=1)]
 
     def _cut_all(
-        self, depth: DepthImage, asked: list[Box], outlines: Sequence[Array | None], ground: Ground
+        self, depth: DepthImage, asked: list[Box], outlines: Sequence[Outline | None], ground: Ground
     ) -> dict[int, Isolated]:
         """What each box that is not empty shows, by its number; about half of the pixels on a second thread."""
         first, second = boxes.halves(asked)
@@ -145,7 +146,7 @@ class Segmenter:
             found[k] = _result(beside[k], self._cut, depth, asked[k], outlines[k], ground)
         return found
 
-    def _cut(self, depth: DepthImage, box: Box, outline: Array | None, ground: Ground) -> Isolated:
+    def _cut(self, depth: DepthImage, box: Box, outline: Outline | None, ground: Ground) -> Isolated:
         if outline is not None:
             return cut_out(depth, box, outline, ground, self.params)
         if self.params.preset == "paper":
@@ -164,16 +165,20 @@ class Segmenter:
         return Ground(up, confidence, supports, surface, coarse)
 
 
-def _outlines(masks: Sequence[Array | None] | None, count: int, depth: DepthImage) -> Sequence[Array | None]:
-    """A mask or None for each box; ValueError for another number or another shape."""
+def _outlines(
+    masks: Sequence[Array | None] | None, detections: Detections, depth: DepthImage
+) -> Sequence[Outline | None]:
+    """The outline of each box, or None; ValueError for masks of another number or another shape."""
+    count = len(detections)
     if masks is None:
-        return [None] * count
+        numbers = detections.instances_at(depth.depth.shape)
+        return [None if numbers is None else Outline(numbers, k + 1) for k in range(count)]
     if len(masks) != count:
         raise ValueError(f"masks: expected one or None for each of {count} boxes, got {len(masks)}")
     for mask in masks:
         if mask is not None and (mask.dtype != np.bool_ or mask.shape != depth.depth.shape):
             raise ValueError(f"mask: expected bool of shape {depth.depth.shape}, got {mask.dtype} of {mask.shape}")
-    return masks
+    return [None if mask is None else Outline(mask) for mask in masks]
 
 
 def _result(beside: Future[Any], work: Callable[..., Any], *inputs: Any) -> Any:

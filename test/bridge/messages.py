@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 from typing import Any
 
@@ -47,10 +48,12 @@ def camera_info(
 
 def cloud(records: np.ndarray, pad: int = 0, **where: Any) -> SimpleNamespace:
     """A PointCloud2 of records (H, W) with ``pad`` bytes behind each row; big endian if the records are."""
-    big = any(kind.byteorder == ">" for kind, *_ in records.dtype.fields.values())
+    big = any(kind.base.byteorder == ">" for kind, *_ in records.dtype.fields.values())
     kinds = {np.dtype(f): n for f, n in zip(["i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8"], range(1, 9), strict=True)}
     fields = [
-        SimpleNamespace(name=name, offset=place[1], datatype=kinds[place[0].newbyteorder("=")], count=1)
+        SimpleNamespace(
+            name=name, offset=place[1], datatype=kinds[place[0].base.newbyteorder("=")], count=math.prod(place[0].shape)
+        )
         for name, place in records.dtype.fields.items()
     ]
     rows = np.frombuffer(np.ascontiguousarray(records).tobytes(), np.uint8).reshape(len(records), -1)
@@ -72,7 +75,8 @@ def own_table(rows: np.ndarray, **where: Any) -> SimpleNamespace:
     """A PointCloud2 of rows (N,) or (H, W) in one of the layouts of this package."""
     message = cloud(np.atleast_2d(rows), **where)
     placed = fields_of(rows.dtype)
-    message.fields = [SimpleNamespace(name=n, offset=o, datatype=d, count=1) for n, o, d in placed]
+    count = {name: math.prod(rows.dtype[name].shape) for name, *_ in placed}
+    message.fields = [SimpleNamespace(name=n, offset=o, datatype=d, count=count[n]) for n, o, d in placed]
     return message
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -88,8 +89,17 @@ def test_our_table_is_read_with_the_names_that_were_told() -> None:
     door.hear("detections_table", message)
     assert door.fed == [("labels", 0, NAMES), ("detections", 5, message)]
     asked = read(inputs, message, labels=NAMES)
-    assert asked.detections.label == ("cup", "cup") and asked.masks is None and asked.names == NAMES
+    assert asked.detections.label == ("cup", "cup") and asked.detections.instances is None and asked.names == NAMES
     assert door.published == []
+
+
+def test_masks_of_our_table_reach_the_segmenter_as_a_message_and_as_a_word() -> None:
+    instances = np.zeros((60, 80), np.uint16)
+    instances[12:18, 11:15] = 1
+    word = replace(boxes(1), instances=instances)
+    for told in (word, to_msg.detections_table(word, NAMES)):
+        seen = read(DetectionsIn(Door(), "table"), told, labels=NAMES).detections  # type: ignore[arg-type]
+        np.testing.assert_array_equal(seen.instances, instances)
 
 
 def test_a_surplus_picture_is_fed_as_one() -> None:
@@ -105,7 +115,8 @@ def test_masks_bring_a_table_of_names_that_is_everywhere_before_their_objects() 
     door.hear("masks", masks())
     assert [name for name, *_ in door.fed] == ["labels", "detections"]
     asked = read(inputs, masks())
-    assert asked.detections.label == (UNNAMED,) and asked.masks is not None and asked.masks[0].sum() == 200
+    assert asked.detections.label == (UNNAMED,) and asked.detections.instances is not None
+    assert np.bincount(asked.detections.instances.ravel())[1:].tolist() == [200]
     assert [from_msg.labels(message) for message in door.published] == [{}] and door.acknowledged == [1]
     inputs._names = {4: "cup"}
     for _ in range(2):

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from detector.discs import instances, require_objects, save_disc_model
 from nav_msgs.msg import Odometry
-from recording.folders import tum_folder
+from recording.folders import CAMERA, tum_folder
 from sensor_msgs.msg import PointCloud2
 
 from objreg_ros.bridge import from_msg, qos
@@ -65,6 +66,24 @@ def test_who_listens_from_outside_hears_what_the_rooms_say(fresh: Graph, tiny_mo
     objreg(fresh, "replay", str(tum_folder(tmp_path / "tum", frames=3)), *LOSSLESS)
     for topic in topics:
         fresh.wait_for(lambda: len(fresh.heard[topic]) == 3, what=topic)  # noqa: B023
+
+
+@pytest.mark.parametrize("composed", [False, True], ids=["three", "one"])
+def test_the_masks_of_our_detector_cut_the_objects_in_three_processes_and_in_one(
+    composed: bool, fresh: Graph, tmp_path: Path
+) -> None:
+    model = save_disc_model(tmp_path / "discs.onnx", (CAMERA.height, CAMERA.width))
+    fresh.hear(PointCloud2, "objects")
+    fresh.hear(PointCloud2, "detections_table")
+    (compose if composed else start)(fresh, model)
+    objreg(fresh, "replay", str(tum_folder(tmp_path / "tum", frames=3)), *LOSSLESS)
+    fresh.wait_for(lambda: all(len(fresh.heard[name]) == 3 for name in ("objects", "detections_table")), what="all")
+    names = {0: "cup", 1: "pot", 2: "book"}
+    expected, known = instances((CAMERA.height, CAMERA.width))
+    for objects, table in zip(fresh.heard["objects"], fresh.heard["detections_table"], strict=True):
+        require_objects(CAMERA, from_msg.objects(objects, names)[0])
+        found = from_msg.detections(table, names).instances
+        assert found is not None and np.array_equal(found[known], expected[known])
 
 
 def test_a_node_that_is_refused_ends_the_process_with_one_line(fresh: Graph, tmp_path: Path) -> None:

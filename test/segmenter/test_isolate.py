@@ -10,7 +10,7 @@ import pytest
 
 from objreg_ros.data import DepthImage, PointFlag
 from objreg_ros.segmenter.boxes import Box, pixel_boxes
-from objreg_ros.segmenter.isolate import Cells, Isolated, cut_out, isolate, mark
+from objreg_ros.segmenter.isolate import Cells, Isolated, Outline, cut_out, isolate, mark
 from objreg_ros.segmenter.params import SegmenterParams
 
 from .scenes import CAMERA, Scene, two_boxes
@@ -140,7 +140,7 @@ def test_the_cells_of_an_object_are_marked_on_the_grid_of_the_supports_and_no_ma
 
 def masked(scene: Scene, mask: np.ndarray, box: Box) -> Isolated:
     image = scene.image(NOISE)
-    return cut_out(image, box, mask, scene.ground(image), PARAMS)
+    return cut_out(image, box, Outline(mask), scene.ground(image), PARAMS)
 
 
 def test_what_a_mask_covers_is_the_object_whatever_stands_there(boxes: Scene) -> None:

@@ -141,7 +141,9 @@ def spied(camera: Camera, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """The boxes and the depth image of each frame that its segmenter gets."""
     met: list[Any] = []
     segment = camera.door._segmenter.segment
-    spy = lambda boxes, depth, *more: met.append((boxes.xyxy, depth)) or segment(boxes, depth, *more)  # noqa: E731
+    spy = lambda boxes, depth, *more, **named: (  # noqa: E731
+        met.append((boxes.xyxy, depth)) or segment(boxes, depth, *more, **named)
+    )
     monkeypatch.setattr(camera.door._segmenter, "segment", spy)
     return met
 

@@ -172,6 +172,32 @@ def test_a_mask_takes_the_place_of_what_stands_in_its_box_and_none_leaves_a_box_
     np.testing.assert_array_equal(frame.objects[1].xyz, Segmenter().segment(asked, image).objects[1].xyz)
 
 
+@pytest.mark.parametrize("every", [1, 2])
+def test_instances_of_any_size_take_the_place_of_what_stands_in_the_boxes(every: int) -> None:
+    scene = two_boxes()
+    asked, image = scene.detections(scene.box_of(2), scene.box_of(3)), scene.image(NOISE)
+    halves = [scene.owner == 2, scene.owner == 3]
+    for half in halves:
+        half[:, : int(np.flatnonzero(half.any(axis=0)).mean())] = False
+    numbers = (halves[0] + 2 * halves[1].astype(np.uint16)).astype(np.uint16)
+    frame = Segmenter().segment(replace(asked, instances=np.ascontiguousarray(numbers[::every, ::every])), image)
+    told = Segmenter().segment(asked, image, masks=halves)
+    assert len(frame.objects) == 2
+    for one, other, half in zip(frame.objects, told.objects, halves, strict=True):
+        assert abs(len(one) - half.sum()) < 0.06 * half.sum()
+        if every == 1:
+            np.testing.assert_array_equal(one.xyz, other.xyz)
+
+
+def test_a_box_that_no_instance_is_of_gives_no_object() -> None:
+    scene = two_boxes()
+    numbers = 2 * (scene.owner == 3).astype(np.uint16)
+    asked = replace(scene.detections(scene.box_of(2), scene.box_of(3)), instances=numbers)
+    assert [
+        one.label for one in Segmenter(SegmenterParams(unnamed=False)).segment(asked, scene.image(NOISE)).objects
+    ] == ["1"]
+
+
 @pytest.mark.parametrize(
     ("masks", "message"),
     [
