@@ -197,7 +197,12 @@ class PoseGraph:
             for s, session in enumerate(self.sessions)
             for k in range(1, len(session.keyframes))
         ]
-        return steps + [tie for k, tie in enumerate(self._closures) if k not in self._withdrawn]
+        return steps + self.closures
+
+    @property
+    def closures(self) -> list[Tie]:
+        """The closures that are not withdrawn."""
+        return [tie for k, tie in enumerate(self._closures) if k not in self._withdrawn]
 
     @property
     def is_placed(self) -> bool:
