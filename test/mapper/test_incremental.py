@@ -120,8 +120,9 @@ def test_what_an_edge_is_expected_to_cost_is_what_it_costs(sideways: float) -> N
 
 
 def test_a_graph_without_an_answer_says_so() -> None:
-    graph = row()
-    graph.grow(translation(9.0)[None], edges_of(()))  # nothing ties it
+    graph, spoilt = row(), edge(0, 5, translation(5.0))
+    spoilt.T_1_2[0, 0, 3] = np.nan
+    graph.add(spoilt)
     with pytest.raises(RuntimeError):
         graph.settle()
 
