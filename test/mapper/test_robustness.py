@@ -91,8 +91,8 @@ def random_walk(seed: int) -> Walk:
     rng = np.random.default_rng([seed, 4])
     agreeing, farthest_m = float(rng.choice([0.0, 0.05, 0.1])), float(rng.choice([1.0, 10.0, 1e9]))
     params = WalkParams(
-        poses=int(rng.integers(80, 240)),
-        closures=int(rng.integers(10, 40)),
+        poses=int(rng.integers(80, 200)),
+        closures=int(rng.integers(10, 32)),
         corridor_m=float(rng.uniform(2.0, 6.0)),
         false_share=FALSE - agreeing,
         agreeing_share=agreeing,
