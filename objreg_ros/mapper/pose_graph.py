@@ -163,14 +163,19 @@ class PoseGraph:
         """What there is to solve now; solved by one thread, while another goes on with the graph."""
         counts = tuple(len(session.keyframes) for session in self.sessions)
         return Problem(
-            self._solver, tuple(self.sessions), counts, self._closures, len(self._closures),
-            frozenset(self._withdrawn), self.params,
+            self._solver,
+            tuple(self.sessions),
+            counts,
+            self._closures,
+            len(self._closures),
+            frozenset(self._withdrawn),
+            self.params,
         )
 
     def adopt(self, problem: Problem, solution: Solution) -> Summary:
         """Take over the solution of a problem of this graph; keyframes that came since then follow its last one."""
         self._solution = solution
-        kept, pruned = [], []
+        kept, pruned = list[tuple[LoopClosure, float]](), list[tuple[LoopClosure, float]]()
         for k, (is_kept, residual) in enumerate(zip(solution.kept, solution.residuals, strict=True)):
             closure = self._closures[k].closure
             if closure is not None and k not in problem.withdrawn and not np.isnan(residual):

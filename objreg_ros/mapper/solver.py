@@ -248,7 +248,9 @@ class Solver:
             return None
         T_chain_end, T_map_end = chain.T_chain_body[ends], np.array(places)
         T_map_chain = T_map_end @ inverses(T_chain_end)
-        apart = np.linalg.norm((T_map_chain[:, None] @ T_chain_end[None])[..., :3, 3] - T_map_end[None, :, :3, 3], axis=2)
+        apart = np.linalg.norm(
+            (T_map_chain[:, None] @ T_chain_end[None])[..., :3, 3] - T_map_end[None, :, :3, 3], axis=2
+        )
         ways = np.array([[known.way_m(a, b) for b in ends] for a in ends])
         votes = (np.maximum(apart, apart.T) < AGREEING_M + AGREEING_SHARE * ways).sum(axis=1)
         best = int(votes.argmax())
@@ -262,7 +264,9 @@ class Solver:
         expected = problem.params.steady
         if not any(expected):
             return
-        plain = self._rebuilt(problem, {session: Steady() for session in self._routes}) if self._is_corrected() else self
+        plain = (
+            self._rebuilt(problem, {session: Steady() for session in self._routes}) if self._is_corrected() else self
+        )
         found, best = plain._steady(problem), plain
         for _ in range(ROUNDS):
             best = best._rebuilt(problem, found)
@@ -270,7 +274,10 @@ class Solver:
             if np.allclose([*found.values()], [*known.values()], atol=SETTLED):
                 break
         steady = [route.chain.steady for route in best._routes.values()]
-        unexpected = sum(np.square([part / sigma for part, sigma in zip(one, expected, strict=True) if sigma]).sum() for one in steady)
+        unexpected = sum(
+            np.square([part / sigma for part, sigma in zip(one, expected, strict=True) if sigma]).sum()
+            for one in steady
+        )
         gain = plain._cost() - best._cost() - unexpected
         chosen = best if gain > sum(map(len, steady)) * np.log(FREEDOMS * len(self._numbers)) else plain
         self._robust, self._routes = chosen._robust, chosen._routes

@@ -71,7 +71,13 @@ def test_after_a_silence_the_next_keyframe_may_be_anywhere() -> None:
 
 def test_it_covers_what_odometry_told_of_and_no_silence() -> None:
     session = told(straight(0.0, 0.5, 1.0), [1.0, 1.1, 20.0])
-    assert [session.covers(round(s * SECOND)) for s in (0.9, 1.05, 10.0, 20.0, 20.1)] == [False, True, False, True, False]
+    assert [session.covers(round(s * SECOND)) for s in (0.9, 1.05, 10.0, 20.0, 20.1)] == [
+        False,
+        True,
+        False,
+        True,
+        False,
+    ]
 
 
 def test_time_that_runs_back_is_refused_and_changes_nothing() -> None:

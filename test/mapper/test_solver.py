@@ -37,7 +37,9 @@ def session(poses: Sequence[Array], params: MapperParams = PLAIN) -> Session:
     return made
 
 
-def tie(sessions: Sequence[Session], one: End, other: End, true: tuple[Array, Array], error: Array | None = None) -> Tie:
+def tie(
+    sessions: Sequence[Session], one: End, other: End, true: tuple[Array, Array], error: Array | None = None
+) -> Tie:
     """What says of two keyframes where they truly are, or a tie that is off by an error."""
     T = inverse(true[0]) @ true[1] @ (np.eye(4) if error is None else error)
     covariance = np.diag([0.02**2] * 3 + [np.radians(0.5) ** 2] * 3)

@@ -100,7 +100,11 @@ def test_lies_have_their_share_of_all(false: float, agreeing: float) -> None:
 
 
 def test_lies_are_of_any_size_and_as_sure_as_they_like() -> None:
-    found = [(walk_, word) for walk_ in (walk(WalkParams(false_share=0.4), seed) for seed in range(6)) for word in lies(walk_)]
+    found = [
+        (walk_, word)
+        for walk_ in (walk(WalkParams(false_share=0.4), seed) for seed in range(6))
+        for word in lies(walk_)
+    ]
     metres = np.array([np.linalg.norm(error(of, word)[:3, 3]) for of, word in found])
     sigmas = np.sqrt([word.covariance[0, 0] for _, word in found])
     assert metres.min() >= 0.1 - 1e-9 and metres.max() <= 1e9 * (1 + 1e-9)
