@@ -19,7 +19,7 @@ from objreg_ros.adapters.params import BodyParams, ToG2oParams
 from objreg_ros.bridge.door import DroppedError
 from objreg_ros.bridge.spin import run
 from objreg_ros.data import LoopClosure, Odometry
-from objreg_ros.mapper.adapters.g2o import map_text
+from objreg_ros.mapper.adapters.g2o import graph_text
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.pose_graph import ImplausibleError, PoseGraph
 from objreg_ros.mapper.restart import Anew
@@ -102,7 +102,7 @@ class ToG2o(Adapter):
     def write(self) -> None:
         """Write the file whole, then put it in the place of the one before. OSError where that cannot be."""
         part = self.path.with_name(f".{self.path.name}.part")
-        part.write_text(map_text(self._graph), encoding="ascii")
+        part.write_text(graph_text(*self._graph.flat()), encoding="ascii")
         os.replace(part, self.path)
         self._has_news = False
 
@@ -117,7 +117,7 @@ class ToG2o(Adapter):
 
     def extra_diagnostics(self) -> Mapping[str, object]:
         """And what the file has."""
-        told = {"vertices": len(self._graph.keyframes), "constraints in the file": len(self._graph.closures)}
+        told = {"vertices": len(self._graph.keyframes), "constraints in the file": len(self._graph.closure_ties)}
         return {**super().extra_diagnostics(), **told}
 
     def close(self) -> None:

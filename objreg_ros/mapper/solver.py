@@ -26,7 +26,8 @@ from objreg_ros.mapper.robust import RobustGraph
 from objreg_ros.mapper.session import Session, stacked
 from objreg_ros.mapper.steady import Steady, estimate
 
-FREEDOMS = 6  # of a closure
+FREEDOMS, FREEDOMS_OF_STEADY = 6, 3  # of a closure, and of what is steadily wrong with an odometry
+MOST_TRIED = 2  # of the newest closures that are left out
 ROUNDS = 4  # most times that odometry is corrected
 SETTLED = 5e-4  # rad/m and m/m: a change of its steady error that matters no more
 GROWTH = 1.1  # so many times the closures there were, and what is steady is looked at again
@@ -264,27 +265,39 @@ class Solver:
         expected = problem.params.steady
         if not any(expected):
             return
-        plain = (
-            self._rebuilt(problem, {session: Steady() for session in self._routes}) if self._is_corrected() else self
-        )
-        found, best = plain._steady(problem), plain
+        plain = self
+        if self._is_corrected():
+            plain = self._rebuilt(problem, {session: Steady() for session in self._routes})
+        assert plain._robust is not None
+        starts = [plain, *(plain._forced(number) for number in plain._robust.left_out[-MOST_TRIED:])]
+        best = min((start._corrected(problem) for start in starts), key=lambda solver: solver._cost(expected))
+        needed = FREEDOMS_OF_STEADY * len(self._routes) * np.log(FREEDOMS * len(self._numbers))
+        chosen = best if best._cost(expected) + needed < plain._cost(expected) else plain
+        self._robust, self._routes = chosen._robust, chosen._routes
+
+    def _forced(self, number: int) -> Solver:
+        """With a closure that was left out: it may be right where odometry is steadily wrong."""
+        assert self._robust is not None
+        other = copy(self)
+        other._robust = self._robust.forced(number)
+        return other
+
+    def _corrected(self, problem: Problem) -> Solver:
+        """In turn what the map says is steadily wrong with odometry, and the map, until the first changes little."""
+        best, found = self, self._steady(problem)
         for _ in range(ROUNDS):
             best = best._rebuilt(problem, found)
             known, found = found, best._steady(problem)
             if np.allclose([*found.values()], [*known.values()], atol=SETTLED):
                 break
-        steady = [route.chain.steady for route in best._routes.values()]
-        unexpected = sum(
-            np.square([part / sigma for part, sigma in zip(one, expected, strict=True) if sigma]).sum()
-            for one in steady
-        )
-        gain = plain._cost() - best._cost() - unexpected
-        chosen = best if gain > sum(map(len, steady)) * np.log(FREEDOMS * len(self._numbers)) else plain
-        self._robust, self._routes = chosen._robust, chosen._routes
+        return best
 
-    def _cost(self) -> float:
+    def _cost(self, expected: Steady) -> float:
+        """What all residuals cost, and how unexpected what is steadily wrong is."""
         assert self._robust is not None
-        return self._robust.cost
+        sigmas = np.array(expected)
+        steady = np.array([route.chain.steady for route in self._routes.values()])
+        return self._robust.cost + float(np.square(steady[:, sigmas > 0] / sigmas[sigmas > 0]).sum())
 
     def _is_corrected(self) -> bool:
         return any(route.chain.steady != Steady() for route in self._routes.values())

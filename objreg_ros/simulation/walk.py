@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Walks of a body with odometry that drifts and closures, some of them false: what a mapper gets, without images."""
+"""Walks of a body with odometry that drifts and closures of which some are false: what a mapper gets, no images."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class WalkParams:
 
 @dataclass(frozen=True)
 class Walk:
-    """``T_world_body (n, 4, 4)``, odometry of the same moments; closures and ``is_false (m,)``, the earliest first."""
+    """``T_world_body (n, 4, 4)``, odometry of the same moments, and closures in order, each with ``is_false (m,)``."""
 
     T_world_body: Array
     odometry: tuple[Odometry, ...]

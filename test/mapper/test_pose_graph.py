@@ -318,7 +318,7 @@ def test_a_withdrawn_closure_is_in_no_map_and_no_summary_any_more() -> None:
     assert graph.withdraw(lambda word: word is slightly) == 1 and graph.withdraw(lambda word: word is slightly) == 0
     summary = graph.optimise()
     assert slightly not in (*summary.kept, *summary.pruned) and len(summary.kept) == len(RIGHT)
-    assert slightly not in [tie.closure for tie in graph.ties] and len(graph.closures) == len(RIGHT)
+    assert slightly not in [tie.closure for tie in graph.ties] and len(graph.closure_ties) == len(RIGHT)
     assert distances(corrected(graph), corrected(clean)).max() < 0.005
 
 
@@ -364,7 +364,7 @@ def test_two_runs_of_one_clock_that_nothing_tells_apart_are_refused(
     graph = two_sessions(second)
     with pytest.raises(ValueError, match="expected a constraint that names its sessions, as 2 runs of odometry have"):
         graph.add_closure(across(20, 21, sessions))
-    assert not graph.closures
+    assert not graph.closure_ties
 
 
 def test_a_session_that_one_closure_ties_waits_for_another() -> None:
@@ -400,3 +400,19 @@ def test_a_session_of_no_odometry_is_none() -> None:
     graph.begin_session(4)
     graph.begin_session(5)
     assert [one.name for one in graph.sessions] == [3, 5] and not graph.is_placed
+
+
+def test_the_keyframes_of_sessions_are_numbered_in_one_row_once_they_are_in_the_map() -> None:
+    graph = two_sessions()
+    first, second = (len(one.keyframes) for one in graph.sessions)
+    for a, b in ((20, 21), (60, 62)):
+        assert graph.add_closure(across(a, b))
+    poses, edges = graph.flat()
+    assert len(poses) == first and [edge[:2] for edge in edges] == [(k, k + 1) for k in range(first - 1)]
+    graph.optimise()
+    poses, edges = graph.flat()
+    rows = [*range(first - 1), *range(first, first + second - 1)]
+    assert len(poses) == first + second and [edge[:2] for edge in edges[:-2]] == [(k, k + 1) for k in rows]
+    for k1, k2, constraint in edges:
+        assert pose_error(inverse(poses[k1]) @ poses[k2], constraint.T_from_to)[1] < 10.0
+    assert all(k1 < first <= k2 for k1, k2, _ in edges[-2:])

@@ -8,31 +8,12 @@ last three for half the rotation vector and so trusts rotations a quarter as muc
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from itertools import accumulate
 
 import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import quaternion_from_rotation
 from objreg_ros.mapper.constraint import Constraint, local_information
-from objreg_ros.mapper.pose_graph import PoseGraph
-from objreg_ros.mapper.solver import End
-
-
-def map_text(graph: PoseGraph) -> str:
-    """The file of a map: the keyframes of its sessions, the first session's first, and what ties them.
-
-    A session that is not in the map yet is left out, with all that ties it.
-    """
-    paths = graph.paths()
-    firsts = [0, *accumulate(map(len, paths))]
-
-    def vertex(end: End) -> int:
-        return firsts[end.session] + end.keyframe
-
-    ties = [tie for tie in graph.ties if paths[tie.end1.session] and paths[tie.end2.session]]
-    edges = [(vertex(tie.end1), vertex(tie.end2), tie.constraint) for tie in ties]
-    return graph_text([T for path in paths for _, T in path], edges)
 
 
 def graph_text(poses: Sequence[Array], edges: Iterable[tuple[int, int, Constraint]]) -> str:

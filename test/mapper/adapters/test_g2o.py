@@ -3,14 +3,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from objreg_ros.mapper.adapters.g2o import edge_text, graph_text, map_text
-from objreg_ros.mapper.pose_graph import PoseGraph
+from objreg_ros.mapper.adapters.g2o import edge_text, graph_text
 
-from ..bent import SECOND, closure, odometry, square
 from .blank import CONSTRAINT, LOCAL_INFORMATION_DIAGONAL, QUARTER_LEFT
 
 HALF = np.sqrt(0.5)
@@ -35,26 +31,3 @@ def test_a_graph_lists_its_vertices_fixes_the_first_and_ends_with_its_edges() ->
         ["EDGE_SE3:QUAT", "0"],
     ]
     assert graph_text([], []) == ""
-
-
-def test_the_vertices_of_a_second_session_follow_those_of_the_first_once_it_is_in_the_map() -> None:
-    graph, true = PoseGraph(), square()
-    for word in odometry(true):
-        graph.add_odometry(word)
-    first = len(graph.keyframes)
-    graph.begin_session()
-    for word in odometry(true):
-        graph.add_odometry(replace(word, stamp_ns=word.stamp_ns + 60 * SECOND))
-    for k in (2, 30):
-        told = closure(true, k, k)
-        assert graph.add_closure(replace(told, to_ns=told.to_ns + 60 * SECOND))
-    steps = [f"{k} {k + 1}" for k in range(first - 1)]
-    alone = [line.split() for line in map_text(graph).splitlines()]
-    assert sum(line[0].startswith("VERTEX") for line in alone) == first
-    assert [" ".join(line[1:3]) for line in alone if line[0].startswith("EDGE")] == steps
-    graph.optimise()
-    both = [line.split() for line in map_text(graph).splitlines()]
-    assert [int(line[1]) for line in both if line[0].startswith("VERTEX")] == list(range(2 * first))
-    ends = [(int(line[1]), int(line[2])) for line in both if line[0].startswith("EDGE")]
-    assert [b - a for a, b in ends] == [1] * (2 * first - 2) + [first, first]
-    assert (first - 1, first) not in ends
