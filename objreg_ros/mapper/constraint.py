@@ -15,9 +15,6 @@ from objreg_ros.data import Array, LoopClosure
 from objreg_ros.geometry import inverse, pose, rotation_angle, skew
 from objreg_ros.mapper.trajectory import Trajectory
 
-# Between the error [t r] of ROS, RTAB-Map, g2o and the error [r t] of GTSAM.
-ROTATION_FIRST = np.roll(np.eye(6), 3, axis=0)
-
 
 class Constraint(NamedTuple):
     """``T_from_to (4, 4)`` and its ``covariance (6, 6)`` in ROS order, in the *from* frame."""
