@@ -4,10 +4,10 @@
 from __future__ import annotations
 
 import sys
+
 import numpy as np
 import pytest
 
-from objreg_ros.geometry import rotation_from_vector
 from objreg_ros.report.story import Story
 from objreg_ros.truth import Truth
 
