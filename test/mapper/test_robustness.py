@@ -111,7 +111,7 @@ def harm(seed: int) -> float:
 
 @pytest.mark.slow
 def test_a_third_of_lies_hardly_ever_harms_a_map() -> None:
-    """Of 300 graphs 17 were harmed by 1.3 times, one by twice: by lies so small that odometry cannot contradict them."""
+    """Of 300 graphs 17 were harmed by 1.3 times, one by twice: by lies too small for odometry to contradict them."""
     harms = np.array([harm(seed) for seed in range(GRAPHS)])
     harmed = f"harmed: {np.flatnonzero(harms > 1.3).tolist()}"
     assert np.median(harms) <= 1.02, harmed
