@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is the mapper worth? Against false closures, over kilometres, on recordings with truth, and on public graphs.
+
+    python benchmarks/mapper.py robust --graphs 200 --seed 0
+    python benchmarks/mapper.py scale --poses 40000 --closures 5000
+    python benchmarks/mapper.py limits REC --simulate loop:0 --drifts 6
+    python benchmarks/mapper.py public sphere2500.g2o
+
+``robust``: random walks with 10, 20 or 30 % false closures of any size and claimed sigma, a third of the walks with up
+to 10 % that agree with each other. The error of the trajectory over that of our map without the false ones. The peers
+have the same keyframes, steps and closures, those that our mapper refuses as implausible left out, and the same limit.
+
+``scale``: a walk through a building with 5 % false closures, solved after each.
+
+``limits``: what the error of the trajectory comes from. Closures of a recording are found once and kept in a folder;
+odometry drifts anew from its truth. Beside our closures those of the same pairs with true poses and the same
+covariances, and with parts of the mapper, or of the closures, switched off or made perfect.
+
+``public``: pose graphs as g2o text. Chi-squared before and after, beside GTSAM's Levenberg-Marquardt.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import click
+import map_lies
+import map_scale
+from map_peers import PEERS, chosen
+from tqdm import tqdm
+
+JSON = click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write figures here.")
+
+
+@click.group(help=__doc__)
+def main() -> None:
+    """The subcommands say it."""
+
+
+def write(file: Path | None, told: Any) -> None:
+    """Figures as JSON, if asked for."""
+    if file is not None:
+        file.write_text(json.dumps(told, indent=1))
+
+
+def _peers(context: click.Context, parameter: click.Parameter, value: str) -> list[str]:
+    try:
+        return list(chosen(value))
+    except ValueError as error:
+        raise click.BadParameter(str(error)) from error
+
+
+@main.command()
+@click.option("--graphs", default=200, show_default=True, type=click.IntRange(1), help="How many random graphs.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of the first of them.")
+@click.option("--peers", default=",".join(PEERS), show_default=True, callback=_peers, help="Which, by comma.")
+@JSON
+def robust(graphs: int, seed: int, peers: list[str], json_file: Path | None) -> None:
+    """False closures on random graphs."""
+    rows = list[dict[str, Any]]()
+    with tqdm(total=graphs, desc="graphs") as bar:
+        while len(rows) < graphs:
+            row = map_lies.one(seed, peers)
+            seed += 1
+            if row is not None:
+                rows.append(row)
+                bar.update()
+    click.echo(map_lies.table(rows))
+    write(json_file, {"summary": map_lies.summary(rows), "graphs": rows})
+
+
+@main.command()
+@click.option("--poses", default=40000, show_default=True, type=click.IntRange(100), help="Of odometry, 27 cm each.")
+@click.option("--closures", default=5000, show_default=True, type=click.IntRange(1), help="Right ones.")
+@click.option("--seed", default=1, show_default=True, type=click.IntRange(0))
+@JSON
+def scale(poses: int, closures: int, seed: int, json_file: Path | None) -> None:
+    """A walk of kilometres."""
+    words = map_scale.long_walk(poses, closures, seed)
+    click.echo(map_scale.HEAD)
+    told = map_scale.ours(words)
+    write(json_file, told)
+    told["short"] = map_scale.at_once(map_scale.shortened(words, map_scale.SHORT_M), list(PEERS))
+    click.echo(map_scale.rows_at_once(told["short"]))
+    told["whole"] = map_scale.at_once(words, ["GTSAM LM"], with_ours=False)
+    click.echo(map_scale.rows_at_once(told["whole"]))
+    write(json_file, told)
+
+
+if __name__ == "__main__":
+    main()
