@@ -28,10 +28,13 @@ from typing import Any
 
 import click
 import map_lies
+import map_limits
 import map_scale
+from closure import simulated, stories
 from map_peers import PEERS, chosen
 from tqdm import tqdm
 
+KEPT = Path(tempfile.gettempdir()) / "objreg_mapper"
 JSON = click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write figures here.")
 
 
@@ -88,6 +91,33 @@ def scale(poses: int, closures: int, seed: int, json_file: Path | None) -> None:
     told["whole"] = map_scale.at_once(words, ["GTSAM LM"], with_ours=False)
     click.echo(map_scale.rows_at_once(told["whole"]))
     write(json_file, told)
+
+
+@main.command()
+@click.argument("recordings", nargs=-1, type=click.Path(exists=True, path_type=Path))
+@click.option("--simulate", "scenarios", multiple=True, metavar="SCENARIO:SEED,…", help="Such recordings too.")
+@click.option("--frames", default=600, show_default=True, type=click.IntRange(2), help="Of each that is simulated.")
+@click.option("--drifts", default=6, show_default=True, type=click.IntRange(1), help="Of odometry.")
+@click.option("--keep", type=click.Path(file_okay=False, path_type=Path), default=KEPT, show_default=True)
+@JSON
+def limits(
+    recordings: tuple[Path, ...],
+    scenarios: tuple[str, ...],
+    frames: int,
+    drifts: int,
+    keep: Path,
+    json_file: Path | None,
+) -> None:
+    """What limits the trajectory."""
+    asked = stories(scenarios)
+    if not recordings and not asked:
+        raise click.UsageError("expected RECORDINGS or --simulate SCENARIO:SEED, got neither")
+    told = {}
+    for path in [*recordings, *(simulated(keep, name, seed, frames) for name, seed in asked)]:
+        case = map_limits.found(path, keep)
+        told[case.name] = map_limits.limits(case, drifts)
+        click.echo(map_limits.table(case.name, told[case.name]) + "\n")
+        write(json_file, told)
 
 
 if __name__ == "__main__":
