@@ -29,6 +29,7 @@ from typing import Any
 import click
 import map_lies
 import map_limits
+import map_public
 import map_scale
 from closure import simulated, stories
 from map_peers import PEERS, chosen
@@ -117,6 +118,23 @@ def limits(
         case = map_limits.found(path, keep)
         told[case.name] = map_limits.limits(case, drifts)
         click.echo(map_limits.table(case.name, told[case.name]) + "\n")
+        write(json_file, told)
+
+
+@main.command()
+@click.argument("files", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option("--robust/--believed", "is_robust", default=True, show_default=True, help="Doubt closures, too.")
+@JSON
+def public(files: tuple[Path, ...], is_robust: bool, json_file: Path | None) -> None:
+    """Pose graphs that others publish, as g2o text."""
+    told = {}
+    for file in files:
+        try:
+            graph = map_public.read(file)
+        except (ValueError, RuntimeError) as error:
+            raise click.BadParameter(str(error), param_hint="FILES") from error
+        told[graph.name] = map_public.compare(graph, is_robust)
+        click.echo(map_public.table(graph.name, told[graph.name]) + "\n")
         write(json_file, told)
 
 
