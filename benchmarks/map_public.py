@@ -58,8 +58,10 @@ def _edges(factors: list[Any], number: dict[int, int], flat: bool) -> Edges:
     for factor in factors:
         if not isinstance(factor, gtsam.BetweenFactorPose2 if flat else gtsam.BetweenFactorPose3):
             continue
-        measured, R = factor.measured(), np.asarray(factor.noiseModel().R())
-        rows.append((*(number[key] for key in factor.keys()), _lifted(measured) if flat else measured.matrix()))
+        noise: Any = factor.noiseModel()
+        keys = list(factor.keys())
+        measured, R = factor.measured(), np.asarray(noise.R())
+        rows.append((*(number[key] for key in keys), _lifted(measured) if flat else measured.matrix()))
         whitening.append(_whitening_in_space(R) if flat else R)
     if not rows:
         return edges_of(())
@@ -129,7 +131,7 @@ def _believed(public: Public) -> Array:
 def _doubted(public: Public) -> RobustGraph:
     """Our robust graph, closure by closure."""
     dense = public.dense
-    graph = RobustGraph(dense.poses[0], MapperParams().max_residual**2)
+    graph = RobustGraph(dense.poses[0], MapperParams().max_residual ** 2)
     for k in tqdm(range(len(dense.closures)), desc=f"{public.name}, any may be false"):
         closure = dense.closures.taken(slice(k, k + 1))
         _grown(graph, dense, int(max(closure.k1[0], closure.k2[0])))
@@ -165,5 +167,7 @@ def table(name: str, told: dict[str, Any]) -> str:
         if method in told:
             one = told[method]
             truncated = f"{one['truncated']:.1f}" if "truncated" in one else "-"
-            lines.append(f"{method:44} {one['chi2']:>14.5g} {one['seconds']:>8.2f} {one['left_out']:>9} {truncated:>12}")
+            lines.append(
+                f"{method:44} {one['chi2']:>14.5g} {one['seconds']:>8.2f} {one['left_out']:>9} {truncated:>12}"
+            )
     return "\n".join(lines)
