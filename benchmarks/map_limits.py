@@ -15,6 +15,7 @@ from typing import Any
 
 import click
 import closers
+import map_shared
 import numpy as np
 from sources import detector_of, read_source, with_drift
 from tqdm import tqdm
@@ -160,18 +161,6 @@ def thinned(metres: float) -> Words:
     return made
 
 
-def best_alone(metres: float) -> Words:
-    """Of the closures between the same two stretches the one that claims to know its position best."""
-
-    def made(case: Case, frames: list[Frame]) -> list[LoopClosure]:
-        stamps, way, best = np.array([frame.stamp_ns for frame in frames]), _way(frames), {}
-        for word in sorted(case.closures, key=lambda word: -float(np.trace(word.covariance[:3, :3]))):
-            best[tuple(int(np.interp(t, stamps, way) / metres) for t in (word.from_ns, word.to_ns))] = word
-        return sorted(best.values(), key=lambda word: word.to_ns)
-
-    return made
-
-
 def _way(frames: Sequence[Frame]) -> Array:
     """How far odometry went until each frame, m and rad together."""
     poses = [frame.T_odom_camera for frame in frames if frame.T_odom_camera is not None]
@@ -195,7 +184,6 @@ def variants() -> dict[str, Variant]:
         "ours, none pruned": Variant(as_found, patient),
         "ours, no steady error": Variant(as_found, steadfast),
         **{f"ours, shared by {m:g} m": Variant(thinned(m)) for m in STRETCHES_M},
-        **{f"ours, best of {m:g} m": Variant(best_alone(m)) for m in STRETCHES_M[:1]},
         **{
             f"ours, least {100 * m:g} cm, {deg:g} deg": Variant(
                 as_found, usual.replaced(min_sigma_translation=m, min_sigma_rotation=deg)
@@ -214,11 +202,13 @@ def variants() -> dict[str, Variant]:
 
 
 def limits(case: Case, drifts: int) -> dict[str, Any]:
-    """The error of the trajectory in cm by odometry and with each variant, one for each drift."""
+    """The error of the trajectory in cm by odometry and with each variant, one for each drift; of keyframes by LM."""
     cm: dict[str, list[float]] = {ODOMETRY: []}
     pruned: dict[str, list[int]] = {}
     for seed in tqdm(range(1, drifts + 1), desc=case.name):
         frames = with_drift(case.frames, case.truth, seed)
+        for name, value in map_shared.errors_cm(filled(case, frames, Variant(as_found))[0], case.truth).items():
+            cm.setdefault(name, []).append(value)
         for name, variant in variants().items():
             before, after, refused = trajectory_errors(case, frames, variant)
             cm.setdefault(name, []).append(100 * after)
@@ -227,17 +217,24 @@ def limits(case: Case, drifts: int) -> dict[str, Any]:
     return {"closures": len(case.closures), "cm": cm, "pruned": pruned, **consistency(case)}
 
 
-def trajectory_errors(case: Case, frames: list[Frame], variant: Variant) -> tuple[float, float, int]:
-    """As `closers.trajectory_errors`, with parameters; what the mapper refuses at once counts as pruned."""
+def filled(case: Case, frames: list[Frame], variant: Variant) -> tuple[PoseGraph, int]:
+    """A graph with all of it, unsolved, and how many closures it refused."""
     graph, refused = PoseGraph(variant.params), 0
-    posed = [(frame.stamp_ns, T) for frame in frames if (T := frame.T_odom_camera) is not None]
-    for stamp_ns, T in posed:
-        graph.add_odometry(Odometry(T_odom_body=T, stamp_ns=stamp_ns))
+    for frame in frames:
+        if frame.T_odom_camera is not None:
+            graph.add_odometry(Odometry(T_odom_body=frame.T_odom_camera, stamp_ns=frame.stamp_ns))
     for word in variant.closures(case, frames):
         try:
             graph.add_closure(word)
         except ValueError:
             refused += 1
+    return graph, refused
+
+
+def trajectory_errors(case: Case, frames: list[Frame], variant: Variant) -> tuple[float, float, int]:
+    """As `closers.trajectory_errors`, with parameters; what the mapper refuses at once counts as pruned."""
+    graph, refused = filled(case, frames, variant)
+    posed = [(frame.stamp_ns, T) for frame in frames if (T := frame.T_odom_camera) is not None]
     pruned = len(graph.optimise().pruned) + refused
     true = [T for stamp, _ in posed if (T := case.truth.at(stamp)) is not None]
     before = absolute_trajectory_error([T for _, T in posed], true)
@@ -283,14 +280,14 @@ def table(name: str, told: dict[str, Any]) -> str:
         f"{name}: {told['closures']} closures that err {told['error_cm']:.2f} cm and {told['error_deg']:.2f} deg, and"
         f" claim {told['claimed_cm']:.2f} cm and {told['claimed_deg']:.2f} deg; squared in variances"
         f" {told['squared_in_variances']:.2f}; shared " + ("-" if told["shared"] is None else f"{told['shared']:.2f}"),
-        f"{'':28} {'mean cm':>8} {'least':>7} {'most':>7} {'/ perfect':>10} {'worst':>6} {'pruned':>7}",
+        f"{'':38} {'mean cm':>8} {'least':>7} {'most':>7} {'/ perfect':>10} {'worst':>6} {'pruned':>7}",
     ]
     base = np.array(told["cm"][PERFECT])
     for variant, values in told["cm"].items():
         cm = np.array(values)
         pruned = f"{np.mean(told['pruned'][variant]):.1f}" if variant in told["pruned"] else "-"
         lines.append(
-            f"{variant:28} {cm.mean():>8.2f} {cm.min():>7.2f} {cm.max():>7.2f} {cm.mean() / base.mean():>10.2f}"
+            f"{variant:38} {cm.mean():>8.2f} {cm.min():>7.2f} {cm.max():>7.2f} {cm.mean() / base.mean():>10.2f}"
             f" {(cm / base).max():>6.2f} {pruned:>7}"
         )
     return "\n".join(lines)

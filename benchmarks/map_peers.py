@@ -34,6 +34,11 @@ class Dense(NamedTuple):
         first = len(graph.keyframes) - 1
         return cls(np.array(graph.keyframes.poses), edges_of(rows[:first]), edges_of(rows[first:]))
 
+    def between_pictures(self, offset: int) -> Dense:
+        """The same with closures between other nodes, whose numbers are higher by an offset."""
+        words = self.closures
+        return self._replace(closures=Edges(words.k1 + offset, words.k2 + offset, words.T_1_2, words.whitening))
+
 
 class Solved(NamedTuple):
     """``poses (n, 4, 4)``, and which closures (m,) an optimiser ``kept``."""

@@ -14,7 +14,8 @@ have the same keyframes, steps and closures, those that our mapper refuses as im
 
 ``limits``: what the error of the trajectory comes from. Closures of a recording are found once and kept in a folder;
 odometry drifts anew from its truth. Beside our closures those of the same pairs with true poses and the same
-covariances, and with parts of the mapper, or of the closures, switched off or made perfect.
+covariances, and with parts of the mapper, or of the closures, switched off or made perfect. And, by plain
+Levenberg-Marquardt, with an error of each keyframe that all its closures share.
 
 ``public``: pose graphs as g2o text. Chi-squared before and after, beside GTSAM's Levenberg-Marquardt.
 """
