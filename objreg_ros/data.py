@@ -495,6 +495,11 @@ class LoopClosure:
         _require(self, bool(least > LEAST_VARIANCE), "a positive definite covariance", C.tolist())
 
     @property
+    def moments(self) -> tuple[str, int, str, int]:
+        """What is the same of a closure on every topic and whenever it is told."""
+        return self.from_frame_id, self.from_ns, self.to_frame_id, self.to_ns
+
+    @property
     def moved(self) -> dict[str, float]:
         """How far objects went that stood elsewhere before, m by label, as the evidence tells (see `MOVED`)."""
         found = ((MOVED.fullmatch(name), metres) for name, metres in self.evidence.items())

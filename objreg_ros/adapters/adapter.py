@@ -31,7 +31,7 @@ def require(kind: object, package: str, install: str) -> None:
 
 def key_of(closure: LoopClosure) -> Key:
     """What is the same of a constraint on every topic and whenever it is told: its two moments."""
-    return closure.from_frame_id, closure.from_ns, closure.to_frame_id, closure.to_ns
+    return closure.moments
 
 
 class Adapter(Door):

@@ -60,12 +60,25 @@ class Scene:
             _lines(head, "rejected", self._ends(self._rejected), RED, 0.005),
         ]
         for number, label, position in objects:
-            made += [_ball(head, number, position), _name(head, number, label, position)]
+            made += [_ball(head, number, position), _name(head, number, f"{label} {number}", position)]
         return MarkerArray(markers=made)
 
     def _ends(self, edges: Iterable[Edge]) -> list[Point]:
         known = [edge for edge in edges if edge[0] in self._places and edge[1] in self._places]
         return [_point(self._places[stamp_ns]) for edge in known for stamp_ns in edge]
+
+
+def closures(kept: Array, pruned: Array, residuals: Sequence[float], stamp_ns: int, frame_id: str) -> MarkerArray:
+    """Closures as lines between two places, (m, 2, 3) and (n, 2, 3); at those that are pruned their residuals."""
+    head = to_msg.header(stamp_ns, frame_id)
+    made = [
+        Marker(header=head, action=Marker.DELETEALL),
+        _lines(head, "kept", [_point(xyz) for xyz in kept.reshape(-1, 3)], GREEN, 0.015),
+        _lines(head, "pruned", [_point(xyz) for xyz in pruned.reshape(-1, 3)], RED, 0.01),
+    ]
+    for number, (ends, residual) in enumerate(zip(pruned, residuals, strict=True)):
+        made.append(_name(head, number, f"{residual:.3g}", ends.mean(axis=0)))
+    return MarkerArray(markers=made)
 
 
 def _point(xyz: Array) -> Point:
@@ -93,9 +106,9 @@ def _ball(head: Any, number: int, position: Array) -> Marker:
     return marker
 
 
-def _name(head: Any, number: int, label: str, position: Array) -> Marker:
+def _name(head: Any, number: int, text: str, position: Array) -> Marker:
     marker = _marker(head, "names", number, Marker.TEXT_VIEW_FACING, WHITE, 0.07)
     marker.pose.position = _point(position)
     marker.pose.position.z += 0.08
-    marker.text = f"{label} {number}"
+    marker.text = text
     return marker

@@ -29,7 +29,7 @@ class Chain:
 
     def __init__(self, T_odom_first: Array, steady: Steady) -> None:
         self.steady, self.T_chain_body = steady, T_odom_first[None].copy()
-        self._sums = np.zeros((1,)), np.zeros((1,)), np.zeros((1, 3)), np.zeros((1, 3, 3))
+        self._sums: tuple[Array, ...] = np.zeros((1,)), np.zeros((1,)), np.zeros((1, 3)), np.zeros((1, 3, 3))
 
     def __len__(self) -> int:
         return len(self.T_chain_body)

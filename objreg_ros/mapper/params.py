@@ -80,5 +80,13 @@ class MapperNodeParams(MountedParams):
     """Frames and files of the mapper's node."""
 
     map_frame: str = param("map", "the frame of the corrected map")
+    input: str = param(
+        "auto",
+        "the topic of the constraints; auto: both, each constraint is taken once",
+        choices=("auto", "loop_closures", "constraints"),
+    )
     publish_tf: bool = param(True, "whether the correction is broadcast on /tf, where tf2_ros is installed", live=True)
-    graph_path: str = param("objreg_map.g2o", "where ~/save writes the pose graph", live=True)
+    graph_path: str = param(
+        "objreg_map.g2o", "where ~/save writes the pose graph; beside it, as .npz, what resume needs", live=True
+    )
+    resume: bool = param(False, "whether the map that was saved at graph_path is gone on with; it has to be there")

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,6 +52,7 @@ class PoseGraph:
         self._withdrawn: set[int] = set()
         self._solver = Solver()
         self._solution = Solution((), np.zeros(0, bool), np.zeros(0))
+        self._T_map_odom = np.eye(4)
 
     # What comes in
 
@@ -59,6 +61,7 @@ class PoseGraph:
         if len(self.sessions[-1].keyframes) == 0:
             self.sessions.pop()
         self.sessions.append(Session(name))
+        self._T_map_odom = np.eye(4)
 
     def add_odometry(self, odometry: Odometry) -> bool:
         """Take the newest pose; True if it became a keyframe. ValueError if time does not advance."""
@@ -87,6 +90,21 @@ class PoseGraph:
         if ends[0] != ends[1]:
             self._tie(closure, ends, np.eye(4) if T_body_camera is None else T_body_camera)
         return True
+
+    def restore(self, tie: Tie) -> None:
+        """Take a tie of a closure that was in another graph of these sessions. ValueError for keyframes it has not."""
+        for end in tie[:2]:
+            if not (
+                0 <= end.session < len(self.sessions) and 0 <= end.keyframe < len(self.sessions[end.session].keyframes)
+            ):
+                raise ValueError(f"tie: expected a keyframe of the graph, got {end}")
+        self._closures.append(tie)
+
+    def learn_sessions(self, closure: LoopClosure) -> None:
+        """Take the names of sessions from a closure that is known without them."""
+        for name, stamp_ns in ((closure.from_session, closure.from_ns), (closure.to_session, closure.to_ns)):
+            with suppress(ValueError):
+                self._of(name, stamp_ns)
 
     def withdraw(self, is_withdrawn: Callable[[LoopClosure], bool]) -> int:
         """Take closures out of the graph, for good; how many."""
@@ -152,6 +170,12 @@ class PoseGraph:
         """Whether a moment of the closure lies in a gap of the newest odometry."""
         return self.odometry.in_gap(closure.from_ns) or self.odometry.in_gap(closure.to_ns)
 
+    def is_before_odometry(self, closure: LoopClosure) -> bool:
+        """Whether odometry began after a moment of the closure that no other session has: it will never be covered."""
+        known = self.odometry.stamps_ns
+        stamps = closure.from_ns, closure.to_ns
+        return bool(known) and any(s < known[0] and not any(one.covers(s) for one in self.sessions) for s in stamps)
+
     # Solving
 
     def optimise(self) -> Summary:
@@ -163,14 +187,20 @@ class PoseGraph:
         """What there is to solve now; solved by one thread, while another goes on with the graph."""
         counts = tuple(len(session.keyframes) for session in self.sessions)
         return Problem(
-            self._solver, tuple(self.sessions), counts, self._closures, len(self._closures),
-            frozenset(self._withdrawn), self.params,
+            self._solver,
+            tuple(self.sessions),
+            counts,
+            self._closures,
+            len(self._closures),
+            frozenset(self._withdrawn),
+            self.params,
         )
 
     def adopt(self, problem: Problem, solution: Solution) -> Summary:
         """Take over the solution of a problem of this graph; keyframes that came since then follow its last one."""
         self._solution = solution
-        kept, pruned = [], []
+        self._T_map_odom = self._correction()
+        kept, pruned = list[tuple[LoopClosure, float]](), list[tuple[LoopClosure, float]]()
         for k, (is_kept, residual) in enumerate(zip(solution.kept, solution.residuals, strict=True)):
             closure = self._closures[k].closure
             if closure is not None and k not in problem.withdrawn and not np.isnan(residual):
@@ -197,7 +227,12 @@ class PoseGraph:
             for s, session in enumerate(self.sessions)
             for k in range(1, len(session.keyframes))
         ]
-        return steps + [tie for k, tie in enumerate(self._closures) if k not in self._withdrawn]
+        return steps + self.closure_ties
+
+    @property
+    def closure_ties(self) -> list[Tie]:
+        """The closures that are not withdrawn."""
+        return [tie for k, tie in enumerate(self._closures) if k not in self._withdrawn]
 
     @property
     def is_placed(self) -> bool:
@@ -207,11 +242,23 @@ class PoseGraph:
     @property
     def T_map_odom(self) -> Array:
         """The correction of the newest solved keyframe of the newest session; the identity before there is one."""
+        return self._T_map_odom
+
+    def _correction(self) -> Array:
         course = self._course()
         if course is None:
             return np.eye(4)
         last = len(course) - 1
         return course.of(np.array([last]))[0] @ inverse(self.keyframes.poses[last])
+
+    def edges(self) -> tuple[Array, Array]:
+        """(m, 2, 3): where the ends of the kept closures are in the map, and (n, 2, 3) those of the pruned ones."""
+        mapped = [np.zeros((0, 4, 4)) if not way else stacked([T for _, T in way]) for way in self.paths()]
+        solved = range(len(self._solution.kept))
+        known = [k for k in solved if not (np.isnan(self._solution.residuals[k]) or k in self._withdrawn)]
+        ends = [[mapped[end.session][end.keyframe][:3, 3] for end in self._closures[k][:2]] for k in known]
+        places, kept = np.array(ends).reshape(-1, 2, 3), self._solution.kept[known]
+        return places[kept], places[~kept]
 
     def path(self) -> list[tuple[int, Array]]:
         """Stamp and ``T_map_body`` of every keyframe of the newest session."""
@@ -225,6 +272,17 @@ class PoseGraph:
             list(zip(stamps[s], self._mapped_of(s), strict=True)) if is_placed else []
             for s, is_placed in enumerate(placed)
         ]
+
+    def flat(self) -> tuple[list[Array], list[tuple[int, int, Constraint]]]:
+        """``T_map_body`` of the keyframes of all sessions that are placed, in one row, and the ties between them."""
+        paths = self.paths()
+        first = np.cumsum([0, *(len(path) for path in paths)])
+        edges = [
+            (int(first[one.session] + one.keyframe), int(first[other.session] + other.keyframe), constraint)
+            for one, other, constraint, _ in self.ties
+            if paths[one.session] and paths[other.session]
+        ]
+        return [T for path in paths for _, T in path], edges
 
     def corrected(self, stamps_ns: Iterable[int]) -> list[Array]:
         """``T_map_body`` at any moments that the newest odometry covers; ValueError for one that it does not."""

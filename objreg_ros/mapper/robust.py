@@ -9,6 +9,7 @@ without one that was doubtful when it came.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,7 +53,7 @@ class RobustGraph:
         self.limit = limit
         self.steps = self.closures = edges_of(())
         self._step_factors = np.zeros(0, int)
-        self._withdrawn: list[int] = []  # closures
+        self._withdrawn: tuple[int, ...] = ()  # closures
         self._expected = np.zeros(0)  # what each closure was expected to cost when it came
         graph = IncrementalGraph(T_map_first)
         self._state = _State(graph, np.zeros(0, int), graph.poses(), np.zeros(0), 0.0)
@@ -90,7 +91,7 @@ class RobustGraph:
 
     def believe(self, other: RobustGraph) -> None:
         """Take in the closures of another graph of these nodes, as it does; then those go in and out that want to."""
-        self.closures, self._expected, self._withdrawn = other.closures, other._expected, list(other._withdrawn)
+        self.closures, self._expected, self._withdrawn = other.closures, other._expected, other._withdrawn
         graph, factors = self._state.graph, np.full(len(other.closures), -1)
         factors[other.kept] = graph.add(other.closures.taken(other.kept))
         graph.settle()
@@ -112,12 +113,23 @@ class RobustGraph:
         if expected < LINEAR * self.limit or self._is_agreed(newest):
             self._take(self._sorted_out(self._changed(self._state, [newest], []), stays_in=newest))
             self._take(self._sorted_out(self._state))
-        if self._state.cost - before.cost > DOUBTFUL:
-            self._doubt()
+            if self._state.cost - before.cost > DOUBTFUL:
+                self._doubt()
+
+    @property
+    def left_out(self) -> list[int]:
+        """The numbers of closures that are not believed and may be."""
+        return np.setdiff1d(np.flatnonzero(~self.kept), self._withdrawn).tolist()
+
+    def forced(self, number: int) -> RobustGraph:
+        """The same with a closure in it that was left out, whatever it costs."""
+        other = copy(self)
+        other._state = self._changed(self._state, [number], [])
+        return other
 
     def withdraw(self, number: int) -> None:
         """A closure is left out from now on, whatever it costs."""
-        self._withdrawn.append(number)
+        self._withdrawn += (number,)
         if self.kept[number]:
             self._state = self._sorted_out(self._changed(self._state, [], [number]))
 
@@ -166,7 +178,7 @@ class RobustGraph:
         best = state
         for _ in range(ROUNDS):
             out, into = state.kept & (state.residuals > self.limit), ~state.kept & (state.residuals <= self.limit)
-            into[self._withdrawn] = False
+            into[list(self._withdrawn)] = False
             if stays_in >= 0:
                 out[stays_in] = False
             if stays_out >= 0:

@@ -3,12 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from objreg_ros.data import Array, Odometry
-from objreg_ros.geometry import inverse, rotation_angle
+from objreg_ros.geometry import inverse, is_rigid, rotation_angle
 from objreg_ros.mapper.constraint import Constraint, unseen, wandering
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.sparse import SparseTrajectory
@@ -38,6 +38,38 @@ class Session:
         if len(self.keyframes) > 1:
             self._step(params)
         return True
+
+    ARRAYS = ("stamps_ns", "poses", "keyframes", "gaps", "variances", "way")
+
+    def arrays(self) -> dict[str, Array]:
+        """All of it: poses with stamps, which of them are keyframes, silences, errors and ways of the steps."""
+        return {
+            "stamps_ns": np.array(self.odometry.stamps_ns, np.int64),
+            "poses": stacked(self.odometry.poses),
+            "keyframes": np.array(self.keyframes.stamps_ns, np.int64),
+            "gaps": np.array(self.odometry.gaps, np.int64).reshape(-1, 2),
+            "variances": np.array(self.variances).reshape(-1, 2),
+            "way": np.array(self._way),
+        }
+
+    @classmethod
+    def of_arrays(cls, name: int | None, arrays: Mapping[str, Array]) -> Session:
+        """The session of such arrays, which is over. ValueError where they do not go together."""
+        session = cls(name)
+        stamps, poses, keyframes = arrays["stamps_ns"], arrays["poses"], arrays["keyframes"]
+        count, steps = len(keyframes), max(len(keyframes) - 1, 0)
+        shapes = [len(stamps), arrays["variances"].shape, arrays["way"].shape]
+        if shapes != [len(poses), (steps, 2), (max(count, 1),)] or not np.isin(keyframes, stamps).all():
+            raise ValueError(f"session {name}: expected arrays that go together, got {shapes} of {count} keyframes")
+        if not (np.isfinite(poses).all() and all(is_rigid(T) for T in poses) and (arrays["variances"] > 0).all()):
+            raise ValueError(f"session {name}: expected rigid poses and positive variances, got others")
+        session.odometry = SparseTrajectory.of(
+            stamps.tolist(), list(poses), [tuple(g) for g in arrays["gaps"].tolist()]
+        )
+        for stamp in keyframes.tolist():
+            session.keyframes.append(stamp, session.odometry.at(stamp))
+        session.variances, session._way = [tuple(row) for row in arrays["variances"].tolist()], arrays["way"].tolist()
+        return session
 
     def covers(self, stamp_ns: int) -> bool:
         """Whether its odometry tells where the body was at a moment."""

@@ -26,10 +26,11 @@ from objreg_ros.mapper.robust import RobustGraph
 from objreg_ros.mapper.session import Session, stacked
 from objreg_ros.mapper.steady import Steady, estimate
 
-FREEDOMS = 6  # of a closure
+FREEDOMS, FREEDOMS_OF_STEADY = 6, 3  # of a closure, and of what is steadily wrong with an odometry
+FEW, MOST_TRIED = 30, 2  # closures with which one that was left out may be right; of those, the newest
 ROUNDS = 4  # most times that odometry is corrected
 SETTLED = 5e-4  # rad/m and m/m: a change of its steady error that matters no more
-GROWTH = 1.1  # so many times the closures there were, and what is steady is looked at again
+GROWTH = 1.2  # so many times the closures there were, and what is steady is looked at again
 TIES = 2  # closures that have to agree on where a session is in the map
 AGREEING_M, AGREEING_SHARE = 0.3, 0.05  # how far they may be from that, and with every metre of odometry between them
 LOOSE = np.diag(np.repeat([1e4, 10.0], 3) ** 2)  # m and rad: what ties a session that only closures hold
@@ -248,7 +249,9 @@ class Solver:
             return None
         T_chain_end, T_map_end = chain.T_chain_body[ends], np.array(places)
         T_map_chain = T_map_end @ inverses(T_chain_end)
-        apart = np.linalg.norm((T_map_chain[:, None] @ T_chain_end[None])[..., :3, 3] - T_map_end[None, :, :3, 3], axis=2)
+        apart = np.linalg.norm(
+            (T_map_chain[:, None] @ T_chain_end[None])[..., :3, 3] - T_map_end[None, :, :3, 3], axis=2
+        )
         ways = np.array([[known.way_m(a, b) for b in ends] for a in ends])
         votes = (apart < AGREEING_M + AGREEING_SHARE * ways).sum(axis=1)
         best = int(votes.argmax())
@@ -262,22 +265,40 @@ class Solver:
         expected = problem.params.steady
         if not any(expected):
             return
-        plain = self._rebuilt(problem, {session: Steady() for session in self._routes}) if self._is_corrected() else self
-        found, best = plain._steady(problem), plain
+        plain = self
+        if self._is_corrected():
+            plain = self._rebuilt(problem, {session: Steady() for session in self._routes})
+        assert plain._robust is not None
+        suspects = plain._robust.left_out[-MOST_TRIED:] if len(self._numbers) <= FEW else []
+        starts = [plain, *map(plain._forced, suspects)]
+        best = min((start._corrected(problem) for start in starts), key=lambda solver: solver._cost(expected))
+        needed = FREEDOMS_OF_STEADY * len(self._routes) * np.log(FREEDOMS * len(self._numbers))
+        chosen = best if best._cost(expected) + needed < plain._cost(expected) else plain
+        self._robust, self._routes = chosen._robust, chosen._routes
+
+    def _forced(self, number: int) -> Solver:
+        """With a closure that was left out: it may be right where odometry is steadily wrong."""
+        assert self._robust is not None
+        other = copy(self)
+        other._robust = self._robust.forced(number)
+        return other
+
+    def _corrected(self, problem: Problem) -> Solver:
+        """In turn what the map says is steadily wrong with odometry, and the map, until the first changes little."""
+        best, found = self, self._steady(problem)
         for _ in range(ROUNDS):
             best = best._rebuilt(problem, found)
             known, found = found, best._steady(problem)
             if np.allclose([*found.values()], [*known.values()], atol=SETTLED):
                 break
-        steady = [route.chain.steady for route in best._routes.values()]
-        unexpected = sum(np.square([part / sigma for part, sigma in zip(one, expected, strict=True) if sigma]).sum() for one in steady)
-        gain = plain._cost() - best._cost() - unexpected
-        chosen = best if gain > sum(map(len, steady)) * np.log(FREEDOMS * len(self._numbers)) else plain
-        self._robust, self._routes = chosen._robust, chosen._routes
+        return best
 
-    def _cost(self) -> float:
+    def _cost(self, expected: Steady) -> float:
+        """What all residuals cost, and how unexpected what is steadily wrong is."""
         assert self._robust is not None
-        return self._robust.cost
+        sigmas = np.array(expected)
+        steady = np.array([route.chain.steady for route in self._routes.values()])
+        return self._robust.cost + float(np.square(steady[:, sigmas > 0] / sigmas[sigmas > 0]).sum())
 
     def _is_corrected(self) -> bool:
         return any(route.chain.steady != Steady() for route in self._routes.values())

@@ -37,6 +37,20 @@ class SparseTrajectory(Trajectory):
         self._usual_ns = np.inf  # the time between two poses
         self._least, self._most = _nothing()
 
+    @classmethod
+    def of(cls, stamps_ns: list[int], poses: list[Array], gaps: list[tuple[int, int]]) -> SparseTrajectory:
+        """One that is over: what another of these kept."""
+        trajectory = cls()
+        for stamp_ns, T in zip(stamps_ns, poses, strict=True):
+            Trajectory.append(trajectory, stamp_ns, T)
+        trajectory._gaps = gaps
+        return trajectory
+
+    @property
+    def gaps(self) -> list[tuple[int, int]]:
+        """The silences, from the pose before to the one after, ns."""
+        return list(self._gaps)
+
     def append(self, stamp_ns: int, T_world_body: Array) -> None:
         """Add the newest pose; the one before it goes if it can. ValueError if time does not advance."""
         last_ns = self.stamps_ns[-1] if self.stamps_ns else stamp_ns

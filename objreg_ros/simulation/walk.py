@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Walks of a body with odometry that drifts and with closures, of which some are false: what a mapper gets, no images."""
+"""Walks of a body with odometry that drifts and closures of which some are false: what a mapper gets, no images."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class WalkParams:
 
 @dataclass(frozen=True)
 class Walk:
-    """``T_world_body (n, 4, 4)``, odometry of the same moments, and closures with ``is_false (m,)``, the earliest first."""
+    """``T_world_body (n, 4, 4)``, odometry of the same moments, and closures in order, each with ``is_false (m,)``."""
 
     T_world_body: Array
     odometry: tuple[Odometry, ...]
@@ -64,7 +64,9 @@ def walk(params: WalkParams, seed: int) -> Walk:
     odometry = drifted(T, params, np.random.default_rng([seed, 1]))
     right = _right(T, params, np.random.default_rng([seed, 2]))
     lies = _false(T, len(right), params, np.random.default_rng([seed, 3]))
-    rows = sorted([(word.to_ns, False, word) for word in right] + [(word.to_ns, True, word) for word in lies], key=_when)
+    rows = sorted(
+        [(word.to_ns, False, word) for word in right] + [(word.to_ns, True, word) for word in lies], key=_when
+    )
     words = tuple(Odometry(T_odom_body=pose, stamp_ns=k * PERIOD_NS) for k, pose in enumerate(odometry))
     return Walk(T, words, tuple(row[2] for row in rows), np.array([row[1] for row in rows], bool))
 
@@ -75,7 +77,7 @@ def _when(row: tuple[int, bool, LoopClosure]) -> tuple[int, bool]:
 
 def through_corridors(params: WalkParams, rng: np.random.Generator) -> Array:
     """True poses (n, 4, 4) along corridors, never straight back; the body looks ahead and turns over three steps."""
-    per = max(int(round(params.corridor_m / params.step_m)), 1)
+    per = max(round(params.corridor_m / params.step_m), 1)
     place, ahead, xy = np.zeros(2, int), np.array([1, 0]), [np.zeros(2)]
     while len(xy) < params.poses:
         ways = [np.array(way) for way in ((1, 0), (-1, 0), (0, 1), (0, -1))]
@@ -152,7 +154,10 @@ def _wrong(params: WalkParams, rng: np.random.Generator) -> Array:
     metres, heading = np.exp(rng.uniform(*np.log(params.lie_m))), rng.uniform(-np.pi, np.pi)
     turn = rng.uniform(-np.pi, np.pi) * min(metres / FREE_TURN_M, 1.0)
     E = np.eye(4)
-    E[:2, 3], E[:3, :3] = metres * np.array([np.cos(heading), np.sin(heading)]), Rotation.from_euler("z", turn).as_matrix()
+    E[:2, 3], E[:3, :3] = (
+        metres * np.array([np.cos(heading), np.sin(heading)]),
+        Rotation.from_euler("z", turn).as_matrix(),
+    )
     return E
 
 
@@ -164,8 +169,9 @@ def _lie(T: Array, a: int, b: int, error: Array, params: WalkParams, rng: np.ran
 def _closure(T: Array, a: int, b: int, error: Array, sigmas: tuple[float, float]) -> LoopClosure:
     T_from_to = inverses(T[a : a + 1])[0] @ T[b] @ error
     covariance = np.diag(np.square(np.repeat(np.maximum(sigmas, LEAST_SIGMA), 3)))
-    moments = {"from_ns": a * PERIOD_NS, "to_ns": b * PERIOD_NS}
-    return LoopClosure(T_from_to=T_from_to, covariance=covariance, labels=("cup",), **moments)
+    return LoopClosure(
+        from_ns=a * PERIOD_NS, to_ns=b * PERIOD_NS, T_from_to=T_from_to, covariance=covariance, labels=("cup",)
+    )
 
 
 def _errors(rng: np.random.Generator, metres: Array, radians: Array) -> Array:

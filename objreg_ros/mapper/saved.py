@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A pose graph in a file that keeps its sessions, so that another day goes on in its map. numpy's npz."""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from objreg_ros.data import Array, LoopClosure
+from objreg_ros.mapper.constraint import Constraint
+from objreg_ros.mapper.params import MapperParams
+from objreg_ros.mapper.pose_graph import PoseGraph
+from objreg_ros.mapper.session import Session, stacked
+from objreg_ros.mapper.solver import End, Tie
+
+VERSION = 1
+MOST_BYTES = 2_000_000_000  # of a file and of what is unpacked from it
+PLAIN = ("from_ns", "to_ns", "labels", "from_frame_id", "to_frame_id", "from_session", "to_session")  # of a closure
+
+
+def save(graph: PoseGraph, path: Path) -> None:
+    """Write the file whole, then put it in the place of the one before. OSError where that cannot be."""
+    ties = graph.closure_ties
+    told = {
+        "version": VERSION,
+        "names": [session.name for session in graph.sessions],
+        "closures": [{name: getattr(tie.closure, name) for name in PLAIN} for tie in ties],
+    }
+    arrays: dict[str, Any] = {
+        "told": np.frombuffer(json.dumps(told).encode(), np.uint8),
+        "ends": np.array([(*tie.end1, *tie.end2) for tie in ties], np.int64).reshape(-1, 4),
+        "T_1_2": stacked([tie.constraint.T_from_to for tie in ties]),
+        "covariances": np.array([tie.constraint.covariance for tie in ties]).reshape(-1, 6, 6),
+        "T_from_to": stacked([tie.closure.T_from_to for tie in ties if tie.closure]),
+        "closure_covariances": np.array([tie.closure.covariance for tie in ties if tie.closure]).reshape(-1, 6, 6),
+    }
+    for number, session in enumerate(graph.sessions):
+        arrays.update({f"{number}_{name}": value for name, value in session.arrays().items()})
+    part = path.with_name(f".{path.name}.part")
+    with part.open("wb") as file:
+        np.savez_compressed(file, **arrays)
+    os.replace(part, path)
+
+
+def load(path: Path, params: MapperParams) -> PoseGraph:
+    """The graph of a file, unsolved, with a session after those of the file for odometry that comes.
+
+    OSError where it cannot be read, ValueError where it is not what `save` writes.
+    """
+    size = path.stat().st_size
+    if size > MOST_BYTES:
+        raise ValueError(f"{path}: expected a map of at most {MOST_BYTES} bytes, got {size}")
+    try:
+        with zipfile.ZipFile(path) as archive:
+            unpacked = sum(entry.file_size for entry in archive.infolist())
+        if unpacked > MOST_BYTES:
+            raise ValueError(f"expected at most {MOST_BYTES} bytes unpacked, got {unpacked}")
+        with np.load(path, allow_pickle=False) as arrays:
+            return _graph({name: arrays[name] for name in arrays.files}, params)
+    except (KeyError, IndexError, TypeError, ValueError, zipfile.BadZipFile) as error:
+        raise ValueError(f"{path}: expected a map that ~/save wrote, got a file that is none: {error}") from error
+
+
+def _graph(arrays: Mapping[str, Array], params: MapperParams) -> PoseGraph:
+    told = json.loads(arrays["told"].tobytes())
+    if told["version"] != VERSION:
+        raise ValueError(f"version: expected {VERSION}, got {told['version']!r}")
+    graph = PoseGraph(params)
+    graph.sessions = [
+        Session.of_arrays(name, {key: arrays[f"{number}_{key}"] for key in Session.ARRAYS})
+        for number, name in enumerate(told["names"])
+    ]
+    for number, known in enumerate(told["closures"]):
+        known = {name: known[name] for name in PLAIN} | {"labels": tuple(known["labels"])}
+        T, C = arrays["T_from_to"][number], arrays["closure_covariances"][number]
+        s1, k1, s2, k2 = arrays["ends"][number].tolist()
+        constraint = Constraint(arrays["T_1_2"][number], arrays["covariances"][number])
+        closure = LoopClosure(T_from_to=T, covariance=C, **known)
+        graph.restore(Tie(End(s1, k1), End(s2, k2), constraint, closure))
+    graph.begin_session()
+    return graph
