@@ -6,7 +6,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-pytest.importorskip("gtsam", reason="the map is solved with gtsam")
+
+@pytest.fixture(autouse=True)
+def _gtsam() -> None:
+    pytest.importorskip("gtsam", reason="the map is solved with gtsam")
 
 
 def test_every_method_is_judged_on_the_same_closures() -> None:

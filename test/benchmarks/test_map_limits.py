@@ -13,9 +13,12 @@ from objreg_ros.data import LoopClosure
 from objreg_ros.geometry import pose
 from objreg_ros.truth import Truth
 
-pytest.importorskip("gtsam", reason="the map is solved with gtsam")
-
 SECOND = 10**9
+
+
+@pytest.fixture(autouse=True)
+def _gtsam() -> None:
+    pytest.importorskip("gtsam", reason="the map is solved with gtsam")
 
 
 @pytest.fixture

@@ -6,10 +6,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-pytest.importorskip("gtsam", reason="the map is solved with gtsam")
-
 from objreg_ros.mapper.pose_graph import PoseGraph
 from objreg_ros.simulation.walk import Walk, WalkParams, walk
+
+
+@pytest.fixture(autouse=True)
+def _gtsam() -> None:
+    pytest.importorskip("gtsam", reason="the map is solved with gtsam")
 
 
 @pytest.fixture

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("gtsam", reason="the map is solved with gtsam")
-
 SQUARE = """VERTEX_SE2 0 0 0 0
 VERTEX_SE2 1 1 0.1 1.57
 VERTEX_SE2 2 1.1 1 3.14
@@ -18,6 +16,11 @@ EDGE_SE2 1 2 1 0 1.5707963 100 0 0 100 0 400
 EDGE_SE2 2 3 1 0 1.5707963 100 0 0 100 0 400
 EDGE_SE2 3 0 1.1 0 1.5707963 100 0 0 100 0 400
 """
+
+
+@pytest.fixture(autouse=True)
+def _gtsam() -> None:
+    pytest.importorskip("gtsam", reason="the map is solved with gtsam")
 
 
 def test_a_square_in_the_plane_is_solved_as_well_by_all(tmp_path: Path) -> None:

@@ -5,7 +5,10 @@ from __future__ import annotations
 
 import pytest
 
-pytest.importorskip("gtsam", reason="the map is solved with gtsam")
+
+@pytest.fixture(autouse=True)
+def _gtsam() -> None:
+    pytest.importorskip("gtsam", reason="the map is solved with gtsam")
 
 
 def test_a_walk_is_told_part_by_part_and_its_beginning_at_once() -> None:

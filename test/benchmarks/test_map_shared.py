@@ -6,10 +6,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-pytest.importorskip("gtsam", reason="the map is solved with gtsam")
-
 from objreg_ros.simulation.walk import WalkParams, walk
 from objreg_ros.truth import Truth
+
+
+@pytest.fixture(autouse=True)
+def _gtsam() -> None:
+    pytest.importorskip("gtsam", reason="the map is solved with gtsam")
 
 
 def test_pictures_that_are_not_off_change_nothing_and_those_that_are_do() -> None:
