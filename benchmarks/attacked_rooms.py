@@ -38,7 +38,7 @@ from objreg_ros.bridge import from_msg, to_msg
 from objreg_ros.data import DepthImage, Detections, Frame, Intrinsics
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
-from objreg_ros.mapper.optimisation import load
+from objreg_ros.mapper.incremental import load
 from objreg_ros.mapper.pose_graph import PoseGraph
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm

@@ -2,14 +2,14 @@
 """A constraint as a BetweenFactorPose3 of GTSAM (`pip install gtsam`).
 
 Two things differ from ROS: GTSAM counts errors in the axes of *to*, and puts rotation before translation.
-`local_information` turns the axes and `ROTATION_FIRST` the order. The poses of the graph are those of the camera here;
+`local_information` turns the axes and `rotation_first` the order. The poses of the graph are those of the camera here;
 `between_keyframes` moves a constraint to the poses of a body at your own keyframes.
 """
 
 import numpy as np
 
 from objreg_ros.data import LoopClosure
-from objreg_ros.mapper.constraint import ROTATION_FIRST, Constraint, local_information
+from objreg_ros.mapper.constraint import Constraint, local_information, rotation_first
 
 try:
     import gtsam
@@ -20,7 +20,7 @@ except ImportError:
 def factor(closure: LoopClosure, from_key: int, to_key: int) -> "gtsam.BetweenFactorPose3":
     """The factor between the poses of the camera at the two moments."""
     information = local_information(Constraint(closure.T_from_to, closure.covariance))
-    noise = gtsam.noiseModel.Gaussian.Information(ROTATION_FIRST @ information @ ROTATION_FIRST.T)
+    noise = gtsam.noiseModel.Gaussian.Information(rotation_first(information))
     return gtsam.BetweenFactorPose3(from_key, to_key, gtsam.Pose3(closure.T_from_to), noise)
 
 

@@ -85,7 +85,7 @@ class ToG2o(Adapter):
 
     def take_back(self, key: Key) -> bool:
         """Leave the edge out of the file from now on."""
-        self._graph.ties = [tie for tie in self._graph.ties if tie.closure is None or key_of(tie.closure) != key]
+        self._graph.withdraw(lambda closure: key_of(closure) == key)
         self._has_news = True
         return True
 
@@ -102,9 +102,7 @@ class ToG2o(Adapter):
     def write(self) -> None:
         """Write the file whole, then put it in the place of the one before. OSError where that cannot be."""
         part = self.path.with_name(f".{self.path.name}.part")
-        poses = [T for _, T in self._graph.path()]
-        edges = [(tie.k1, tie.k2, tie.constraint) for tie in self._graph.ties]
-        part.write_text(graph_text(poses, edges), encoding="ascii")
+        part.write_text(graph_text(*self._graph.flat()), encoding="ascii")
         os.replace(part, self.path)
         self._has_news = False
 
@@ -119,8 +117,8 @@ class ToG2o(Adapter):
 
     def extra_diagnostics(self) -> Mapping[str, object]:
         """And what the file has."""
-        edges = sum(tie.closure is not None for tie in self._graph.ties)
-        return {**super().extra_diagnostics(), "vertices": len(self._graph.keyframes), "constraints in the file": edges}
+        told = {"vertices": len(self._graph.keyframes), "constraints in the file": len(self._graph.closure_ties)}
+        return {**super().extra_diagnostics(), **told}
 
     def close(self) -> None:
         """Write what is new, then end."""

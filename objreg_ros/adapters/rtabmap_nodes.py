@@ -113,7 +113,7 @@ class RtabmapNodes:
         way: Trajectory | None = odometry if covered else self.way(moments)
         if way is None:
             return None
-        between = between_keyframes(closure, way, k1.stamp_ns, k2.stamp_ns, T_base_camera, WANDERING)
+        between = between_keyframes(closure, (way, way), (k1.stamp_ns, k2.stamp_ns), T_base_camera, WANDERING)
         return k1.number, k2.number, between
 
 

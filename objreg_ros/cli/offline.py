@@ -149,8 +149,8 @@ def _remembering(registrar: RegistrarParams, files: MapFiles, folder: str) -> Re
 def _map(files: MapFiles, story: Story, store: Path) -> None:
     """Write what is asked for of the corrected map, and say what became of it."""
     click.echo(f"  map: {len(story.graph.keyframes)} keyframes, {len(story.pruned)} constraints pruned")
-    if story.keyframe_step is not None:
-        click.echo(f"  map: a long way; its keyframes stand {story.keyframe_step:.2f} m apart")
+    if story.unsolved:
+        click.echo(f"  map: as odometry says: {story.unsolved}")
     if story.left_out:
         click.echo(f"  map: {story.left_out} frames at which time does not advance are left out")
     files.write(story, store, lambda line: click.echo(f"  map: {line}"))

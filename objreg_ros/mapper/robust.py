@@ -9,6 +9,7 @@ without one that was doubtful when it came.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 
@@ -132,6 +133,7 @@ class RobustGraph:
         self._withdrawn += (number,)
         if self.kept[number]:
             self._state = self._sorted_out(self._changed(self._state, [], [number]))
+            self._take(self._tried_again(self._state, ()))
 
     def _take(self, state: _State) -> None:
         """The better one of two."""
@@ -145,44 +147,56 @@ class RobustGraph:
         return float(error @ np.linalg.solve(covariance, error))
 
     def _is_agreed(self, number: int) -> bool:
-        """Whether another closure that is left out says the same of the same two places, as far as the map knows."""
-        one, others = self.closures.taken(slice(number, number + 1)), self.closures.taken(~self.kept)
+        """Whether another closure that is left out says the same."""
+        return bool((self._saying_the_same(number) & ~self.kept).any())
+
+    def _saying_the_same(self, number: int) -> Array:
+        """(m,) of bool: the other closures that say of two places what this one does, as far as the map knows."""
+        one, others = self.closures.taken(slice(number, number + 1)), self.closures
         T = inverses(self.poses)
         there = T[one.k1] @ self.poses[others.k1]
         back = T[others.k2] @ self.poses[one.k2]
         apart = inverses(one.T_1_2) @ there @ others.T_1_2 @ back
         ways = np.linalg.norm(there[:, :3, 3], axis=1) + np.linalg.norm(back[:, :3, 3], axis=1)
         near = (ways < NEAR_M) & (np.linalg.norm(apart[:, :3, 3], axis=1) < AGREEING_M + AGREEING_SHARE * ways)
-        near[-1] = False  # that is itself
-        return bool(near.any())
+        near[number] = False  # that is itself
+        return near
 
     def _doubt(self) -> None:
-        """Leave out, one by one, those that were the most doubtful when they came, where all else is better then."""
+        """Leave out, one by one, those that were the most doubtful when they came, where all else is better then.
+
+        And each with those that say the same: lies that agree hold each other up.
+        """
         kept = np.flatnonzero(self.kept)
         for k in kept[np.argsort(-self._expected[kept])][:MOST_DOUBTED].tolist():
-            if self.kept[k]:
-                without = self._sorted_out(self._changed(self._state, [], [k]), stays_out=k)
-                self._take(without)
-                self._take(self._tried_again(without, k))
+            self._leave_out([k])
+            together = [k, *np.flatnonzero(self._saying_the_same(k) & self.kept).tolist()]
+            if len(together) > 1 and len(together) * self.limit < self._state.cost:  # it is the least to come of it
+                self._leave_out(together)
 
-    def _tried_again(self, state: _State, stays_out: int) -> _State:
-        """With a closure back in that fits a map which one less holds; others follow it by themselves."""
-        left_out = np.setdiff1d(np.flatnonzero(~state.kept), [stays_out, *self._withdrawn])
+    def _leave_out(self, numbers: list[int]) -> None:
+        """Where all else is better then, and none of them is left out already."""
+        if self.kept[numbers].all():
+            without = self._sorted_out(self._changed(self._state, [], numbers), stays_out=numbers)
+            self._take(without)
+            self._take(self._tried_again(without, numbers))
+
+    def _tried_again(self, state: _State, stays_out: Sequence[int]) -> _State:
+        """With a closure back in that fits a map which some less hold; others follow it by themselves."""
+        left_out = np.setdiff1d(np.flatnonzero(~state.kept), [*stays_out, *self._withdrawn])
         for k in left_out[np.argsort(state.residuals[left_out])][:MOST_RETRIED].tolist():
             if not state.kept[k] and self._expected_cost(state, self.closures.taken(slice(k, k + 1))) <= self.limit:
                 state = self._sorted_out(self._changed(state, [k], []), stays_out=stays_out)
         return state
 
-    def _sorted_out(self, state: _State, stays_in: int = -1, stays_out: int = -1) -> _State:
+    def _sorted_out(self, state: _State, stays_in: int = -1, stays_out: Sequence[int] = ()) -> _State:
         """Closures go in and out until none wants to. The best state on the way."""
         best = state
         for _ in range(ROUNDS):
             out, into = state.kept & (state.residuals > self.limit), ~state.kept & (state.residuals <= self.limit)
-            into[list(self._withdrawn)] = False
+            into[[*self._withdrawn, *stays_out]] = False
             if stays_in >= 0:
                 out[stays_in] = False
-            if stays_out >= 0:
-                into[stays_out] = False
             if not out.any() and not into.any():
                 break
             state = self._changed(state, np.flatnonzero(into).tolist(), np.flatnonzero(out).tolist())

@@ -253,7 +253,7 @@ class Solver:
             (T_map_chain[:, None] @ T_chain_end[None])[..., :3, 3] - T_map_end[None, :, :3, 3], axis=2
         )
         ways = np.array([[known.way_m(a, b) for b in ends] for a in ends])
-        votes = (apart < AGREEING_M + AGREEING_SHARE * ways).sum(axis=1)
+        votes = (np.maximum(apart, apart.T) < AGREEING_M + AGREEING_SHARE * ways).sum(axis=1)
         best = int(votes.argmax())
         return (T_map_chain[best] @ chain.T_chain_body[0], chain) if votes[best] >= TIES else None
 

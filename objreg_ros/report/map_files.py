@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +11,6 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.mapper.adapters import g2o, kitti, tum
-from objreg_ros.mapper.pose_graph import Tie
 from objreg_ros.memory.store import Store
 from objreg_ros.memory.store_file import StoreError
 from objreg_ros.registration.keyframe import Keyframe
@@ -67,9 +66,9 @@ class MapFiles:
             self.kitti.write_text(kitti.trajectory_text(corrected), encoding="ascii")
             tell(f"{self.kitti}: {len(stamps)} poses")
         if self.g2o is not None:
-            ties = _believed(story)
-            self.g2o.write_text(_graph_text(story, ties), encoding="ascii")
-            tell(f"{self.g2o}: {len(story.graph.keyframes)} keyframes, {len(ties)} edges")
+            keyframes, edges = story.graph.flat(left_out=story.pruned)
+            self.g2o.write_text(g2o.graph_text(keyframes, edges), encoding="ascii")
+            tell(f"{self.g2o}: {len(keyframes)} keyframes, {len(edges)} edges")
         if self.cloud is not None:
             poses = dict(zip(stamps, zip(odometry, corrected, strict=True), strict=True))
             cloud = cloud_of(_keyframes(store, tell), poses, self.voxel, tell)
@@ -128,14 +127,3 @@ def _keyframes(path: Path, tell: Callable[[str], None]) -> Iterator[Keyframe]:
             yield keyframe
     finally:
         store.close()
-
-
-def _believed(story: Story) -> list[Tie]:
-    """The ties of the graph without the closures that were pruned."""
-    pruned = {id(closure) for closure in story.pruned}
-    return [tie for tie in story.graph.ties if tie.closure is None or id(tie.closure) not in pruned]
-
-
-def _graph_text(story: Story, ties: Sequence[Tie]) -> str:
-    poses = [T for _, T in story.graph.path()]
-    return g2o.graph_text(poses, [(tie.k1, tie.k2, tie.constraint) for tie in ties])

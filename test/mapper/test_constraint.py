@@ -15,7 +15,7 @@ from objreg_ros.mapper.constraint import (
     floored,
     inverted,
     local_information,
-    open3d_information,
+    rotation_first,
     unseen,
     wandering,
 )
@@ -83,9 +83,11 @@ def test_local_information_is_the_inverse_covariance_in_the_axes_of_to() -> None
     np.testing.assert_allclose(np.linalg.inv(local_information(constraint)), expected, rtol=1e-3, atol=1e-10)
 
 
-def test_open3d_wants_the_same_numbers_with_rotation_first() -> None:
-    constraint = Constraint(np.eye(4), np.diag([1.0, 4.0, 9.0, 16.0, 25.0, 36.0]))
-    np.testing.assert_allclose(np.diag(open3d_information(constraint)), 1 / np.array([16, 25, 36, 1, 4, 9]))
+def test_gtsam_wants_the_same_numbers_with_rotation_first() -> None:
+    rng = np.random.default_rng(1)
+    information, error = rng.normal(size=(6, 6)), rng.normal(size=6)
+    swapped = np.concatenate([error[3:], error[:3]])
+    assert swapped @ rotation_first(information) @ swapped == pytest.approx(error @ information @ error)
 
 
 def test_a_closure_between_cameras_becomes_one_between_the_bodies_of_the_keyframes() -> None:
@@ -96,7 +98,19 @@ def test_a_closure_between_cameras_becomes_one_between_the_bodies_of_the_keyfram
         odometry.append(stamp, T)
     T_from_to = inverse(T_world_body[0] @ T_body_camera) @ T_world_body[20] @ T_body_camera
     closure = LoopClosure(from_ns=0, to_ns=20, T_from_to=T_from_to, covariance=np.eye(6), labels=())
-    constraint = between_keyframes(closure, odometry, 10, 30, T_body_camera)
+    constraint = between_keyframes(closure, (odometry, odometry), (10, 30), T_body_camera)
+    np.testing.assert_allclose(constraint.T_from_to, inverse(T_world_body[10]) @ T_world_body[30], atol=1e-9)
+
+
+def test_a_closure_of_two_sessions_is_moved_by_the_odometry_of_each() -> None:
+    T_body_camera, origin = random_pose(), random_pose()
+    T_world_body = {stamp: random_pose() for stamp in (0, 10, 20, 30)}
+    one, other = Trajectory(), Trajectory()
+    for stamp, T in T_world_body.items():
+        one.append(stamp, T) if stamp < 20 else other.append(stamp - 20, origin @ T)
+    T_from_to = inverse(T_world_body[0] @ T_body_camera) @ T_world_body[20] @ T_body_camera
+    closure = LoopClosure(from_ns=0, to_ns=0, T_from_to=T_from_to, covariance=np.eye(6), labels=())
+    constraint = between_keyframes(closure, (one, other), (10, 10), T_body_camera)
     np.testing.assert_allclose(constraint.T_from_to, inverse(T_world_body[10]) @ T_world_body[30], atol=1e-9)
 
 
@@ -115,7 +129,7 @@ def test_a_closure_moved_by_odometry_is_known_less_well_by_what_that_wanders() -
             each = np.sqrt(np.diag(wandering(step, sigmas)))
             odometry.append(k1, T[k1])
             odometry.append(k2, T[k1] @ disturbed(step, each * RNG.standard_normal(6)))
-        moved = between_keyframes(closure, odometry, 1, 22, T_body_camera, sigmas)
+        moved = between_keyframes(closure, (odometry, odometry), (1, 22), T_body_camera, sigmas)
         errors.append(difference(moved.T_from_to, inverse(T[1]) @ T[22]))
     seen, said = np.cov(np.array(errors).T), moved.covariance
     np.testing.assert_allclose(np.sqrt(np.diag(seen)), np.sqrt(np.diag(said)), rtol=0.15)
@@ -139,7 +153,7 @@ def test_a_closure_outside_odometry_is_refused_with_the_span() -> None:
     odometry.append(5, np.eye(4))
     closure = LoopClosure(from_ns=0, to_ns=5, T_from_to=np.eye(4), covariance=np.eye(6), labels=())
     with pytest.raises(ValueError, match="expected a stamp within 5 to 5 ns, got 0 ns"):
-        between_keyframes(closure, odometry, 5, 5, np.eye(4))
+        between_keyframes(closure, (odometry, odometry), (5, 5), np.eye(4))
 
 
 def test_a_claim_is_raised_to_the_floor_in_the_directions_below_it_and_else_left_alone() -> None:

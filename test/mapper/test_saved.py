@@ -66,7 +66,11 @@ def test_the_next_day_goes_on_in_the_map_once_two_closures_agree_on_where(yester
     assert placed == [False, True, True, True]
     assert distances(today.corrected(w.stamp_ns for w in late[:HALF]), TRUE[:HALF]).max() < 0.25
     saved.save(today, tmp_path / "map.npz")
-    assert [len(path) for path in saved.load(tmp_path / "map.npz", MapperParams()).paths()] == [len(today.keyframes), 0, 0]
+    assert [len(path) for path in saved.load(tmp_path / "map.npz", MapperParams()).paths()] == [
+        len(today.keyframes),
+        0,
+        0,
+    ]
 
 
 def test_a_withdrawn_closure_is_not_saved(yesterday: PoseGraph, tmp_path: Path) -> None:
