@@ -70,7 +70,12 @@ def oracle(source: Source, found: Sequence[Revisit]) -> Result:
     answers = [
         (revisit.from_ns, revisit.to_ns, source.truth.between(revisit.from_ns, revisit.to_ns)) for revisit in found
     ]
-    return Result([_closure(a, b, T, ORACLE_COVARIANCE) for a, b, T in answers if T is not None], len(answers), 0.0)
+    return Result([perfect(a, b, T) for a, b, T in answers if T is not None], len(answers), 0.0)
+
+
+def perfect(from_ns: int, to_ns: int, T_from_to: Array) -> LoopClosure:
+    """A true pose as a constraint that is known well."""
+    return _closure(from_ns, to_ns, T_from_to, ORACLE_COVARIANCE)
 
 
 def theirs(peer: Peer, source: Source, keyframes: Sequence[Frame], pairs: Sequence[tuple[int, int]]) -> Result:

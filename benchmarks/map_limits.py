@@ -1,0 +1,293 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What limits the trajectory of a recording: closures found once, odometry that drifts anew, parts left out."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import click
+import closers
+import map_shared
+import numpy as np
+from sources import detector_of, read_source, with_drift
+from tqdm import tqdm
+
+from objreg_ros.data import Array, Frame, LoopClosure, Odometry
+from objreg_ros.geometry import inverse, rotation_angle, vector_from_rotation
+from objreg_ros.mapper.params import MapperParams
+from objreg_ros.mapper.pose_graph import PoseGraph
+from objreg_ros.report.trajectory_error import absolute_trajectory_error
+from objreg_ros.truth import LOOSE, Truth, within
+
+SEED = 1  # of the odometry with which closures are found
+PERFECT, OURS, ODOMETRY = "perfect constraints", "ours", "odometry alone"
+NO_STEADY = {"steady_heading": 0.0, "steady_distance": 0.0}
+NEVER_PRUNED = {"max_residual": 1e3}
+STRETCHES_M = (0.5, 2.0, 4.0)
+WANDERING = {"odometry_translation_error": 0.014, "odometry_rotation_error": 0.32}  # of `with_drift`, by its model
+LEAST_SIGMAS = ((0.005, 0.2), (0.01, 0.5), (0.02, 1.0), (0.04, 2.0))  # m, degrees
+MOST_REVISITS = 200  # of all that there are, evenly
+
+
+@dataclass(frozen=True)
+class Case:
+    """A recording without its pictures: what its frames, its truth and the registrar came to."""
+
+    name: str
+    frames: list[Frame]
+    truth: Truth
+    closures: list[LoopClosure]
+
+
+def found(path: Path, folder: Path) -> Case:
+    """Of a recording; out of a file where it was found before."""
+    stat = path.stat()
+    tag = hashlib.sha1(f"{path.resolve()} {stat.st_mtime_ns} {stat.st_size}".encode()).hexdigest()[:8]
+    file = folder / f"{path.name}_{tag}.pickle"
+    if file.exists():
+        click.echo(f"{path.name}: closures as found before, in {file}", err=True)
+        case: Case = pickle.loads(file.read_bytes())
+        return case
+    click.echo(f"{path.name}: finding closures", err=True)
+    with read_source(path, detector_of(), SEED) as source:
+        result = closers.ours(source, SEED)
+        bare = [
+            replace(frame, objects=(), support=None)
+            for frame in source.frames
+            if source.truth.at(frame.stamp_ns) is not None
+        ]
+        case = Case(path.name, bare, source.truth, result.closures)
+    folder.mkdir(parents=True, exist_ok=True)
+    unfinished = file.with_suffix(".part")
+    unfinished.write_bytes(pickle.dumps(case))
+    os.replace(unfinished, file)
+    return case
+
+
+Words = Callable[[Case, list[Frame]], list[LoopClosure]]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """Closures made of those that were found, and parameters of the mapper."""
+
+    closures: Words
+    params: MapperParams = MapperParams()
+
+
+def as_found(case: Case, _: list[Frame]) -> list[LoopClosure]:
+    """Those that the registrar published."""
+    return case.closures
+
+
+def perfect(case: Case, _: list[Frame]) -> list[LoopClosure]:
+    """The same pairs with true poses."""
+    return [replace(word, T_from_to=T) for word, T in _with_truth(case)]
+
+
+def rotations_perfect(case: Case, _: list[Frame]) -> list[LoopClosure]:
+    """The same pairs, their rotations true."""
+    return [replace(word, T_from_to=_mixed(T, word.T_from_to)) for word, T in _with_truth(case)]
+
+
+def positions_perfect(case: Case, _: list[Frame]) -> list[LoopClosure]:
+    """The same pairs, their positions true."""
+    return [replace(word, T_from_to=_mixed(word.T_from_to, T)) for word, T in _with_truth(case)]
+
+
+def _mixed(rotation_of: Array, position_of: Array) -> Array:
+    T = position_of.copy()
+    T[:3, :3] = rotation_of[:3, :3]
+    return T
+
+
+def _with_truth(case: Case) -> list[tuple[LoopClosure, Array]]:
+    pairs = [(word, case.truth.between(word.from_ns, word.to_ns)) for word in case.closures]
+    return [(word, T) for word, T in pairs if T is not None]
+
+
+def true_ones(case: Case, _: list[Frame]) -> list[LoopClosure]:
+    """Those within 5 degrees and 10 cm."""
+    errors = [(word, case.truth.error(word)) for word in case.closures]
+    return [word for word, error in errors if error is not None and within(error, LOOSE)]
+
+
+def every_revisit(case: Case, frames: list[Frame]) -> list[LoopClosure]:
+    """Perfect constraints for pairs of keyframes that there were to close, known to 5 mm and 0.2 degrees."""
+    words = []
+    revisits = closers.loops_of(closers.keyframes_of(frames), case.truth)
+    for revisit in revisits[:: len(revisits) // MOST_REVISITS + 1]:
+        T = case.truth.between(revisit.from_ns, revisit.to_ns)
+        if T is not None:
+            words.append(closers.perfect(revisit.from_ns, revisit.to_ns, T))
+    return words
+
+
+def scaled(factor: float) -> Words:
+    """All covariances by a factor."""
+    return lambda case, _: [replace(word, covariance=factor * word.covariance) for word in case.closures]
+
+
+def alike() -> Words:
+    """All covariances the same: the middle one of position, and of rotation."""
+
+    def made(case: Case, _: list[Frame]) -> list[LoopClosure]:
+        variances = np.median([np.diag(word.covariance) for word in case.closures], axis=0)
+        C = np.diag(np.repeat([variances[:3].mean(), variances[3:].mean()], 3))
+        return [replace(word, covariance=C) for word in case.closures]
+
+    return made
+
+
+def thinned(metres: float) -> Words:
+    """Closures between the same two stretches of the way share what one of them knows; a radian counts as a metre."""
+
+    def made(case: Case, frames: list[Frame]) -> list[LoopClosure]:
+        words, stamps, way = case.closures, np.array([frame.stamp_ns for frame in frames]), _way(frames)
+        ends = [
+            tuple(int(np.interp(stamp, stamps, way) / metres) for stamp in (word.from_ns, word.to_ns)) for word in words
+        ]
+        count = Counter(ends)
+        return [replace(word, covariance=count[end] * word.covariance) for word, end in zip(words, ends, strict=True)]
+
+    return made
+
+
+def _way(frames: Sequence[Frame]) -> Array:
+    """How far odometry went until each frame, m and rad together."""
+    poses = [frame.T_odom_camera for frame in frames if frame.T_odom_camera is not None]
+    steps = [inverse(a) @ b for a, b in pairwise(poses)]
+    return np.cumsum([0.0, *(float(np.linalg.norm(T[:3, 3])) + rotation_angle(T[:3, :3]) for T in steps)])
+
+
+def variants() -> dict[str, Variant]:
+    """What is compared, by name."""
+    usual = MapperParams()
+    steadfast, patient = usual.replaced(**NO_STEADY), usual.replaced(**NEVER_PRUNED)
+    trusted, lowest = usual.replaced(**WANDERING), LEAST_SIGMAS[2]
+    blunt = {"min_sigma_translation": lowest[0], "min_sigma_rotation": lowest[1]}
+    return {
+        OURS: Variant(as_found),
+        PERFECT: Variant(perfect),
+        "perfect, any revisits": Variant(every_revisit),
+        "ours, rotations perfect": Variant(rotations_perfect),
+        "ours, positions perfect": Variant(positions_perfect),
+        "ours, true ones alone": Variant(true_ones),
+        "ours, none pruned": Variant(as_found, patient),
+        "ours, no steady error": Variant(as_found, steadfast),
+        **{f"ours, shared by {m:g} m": Variant(thinned(m)) for m in STRETCHES_M},
+        **{
+            f"ours, least {100 * m:g} cm, {deg:g} deg": Variant(
+                as_found, usual.replaced(min_sigma_translation=m, min_sigma_rotation=deg)
+            )
+            for m, deg in LEAST_SIGMAS
+        },
+        "ours, covariance x 4": Variant(scaled(4.0)),
+        "ours, covariance x 16": Variant(scaled(16.0)),
+        "ours, covariances alike": Variant(alike()),
+        "ours, odometry as it is": Variant(as_found, trusted),
+        "perfect, odometry as it is": Variant(perfect, trusted),
+        "ours, 2 m and odometry": Variant(thinned(STRETCHES_M[1]), trusted),
+        "ours, 2 m and 2 cm, 1 deg": Variant(thinned(STRETCHES_M[1]), usual.replaced(**blunt)),
+        "ours, those and 2 cm, 1 deg": Variant(thinned(STRETCHES_M[1]), trusted.replaced(**blunt)),
+    }
+
+
+def limits(case: Case, drifts: int) -> dict[str, Any]:
+    """The error of the trajectory in cm by odometry and with each variant, one for each drift; of keyframes by LM."""
+    cm: dict[str, list[float]] = {ODOMETRY: []}
+    pruned: dict[str, list[int]] = {}
+    for seed in tqdm(range(1, drifts + 1), desc=case.name):
+        frames = with_drift(case.frames, case.truth, seed)
+        for name, value in map_shared.errors_cm(filled(case, frames, Variant(as_found))[0], case.truth).items():
+            cm.setdefault(name, []).append(value)
+        for name, variant in variants().items():
+            before, after, refused = trajectory_errors(case, frames, variant)
+            cm.setdefault(name, []).append(100 * after)
+            pruned.setdefault(name, []).append(refused)
+        cm[ODOMETRY].append(100 * before)
+    return {"closures": len(case.closures), "cm": cm, "pruned": pruned, **consistency(case)}
+
+
+def filled(case: Case, frames: list[Frame], variant: Variant) -> tuple[PoseGraph, int]:
+    """A graph with all of it, unsolved, and how many closures it refused."""
+    graph, refused = PoseGraph(variant.params), 0
+    for frame in frames:
+        if frame.T_odom_camera is not None:
+            graph.add_odometry(Odometry(T_odom_body=frame.T_odom_camera, stamp_ns=frame.stamp_ns))
+    for word in variant.closures(case, frames):
+        try:
+            graph.add_closure(word)
+        except ValueError:
+            refused += 1
+    return graph, refused
+
+
+def trajectory_errors(case: Case, frames: list[Frame], variant: Variant) -> tuple[float, float, int]:
+    """As `closers.trajectory_errors`, with parameters; what the mapper refuses at once counts as pruned."""
+    graph, refused = filled(case, frames, variant)
+    posed = [(frame.stamp_ns, T) for frame in frames if (T := frame.T_odom_camera) is not None]
+    pruned = len(graph.optimise().pruned) + refused
+    true = [T for stamp, _ in posed if (T := case.truth.at(stamp)) is not None]
+    before = absolute_trajectory_error([T for _, T in posed], true)
+    return before, absolute_trajectory_error(graph.corrected(stamp for stamp, _ in posed), true), pruned
+
+
+def consistency(case: Case) -> dict[str, Any]:
+    """What closures err, and what they claim: medians, and the middle squared error in variances (right: 0.89).
+
+    ``shared`` is the part of the squared error that closures between the same two stretches of 2 s have in common: 0 of
+    independent ones, 1 where they all err alike.
+    """
+    rows = _with_truth(case)
+    errors = np.array([_error(word, T) for word, T in rows]).reshape(-1, 6)
+    white = np.array([e @ np.linalg.solve(word.covariance, e) / 6 for e, (word, _) in zip(errors, rows, strict=True)])
+    claimed = np.array([np.sqrt(np.diag(word.covariance)) for word, _ in rows]).reshape(-1, 6)
+    groups: dict[tuple[int, int], list[Array]] = {}
+    for e, (word, _) in zip(errors, rows, strict=True):
+        groups.setdefault((word.from_ns // 2_000_000_000, word.to_ns // 2_000_000_000), []).append(e[:3])
+    many = [np.array(group) for group in groups.values() if len(group) > 1]
+    pairs = sum(len(g) * (len(g) - 1) for g in many)
+    products = sum(float(np.square(g.sum(axis=0)).sum() - np.square(g).sum()) for g in many)
+    alone = sum((len(g) - 1) * float(np.square(g).sum()) for g in many)
+    return {
+        "error_cm": 100 * float(np.median(np.linalg.norm(errors[:, :3], axis=1))),
+        "error_deg": float(np.degrees(np.median(np.linalg.norm(errors[:, 3:], axis=1)))),
+        "claimed_cm": 100 * float(np.median(np.linalg.norm(claimed[:, :3], axis=1))),
+        "claimed_deg": float(np.degrees(np.median(np.linalg.norm(claimed[:, 3:], axis=1)))),
+        "squared_in_variances": float(np.median(white)),
+        "shared": products / alone if pairs else None,
+    }
+
+
+def _error(word: LoopClosure, T: Array) -> Array:
+    """[t r] in the axes of *from*."""
+    turned = vector_from_rotation(word.T_from_to[:3, :3] @ T[:3, :3].T)
+    return np.concatenate([word.T_from_to[:3, 3] - T[:3, 3], turned])
+
+
+def table(name: str, told: dict[str, Any]) -> str:
+    """One recording as text: means over the drifts, and the ratio to perfect constraints, drift by drift."""
+    lines = [
+        f"{name}: {told['closures']} closures that err {told['error_cm']:.2f} cm and {told['error_deg']:.2f} deg, and"
+        f" claim {told['claimed_cm']:.2f} cm and {told['claimed_deg']:.2f} deg; squared in variances"
+        f" {told['squared_in_variances']:.2f}; shared " + ("-" if told["shared"] is None else f"{told['shared']:.2f}"),
+        f"{'':38} {'mean cm':>8} {'least':>7} {'most':>7} {'/ perfect':>10} {'worst':>6} {'pruned':>7}",
+    ]
+    base = np.array(told["cm"][PERFECT])
+    for variant, values in told["cm"].items():
+        cm = np.array(values)
+        pruned = f"{np.mean(told['pruned'][variant]):.1f}" if variant in told["pruned"] else "-"
+        lines.append(
+            f"{variant:38} {cm.mean():>8.2f} {cm.min():>7.2f} {cm.max():>7.2f} {cm.mean() / base.mean():>10.2f}"
+            f" {(cm / base).max():>6.2f} {pruned:>7}"
+        )
+    return "\n".join(lines)
