@@ -35,6 +35,13 @@ class MapperParams(Params):
         0.02, "error of position that every metre adds alike, one sigma", "m/m", ge=0.0, live=True
     )
     max_speed: float = param(5.0, "odometry that leaps faster than this has begun anew: a new map", "m/s", ge=0.1)
+    # What a picture's depth, its lag behind colour and its shutter do to all constraints of it alike.
+    picture_translation_error: float = param(
+        0.01, "error of position that all constraints of a keyframe share, one sigma; 0 is none", "m", ge=0.0, live=True
+    )
+    picture_rotation_error: float = param(
+        0.5, "error of rotation that all constraints of a keyframe share, one sigma; 0 is none", "deg", ge=0.0, live=True
+    )
     min_sigma_translation: float = param(
         0.001,
         "a constraint that claims to know its position better is believed no better than this",
@@ -63,6 +70,11 @@ class MapperParams(Params):
     def odometry_sigmas(self) -> tuple[float, float]:
         """How odometry wanders in m and rad, after one metre or one radian."""
         return self.odometry_translation_error, float(np.radians(self.odometry_rotation_error))
+
+    @property
+    def picture_sigmas(self) -> tuple[float, float]:
+        """How far a picture is from its keyframe, m and rad."""
+        return self.picture_translation_error, float(np.radians(self.picture_rotation_error))
 
     @property
     def least_sigmas(self) -> tuple[float, float]:

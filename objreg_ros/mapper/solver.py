@@ -120,7 +120,8 @@ class Solver:
         self._at: int | None = None  # the tie that is being taken in
         self._numbers: dict[int, int] = {}  # of ties in the graph, by theirs
         self._untied: list[int] = []  # ties of sessions that are not in the graph
-        self._tethers: list[tuple[int, int, Constraint]] = []  # what holds sessions, next to nothing, but for closures
+        self._tethers: list[tuple[int, int, Constraint]] = []  # what holds pictures to keyframes, and sessions, loosely
+        self._pictures: dict[int, int] = {}  # nodes by those of their keyframes
         self._gone = frozenset[int]()  # ties that are withdrawn
         self._due = 1
 
@@ -171,7 +172,7 @@ class Solver:
     def _close(self, problem: Problem, number: int) -> None:
         assert self._robust is not None
         tie = problem.ties[number]
-        k1, k2 = (self._node(problem, end) for end in (tie.end1, tie.end2))
+        k1, k2 = (self._picture(problem, end) for end in (tie.end1, tie.end2))
         self._numbers[number] = len(self._robust.closures)
         self._robust.close(edges_of([(k1, k2, tie.constraint)]))
 
@@ -184,6 +185,19 @@ class Solver:
         if end.keyframe not in route.nodes:
             self._insert(route, end.keyframe)
         return route.nodes[end.keyframe]
+
+    def _picture(self, problem: Problem, end: End) -> int:
+        """The node of what a keyframe saw: the keyframe's, but for an error that all closures of it share."""
+        node, sigmas = self._node(problem, end), problem.params.picture_sigmas
+        if not all(sigmas):
+            return node
+        assert self._robust is not None
+        if node not in self._pictures:
+            self._pictures[node] = len(self._robust.poses)
+            same = Constraint(np.eye(4), np.diag(np.repeat(sigmas, 3) ** 2))
+            self._tethers.append((node, self._pictures[node], same))
+            self._robust.grow(self._robust.poses[[node]], edges_of(self._tethers[-1:]))
+        return self._pictures[node]
 
     def _insert(self, route: _Route, k: int) -> None:
         """A keyframe becomes a node, after the last one or between two."""
