@@ -53,8 +53,8 @@ setup(
         # What only the demo's picture of the way and the figures of benchmarks/ draw with; a robot does without. The
         # simulator itself needs nothing that a robot has not.
         "simulation": ["matplotlib>=3.6"],
-        # The mapper, and the corrected trajectory of a report. Its wheel asks for pytest 9, which the launch_testing of
-        # Ubuntu does not go with: on a robot, `pip install --no-deps gtsam`.
+        # The mapper, and the corrected way of a report. Its wheel asks for pytest 9, which Ubuntu's launch_testing
+        # does not go with: on a robot, `pip install --no-deps gtsam`.
         "mapper": ["gtsam>=4.3"],
         # The real ROS 2 Jazzy as wheels, for machines without a ROS installation.
         "ros": ["ros-jazzy-rclpy", "ros-jazzy-common-interfaces", "ros-jazzy-rmw-fastrtps-cpp"],

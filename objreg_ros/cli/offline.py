@@ -7,6 +7,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import click
 import numpy as np
@@ -24,9 +25,12 @@ from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.mounts import static_frames
 from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
+from objreg_ros.report.map_files import VOXEL_M, MapFiles
+from objreg_ros.report.story import Story
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_ros.truth import Truth
 
+FILE = click.Path(dir_okay=False, path_type=Path)
 DRIFT = "drift:"
 STILL = "all frames have the stamp {} ns, so none closes a loop: record them again with the time in their headers"
 CAMERAS_OWN = (
@@ -40,6 +44,19 @@ CAMERAS_OWN = (
 @options.labels
 @options.camera
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the outcome here.")
+@click.option(
+    "--tum", type=FILE, help="Write the corrected trajectory here: stamp tx ty tz qx qy qz qw, as evo reads it."
+)
+@click.option("--kitti", type=FILE, help="Write it here as 12 numbers a pose, of the 3x4 matrix. KITTI has no stamps.")
+@click.option("--g2o", type=FILE, help="Write the corrected pose graph here, without the constraints that were pruned.")
+@click.option("--map", "cloud", type=FILE, metavar="FILE.ply", help="Write here what the keyframes saw, corrected.")
+@click.option(
+    "--voxel",
+    type=float,
+    default=VOXEL_M,
+    show_default=True,
+    help="The side of the voxels to which --map is thinned, m. It doubles where they do not fit into memory.",
+)
 @click.option("--max-frames", type=click.IntRange(min=1), help="Stop after this many frames.")
 @click.option(
     "--odometry",
@@ -55,6 +72,11 @@ def command(
     labels: str | None,
     camera: str,
     json_file: Path | None,
+    tum: Path | None,
+    kitti: Path | None,
+    g2o: Path | None,
+    cloud: Path | None,
+    voxel: float,
     max_frames: int | None,
     odometry: str | None,
     params_file: Path | None,
@@ -65,31 +87,73 @@ def command(
 
     Deterministic, and as fast as the CPU goes. Prints what came out and, where the recording has ground truth, the
     true error of every constraint.
+
+    With odometry the constraints correct it: --tum, --kitti, --g2o and --map write what comes out, in the frame in
+    which odometry began. Poses are of the camera's optical frame, at every frame of the recording.
     """
-    if json_file is not None:
-        require_writable("--json", json_file)
+    files = _files(tum, kitti, g2o, cloud, voxel)
+    for option, file in (({"--json": json_file} if json_file else {}) | files.wanted).items():
+        require_writable(option, file)
     _require_seed(odometry)
     settings = read_settings(params_file, [*changes, *_named(model, labels, camera)])
     tell_ignored(settings)
     told = settings.of("segmenter", SegmenterNodeParams)
-    with open_recording(recording) as opened:
+    with open_recording(recording) as opened, TemporaryDirectory() as folder:
         source = with_camera(opened, told.camera, parse_remaps(remaps), told.source)
         inputs = _inputs(source, remaps, odometry, told.source)
+        _require_odometry(files, source, inputs)
         truth = Truth.of(source, inputs.ground_truth)
         for note in (*source.notes, *truth.notes):
             click.echo(f"! {note}", err=True)
-        run = _run(source, inputs, settings, max_frames, odometry)
-    summary = run.summary(truth)
-    _say(run, summary)
-    if json_file is not None:
-        about = {
-            "recording": str(recording.resolve()),
-            "inputs": inputs.outright,
-            "odometry": inputs.odom,
-            "rectified": told.rectified,
-            "camera": absolute(told.camera),
-        }
-        json_file.write_text(json.dumps({**about, **summary}, indent=1))
+        registrar = _remembering(settings.of("registrar", RegistrarParams), files, folder)
+        run = _run(source, inputs, settings, registrar, max_frames, odometry)
+        summary = run.summary(truth)
+        _say(run, summary)
+        if json_file is not None:
+            about = {
+                "recording": str(recording.resolve()),
+                "inputs": inputs.outright,
+                "odometry": inputs.odom,
+                "rectified": told.rectified,
+                "camera": absolute(told.camera),
+            }
+            json_file.write_text(json.dumps({**about, **summary}, indent=1))
+        if files.wanted:
+            _map(files, Story.of(recording.name, summary, truth), Path(registrar.store))
+
+
+def _files(tum: Path | None, kitti: Path | None, g2o: Path | None, cloud: Path | None, voxel: float) -> MapFiles:
+    try:
+        return MapFiles(tum, kitti, g2o, cloud, voxel)
+    except ValueError as error:
+        raise ValueError(f"--voxel: {error}") from error
+
+
+def _require_odometry(files: MapFiles, source: Recording, inputs: Inputs) -> None:
+    """ValueError, before the long run, where a map is asked for and there is no odometry that it could correct."""
+    if files.wanted and inputs.odom is None:
+        there = ", ".join(source.topics)
+        raise ValueError(
+            f"{source.path}: {', '.join(files.wanted)}: expected odometry, which a map corrects, got none of {there}; "
+            "choose its topic with --odometry TOPIC, or make one that drifts from the truth with --odometry drift:1"
+        )
+
+
+def _remembering(registrar: RegistrarParams, files: MapFiles, folder: str) -> RegistrarParams:
+    """With a store in a file, in ``folder`` unless it has one, where the map is made of what it remembers."""
+    if files.cloud is None or registrar.store:
+        return registrar
+    return registrar.replaced(store=str(Path(folder, "keyframes.db")))
+
+
+def _map(files: MapFiles, story: Story, store: Path) -> None:
+    """Write what is asked for of the corrected map, and say what became of it."""
+    click.echo(f"  map: {len(story.graph.keyframes)} keyframes, {len(story.pruned)} constraints pruned")
+    if story.unsolved:
+        click.echo(f"  map: as odometry says: {story.unsolved}")
+    if story.left_out:
+        click.echo(f"  map: {story.left_out} frames at which time does not advance are left out")
+    files.write(story, store, lambda line: click.echo(f"  map: {line}"))
 
 
 def _require_seed(odometry: str | None) -> None:
@@ -128,7 +192,14 @@ def _inputs(source: Recording, remaps: tuple[str, ...], odometry: str | None, de
     return inputs
 
 
-def _run(source: Recording, inputs: Inputs, settings: Settings, max_frames: int | None, odometry: str | None) -> Run:
+def _run(
+    source: Recording,
+    inputs: Inputs,
+    settings: Settings,
+    registrar: RegistrarParams,
+    max_frames: int | None,
+    odometry: str | None,
+) -> Run:
     max_rate = settings.of("detector", DetectorParams).max_rate
     find_pose = static_frames(source).between
     timing = replace(_timing(settings, odometry), find_pose=find_pose, max_rate=max_rate)
@@ -136,7 +207,7 @@ def _run(source: Recording, inputs: Inputs, settings: Settings, max_frames: int 
     rooms, close = build_rooms(
         settings.of("detector", DetectorParams),
         settings.of("segmenter", SegmenterParams),
-        settings.of("registrar", RegistrarParams),
+        registrar,
     )
     try:
         frames = source.topics[inputs.depth or inputs.points or ""].count

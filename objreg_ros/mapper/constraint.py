@@ -104,15 +104,19 @@ def inverted(constraint: Constraint) -> Constraint:
     return Constraint(pose(R.T, -R.T @ t), J @ constraint.covariance @ J.T)
 
 
-def local_information(constraint: Constraint) -> Array:
-    """The (6, 6) information of the error ``[t r]`` in the axes of the *to* frame: ``T' = T exp([t r])``.
+def local_covariance(constraint: Constraint) -> Array:
+    """The (6, 6) covariance of the error ``[t r]`` in the axes of the *to* frame: ``T' = T exp([t r])``.
 
     This is what pose-graph optimisers weigh (g2o's EdgeSE3, GTSAM's BetweenFactor, and RTAB-Map over them): the error
     of ``measured^-1 estimated``.
     """
-    R_to_from = constraint.T_from_to[:3, :3].T
-    J = np.kron(np.eye(2), R_to_from)
-    information = np.linalg.inv(J @ constraint.covariance @ J.T)
+    J = np.kron(np.eye(2), constraint.T_from_to[:3, :3].T)
+    return J @ constraint.covariance @ J.T
+
+
+def local_information(constraint: Constraint) -> Array:
+    """The inverse of `local_covariance`."""
+    information = np.linalg.inv(local_covariance(constraint))
     return (information + information.T) / 2
 
 

@@ -11,15 +11,17 @@ from scipy.spatial.transform import Rotation
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import inverses, skew
-from objreg_ros.mapper.constraint import Constraint, local_information, rotation_first
+from objreg_ros.mapper.constraint import Constraint, local_covariance, rotation_first
+
+LEAST_FREEDOM = 1e-9  # of errors that go together: rounding must not make them more than one
 
 
 @dataclass(frozen=True, slots=True)
 class Edges:
     """``T_1_2 (m, 4, 4)`` between nodes ``k1 (m,)`` and ``k2 (m,)``, and the ``whitening (m, 6, 6)`` of their errors.
 
-    The error [r t] is that of ``T_1_2^-1`` times what poses say, in the axes of *2*. Whitened by an upper triangle it
-    is in standard deviations. Both are GTSAM's order and axes.
+    The error [r t] is that of ``T_1_2^-1`` times what poses say, in the axes of *2*. Whitened it is in standard
+    deviations. Both are GTSAM's order and axes.
     """
 
     k1: Array
@@ -44,8 +46,15 @@ def edges_of(rows: Sequence[tuple[int, int, Constraint]]) -> Edges:
     """The arrays of constraints between nodes."""
     k1, k2 = (np.array([row[side] for row in rows], int) for side in (0, 1))
     T_1_2 = np.array([row[2].T_from_to for row in rows]).reshape(-1, 4, 4)
-    information = np.array([rotation_first(local_information(row[2])) for row in rows]).reshape(-1, 6, 6)
-    return Edges(k1, k2, T_1_2, np.linalg.cholesky(information).transpose(0, 2, 1))
+    covariances = np.array([rotation_first(local_covariance(row[2])) for row in rows]).reshape(-1, 6, 6)
+    return Edges(k1, k2, T_1_2, _whitenings(covariances))
+
+
+def _whitenings(covariances: Array) -> Array:
+    """(m, 6, 6) W with ``W C W^T = 1``, by way of correlations: what is known to microns and to kilometres goes too."""
+    sigmas = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+    correlations = covariances / (sigmas[:, :, None] * sigmas[:, None, :]) + LEAST_FREEDOM * np.eye(6)
+    return np.linalg.inv(np.linalg.cholesky(correlations)) / sigmas[:, None, :]
 
 
 def whitened_errors(poses: Array, edges: Edges) -> Array:

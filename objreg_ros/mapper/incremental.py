@@ -23,12 +23,16 @@ FEW = 0.05  # of all nodes
 INSTALL = "expected gtsam, which solves the map, got none: pip install --no-deps gtsam (or objreg_ros[mapper])"
 
 
+class MissingError(ImportError, ValueError):
+    """What solves the map is not installed; a node that needs it ends with this line."""
+
+
 def load() -> Any:
-    """GTSAM, imported now: it takes a moment, in which nothing else runs. ValueError where it is not installed."""
+    """GTSAM, imported now: it takes a moment, in which nothing else runs. `MissingError` where it is not installed."""
     try:
         return import_module("gtsam")
     except ImportError as error:
-        raise ValueError(INSTALL) from error
+        raise MissingError(INSTALL) from error
 
 
 class IncrementalGraph:

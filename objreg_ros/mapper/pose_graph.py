@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -273,14 +273,14 @@ class PoseGraph:
             for s, is_placed in enumerate(placed)
         ]
 
-    def flat(self) -> tuple[list[Array], list[tuple[int, int, Constraint]]]:
+    def flat(self, left_out: Sequence[LoopClosure] = ()) -> tuple[list[Array], list[tuple[int, int, Constraint]]]:
         """``T_map_body`` of the keyframes of all sessions that are placed, in one row, and the ties between them."""
-        paths = self.paths()
+        paths, gone = self.paths(), {id(closure) for closure in left_out}
         first = np.cumsum([0, *(len(path) for path in paths)])
         edges = [
             (int(first[one.session] + one.keyframe), int(first[other.session] + other.keyframe), constraint)
-            for one, other, constraint, _ in self.ties
-            if paths[one.session] and paths[other.session]
+            for one, other, constraint, closure in self.ties
+            if paths[one.session] and paths[other.session] and id(closure) not in gone
         ]
         return [T for path in paths for _, T in path], edges
 

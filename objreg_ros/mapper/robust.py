@@ -114,8 +114,8 @@ class RobustGraph:
         if expected < LINEAR * self.limit or self._is_agreed(newest):
             self._take(self._sorted_out(self._changed(self._state, [newest], []), stays_in=newest))
             self._take(self._sorted_out(self._state))
-        if self._state.cost - before.cost > DOUBTFUL:
-            self._doubt()
+            if self._state.cost - before.cost > DOUBTFUL:
+                self._doubt()
 
     @property
     def left_out(self) -> list[int]:

@@ -14,6 +14,8 @@ from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.sparse import SparseTrajectory
 from objreg_ros.mapper.trajectory import Trajectory
 
+LOST_S = 600.0  # a silence after which the body may be anywhere, so that a longer one tells no less
+
 
 class Session:
     """Its ``odometry`` gives back what was added to within 1 mm and 0.05°, and the poses of ``keyframes`` exactly.
@@ -99,7 +101,7 @@ class Session:
         """What odometry says between the two newest keyframes: next to nothing where it was silent meanwhile."""
         first, second = self.keyframes.poses[-2:]
         self._way.append(self._way[-1] + float(np.linalg.norm(second[:3, 3] - first[:3, 3])))
-        silent_s = self.silent_s(len(self.keyframes) - 2, len(self.keyframes) - 1)
+        silent_s = min(self.silent_s(len(self.keyframes) - 2, len(self.keyframes) - 1), LOST_S)
         C = wandering(inverse(first) @ second, params.odometry_sigmas) + unseen(silent_s, params.max_speed)
         self.variances.append((float(C[0, 0]), float(C[3, 3])))
 

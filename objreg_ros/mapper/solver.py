@@ -27,10 +27,10 @@ from objreg_ros.mapper.session import Session, stacked
 from objreg_ros.mapper.steady import Steady, estimate
 
 FREEDOMS, FREEDOMS_OF_STEADY = 6, 3  # of a closure, and of what is steadily wrong with an odometry
-MOST_TRIED = 2  # of the newest closures that are left out
+FEW, MOST_TRIED = 30, 2  # closures with which one that was left out may be right; of those, the newest
 ROUNDS = 4  # most times that odometry is corrected
 SETTLED = 5e-4  # rad/m and m/m: a change of its steady error that matters no more
-GROWTH = 1.1  # so many times the closures there were, and what is steady is looked at again
+GROWTH = 1.2  # so many times the closures there were, and what is steady is looked at again
 TIES = 2  # closures that have to agree on where a session is in the map
 AGREEING_M, AGREEING_SHARE = 0.3, 0.05  # how far they may be from that, and with every metre of odometry between them
 LOOSE = np.diag(np.repeat([1e4, 10.0], 3) ** 2)  # m and rad: what ties a session that only closures hold
@@ -269,7 +269,8 @@ class Solver:
         if self._is_corrected():
             plain = self._rebuilt(problem, {session: Steady() for session in self._routes})
         assert plain._robust is not None
-        starts = [plain, *(plain._forced(number) for number in plain._robust.left_out[-MOST_TRIED:])]
+        suspects = plain._robust.left_out[-MOST_TRIED:] if len(self._numbers) <= FEW else []
+        starts = [plain, *map(plain._forced, suspects)]
         best = min((start._corrected(problem) for start in starts), key=lambda solver: solver._cost(expected))
         needed = FREEDOMS_OF_STEADY * len(self._routes) * np.log(FREEDOMS * len(self._numbers))
         chosen = best if best._cost(expected) + needed < plain._cost(expected) else plain

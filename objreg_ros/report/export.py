@@ -20,6 +20,7 @@ from objreg_ros.memory.store import Store
 from objreg_ros.memory.store_file import StoreError
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.report.ply import write_ply
 
 MOST_BYTES = 200  # of a label in the name of a file, which may have 255 in all
 
@@ -79,26 +80,6 @@ def _all_or_nothing(folder: Path) -> Iterator[None]:
             if not was_there:
                 folder.rmdir()
         raise
-
-
-def write_ply(path: Path, xyz: Array, normals: Array, rgb: Array | None) -> Path:
-    """Write points as binary little-endian PLY: x y z as doubles, normals as floats and, if there are any, colours.
-
-    Not by Open3D, which writes no empty cloud and says of a full disk that all is well.
-    """
-    fields = [(name, "<f8") for name in ("x", "y", "z")] + [(name, "<f4") for name in ("nx", "ny", "nz")]
-    fields += [(name, "u1") for name in ("red", "green", "blue")] if rgb is not None else []
-    table = np.zeros(len(xyz), fields)
-    for k, name in enumerate(("x", "y", "z")):
-        table[name], table["n" + name] = xyz[:, k], normals[:, k]
-    for k, name in enumerate(("red", "green", "blue") if rgb is not None else ()):
-        table[name] = rgb[:, k]  # type: ignore[index]
-    kinds = {"<f8": "double", "<f4": "float", "u1": "uchar"}
-    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(xyz)}"]
-    header += [f"property {kinds[kind]} {name}" for name, kind in fields] + ["end_header", ""]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes("\n".join(header).encode() + table.tobytes())
-    return path
 
 
 def _refuse_used(folder: Path) -> None:

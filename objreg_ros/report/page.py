@@ -132,8 +132,8 @@ def _way(story: Story, tracks: Tracks | None) -> str:
     words = "From above. Closures tie places that were seen twice; the pose graph takes the drift out of odometry."
     if story.pruned:
         words += f" The mapper pruned {len(story.pruned)} of {len(story.closures)} closures."
-    if story.keyframe_step is not None:
-        words += f" The way is long: a keyframe stands only every {story.keyframe_step:.2g} m, to bound the memory."
+    if story.unsolved:
+        words += f" The corrected way is that of odometry here: {escape(story.unsolved)}."
     if story.left_out:
         words += f" {story.left_out} frames are left out: their time is not later than that of the frames before them."
     across = len(story.closures) - len(of_one_clock(story.closures))

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, TypeVar
@@ -13,7 +13,6 @@ import numpy as np
 
 from objreg_ros.data import Array, LoopClosure, Odometry, Reason, Rejected
 from objreg_ros.geometry import rigid_fit, transform
-from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.pose_graph import PoseGraph
 from objreg_ros.report.trajectory_error import absolute_errors
 from objreg_ros.truth import FALSE, Error, Truth, within
@@ -21,7 +20,6 @@ from objreg_ros.truth import FALSE, Error, Truth, within
 Row = TypeVar("Row")
 
 PAUSE_NS = 3_600_000_000_000  # what is further from a run is not of it: one stamp of 0 would make it last for decades
-MOST_KEYFRAMES = 1000  # of the corrected way: to solve it takes 1.1 GB, and memory grows with the square
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,18 +62,22 @@ class Story:
     refusals: tuple[Rejected, ...] = ()
     graph: PoseGraph = field(default_factory=PoseGraph)
     pruned: tuple[LoopClosure, ...] = ()
+    unsolved: str = ""  # why the corrected way is that of odometry
 
     @classmethod
-    def of(cls, name: str, summary: Mapping[str, Any], truth: Truth, most_keyframes: int = MOST_KEYFRAMES) -> Story:
+    def of(cls, name: str, summary: Mapping[str, Any], truth: Truth) -> Story:
         """The story of a run's JSON; the map is made here. Keys that are missing leave their section out.
 
         ValueError for what `objreg offline --json` would not write.
         """
         glimpses = _read(name, summary, "glimpses", _glimpse)
         closures = _read(name, summary, "constraints", _closure)
-        graph = mapped(glimpses, closures, most_keyframes)
-        refusals = _read(name, summary, "refusals", _refusal)
-        return cls(name, summary, truth, glimpses, closures, refusals, graph, graph.optimise().pruned)
+        graph, refusals = mapped(glimpses, closures), _read(name, summary, "refusals", _refusal)
+        try:
+            pruned, unsolved = graph.optimise().pruned, ""
+        except ImportError as error:
+            pruned, unsolved = (), str(error)
+        return cls(name, summary, truth, glimpses, closures, refusals, graph, pruned, unsolved)
 
     @cached_property
     def stretch_ns(self) -> tuple[int, int]:
@@ -131,12 +133,6 @@ class Story:
         """How many frames with odometry are not on the map because time does not advance at them."""
         told = sum(glimpse.T_odom_camera is not None for glimpse in self.glimpses)
         return told - len(advancing(self.glimpses))
-
-    @property
-    def keyframe_step(self) -> float | None:
-        """How far apart the keyframes stand, m, where a long way asked for fewer than the mapper makes; else None."""
-        step = self.graph.params.keyframe_translation
-        return None if step == MapperParams().keyframe_translation else step
 
     def poses_before_and_after(self) -> tuple[list[int], list[Array], list[Array]]:
         """The stamps of the frames on the map, and ``T_odom_camera`` and ``T_map_camera`` (4, 4) at each."""
@@ -196,35 +192,14 @@ def of_one_clock(closures: Sequence[LoopClosure]) -> list[LoopClosure]:
     return [closure for closure in closures if closure.from_ns < closure.to_ns]
 
 
-def mapped(
-    glimpses: Sequence[Glimpse], closures: Sequence[LoopClosure], most_keyframes: int = MOST_KEYFRAMES
-) -> PoseGraph:
-    """The pose graph of the frames with odometry at which time advances, with every closure of one clock.
-
-    Where that makes more keyframes than ``most_keyframes``, they stand further apart than the mapper's.
-    """
-    graph = _of_odometry(glimpses, MapperParams())
-    while len(graph.keyframes) > most_keyframes:
-        graph = _of_odometry(glimpses, _sparser(graph.params, 1.1 * len(graph.keyframes) / most_keyframes))
+def mapped(glimpses: Sequence[Glimpse], closures: Sequence[LoopClosure]) -> PoseGraph:
+    """The pose graph of the frames with odometry at which time advances, with every closure of one clock."""
+    graph = PoseGraph()
+    for stamp_ns, T_odom_camera in posed(glimpses):
+        graph.add_odometry(Odometry(T_odom_body=T_odom_camera, stamp_ns=stamp_ns))
     for closure in of_one_clock(closures):
         graph.add_closure(closure)
     return graph
-
-
-def _of_odometry(glimpses: Sequence[Glimpse], params: MapperParams) -> PoseGraph:
-    graph = PoseGraph(params)
-    for stamp_ns, T_odom_camera in posed(glimpses):
-        graph.add_odometry(Odometry(T_odom_body=T_odom_camera, stamp_ns=stamp_ns))
-    return graph
-
-
-def _sparser(params: MapperParams, factor: float) -> MapperParams:
-    """With so many times the motion from keyframe to keyframe."""
-    return replace(
-        params,
-        keyframe_translation=factor * params.keyframe_translation,
-        keyframe_rotation=min(factor * params.keyframe_rotation, 180.0),
-    )
 
 
 def positions(poses: Sequence[Array]) -> Array:

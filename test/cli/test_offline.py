@@ -183,3 +183,37 @@ def test_a_camera_that_is_told_takes_the_place_of_the_recordings_and_is_named_in
     assert "2 frames" in offline(folder, "--model", model, "--set", "segmenter.camera=100,100,63.5,47.5,128,96")
     with pytest.raises(ValueError, match="expected a picture of 640 × 360 or of that shape, got 64 × 48"):
         offline(folder, "--model", model, "--camera", "500,500,320,180,640,360")
+
+
+def test_the_map_of_a_run_is_written(model: Path, tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path / "tum", frames=6)
+    tum, kitti, g2o, ply = (tmp_path / name for name in ("way.tum", "way.kitti", "graph.g2o", "map.ply"))
+    words = ("--tum", tum, "--kitti", kitti, "--g2o", g2o, "--map", ply, "--voxel", 0.05)
+    output = offline(folder, "--model", model, "--odometry", "drift:1", *words)
+    assert [len(file.read_text().splitlines()) for file in (tum, kitti)] == [6, 6]
+    assert tum.read_text().splitlines()[3].startswith("0.300000000 ")
+    assert g2o.read_text().startswith("VERTEX_SE3:QUAT 0 ") and ply.read_bytes().startswith(b"ply\nformat binary")
+    assert f"map: {tum}: 6 poses" in output and "one for each voxel of 5 cm" in output
+
+
+def test_the_map_is_made_of_the_store_that_was_asked_for(model: Path, tmp_path: Path) -> None:
+    words = ("--odometry", "drift:1", "--map", tmp_path / "map.ply", "--set", f"registrar.store={tmp_path / 'a.db'}")
+    offline(tum_folder(tmp_path / "tum", frames=4), "--model", model, *words)
+    assert (tmp_path / "map.ply").exists() and (tmp_path / "a.db").exists()
+
+
+@pytest.mark.parametrize("option", ["--tum", "--kitti", "--g2o", "--map"])
+def test_a_map_without_odometry_is_refused_before_the_run(option: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=rf"{option}: expected odometry, .* got none of /.*--odometry TOPIC, or"):
+        offline(tum_folder(tmp_path / "tum"), "--model", "no_model.onnx", option, tmp_path / "out")
+
+
+@pytest.mark.parametrize("option", ["--tum", "--kitti", "--g2o", "--map"])
+def test_a_map_that_cannot_be_written_is_refused_before_the_run(option: str, tmp_path: Path) -> None:
+    with pytest.raises(OSError, match=f"{option}: expected an existing folder .*nowhere, got none"):
+        offline(tmp_path / "no_recording", option, tmp_path / "nowhere" / "out")
+
+
+def test_a_voxel_of_no_size_is_refused_before_the_run(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"--voxel: expected voxels of 0\.001 to 10 m, got nan"):
+        offline(tmp_path / "no_recording", "--map", tmp_path / "map.ply", "--voxel", "nan")

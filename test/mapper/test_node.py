@@ -268,7 +268,7 @@ def test_one_pose_that_leaps_and_two_stale_ones_leave_the_map(outside: Outside) 
 
 def test_a_constraint_that_no_body_can_have_gone_is_dropped_as_implausible(outside: Outside) -> None:
     outside.drive(BENT)
-    far = [closure(TRUE, 10, 90, pose(np.eye(3), np.array([x, 0.0, 0.0]))) for x in (50.0, 1e9)]
+    far = [closure(TRUE, k, 90, pose(np.eye(3), np.array([x, 0.0, 0.0]))) for k, x in ((10, 50.0), (11, 1e9))]
     outside.send([*ROUND_TRIP, *far])
     outside.wait(lambda: outside.door.ledger.balance().dropped == {"implausible": 2} and outside.settled())
     assert outside.door.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP)

@@ -10,48 +10,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import open3d
 import pytest
 from registration.samples import box, keyframe, moved
 
 from objreg_ros.data import LoopClosure
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store
-from objreg_ros.report.export import export, write_ply
+from objreg_ros.report.export import export
 
-
-def _read_ply(path: Path) -> np.ndarray:
-    header, body = path.read_bytes().split(b"end_header\n", 1)
-    kinds = {b"double": "<f8", b"float": "<f4", b"uchar": "u1"}
-    fields = [(line.split()[2].decode(), kinds[line.split()[1]]) for line in header.split(b"\n") if b"property" in line]
-    return np.frombuffer(body, fields)
-
-
-def test_points_normals_and_colours_are_written(tmp_path: Path) -> None:
-    item = box("cup", (0, 0, 1))
-    table = _read_ply(write_ply(tmp_path / "a.ply", item.xyz, item.normals, item.rgb))
-    assert np.array_equal(np.stack([table["x"], table["y"], table["z"]], axis=1), item.xyz)
-    assert np.array_equal(table["nz"], item.normals[:, 2]) and np.array_equal(table["red"], item.rgb[:, 0])
-    assert "red" not in (_read_ply(write_ply(tmp_path / "b.ply", item.xyz, item.normals, None)).dtype.names or ())
-
-
-def test_open3d_reads_what_is_written_to_the_last_bit(tmp_path: Path) -> None:
-    item, far = box("cup", (0, 0, 1)), np.array([450_000.0, 5_400_000.0, 0.0])
-    cloud = open3d.io.read_point_cloud(str(write_ply(tmp_path / "a.ply", item.xyz + far, item.normals, item.rgb)))
-    assert np.array_equal(np.asarray(cloud.points), item.xyz + far)
-    assert np.array_equal(np.asarray(cloud.normals), item.normals)
-    assert np.array_equal(np.round(255.0 * np.asarray(cloud.colors)), item.rgb)
-
-
-def test_a_cloud_without_points_is_written_too(tmp_path: Path) -> None:
-    assert len(_read_ply(write_ply(tmp_path / "a.ply", np.zeros((0, 3)), np.zeros((0, 3)), None))) == 0
-
-
-def test_a_full_disk_is_an_error(tmp_path: Path) -> None:
-    (tmp_path / "full.ply").symlink_to("/dev/full")
-    item = box("cup", (0, 0, 1))
-    with pytest.raises(OSError, match="No space left"):
-        write_ply(tmp_path / "full.ply", item.xyz, item.normals, item.rgb)
+from .ply_reader import positions, read_ply
 
 
 def test_points_far_from_the_origin_of_the_odometry_keep_their_places(tmp_path: Path) -> None:
@@ -65,8 +32,8 @@ def test_points_far_from_the_origin_of_the_odometry_keep_their_places(tmp_path: 
     *files, told = export(tmp_path / "place.db", tmp_path / "out")
     kept = Store(tmp_path / "place.db", read_only=True).keyframe(1)
     for file, xyz in zip(files, (kept.objects[0].cloud.xyz, kept.context.xyz), strict=True):
-        table = _read_ply(file)
-        offset_m = np.stack([table["x"], table["y"], table["z"]], axis=1) - T_utm_camera[:3, 3]
+        table = read_ply(file)
+        offset_m = positions(table) - T_utm_camera[:3, 3]
         np.testing.assert_allclose(offset_m, xyz, atol=1e-6)
     (landmark,) = json.loads(told.read_text())["landmarks"]
     np.testing.assert_allclose(landmark["position"] - T_utm_camera[:3, 3], kept.objects[0].centroid, atol=1e-6)
@@ -86,7 +53,7 @@ def test_a_store_becomes_clouds_in_the_frame_of_the_session_and_a_map(tmp_path: 
         "contexts/keyframe_000001.ply",
         "map.json",
     ]
-    assert abs(float(_read_ply(files[0])["x"].mean()) - 5.0) < 0.05
+    assert abs(float(read_ply(files[0])["x"].mean()) - 5.0) < 0.05
     content = json.loads(files[2].read_text())
     (item,) = content["keyframes"][0]["objects"]
     assert (item["landmark"], item["frames"], item["density"]) == (7, 3, taken.objects[0].cloud.density)
@@ -104,7 +71,7 @@ def test_two_objects_of_a_keyframe_are_two_files_even_where_they_are_one_landmar
     store.add(taken, [sighting.of_landmark(7, np.eye(3)) for sighting in sightings_of(taken)])
     store.close()
     first, second, *_ = export(tmp_path / "place.db", tmp_path / "out")
-    middles = [float(_read_ply(file)["x"].mean()) for file in (first, second)]
+    middles = [float(read_ply(file)["x"].mean()) for file in (first, second)]
     assert np.allclose(middles, (0.0, 0.4), atol=0.02)
 
 

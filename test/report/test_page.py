@@ -80,12 +80,6 @@ def test_names_are_escaped() -> None:
     assert "<b>" not in page([(Story.of("<b>", summary(), TRUTH), None)])
 
 
-def test_keyframes_that_stand_further_apart_than_the_mapper_s_are_told() -> None:
-    assert "a keyframe stands only every" not in page([(Story.of("walk", summary(), TRUTH), None)])
-    text = page([(Story.of("walk", summary(), TRUTH, most_keyframes=30), None)])
-    assert "The way is long: a keyframe stands only every 0." in text
-
-
 def test_what_is_of_another_time_is_counted_beside_the_timeline() -> None:
     assert "Left out:" not in page([(Story.of("walk", summary(), TRUTH), None)])
     text = page([(Story.of("walk", with_a_stray(-1_700_000_000 * 10**9), TRUTH), None)])

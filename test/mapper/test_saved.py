@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A map that was saved is the same map another day, and goes on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from objreg_ros.data import LoopClosure
+from objreg_ros.geometry import pose, rotation_from_vector
+from objreg_ros.mapper import saved
+from objreg_ros.mapper.params import MapperParams
+from objreg_ros.mapper.pose_graph import PoseGraph
+
+from .bent import SECOND, bent, closure, distances, odometry, square
+
+TRUE = square(laps=2)
+BENT = bent(TRUE)
+HALF = len(TRUE) // 2
+LATER_NS = 86_400 * SECOND
+ELSEWHERE = pose(rotation_from_vector(np.array([0.0, 0.0, 0.7])), np.array([3.0, 1.0, 0.0]))
+
+
+@pytest.fixture
+def yesterday() -> PoseGraph:
+    graph = PoseGraph()
+    for word in odometry(BENT):
+        graph.add_odometry(word)
+    for k in range(3, HALF, 13):
+        assert graph.add_closure(replace(closure(TRUE, k, k + HALF), from_session=7, to_session=7))
+    graph.optimise()
+    return graph
+
+
+def again(k: int, later: int) -> LoopClosure:
+    """Today's step ``later`` sees what yesterday's step ``k`` saw."""
+    found = closure(TRUE, k, later)
+    return replace(found, to_ns=found.to_ns + LATER_NS)
+
+
+def test_a_map_comes_back_as_it_was(yesterday: PoseGraph, tmp_path: Path) -> None:
+    saved.save(yesterday, tmp_path / "map.npz")
+    found = saved.load(tmp_path / "map.npz", MapperParams())
+    found.optimise()
+    (way, today), expected = found.paths(), yesterday.path()
+    assert today == [] and found.sessions[0].name == 7
+    assert [stamp for stamp, _ in way] == [stamp for stamp, _ in expected]
+    assert distances([T for _, T in way], [T for _, T in expected]).max() < 1e-3
+    assert found.sessions[0].odometry.covers(5 * SECOND) and not found.sessions[0].covers(LATER_NS)
+
+
+def test_the_next_day_goes_on_in_the_map_once_two_closures_agree_on_where(yesterday: PoseGraph, tmp_path: Path) -> None:
+    saved.save(yesterday, tmp_path / "map.npz")
+    today = saved.load(tmp_path / "map.npz", MapperParams())
+    late = [replace(w, stamp_ns=w.stamp_ns + LATER_NS, T_odom_body=ELSEWHERE @ w.T_odom_body) for w in odometry(BENT)]
+    for word in late:
+        today.add_odometry(word)
+    placed = []
+    for k in (5, 15, 35, 55):
+        assert today.add_closure(again(k, k + 4))
+        assert not today.optimise().pruned
+        placed.append(today.is_placed)
+    assert placed == [False, True, True, True]
+    assert distances(today.corrected(w.stamp_ns for w in late[:HALF]), TRUE[:HALF]).max() < 0.25
+    saved.save(today, tmp_path / "map.npz")
+    assert [len(path) for path in saved.load(tmp_path / "map.npz", MapperParams()).paths()] == [
+        len(today.keyframes),
+        0,
+        0,
+    ]
+
+
+def test_a_withdrawn_closure_is_not_saved(yesterday: PoseGraph, tmp_path: Path) -> None:
+    first = yesterday.closure_ties[0].closure
+    assert yesterday.withdraw(lambda one: one is first) == 1
+    saved.save(yesterday, tmp_path / "map.npz")
+    assert len(saved.load(tmp_path / "map.npz", MapperParams()).closure_ties) == len(yesterday.closure_ties) == 5
+
+
+@pytest.mark.parametrize("spoil", [b"", b"PK\x03\x04 no archive", b"text"])
+def test_what_is_no_map_is_refused(spoil: bytes, tmp_path: Path) -> None:
+    (tmp_path / "map.npz").write_bytes(spoil)
+    with pytest.raises(ValueError, match="expected a map that ~/save wrote"):
+        saved.load(tmp_path / "map.npz", MapperParams())
+
+
+def test_a_map_with_a_keyframe_that_it_has_not_is_refused(yesterday: PoseGraph, tmp_path: Path) -> None:
+    saved.save(yesterday, tmp_path / "map.npz")
+    with np.load(tmp_path / "map.npz") as file:
+        arrays = {name: file[name] for name in file.files}
+    arrays["ends"][0, 1] = 100_000
+    np.savez(tmp_path / "map.npz", **arrays)
+    with pytest.raises(ValueError, match="expected a keyframe of the graph"):
+        saved.load(tmp_path / "map.npz", MapperParams())
