@@ -66,6 +66,14 @@ def floored(covariance: Array, sigmas: tuple[float, float]) -> Array:
     return spread * ((vectors * np.maximum(values, 1.0)) @ vectors.T)
 
 
+def shared(constraint: Constraint, sigmas: tuple[float, float]) -> Constraint:
+    """The constraint between keyframes whose pictures are both off by so many m and rad."""
+    end = np.diag(np.repeat(np.square(sigmas), 3))
+    turned = _turning(constraint.T_from_to[:3, 3])
+    R = np.kron(np.eye(2), constraint.T_from_to[:3, :3])
+    return constraint._replace(covariance=constraint.covariance + turned @ end @ turned.T + R @ end @ R.T)
+
+
 def unseen(seconds: float, max_speed: float) -> Array:
     """The covariance (6, 6) of a motion of which nothing was told for so long: to anywhere that a body gets, any turn.
 

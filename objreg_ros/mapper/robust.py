@@ -52,7 +52,7 @@ class RobustGraph:
 
     def __init__(self, T_map_first: Array, limit: float) -> None:
         self.limit = limit
-        self.steps = self.closures = edges_of(())
+        self.steps = self.closures = self._apart = edges_of(())
         self._step_factors = np.zeros(0, int)
         self._withdrawn: tuple[int, ...] = ()  # closures
         self._expected = np.zeros(0)  # what each closure was expected to cost when it came
@@ -92,18 +92,23 @@ class RobustGraph:
 
     def believe(self, other: RobustGraph) -> None:
         """Take in the closures of another graph of these nodes, as it does; then those go in and out that want to."""
-        self.closures, self._expected, self._withdrawn = other.closures, other._expected, other._withdrawn
+        self.closures, self._apart = other.closures, other._apart
+        self._expected, self._withdrawn = other._expected, other._withdrawn
         graph, factors = self._state.graph, np.full(len(other.closures), -1)
         factors[other.kept] = graph.add(other.closures.taken(other.kept))
         graph.settle()
         self._state = self._sorted_out(self._weighed(graph, factors))
 
-    def close(self, closure: Edges) -> None:
-        """Take in one more; `kept` says whether it is believed, and what became of the others."""
-        before, self.closures = self._state, self.closures.joined(closure)
+    def close(self, closure: Edges, apart: Edges | None = None) -> None:
+        """Take in one more; `kept` says whether it is believed, and what became of the others.
+
+        ``apart`` is what it says to a graph that it is not in: with the freedom that nodes have which it alone holds.
+        """
+        before, apart = self._state, apart or closure
+        self.closures, self._apart = self.closures.joined(closure), self._apart.joined(apart)
         expected = self._expected_cost(before, closure)
         self._expected = np.append(self._expected, expected)
-        residual = squared_residuals(before.poses, closure)
+        residual = squared_residuals(before.poses, apart)
         self._state = replace(
             before,
             factors=np.append(before.factors, -1),
@@ -220,6 +225,7 @@ class RobustGraph:
 
     def _weighed(self, graph: IncrementalGraph, factors: Array) -> _State:
         poses = graph.poses()
-        residuals = squared_residuals(poses, self.closures)
+        held, apart = squared_residuals(poses, self.closures), squared_residuals(poses, self._apart)
+        residuals = np.where(factors >= 0, held, apart)
         cost = squared_residuals(poses, self.steps).sum() + np.where(factors >= 0, residuals, self.limit).sum()
         return _State(graph, factors, poses, residuals, float(cost) if np.isfinite(cost) else np.inf)

@@ -19,7 +19,7 @@ import numpy as np
 from objreg_ros.data import Array, LoopClosure
 from objreg_ros.geometry import inverse, inverses
 from objreg_ros.mapper.chain import Chain
-from objreg_ros.mapper.constraint import Constraint, inverted
+from objreg_ros.mapper.constraint import Constraint, inverted, shared
 from objreg_ros.mapper.edges import edges_of
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.robust import RobustGraph
@@ -174,7 +174,8 @@ class Solver:
         tie = problem.ties[number]
         k1, k2 = (self._picture(problem, end) for end in (tie.end1, tie.end2))
         self._numbers[number] = len(self._robust.closures)
-        self._robust.close(edges_of([(k1, k2, tie.constraint)]))
+        free = shared(tie.constraint, problem.params.picture_sigmas)
+        self._robust.close(edges_of([(k1, k2, tie.constraint)]), edges_of([(k1, k2, free)]))
 
     def _node(self, problem: Problem, end: End) -> int:
         """The node of a keyframe, which becomes one if it is none; so do some on the way there from the last."""
