@@ -40,7 +40,11 @@ class MapperParams(Params):
         0.01, "error of position that all constraints of a keyframe share, one sigma; 0 is none", "m", ge=0.0, live=True
     )
     picture_rotation_error: float = param(
-        0.5, "error of rotation that all constraints of a keyframe share, one sigma; 0 is none", "deg", ge=0.0, live=True
+        0.5,
+        "error of rotation that all constraints of a keyframe share, one sigma; 0 is none",
+        "deg",
+        ge=0.0,
+        live=True,
     )
     min_sigma_translation: float = param(
         0.001,
