@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -25,7 +25,7 @@ settings.load_profile("ci" if os.environ.get("CI") else "desk")
 os.environ["XDG_DATA_HOME"] = tempfile.mkdtemp(prefix="objreg_data_")
 
 RUN_AT_LEAST = 1500  # of more than twice as many; without ROS, onnx, torch and recordings it is still fewer that skip
-OPTIONAL = {"rclpy", "launch_ros", "onnx", "torch"}
+OPTIONAL = {"rclpy", "launch_ros", "onnx", "torch", "gtsam"}
 if find_spec("rclpy") is None:  # messages are a part of ROS; beside an rclpy, a missing one is an error
     OPTIONAL |= {f"{name}_msgs" for name in ("diagnostic", "geometry", "nav", "sensor", "std", "visualization")}
     OPTIONAL |= {"builtin_interfaces", "rcl_interfaces", "rosgraph_msgs", "std_srvs"}
@@ -74,6 +74,28 @@ class File(pytest.Module):
 @pytest.hookimpl(tryfirst=True)  # before launch_testing's, which imports every file by itself
 def pytest_pycollect_makemodule(module_path: Path, parent: pytest.Collector) -> pytest.Module | None:
     return None if module_path.name == "__init__.py" else File.from_parent(parent, path=module_path)
+
+
+def _skipped_without_solver() -> Generator[None, object, object]:
+    """A test that solves a map skips where GTSAM, which is an extra, is not installed."""
+    try:
+        return (yield)
+    except ImportError as error:
+        if find_spec("gtsam") is None and isinstance(error, ValueError):  # mapper's `MissingError`
+            pytest.skip(str(error))
+        raise
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup() -> Generator[None, object, object]:
+    """Of the fixtures."""
+    return (yield from _skipped_without_solver())
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call() -> Generator[None, object, object]:
+    """Of the test itself."""
+    return (yield from _skipped_without_solver())
 
 
 class Count:

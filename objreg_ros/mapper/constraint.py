@@ -66,12 +66,12 @@ def floored(covariance: Array, sigmas: tuple[float, float]) -> Array:
     return spread * ((vectors * np.maximum(values, 1.0)) @ vectors.T)
 
 
-def shared(constraint: Constraint, sigmas: tuple[float, float]) -> Constraint:
-    """The constraint between keyframes whose pictures are both off by so many m and rad."""
-    end = np.diag(np.repeat(np.square(sigmas), 3))
-    turned = _turning(constraint.T_from_to[:3, 3])
-    R = np.kron(np.eye(2), constraint.T_from_to[:3, :3])
-    return constraint._replace(covariance=constraint.covariance + turned @ end @ turned.T + R @ end @ R.T)
+def freed(constraint: Constraint, sigmas: tuple[float, float], ends: tuple[bool, bool] = (True, True)) -> Constraint:
+    """The constraint between keyframes whose pictures are off by so many m and rad, at these ends of it."""
+    spread, R = np.diag(np.repeat(np.square(sigmas), 3)), np.kron(np.eye(2), constraint.T_from_to[:3, :3])
+    turned, C = _turning(constraint.T_from_to[:3, 3]), constraint.covariance
+    C = C + turned @ spread @ turned.T if ends[0] else C
+    return constraint._replace(covariance=C + R @ spread @ R.T if ends[1] else C)
 
 
 def unseen(seconds: float, max_speed: float) -> Array:

@@ -19,7 +19,7 @@ import numpy as np
 from objreg_ros.data import Array, LoopClosure
 from objreg_ros.geometry import inverse, inverses
 from objreg_ros.mapper.chain import Chain
-from objreg_ros.mapper.constraint import Constraint, inverted, shared
+from objreg_ros.mapper.constraint import Constraint, freed, inverted
 from objreg_ros.mapper.edges import edges_of
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.robust import RobustGraph
@@ -121,6 +121,7 @@ class Solver:
         self._numbers: dict[int, int] = {}  # of ties in the graph, by theirs
         self._untied: list[int] = []  # ties of sessions that are not in the graph
         self._tethers: list[tuple[int, int, Constraint]] = []  # what holds pictures to keyframes, and sessions, loosely
+        self._held: set[int] = set()  # nodes of keyframes that a closure holds
         self._pictures: dict[int, int] = {}  # nodes by those of their keyframes
         self._gone = frozenset[int]()  # ties that are withdrawn
         self._due = 1
@@ -172,10 +173,13 @@ class Solver:
     def _close(self, problem: Problem, number: int) -> None:
         assert self._robust is not None
         tie = problem.ties[number]
-        k1, k2 = (self._picture(problem, end) for end in (tie.end1, tie.end2))
+        nodes = [self._node(problem, end) for end in (tie.end1, tie.end2)]
+        sigmas, alone = problem.params.picture_sigmas, (nodes[0] not in self._held, nodes[1] not in self._held)
+        k1, k2 = (self._picture(node, sigmas) for node in nodes)
         self._numbers[number] = len(self._robust.closures)
-        free = shared(tie.constraint, problem.params.picture_sigmas)
-        self._robust.close(edges_of([(k1, k2, tie.constraint)]), edges_of([(k1, k2, free)]))
+        said, free = freed(tie.constraint, sigmas, alone), freed(tie.constraint, sigmas)
+        self._robust.close(edges_of([(k1, k2, said)]), edges_of([(k1, k2, free)]))
+        self._held.update(nodes)
 
     def _node(self, problem: Problem, end: End) -> int:
         """The node of a keyframe, which becomes one if it is none; so do some on the way there from the last."""
@@ -187,15 +191,17 @@ class Solver:
             self._insert(route, end.keyframe)
         return route.nodes[end.keyframe]
 
-    def _picture(self, problem: Problem, end: End) -> int:
-        """The node of what a keyframe saw: the keyframe's, but for an error that all closures of it share."""
-        node, sigmas = self._node(problem, end), problem.params.picture_sigmas
-        if not all(sigmas):
-            return node
+    def _picture(self, node: int, sigmas: tuple[float, float]) -> int:
+        """The node of what a keyframe saw: the keyframe's, but for an error that closures of it share.
+
+        The first closure has that error for itself, as most are the only one of their keyframe.
+        """
         assert self._robust is not None
+        if node not in self._held or not all(sigmas):
+            return node
         if node not in self._pictures:
             self._pictures[node] = len(self._robust.poses)
-            same = Constraint(np.eye(4), np.diag(np.repeat(sigmas, 3) ** 2))
+            same = Constraint(np.eye(4), np.diag(np.repeat(np.square(sigmas), 3)))
             self._tethers.append((node, self._pictures[node], same))
             self._robust.grow(self._robust.poses[[node]], edges_of(self._tethers[-1:]))
         return self._pictures[node]
