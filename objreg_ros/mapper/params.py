@@ -67,7 +67,7 @@ class MapperParams(Params):
         live=True,
     )
     max_residual: float = param(
-        4.0, "a constraint farther than this from all the others is pruned", "standard deviations", ge=1.0, live=True
+        3.5, "a constraint farther than this from all the others is pruned", "standard deviations", ge=1.0, live=True
     )
 
     @property
