@@ -138,20 +138,23 @@ class MapperNode(Door):
     def _begin_elsewhere(self, anew: Anew, stamp_ns: int) -> None:
         """Time jumped back (a looped bag, a simulation begun anew), or odometry was started again elsewhere.
 
-        Where that is on the map only closures can tell. Those of a clock that runs again would be of both runs, so that
-        is a new map.
+        Where that is on the map only closures can tell. Where they do not name their sessions, those of a clock that
+        runs again would be of both runs: that is a new map.
         """
         if anew is Anew.TIME:
             self._ended_ns = self._graph.odometry.stamps_ns[-1]
             back_s = 1e-9 * (self._ended_ns - stamp_ns)
-            self.get_logger().warning(f"time jumped back by {back_s:.3f} s: a new map")
-            self._start_anew(anew.value)
-            return
-        self.throttled.warn(
-            "new_session",
-            "odometry leapt faster than max_speed, or to its origin: where it is on the map is not known, and no "
-            "correction is published, until constraints tie it there; ~/reset begins a new map",
-        )
+            told = "a new map" if self._graph.sessions[-1].name is None else "another session of the map"
+            self.get_logger().warning(f"time jumped back by {back_s:.3f} s: {told}")
+            if self._graph.sessions[-1].name is None:
+                self._start_anew(anew.value)
+                return
+        else:
+            self.throttled.warn(
+                "new_session",
+                "odometry leapt faster than max_speed, or to its origin: where it is on the map is not known, and no "
+                "correction is published, until constraints tie it there; ~/reset begins a new map",
+            )
         with self._graph_lock:
             self._graph.begin_session()
 

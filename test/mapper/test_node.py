@@ -226,6 +226,21 @@ def test_a_jump_back_in_time_starts_a_new_map(outside: Outside) -> None:
     assert keyframes > 3
 
 
+def test_a_jump_back_in_time_is_another_session_where_closures_name_them(outside: Outside) -> None:
+    walk = odometry(BENT)
+    outside.drive(BENT[:40])
+    door = outside.door
+    door._learn(replace(closure(TRUE, 5, 30), from_session=1, to_session=1))
+    for again in walk[:30]:
+        outside.odom.publish(to_msg.odometry(again))
+    outside.wait(lambda: door.extra_diagnostics()["odometry"] == 70)
+    assert (door.extra_diagnostics()["sessions"], door.extra_diagnostics()["placed in the map"]) == (2, False)
+    for k in (3, 15):
+        door._take(replace(closure(TRUE, k + 5, k), from_session=1, to_session=2))
+    outside.wait(lambda: door.extra_diagnostics()["placed in the map"])
+    assert door.extra_diagnostics()["constraints kept"] == 2
+
+
 def test_odometry_that_comes_late_is_passed_over_and_counted_and_leaves_the_map(outside: Outside) -> None:
     door = outside.door
     outside.drive(BENT)
