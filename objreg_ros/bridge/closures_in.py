@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from nav_msgs.msg import Odometry
@@ -43,9 +43,17 @@ class ClosuresIn:
         if topic != "loop_closures":
             door.listen(Odometry, "constraints", self._hear_constraint, kept)
 
+    def know(self, closures: Iterable[LoopClosure]) -> None:
+        """These were taken before."""
+        self._known.update((closure.moments, None) for closure in closures)
+
     def forget(self, closure: LoopClosure) -> None:
-        """It was not taken: told otherwise, it may be."""
+        """It was not taken: told otherwise, or later, it may be."""
         self._known.pop(closure.moments, None)
+
+    def forget_all(self) -> None:
+        """What comes is of another map."""
+        self._known.clear()
 
     def _hear_constraint(self, message: Any) -> None:
         self._hear("constraints", message, from_msg.loop_closure)
@@ -56,9 +64,9 @@ class ClosuresIn:
             if moments is not None:
                 self._withdraw(moments)
             return
-        closure = self._hear("loop_closures", message, closures_msg.read_loop_closure)
+        closure = self._hear("loop_closures", message, _whole)
         if closure is not None:
-            self._moments[from_msg.bounded(message.id, "id")] = closure.moments
+            self._moments[message.id] = closure.moments
             while len(self._moments) > MOST_KNOWN:
                 del self._moments[next(iter(self._moments))]
 
@@ -77,3 +85,8 @@ class ClosuresIn:
             self._door.accept(closure.to_ns)
             self._take(closure)
         return closure
+
+
+def _whole(message: Any) -> LoopClosure:
+    from_msg.bounded(message.id, "id")
+    return closures_msg.read_loop_closure(message)

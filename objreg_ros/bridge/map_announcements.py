@@ -26,7 +26,7 @@ Array = NDArray[Any]
 
 
 class MapAnnouncements:
-    """Publishes for ``node``, in the frame of the map. Not for two threads at once."""
+    """Publishes for ``node``, in the frame of the map; each topic in one piece from whatever thread."""
 
     def __init__(self, node: Node, map_frame: str) -> None:
         self._node, self._map_frame = node, map_frame
@@ -48,7 +48,7 @@ class MapAnnouncements:
             self._broadcaster = self._broadcaster or TransformBroadcaster(self._node)
             self._broadcaster.sendTransform(message)
 
-    def graph(self, kept: Array, pruned: Array, residuals: Sequence[float], stamp_ns: int) -> None:
+    def graph(self, kept: Array, pruned: Array, residuals: Array, stamp_ns: int) -> None:
         """Show closures between two places each, (m, 2, 3) and (n, 2, 3); residuals of the latter, in deviations."""
         if self._graph.get_subscription_count():
             self._graph.publish(markers.closures(kept, pruned, residuals, stamp_ns, self._map_frame))

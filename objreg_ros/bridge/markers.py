@@ -68,7 +68,7 @@ class Scene:
         return [_point(self._places[stamp_ns]) for edge in known for stamp_ns in edge]
 
 
-def closures(kept: Array, pruned: Array, residuals: Sequence[float], stamp_ns: int, frame_id: str) -> MarkerArray:
+def closures(kept: Array, pruned: Array, residuals: Array, stamp_ns: int, frame_id: str) -> MarkerArray:
     """Closures as lines between two places, (m, 2, 3) and (n, 2, 3); at those that are pruned their residuals."""
     head = to_msg.header(stamp_ns, frame_id)
     made = [

@@ -29,6 +29,7 @@ from objreg_ros.mapper.incremental import load
 from objreg_ros.mapper.params import MapperNodeParams, MapperParams
 from objreg_ros.mapper.pose_graph import ImplausibleError, PoseGraph, Summary
 from objreg_ros.mapper.restart import Anew, Restart
+from objreg_ros.mapper.solver import Problem, Solution
 
 MOST_WAITING = qos.KEPT_CONSTRAINTS  # closures without odometry yet; the oldest go when there are more
 PACE = 20.0  # a path of many keyframes takes long to write: one in so many times as long
@@ -63,6 +64,7 @@ class MapperNode(Door):
         self._serve()
         self.listen(OdometryMsg, "odom", self._hear_odometry, self.sensor(qos.ODOMETRY), watched="odom")
         self._closures = ClosuresIn(self, self._inputs.input, self._take, self._learn, self._withdraw)
+        self._closures.know(tie.closure for tie in self._graph.closure_ties if tie.closure is not None)
         self.expect("odom", "odom")
         self.create_timer(LOOK_S, self._publish_path, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -75,22 +77,17 @@ class MapperNode(Door):
         """The map of another day, solved; None where none is asked for. ValueError, OSError where it cannot be read."""
         if not self._inputs.resume:
             return None
-        graph = saved.load(self._saved_path, self.settings.of(MapperParams))
-        graph.optimise()
-        return graph
-
-    @property
-    def _saved_path(self) -> Path:
-        return Path(self._inputs.graph_path).expanduser().absolute().with_suffix(".npz")
+        return saved.load(_saved_path(_absolute(self._inputs.graph_path)), self.settings.of(MapperParams))
 
     def _begin(self, graph: PoseGraph | None = None) -> None:
         self._graph = graph or PoseGraph(self.settings.of(MapperParams))
-        self._summary = Summary()
+        self._summary = Summary() if graph is None else graph.optimise()
 
     def _start_anew(self, reason: str) -> None:
         """An empty map; the closures that wait are about moments of the old one, and are dropped."""
         with self._graph_lock:
             self._begin()
+        self._closures.forget_all()
         waiting, self._waiting = self._waiting, []
         for closure in waiting:
             self.drop(closure.to_ns, reason)
@@ -144,9 +141,9 @@ class MapperNode(Door):
         if anew is Anew.TIME:
             self._ended_ns = self._graph.odometry.stamps_ns[-1]
             back_s = 1e-9 * (self._ended_ns - stamp_ns)
-            told = "a new map" if self._graph.sessions[-1].name is None else "another session of the map"
+            told = "a new map" if not self._graph.sessions[-1].names else "another session of the map"
             self.get_logger().warning(f"time jumped back by {back_s:.3f} s: {told}")
-            if self._graph.sessions[-1].name is None:
+            if not self._graph.sessions[-1].names:
                 self._start_anew(anew.value)
                 return
         else:
@@ -162,10 +159,15 @@ class MapperNode(Door):
 
     def _take(self, closure: LoopClosure) -> None:
         if not self._enabled:
-            self.drop(closure.to_ns, "disabled")
+            self._leave(closure, "disabled")
         elif self.let_in(closure.to_ns):
             self._waiting.append(closure)
             self._tie_what_waits()
+
+    def _leave(self, closure: LoopClosure, reason: str, words: str = "") -> None:
+        """Drop a closure; told again, it is a new one."""
+        self._closures.forget(closure)
+        self.drop(closure.to_ns, reason, words)
 
     def _learn(self, closure: LoopClosure) -> None:
         """A closure that is known names its sessions."""
@@ -189,12 +191,11 @@ class MapperNode(Door):
             try:
                 self._tie(closure)
             except ImplausibleError as error:
-                self.drop(closure.to_ns, "implausible", f"{_named(closure)}: {error}")
+                self._leave(closure, "implausible", f"{_named(closure)}: {error}")
             except ValueError as error:
-                self._closures.forget(closure)
-                self.drop(closure.to_ns, "two_clocks", str(error))
+                self._leave(closure, "two_clocks", str(error))
         while len(self._waiting) > MOST_WAITING:
-            self.drop(self._waiting.pop(0).to_ns, "queue_full", "no odometry covers the moments of the constraint")
+            self._leave(self._waiting.pop(0), "queue_full", "no odometry covers the moments of the constraint")
 
     def _tie(self, closure: LoopClosure) -> None:
         """Into the graph, or back to what waits; ValueError if it is implausible or not of one run of the clock."""
@@ -205,11 +206,11 @@ class MapperNode(Door):
         if tied:
             self.worker.put((closure.to_ns, closure))
         elif self._graph.in_gap(closure):
-            self.drop(closure.to_ns, "odometry_gap", "no odometry came around a moment of the constraint")
+            self._leave(closure, "odometry_gap", "no odometry came around a moment of the constraint")
         elif self._graph.is_before_odometry(closure):
-            self.drop(closure.to_ns, "before_odometry", "odometry begins after the first moment of the constraint")
+            self._leave(closure, "before_odometry", "odometry begins after the first moment of the constraint")
         elif self._is_of_old_run(closure):
-            self.drop(closure.to_ns, "time_jump", "it was found before time jumped back, and came after that")
+            self._leave(closure, "time_jump", "it was found before time jumped back, and came after that")
         else:
             self._waiting.append(closure)
 
@@ -229,19 +230,30 @@ class MapperNode(Door):
     def compute(self, stamp_ns: int, payload: LoopClosure | None) -> bool:
         """Solve the graph as it is now, and settle every closure that came until now."""
         with self._graph_lock:
-            riding, self._riding = self._riding, []
-            graph, problem = self._graph, self._graph.problem()
+            graph, problem, riding = self._graph, self._graph.problem(), len(self._riding)
         with self.ledger.timed("optimise"):
-            solution = problem.solve()
+            solution = problem.solve() if payload is not None else self._without_withdrawn(problem)
+        if solution is None:
+            return False
         with self._graph_lock:
+            settled, self._riding = self._riding[:riding], self._riding[riding:]
             if graph is self._graph:
                 self._summary, self._has_news = graph.adopt(problem, solution), True
-        for stamp in riding:
+            summary = self._summary
+        for stamp in settled:
             self.conclude(stamp, lambda: True)
         # The topic alone: TF is sent with odometry only, for its time must not go back.
         self._publish_correction(stamp_ns, by_tf=False)
-        self._out.pruned(self._summary.pruned, self._summary.residuals)
+        self._out.pruned(summary.pruned, summary.residuals)
         return payload is not None
+
+    def _without_withdrawn(self, problem: Problem) -> Solution | None:
+        """A solution that no closure waits for, so that no drop tells of what goes wrong; None then."""
+        try:
+            return problem.solve()
+        except (RuntimeError, ValueError) as error:
+            self.throttled.warn("retraction", f"the map is not solved without what was withdrawn: {error}")
+            return None
 
     # Publish
 
@@ -251,11 +263,11 @@ class MapperNode(Door):
             return
         begun, stamp_ns = time.monotonic(), self._newest.stamp_ns
         with self._graph_lock:
-            self._has_news, summary = False, self._summary
+            self._has_news = False
             path = self._graph.path() if self._graph.is_placed else []
             edges = self._graph.edges()
         self._out.path(path, stamp_ns)
-        self._out.graph(*edges, summary.residuals, stamp_ns)
+        self._out.graph(*edges, stamp_ns)
         self._path_due_s = time.monotonic() + PACE * (time.monotonic() - begun)
 
     def _publish_correction(self, stamp_ns: int, by_tf: bool) -> None:
@@ -289,21 +301,32 @@ class MapperNode(Door):
         return response
 
     def _save(self, _: Any, response: Any) -> Any:
-        path = Path(self._inputs.graph_path).expanduser().absolute()
         try:
+            path = _absolute(self._inputs.graph_path)
             with self._graph_lock:
-                path.write_text(graph_text(*self._graph.flat()), encoding="ascii")
-                saved.save(self._graph, self._saved_path)
-        except OSError as error:
+                poses, edges = self._graph.flat()
+                arrays = saved.packed(self._graph)
+            path.write_text(graph_text(poses, edges), encoding="ascii")
+            saved.save(arrays, _saved_path(path))
+        except (OSError, RuntimeError) as error:  # the latter of a home that there is not
             response.success, response.message = False, str(error)
         else:
-            response.success, response.message = True, f"{path} and {self._saved_path.name}"
+            response.success, response.message = True, f"{path} and {_saved_path(path).name}"
         return response
 
     def _enable(self, request: Any, response: Any) -> Any:
         self._enabled = request.data
         response.success, response.message = True, "enabled" if request.data else "constraints are dropped as disabled"
         return response
+
+
+def _absolute(graph_path: str) -> Path:
+    return Path(graph_path).expanduser().absolute()
+
+
+def _saved_path(graph_path: Path) -> Path:
+    """What `resume` reads, beside the g2o text."""
+    return graph_path.with_name(f"{graph_path.stem if graph_path.suffix != '.npz' else graph_path.name}.npz")
 
 
 def _named(closure: LoopClosure) -> str:

@@ -34,7 +34,7 @@ class MapperParams(Params):
     steady_distance: float = param(
         0.02, "error of position that every metre adds alike, one sigma", "m/m", ge=0.0, live=True
     )
-    max_speed: float = param(5.0, "odometry that leaps faster than this has begun anew: a new map", "m/s", ge=0.1)
+    max_speed: float = param(5.0, "odometry that leaps faster than this has begun anew", "m/s", ge=0.1)
     # What a picture's depth, its lag behind colour and its shutter do to all constraints of it alike.
     picture_translation_error: float = param(
         0.01, "error of position that all constraints of a keyframe share, one sigma; 0 is none", "m", ge=0.0, live=True

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from objreg_ros.data import Array, LoopClosure, Odometry
-from objreg_ros.geometry import inverse
+from objreg_ros.geometry import inverse, is_rigid
 from objreg_ros.mapper.constraint import Constraint, between_keyframes, floored
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.session import Session, stacked
@@ -60,7 +60,8 @@ class PoseGraph:
         """Odometry from now on is of another run; nothing ties it to the runs before."""
         if len(self.sessions[-1].keyframes) == 0:
             self.sessions.pop()
-        self.sessions.append(Session(name))
+        self.sessions.append(Session())
+        self._name(len(self.sessions) - 1, name)
         self._T_map_odom = np.eye(4)
 
     def add_odometry(self, odometry: Odometry) -> bool:
@@ -89,6 +90,8 @@ class PoseGraph:
         ends = End(one, self._nearest(one, closure.from_ns)), End(other, self._nearest(other, closure.to_ns))
         if ends[0] != ends[1]:
             self._tie(closure, ends, np.eye(4) if T_body_camera is None else T_body_camera)
+        self._name(one, closure.from_session)
+        self._name(other, closure.to_session)
         return True
 
     def restore(self, tie: Tie) -> None:
@@ -98,13 +101,24 @@ class PoseGraph:
                 0 <= end.session < len(self.sessions) and 0 <= end.keyframe < len(self.sessions[end.session].keyframes)
             ):
                 raise ValueError(f"tie: expected a keyframe of the graph, got {end}")
+        T, C = tie.constraint
+        if tie.end1 == tie.end2 or T.shape != (4, 4) or C.shape != (6, 6) or not np.isfinite(C).all():
+            raise ValueError(f"tie: expected a constraint of two keyframes, got shapes {T.shape} and {C.shape}")
+        if not (is_rigid(T) and np.allclose(C, C.T) and np.linalg.eigvalsh(C).min() > 0.0):
+            raise ValueError("tie: expected a rigid pose with a positive definite covariance, got another")
         self._closures.append(tie)
 
     def learn_sessions(self, closure: LoopClosure) -> None:
         """Take the names of sessions from a closure that is known without them."""
         for name, stamp_ns in ((closure.from_session, closure.from_ns), (closure.to_session, closure.to_ns)):
             with suppress(ValueError):
-                self._of(name, stamp_ns)
+                session = self._of(name, stamp_ns)
+                if session is not None:
+                    self._name(session, name)
+
+    def _name(self, session: int, name: int | None) -> None:
+        if name is not None:
+            self.sessions[session].names.add(name)
 
     def withdraw(self, is_withdrawn: Callable[[LoopClosure], bool]) -> int:
         """Take closures out of the graph, for good; how many."""
@@ -114,24 +128,30 @@ class PoseGraph:
         return len(new)
 
     def _of(self, name: int | None, stamp_ns: int) -> int | None:
-        """The session of a moment: of this name where one has it, else the only one that covers it; None if none does.
+        """The session that has a moment: the one that does, and of two runs of a clock the one of this name.
 
-        ValueError where two runs of a clock do, and nothing says which is meant.
+        None where none has it yet. ValueError where two may, and nothing says which is meant.
         """
-        if name is not None and any(session.name == name for session in self.sessions):
-            return next((k for k, one in enumerate(self.sessions) if one.name == name and one.covers(stamp_ns)), None)
-        nameless = name is not None
-        found = [
-            k for k, one in enumerate(self.sessions) if one.covers(stamp_ns) and not (nameless and one.name is not None)
-        ]
-        if len(found) > 1:
+        covering = [k for k, one in enumerate(self.sessions) if one.covers(stamp_ns)]
+        named = [k for k in covering if name in self.sessions[k].names]
+        if len(named) == 1 or (len(covering) == 1 and not self._may_come(stamp_ns)):
+            return (named or covering)[0]
+        if name is not None and covering and self._may_come(stamp_ns):
+            return None  # of the run that goes on, once it is there
+        nameless = [k for k in covering if not self.sessions[k].names]
+        if name is not None and len(nameless) == 1:
+            return nameless[0]
+        if covering:
             raise ValueError(
-                f"expected a constraint that names its sessions, as {len(found)} runs of odometry have the moment "
-                f"{stamp_ns} ns, got none; objreg_msgs/LoopClosure names them"
+                f"expected a constraint that names its sessions, as {max(len(covering), 2)} runs of odometry have the "
+                f"moment {stamp_ns} ns, got none that tells; objreg_msgs/LoopClosure names them"
             )
-        if found and nameless:
-            self.sessions[found[0]].name = name
-        return found[0] if found else None
+        return None
+
+    def _may_come(self, stamp_ns: int) -> bool:
+        """Whether odometry that goes on has yet to come to a moment after it began."""
+        known = self.odometry.stamps_ns
+        return not known or (known[0] <= stamp_ns and known[-1] < stamp_ns)
 
     def _nearest(self, session: int, stamp_ns: int) -> int:
         return self.sessions[session].keyframes.nearest(stamp_ns)
@@ -251,14 +271,21 @@ class PoseGraph:
         last = len(course) - 1
         return course.of(np.array([last]))[0] @ inverse(self.keyframes.poses[last])
 
-    def edges(self) -> tuple[Array, Array]:
-        """(m, 2, 3): where the ends of the kept closures are in the map, and (n, 2, 3) those of the pruned ones."""
-        mapped = [np.zeros((0, 4, 4)) if not way else stacked([T for _, T in way]) for way in self.paths()]
-        solved = range(len(self._solution.kept))
-        known = [k for k in solved if not (np.isnan(self._solution.residuals[k]) or k in self._withdrawn)]
+    def edges(self) -> tuple[Array, Array, Array]:
+        """(m, 2, 3): where the ends of the kept closures are in the map, (n, 2, 3) those of the pruned ones, and (n,).
+
+        The last are the residuals of the pruned ones, in standard deviations.
+        """
+        mapped = [stacked([T for _, T in way]) for way in self.paths()]
+        residuals, kept = self._solution.residuals, self._solution.kept
+        known = [
+            k
+            for k in np.flatnonzero(~np.isnan(residuals)).tolist()
+            if k not in self._withdrawn and all(len(mapped[end.session]) for end in self._closures[k][:2])
+        ]
         ends = [[mapped[end.session][end.keyframe][:3, 3] for end in self._closures[k][:2]] for k in known]
-        places, kept = np.array(ends).reshape(-1, 2, 3), self._solution.kept[known]
-        return places[kept], places[~kept]
+        places = np.array(ends).reshape(-1, 2, 3)
+        return places[kept[known]], places[~kept[known]], residuals[known][~kept[known]]
 
     def path(self) -> list[tuple[int, Array]]:
         """Stamp and ``T_map_body`` of every keyframe of the newest session."""

@@ -137,7 +137,10 @@ class RobustGraph:
         """A closure is left out from now on, whatever it costs."""
         self._withdrawn += (number,)
         if self.kept[number]:
-            self._state = self._sorted_out(self._changed(self._state, [], [number]))
+            without = self._changed(self._state, [], [number])
+            if not np.isfinite(without.cost):
+                raise RuntimeError(f"expected a solution without closure {number}, got none")
+            self._state = self._sorted_out(without)
             self._take(self._tried_again(self._state, ()))
 
     def _take(self, state: _State) -> None:
@@ -153,7 +156,7 @@ class RobustGraph:
 
     def _is_agreed(self, number: int) -> bool:
         """Whether another closure that is left out says the same."""
-        return bool((self._saying_the_same(number) & ~self.kept).any())
+        return bool(self._saying_the_same(number)[self.left_out].any())
 
     def _saying_the_same(self, number: int) -> Array:
         """(m,) of bool: the other closures that say of two places what this one does, as far as the map knows."""
@@ -211,17 +214,18 @@ class RobustGraph:
 
     def _changed(self, state: _State, into: list[int], out: list[int]) -> _State:
         """With other closures in it; one that costs infinitely where that has no solution."""
-        graph, factors = state.graph.copied(), state.factors.copy()
+        factors = state.factors.copy()
         try:
+            graph = state.graph.copied()
             if out:
                 graph.remove(factors[out].tolist())
                 factors[out] = -1
             if into:
                 factors[into] = graph.add(self.closures.taken(np.array(into)))
             graph.settle()
-        except RuntimeError:
+            return self._weighed(graph, factors)
+        except (RuntimeError, ValueError):
             return replace(state, cost=np.inf)
-        return self._weighed(graph, factors)
 
     def _weighed(self, graph: IncrementalGraph, factors: Array) -> _State:
         poses = graph.poses()

@@ -6,7 +6,8 @@ from __future__ import annotations
 import json
 import os
 import zipfile
-from collections.abc import Mapping
+import zlib
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,15 +22,38 @@ from objreg_ros.mapper.solver import End, Tie
 
 VERSION = 1
 MOST_BYTES = 2_000_000_000  # of a file and of what is unpacked from it
-PLAIN = ("from_ns", "to_ns", "labels", "from_frame_id", "to_frame_id", "from_session", "to_session")  # of a closure
+BROKEN = (
+    *(KeyError, IndexError, TypeError, ValueError, AttributeError, EOFError, MemoryError, RuntimeError),
+    *(zipfile.BadZipFile, zlib.error),
+)  # what numpy, zipfile and json say of a file that is not whole
 
 
-def save(graph: PoseGraph, path: Path) -> None:
-    """Write the file whole, then put it in the place of the one before. OSError where that cannot be."""
+def _labels(told: Any) -> tuple[str, ...]:
+    return tuple(str(label) for label in told)
+
+
+def _session(told: Any) -> int | None:
+    return None if told is None else int(told)
+
+
+KINDS: dict[str, Callable[[Any], Any]] = {
+    "from_ns": int,
+    "to_ns": int,
+    "labels": _labels,
+    "from_frame_id": str,
+    "to_frame_id": str,
+    "from_session": _session,
+    "to_session": _session,
+}
+PLAIN = tuple(KINDS)  # of a closure, by what makes each of what a file tells
+
+
+def packed(graph: PoseGraph) -> dict[str, Any]:
+    """All of a graph in arrays, for `save`, which takes longer."""
     ties = graph.closure_ties
     told = {
         "version": VERSION,
-        "names": [session.name for session in graph.sessions],
+        "names": [sorted(session.names) for session in graph.sessions],
         "closures": [{name: getattr(tie.closure, name) for name in PLAIN} for tie in ties],
     }
     arrays: dict[str, Any] = {
@@ -42,6 +66,11 @@ def save(graph: PoseGraph, path: Path) -> None:
     }
     for number, session in enumerate(graph.sessions):
         arrays.update({f"{number}_{name}": value for name, value in session.arrays().items()})
+    return arrays
+
+
+def save(arrays: Mapping[str, Any], path: Path) -> None:
+    """Write what is `packed` whole, then put it in the place of the file before. OSError where that cannot be."""
     part = path.with_name(f".{path.name}.part")
     with part.open("wb") as file:
         np.savez_compressed(file, **arrays)
@@ -63,7 +92,7 @@ def load(path: Path, params: MapperParams) -> PoseGraph:
             raise ValueError(f"expected at most {MOST_BYTES} bytes unpacked, got {unpacked}")
         with np.load(path, allow_pickle=False) as arrays:
             return _graph({name: arrays[name] for name in arrays.files}, params)
-    except (KeyError, IndexError, TypeError, ValueError, zipfile.BadZipFile) as error:
+    except BROKEN as error:
         raise ValueError(f"{path}: expected a map that ~/save wrote, got a file that is none: {error}") from error
 
 
@@ -72,12 +101,13 @@ def _graph(arrays: Mapping[str, Array], params: MapperParams) -> PoseGraph:
     if told["version"] != VERSION:
         raise ValueError(f"version: expected {VERSION}, got {told['version']!r}")
     graph = PoseGraph(params)
-    graph.sessions = [
-        Session.of_arrays(name, {key: arrays[f"{number}_{key}"] for key in Session.ARRAYS})
-        for number, name in enumerate(told["names"])
-    ]
+    graph.sessions = []
+    for number, names in enumerate(told["names"]):
+        session = Session.of_arrays({key: arrays[f"{number}_{key}"] for key in Session.ARRAYS})
+        session.names = {int(name) for name in names}
+        graph.sessions.append(session)
     for number, known in enumerate(told["closures"]):
-        known = {name: known[name] for name in PLAIN} | {"labels": tuple(known["labels"])}
+        known = {name: KINDS[name](known[name]) for name in PLAIN}
         T, C = arrays["T_from_to"][number], arrays["closure_covariances"][number]
         s1, k1, s2, k2 = arrays["ends"][number].tolist()
         constraint = Constraint(arrays["T_1_2"][number], arrays["covariances"][number])

@@ -20,12 +20,12 @@ LOST_S = 600.0  # a silence after which the body may be anywhere, so that a long
 class Session:
     """Its ``odometry`` gives back what was added to within 1 mm and 0.05°, and the poses of ``keyframes`` exactly.
 
-    ``name`` is the session that closures tell of its moments, None until one did. Everything grows at the end alone, so
+    ``names`` are the sessions that closures tell of its moments. Everything grows at the end alone, so
     a length tells what was there at one moment.
     """
 
-    def __init__(self, name: int | None = None) -> None:
-        self.name = name
+    def __init__(self) -> None:
+        self.names = set[int]()
         self.odometry, self.keyframes = SparseTrajectory(), Trajectory()
         self.variances: list[tuple[float, float]] = []  # of each step between keyframes: m^2 and rad^2 in every axis
         self._way = [0.0]
@@ -55,22 +55,26 @@ class Session:
         }
 
     @classmethod
-    def of_arrays(cls, name: int | None, arrays: Mapping[str, Array]) -> Session:
+    def of_arrays(cls, arrays: Mapping[str, Array]) -> Session:
         """The session of such arrays, which is over. ValueError where they do not go together."""
-        session = cls(name)
+        session = cls()
         stamps, poses, keyframes = arrays["stamps_ns"], arrays["poses"], arrays["keyframes"]
         count, steps = len(keyframes), max(len(keyframes) - 1, 0)
-        shapes = [len(stamps), arrays["variances"].shape, arrays["way"].shape]
+        variances, way, gaps = arrays["variances"], arrays["way"], arrays["gaps"]
+        shapes = [len(stamps), variances.shape, way.shape]
+        if gaps.shape != (len(gaps), 2) or any(part.dtype != np.int64 for part in (stamps, keyframes, gaps)):
+            raise ValueError(f"session: expected stamps and gaps in whole nanoseconds, got {gaps.shape} {stamps.dtype}")
         if shapes != [len(poses), (steps, 2), (max(count, 1),)] or not np.isin(keyframes, stamps).all():
-            raise ValueError(f"session {name}: expected arrays that go together, got {shapes} of {count} keyframes")
-        if not (np.isfinite(poses).all() and all(is_rigid(T) for T in poses) and (arrays["variances"] > 0).all()):
-            raise ValueError(f"session {name}: expected rigid poses and positive variances, got others")
-        session.odometry = SparseTrajectory.of(
-            stamps.tolist(), list(poses), [tuple(g) for g in arrays["gaps"].tolist()]
-        )
+            raise ValueError(f"session: expected arrays that go together, got {shapes} of {count} keyframes")
+        spread = (variances > 0) & (variances < np.inf)
+        if not (np.isfinite(poses).all() and all(is_rigid(T) for T in poses) and spread.all()):
+            raise ValueError("session: expected rigid poses and positive variances, got others")
+        if not (np.isfinite(way).all() and (np.diff(way) >= 0.0).all()):
+            raise ValueError("session: expected a way that grows, got one that does not")
+        session.odometry = SparseTrajectory.of(stamps.tolist(), list(poses), [tuple(gap) for gap in gaps.tolist()])
         for stamp in keyframes.tolist():
             session.keyframes.append(stamp, session.odometry.at(stamp))
-        session.variances, session._way = [tuple(row) for row in arrays["variances"].tolist()], arrays["way"].tolist()
+        session.variances, session._way = [tuple(row) for row in variances.tolist()], way.tolist()
         return session
 
     def covers(self, stamp_ns: int) -> bool:

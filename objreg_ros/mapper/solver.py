@@ -31,7 +31,7 @@ FEW, MOST_TRIED = 30, 2  # closures with which one that was left out may be righ
 ROUNDS = 4  # most times that odometry is corrected
 SETTLED = 5e-4  # rad/m and m/m: a change of its steady error that matters no more
 GROWTH = 1.2  # so many times the closures there were, and what is steady is looked at again
-TIES = 2  # closures that have to agree on where a session is in the map
+TIES, MOST_VOTES = 2, 100  # closures that have to agree on where a session is in the map, of the newest so many
 AGREEING_M, AGREEING_SHARE = 0.3, 0.05  # how far they may be from that, and with every metre of odometry between them
 LOOSE = np.diag(np.repeat([1e4, 10.0], 3) ** 2)  # m and rad: what ties a session that only closures hold
 
@@ -131,7 +131,7 @@ class Solver:
         while True:
             try:
                 return self._solved(problem)
-            except RuntimeError:
+            except (RuntimeError, ValueError):  # GTSAM's, and numpy's of what is no number
                 if self._at is None:
                     raise
                 self._unsolvable.add(self._at)
@@ -142,11 +142,10 @@ class Solver:
             self._forget(problem.params)
         if problem.keyframes[0] and self._robust is None:
             self._begin(problem)
+        self._withdraw(problem)
         for number in range(self._taken, problem.tie_count):
-            self._at = number
             self._take(problem, number)
         self._at, self._taken = None, problem.tie_count
-        self._withdraw(problem.withdrawn)
         if len(self._numbers) >= self._due:
             self._due = max(len(self._numbers) + 1, int(GROWTH * len(self._numbers)))
             self._calibrate(problem)
@@ -160,9 +159,9 @@ class Solver:
     # Closures
 
     def _take(self, problem: Problem, number: int) -> None:
-        tie = problem.ties[number]
         if number in self._unsolvable or number in problem.withdrawn:
             return
+        self._at, tie = number, problem.ties[number]
         if tie.end1.session in self._routes and tie.end2.session in self._routes:
             self._close(problem, number)
         else:
@@ -174,10 +173,11 @@ class Solver:
         assert self._robust is not None
         tie = problem.ties[number]
         nodes = [self._node(problem, end) for end in (tie.end1, tie.end2)]
-        sigmas, alone = problem.params.picture_sigmas, (nodes[0] not in self._held, nodes[1] not in self._held)
+        sigmas = problem.params.picture_sigmas
+        first, second = (node not in self._held or not all(sigmas) for node in nodes)  # it has that error for itself
         k1, k2 = (self._picture(node, sigmas) for node in nodes)
         self._numbers[number] = len(self._robust.closures)
-        said, free = freed(tie.constraint, sigmas, alone), freed(tie.constraint, sigmas)
+        said, free = freed(tie.constraint, sigmas, (first, second)), freed(tie.constraint, sigmas)
         self._robust.close(edges_of([(k1, k2, said)]), edges_of([(k1, k2, free)]))
         self._held.update(nodes)
 
@@ -227,12 +227,18 @@ class Solver:
             poses = stacked(known.keyframes.poses[begin - 1 : end])
             route.chain.extend(poses, np.array(known.variances[begin - 1 : end - 1]))
 
-    def _withdraw(self, withdrawn: frozenset[int]) -> None:
-        for number in (withdrawn - self._gone) & self._numbers.keys():
+    def _withdraw(self, problem: Problem) -> None:
+        """Take closures out. One that placed a session did more than to tie it, so all is taken in anew without it."""
+        gone = (problem.withdrawn - self._gone) & self._numbers.keys()
+        if any(problem.ties[number].end1.session != problem.ties[number].end2.session for number in gone):
+            self._forget(problem.params)
+            self._begin(problem)
+            return
+        for number in gone:
             assert self._robust is not None
             self._robust.withdraw(self._numbers[number])
-        self._gone = withdrawn
-        self._untied = [number for number in self._untied if number not in withdrawn]
+        self._gone = problem.withdrawn
+        self._untied = [number for number in self._untied if number not in problem.withdrawn]
 
     # Sessions
 
@@ -257,7 +263,7 @@ class Solver:
         chain = Chain(known.keyframes.poses[0], Steady())
         chain.extend(stacked(known.keyframes.poses[:count]), np.array(known.variances[: count - 1]).reshape(-1, 2))
         ends, places = [], []
-        for number in self._untied:
+        for number in self._untied[-MOST_VOTES:]:
             tie = problem.ties[number]
             there, here, T = tie.end1, tie.end2, tie.constraint.T_from_to
             if there.session == session:
@@ -369,5 +375,15 @@ class Solver:
             places = list(self._numbers.values())
             kept[numbers] = self._robust.kept[places]
             residuals[numbers] = np.sqrt(self._robust.residuals[places])
-        courses = [self._course(s) if s in self._routes else None for s in range(len(problem.keyframes))]
+        placed = self._placed(problem, kept)
+        courses = [self._course(s) if s in placed else None for s in range(len(problem.keyframes))]
         return Solution(tuple(courses), kept, residuals)
+
+    def _placed(self, problem: Problem, kept: Array) -> set[int]:
+        """The sessions that are the first, or tied to it by closures that are believed."""
+        pairs = {(problem.ties[k].end1.session, problem.ties[k].end2.session) for k in np.flatnonzero(kept).tolist()}
+        placed, grown = set[int](), {0} & self._routes.keys()
+        while grown:
+            placed |= grown
+            grown = {b for pair in pairs for a, b in (pair, pair[::-1]) if a in placed} - placed
+        return placed

@@ -15,7 +15,7 @@ from objreg_ros.mapper.chain import Chain
 from objreg_ros.mapper.edges import Edges
 from objreg_ros.mapper.incremental import IncrementalGraph
 from objreg_ros.mapper.params import MapperParams
-from objreg_ros.mapper.pose_graph import PoseGraph
+from objreg_ros.mapper.pose_graph import ImplausibleError, PoseGraph
 from objreg_ros.mapper.solver import Course, Solution
 from objreg_ros.mapper.sparse import TOLERANCE_DEG, TOLERANCE_M
 from objreg_ros.mapper.steady import Steady
@@ -352,7 +352,7 @@ def test_two_runs_of_one_clock_are_told_apart_by_their_sessions() -> None:
         assert graph.add_closure(across(a, b))
     summary = graph.optimise()
     assert len(summary.kept) == 3 and graph.is_placed
-    assert [one.name for one in graph.sessions] == [1, 2]
+    assert [one.names for one in graph.sessions] == [{1}, {2}]
     found = graph.corrected(word.stamp_ns for word in odometry(LAPS[1]))
     assert distances(found, LAPS[1]).max() < 0.03
 
@@ -365,6 +365,53 @@ def test_two_runs_of_one_clock_that_nothing_tells_apart_are_refused(
     with pytest.raises(ValueError, match="expected a constraint that names its sessions, as 2 runs of odometry have"):
         graph.add_closure(across(20, 21, sessions))
     assert not graph.closure_ties
+
+
+def test_a_registrar_that_begins_a_session_where_odometry_goes_on_is_heard_all_the_same() -> None:
+    graph = mapped([])
+    names = (0, 0), (0, 1), (1, 1)
+    for k, (one, other) in enumerate(names):
+        assert graph.add_closure(replace(RIGHT[k], from_session=one, to_session=other))
+    assert graph.sessions[0].names == {0, 1}
+
+
+def test_a_closure_that_is_refused_names_no_session() -> None:
+    graph = mapped([])
+    far = closure(TRUE, 10, 90, pose(np.eye(3), np.array([600.0, 0.0, 0.0])))
+    with pytest.raises(ImplausibleError):
+        graph.add_closure(replace(far, from_session=9, to_session=9))
+    assert graph.sessions[0].names == set()
+
+
+def test_a_moment_that_the_run_of_now_has_yet_to_come_to_is_not_that_of_the_run_before() -> None:
+    graph = PoseGraph()
+    for word in odometry(LAPS[0]):
+        graph.add_odometry(word)
+    assert graph.add_closure(replace(closure(TRUE, 5, 30), from_session=1, to_session=1))
+    graph.begin_session()
+    for word in odometry([ELSEWHERE @ T for T in LAPS[1][:20]]):
+        graph.add_odometry(word)
+    early = replace(closure(TRUE, 3, 40), from_session=2, to_session=2)
+    assert not graph.add_closure(early)
+    with pytest.raises(ValueError, match="names its sessions"):
+        graph.add_closure(closure(TRUE, 3, 40))
+
+
+def test_a_session_leaves_the_map_with_the_closures_that_placed_it() -> None:
+    graph = two_sessions()
+    for a, b in ((20, 21), (60, 62)):
+        assert graph.add_closure(across(a, b))
+    graph.optimise()
+    assert graph.is_placed
+    graph.withdraw(lambda one: one.from_ns == 2 * SECOND)
+    assert graph.add_closure(across(40, 41))
+    graph.optimise()
+    assert graph.is_placed  # two are left
+    graph.withdraw(lambda one: one.from_ns == 4 * SECOND)
+    summary = graph.optimise()
+    assert not graph.is_placed and not summary.kept
+    np.testing.assert_array_equal(graph.T_map_odom, np.eye(4))
+    assert all(len(part) == 0 for part in graph.edges())
 
 
 def test_a_session_that_one_closure_ties_waits_for_another() -> None:
@@ -394,12 +441,12 @@ def test_sessions_by_different_clocks_need_no_names() -> None:
 def test_a_session_of_no_odometry_is_none() -> None:
     graph = PoseGraph()
     graph.begin_session(3)
-    assert [one.name for one in graph.sessions] == [3] and graph.is_placed
+    assert [one.names for one in graph.sessions] == [{3}] and graph.is_placed
     for word in odometry(LAPS[0]):
         graph.add_odometry(word)
     graph.begin_session(4)
     graph.begin_session(5)
-    assert [one.name for one in graph.sessions] == [3, 5] and not graph.is_placed
+    assert [one.names for one in graph.sessions] == [{3}, {5}] and not graph.is_placed
 
 
 def test_the_keyframes_of_sessions_are_numbered_in_one_row_once_they_are_in_the_map() -> None:
