@@ -355,6 +355,41 @@ def test_the_services_answer(outside: Outside, tmp_path: Path) -> None:
     assert door.extra_diagnostics()["keyframes"] == 0
 
 
+def test_after_a_reset_the_same_constraints_are_of_the_new_map(outside: Outside) -> None:
+    door = outside.door
+    for _ in range(2):
+        for word in odometry(BENT):
+            door._hear_odometry(to_msg.odometry(word))
+        for word in ROUND_TRIP:
+            door._closures._hear_constraint(to_msg.constraint(word))
+        outside.wait(lambda: door.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP))
+        outside.wait(outside.settled)
+        assert door._reset(None, Trigger.Response()).success
+    assert door.ledger.balance().published == 2 * len(ROUND_TRIP)
+
+
+def test_a_retracted_constraint_leaves_the_map(outside: Outside) -> None:
+    outside.drive(BENT)
+    outside.send(ROUND_TRIP)
+    outside.wait(lambda: outside.door.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP))
+    outside.door._withdraw(ROUND_TRIP[0].moments)
+    outside.wait(lambda: outside.door.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP) - 1)
+    assert outside.door.extra_diagnostics()["constraints retracted"] == 1 and outside.settled()
+
+
+def test_a_saved_map_is_gone_on_with(outside: Outside) -> None:
+    outside.drive(BENT)
+    outside.send(ROUND_TRIP)
+    outside.wait(lambda: outside.door.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP))
+    outside.wait(outside.settled)
+    assert outside.door._save(None, Trigger.Response()).success
+    outside.door._inputs = outside.door._inputs.replaced(resume=True)
+    resumed = outside.door._resumed()
+    outside.door._begin(resumed)
+    told = outside.door.extra_diagnostics()
+    assert (told["sessions"], told["placed in the map"], told["constraints kept"]) == (2, False, len(ROUND_TRIP))
+
+
 def test_a_stamp_that_repeats_is_passed_over(outside: Outside) -> None:
     outside.drive(BENT[:5])
     outside.odom.publish(to_msg.odometry(odometry(BENT)[4]))

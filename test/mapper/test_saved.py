@@ -95,3 +95,28 @@ def test_a_map_with_a_keyframe_that_it_has_not_is_refused(yesterday: PoseGraph, 
     np.savez(tmp_path / "map.npz", **arrays)
     with pytest.raises(ValueError, match="expected a keyframe of the graph"):
         saved.load(tmp_path / "map.npz", MapperParams())
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("T_1_2", np.nan), ("T_1_2", 0.0), ("covariances", np.nan), ("covariances", 0.0), ("0_variances", np.inf)],
+)
+def test_numbers_that_no_map_has_are_refused(yesterday: PoseGraph, tmp_path: Path, name: str, value: float) -> None:
+    arrays = saved.packed(yesterday)
+    arrays[name] = np.full_like(arrays[name], value)
+    saved.save(arrays, tmp_path / "map.npz")
+    with pytest.raises(ValueError, match="expected a map that ~/save wrote"):
+        saved.load(tmp_path / "map.npz", MapperParams())
+
+
+def test_a_file_with_a_wrong_byte_is_refused_or_the_same_map(yesterday: PoseGraph, tmp_path: Path) -> None:
+    saved.save(saved.packed(yesterday), tmp_path / "map.npz")
+    whole = (tmp_path / "map.npz").read_bytes()
+    rng = np.random.default_rng(0)
+    for at in rng.integers(0, len(whole), 60).tolist():
+        (tmp_path / "spoilt.npz").write_bytes(whole[:at] + bytes([whole[at] ^ 0x55]) + whole[at + 1 :])
+        try:
+            found = saved.load(tmp_path / "spoilt.npz", MapperParams())
+        except ValueError:
+            continue
+        assert len(found.closure_ties) == len(yesterday.closure_ties)
