@@ -11,11 +11,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from objreg_ros.data import Array
-from objreg_ros.geometry import inverses
-from objreg_ros.mapper.constraint import Constraint
+from objreg_ros.geometry import inverses, rotation_from_vector, skew
+from objreg_ros.mapper.constraint import Constraint, rotation_vectors
 from objreg_ros.mapper.steady import Steady, corrected_steps
 
 STRAIGHT_RAD = 0.06  # one sigma: what an error that is shared by first order may turn by
@@ -77,7 +76,7 @@ class Chain:
     def _shared(self, k1: Array, k: Array, k2: Array, target: Array) -> Array:
         """(m, 4, 4): keyframes ``k`` in the chain's frame, once ``k2`` is at a target there and ``k1`` stays."""
         here, end = self.T_chain_body[k], self.T_chain_body[k2]
-        turn = Rotation.from_matrix(target[:, :3, :3] @ end[:, :3, :3].transpose(0, 2, 1)).as_rotvec()
+        turn = rotation_vectors(target[:, :3, :3] @ end[:, :3, :3].transpose(0, 2, 1))
         error = np.hstack([target[:, :3, 3] - end[:, :3, 3], turn])
         share = np.linalg.solve(self._covariances(k1, k2), error[:, :, None])[:, :, 0]
         lever = end[:, :3, 3] - here[:, :3, 3]  # what has come up at a keyframe turns the end about it
@@ -85,7 +84,7 @@ class Chain:
         moved = np.einsum("mij,mj->mi", self._covariances(k1, k), share)
         T = here.copy()
         T[:, :3, 3] += moved[:, :3]
-        T[:, :3, :3] = Rotation.from_rotvec(moved[:, 3:]).as_matrix() @ here[:, :3, :3]
+        T[:, :3, :3] = rotation_from_vector(moved[:, 3:]) @ here[:, :3, :3]
         return T
 
     def _covariances(self, k1: Array, k2: Array) -> Array:
@@ -97,16 +96,9 @@ class Chain:
         p = self.T_chain_body[k2, :3, 3] - self.T_chain_body[0, :3, 3]
         mixed = bp[:, :, None] * p[:, None, :]
         M = b[:, None, None] * p[:, :, None] * p[:, None, :] - mixed - mixed.transpose(0, 2, 1) + bpp
-        levers = _skews(b[:, None] * p - bp)
+        levers = skew(b[:, None] * p - bp)
         C = np.zeros((len(p), 6, 6))
         C[:, :3, :3] = (a + np.trace(M, axis1=1, axis2=2))[:, None, None] * np.eye(3) - M
         C[:, 3:, 3:] = b[:, None, None] * np.eye(3)
         C[:, :3, 3:], C[:, 3:, :3] = -levers, levers
         return C
-
-
-def _skews(v: Array) -> Array:
-    """(m, 3, 3) of (m, 3): ``_skews(a) @ b = a x b``."""
-    out = np.zeros((len(v), 3, 3))
-    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
-    return out - out.transpose(0, 2, 1)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from objreg_ros.data import Array, LoopClosure
 from objreg_ros.geometry import inverse, pose, rotation_angle, skew
@@ -48,6 +49,11 @@ def between_keyframes(
     turned = _turning(moved.T_from_to[:3, 3] - T_k1_body[:3, 3])
     there, back = wandering(T_k1_body, sigmas), wandering(T_k2_body, sigmas)
     return moved._replace(covariance=moved.covariance + turned @ there @ turned.T + back)
+
+
+def rotation_vectors(R: Array) -> Array:
+    """(m, 3) of rotations (m, 3, 3), of none too, which scipy before 1.13 refuses."""
+    return Rotation.from_matrix(R).as_rotvec() if len(R) else np.zeros((0, 3))
 
 
 def wandering(T_motion: Array, sigmas: tuple[float, float]) -> Array:

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import inverses, skew
-from objreg_ros.mapper.constraint import Constraint, local_covariance, rotation_first
+from objreg_ros.mapper.constraint import Constraint, local_covariance, rotation_first, rotation_vectors
 
 LEAST_FREEDOM = 1e-9  # of errors that go together: rounding must not make them more than one
 
@@ -60,7 +59,7 @@ def _whitenings(covariances: Array) -> Array:
 def whitened_errors(poses: Array, edges: Edges) -> Array:
     """(m, 6): how far ``poses (n, 4, 4)`` are from what each edge says, in standard deviations."""
     error = inverses(edges.T_1_2) @ inverses(poses[edges.k1]) @ poses[edges.k2]
-    turns = Rotation.from_matrix(error[:, :3, :3]).as_rotvec()
+    turns = rotation_vectors(error[:, :3, :3])
     return np.einsum("mij,mj->mi", edges.whitening, np.hstack([turns, error[:, :3, 3]]))
 
 

@@ -12,10 +12,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from objreg_ros.data import Array
-from objreg_ros.geometry import inverses
+from objreg_ros.geometry import inverses, rotation_from_vector
+from objreg_ros.mapper.constraint import rotation_vectors
 
 UP = np.array([0.0, 0.0, 1.0])  # of the frame of odometry (REP-103)
 LEAST_VARIANCE = 1e-12  # m^2 and rad^2 of a step: one at rest tells nothing, and does not divide by nothing
@@ -38,9 +38,8 @@ def corrected_steps(T_odom_body: Array, steady: Steady) -> Array:
     stretched = (1.0 + steady.along) * ways + steady.across * ways @ QUARTER_TURN.T
     R_1_odom = first[:, :3, :3].transpose(0, 2, 1)
     T = np.tile(np.eye(4), (len(ways), 1, 1))
-    T[:, :3, :3] = R_1_odom @ Rotation.from_rotvec(turns).as_matrix() @ second[:, :3, :3]
-    halfway = Rotation.from_rotvec(0.5 * turns).apply(stretched) if len(turns) else stretched
-    T[:, :3, 3] = np.einsum("mij,mj->mi", R_1_odom, halfway)
+    T[:, :3, :3] = R_1_odom @ rotation_from_vector(turns) @ second[:, :3, :3]
+    T[:, :3, 3] = np.einsum("mij,mjk,mk->mi", R_1_odom, rotation_from_vector(0.5 * turns), stretched)
     return T
 
 
@@ -64,7 +63,7 @@ def _differences(T_odom_body: Array, T_map_body: Array) -> tuple[Array, Array]:
     R_odom_1 = T_odom_body[:-1, :3, :3]
     motion, mapped = (inverses(T[:-1]) @ T[1:] for T in (T_odom_body, T_map_body))
     shifts = np.einsum("mij,mj->mi", R_odom_1, mapped[:, :3, 3] - motion[:, :3, 3])
-    turns = Rotation.from_matrix(mapped[:, :3, :3] @ motion[:, :3, :3].transpose(0, 2, 1)).as_rotvec()
+    turns = rotation_vectors(mapped[:, :3, :3] @ motion[:, :3, :3].transpose(0, 2, 1))
     ways = T_odom_body[1:, :3, 3] - T_odom_body[:-1, :3, 3]
     lengths, left = np.linalg.norm(ways, axis=1)[:, None], ways @ QUARTER_TURN.T
     A = np.zeros((len(ways), 6, 3))

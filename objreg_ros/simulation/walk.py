@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from objreg_ros.data import Array, LoopClosure, Odometry
-from objreg_ros.geometry import inverses
+from objreg_ros.geometry import inverses, rotation_from_vector
 
 PERIOD_NS = 500_000_000  # between two poses of odometry
 NEAR_M = 1.5  # from here to there a place is met again,
@@ -178,5 +178,5 @@ def _errors(rng: np.random.Generator, metres: Array, radians: Array) -> Array:
     """Errors (n, 4, 4) with these sigmas in every axis."""
     E = np.tile(np.eye(4), (len(metres), 1, 1))
     E[:, :3, 3] = metres[:, None] * rng.normal(size=(len(metres), 3))
-    E[:, :3, :3] = Rotation.from_rotvec(radians[:, None] * rng.normal(size=(len(metres), 3))).as_matrix()
+    E[:, :3, :3] = rotation_from_vector(radians[:, None] * rng.normal(size=(len(metres), 3)))
     return E
