@@ -80,8 +80,16 @@ def test_what_another_setup_or_lock_asked_for_is_not_taken_as_installed(checkout
 @pytest.mark.parametrize(
     ("variables", "wanted", "reason"),
     [
-        ({"PYTHON_VERSION": "3.13.0"}, "--editable .[simulation,mapper,ros]", "no lock fits Python 3.13.0 on Linux x86_64"),
-        ({"SYSTEM": "Linux aarch64"}, "--editable .[simulation,mapper,ros]", "no lock fits Python 3.12.0 on Linux aarch64"),
+        (
+            {"PYTHON_VERSION": "3.13.0"},
+            "--editable .[simulation,mapper,ros]",
+            "no lock fits Python 3.13.0 on Linux x86_64",
+        ),
+        (
+            {"SYSTEM": "Linux aarch64"},
+            "--editable .[simulation,mapper,ros]",
+            "no lock fits Python 3.12.0 on Linux aarch64",
+        ),
         (
             {"ROS_DISTRO": "jazzy"},
             "--editable .[simulation,mapper] --constraint config/constraints.txt",
