@@ -463,6 +463,9 @@ class Observation:
         _hold(self, "xyz", np.float64, (3,), {})
 
 
+Moments = tuple[str, int, str, int]  # of a closure: camera and stamp in ns of *from*, and of *to*
+
+
 @word
 class LoopClosure:
     """Two moments that saw the same place: ``T_from_to`` maps points of the camera at *to* into the camera at *from*.
@@ -495,7 +498,7 @@ class LoopClosure:
         _require(self, bool(least > LEAST_VARIANCE), "a positive definite covariance", C.tolist())
 
     @property
-    def moments(self) -> tuple[str, int, str, int]:
+    def moments(self) -> Moments:
         """What is the same of a closure on every topic and whenever it is told."""
         return self.from_frame_id, self.from_ns, self.to_frame_id, self.to_ns
 

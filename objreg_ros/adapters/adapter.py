@@ -14,13 +14,11 @@ from rclpy.clock import Clock, ClockType
 from objreg_ros.adapters.params import AdapterParams
 from objreg_ros.bridge import closures_msg, from_msg, qos
 from objreg_ros.bridge.door import Door
-from objreg_ros.data import LoopClosure
+from objreg_ros.data import LoopClosure, Moments
 from objreg_ros.params import Params
 
 LOOK_S = 0.1  # between two looks at what waits
 MOST_KNOWN = 100_000  # constraints that are remembered, so that none is taken twice
-
-Key = tuple[str, int, str, int]
 
 
 def require(kind: object, package: str, install: str) -> None:
@@ -29,20 +27,15 @@ def require(kind: object, package: str, install: str) -> None:
         raise ValueError(f"expected the messages of {package}, got none that are installed: {install}")
 
 
-def key_of(closure: LoopClosure) -> Key:
-    """What is the same of a constraint on every topic and whenever it is told: its two moments."""
-    return closure.moments
-
-
 class Adapter(Door):
     """The books count constraints. A subclass fills in `hand_over`, and calls `listen_for_closures` when it is made."""
 
     def __init__(self, name: str, *kinds: type[Params]) -> None:
         super().__init__(name, *kinds, AdapterParams)
         self._params = self.settings.of(AdapterParams)
-        self.waiting: dict[Key, LoopClosure] = {}
-        self._taken: dict[Key, bool] = {}  # whether it was handed over; of all that came, the oldest first
-        self._keys: dict[str, Key] = {}  # id of objreg_msgs → key
+        self.waiting: dict[Moments, LoopClosure] = {}
+        self._taken: dict[Moments, bool] = {}  # whether it was handed over; of all that came, the oldest first
+        self._keys: dict[str, Moments] = {}  # id of objreg_msgs → key
         self._again = self._retracted = self._retracted_late = 0
 
     # What a subclass fills in
@@ -54,14 +47,14 @@ class Adapter(Door):
         """
         raise NotImplementedError
 
-    def take_back(self, key: Key) -> bool:
+    def take_back(self, key: Moments) -> bool:
         """Take a constraint that was handed over out of the consumer's graph; False where that is not possible."""
         return False
 
-    def forget(self, key: Key) -> None:
+    def forget(self, key: Moments) -> None:
         """A constraint no longer waits."""
 
-    def is_on_its_way(self, key: Key) -> bool:
+    def is_on_its_way(self, key: Moments) -> bool:
         """Whether the consumer is asked just now, and so may have a constraint that waits."""
         return False
 
@@ -90,7 +83,7 @@ class Adapter(Door):
             return
         closure = self._take("loop_closures", message, closures_msg.read_loop_closure)
         if closure is not None:
-            self._keys[from_msg.bounded(message.id, "id")] = key_of(closure)
+            self._keys[from_msg.bounded(message.id, "id")] = closure.moments
             while len(self._keys) > MOST_KNOWN:
                 del self._keys[next(iter(self._keys))]
 
@@ -101,7 +94,7 @@ class Adapter(Door):
             stamp_ns = from_msg.stamp_ns(message)
             self.accept(stamp_ns)
             self.drop(stamp_ns, f"malformed_{topic}")
-        elif key_of(closure) in self._taken:
+        elif closure.moments in self._taken:
             self._again += 1
         else:
             self._admit(closure)
@@ -109,10 +102,10 @@ class Adapter(Door):
 
     def _admit(self, closure: LoopClosure) -> None:
         self.accept(closure.to_ns)
-        self._taken[key_of(closure)] = False
+        self._taken[closure.moments] = False
         while len(self._taken) > MOST_KNOWN:
             del self._taken[next(iter(self._taken))]
-        self.waiting[key_of(closure)] = closure
+        self.waiting[closure.moments] = closure
         while len(self.waiting) > self._params.most_waiting:
             oldest = next(key for key in self.waiting if not self.is_on_its_way(key))
             self.end(oldest, "queue_full", "its consumer is not there, or takes fewer than come")
@@ -126,7 +119,7 @@ class Adapter(Door):
         if key is not None and self._taken.get(key, False):
             self._withdraw(key)
 
-    def _withdraw(self, key: Key) -> None:
+    def _withdraw(self, key: Moments) -> None:
         """Take back what was handed over, and say where that is too late."""
         self._taken[key] = False  # it came: by whatever topic it comes again, it stays out
         if not self.take_back(key):
@@ -141,7 +134,7 @@ class Adapter(Door):
             if key in self.waiting:
                 self.conclude(closure.to_ns, partial(self._handed_over, key, closure))
 
-    def _handed_over(self, key: Key, closure: LoopClosure) -> bool:
+    def _handed_over(self, key: Moments, closure: LoopClosure) -> bool:
         try:
             done = self.hand_over(closure)
         except BaseException:
@@ -152,7 +145,7 @@ class Adapter(Door):
             self._taken[key] = True
         return done
 
-    def settle(self, key: Key) -> None:
+    def settle(self, key: Moments) -> None:
         """The consumer has a constraint that was on its way, which may have been withdrawn meanwhile."""
         closure = self.waiting.get(key)
         if closure is None:
@@ -162,13 +155,13 @@ class Adapter(Door):
         self._taken[key] = True
         self.conclude(closure.to_ns, lambda: True)
 
-    def end(self, key: Key, reason: str, text: str = "") -> None:
+    def end(self, key: Moments, reason: str, text: str = "") -> None:
         """Drop a constraint that waits."""
         closure = self.waiting[key]
         self._leave(key)
         self.drop(closure.to_ns, reason, text)
 
-    def _leave(self, key: Key) -> None:
+    def _leave(self, key: Moments) -> None:
         self.waiting.pop(key, None)
         self.forget(key)
 

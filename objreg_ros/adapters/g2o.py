@@ -12,13 +12,13 @@ from typing import Any
 from rclpy.clock import Clock, ClockType
 from std_srvs.srv import Trigger
 
-from objreg_ros.adapters.adapter import Adapter, Key, key_of
+from objreg_ros.adapters.adapter import Adapter
 from objreg_ros.adapters.body import Body
 from objreg_ros.adapters.odometry_in import OdometryIn
 from objreg_ros.adapters.params import BodyParams, ToG2oParams
 from objreg_ros.bridge.door import DroppedError
 from objreg_ros.bridge.spin import run
-from objreg_ros.data import LoopClosure, Odometry
+from objreg_ros.data import LoopClosure, Moments, Odometry
 from objreg_ros.mapper.adapters.g2o import graph_text
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.pose_graph import ImplausibleError, PoseGraph
@@ -83,9 +83,9 @@ class ToG2o(Adapter):
         self._has_news = tied or self._has_news
         return tied
 
-    def take_back(self, key: Key) -> bool:
+    def take_back(self, key: Moments) -> bool:
         """Leave the edge out of the file from now on."""
-        self._graph.withdraw(lambda closure: key_of(closure) == key)
+        self._graph.withdraw(lambda closure: closure.moments == key)
         self._has_news = True
         return True
 

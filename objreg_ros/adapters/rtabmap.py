@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 from rclpy.task import Future
 
-from objreg_ros.adapters.adapter import Adapter, Key, key_of, require, seconds
+from objreg_ros.adapters.adapter import Adapter, require, seconds
 from objreg_ros.adapters.body import Body
 from objreg_ros.adapters.odometry_in import OdometryIn
 from objreg_ros.adapters.params import BodyParams, ToRtabmapParams
@@ -24,7 +24,7 @@ from objreg_ros.adapters.rtabmap_nodes import RtabmapNodes
 from objreg_ros.bridge import qos
 from objreg_ros.bridge.door import DroppedError
 from objreg_ros.bridge.spin import run
-from objreg_ros.data import LoopClosure, Odometry
+from objreg_ros.data import LoopClosure, Moments, Odometry
 from objreg_ros.mapper.adapters.rtabmap import fill_link
 from objreg_ros.mapper.restart import Anew
 from objreg_ros.mapper.sparse import SparseTrajectory
@@ -41,7 +41,7 @@ INSTALL = "apt install ros-$ROS_DISTRO-rtabmap-msgs"
 class _Asked(NamedTuple):
     """The link that is on its way."""
 
-    key: Key
+    key: Moments
     future: Future
     since: float
 
@@ -55,8 +55,8 @@ class ToRtabmap(Adapter):
         self._limits = self.settings.of(ToRtabmapParams)
         self._nodes, self._odometry = RtabmapNodes(), SparseTrajectory()
         self._asked: _Asked | None = None
-        self._attempts: Counter[Key] = Counter()
-        self._since: dict[Key, float] = {}  # when a constraint first found RTAB-Map without the nodes that it needs
+        self._attempts: Counter[Moments] = Counter()
+        self._since: dict[Moments, float] = {}  # when a constraint first found RTAB-Map without the nodes that it needs
         self._databases = 0
         self._body = Body(self)
         self._odom = OdometryIn(self, self._follow, self._begin_anew)
@@ -137,7 +137,7 @@ class ToRtabmap(Adapter):
             raise DroppedError("same_node", f"both moments are nearest to node {from_id} of RTAB-Map")
         request = AddLink.Request()
         fill_link(request.link, constraint, from_id, to_id)
-        self._ask(key_of(closure), request)
+        self._ask(closure.moments, request)
         return False
 
     def _offset_s(self, closure: LoopClosure) -> float:
@@ -150,7 +150,7 @@ class ToRtabmap(Adapter):
 
     def _be_patient(self, closure: LoopClosure) -> None:
         """`DroppedError` where a constraint has waited for its nodes for too long."""
-        since = self._since.setdefault(key_of(closure), seconds())
+        since = self._since.setdefault(closure.moments, seconds())
         if seconds() - since < self._limits.patience:
             return
         if self._has_nodes(closure):
@@ -161,7 +161,7 @@ class ToRtabmap(Adapter):
             f"{self._offset_s(closure):.3f} s away",
         )
 
-    def _ask(self, key: Key, request: Any) -> None:
+    def _ask(self, key: Moments, request: Any) -> None:
         self._attempts[key] += 1
         future = self._add.call_async(request)
         self._asked = _Asked(key, future, seconds())
@@ -183,16 +183,16 @@ class ToRtabmap(Adapter):
         asked.future.cancel()
         self._end_hopeless(asked.key)
 
-    def _end_hopeless(self, key: Key) -> None:
+    def _end_hopeless(self, key: Moments) -> None:
         """Never ask again what was asked too often."""
         if key in self.waiting and self._attempts[key] >= self._limits.most_attempts:
             self.end(key, "unanswered", f"add_link was asked {self._attempts[key]} times")
 
-    def is_on_its_way(self, key: Key) -> bool:
+    def is_on_its_way(self, key: Moments) -> bool:
         """Whether RTAB-Map was asked and has not answered."""
         return self._asked is not None and self._asked.key == key
 
-    def forget(self, key: Key) -> None:
+    def forget(self, key: Moments) -> None:
         """Its patience and its attempts are over."""
         self._since.pop(key, None)
         self._attempts.pop(key, None)

@@ -10,11 +10,9 @@ from nav_msgs.msg import Odometry
 
 from objreg_ros.bridge import closures_msg, from_msg, qos
 from objreg_ros.bridge.door import Door
-from objreg_ros.data import LoopClosure
+from objreg_ros.data import LoopClosure, Moments
 
 MOST_KNOWN = 100_000  # closures that are remembered, so that none is taken twice
-
-Moments = tuple[str, int, str, int]
 
 
 class ClosuresIn:

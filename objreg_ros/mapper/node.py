@@ -15,14 +15,14 @@ from rclpy.clock import Clock, ClockType
 from std_srvs.srv import SetBool, Trigger
 
 from objreg_ros.bridge import from_msg, qos
-from objreg_ros.bridge.closures_in import ClosuresIn, Moments
+from objreg_ros.bridge.closures_in import ClosuresIn
 from objreg_ros.bridge.door import Door
 from objreg_ros.bridge.indoors import Indoors
 from objreg_ros.bridge.map_announcements import MapAnnouncements
 from objreg_ros.bridge.params import ManagedParams
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.transforms import hear_mount
-from objreg_ros.data import JUMP_NS, LoopClosure, Odometry
+from objreg_ros.data import JUMP_NS, LoopClosure, Moments, Odometry
 from objreg_ros.mapper import saved
 from objreg_ros.mapper.adapters.g2o import graph_text
 from objreg_ros.mapper.incremental import load

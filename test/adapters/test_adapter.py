@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from objreg_ros.adapters.adapter import Adapter, Key, key_of
+from objreg_ros.adapters.adapter import Adapter
 from objreg_ros.bridge import closures_msg, to_msg
-from objreg_ros.data import LoopClosure
+from objreg_ros.data import LoopClosure, Moments
 
 from .standing_by import Around, closure
 
@@ -21,14 +21,14 @@ class Shelf(Adapter):
     def __init__(self) -> None:
         super().__init__("shelf")
         self.is_open = True
-        self.has: list[Key] = []
+        self.has: list[Moments] = []
         self.listen_for_closures()
 
     def hand_over(self, closure: LoopClosure) -> bool:
         if closure.from_ns == 13_000_000_000:
             raise IndexError("nobody expected this")
         if self.is_open:
-            self.has.append(key_of(closure))
+            self.has.append(closure.moments)
         return self.is_open
 
 
@@ -129,7 +129,7 @@ def test_what_is_on_its_way_is_not_pushed_out_and_is_withdrawn_too_late(
     graph = around("most_waiting:=1")
     door = graph.start(Shelf)
     door.is_open = False
-    asked = key_of(closure(1.0))
+    asked = closure(1.0).moments
     monkeypatch.setattr(door, "is_on_its_way", lambda key: key == asked)
     graph.send(closure(1.0), closure(2.0))
     graph.wait(lambda: door.ledger.balance().dropped == {"queue_full": 1})

@@ -14,7 +14,6 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.task import Future
 
 from objreg_ros.adapters import rtabmap
-from objreg_ros.adapters.adapter import key_of
 from objreg_ros.adapters.rtabmap import ToRtabmap
 from objreg_ros.bridge import from_msg, to_msg
 from objreg_ros.geometry import inverse
@@ -184,8 +183,8 @@ def test_a_link_that_is_withdrawn_on_its_way_is_counted_once_rtabmap_has_it(
     graph.wait(lambda: door._asked is not None)
     graph.send(closure(1.5, 62.25))
     graph.wait(lambda: door.ledger.balance().dropped == {"queue_full": 1})
-    assert list(door.waiting) == [key_of(closure())]
-    door._keys["its id"] = key_of(closure())
+    assert list(door.waiting) == [closure().moments]
+    door._keys["its id"] = closure().moments
     door._retract("its id")
     answer.set_result(rtabmap.AddLink.Response())
     graph.wait(lambda: door.extra_diagnostics()["retracted too late"] == 1)
