@@ -38,6 +38,7 @@ setup(
     install_requires=[
         "setuptools",
         "click>=8.1",
+        "jinja2>=3.1",
         "numba>=0.59",
         "numpy>=1.26",
         "onnxruntime>=1.17",
@@ -56,9 +57,15 @@ setup(
         # The mapper, and the corrected trajectory of a report. Its wheel asks for pytest 9, which the launch_testing of
         # Ubuntu does not go with: on a robot, `pip install --no-deps gtsam`.
         "mapper": ["gtsam>=4.3"],
+        # The parts of a report that one can turn about. Without it the report has its flat pictures, and says so.
+        "report": ["plotly>=5.9"],
+        # `--rerun`: a run as a recording for the Rerun viewer.
+        "rerun": ["rerun-sdk>=0.20"],
+        # The site of the documentation: `mkdocs build`.
+        "docs": ["mkdocs-material>=9.5", "mkdocstrings-python>=1.10"],
         # The real ROS 2 Jazzy as wheels, for machines without a ROS installation.
         "ros": ["ros-jazzy-rclpy", "ros-jazzy-common-interfaces", "ros-jazzy-rmw-fastrtps-cpp"],
-        "test": ["hypothesis", "mypy", "onnx", "pytest", "ruff", "small_gicp>=1.0"],
+        "test": ["hypothesis", "mypy", "onnx", "pytest", "pytest-xdist", "ruff", "selenium>=4.11", "small_gicp>=1.0"],
     },
     entry_points={
         "console_scripts": [

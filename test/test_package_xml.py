@@ -28,6 +28,7 @@ HERE = {"objreg_msgs"}  # in this repository: rosdep and colcon are told of its 
 IN_NOBLE = {  # key → what it leads to: a package of Ubuntu with its version, or one of PyPI
     "python3-click": "python3-click 8.1.6",
     "python3-hypothesis": "python3-hypothesis 6.98.15",
+    "python3-jinja2": "python3-jinja2 3.1.2",
     "python3-matplotlib": "python3-matplotlib 3.6.3",
     "python3-numpy": "python3-numpy 1.26.4",
     "python3-onnxruntime-pip": "pip: onnxruntime",
