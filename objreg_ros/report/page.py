@@ -14,29 +14,9 @@ from objreg_ros.geometry import pose_error, rotation_angle
 from objreg_ros.report import figures
 from objreg_ros.report.drawing import legend
 from objreg_ros.report.pictures import Album, chosen_closures, chosen_refusals, data_uri, overlay
+from objreg_ros.report.reasons import MEANINGS
 from objreg_ros.report.story import Story, Tracks, of_one_clock
 from objreg_ros.report.style import CSS
-
-MEANINGS = {
-    "no_candidate": "no stored place has such objects",
-    "no_hypothesis": "no pose explains the two moments",
-    "not_converged": "too few points find a partner",
-    "low_overlap": "too little of the two views is the same, or they like the pose too little",
-    "free_space_violated": "something would float where the other view saw free space",
-    "texture_disagrees": "the shapes fit, the pictures do not",
-    "few_objects_explained": "too few objects lie on each other",
-    "chains_disagree": "another pose is as good, or too little independent evidence agrees",
-    "gravity_not_kept": "the room would tilt",
-    "implausible_motion": "the cameras would be too far apart",
-    "odometry_disagrees": "odometry rules it out",
-    "slides_along_a_plane": "the data leave a direction open",
-    "objects_moved": "more objects have moved than stayed",
-    "redundant": "a closure of this revisit was accepted already",
-    "over_budget": "time ran out before this place was tried",
-    "unreadable": "what the store holds of this place is damaged",
-    "neighbours_disagree": "the keyframes around it tell another pose",
-    "clock_began_anew": "what was seen before then has stamps of now, and is left out",
-}
 
 
 def page(chapters: Sequence[tuple[Story, Album | None]]) -> str:

@@ -6,8 +6,7 @@ from __future__ import annotations
 import re
 from html.parser import HTMLParser
 
-from objreg_ros.data import Reason
-from objreg_ros.report.page import MEANINGS, page
+from objreg_ros.report.page import page
 from objreg_ros.report.story import Story
 from objreg_ros.truth import Truth
 
@@ -50,10 +49,6 @@ def test_the_head_counts_what_was_tried_apart_from_what_was_not() -> None:
     assert "2 candidates refused, 1 more not tried" in page([(Story.of("walk", summary(), TRUTH), None)])
     told = {**summary(), "rejected": {"texture_disagrees": 2}}
     assert "2 candidates refused<" in page([(Story.of("walk", told, TRUTH), None)])
-
-
-def test_every_reason_has_its_meaning() -> None:
-    assert set(MEANINGS) == {reason.value for reason in Reason}
 
 
 def test_a_run_that_closed_nothing_says_so() -> None:
