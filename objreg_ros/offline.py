@@ -187,7 +187,7 @@ class Run:
             "gravity": self.gravity(),
             "stage_ms": {stage: percentiles_ms(seconds) for stage, seconds in self.stage_s.items()},
             "truth": summarise(truth.errors(self.closures)),
-            "refusals": [refusal(rejected) for rejected in self.refusals],
+            "refusals": [refusal_with_evidence(rejected) for rejected in self.refusals],
             "glimpses": self.glimpses,
         }
 
@@ -215,6 +215,11 @@ def refusal(rejected: Rejected) -> dict[str, Any]:
     pose = None if rejected.T_from_to is None else rejected.T_from_to.round(6).tolist()
     moments = {"from_ns": rejected.from_ns, "to_ns": rejected.to_ns, "T_from_to": pose}
     return {"reason": rejected.reason.value, **moments, "detail": rejected.detail}
+
+
+def refusal_with_evidence(rejected: Rejected) -> dict[str, Any]:
+    """A refused candidate as JSON, with the named numbers that were read of its pose."""
+    return {**refusal(rejected), "evidence": rejected.evidence}
 
 
 def glimpse(frame: Frame, labels: tuple[str, ...]) -> dict[str, Any]:

@@ -14,11 +14,17 @@ EMBEDDED = "objreg_ssd.onnx"
 COCO = ("ssd_mobilenet_v1_12.onnx", "ssd_mobilenet_v1_12-int8.onnx")  # as `objreg fetch-model` brings them
 
 
+def checkout() -> Path | None:
+    """The folder of the source where this very code lies in one; None where it is installed."""
+    parent = Path(__file__).resolve().parents[1]
+    return parent if (parent / "package.xml").is_file() else None
+
+
 def folders() -> Iterator[Path]:
     """The places where the package's files may be, the one that belongs to this very code first."""
     package = Path(__file__).resolve().parent
-    if (package.parent / "package.xml").is_file():
-        yield package.parent
+    if (source := checkout()) is not None:
+        yield source
     for prefix in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep):
         if prefix:
             yield Path(prefix) / "share" / NAME

@@ -21,7 +21,7 @@ from objreg_ros.cli.played import as_rosbag2, simulated_room
 from objreg_ros.cli.settings import parse_change, read_settings, ros_argument, tell_ignored
 from objreg_ros.data import ColourImage, Intrinsics
 from objreg_ros.geometry import quaternion_from_rotation
-from objreg_ros.offline import constraint_with_error, refusal
+from objreg_ros.offline import constraint_with_error, refusal_with_evidence
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.mounts import TRANSFORMS, camera_on_body
@@ -199,7 +199,7 @@ def _write(file: Path, told: Mapping[str, Any], live: Live, truth: Truth) -> Non
         "constraints": [constraint_with_error(closure, truth) for closure in live.closures],
         "rejected": dict(live.rejected),
         "truth": summarise(truth.errors(live.closures)),
-        "refusals": [refusal(rejected) for rejected in live.refusals],
+        "refusals": [refusal_with_evidence(rejected) for rejected in live.refusals],
         "glimpses": live.glimpses,
     }
     file.write_text(json.dumps(summary, indent=1))

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -25,6 +26,7 @@ from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.mounts import static_frames
 from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
+from objreg_ros.report.about import about
 from objreg_ros.report.map_files import VOXEL_M, MapFiles
 from objreg_ros.report.story import Story
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
@@ -110,14 +112,16 @@ def command(
         summary = run.summary(truth)
         _say(run, summary)
         if json_file is not None:
-            about = {
+            detector = settings.of("detector", DetectorParams)
+            told_of = {
+                "about": about(recording, detector.model, settings.changed(), sys.argv[1:]),
                 "recording": str(recording.resolve()),
                 "inputs": inputs.outright,
                 "odometry": inputs.odom,
                 "rectified": told.rectified,
                 "camera": absolute(told.camera),
             }
-            json_file.write_text(json.dumps({**about, **summary}, indent=1))
+            json_file.write_text(json.dumps({**told_of, **summary}, indent=1))
         if files.wanted:
             _map(files, Story.of(recording.name, summary, truth), Path(registrar.store))
 

@@ -66,6 +66,16 @@ class Settings:
         names = names_of(kind)
         return kind.from_mapping({name: value for name, value in self._values[node].items() if name in names})
 
+    def changed(self) -> dict[str, Any]:
+        """The values that are not the defaults, by ``node.parameter``."""
+        told = {(node, kind): self.of(node, kind) for node, kinds in NODES.items() for kind in kinds}
+        return {
+            f"{node}.{declaration.name}": value
+            for (node, kind), params in told.items()
+            for declaration in kind.declarations()
+            if (value := getattr(params, declaration.name)) != declaration.default
+        }
+
 
 def _refuse_dropped(node: str, kinds: Iterable[type[Params]], values: Mapping[str, Any]) -> None:
     for kind in kinds:

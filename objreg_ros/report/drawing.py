@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from html import escape
 
 import numpy as np
@@ -28,6 +27,7 @@ class Plot:
         self.width, self.height, self.left = width, height, left
         self.x_range, self.y_range = x_range, y_range
         self.parts: list[str] = []
+        self.hits: list[str] = []  # broad and unseen, above all else: a thin line is hard to point at
 
     @classmethod
     def equal(cls, xy: Array, width: int = 1040, least: int = 240, most: int = 560) -> Plot:
@@ -53,16 +53,18 @@ class Plot:
         low, high = self.y_range
         return self.height - BOTTOM - (value - low) / (high - low) * (self.height - TOP - BOTTOM)
 
-    def line(self, xy: Array, style: str, title: str = "") -> None:
-        """A line through points (N, 2)."""
+    def line(self, xy: Array, style: str, title: str = "", pair: str = "") -> None:
+        """A line through points (N, 2); one of a ``pair`` opens it."""
         step = max(1, len(xy) // LONGEST_LINE)
         kept = np.concatenate([xy[:-1:step], xy[-1:]])
         points = " ".join(f"{self.x(x):.1f},{self.y(y):.1f}" for x, y in kept)
-        self._add(f'<polyline class="line {style}" points="{points}"', title)
+        self._add_stroke("polyline", f'points="{points}"', style, title, pair)
 
-    def dot(self, x: float, y: float, style: str, title: str = "", radius: float = 3.0) -> None:
-        """A dot."""
-        self._add(f'<circle class="dot {style}" cx="{self.x(x):.1f}" cy="{self.y(y):.1f}" r="{radius}"', title)
+    def dot(self, x: float, y: float, style: str, title: str = "", radius: float = 3.0, pair: str = "") -> None:
+        """A dot; one of a ``pair`` opens it."""
+        opens = f' data-pair="{pair}"' if pair else ""
+        place = f'cx="{self.x(x):.1f}" cy="{self.y(y):.1f}" r="{radius}"'
+        self._add(f'<circle class="dot {style}"{opens} {place}', title)
 
     def bar(self, x0: float, x1: float, y: float, style: str, title: str = "", thickness: float = 8.0) -> None:
         """A bar from ``x0`` to ``x1``, its middle at ``y``."""
@@ -70,14 +72,11 @@ class Plot:
         box = f'x="{left:.1f}" y="{self.y(y) - thickness / 2:.1f}" width="{width:.1f}" height="{thickness}"'
         self._add(f'<rect class="dot {style}" {box}', title)
 
-    def arc(self, x0: float, x1: float, y: float, rise: float, style: str, title: str = "") -> None:
-        """A bow over the axis from ``x0`` to ``x1`` at ``y``, ``rise`` px high."""
+    def arc(self, x0: float, x1: float, y: float, rise: float, style: str, title: str = "", pair: str = "") -> None:
+        """A bow over the axis from ``x0`` to ``x1`` at ``y``, ``rise`` px high; one of a ``pair`` opens it."""
         a, b, base = self.x(x0), self.x(x1), self.y(y)
-        self._add(
-            f'<path class="line {style}" d="M{a:.1f} {base:.1f} Q{(a + b) / 2:.1f} {base - 2 * rise:.1f} '
-            f'{b:.1f} {base:.1f}"',
-            title,
-        )
+        bow = f"M{a:.1f} {base:.1f} Q{(a + b) / 2:.1f} {base - 2 * rise:.1f} {b:.1f} {base:.1f}"
+        self._add_stroke("path", f'd="{bow}"', style, title, pair)
 
     def text(self, x_px: float, y_px: float, words: str, anchor: str = "start", style: str = "label") -> None:
         """Words at a place in pixels."""
@@ -107,13 +106,25 @@ class Plot:
         """The drawing; ``title`` is what a screen reader says."""
         return (
             f'<svg viewBox="0 0 {self.width} {self.height}" role="img" aria-label="{escape(title)}">'
-            + "".join(self.parts)
+            + "".join(self.parts + self.hits)
             + "</svg>"
         )
 
+    def _add_stroke(self, tag: str, shape: str, style: str, title: str, pair: str) -> None:
+        if not pair:
+            self._add(f'<{tag} class="line {style}" {shape}', title)
+            return
+        self._add(f'<{tag} class="line {style}" data-of="{pair}" {shape}', "")
+        self.hits.append(_closed(f'<{tag} class="hit" data-pair="{pair}" {shape}', title))
+
     def _add(self, opened: str, title: str) -> None:
-        tag = opened[1 : opened.index(" ")]
-        self.parts.append(f"{opened}><title>{escape(title)}</title></{tag}>" if title else f"{opened}/>")
+        self.parts.append(_closed(opened, title))
+
+
+def _closed(opened: str, title: str) -> str:
+    """An element with its title, which shows where one hovers over it."""
+    tag = opened[1 : opened.index(" ")]
+    return f"{opened}><title>{escape(title)}</title></{tag}>" if title else f"{opened}/>"
 
 
 def ticks(low: float, high: float, about: int = 6) -> list[float]:
@@ -124,9 +135,3 @@ def ticks(low: float, high: float, about: int = 6) -> list[float]:
     first = np.ceil(low / step)
     count = int(np.floor(high / step) - first) + 1
     return [round(float((first + k) * step), 10) for k in range(count)]
-
-
-def legend(entries: Sequence[tuple[str, str]]) -> str:
-    """HTML of a legend: (CSS class, words) for each series."""
-    items = "".join(f'<li><span class="swatch {style}"></span>{escape(words)}</li>' for style, words in entries)
-    return f'<ul class="legend">{items}</ul>'

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -13,6 +13,7 @@ from objreg_ros.data import Array, LoopClosure
 from objreg_ros.report.drawing import Plot
 from objreg_ros.report.story import Story, Tracks
 
+WIDE, HALF, NARROW = 1040, 510, 400  # px of a drawing across the page, across half of it, and on a telephone
 LANE = 18  # px of one row of the timeline
 MOST_LABELS = 9  # rows of detections; the rarer labels share one more
 LINE, LETTER = 13.0, 7.0  # px of a line of text and of a letter
@@ -34,28 +35,26 @@ class Ground:
         return (xyz - self.middle) @ self.axes.T
 
 
-def way(story: Story, tracks: Tracks) -> str:
-    """Odometry, corrected and true way from above, and the closures as links on the corrected one."""
-    ground = Ground(tracks.corrected if tracks.true is None else tracks.true)
-    lines = {"odometry": tracks.odometry, "corrected": tracks.corrected}
+def way(story: Story, stamps_ns: Array, lines: Mapping[str, Array], width: int = WIDE) -> str:
+    """Ways (N, 3) by their CSS class from above, at stamps (N,), and the closures as links on the last of them."""
+    ground = Ground(next(iter(lines.values())) if "true" in lines else list(lines.values())[-1])
     flat = {name: ground.flat(xyz) for name, xyz in lines.items()}
-    if tracks.true is not None:
-        flat = {"true": ground.flat(tracks.true), **flat}
-    plot = Plot.equal(np.concatenate(list(flat.values())))
+    plot = Plot.equal(np.concatenate(list(flat.values())), width)
     plot.x_axis("m")
     plot.y_axis("m")
     for name, xy in flat.items():
         plot.line(xy, name, name)
-    for closure in story.closures:
-        ends = [flat["corrected"][_index(tracks, stamp)] for stamp in (closure.from_ns, closure.to_ns)]
-        plot.line(np.array(ends), f"link {verdict(story, closure)}", closure_words(story, closure))
-    x, y = flat["corrected"][0]
+    main = list(flat.values())[-1]
+    for k, closure in enumerate(story.closures):
+        ends = [main[np.abs(stamps_ns - stamp).argmin()] for stamp in (closure.from_ns, closure.to_ns)]
+        plot.line(np.array(ends), f"link {verdict(story, closure)}", closure_words(story, closure), f"c{k}")
+    x, y = main[0]
     plot.dot(x, y, "start", "start", radius=4)
     plot.text(plot.x(x) + 8, plot.y(y) - 6, "start")
-    return plot.svg("the way of the camera from above: true, by odometry, and corrected")
+    return plot.svg("the way of the camera from above: " + ", ".join(lines))
 
 
-def error_over_time(story: Story, tracks: Tracks) -> str:
+def error_over_time(story: Story, tracks: Tracks, width: int = WIDE) -> str:
     """The distance from the truth, before and after."""
     if tracks.odometry_error is None or tracks.corrected_error is None:
         return ""
@@ -65,7 +64,7 @@ def error_over_time(story: Story, tracks: Tracks) -> str:
     times = (tracks.stamps_ns[shown] - story.start_ns) * 1e-9
     errors = {"odometry": 100 * tracks.odometry_error[shown], "corrected": 100 * tracks.corrected_error[shown]}
     top = max(float(error.max()) for error in errors.values())
-    plot = Plot((float(times[0]), float(times[-1]) + 1e-9), (0.0, 1.08 * max(top, 1.0)), height=220)
+    plot = Plot((float(times[0]), float(times[-1]) + 1e-9), (0.0, 1.08 * max(top, 1.0)), width, height=220)
     plot.x_axis("s")
     plot.y_axis("cm")
     for name, error in errors.items():
@@ -73,7 +72,7 @@ def error_over_time(story: Story, tracks: Tracks) -> str:
     return plot.svg("the distance from the truth over time, before and after")
 
 
-def timeline(story: Story) -> str:
+def timeline(story: Story, width: int = WIDE) -> str:
     """Rows over time: detections by label, closures as bows, refusals by reason; without what is `out_of_time`."""
     names = [label for label, _ in Counter(label for g in story.glimpses for label in g.labels).most_common()]
     labels, rare = names[:MOST_LABELS], names[MOST_LABELS:]
@@ -83,22 +82,22 @@ def timeline(story: Story) -> str:
     level = dict(zip(rows, np.cumsum(list(heights.values())) - LANE / 2, strict=True))
     total = sum(heights.values())
     end = max((story.seconds(moment) for moment in _moments(story)), default=1.0)
-    plot = Plot((0.0, end + 1e-9), (-float(total), 0.0), height=total + 46, left=150)
+    plot = Plot((0.0, end + 1e-9), (-float(total), 0.0), width, height=total + 46, left=150)
     plot.x_axis("s")
     for name in rows:
         plot.text(plot.left - 8, plot.y(-level[name]) + 4, name.replace("_", " "), "end")
     row_of = {name: level.get(name, level.get("other labels", 0.0)) for name in names}
     _draw_detections(plot, story, row_of)
     _draw_closures(plot, story, level["closures"])
-    for refusal in story.refusals:
+    for k, refusal in enumerate(story.refusals):
         if not story.in_time(refusal.to_ns):
             continue
         words = f"{refusal.detail} ({story.seconds(refusal.from_ns):.1f} s, {story.seconds(refusal.to_ns):.1f} s)"
-        plot.dot(story.seconds(refusal.to_ns), -level[refusal.reason.value], "refused", words)
+        plot.dot(story.seconds(refusal.to_ns), -level[refusal.reason.value], "refused", words, pair=f"r{k}")
     return plot.svg("detections, closures and refusals over time")
 
 
-def object_map(story: Story, corrected: bool) -> str:
+def object_map(story: Story, corrected: bool, width: int = HALF) -> str:
     """Every sighting of an object from above, by odometry or in the corrected map, and the camera's way."""
     seen = story.objects()
     places = [row[2] for row in seen]
@@ -110,7 +109,7 @@ def object_map(story: Story, corrected: bool) -> str:
     line = poses if corrected else odometry
     xy = ground.flat(np.array([row[2 if corrected else 1] for row in seen]))
     both = np.concatenate([ground.flat(np.array(places)), ground.flat(np.array([row[1] for row in seen]))])
-    plot = Plot.equal(np.concatenate([both, ground.flat(np.array([T[:3, 3] for T in poses]))]), width=510, most=440)
+    plot = Plot.equal(np.concatenate([both, ground.flat(np.array([T[:3, 3] for T in poses]))]), width, most=440)
     plot.x_axis("m")
     plot.y_axis("m")
     plot.line(ground.flat(np.array([T[:3, 3] for T in line])), "faint")
@@ -165,10 +164,6 @@ def closure_words(story: Story, closure: LoopClosure) -> str:
     return ", ".join([times, *closure.labels, *moved, *truth])
 
 
-def _index(tracks: Tracks, stamp_ns: int) -> int:
-    return int(np.abs(tracks.stamps_ns - stamp_ns).argmin())
-
-
 def _moments(story: Story) -> list[int]:
     moments = [glimpse.stamp_ns for glimpse in story.glimpses]
     moments += [c.to_ns for c in story.closures] + [r.to_ns for r in story.refusals]
@@ -188,12 +183,12 @@ def _draw_detections(plot: Plot, story: Story, level: dict[str, float]) -> None:
 
 
 def _draw_closures(plot: Plot, story: Story, row: float) -> None:
-    closures = [closure for closure in story.closures if story.in_time(closure.to_ns)]
-    longest = max((abs(c.to_ns - c.from_ns) for c in closures if story.in_time(c.from_ns)), default=1)
-    for closure in closures:
+    closures = [(k, closure) for k, closure in enumerate(story.closures) if story.in_time(closure.to_ns)]
+    longest = max((abs(c.to_ns - c.from_ns) for _, c in closures if story.in_time(c.from_ns)), default=1)
+    for k, closure in closures:
         start, end = sorted(story.seconds(stamp) for stamp in (closure.from_ns, closure.to_ns))
         rise = 2.4 * LANE * min(abs(closure.to_ns - closure.from_ns) / longest, 1.0)
         style = verdict(story, closure)
-        plot.arc(start, end, -row, rise, style, closure_words(story, closure))
+        plot.arc(start, end, -row, rise, style, closure_words(story, closure), f"c{k}")
         for moment in (start, end):
-            plot.dot(moment, -row, style, closure_words(story, closure), radius=2.5)
+            plot.dot(moment, -row, style, closure_words(story, closure), 2.5, f"c{k}")

@@ -67,6 +67,8 @@ def _each(fits: Check) -> Check:
 
 FIELDS: dict[str, tuple[str, Check]] = {
     "recording": ("the path of a recording", _is_text),
+    "about": ("an object", lambda value: isinstance(value, dict)),
+    "findings": ("a list of objects of text", lambda value: _is_rows(value) and all(map(_each(_is_text), value))),
     "name": ("text", _is_text),
     "lens": ("text", _is_text),
     "rectified": ("auto, all or none", lambda value: value in ("auto", "all", "none")),

@@ -21,6 +21,7 @@ from objreg_ros.segmenter.organise import organise
 
 WIDTH = 320  # px of one picture
 QUALITY = 82
+KEPT = 64  # moments that an album holds at once: 2 MB each of VGA
 
 
 class Album:
@@ -55,6 +56,8 @@ class Album:
     def _seen(self, stamp_ns: int) -> DepthImage | str:
         if stamp_ns not in self._known:
             self._known[stamp_ns] = self._read(stamp_ns)
+            if len(self._known) > KEPT:
+                del self._known[next(iter(self._known))]
         return self._known[stamp_ns]
 
     def _read(self, stamp_ns: int) -> DepthImage | str:
@@ -118,11 +121,12 @@ def chosen_refusals(story: Story, most: int = 6) -> list[Rejected]:
     return [refusal for group in by_reason for refusal in _spread(group, share)][:most]
 
 
-def data_uri(rgb: Array) -> str:
+def data_uri(rgb: Array, quality: int = QUALITY) -> str:
     """A picture (H, W, 3) as a JPEG inside the page, `WIDTH` wide."""
     height = round(rgb.shape[0] * WIDTH / rgb.shape[1])
+    rgb = np.ascontiguousarray(rgb)
     small = rgb if rgb.shape[1] == WIDTH else cv2.resize(rgb, (WIDTH, height), interpolation=cv2.INTER_AREA)
-    _, jpeg = cv2.imencode(".jpg", small[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    _, jpeg = cv2.imencode(".jpg", small[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
     return "data:image/jpeg;base64," + base64.b64encode(jpeg.tobytes()).decode("ascii")
 
 

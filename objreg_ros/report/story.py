@@ -49,6 +49,12 @@ class Tracks:
     odometry_error: Array | None = None
     corrected_error: Array | None = None
 
+    @property
+    def lines(self) -> dict[str, Array]:
+        """The ways that there are, by name, in the order in which they are drawn."""
+        told = {"odometry": self.odometry, "corrected": self.corrected}
+        return told if self.true is None else {"true": self.true, **told}
+
 
 @dataclass(frozen=True, eq=False)
 class Story:
@@ -128,6 +134,15 @@ class Story:
         error = self.error(closure)
         return error is not None and not within(error, FALSE)
 
+    @cached_property
+    def _labels_at(self) -> dict[int, tuple[str, ...]]:
+        return {glimpse.stamp_ns: glimpse.labels for glimpse in self.glimpses}
+
+    def seen_at_both(self, from_ns: int, to_ns: int) -> tuple[str, ...]:
+        """The labels that were detected in the frames of both moments, by name; none where one is no frame's."""
+        first, second = (set(self._labels_at.get(stamp, ())) for stamp in (from_ns, to_ns))
+        return tuple(sorted(first & second))
+
     @property
     def left_out(self) -> int:
         """How many frames with odometry are not on the map because time does not advance at them."""
@@ -160,6 +175,17 @@ class Story:
             absolute_errors(odometry, targets),
             absolute_errors(corrected, targets),
         )
+
+    def true_way(self) -> tuple[Array, Array] | None:
+        """The stamps of the frames that truth tells of and the true positions (N, 3) m there; None for fewer than two.
+
+        Without frames, all of the truth.
+        """
+        stamps = [glimpse.stamp_ns for glimpse in self.glimpses] or self.truth.stamps_ns
+        known = [(stamp, T) for stamp in stamps if (T := self.truth.at(stamp)) is not None]
+        if len(known) < 2:
+            return None
+        return np.array([stamp for stamp, _ in known]), positions([T for _, T in known])
 
     def objects(self) -> list[tuple[str, Array, Array]]:
         """(label, position by odometry, position in the map) of every object seen with odometry."""
@@ -243,8 +269,12 @@ def _closure(row: Mapping[str, Any]) -> LoopClosure:
         T_from_to=np.array(row["T_from_to"], float),
         covariance=np.array(row["covariance"], float),
         labels=tuple(map(_spaced, row["labels"])),
-        evidence={_spaced(name): number for name, number in row.get("evidence", {}).items()},
+        evidence=_evidence(row),
     )
+
+
+def _evidence(row: Mapping[str, Any]) -> dict[str, float]:
+    return {_spaced(name): number for name, number in row.get("evidence", {}).items()}
 
 
 def _spaced(label: str) -> str:
@@ -260,4 +290,5 @@ def _refusal(row: Mapping[str, Any]) -> Rejected:
         to_ns=int(row["to_ns"]),
         detail=row["detail"],
         T_from_to=None if pose is None else np.array(pose, float),
+        evidence=_evidence(row),
     )

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from objreg_ros.report.drawing import Plot, legend, ticks
+from objreg_ros.report.drawing import Plot, ticks
 
 
 def test_ticks_are_round_and_within_the_bounds() -> None:
@@ -45,5 +45,12 @@ def test_a_long_line_is_thinned_and_keeps_its_ends() -> None:
     assert points[0].startswith(f"{plot.x(0):.1f},") and points[-1].startswith(f"{plot.x(10_000):.1f},")
 
 
-def test_a_legend_escapes_its_words() -> None:
-    assert "&lt;" in legend([("true", "<")])
+def test_what_is_of_a_pair_can_be_pointed_at_above_all_that_is_drawn() -> None:
+    plot = Plot((0.0, 1.0), (0.0, 1.0))
+    plot.line(np.array([[0.0, 0.0], [1.0, 1.0]]), "link accepted", "a closure", pair="c3")
+    plot.arc(0.1, 0.9, 0.5, 20.0, "accepted", "1 ↔ 2", pair="c3")
+    plot.dot(0.5, 0.5, "refused", pair="r0")
+    root = ElementTree.fromstring(plot.svg("drawing"))
+    assert [child.get("data-pair") for child in root] == [None, None, "r0", "c3", "c3"]
+    assert [child.get("class") for child in root][-2:] == ["hit", "hit"] and root[-2].find("title").text == "a closure"
+    assert [child.get("data-of") for child in root][:2] == ["c3", "c3"]

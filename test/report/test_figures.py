@@ -23,9 +23,22 @@ def count(svg: str, style: str) -> int:
 
 
 def test_the_way_shows_three_lines_and_a_link_a_closure() -> None:
-    svg = figures.way(STORY, STORY.tracks())
+    svg = figures.way(STORY, STORY.tracks().stamps_ns, STORY.tracks().lines)
     assert [count(svg, style) for style in ("true", "odometry", "corrected", "link", "false")] == [1, 1, 1, 5, 1]
     assert "off by 0.0° and 50.0 cm" in svg
+
+
+def test_the_closures_of_a_run_without_odometry_are_drawn_on_the_true_way() -> None:
+    blind = Story.of("blind", {**summary(), "glimpses": []}, TRUTH)
+    stamps_ns, true = blind.true_way()
+    svg = figures.way(blind, stamps_ns, {"true": true})
+    assert [count(svg, style) for style in ("true", "odometry", "link")] == [1, 0, 4]
+
+
+def test_a_drawing_for_a_telephone_has_letters_of_the_same_size_in_less_width() -> None:
+    wide, narrow = (figures.timeline(STORY, width) for width in (figures.WIDE, figures.NARROW))
+    assert 'viewBox="0 0 1040 ' in wide and 'viewBox="0 0 400 ' in narrow
+    assert max(float(x) for x in re.findall(r' cx="([^"]+)"', narrow)) <= 400
 
 
 def test_a_closure_tells_what_had_moved() -> None:

@@ -8,12 +8,12 @@ import re
 import pytest
 
 from objreg_ros.report.figures import SERIES
-from objreg_ros.report.page import page
+from objreg_ros.report.page import TEMPLATES, page
 from objreg_ros.report.story import Story
-from objreg_ros.report.style import CSS
 
 from .runs import TRUTH, summary
 
+CSS = (TEMPLATES / "style.css").read_text()
 MARKS = {"line", "dot", "swatch"}
 TAGS = {("tag", kind) for kind in ("accepted", "false", "refused")}  # of pairs of pictures
 LIGHT, DARK = (dict(re.findall(r"--(\w+):\s*(#\w+)", block)) for block in re.findall(r":root \{(.*?)\}", CSS, re.S))

@@ -23,7 +23,7 @@ def test_a_report_is_written_from_json_alone(tmp_path: Path) -> None:
     (tmp_path / "run.json").write_text(json.dumps(summary()))
     lacking = write_report(tmp_path / "out.html", [tmp_path / "run.json"] * 2)
     assert len(lacking) == 2 and "names a recording that is not there" in lacking[0]
-    assert (tmp_path / "out.html").read_text().count("<article>") == 2
+    assert (tmp_path / "out.html").read_text().count("<article ") == 2
 
 
 def test_the_recording_of_a_run_gives_truth_and_pictures(tmp_path: Path, shared: Path) -> None:
