@@ -237,7 +237,10 @@ def _pane(pair: Pair) -> View:
         "to": str(pair.told.to_ns),
         "meaning": MEANINGS.get(pair.reason, ""),
         "words": pair.words,
-        "evidence": [(name, f"{value:.4g}") for name, value in pair.told.evidence.items()],
+        "evidence": [
+            (name, f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.4g}")
+            for name, value in pair.told.evidence.items()
+        ],
     }
 
 

@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
+from objreg_ros.data import DepthImage
 from objreg_ros.report.pairs import Pair, by_interest
 from objreg_ros.report.pictures import Album, data_uri, overlay
 
@@ -29,12 +30,13 @@ class Thumbnails:
 
     def add(self, pair: Pair, album: Album, most_bytes: int) -> None:
         """Both pictures of a pair, and the second over the first by its pose; nothing where they have no place."""
-        told = pair.told
-        why = album.lacking(told.from_ns) or album.lacking(told.to_ns)
-        if why:
-            self.lacking[why] += 1
+        first, second = album.at(pair.told.from_ns), album.at(pair.told.to_ns)
+        if first is None or second is None:
+            self.lacking[album.lacking(pair.told.from_ns) or album.lacking(pair.told.to_ns)] += 1
             return
-        moments, over = self._drawn(pair, album)
+        moments = self._new_moments({pair.told.from_ns: first, pair.told.to_ns: second})
+        T_from_to = pair.told.T_from_to
+        over = "" if T_from_to is None else data_uri(overlay(first, second, T_from_to), QUALITY)
         size = sum(map(len, moments.values())) + len(over)
         if self.size + size > most_bytes:
             self.left_out += 1
@@ -44,18 +46,13 @@ class Thumbnails:
         if over:
             self.overlays[pair.key] = over
 
-    def _drawn(self, pair: Pair, album: Album) -> tuple[dict[int, str], str]:
-        """What a pair needs that is not there yet."""
-        told = pair.told
-        first, second = album.at(told.from_ns), album.at(told.to_ns)
-        if first is None or second is None:
-            raise ValueError(f"expected pictures of {told.from_ns} and {told.to_ns}, got none")
-        seen = {told.from_ns: first, told.to_ns: second}
-        moments = {ns: data_uri(image.rgb, QUALITY) for ns, image in seen.items()
-                   if ns not in self.moments and image.rgb is not None}  # fmt: skip
-        if told.T_from_to is None:
-            return moments, ""
-        return moments, data_uri(overlay(first, second, told.T_from_to), QUALITY)
+    def _new_moments(self, seen: Mapping[int, DepthImage]) -> dict[int, str]:
+        """The pictures that are not there yet."""
+        return {
+            stamp_ns: data_uri(image.rgb, QUALITY)
+            for stamp_ns, image in seen.items()
+            if stamp_ns not in self.moments and image.rgb is not None
+        }
 
 
 def thumbnails(pairs: Iterable[Pair], album: Album | None, most_bytes: int = PAGE_BYTES) -> Thumbnails:

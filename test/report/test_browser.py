@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page in a real browser: what one clicks on does what it says."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from objreg_ros.report.page import page
+from objreg_ros.report.story import Story
+
+from .runs import TRUTH, summary
+from .test_thumbnails import Wall
+
+TELEPHONE = {"width": 420, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """Chromium without a window, with the page of two runs."""
+    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
+    chromium, driver = (shutil.which(name) for name in ("chromium", "chromedriver"))
+    if chromium is None or driver is None:
+        pytest.skip("chromium or chromedriver is not installed")
+    options = webdriver.ChromeOptions()
+    options.binary_location = chromium
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    for word in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"):
+        options.add_argument(word)
+    opened = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
+    try:
+        opened.get(_written(tmp_path_factory.mktemp("page")).as_uri())
+        yield opened
+    finally:
+        opened.quit()
+
+
+def _written(folder: Path) -> Path:
+    runs = [(Story.of("walk", summary(false=True), TRUTH), Wall()), (Story.of("again", summary(), TRUTH), None)]
+    (folder / "report.html").write_text(page(runs), encoding="utf-8")
+    return folder / "report.html"
+
+
+def keys(browser: Any) -> list[str]:
+    """The pairs of the first run that its table shows, from above."""
+    rows = "document.querySelector('article.run').querySelectorAll('tbody tr:not([hidden])[data-pair]')"
+    return list(browser.execute_script(f"return [...{rows}].map((row) => row.dataset.pair)"))
+
+
+def click(browser: Any, selector: str) -> None:
+    """Click where a mouse would, on the first that is shown."""
+    browser.execute_script(
+        "const one = [...document.querySelectorAll(arguments[0])].find((item) => item.checkVisibility());"
+        "one.scrollIntoView({block: 'center'}); one.dispatchEvent(new MouseEvent('click', {bubbles: true}))",
+        selector,
+    )
+
+
+def pane(browser: Any) -> dict[str, Any]:
+    """What the open pane shows."""
+    return dict(
+        browser.execute_script(
+            "const pane = document.querySelector('dialog[open]'); if (!pane) return {};"
+            "return {text: pane.innerText, space: pane.querySelector('.space').dataset.pair,"
+            "drawn: [...pane.querySelectorAll('img')].filter((i) => i.checkVisibility() && i.naturalWidth).length}"
+        )
+    )
+
+
+def test_the_table_is_filtered_by_reason(browser: Any) -> None:
+    filtering = "const one = document.querySelector('.filter'); one.value = arguments[0];"
+    choose = filtering + "one.dispatchEvent(new Event('change'))"
+    shown = {}
+    for reason in ("texture_disagrees", "false", ""):
+        browser.execute_script(choose, reason)
+        shown[reason] = keys(browser)
+    assert shown["texture_disagrees"] == ["r1", "r2"] and shown["false"] == ["c4"] and len(shown[""]) == 8
+
+
+def test_the_table_is_sorted_by_error_with_what_has_none_at_the_end(browser: Any) -> None:
+    click(browser, "th[data-sort=centimetres] button")
+    assert keys(browser)[0] == "c4" and {*keys(browser)[5:]} == {"r0", "r1", "r2"}
+    click(browser, "th[data-sort=centimetres] button")
+    assert keys(browser)[4] == "c4" and {*keys(browser)[5:]} == {"r0", "r1", "r2"}
+
+
+def test_a_row_opens_a_pair_with_both_pictures_and_the_overlay(browser: Any) -> None:
+    click(browser, "tr[data-pair=c4]")
+    browser.execute_async_script("setTimeout(arguments[0], 50)")  # pictures inside the page are decoded by now
+    shown = pane(browser)
+    assert shown["drawn"] == 3 and shown["space"] == "c4" and "the pose is off by 0.0° and 50.0 cm" in shown["text"]
+    click(browser, "dialog[open] .next")
+    assert pane(browser)["space"] != "c4"
+    click(browser, "dialog[open] .close")
+    assert pane(browser) == {}
+
+
+def test_a_closure_in_the_drawing_opens_its_pair(browser: Any) -> None:
+    click(browser, "article.run svg .hit[data-pair=c2]")
+    assert pane(browser)["space"] == "c2"
+    click(browser, "dialog[open] .close")
+
+
+def test_what_was_lost_between_two_runs_opens_in_its_own(browser: Any) -> None:
+    click(browser, ".comparison button.open[data-pair=c4]")
+    assert pane(browser)["space"] == "c4"
+    click(browser, "dialog[open] .close")
+
+
+def test_nothing_is_wider_than_a_telephone_and_nothing_went_wrong(browser: Any) -> None:
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", TELEPHONE)
+    assert browser.execute_script("return document.documentElement.scrollWidth") <= TELEPHONE["width"]
+    size = "const word = document.querySelector('.narrow svg text'), box = word.ownerSVGElement;"
+    letter = browser.execute_script(f"{size} return 12 * box.clientWidth / box.viewBox.baseVal.width")
+    assert letter >= 10, "letters of a drawing in px"
+    assert browser.get_log("browser") == []
