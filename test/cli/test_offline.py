@@ -44,10 +44,13 @@ def offline(*words: object) -> str:
 
 def test_a_folder_goes_through_the_real_rooms_and_gives_its_json(model: Path, tmp_path: Path) -> None:
     folder, file = tum_folder(tmp_path / "tum", frames=4), tmp_path / "out.json"
-    output = offline(folder, "--model", model, "--json", file)
+    output = offline(folder, "--model", model, "--json", file, "--set", "registrar.seed=7")
     assert "4 frames, 4 detections" in output and "the first time compiles for a minute" in output
     summary = json.loads(file.read_text())
     assert set(summary) >= KEYS and summary["frames"] == 4 and summary["odometry"] is None
+    about = summary["about"]
+    assert about["params"] == {"detector.model": str(model), "registrar.seed": 7}
+    assert about["model"]["name"] == model.name and about["recording"] == str(folder)
     assert summary["inputs"] == {
         **Inputs(image="/image", depth="/depth/image", camera_info="/camera_info").outright,
         "ground_truth": "/ground_truth",

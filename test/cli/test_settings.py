@@ -177,3 +177,9 @@ def test_no_two_classes_of_a_node_share_a_name(node: str) -> None:
 def test_settings_of_an_unknown_parameter_are_refused() -> None:
     with pytest.raises(ValueError, match="no parameter speed"):
         Settings({"detector": {"speed": 1}})
+
+
+def test_what_differs_from_the_defaults_is_told_and_nothing_else() -> None:
+    assert read_settings(None, []).changed() == {}
+    changes = ["registrar.seed=7", "detector.threshold=0.4", "segmenter.slop=0.02"]
+    assert read_settings(None, changes).changed() == {"detector.threshold": 0.4, "registrar.seed": 7}
