@@ -24,7 +24,7 @@ from docs.schemes import SCHEMES
 from objreg_ros.data import Array
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.opening import open_recording
-from objreg_ros.report.pictures import WIDTH, Album, overlay
+from objreg_ros.report.pictures import Album, overlay
 from objreg_ros.report.reasons import DROPS, REFUSALS, Words
 
 FOLDER = Path(__file__).parent
@@ -75,7 +75,7 @@ def pairs(
 
 
 def side_by_side(row: Mapping[str, Any], album: Album) -> Array | None:
-    """(H, 3 W, 3) RGB: the earlier picture, the new one, and the one over the other; None without a pose or pictures."""
+    """(H, 3 W, 3) RGB: earlier, new, and the new one over the earlier; None without a pose or a picture."""
     target, source = album.at(row["from_ns"]), album.at(row["to_ns"])
     if row.get("T_from_to") is None or target is None or source is None:
         return None

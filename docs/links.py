@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A hook of MkDocs: what stands outside docs/ becomes part of the site where it is a page of it or a page links to it.
+"""A hook of MkDocs: what stands outside docs/ becomes part of the site where it is a page or one links to it.
 
-A link is written as GitHub reads it, relative to the file that it is in. Here a document of `PAGES` becomes a page below
-project/, and any other file is copied there as it is. README.md is the site's first page.
+A link is written as GitHub reads it, relative to the file that it is in. Here a document of `PAGES` becomes a page
+below project/, and any other file is copied there as it is. README.md is the site's first page.
 """
 
 from __future__ import annotations

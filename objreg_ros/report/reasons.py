@@ -27,15 +27,15 @@ class Words(NamedTuple):
 REFUSALS = {
     "no_candidate": Words(
         "no stored place has such objects",
-        "Nothing is wrong on the first pass. On a revisit, see whether the detector calls the objects alike both times: "
-        "put labels that it confuses into one group. With odometry, what it puts too far away is not tried: tell its "
+        "Nothing is wrong on the first pass. On a revisit, see whether the detector calls the objects alike both "
+        "times: put labels that it confuses into one group. With odometry, what it puts too far away is not tried: tell its "
         "drift.",
         ("registrar.label_groups", "registrar.odometry_radius", "registrar.odometry_drift", "registrar.min_gap"),
     ),
     "no_hypothesis": Words(
         "no pose explains the two moments",
-        "Too few points were seen, or no proposer found a pose. Look at more of the room, and trust depth farther where "
-        "the sensor allows it.",
+        "Too few points were seen, or no proposer found a pose. Look at more of the room, and trust depth farther "
+        "where the sensor allows it.",
         ("segmenter.z_max", "registrar.context_range"),
         (("registration/refine/batch_icp.py", "LEAST_PAIRS"),),
     ),
@@ -139,8 +139,8 @@ REFUSALS = {
     ),
     "unreadable": Words(
         "what the store holds of this place is damaged",
-        "The other keyframes of the store go on. `objreg export STORE FOLDER` names what is damaged and saves the rest. "
-        "Look for a full or failing disk.",
+        "The other keyframes of the store go on. `objreg export STORE FOLDER` names what is damaged and saves the "
+        "rest. Look for a full or failing disk.",
         ("registrar.store",),
     ),
     "neighbours_disagree": Words(
@@ -196,7 +196,8 @@ DROPS = {
     ),
     "late": Words(
         "one of its stream with a later stamp was there before it",
-        "The stream is out of order, or two publishers share its topic: see `ros2 topic info -v`. A few are no trouble.",
+        "The stream is out of order, or two publishers share its topic: see `ros2 topic info -v`. A few are no "
+        "trouble.",
     ),
     "time_jump": Words(
         "time jumped back and left it in the future",
