@@ -21,7 +21,7 @@ import numpy as np
 
 from docs.schemes import DROPS as DROP_SCHEMES
 from docs.schemes import SCHEMES
-from objreg_ros.data import Array
+from objreg_ros.data import UNTRIED, Array
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.opening import open_recording
 from objreg_ros.report.pictures import Album, overlay
@@ -33,6 +33,11 @@ PAGE = FOLDER / "troubleshooting.md"
 BEGIN, END = "<!-- made by docs/draw_reasons.py -->", "<!-- end of what was made -->"
 QUALITY = 75
 SYMPTOM = "overtaken"  # the drop that the page has a section of already, of the same name
+LEGEND = (
+    "In the pictures green is the earlier view and magenta the new one. Three pictures in a row are of a pair in a\n"
+    "simulated recording: the earlier one, the new one, and the new one laid over the earlier by the pose that was\n"
+    "refused, with the numbers below. Grey is agreement, coloured fringes are not, and what is dark was not seen by both."
+)
 DETAILS = "pairs.json"  # beside the pictures of pairs: the numbers with which each was refused
 
 
@@ -64,7 +69,8 @@ def pairs(
     refusals: Sequence[Mapping[str, Any]], album: Album, known: Mapping[str, str]
 ) -> Iterator[tuple[str, str, Array]]:
     """Reason, numbers and picture of the pair with the most pixels in common, for each reason that is not known yet."""
-    for reason in sorted({row["reason"] for row in refusals} - set(known)):
+    tried = {row["reason"] for row in refusals} - {reason.value for reason in UNTRIED}
+    for reason in sorted(tried - set(known)):
         seen = [
             (row["detail"], rgb)
             for row in refusals
@@ -114,9 +120,7 @@ def reference(pictured: Mapping[str, str]) -> str:
     return (
         "## Why a pair is refused\n\n"
         f"{table(REFUSALS)}\n"
-        "In the pictures green is the earlier view and magenta the new one. A photograph shows a refused pair of a "
-        "simulated recording:\nthe earlier picture, the new one, and the new one laid over the earlier by the pose "
-        "that was refused. Grey is agreement, coloured\nfringes are not, and what is dark was not seen by both.\n\n"
+        f"{LEGEND}\n\n"
         + "".join(section(name, words, scheme(name), pictured.get(name)) for name, words in REFUSALS.items())
         + f"## Why a frame or a constraint is dropped\n\n{table(DROPS)}\n{drops}"
         + "".join(section(name, words, "", None) for name, words in DROPS.items() if name != SYMPTOM)

@@ -107,7 +107,7 @@ SCHEMES = {
         line([(165, 32), (232, 58)], WRONG, 1, True), words(200, 140, "too few points have a partner near them"),
     ),
     "low_overlap": picture(
-        camera(70, 110, -60, EARLIER, 110), camera(330, 110, -120, NEW, 110), camera(200, 118, -90, QUIET, 0),
+        camera(70, 110, -60, EARLIER, 110), camera(330, 110, -120, NEW, 110),
         thing(120, 35), thing(282, 35, "#00897b"), words(200, 140, "the two views share too little"),
     ),
     "free_space_violated": picture(
@@ -180,7 +180,7 @@ SCHEMES = {
 DROPS = {
     "frame": picture(
         words(LEFT, 18, "A frame ends once: as published, or with one of these reasons", anchor="start"),
-        boxes(("arrives", "waits for partners", "is worked on", "published"), 30, QUIET),
+        boxes(("arrives", "is matched", "is worked on", "published"), 30, QUIET),
         falls(60, 56, ("malformed", "odd_stamp", "late", "surplus", "inactive")),
         falls(160, 56, ("unmatched", "queue_full", "time_jump")),
         falls(260, 56, ("overtaken", "refused", "bug", "disabled", "reset")),

@@ -28,8 +28,8 @@ REFUSALS = {
     "no_candidate": Words(
         "no stored place has such objects",
         "Nothing is wrong on the first pass. On a revisit, see whether the detector calls the objects alike both "
-        "times: put labels that it confuses into one group. With odometry, what it puts too far away is not tried: tell its "
-        "drift.",
+        "times: put labels that it confuses into one group. With odometry, what it puts too far away "
+        "is not tried: tell its drift.",
         ("registrar.label_groups", "registrar.odometry_radius", "registrar.odometry_drift", "registrar.min_gap"),
     ),
     "no_hypothesis": Words(
