@@ -36,7 +36,7 @@ SYMPTOM = "overtaken"  # the drop that the page has a section of already, of the
 LEGEND = (
     "In the pictures green is the earlier view and magenta the new one. Three pictures in a row are of a pair in a\n"
     "simulated recording: the earlier one, the new one, and the new one laid over the earlier by the pose that was\n"
-    "refused, with the numbers below. Grey is agreement, coloured fringes are not, and what is dark was not seen by both."
+    "refused, with the numbers below. Grey is agreement, coloured fringes are not; dark was not seen by both."
 )
 DETAILS = "pairs.json"  # beside the pictures of pairs: the numbers with which each was refused
 
