@@ -15,9 +15,10 @@ a detector, a gate and a method of one's own: `help(objreg_ros.register)` and `o
 
 Three rooms in a row, one door between each:
 
-detector/    colour image                -> Detections     (MobileNet-SSD, ONNX Runtime)
-segmenter/   Detections + depth image    -> Frame          (the object and nothing but the object)
-registrar/   Frames                      -> LoopClosures   (propose with objects, decide with context)
+    detector/    colour image                -> Detections     (MobileNet-SSD, ONNX Runtime)
+    segmenter/   Detections + depth image    -> Frame          (the object and nothing but the object)
+    registrar/   Frames                      -> LoopClosures   (propose with objects, decide with context)
+
 data.py holds the words that pass between them; bridge/ is the border to ROS; offline.py drives them without it.
 """
 

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The schemes are well-formed, small, and one for each reason of a refusal."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+import pytest
+
+from docs.schemes import DROPS, HEIGHT, SCHEMES, WIDTH, arrow, picture, words
+from objreg_ros.report.reasons import DROPS as DROP_WORDS
+from objreg_ros.report.reasons import REFUSALS
+
+
+def test_every_refusal_has_a_scheme() -> None:
+    assert set(SCHEMES) == set(REFUSALS)
+
+
+def test_every_drop_is_in_one_of_the_two_schemes_of_a_way() -> None:
+    told = " ".join(DROPS.values())
+    assert not [name for name in DROP_WORDS if name not in told]
+
+
+@pytest.mark.parametrize("svg", [*SCHEMES.values(), *DROPS.values()])
+def test_a_scheme_is_a_small_drawing_within_its_frame(svg: str) -> None:
+    drawing = ElementTree.fromstring(svg)
+    assert drawing.get("width") == str(WIDTH) and len(svg) < 6_000
+    at = [(float(text.get("x", "")), float(text.get("y", ""))) for text in drawing.iter() if text.tag.endswith("text")]
+    assert all(0 <= x <= WIDTH and 0 < y < float(drawing.get("height", "0")) for x, y in at)
+
+
+def test_words_are_escaped_and_an_arrow_ends_where_it_is_told() -> None:
+    drawing = ElementTree.fromstring(picture(words(1, 2, "a < b & c"), arrow(0, 0, 10, 0, "red")))
+    assert "a < b & c" in "".join(drawing.itertext()) and drawing.get("height") == str(HEIGHT)
+    assert any("10.0,0.0" in (part.get("points") or "") for part in drawing.iter())
