@@ -34,7 +34,8 @@ def run(checkout: Path, *words: str) -> tuple[int, list[str]]:
 def test_two_workers_run_the_tests_and_the_arguments_are_pytests(checkout: Path) -> None:
     status, called = run(checkout, "test/cli", "-n", "0")
     assert status == 0 and called[:3] == ["bootstrap --test", "ruff check .", "ruff format --check ."]
-    assert called[-1] == "python -m pytest -p no:dash --numprocesses 2 --dist loadfile --no-loadscope-reorder test/cli -n 0"
+    words = "-p no:dash --numprocesses 2 --dist loadfile --no-loadscope-reorder test/cli -n 0"
+    assert called[-1] == f"python -m pytest {words}"
     assert len(called) == 6 and "mypy " in called
 
 
