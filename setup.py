@@ -3,10 +3,12 @@
 
 import os
 from glob import glob
+from pathlib import Path
 
 from setuptools import find_packages, setup
 
 NAME = "objreg_ros"
+HOME = "https://objreg-ros.invalid"  # where the repository is hosted
 
 
 def files_below(folder: str) -> list[tuple[str, list[str]]]:
@@ -20,9 +22,31 @@ def files_below(folder: str) -> list[tuple[str, list[str]]]:
 
 setup(
     name=NAME,
-    version="0.1.0",
+    version="0.2.0",
     description="Object-level loop closure for ROS 2: detect, segment, register, and say no",
+    long_description=Path(__file__).with_name("README.md").read_text(encoding="utf-8"),
+    long_description_content_type="text/markdown",
     license="Apache-2.0",
+    license_files=["LICENSE"],
+    url=HOME,
+    project_urls={
+        "Source": f"{HOME}/source",
+        "Documentation": f"{HOME}/docs",
+        "Changelog": f"{HOME}/source/CHANGELOG.md",
+        "Issues": f"{HOME}/issues",
+    },
+    keywords=["ros2", "slam", "loop-closure", "point-cloud", "registration", "rgb-d"],
+    classifiers=[
+        "Development Status :: 4 - Beta",
+        "Intended Audience :: Developers",
+        "Intended Audience :: Science/Research",
+        "Operating System :: POSIX :: Linux",
+        "Programming Language :: Python :: 3",
+        "Programming Language :: Python :: 3.11",
+        "Programming Language :: Python :: 3.12",
+        "Topic :: Scientific/Engineering :: Image Recognition",
+        "Typing :: Typed",
+    ],
     maintainer="objreg_ros maintainers",
     maintainer_email="maintainers@objreg-ros.invalid",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),

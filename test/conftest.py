@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Generator, Iterable
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -37,6 +38,12 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 def repository() -> Path:
     """The root of the checkout that is tested."""
     return REPOSITORY
+
+
+@pytest.fixture(scope="session")
+def domain() -> int:
+    """The ROS domain of this process of tests."""
+    return int(os.environ["ROS_DOMAIN_ID"])
 
 
 @pytest.fixture(scope="session")
@@ -99,7 +106,7 @@ def pytest_runtest_call() -> Generator[None, object, object]:
 
 
 class Count:
-    """Fails a session of the whole suite in which hardly a test ran, and says so."""
+    """Fails a session of the whole suite in which hardly a test ran, and says so. Under xdist it hears all workers."""
 
     def __init__(self) -> None:
         self.ran = 0
@@ -128,5 +135,49 @@ def is_whole(config: pytest.Config) -> bool:
     )
 
 
+def is_worker(config: pytest.Config) -> bool:
+    """Whether xdist started this process to run a share of the tests for another, which counts them."""
+    return hasattr(config, "workerinput")
+
+
 def pytest_configure(config: pytest.Config) -> None:
-    config.pluginmanager.register(Count(), "count")
+    os.environ["ROS_DOMAIN_ID"] = str(domain_of(config))
+    if not is_worker(config):
+        config.pluginmanager.register(Count(), "count")
+
+
+def domain_of(config: pytest.Config) -> int:
+    """A ROS domain, 1 to 100, that no other worker of this run has, and other runs on this machine hardly."""
+    if not is_worker(config):
+        return 1 + os.getpid() % 100
+    return 1 + (os.getppid() + int(config.workerinput["workerid"].removeprefix("gw"))) % 100
+
+
+@cache
+def turn(path: Path) -> int:
+    """When a file's tests run where processes share them: first the live graphs, then what is slow, then the rest."""
+    text = path.read_text() if path.is_file() else ""  # an absence is its folder's
+    return 0 if "mark.ros" in text else 1 if "mark.slow" in text else 2
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if is_worker(config):
+        items.sort(key=lambda item: turn(item.path))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
+    """Under `--dist loadfile` a file is one worker's, and all live graphs are: they take turns.
+
+    `--dist loadgroup` would do it by marks, but not with pytest 9.2 (pytest-xdist, issue 1386).
+    """
+    if config.getoption("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadScopeScheduling
+
+    class Files(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = nodeid.partition("::")[0]
+            return "live graphs" if turn(config.rootpath / file) == 0 else file
+
+    return Files(config, log)

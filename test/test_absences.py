@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -88,3 +89,55 @@ def test_a_whole_suite_in_which_hardly_a_test_ran_fails_as_colcon_understands_it
 
 def test_a_choice_among_the_tests_is_not_counted(tmp_path: Path) -> None:
     assert suite(tmp_path, {"test_good.py": GOOD}, "-k", "it")[0] == 0
+
+
+WORKER = "from pathlib import Path\nimport os\nimport pytest\n"
+LIVE = f"""{WORKER}
+@pytest.mark.ros
+@pytest.mark.parametrize("number", range(9))
+def test_it(number, domain) -> None:
+    Path(f"live_{{os.environ['PYTEST_XDIST_WORKER']}}_{{domain}}").touch()
+"""
+OTHER = f"""{WORKER}
+@pytest.mark.parametrize("number", range(4))
+def test_it(number, domain) -> None:
+    Path(f"other_{{os.environ['PYTEST_XDIST_WORKER']}}_{{domain}}").touch()
+"""
+
+
+@pytest.fixture
+def workers() -> tuple[str, ...]:
+    """The words that let two processes share the tests; the test skips where xdist is not installed."""
+    if find_spec("xdist") is None:
+        pytest.skip("pytest-xdist is not installed")
+    return (
+        "-p",
+        "xdist.plugin",
+        "--numprocesses",
+        "2",
+        "--dist",
+        "loadfile",
+        "--no-loadscope-reorder",
+        "-o",
+        "markers=ros",
+    )
+
+
+def test_live_graphs_are_one_workers_and_no_two_workers_share_a_domain(
+    tmp_path: Path, workers: tuple[str, ...]
+) -> None:
+    live = {f"test_live_{number}.py": LIVE for number in range(3)}
+    other = {f"test_other_{number}.py": OTHER for number in range(6)}
+    status, said = suite(tmp_path, live | other, *workers, "test")
+    assert status == 0 and "51 passed" in said
+    by = {kind: {path.name.split("_", 1)[1] for path in tmp_path.glob(f"{kind}_*")} for kind in ("live", "other")}
+    assert len(by["live"]) == 1
+    domains = dict(one.split("_") for one in by["live"] | by["other"])
+    assert len(domains) == len(set(domains.values())) == 2
+
+
+def test_the_tests_of_all_workers_are_counted_together(tmp_path: Path, workers: tuple[str, ...]) -> None:
+    files = {"test_absent.py": ABSENT, "test_good.py": GOOD, "test_good_too.py": GOOD}
+    status, said = suite(tmp_path, files, *workers)
+    assert status == pytest.ExitCode.USAGE_ERROR and said.count("1500 tests or more to run, got 2") == 1
+    assert "1 skipped" in said and "test_absent.py needs torch, which is not installed" in said

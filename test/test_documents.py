@@ -17,9 +17,11 @@ DOCUMENTS = (
     "README.md",
     "ARCHITECTURE.md",
     "CHANGELOG.md",
+    "CONTRIBUTING.md",
+    ".github/SECURITY.md",
     "QUALITY_DECLARATION.md",
     "models/README.md",
-    *sorted(str(path.relative_to(REPOSITORY)) for path in (REPOSITORY / "docs").glob("*.md")),
+    *sorted(str(path.relative_to(REPOSITORY)) for path in (REPOSITORY / "docs").rglob("*.md")),
 )
 ROOTS = ("", "objreg_ros", "objreg_ros/registration")  # below which a document names files
 NAMED_FILE = re.compile(r"`((?:[\w.-]+/)+[\w.-]+\.(?:py|md|yaml|toml|xml|txt|lock|onnx|rviz|json))[^`]*`")

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from typing import Any
 
@@ -29,7 +28,7 @@ BOOKS = Balance(10, 6, 1, {"overtaken": 3}, {"image": 2}, {"total": (10.0, 20.0)
 def collector(monkeypatch: pytest.MonkeyPatch) -> Iterator[Collector]:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     context = Context()
-    context.init(args=[], domain_id=1 + os.getpid() % 100)
+    context.init(args=[])
     made = Collector(context)
     yield made
     made.close()

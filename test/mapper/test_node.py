@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -83,7 +82,7 @@ class Outside:
 @pytest.fixture
 def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Outside]:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    rclpy.init(args=["--ros-args", "-p", f"graph_path:={tmp_path}/map.g2o"], domain_id=100 + os.getpid() % 100)
+    rclpy.init(args=["--ros-args", "-p", f"graph_path:={tmp_path}/map.g2o"])
     around = Outside(MapperNode())
     yield around
     around.executor.shutdown()
@@ -453,7 +452,7 @@ def test_the_correction_is_broadcast_unless_that_is_switched_off(
     publish_tf: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("objreg_ros.bridge.map_announcements.TransformBroadcaster", Broadcaster)
-    rclpy.init(args=["--ros-args", "-p", f"publish_tf:={publish_tf}".lower()], domain_id=100 + os.getpid() % 100)
+    rclpy.init(args=["--ros-args", "-p", f"publish_tf:={publish_tf}".lower()])
     door = MapperNode()
     try:
         door._hear_odometry(to_msg.odometry(odometry(BENT)[0]))

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,12 +11,6 @@ import pytest
 
 if TYPE_CHECKING:  # a conftest.py must load where there is no ROS and no onnx
     from .graph import Graph
-
-
-@pytest.fixture(scope="session")
-def domain() -> int:
-    """A ROS domain that other test runs on this machine are unlikely to use."""
-    return 1 + os.getpid() % 100
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -78,9 +77,7 @@ class Camera:
 def made(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Iterator[Callable[[bool], Camera]]:
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     monkeypatch.setattr(Segmenter, "warm", lambda self: None)
-    rclpy.init(
-        args=["--ros-args", "-p", "colour:=false", *getattr(request, "param", ())], domain_id=100 + os.getpid() % 100
-    )
+    rclpy.init(args=["--ros-args", "-p", "colour:=false", *getattr(request, "param", ())])
     cameras: list[Camera] = []
 
     def make(kept: bool = True, **lens: Any) -> Camera:

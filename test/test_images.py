@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The container files: linted where hadolint is, pinned, without root, and made of files that are there."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+IMAGES = ("python", "ros")
+
+
+@pytest.fixture(params=IMAGES)
+def dockerfile(request: pytest.FixtureRequest, repository: Path) -> Path:
+    return repository / f"docker/{request.param}.Dockerfile"
+
+
+def instructions(dockerfile: Path, name: str) -> list[str]:
+    """What stands behind an instruction, each as one line."""
+    text = re.sub(r"^#.*\n", "", dockerfile.read_text(), flags=re.M).replace("\\\n", " ")
+    return re.findall(rf"^{name} (.+)$", text, re.M)
+
+
+def test_hadolint_has_no_complaint(dockerfile: Path) -> None:
+    hadolint = shutil.which("hadolint")
+    if hadolint is None:
+        pytest.skip("hadolint is not installed")
+    done = subprocess.run([hadolint, dockerfile], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_an_image_comes_from_a_version_and_ends_without_root(dockerfile: Path) -> None:
+    sources = [line.split() for line in instructions(dockerfile, "FROM")]
+    stages = {words[-1] for words in sources if "AS" in words}
+    bases = {words[0] for words in sources} - stages
+    assert bases and all(":" in base and not base.endswith(":latest") for base in bases)
+    last = dockerfile.read_text().rpartition("\nFROM ")[2]
+    assert re.findall(r"^USER (.+)$", last, re.M)[-1:] == ["1000"]
+
+
+def test_what_is_copied_is_there_and_sent_to_the_builder(repository: Path, dockerfile: Path) -> None:
+    sent = Path(f"{dockerfile}.dockerignore").read_text().splitlines()
+    copied = [line.split()[:-1] for line in instructions(dockerfile, "COPY") if "--from" not in line]
+    wanted = {name for names in copied for name in names} - {"."}
+    wanted |= {line[1:] for line in sent if line.startswith("!")}
+    assert all(list(repository.glob(name)) for name in wanted)
+    roots = {line[1:].partition("/")[0] for line in sent if line.startswith("!")}
+    assert {name.partition("/")[0] for name in wanted} <= roots
+
+
+def test_the_libraries_are_those_of_bootstrap(repository: Path) -> None:
+    table = re.search(r"declare -A system_library=\((.+)\)", (repository / "scripts/bootstrap").read_text())
+    assert table is not None
+    installed = " ".join(instructions(repository / "docker/python.Dockerfile", "RUN")).split()
+    assert set(re.findall(r"=(\S+)", table[1])) <= set(installed)
+
+
+def test_a_workflow_builds_every_image(repository: Path) -> None:
+    workflow = (repository / ".github/workflows/images.yml").read_text()
+    assert sorted(re.findall(r"- file: (\w+)", workflow)) == sorted(IMAGES)
+    assert {path.name for path in (repository / "docker").glob("*.Dockerfile")} == {f"{n}.Dockerfile" for n in IMAGES}

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What tells of the release is of one version, and the forms around the project are what a host takes."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+FORMS = ("bug", "closure", "idea")
+FIELDS = {"checkboxes", "dropdown", "input", "markdown", "textarea"}  # what GitHub knows
+
+
+def released(repository: Path) -> tuple[str, str]:
+    """The newest version of CHANGELOG.md and its date."""
+    found = re.search(r"^## \[(\d+\.\d+\.\d+)\] - (\d{4}-\d\d-\d\d)$", (repository / "CHANGELOG.md").read_text(), re.M)
+    assert found is not None
+    return found[1], found[2]
+
+
+def loaded(path: Path) -> Any:
+    return yaml.safe_load(path.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(
+    ("file", "line"),
+    [
+        ("setup.py", 'version="{}",'),
+        ("package.xml", "<version>{}</version>"),
+        ("objreg_msgs/package.xml", "<version>{}</version>"),
+        ("CITATION.cff", "version: {}\n"),
+        ("docs/releases/{}.md", "# {}\n"),
+    ],
+)
+def test_a_file_has_the_version_that_the_changelog_released(repository: Path, file: str, line: str) -> None:
+    version, _ = released(repository)
+    assert line.format(version) in (repository / file.format(version)).read_text()
+
+
+def test_the_changelog_has_a_place_for_what_is_not_released(repository: Path) -> None:
+    headings = re.findall(r"^## (.+)$", (repository / "CHANGELOG.md").read_text(), re.M)
+    assert headings[0] == "[Unreleased]" and headings[1].startswith(f"[{released(repository)[0]}]")
+
+
+def test_the_citation_has_what_its_format_asks_for_and_the_date_of_the_release(repository: Path) -> None:
+    citation = loaded(repository / "CITATION.cff")
+    assert {"cff-version", "message", "title", "authors"} <= set(citation)
+    assert str(citation["date-released"]) == released(repository)[1] and citation["license"] == "Apache-2.0"
+
+
+def test_both_packages_have_the_same_licence_file(repository: Path) -> None:
+    assert (repository / "LICENSE").read_bytes() == (repository / "objreg_msgs/LICENSE").read_bytes()
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_form_for_issues_asks_what_a_host_can_show(repository: Path, form: str) -> None:
+    told = loaded(repository / f".github/ISSUE_TEMPLATE/{form}.yml")
+    assert told["name"] and told["description"]
+    asked = [field for field in told["body"] if field["type"] != "markdown"]
+    assert {field["type"] for field in told["body"]} <= FIELDS and asked
+    assert len({field["id"] for field in asked}) == len(asked)
+    assert all(field["attributes"]["label"] for field in asked)
+    assert any(field.get("validations", {}).get("required") for field in asked)
+
+
+def test_the_devcontainer_is_a_stage_of_the_image_for_python(repository: Path) -> None:
+    told = json.loads((repository / ".devcontainer/devcontainer.json").read_text())
+    dockerfile = (repository / ".devcontainer" / told["build"]["dockerfile"]).resolve()
+    assert f" AS {told['build']['target']}\n" in dockerfile.read_text()
+    assert f"useradd --create-home --uid 1000 {told['remoteUser']}\n" in dockerfile.read_text()
+    assert (repository / told["postCreateCommand"].split()[0]).is_file()
