@@ -25,6 +25,7 @@ class Constraint(NamedTuple):
 
 
 EXACT = (0.0, 0.0)
+NEAR_HALF_TURN = -0.9  # the cosine of the angle
 
 
 def between_keyframes(
@@ -52,8 +53,15 @@ def between_keyframes(
 
 
 def rotation_vectors(R: Array) -> Array:
-    """(m, 3) of rotations (m, 3, 3), of none too, which scipy before 1.13 refuses."""
-    return Rotation.from_matrix(R).as_rotvec() if len(R) else np.zeros((0, 3))
+    """(m, 3) of rotations (m, 3, 3): the axis is that of their skew part, which near half a turn has none."""
+    axis = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
+    sine, cosine = np.linalg.norm(axis, axis=1), 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0)
+    angle_by_sine = np.divide(np.arctan2(sine, cosine), sine, out=np.ones_like(sine), where=sine > 0.0)
+    vectors = axis * angle_by_sine[:, None]
+    turned = cosine < NEAR_HALF_TURN
+    if turned.any():
+        vectors[turned] = Rotation.from_matrix(R[turned]).as_rotvec()
+    return vectors
 
 
 def wandering(T_motion: Array, sigmas: tuple[float, float]) -> Array:

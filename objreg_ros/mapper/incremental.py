@@ -6,7 +6,7 @@ Kaess et al., "iSAM2: Incremental Smoothing and Mapping Using the Bayes Tree" (2
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from importlib import import_module
 from typing import Any
@@ -18,7 +18,7 @@ from objreg_ros.mapper.edges import Edges, error_jacobians
 
 RELINEARISED = 0.05  # rad and m: a node that moves farther is linearised anew
 HELD_SIGMA = 1e-2  # rad and m; how fast the first node is held moves nothing, as nothing else holds it
-MOST_UPDATES = 3
+MOST_UPDATES = 4
 FEW = 0.05  # of all nodes
 INSTALL = "expected gtsam, which solves the map, got none: pip install --no-deps gtsam (or objreg_ros[mapper])"
 
@@ -38,20 +38,40 @@ def load() -> Any:
 class IncrementalGraph:
     """Nodes by number from 0, of which the first is held at a pose; edges by the numbers that come back for them.
 
-    What is asked for waits for the next look at the graph, and is done at once.
-    RuntimeError where GTSAM finds no solution; the graph is of no use then.
+    What is asked for waits for the next look at the graph, and is done at once. It is solved by Cholesky's factors, and
+    by QR, which takes twice the time, from where these are too coarse: a lie that claims a micrometre among odometry of
+    metres. RuntimeError where GTSAM finds no solution; the graph is of no use then.
     """
 
     def __init__(self, T_map_first: Array) -> None:
         self._gtsam = load()
-        self._isam = self._gtsam.ISAM2(self._params())
-        self._factors: list[int] = []  # GTSAM's numbers of the edges, by ours
-        self.count = 1
+        self._is_careful = False
+        self._edges: list[Any] = []  # GTSAM's factors, by our numbers; None of one that is gone
+        self._places: list[int] = []  # GTSAM's numbers of them
+        self._settled = T_map_first[None]
+        self._begin()
+
+    @property
+    def count(self) -> int:
+        """How many nodes there are."""
+        return len(self._settled)
+
+    def _begin(self) -> None:
+        """All that is there, in a new iSAM2."""
+        gtsam = self._gtsam
+        self._isam = gtsam.ISAM2(self._params())
         self._clear()
-        first, noise = self._gtsam.Pose3(T_map_first), self._gtsam.noiseModel.Isotropic.Sigma(6, HELD_SIGMA)
-        self._new_factors.add(self._gtsam.PriorFactorPose3(0, first, noise))
-        self._new_values.insert(0, first)
-        self._isam.update(self._new_factors, self._new_values)
+        noise = gtsam.noiseModel.Isotropic.Sigma(6, HELD_SIGMA)
+        self._new_factors.add(gtsam.PriorFactorPose3(0, gtsam.Pose3(self._settled[0]), noise))
+        here = [number for number, edge in enumerate(self._edges) if edge is not None]
+        for number in here:
+            self._new_factors.add(self._edges[number])
+        for k, T in enumerate(self._settled):
+            self._new_values.insert(k, gtsam.Pose3(T))
+        places = list(self._isam.update(self._new_factors, self._new_values).getNewFactorsIndices())
+        self._places = [-1] * len(self._edges)
+        for number, place in zip(here, places[1:], strict=True):
+            self._places[number] = place
         self._clear()
 
     def _clear(self) -> None:
@@ -63,14 +83,15 @@ class IncrementalGraph:
         params = self._gtsam.ISAM2Params()
         params.setRelinearizeThreshold(RELINEARISED)
         params.relinearizeSkip = 1
-        params.setFactorization("QR")  # a lie that claims a micrometre among odometry of metres: no Cholesky stands it
+        params.setFactorization("QR" if self._is_careful else "CHOLESKY")
         return params
 
     def copied(self) -> IncrementalGraph:
         """The same once more, to try something on."""
         self._update()
         other = copy(self)
-        other._isam, other._factors = self._gtsam.ISAM2(self._isam), list(self._factors)
+        other._isam = self._gtsam.ISAM2(self._isam)
+        other._edges, other._places = list(self._edges), list(self._places)
         other._clear()
         return other
 
@@ -78,37 +99,57 @@ class IncrementalGraph:
         """Add nodes at ``poses (n, 4, 4)``, by the next numbers, and the edges that tie them; take out those gone."""
         for k, T in enumerate(poses, self.count):
             self._new_values.insert(k, self._gtsam.Pose3(T))
-        self.count += len(poses)
+        self._settled = np.concatenate([self._settled, poses])
         numbers = self.add(edges)
         self.remove(gone)
         return numbers
 
     def add(self, edges: Edges) -> list[int]:
         """Tie nodes that are there."""
-        gtsam = self._gtsam
+        gtsam, first = self._gtsam, len(self._edges)
         for k1, k2, T, W in zip(edges.k1.tolist(), edges.k2.tolist(), edges.T_1_2, edges.whitening, strict=True):
             noise = gtsam.noiseModel.Gaussian.SqrtInformation(W, False)
-            self._new_factors.add(gtsam.BetweenFactorPose3(k1, k2, gtsam.Pose3(T), noise))
-        first = len(self._factors) + self._new_factors.size() - len(edges)
-        return list(range(first, first + len(edges)))
+            self._edges.append(gtsam.BetweenFactorPose3(k1, k2, gtsam.Pose3(T), noise))
+            self._new_factors.add(self._edges[-1])
+        return list(range(first, len(self._edges)))
 
     def remove(self, numbers: Sequence[int]) -> None:
         """Take edges out."""
-        if any(number >= len(self._factors) for number in numbers):
+        if any(number >= len(self._places) for number in numbers):
             self._update()
-        self._gone += [self._factors[number] for number in numbers]
+        for number in numbers:
+            self._gone.append(self._places[number])
+            self._edges[number] = None
 
-    def settle(self) -> None:
-        """Go on until few nodes move far any more."""
-        self._update()
+    def settle(self) -> Array:
+        """(n, 4, 4): where the nodes are with all that waits. What moves far is linearised anew, until little does."""
+        relinearised = self.count
         for _ in range(MOST_UPDATES):
-            if self._isam.update().getVariablesRelinearized() <= FEW * self.count:
-                break
+            known, self._settled = self._settled, self.poses()
+            if relinearised <= FEW * self.count or np.abs(self._settled - known).max() < RELINEARISED:
+                return self._settled
+            relinearised = self._carefully(lambda: self._isam.update().getVariablesRelinearized())
+        self._settled = self.poses()
+        return self._settled
+
+    def _carefully(self, work: Callable[[], Any]) -> Any:
+        """What comes of work; where that fails, of doing it once more in a graph that is solved with more care."""
+        try:
+            return work()
+        except RuntimeError:
+            if self._is_careful:
+                raise
+        self._is_careful = True
+        self._begin()
+        return work()
 
     def _update(self) -> None:
+        self._carefully(self._take_in)
+
+    def _take_in(self) -> None:
         if self._new_factors.size() or self._gone:
             result = self._isam.update(self._new_factors, self._new_values, self._gone)
-            self._factors += list(result.getNewFactorsIndices())
+            self._places += list(result.getNewFactorsIndices())
             self._clear()
 
     def poses(self) -> Array:
@@ -123,7 +164,7 @@ class IncrementalGraph:
         """The covariance (6, 6) of the error of one whitened edge, [r t], as the graph without it knows its nodes."""
         self._update()
         keys = [int(edge.k1[0]), int(edge.k2[0])]
-        joint = self._isam.jointMarginalCovariance(keys)
+        joint = self._carefully(lambda: self._isam.jointMarginalCovariance(keys))
         blocks = np.block([[joint.at(a, b) for b in keys] for a in keys])
         J = np.hstack(error_jacobians(poses, edge))
         return J @ blocks @ J.T + np.eye(6)

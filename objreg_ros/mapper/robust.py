@@ -96,7 +96,6 @@ class RobustGraph:
         self._expected, self._withdrawn = other._expected, other._withdrawn
         graph, factors = self._state.graph, np.full(len(other.closures), -1)
         factors[other.kept] = graph.add(other.closures.taken(other.kept))
-        graph.settle()
         self._state = self._sorted_out(self._weighed(graph, factors))
 
     def close(self, closure: Edges, apart: Edges | None = None) -> None:
@@ -116,11 +115,21 @@ class RobustGraph:
             cost=before.cost + self.limit,
         )
         newest = len(self.closures) - 1
-        if expected < LINEAR * self.limit or self._is_agreed(newest):
+        if expected <= self.limit:
+            self._welcome(closure)
+        elif expected < LINEAR * self.limit or self._is_agreed(newest):
             self._take(self._sorted_out(self._changed(self._state, [newest], []), stays_in=newest))
-            self._take(self._sorted_out(self._state))
-            if self._state.cost - before.cost > DOUBTFUL:
-                self._doubt()
+        self._take(self._sorted_out(self._state))
+        if self._state.cost - before.cost > DOUBTFUL:
+            self._doubt()
+
+    def _welcome(self, closure: Edges) -> None:
+        """Believe the newest closure, which is expected to fit: nothing is tried on a copy, as for those in doubt."""
+        without, factors = self._state, self._state.factors.copy()
+        factors[-1:] = without.graph.add(closure)
+        self._state = self._weighed(without.graph, factors)
+        if not self._state.cost <= without.cost:
+            self._state = self._changed(self._state, [], [len(factors) - 1])
 
     @property
     def left_out(self) -> list[int]:
@@ -149,9 +158,14 @@ class RobustGraph:
             self._state = state
 
     def _expected_cost(self, state: _State, closure: Edges) -> float:
-        """What it will cost to believe a closure, were all of it linear: its error as the map expects it."""
-        covariance = state.graph.expected_covariance(state.poses, closure)
+        """What it will cost to believe a closure, were all of it linear: its error as the map expects it.
+
+        What it costs where the nodes are is more; where that is little already, nothing has to be known of the map.
+        """
         error = whitened_errors(state.poses, closure)[0]
+        if error @ error <= self.limit:
+            return float(error @ error)
+        covariance = state.graph.expected_covariance(state.poses, closure)
         return float(error @ np.linalg.solve(covariance, error))
 
     def _is_agreed(self, number: int) -> bool:
@@ -222,13 +236,12 @@ class RobustGraph:
                 factors[out] = -1
             if into:
                 factors[into] = graph.add(self.closures.taken(np.array(into)))
-            graph.settle()
             return self._weighed(graph, factors)
         except (RuntimeError, ValueError):
             return replace(state, cost=np.inf)
 
     def _weighed(self, graph: IncrementalGraph, factors: Array) -> _State:
-        poses = graph.poses()
+        poses = graph.settle()
         held, apart = squared_residuals(poses, self.closures), squared_residuals(poses, self._apart)
         residuals = np.where(factors >= 0, held, apart)
         cost = squared_residuals(poses, self.steps).sum() + np.where(factors >= 0, residuals, self.limit).sum()
