@@ -68,7 +68,7 @@ def solved(graph: PoseGraph) -> Solved:
     return Solved(np.array([T for _, T in graph.path()]), solution.kept)
 
 
-def one(seed: int, peers: list[str]) -> dict[str, Any] | None:
+def one(seed: int, peers: list[str], params: MapperParams | None = None) -> dict[str, Any] | None:
     """Ours and its peers on one graph: the error over that of ours without the false ones, and what was believed.
 
     None of a walk that met no place again or has no false closure.
@@ -76,14 +76,14 @@ def one(seed: int, peers: list[str]) -> dict[str, Any] | None:
     words, row = drawn(seed)
     if words.is_false.all() or not words.is_false.any():
         return None
-    graph, _, _ = filled(words, right_only=True)
+    graph, _, _ = filled(words, right_only=True, params=params)
     clean = error_of(words, graph, solved(graph).poses)
     limit = graph.params.max_residual
     row["clean_m"], row["methods"] = clean, {}
     dense = Dense.of(graph)
     right = np.zeros(len(dense.closures), bool)
     row["methods"][CLEAN_LM] = judged(words, graph, PEERS["GTSAM LM"](dense, limit), right, clean)
-    graph, is_false, refused = filled(words, right_only=False)
+    graph, is_false, refused = filled(words, right_only=False, params=params)
     row |= {"closures": len(is_false), "false": int(is_false.sum()), "implausible": refused}
     row["methods"][OURS] = judged(words, graph, solved(graph), is_false, clean)
     dense = Dense.of(graph)

@@ -30,24 +30,31 @@ def long_walk(poses: int, closures: int, seed: int) -> Walk:
 
 def ours(words: Walk) -> dict[str, Any]:
     """Odometry and closures in the order of time, with a solution after every closure."""
-    graph, at, of_odometry, of_closures = PoseGraph(), 0, list[float](), list[float]()
+    graph, at = PoseGraph(), 0
+    of_odometry, of_closures, of_processor = list[float](), list[float](), list[float]()
     parts, refused = list[dict[str, Any]](), 0
     every = max(len(words.closures) // PARTS, 1)
     for k, closure in enumerate(tqdm(words.closures, desc="closures"), 1):
         until = closure.to_ns // PERIOD_NS + 1
         of_odometry += [_seconds(graph.add_odometry, odometry) for odometry in words.odometry[at:until]]
-        at, start = max(at, until), time.perf_counter()
+        at, start, begun = max(at, until), time.perf_counter(), time.process_time()
         try:
             graph.add_closure(closure)
         except ValueError:
             refused += 1
         summary = graph.optimise()
         of_closures.append(time.perf_counter() - start)
+        of_processor.append(time.process_time() - begun)
         if k % every == 0 or k == len(words.closures):
             kept = {(word.from_ns, word.to_ns) for word in summary.kept}
-            parts.append(_told(words, graph, kept, of_odometry, of_closures, (k, refused)))
+            times = {
+                "odometry_ms": _percentiles(of_odometry, (50, 95)),
+                "closure_ms": _percentiles(of_closures, (50, 95, 100)),
+                "processor_ms": _percentiles(of_processor, (50, 95)),
+            }
+            parts.append(_told(words, graph, kept, times, (k, refused)))
             tqdm.write(row(parts[-1]))
-            of_odometry, of_closures = [], []
+            of_odometry, of_closures, of_processor = [], [], []
     return {"parts": parts, "keyframes": len(graph.keyframes)}
 
 
@@ -61,8 +68,7 @@ def _told(
     words: Walk,
     graph: PoseGraph,
     kept: set[tuple[int, int]],
-    of_odometry: list[float],
-    of_closures: list[float],
+    times: dict[str, list[float]],
     counts: tuple[int, int],
 ) -> dict[str, Any]:
     """One part of the walk: its times, and the map as it is after it."""
@@ -72,8 +78,7 @@ def _told(
         "keyframes": len(graph.keyframes),
         "closures": closures,
         "implausible": refused,
-        "odometry_ms": _percentiles(of_odometry, (50, 95)),
-        "closure_ms": _percentiles(of_closures, (50, 95, 100)),
+        **times,
         "memory_mb": memory_mb(),
         "false": sum(false for _, false in seen),
         "false_kept": sum(false and (word.from_ns, word.to_ns) in kept for word, false in seen),
@@ -123,7 +128,7 @@ def _judged(words: Walk, graph: PoseGraph, answer: Solved, is_false: Array) -> d
 
 HEAD = (
     f"{'keyframes':>9} {'closures':>8}   {'ms a pose (50, 95 %)':22} {'ms a closure (50, 95, 100 %)':30}"
-    f" {'MB':>6} {'false kept':>12} {'right pruned':>13} {'ATE m':>7}"
+    f" {'of processor (50, 95 %)':24} {'MB':>6} {'false kept':>12} {'right pruned':>13} {'ATE m':>7}"
 )
 
 
@@ -131,10 +136,11 @@ def row(part: dict[str, Any]) -> str:
     """One part as a line."""
     odometry = ", ".join(f"{value:.2f}" for value in part["odometry_ms"])
     closing = ", ".join(f"{value:.0f}" for value in part["closure_ms"])
+    processor = ", ".join(f"{value:.0f}" for value in part["processor_ms"])
     false = f"{part['false_kept']} of {part['false']}"
     return (
-        f"{part['keyframes']:>9} {part['closures']:>8}   {odometry:22} {closing:30} {part['memory_mb']:>6.0f}"
-        f" {false:>12} {part['right_pruned']:>13} {part['ate_m']:>7.3f}"
+        f"{part['keyframes']:>9} {part['closures']:>8}   {odometry:22} {closing:30} {processor:24}"
+        f" {part['memory_mb']:>6.0f} {false:>12} {part['right_pruned']:>13} {part['ate_m']:>7.3f}"
     )
 
 

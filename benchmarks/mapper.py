@@ -36,6 +36,8 @@ from closure import simulated, stories
 from map_peers import PEERS, chosen
 from tqdm import tqdm
 
+from objreg_ros.mapper.params import MapperParams
+
 KEPT = Path(tempfile.gettempdir()) / "objreg_mapper"
 JSON = click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write figures here.")
 
@@ -62,13 +64,14 @@ def _peers(context: click.Context, parameter: click.Parameter, value: str) -> li
 @click.option("--graphs", default=200, show_default=True, type=click.IntRange(1), help="How many random graphs.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0), help="Of the first of them.")
 @click.option("--peers", default=",".join(PEERS), show_default=True, callback=_peers, help="Which, by comma.")
+@click.option("--pairwise", is_flag=True, help="Ours with pairwise_consistency.")
 @JSON
-def robust(graphs: int, seed: int, peers: list[str], json_file: Path | None) -> None:
+def robust(graphs: int, seed: int, peers: list[str], pairwise: bool, json_file: Path | None) -> None:
     """False closures on random graphs."""
-    rows = list[dict[str, Any]]()
+    rows, params = list[dict[str, Any]](), MapperParams(pairwise_consistency=pairwise)
     with tqdm(total=graphs, desc="graphs") as bar:
         while len(rows) < graphs:
-            row = map_lies.one(seed, peers)
+            row = map_lies.one(seed, peers, params)
             seed += 1
             if row is not None:
                 rows.append(row)

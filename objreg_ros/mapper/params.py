@@ -69,6 +69,9 @@ class MapperParams(Params):
     max_residual: float = param(
         3.5, "a constraint farther than this from all the others is pruned", "standard deviations", ge=1.0, live=True
     )
+    pairwise_consistency: bool = param(
+        False, "whether constraints come into the graph only where they agree with most others in pairs", live=True
+    )
 
     @property
     def odometry_sigmas(self) -> tuple[float, float]:

@@ -12,6 +12,7 @@ import numpy as np
 from objreg_ros.data import Array, LoopClosure, Odometry
 from objreg_ros.geometry import inverse, is_rigid
 from objreg_ros.mapper.constraint import Constraint, between_keyframes, floored
+from objreg_ros.mapper.pairwise import PairwiseConsistency
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.session import Session, stacked
 from objreg_ros.mapper.solver import Course, End, Problem, Solution, Solver, Tie
@@ -50,7 +51,7 @@ class PoseGraph:
         self.sessions = [Session()]
         self._closures: list[Tie] = []
         self._withdrawn: set[int] = set()
-        self._solver = Solver()
+        self._solver, self._pairwise = Solver(), PairwiseConsistency()
         self._solution = Solution((), np.zeros(0, bool), np.zeros(0))
         self._T_map_odom = np.eye(4)
 
@@ -214,7 +215,13 @@ class PoseGraph:
             len(self._closures),
             frozenset(self._withdrawn),
             self.params,
+            self._inconsistent(),
         )
+
+    def _inconsistent(self) -> frozenset[int]:
+        if not self.params.pairwise_consistency:
+            return frozenset()
+        return self._pairwise.inconsistent(self._closures, self.sessions) - self._withdrawn
 
     def adopt(self, problem: Problem, solution: Solution) -> Summary:
         """Take over the solution of a problem of this graph; keyframes that came since then follow its last one."""

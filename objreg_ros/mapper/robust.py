@@ -152,6 +152,11 @@ class RobustGraph:
             self._state = self._sorted_out(without)
             self._take(self._tried_again(self._state, ()))
 
+    def admit(self, number: int) -> None:
+        """A closure that was withdrawn may be believed again."""
+        self._withdrawn = tuple(gone for gone in self._withdrawn if gone != number)
+        self._take(self._sorted_out(self._changed(self._state, [number], [])))
+
     def _take(self, state: _State) -> None:
         """The better one of two."""
         if state.cost < self._state.cost:

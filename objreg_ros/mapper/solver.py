@@ -62,6 +62,12 @@ class Problem(NamedTuple):
     tie_count: int
     withdrawn: frozenset[int]  # numbers of ties
     params: MapperParams
+    inconsistent: frozenset[int] = frozenset()  # those that others speak against in pairs, for now
+
+    @property
+    def left_out(self) -> frozenset[int]:
+        """The ties that do not come into the graph."""
+        return self.withdrawn | self.inconsistent
 
     def solve(self) -> Solution:
         """The courses with which all that can be believed agrees best."""
@@ -159,7 +165,7 @@ class Solver:
     # Closures
 
     def _take(self, problem: Problem, number: int) -> None:
-        if number in self._unsolvable or number in problem.withdrawn:
+        if number in self._unsolvable or number in problem.left_out:
             return
         self._at, tie = number, problem.ties[number]
         if tie.end1.session in self._routes and tie.end2.session in self._routes:
@@ -229,16 +235,26 @@ class Solver:
 
     def _withdraw(self, problem: Problem) -> None:
         """Take closures out. One that placed a session did more than to tie it, so all is taken in anew without it."""
-        gone = (problem.withdrawn - self._gone) & self._numbers.keys()
+        gone = set((problem.left_out - self._gone) & self._numbers.keys())
         if any(problem.ties[number].end1.session != problem.ties[number].end2.session for number in gone):
             self._forget(problem.params)
             self._begin(problem)
-            return
+            gone = set[int]()
         for number in gone:
             assert self._robust is not None
             self._robust.withdraw(self._numbers[number])
-        self._gone = problem.withdrawn
-        self._untied = [number for number in self._untied if number not in problem.withdrawn]
+        back, self._gone = self._gone - problem.left_out, problem.left_out
+        self._untied = [number for number in self._untied if number not in problem.left_out]
+        for number in sorted(back):
+            self._admit(problem, number)
+
+    def _admit(self, problem: Problem, number: int) -> None:
+        """Take in a closure that was left out before."""
+        if number in self._numbers:
+            assert self._robust is not None
+            self._robust.admit(self._numbers[number])
+        elif number < self._taken:
+            self._take(problem, number)
 
     # Sessions
 

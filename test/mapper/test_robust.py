@@ -179,6 +179,14 @@ def test_another_graph_of_the_nodes_believes_the_same() -> None:
     assert other.kept.tolist() == [*graph.kept.tolist(), True]
 
 
+def test_what_was_withdrawn_is_believed_again_once_it_is_admitted() -> None:
+    graph = closed([right(0, 9), right(1, 10)])
+    graph.withdraw(0)
+    assert graph.kept.tolist() == [False, True]
+    graph.admit(0)
+    assert graph.kept.tolist() == [True, True] and graph.left_out == []
+
+
 def test_a_closure_with_which_there_is_no_solution_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     settle, add = IncrementalGraph.settle, IncrementalGraph.add
 
