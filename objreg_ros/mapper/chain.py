@@ -52,6 +52,15 @@ class Chain:
         J = np.kron(np.eye(2), self.T_chain_body[k1, :3, :3].T)
         return Constraint(T_1_2, J @ self._covariances(np.array([k1]), np.array([k2]))[0] @ J.T)
 
+    def motions(self, k1: Array, k2: Array) -> tuple[Array, Array]:
+        """What odometry says from keyframes to others that are no earlier: poses (m, 4, 4) and the (m, 6, 6) of [t r].
+
+        These are of the errors in the axes of the later ones.
+        """
+        J = np.kron(np.eye(2), self.T_chain_body[k2, :3, :3].transpose(0, 2, 1))
+        C = J @ self._covariances(k1, k2) @ J.transpose(0, 2, 1)
+        return inverses(self.T_chain_body[k1]) @ self.T_chain_body[k2], C
+
     def straight_until(self, k1: int) -> int:
         """The last keyframe until which odometry has not turned far enough to matter; the next one at least."""
         return max(int(np.searchsorted(self._sums[1], self._sums[1][k1] + STRAIGHT_RAD**2, side="right")) - 1, k1 + 1)

@@ -117,13 +117,6 @@ def compensated(constraint: Constraint, T_k1_from: Array, T_to_k2: Array) -> Con
     return Constraint(T_k1_from @ constraint.T_from_to @ T_to_k2, J @ constraint.covariance @ J.T)
 
 
-def followed(first: Constraint, second: Constraint) -> Constraint:
-    """``T_1_3 = T_1_2 T_2_3`` and its covariance, to first order, of two constraints that err by themselves."""
-    R, turned = np.kron(np.eye(2), first.T_from_to[:3, :3]), _turning(first.T_from_to[:3, :3] @ second.T_from_to[:3, 3])
-    C = turned @ first.covariance @ turned.T + R @ second.covariance @ R.T
-    return Constraint(first.T_from_to @ second.T_from_to, C)
-
-
 def inverted(constraint: Constraint) -> Constraint:
     """The same constraint from *to* to *from*: ``T_to_from`` and the covariance in the *to* frame."""
     R, t = constraint.T_from_to[:3, :3], constraint.T_from_to[:3, 3]

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.geometry import inverse, vector_from_rotation
+from objreg_ros.geometry import inverses, skew
 from objreg_ros.mapper.chain import Chain
-from objreg_ros.mapper.constraint import Constraint, followed, inverted, local_covariance
+from objreg_ros.mapper.constraint import inverted, local_covariance, rotation_vectors
 from objreg_ros.mapper.session import Session, stacked
 from objreg_ros.mapper.steady import Steady
 
@@ -41,8 +41,7 @@ class Agreement:
         count, first = len(self._ties), max(len(self._ties) - MOST_PAIRS, 0)
         grown = np.ones((count + 1, count + 1), bool)  # what is not compared does not disagree
         grown[:count, :count] = self._agree
-        for k in range(first, count):
-            grown[k, count] = grown[count, k] = agrees(self._ties[k], tie, chains)
+        grown[first:count, count] = grown[count, first:count] = agreeing(tie, self._ties[first:], chains)
         self._numbers.append(number)
         self._ties.append(tie)
         self._agree = grown
@@ -90,22 +89,44 @@ def in_order(tie: Tie) -> Tie:
     return tie._replace(end1=tie.end2, end2=tie.end1, constraint=inverted(tie.constraint))
 
 
-def agrees(one: Tie, other: Tie, chains: tuple[Chain, Chain]) -> bool:
-    """Whether the cycle of two ties of the same sessions closes within what is expected of it."""
-    out = said(chains[0], one.end1.keyframe, other.end1.keyframe)
-    back = said(chains[1], other.end2.keyframe, one.end2.keyframe)
-    around = followed(followed(out, other.constraint), back)
-    T = inverse(one.constraint.T_from_to) @ around.T_from_to
-    error = np.concatenate([T[:3, 3], vector_from_rotation(T[:3, :3])])
-    covariance = local_covariance(one.constraint) + local_covariance(around)
-    return bool(error @ np.linalg.solve(covariance, error) <= LIMIT)
+def agreeing(one: Tie, others: Sequence[Tie], chains: tuple[Chain, Chain]) -> Array:
+    """(m,) of bool: whether the cycle of a tie with each of others closes within what is expected of it.
+
+    From the first end of the one by odometry to that of the other, by that to its second, and by odometry back. The
+    error of a step is in the axes of its end, and what follows carries it on.
+    """
+    ties = [one, *others]
+    T = stacked([tie.constraint.T_from_to for tie in ties])
+    C = np.array([local_covariance(tie.constraint) for tie in ties])
+    k1, k2 = (np.array([end.keyframe for end in ends]) for ends in zip(*(tie[:2] for tie in ties), strict=True))
+    out, C_out = said(chains[0], np.repeat(k1[0], len(others)), k1[1:])
+    back, C_back = said(chains[1], k2[1:], np.repeat(k2[0], len(others)))
+    around = out @ T[1:] @ back
+    carried = adjoints(inverses(T[1:] @ back)), adjoints(inverses(back))
+    spread = (
+        C[0] + C_back + sum(J @ part @ J.transpose(0, 2, 1) for J, part in zip(carried, (C_out, C[1:]), strict=True))
+    )
+    apart = inverses(T[:1]) @ around
+    error = np.hstack([apart[:, :3, 3], rotation_vectors(apart[:, :3, :3])])
+    return np.asarray(np.einsum("mi,mi->m", error, np.linalg.solve(spread, error[:, :, None])[:, :, 0]) <= LIMIT)
 
 
-def said(chain: Chain, k1: int, k2: int) -> Constraint:
-    """What odometry says between two keyframes in any order."""
-    if k1 == k2:
-        return Constraint(np.eye(4), np.zeros((6, 6)))
-    return chain.between(k1, k2) if k1 < k2 else inverted(chain.between(k2, k1))
+def said(chain: Chain, k1: Array, k2: Array) -> tuple[Array, Array]:
+    """What odometry says between keyframes in any order: poses (m, 4, 4), and (m, 6, 6) of [t r] in the axes of *2*."""
+    first, last = np.minimum(k1, k2), np.maximum(k1, k2)
+    T, C = chain.motions(first, last)
+    is_back = (k1 > k2)[:, None, None]
+    J = adjoints(T)
+    return np.where(is_back, inverses(T), T), np.where(is_back, J @ C @ J.transpose(0, 2, 1), C)
+
+
+def adjoints(T: Array) -> Array:
+    """(m, 6, 6) of poses (m, 4, 4): what a motion [t r] in the axes of *to* is in those of *from*."""
+    R = T[:, :3, :3]
+    J = np.zeros((len(T), 6, 6))
+    J[:, :3, :3] = J[:, 3:, 3:] = R
+    J[:, :3, 3:] = skew(T[:, :3, 3]) @ R
+    return J
 
 
 def most_agreeing(agree: Array) -> list[int]:

@@ -9,8 +9,8 @@ import pytest
 from objreg_ros.data import Array
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
 from objreg_ros.mapper.chain import Chain
-from objreg_ros.mapper.constraint import Constraint
-from objreg_ros.mapper.pairwise import PairwiseConsistency, agrees, in_order, most_agreeing, said
+from objreg_ros.mapper.constraint import Constraint, inverted, local_covariance
+from objreg_ros.mapper.pairwise import PairwiseConsistency, agreeing, in_order, most_agreeing, said
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.pose_graph import PoseGraph
 from objreg_ros.mapper.session import Session
@@ -27,6 +27,10 @@ def chain() -> Chain:
     made = Chain(TRUE[0], Steady())
     made.extend(np.array(TRUE), np.full((COUNT - 1, 2), 1e-5))
     return made
+
+
+def agrees(one: Tie, other: Tie, chains: tuple[Chain, Chain]) -> bool:
+    return bool(agreeing(one, [other], chains)[0])
 
 
 def tie(k1: int, k2: int, aside: float = 0.0, sessions: tuple[int, int] = (0, 0)) -> Tie:
@@ -76,9 +80,13 @@ def test_a_cycle_of_true_ties_closes_as_often_as_the_limit_says() -> None:
 
 
 def test_odometry_is_said_in_both_directions() -> None:
-    there, back = said(chain(), 3, 9), said(chain(), 9, 3)
-    np.testing.assert_allclose(there.T_from_to @ back.T_from_to, np.eye(4), atol=1e-12)
-    assert not said(chain(), 4, 4).covariance.any()
+    T, C = said(chain(), np.array([3, 9, 4]), np.array([9, 3, 4]))
+    np.testing.assert_allclose(T[0] @ T[1], np.eye(4), atol=1e-12)
+    np.testing.assert_allclose(T[2], np.eye(4), atol=1e-12)
+    there = chain().between(3, 9)
+    np.testing.assert_allclose(C[0], local_covariance(there), atol=1e-12)
+    np.testing.assert_allclose(C[1], local_covariance(inverted(there)), atol=1e-12)
+    assert not C[2].any()
 
 
 def test_a_tie_from_a_later_session_is_turned_round() -> None:
