@@ -62,7 +62,7 @@ class Survey:
     def moment(self, sighting: Sighting) -> str:
         """When something was seen: its session, and the time since that began."""
         first_ns = min(s.stamp_ns for s in self.sightings if s.session == sighting.session)
-        return f"session {sighting.session} at {1e-9 * (sighting.stamp_ns - first_ns):.1f} s"
+        return f"{1e-9 * (sighting.stamp_ns - first_ns):.1f} s of session {sighting.session}"
 
 
 def survey(path: str | Path) -> Survey:
@@ -131,7 +131,7 @@ def _told_move(found: Survey, move: Move) -> str:
     stood, stands = (", ".join(f"{value:.2f}" for value in xyz) for xyz in (nearest.stood, nearest.here.position))
     landmarks = f"{there.landmark}" if there.landmark == here.landmark else f"{there.landmark}, now {here.landmark},"
     return (
-        f"{here.label} {landmarks} went {nearest.metres:.2f} m after {found.moment(there)} and before "
+        f"{here.label} {landmarks} went {nearest.metres:.2f} m between {found.moment(there)} and "
         f"{found.moment(here)}, from ({stood}) to ({stands}) m in session {nearest.here.session}, "
         f"by {move.closures} constraints"
     )

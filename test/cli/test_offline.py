@@ -220,3 +220,10 @@ def test_a_map_that_cannot_be_written_is_refused_before_the_run(option: str, tmp
 def test_a_voxel_of_no_size_is_refused_before_the_run(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"--voxel: expected voxels of 0\.001 to 10 m, got nan"):
         offline(tmp_path / "no_recording", "--map", tmp_path / "map.ply", "--voxel", "nan")
+
+
+def test_a_run_is_written_for_foxglove(model: Path, tmp_path: Path) -> None:
+    folder, file = tum_folder(tmp_path / "tum", frames=4), tmp_path / "run.mcap"
+    output = offline(folder, "--model", model, "--mcap", file)
+    assert f"{file}: the way (true), 0 closures, 4 moments with picture and cloud" in output
+    assert {record.topic for record in read(file)} >= {"/way/true", "/tf", "/camera/points"}

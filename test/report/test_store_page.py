@@ -46,7 +46,7 @@ def test_a_page_says_what_moved_or_that_nobody_tells(tmp_path: Path) -> None:
     still = store_page(survey(store_of(tmp_path / "a.db", shown)), {})
     moved = store_page(survey(store_of(tmp_path / "b.db", shown, [told(1.0, 2.0), told(1.0, 9.0)])), {})
     assert "No constraint of this store tells" in still
-    assert "went 0.40 m after session 0 at 0.0 s and before session 0 at 1.0 s" in moved
+    assert "went 0.40 m between 0.0 s of session 0 and 1.0 s of session 0" in moved
     assert "1 constraints tell of another" in moved
 
 

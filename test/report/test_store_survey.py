@@ -71,8 +71,8 @@ def test_an_empty_store_has_a_description(tmp_path: Path) -> None:
 
 def test_a_moment_is_told_from_the_begin_of_its_session(place: Path) -> None:
     found = survey(place)
-    assert found.moment(found.sightings[2]) == "session 0 at 10.0 s"
-    assert found.moment(found.sightings[-1]) == "session 1 at 0.0 s"
+    assert found.moment(found.sightings[2]) == "10.0 s of session 0"
+    assert found.moment(found.sightings[-1]) == "0.0 s of session 1"
 
 
 def test_what_is_no_store_is_refused(tmp_path: Path) -> None:
