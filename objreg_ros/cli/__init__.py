@@ -30,7 +30,7 @@ SUMMARIES = {
     "params": "Show every parameter, or write the files that are made from them.",
 }
 FOLDER = Path(__file__).parent
-BROKEN, INTERRUPTED, TERMINATED = 1, 130, 143
+BROKEN, NOTHING, INTERRUPTED, TERMINATED = 1, 3, 130, 143  # nothing: what was read gave no frame, or cannot
 FIRST_TIME = "the first time compiles for a minute"
 
 
@@ -64,6 +64,8 @@ def group() -> None:
 
 def main(*arguments: Any) -> None:
     """The executable. A broken input is one line on stderr and exit 1; anything else is a bug and shows itself.
+
+    A run of which no frame got through ends with 3, as does the inspection of what the graph cannot run on.
 
     SIGINT and SIGTERM end what was begun, with the usual status.
     """

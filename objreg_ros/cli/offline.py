@@ -18,6 +18,7 @@ from objreg_ros.bridge.calibration import absolute
 from objreg_ros.cli import FIRST_TIME, options
 from objreg_ros.cli.options import require_writable
 from objreg_ros.cli.settings import Settings, read_settings, tell_ignored
+from objreg_ros.cli.told import exit_code, tell
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.offline import Run, Timing, build_rooms, run_offline
 from objreg_ros.recording import Record, Recording, open_recording
@@ -25,8 +26,10 @@ from objreg_ros.recording.drift import ODOM, with_drifting_odometry
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.mounts import static_frames
 from objreg_ros.recording.told_camera import with_camera
+from objreg_ros.recording.troubles import troubles
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.report.about import about
+from objreg_ros.report.findings import as_json, find, setting, verdict
 from objreg_ros.report.map_files import VOXEL_M, MapFiles
 from objreg_ros.report.pictures import Album
 from objreg_ros.report.run_scene import scene_of
@@ -90,7 +93,7 @@ def command(
     params_file: Path | None,
     changes: tuple[str, ...],
     remaps: tuple[str, ...],
-) -> None:
+) -> int:
     """Run RECORDING (rosbag1, rosbag2 or a TUM RGB-D folder) through detector, segmenter and registrar without ROS.
 
     Deterministic, and as fast as the CPU goes. Prints what came out and, where the recording has ground truth, the
@@ -98,6 +101,8 @@ def command(
 
     With odometry the constraints correct it: --tum, --kitti, --g2o and --map write what comes out, in the frame in
     which odometry began. Poses are of the camera's optical frame, at every frame of the recording.
+
+    Says where the run stopped if no loop was closed, and ends with 3 if no frame got through.
     """
     files = _files(tum, kitti, g2o, cloud, voxel)
     scenes = SceneFiles(rerun, mcap)
@@ -117,24 +122,29 @@ def command(
             click.echo(f"! {note}", err=True)
         registrar = _remembering(settings.of("registrar", RegistrarParams), files, folder)
         run = _run(source, inputs, settings, registrar, max_frames, odometry)
-        summary = run.summary(truth)
+        detector = settings.of("detector", DetectorParams)
+        summary = {
+            "about": about(recording, detector.model, settings.changed(), sys.argv[1:]),
+            "recording": str(recording.resolve()),
+            "inputs": inputs.outright,
+            "odometry": inputs.odom,
+            "rectified": told.rectified,
+            "camera": absolute(told.camera),
+            **setting(source, inputs, detector.model),
+            **run.summary(truth),
+        }
         _say(run, summary)
+        findings = find(summary, troubles(source, inputs))
+        click.echo(verdict(summary, findings))
+        tell(findings)
         if json_file is not None:
-            detector = settings.of("detector", DetectorParams)
-            told_of = {
-                "about": about(recording, detector.model, settings.changed(), sys.argv[1:]),
-                "recording": str(recording.resolve()),
-                "inputs": inputs.outright,
-                "odometry": inputs.odom,
-                "rectified": told.rectified,
-                "camera": absolute(told.camera),
-            }
-            json_file.write_text(json.dumps({**told_of, **summary}, indent=1))
-        if scenes.wanted:
+            json_file.write_text(json.dumps({**summary, "findings": as_json(findings)}, indent=1))
+        if scenes.wanted and run.frames:
             album = Album(source, inputs, told.rectified)
             scenes.write(scene_of(Story.of(recording.name, summary, truth), album), click.echo)
-        if files.wanted:
+        if files.wanted and run.frames:
             _map(files, Story.of(recording.name, summary, truth), Path(registrar.store))
+        return exit_code(summary)
 
 
 def _files(tum: Path | None, kitti: Path | None, g2o: Path | None, cloud: Path | None, voxel: float) -> MapFiles:

@@ -227,3 +227,13 @@ def test_a_run_is_written_for_foxglove(model: Path, tmp_path: Path) -> None:
     output = offline(folder, "--model", model, "--mcap", file)
     assert f"{file}: the way (true), 0 closures, 4 moments with picture and cloud" in output
     assert {record.topic for record in read(file)} >= {"/way/true", "/tf", "/camera/points"}
+
+
+def test_a_run_of_which_no_frame_got_through_says_why_and_ends_with_three(model: Path, tmp_path: Path) -> None:
+    folder, file = tum_folder(tmp_path / "tum", frames=3), tmp_path / "out.json"
+    for picture in (folder / "depth").iterdir():
+        picture.write_bytes(b"no png")
+    words = [str(folder), "--model", str(model), "--json", str(file)]
+    result = CliRunner().invoke(command, words, catch_exceptions=False, standalone_mode=False)
+    assert result.return_value == 3 and "! no frame got through: 3 malformed_depth" in result.output
+    assert json.loads(file.read_text())["findings"][0]["anchor"] == "no-frame-got-through"
