@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from objreg_ros.data import DepthImage, Intrinsics
@@ -28,6 +30,7 @@ class FewPictures:
         return DepthImage(depth=depth, rgb=rgb, intrinsics=camera, stamp_ns=stamp_ns)
 
 
+@cache
 def walk(false: bool = True) -> RunScene:
     """The camera that walks a circle twice."""
     return scene_of(Story.of("walk", summary(false), TRUTH), FewPictures())  # type: ignore[arg-type]
