@@ -84,7 +84,7 @@ setup(
         # The parts of a report that one can turn about. Without it the report has its flat pictures, and says so.
         "report": ["plotly>=5.9"],
         # `--rerun`: a run as a recording for the Rerun viewer.
-        "rerun": ["rerun-sdk>=0.20"],
+        "rerun": ["rerun-sdk>=0.23"],
         # The site of the documentation: `mkdocs build`.
         "docs": ["mkdocs-material>=9.5", "mkdocstrings-python>=1.10"],
         # The real ROS 2 Jazzy as wheels, for machines without a ROS installation.

@@ -18,26 +18,33 @@ from objreg_ros.recording.summary import describe_lens, describe_topics
 from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.recording.troubles import warnings
 from objreg_ros.report.live_pictures import write_picture
-from objreg_ros.report.store_summary import describe, draw, survey
+from objreg_ros.report.portraits import portraits
+from objreg_ros.report.store_drawing import draw
+from objreg_ros.report.store_page import store_page
+from objreg_ros.report.store_survey import describe, survey
 from objreg_ros.truth import Truth
+
+FILE = click.Path(dir_okay=False, path_type=Path)
 
 
 @click.command()
 @options.recording
 @options.remap
 @options.camera
-@click.option("--picture", type=click.Path(dir_okay=False, path_type=Path), help="Draw the objects of a store (PNG).")
-def command(recording: Path, remaps: tuple[str, ...], camera: str, picture: Path | None) -> int:
+@click.option("--picture", type=FILE, metavar="FILE.png", help="Draw the sessions of a store and its objects.")
+@click.option("--page", type=FILE, metavar="FILE.html", help="The same as a page, with what moved.")
+def command(recording: Path, remaps: tuple[str, ...], camera: str, picture: Path | None, page: Path | None) -> int:
     """Say what is in RECORDING, which topics the graph would use, and what would go wrong.
 
     Ends with 3 where the graph cannot run on it. RECORDING may also be a store of the registrar: then its sessions,
-    labels and objects are told.
+    labels and objects are told, and what moved.
     """
     if is_store(recording):
-        _say_store(recording, picture)
+        _say_store(recording, picture, page)
         return 0
-    if picture is not None:
-        raise ValueError(f"--picture: expected a store of the registrar, whose objects it draws, got {recording}")
+    for option, file in {"--picture": picture, "--page": page}.items():
+        if file is not None:
+            raise ValueError(f"{option}: expected a store of the registrar, whose objects it draws, got {recording}")
     asked = parse_remaps(remaps)
     with open_recording(recording) as opened:
         source = with_camera(opened, camera, asked)
@@ -51,11 +58,22 @@ def command(recording: Path, remaps: tuple[str, ...], camera: str, picture: Path
     return 0 if inputs.complete else NOTHING
 
 
-def _say_store(store: Path, picture: Path | None) -> None:
-    click.echo(describe(store))
+def _say_store(store: Path, picture: Path | None, page: Path | None) -> None:
+    for option, file in {"--picture": picture, "--page": page}.items():
+        if file is not None:
+            options.require_writable(option, file)
+    found = survey(store)
+    click.echo(describe(found))
+    pictures = portraits(store, found.sightings) if picture or page else {}
     if picture is not None:
-        write_picture(picture, draw(survey(store)))
+        write_picture(picture, draw(found, pictures))
         click.echo(f"  drawn into {picture}")
+    if page is not None:
+        page.write_text(store_page(found, pictures), encoding="utf-8")
+        click.echo(f"  written into {page}")
+    left_out = len(found.landmarks) - len(pictures)
+    if (picture or page) and left_out:
+        click.echo(f"  {left_out} objects have no picture: they were seen least, or their keyframes cannot be read")
 
 
 def _say_what_it_is(source: Recording) -> None:

@@ -31,6 +31,9 @@ from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.report.about import about
 from objreg_ros.report.findings import as_json, find, setting, verdict
 from objreg_ros.report.map_files import VOXEL_M, MapFiles
+from objreg_ros.report.pictures import Album
+from objreg_ros.report.run_scene import scene_of
+from objreg_ros.report.scene_files import SceneFiles
 from objreg_ros.report.story import Story
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_ros.truth import Truth
@@ -62,6 +65,7 @@ CAMERAS_OWN = (
     show_default=True,
     help="The side of the voxels to which --map is thinned, m. It doubles where they do not fit into memory.",
 )
+@options.scene_files
 @click.option("--max-frames", type=click.IntRange(min=1), help="Stop after this many frames.")
 @click.option(
     "--odometry",
@@ -82,6 +86,8 @@ def command(
     g2o: Path | None,
     cloud: Path | None,
     voxel: float,
+    rerun: Path | None,
+    mcap: Path | None,
     max_frames: int | None,
     odometry: str | None,
     params_file: Path | None,
@@ -99,7 +105,8 @@ def command(
     Says where the run stopped if no loop was closed, and ends with 3 if no frame got through.
     """
     files = _files(tum, kitti, g2o, cloud, voxel)
-    for option, file in (({"--json": json_file} if json_file else {}) | files.wanted).items():
+    scenes = SceneFiles(rerun, mcap)
+    for option, file in (({"--json": json_file} if json_file else {}) | files.wanted | scenes.wanted).items():
         require_writable(option, file)
     _require_seed(odometry)
     settings = read_settings(params_file, [*changes, *_named(model, labels, camera)])
@@ -110,6 +117,7 @@ def command(
         inputs = _inputs(source, remaps, odometry, told.source)
         _require_odometry(files, source, inputs)
         truth = Truth.of(source, inputs.ground_truth)
+        scenes.require_way(recording, bool(inputs.odom or truth.poses))
         for note in (*source.notes, *truth.notes):
             click.echo(f"! {note}", err=True)
         registrar = _remembering(settings.of("registrar", RegistrarParams), files, folder)
@@ -131,6 +139,9 @@ def command(
         tell(findings)
         if json_file is not None:
             json_file.write_text(json.dumps({**summary, "findings": as_json(findings)}, indent=1))
+        if scenes.wanted and run.frames:
+            album = Album(source, inputs, told.rectified)
+            scenes.write(scene_of(Story.of(recording.name, summary, truth), album), click.echo)
         if files.wanted and run.frames:
             _map(files, Story.of(recording.name, summary, truth), Path(registrar.store))
         return exit_code(summary)

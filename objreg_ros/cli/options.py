@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import click
@@ -34,6 +35,14 @@ camera = click.option(
 )
 model = click.option("--model", help="ONNX model: a path or the name of an installed one.")
 labels = click.option("--labels", help="Text file of labels, one a line.")
+
+
+def scene_files(command: Callable) -> Callable:
+    """The files of a run for viewers, ``rerun`` and ``mcap``."""
+    file = click.Path(dir_okay=False, path_type=Path)
+    mcap = click.option("--mcap", type=file, metavar="FILE.mcap", help="Write the run here for Foxglove.")
+    rerun = click.option("--rerun", type=file, metavar="FILE.rrd", help="Write the run here for the Rerun viewer.")
+    return rerun(mcap(command))
 
 
 def require_writable(option: str, file: Path) -> None:

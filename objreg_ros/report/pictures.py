@@ -126,7 +126,12 @@ def data_uri(rgb: Array, quality: int = QUALITY) -> str:
     height = round(rgb.shape[0] * WIDTH / rgb.shape[1])
     rgb = np.ascontiguousarray(rgb)
     small = rgb if rgb.shape[1] == WIDTH else cv2.resize(rgb, (WIDTH, height), interpolation=cv2.INTER_AREA)
-    _, jpeg = cv2.imencode(".jpg", small[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
+    return picture_uri(small, quality)
+
+
+def picture_uri(rgb: Array, quality: int = QUALITY) -> str:
+    """A picture (H, W, 3) as a JPEG inside the page, as large as it is."""
+    _, jpeg = cv2.imencode(".jpg", np.ascontiguousarray(rgb[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, quality])
     return "data:image/jpeg;base64," + base64.b64encode(jpeg.tobytes()).decode("ascii")
 
 

@@ -8,18 +8,29 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from report.places import cup_and_book
 
 from objreg_ros.cli import export, inspect
 from objreg_ros.memory.store import Store
 
 
-def test_a_store_is_described_and_drawn(tmp_path: Path) -> None:
+def test_a_store_is_described_drawn_and_written_as_a_page(tmp_path: Path) -> None:
+    place, picture, page = cup_and_book(tmp_path / "place.db"), tmp_path / "map.png", tmp_path / "map.html"
+    words = [str(place), "--picture", str(picture), "--page", str(page)]
+    result = CliRunner().invoke(inspect.command, words, catch_exceptions=False)
+    assert result.exit_code == 0 and "3 keyframes" in result.output and "no picture" not in result.output
+    assert picture.stat().st_size > 0 and "Session 1" in page.read_text()
+
+
+@pytest.mark.parametrize("option", ["--picture", "--page"])
+def test_what_draws_a_store_asks_for_one_and_for_a_place_that_takes_a_file(option: str, tmp_path: Path) -> None:
     Store(tmp_path / "place.db").close()
-    result = CliRunner().invoke(
-        inspect.command, [str(tmp_path / "place.db"), "--picture", str(tmp_path / "map.png")], catch_exceptions=False
-    )
-    assert result.exit_code == 0 and "0 keyframes" in result.output
-    assert (tmp_path / "map.png").stat().st_size > 0
+    with pytest.raises(OSError, match=f"{option}: expected an existing folder"):
+        CliRunner().invoke(
+            inspect.command, [str(tmp_path / "place.db"), option, str(tmp_path / "no" / "x")], catch_exceptions=False
+        )
+    with pytest.raises(ValueError, match=f"{option}: expected a store"):
+        CliRunner().invoke(inspect.command, [str(tmp_path), option, str(tmp_path / "x")], catch_exceptions=False)
 
 
 def test_a_store_is_exported(tmp_path: Path) -> None:

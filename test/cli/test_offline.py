@@ -222,6 +222,13 @@ def test_a_voxel_of_no_size_is_refused_before_the_run(tmp_path: Path) -> None:
         offline(tmp_path / "no_recording", "--map", tmp_path / "map.ply", "--voxel", "nan")
 
 
+def test_a_run_is_written_for_foxglove(model: Path, tmp_path: Path) -> None:
+    folder, file = tum_folder(tmp_path / "tum", frames=4), tmp_path / "run.mcap"
+    output = offline(folder, "--model", model, "--mcap", file)
+    assert f"{file}: the way (true), 0 closures, 4 moments with picture and cloud" in output
+    assert {record.topic for record in read(file)} >= {"/way/true", "/tf", "/camera/points"}
+
+
 def test_a_run_of_which_no_frame_got_through_says_why_and_ends_with_three(model: Path, tmp_path: Path) -> None:
     folder, file = tum_folder(tmp_path / "tum", frames=3), tmp_path / "out.json"
     for picture in (folder / "depth").iterdir():

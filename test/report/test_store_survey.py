@@ -12,27 +12,18 @@ from registration.samples import box, keyframe, moved
 
 from objreg_ros.data import Intrinsics, View
 from objreg_ros.geometry import back_project
-from objreg_ros.memory.landmarks import Landmarks
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.memory.store_file import is_store
-from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.report.store_summary import PANEL, describe, draw, survey
+from objreg_ros.report.store_survey import describe, survey
 from objreg_ros.sensor import KINECT, depth_sigma
+from report.places import cup_and_book
 
 
 @pytest.fixture
 def place(tmp_path: Path) -> Path:
     """A store with two sessions of a cup and a book."""
-    store, landmarks = Store(tmp_path / "place.db"), Landmarks(RegistrarParams())
-    objects = (box("cup", (0, 0, 1)), box("book", (0.5, 0, 1), instance=2))
-    for number, session in ((1, 0), (2, 0), (3, 1)):
-        taken = keyframe(number, 10.0 * number, objects, session, moved(0.0))
-        named, merged = landmarks.assign(sightings_of(taken))
-        store.add(taken, named, (), merged)
-        landmarks.add(named, merged)
-    store.close()
-    return tmp_path / "place.db"
+    return cup_and_book(tmp_path / "place.db")
 
 
 def test_a_survey_counts_labels_sessions_and_landmarks(place: Path) -> None:
@@ -43,7 +34,7 @@ def test_a_survey_counts_labels_sessions_and_landmarks(place: Path) -> None:
 
 
 def test_a_description_names_what_is_there(place: Path) -> None:
-    text = describe(place)
+    text = describe(survey(place))
     assert "3 keyframes" in text and "cup 3" in text and "session 0: 2 keyframes, 4 objects in 10.0 s" in text
 
 
@@ -58,18 +49,13 @@ def test_a_description_tells_the_noise_of_the_depth_of_stored_views(tmp_path: Pa
     store.close()
     found = survey(tmp_path / "noisy.db")
     assert found.depth_noise == pytest.approx(2.0 / KINECT, rel=0.1)
-    assert f"depth noise of the views: {found.depth_noise:.2f} (a Kinect v1 has 1)" in describe(tmp_path / "noisy.db")
+    assert f"depth noise of the views: {found.depth_noise:.2f} (a Kinect v1 has 1)" in describe(found)
 
 
 def test_a_store_whose_views_have_too_little_depth_tells_no_noise(tmp_path: Path) -> None:
     Store(tmp_path / "empty.db").close()
-    assert survey(tmp_path / "empty.db").depth_noise is None and "noise" not in describe(tmp_path / "empty.db")
-
-
-def test_a_picture_has_a_panel_for_each_session(place: Path) -> None:
-    picture = draw(survey(place))
-    assert picture.shape == (PANEL, 2 * PANEL, 3) and picture.dtype == np.uint8
-    assert (picture[:, :PANEL] != 255).any() and (picture[:, PANEL:] != 255).any()
+    found = survey(tmp_path / "empty.db")
+    assert found.depth_noise is None and "noise" not in describe(found)
 
 
 def test_a_store_is_told_from_other_files(place: Path, tmp_path: Path) -> None:
@@ -78,12 +64,17 @@ def test_a_store_is_told_from_other_files(place: Path, tmp_path: Path) -> None:
     assert not is_store(tmp_path / "notes.txt") and not is_store(tmp_path) and not is_store(tmp_path / "nothing")
 
 
-def test_an_empty_store_has_a_description_and_a_picture(tmp_path: Path) -> None:
+def test_an_empty_store_has_a_description(tmp_path: Path) -> None:
     Store(tmp_path / "empty.db").close()
-    assert "0 keyframes" in describe(tmp_path / "empty.db")
-    assert draw(survey(tmp_path / "empty.db")).shape == (PANEL, PANEL, 3)
+    assert "0 keyframes" in describe(survey(tmp_path / "empty.db"))
+
+
+def test_a_moment_is_told_from_the_begin_of_its_session(place: Path) -> None:
+    found = survey(place)
+    assert found.moment(found.sightings[2]) == "10.0 s of session 0"
+    assert found.moment(found.sightings[-1]) == "0.0 s of session 1"
 
 
 def test_what_is_no_store_is_refused(tmp_path: Path) -> None:
     with pytest.raises(StoreError):
-        describe(tmp_path / "nothing.db")
+        survey(tmp_path / "nothing.db")

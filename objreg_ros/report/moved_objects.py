@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""When which objects of a store were moved, as its closures tell.
+
+A closure says how far an object went that stood in one of its views, where the other view looks through, and stands
+somewhere else in that one. So it was moved between the two. What several closures say of one object is put together: as
+few moves as explain all of them, each within the time that all of its closures leave.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from objreg_ros.data import Array, LoopClosure
+from objreg_ros.geometry import inverse, transform
+from objreg_ros.memory.sighting import Sighting
+from objreg_ros.memory.store import Store, StoreError
+from objreg_ros.registration.keyframe import Keyframe
+
+EVIDENCE = re.compile(r"moved (?P<label>.+) \[m\]")
+SAME_M = 1e-3  # the distance in the evidence and that of the two objects that it is of
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Telling:
+    """What closure number ``closure`` says of one object: it went ``metres`` from ``there`` to ``here``.
+
+    ``stood (3,)`` is where it had stood in m, in the session of ``here``.
+    """
+
+    closure: int
+    there: Sighting
+    here: Sighting
+    stood: Array
+    metres: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Move:
+    """One move of an object: at some time after ``there`` was seen and before ``here`` was, so ``closures`` say.
+
+    ``nearest`` is the telling of the two moments that are closest to each other.
+    """
+
+    there: Sighting
+    here: Sighting
+    nearest: Telling
+    closures: int
+
+
+@dataclass(frozen=True, slots=True)
+class Moves:
+    """The ``known`` moves, the oldest first; ``untold`` counts what is said of keyframes that are no longer stored."""
+
+    known: tuple[Move, ...] = ()
+    untold: int = 0
+
+
+def moves_in(store: Store, sightings: Sequence[Sighting]) -> Moves:
+    """What the closures of a store tell of objects that were moved; StoreError where they cannot be read."""
+    ids: defaultdict[int, set[int]] = defaultdict(set)
+    for sighting in sightings:
+        ids[sighting.stamp_ns].add(sighting.keyframe_id)
+    told: list[Telling] = []
+    untold = 0
+    for number, closure in enumerate(store.closures()):
+        for label, metres in _distances(closure):
+            found = list(_tellings(store, ids, number, closure, label, metres))
+            told += found
+            untold += not found
+    moves = [move for of_one in _by_object(told) for move in _fewest(of_one)]
+    return Moves(tuple(sorted(moves, key=lambda move: (move.here.keyframe_id, move.here.landmark))), untold)
+
+
+def _distances(closure: LoopClosure) -> Iterator[tuple[str, float]]:
+    for name, metres in closure.evidence.items():
+        if named := EVIDENCE.fullmatch(name):
+            yield named["label"], metres
+
+
+def _tellings(
+    store: Store, ids: dict[int, set[int]], number: int, closure: LoopClosure, label: str, metres: float
+) -> Iterator[Telling]:
+    """Of the keyframes of both moments; two runs of one recording have the same moments, and it is true of both."""
+    for from_id in sorted(ids.get(closure.from_ns, ())):
+        for to_id in sorted(ids.get(closure.to_ns, ())):
+            if from_id < to_id:
+                yield from _between(store, (from_id, to_id), number, closure.T_from_to, label, metres)
+
+
+def _between(
+    store: Store, ids: tuple[int, int], number: int, T_from_to: Array, label: str, metres: float
+) -> Iterator[Telling]:
+    try:
+        before, after = (store.keyframe(keyframe_id) for keyframe_id in ids)
+    except StoreError:
+        return  # a damaged keyframe tells nothing
+    there, here = (list(store.sightings(keyframe_id)) for keyframe_id in ids)
+    gone, new = transform(inverse(T_from_to), _middles(before)), _middles(after)
+    distances = np.linalg.norm(gone[:, None] - new[None], axis=-1)
+    T_session_to = np.eye(4) if after.T_odom_camera is None else after.T_odom_camera
+    for i, j in np.argwhere(np.abs(distances - metres) < SAME_M).tolist():
+        if here[j].label == label:
+            stood = transform(T_session_to, gone[i])
+            yield Telling(closure=number, there=there[i], here=here[j], stood=stood, metres=metres)
+
+
+def _middles(keyframe: Keyframe) -> Array:
+    return np.array([item.centroid for item in keyframe.objects]).reshape(-1, 3)
+
+
+def _by_object(told: Sequence[Telling]) -> list[list[Telling]]:
+    """The tellings of each object: landmarks are of one object where it is told to have gone from one to the other."""
+    groups: list[tuple[set[int], list[Telling]]] = []
+    for telling in told:
+        landmarks, of_one = {telling.there.landmark, telling.here.landmark}, [telling]
+        for group in [group for group in groups if group[0] & landmarks]:
+            groups.remove(group)
+            landmarks, of_one = landmarks | group[0], group[1] + of_one
+        groups.append((landmarks, of_one))
+    return [of_one for _, of_one in groups]
+
+
+def _fewest(told: Sequence[Telling]) -> Iterator[Move]:
+    """As few moves as explain all that is told: each lies in every span that begins before its first one ends."""
+    left = sorted(told, key=lambda telling: telling.here.keyframe_id)
+    while left:
+        end = left[0].here.keyframe_id
+        together = [telling for telling in left if telling.there.keyframe_id < end]
+        left = [telling for telling in left if telling.there.keyframe_id >= end]
+        yield Move(
+            there=max((telling.there for telling in together), key=lambda s: s.keyframe_id),
+            here=together[0].here,
+            nearest=min(together, key=lambda t: t.here.keyframe_id - t.there.keyframe_id),
+            closures=len({telling.closure for telling in together}),
+        )
