@@ -6,6 +6,9 @@ from __future__ import annotations
 import re
 from html.parser import HTMLParser
 
+import pytest
+
+from objreg_ros.report import page as pages
 from objreg_ros.report.page import page
 from objreg_ros.report.story import Story
 from objreg_ros.truth import Truth
@@ -37,6 +40,12 @@ def test_the_page_is_well_formed_and_loads_nothing() -> None:
     assert parser.open == []
     assert not re.search(r"https?://|<script[^>]* src|<link|url\(", text)
     assert "prefers-color-scheme: dark" in text
+
+
+def test_without_plotly_the_page_says_what_3d_needs_and_keeps_its_drawings(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pages, "plotly_bundle", lambda: "")
+    text = page([(Story.of("walk", summary(), TRUTH), None)])
+    assert text.count("pip install plotly") == 1 and 'class="plot"' not in text and 'class="line corrected"' in text
 
 
 def test_the_head_tells_of_false_constraints_and_of_the_error() -> None:
