@@ -29,7 +29,7 @@ OVERLAID = (
 
 
 def chapter(story: Story, album: Album | None, runs: int = 1, spatial: bool = True) -> View:
-    """Everything that a run's part of a page shows, of which there are so many; ``spatial`` with what is in 3D."""
+    """Everything that a run's part of a page of so many runs shows; ``spatial`` with what is in 3D."""
     tracks = story.tracks()
     pairs = pairs_of(story)
     drawn = thumbnails.thumbnails(pairs, album, thumbnails.PAGE_BYTES // runs)
@@ -44,7 +44,7 @@ def chapter(story: Story, album: Album | None, runs: int = 1, spatial: bool = Tr
         "timeline": _timeline(story),
         "reasons": _reasons(story),
         "pairs": _browser(pairs, drawn, album),
-        "clouds": None if solid is None else _clouds(solid, album),
+        "clouds": None if solid is None else _clouds(solid),
         "galleries": [] if album is None else _galleries(pairs, story, album),
         "objects": _objects(story),
         "stages": _stages(story),
@@ -219,10 +219,10 @@ def _browser(pairs: Sequence[Pair], drawn: Thumbnails, album: Album | None) -> V
     }
 
 
-def _clouds(made: Clouds, album: Album | None) -> View:
-    """What a pane draws in space, and which pairs it lacks."""
+def _clouds(made: Clouds) -> View:
+    """What a pane draws in space, None where there is nothing, and which pairs it lacks."""
     data = {"moments": made.moments, "poses": made.poses, "absent": made.absent}
-    return {"lacking": made.lacking, "data": data, "any": album is not None}
+    return {"lacking": made.lacking, "data": data if made.poses else None}
 
 
 def _row(pair: Pair) -> View:

@@ -64,7 +64,9 @@ class Clouds:
 def clouds(pairs: Iterable[Pair], album: Album | None, most_bytes: int = PAGE_BYTES) -> Clouds:
     """The clouds of the pairs that have a pose: of false constraints first, then of right ones, then of refusals."""
     made = Clouds()
-    for pair in by_interest(pairs) if album is not None else ():
+    if album is None:
+        return made
+    for pair in by_interest(pairs):
         if pair.told.T_from_to is None or pair.told.from_ns == pair.told.to_ns:
             continue
         if LEFT_OUT in made.absent.values():

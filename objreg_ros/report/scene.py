@@ -43,7 +43,8 @@ def scene(story: Story, stamps_ns: Array, lines: Mapping[str, Array], tracks: Tr
 
 
 def _levelling(story: Story, stamps_ns: Array, tracks: Tracks | None) -> Array:
-    """The rotation (4, 4) that turns the frame of the drawing until z is up."""
+    """The rotation (4, 4) that turns the frame of the drawing until z is up, by some of the poses."""
+    stamps_ns = stamps_ns[:: len(stamps_ns) // 100 or 1]
     if tracks is None:
         poses = [T for stamp in stamps_ns if (T := story.truth.at(int(stamp))) is not None]
     else:

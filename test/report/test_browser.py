@@ -126,6 +126,7 @@ def in_space(browser: Any, place: str) -> dict[str, Any]:
 
 @pytest.mark.skipif(not plotly_bundle(), reason="plotly is not installed")
 def test_the_way_and_both_clouds_of_a_pair_can_be_turned_about_once_one_asks(browser: Any) -> None:
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", TELEPHONE)
     assert browser.execute_script("return window.Plotly === undefined"), "nothing is loaded before"
     click(browser, ".world .draw")
     drawn = in_space(browser, ".world")

@@ -103,7 +103,7 @@
     }
 
     async draw() {
-      this.button.setAttribute("aria-pressed", this.open);
+      this.button.setAttribute("aria-expanded", this.open);
       this.button.textContent = this.open ? "Hide the 3D view" : this.words;
       const drawn = this.open ? this.traces() : "";
       const isDrawn = typeof drawn !== "string";
