@@ -12,6 +12,7 @@
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
 
   async function load() {
+    if (!document.createElement("canvas").getContext("webgl")) throw new Error("WebGL is off");
     const packed = new Blob([bytes(document.querySelector("script.plotly").textContent)]);
     const unpacked = packed.stream().pipeThrough(new DecompressionStream("gzip"));
     const script = document.createElement("script");
@@ -29,6 +30,19 @@
 
   const isNarrow = matchMedia("(max-width: 560px)");
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
+
+  // Where the eye is, in plotly's unit, the mean extent: the further, the longer the longest extent is beside that.
+  function eyeFor(direction, traces) {
+    const spans = ["x", "y", "z"].map((axis) => {
+      let low = Infinity, high = -Infinity;
+      for (const trace of traces) for (const value of trace[axis]) {
+        if (value !== null) [low, high] = [Math.min(low, value), Math.max(high, value)];
+      }
+      return high > low ? high - low : 2;
+    });
+    const far = Math.max(...spans) / Math.cbrt(spans[0] * spans[1] * spans[2]);
+    return { x: far * direction[0], y: far * direction[1], z: far * direction[2] };
+  }
 
   function layout(eye) {
     const axis = (title) => ({ title: { text: title }, color: colour("soft"), gridcolor: colour("rule"),
@@ -94,44 +108,42 @@
   // A place with a button and a drawing. `traces` gives what is drawn, or the words that say why there is nothing;
   // `chosen` hears which point was clicked.
   class Space {
-    constructor(place, eye, traces, chosen) {
-      Object.assign(this, { eye, traces, chosen, open: false, isHeard: false });
+    constructor(place, direction, traces, chosen) {
+      Object.assign(this, { direction, traces, chosen, open: false, turn: 0, drawing: Promise.resolve() });
       [this.button, this.told, this.plot] = [".draw", ".told", ".plot"].map((name) => place.querySelector(name));
       this.words = this.button.textContent;
       this.button.addEventListener("click", () => { this.open = !this.open; this.draw(); });
       spaces.push(this);
     }
 
-    async draw() {
+    // One drawing after another, and only the last that was asked for: a browser has few WebGL contexts.
+    draw() {
+      const turn = ++this.turn;
+      this.drawing = this.drawing.then(() => turn === this.turn && this.drawNow());
+    }
+
+    async drawNow() {
       this.button.setAttribute("aria-expanded", this.open);
       this.button.textContent = this.open ? "Hide the 3D view" : this.words;
       const drawn = this.open ? this.traces() : "";
-      const isDrawn = typeof drawn !== "string";
-      this.told.textContent = isDrawn ? "" : drawn;
-      this.plot.hidden = !isDrawn;
-      if (isDrawn) await this.show(drawn).catch((error) => this.fail(error));
-      else this.clear();
+      this.plot.hidden = typeof drawn === "string";
+      this.told.textContent = this.plot.hidden ? drawn : "";
+      if (!this.plot.hidden) await this.show(drawn).catch((error) => this.fail(error));
     }
 
     async show(drawn) {
-      if (!document.createElement("canvas").getContext("webgl")) throw new Error("WebGL is off");
       if (!library) this.told.textContent = "A moment…";
       const Plotly = await (library ??= load());
       this.told.textContent = "";
-      if (this.plot.hidden) return;
-      await Plotly.react(this.plot, drawn, layout(this.eye), CONFIG);
-      if (this.chosen && !this.isHeard) this.plot.on("plotly_click", (event) => this.chosen(event.points[0]));
-      this.isHeard = true;
+      const isFirst = !this.plot.data;
+      await Plotly.react(this.plot, drawn, layout(eyeFor(this.direction, drawn)), CONFIG);
+      if (isFirst && this.chosen) this.plot.on("plotly_click", (event) => this.chosen(event.points[0]));
+      if (this.plot._fullLayout.width !== this.plot.clientWidth) await Plotly.Plots.resize(this.plot);
     }
 
     fail(error) {
       this.plot.hidden = true;
       this.told.textContent = `This browser cannot draw it in 3D: ${error.message}.`;
-    }
-
-    clear() {
-      if (window.Plotly) window.Plotly.purge(this.plot);
-      this.isHeard = false;
     }
   }
 
@@ -140,7 +152,7 @@
     if (!place) return;
     const traces = () => world(JSON.parse(place.querySelector("script.scene").textContent));
     const open = (key) => article.dispatchEvent(new CustomEvent("open-pair", { detail: key }));
-    new Space(place, { x: -1.0, y: -1.4, z: 1.2 }, traces, (point) => point.customdata && open(point.customdata));
+    new Space(place, [-0.75, -1.05, 0.9], traces, (point) => point.customdata && open(point.customdata));
   }
 
   function addPair(article) {
@@ -149,7 +161,7 @@
     const place = pane.querySelector(".space"), paint = place.querySelector(".paint");
     const told = JSON.parse(article.querySelector("script.data").textContent).pairs;
     let clouds;
-    const space = new Space(place, { x: 0.3, y: -1.7, z: 0.6 }, () => {
+    const space = new Space(place, [0.2, -1.3, 0.5], () => {
       const key = place.dataset.pair;
       clouds ??= JSON.parse(stored.textContent);
       if (clouds.poses[key]) return pair(clouds, told[key], key, paint.querySelector("select").value);
@@ -157,7 +169,6 @@
     });
     paint.addEventListener("change", () => space.draw());
     place.addEventListener("pair", () => space.draw());
-    pane.addEventListener("close", () => space.clear());
   }
 
   for (const article of document.querySelectorAll("article.run")) {
