@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-HEAVY = ("gtsam", "matplotlib", "open3d", "rerun")
+HEAVY = ("gtsam", "matplotlib", "open3d", "plotly", "rerun")
 NODES = ("detector", "segmenter", "registrar", "mapper")
 CODE = "import importlib, sys; importlib.import_module(sys.argv[1]); print(*(set(sys.argv[2:]) & set(sys.modules)))"
 

@@ -162,6 +162,7 @@ def test_onnxruntime_is_imported_in_one_file_only() -> None:
         ("open3d", {"registration.paper", "segmenter.paper"}),
         ("matplotlib", {"report.live_pictures"}),
         ("rerun", {"report.rerun_file"}),
+        ("plotly", {"report.bundle"}),
     ],
 )
 def test_a_heavy_library_is_imported_only_where_it_is_used(library: str, users: set[str]) -> None:

@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 
 from objreg_ros.data import UNTRIED, Array
-from objreg_ros.report import figures
+from objreg_ros.report import clouds, figures, thumbnails
+from objreg_ros.report.clouds import Clouds
 from objreg_ros.report.pairs import ACCEPTED, Pair, pairs_of
 from objreg_ros.report.pictures import Album, chosen_closures, chosen_refusals, data_uri, overlay
 from objreg_ros.report.reasons import MEANINGS
+from objreg_ros.report.scene import scene
 from objreg_ros.report.story import Story, Tracks, of_one_clock
-from objreg_ros.report.thumbnails import Thumbnails, thumbnails
+from objreg_ros.report.thumbnails import Thumbnails
 
 View = dict[str, Any]
 
@@ -26,11 +28,12 @@ OVERLAID = (
 )
 
 
-def chapter(story: Story, album: Album | None, most_bytes: int) -> View:
-    """Everything that a run's part of the page shows; its thumbnails have at most so many bytes."""
+def chapter(story: Story, album: Album | None, runs: int = 1, spatial: bool = True) -> View:
+    """Everything that a run's part of a page of so many runs shows; ``spatial`` with what is in 3D."""
     tracks = story.tracks()
     pairs = pairs_of(story)
-    drawn = thumbnails(pairs, album, most_bytes)
+    drawn = thumbnails.thumbnails(pairs, album, thumbnails.PAGE_BYTES // runs)
+    solid = clouds.clouds(pairs, album, clouds.PAGE_BYTES // runs) if spatial else None
     return {
         "name": story.name,
         "said": _said(story),
@@ -41,6 +44,7 @@ def chapter(story: Story, album: Album | None, most_bytes: int) -> View:
         "timeline": _timeline(story),
         "reasons": _reasons(story),
         "pairs": _browser(pairs, drawn, album),
+        "clouds": None if solid is None else _clouds(solid),
         "galleries": [] if album is None else _galleries(pairs, story, album),
         "objects": _objects(story),
         "stages": _stages(story),
@@ -144,13 +148,14 @@ def _way(story: Story, tracks: Tracks | None) -> View:
         )
     else:
         words = "There is neither odometry nor ground truth in this run, so there is no way to draw."
-        return {"words": words, "legend": [], "drawing": None, "error": None}
+        return {"words": words, "legend": [], "drawing": None, "error": None, "scene": None}
     names = {"true": "truth", "accepted": "closure"}
     marks = [*lines, *sorted({figures.verdict(story, closure) for closure in story.closures})]
     return {
         "words": words,
         "legend": [(mark, names.get(mark, "false closure" if mark == "false" else mark)) for mark in marks],
         "drawing": _in_both_widths(lambda width: figures.way(story, stamps_ns, lines, width)),
+        "scene": scene(story, stamps_ns, lines, tracks),
         "error": None if tracks is None else _in_both_widths(lambda w: figures.error_over_time(story, tracks, w)),
     }
 
@@ -212,6 +217,12 @@ def _browser(pairs: Sequence[Pair], drawn: Thumbnails, album: Album | None) -> V
             "overlays": drawn.overlays,
         },
     }
+
+
+def _clouds(made: Clouds) -> View:
+    """What a pane draws in space, None where there is nothing, and which pairs it lacks."""
+    data = {"moments": made.moments, "poses": made.poses, "absent": made.absent}
+    return {"lacking": made.lacking, "data": data if made.poses else None}
 
 
 def _row(pair: Pair) -> View:

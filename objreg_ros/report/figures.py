@@ -46,8 +46,9 @@ def way(story: Story, stamps_ns: Array, lines: Mapping[str, Array], width: int =
         plot.line(xy, name, name)
     main = list(flat.values())[-1]
     for k, closure in enumerate(story.closures):
-        ends = [main[np.abs(stamps_ns - stamp).argmin()] for stamp in (closure.from_ns, closure.to_ns)]
-        plot.line(np.array(ends), f"link {verdict(story, closure)}", closure_words(story, closure), f"c{k}")
+        plot.line(
+            ends(closure, stamps_ns, main), f"link {verdict(story, closure)}", closure_words(story, closure), f"c{k}"
+        )
     x, y = main[0]
     plot.dot(x, y, "start", "start", radius=4)
     plot.text(plot.x(x) + 8, plot.y(y) - 6, "start")
@@ -153,6 +154,11 @@ def apart(names: Sequence[tuple[str, tuple[float, float]]]) -> list[tuple[str, t
 def verdict(story: Story, closure: LoopClosure) -> str:
     """The CSS class of a closure."""
     return "false" if story.is_false(closure) else "accepted"
+
+
+def ends(closure: LoopClosure, stamps_ns: Array, way: Array) -> Array:
+    """Where both moments of a closure are on a way (N, D) at stamps (N,): (2, D)."""
+    return np.array([way[np.abs(stamps_ns - stamp).argmin()] for stamp in (closure.from_ns, closure.to_ns)])
 
 
 def closure_words(story: Story, closure: LoopClosure) -> str:

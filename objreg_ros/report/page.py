@@ -9,11 +9,11 @@ from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from objreg_ros.report.bundle import plotly_bundle
 from objreg_ros.report.chapter import chapter
 from objreg_ros.report.comparison import comparison
 from objreg_ros.report.pictures import Album
 from objreg_ros.report.story import Story
-from objreg_ros.report.thumbnails import PAGE_BYTES
 
 TEMPLATES = Path(__file__).parent / "templates"
 
@@ -23,13 +23,14 @@ def page(chapters: Sequence[tuple[Story, Album | None]]) -> str:
 
     More runs than one are compared before them.
     """
-    share = PAGE_BYTES // max(1, len(chapters))
-    views = [chapter(story, album, share) for story, album in chapters]
+    bundle = plotly_bundle()
+    views = [chapter(story, album, len(chapters), spatial=bool(bundle)) for story, album in chapters]
     compared = comparison([story for story, _ in chapters]) if len(chapters) > 1 else None
     for view, name in zip(views, compared["names"] if compared else (), strict=False):
         view["letter"] = name
     template = environment().get_template("page.html.j2")
-    return template.render(title=", ".join(view["name"] for view in views), chapters=views, compared=compared)
+    title = ", ".join(view["name"] for view in views)
+    return template.render(title=title, chapters=views, compared=compared, bundle=bundle)
 
 
 @cache

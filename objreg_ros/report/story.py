@@ -40,6 +40,7 @@ class Tracks:
     """The camera's way three times over, at ``stamps_ns``: positions (N, 3) m in one frame, the true ones or None.
 
     ``odometry_error`` and ``corrected_error`` (N,) m are the distances from the truth, None without it.
+    ``T_drawn_map`` (4, 4) lays the map over the truth: by it ``corrected`` is drawn.
     """
 
     stamps_ns: Array
@@ -48,6 +49,7 @@ class Tracks:
     true: Array | None
     odometry_error: Array | None = None
     corrected_error: Array | None = None
+    T_drawn_map: Array = field(default_factory=lambda: np.eye(4))
 
     @property
     def lines(self) -> dict[str, Array]:
@@ -174,6 +176,7 @@ class Story:
             positions(targets),
             absolute_errors(odometry, targets),
             absolute_errors(corrected, targets),
+            rigid_fit(positions(corrected), positions(targets)),
         )
 
     def true_way(self) -> tuple[Array, Array] | None:

@@ -16,7 +16,7 @@ FINDING = {"what": "No image was read.", "cause": "All <malformed>.", "todo": "o
 
 
 def view(told: dict[str, Any], truth: Truth = TRUTH) -> dict[str, Any]:
-    return chapter(Story.of("walk", told, truth), None, 0)
+    return chapter(Story.of("walk", told, truth), None)
 
 
 def test_every_pair_has_a_row_with_its_numbers() -> None:

@@ -6,6 +6,11 @@ from __future__ import annotations
 import re
 from html.parser import HTMLParser
 
+import pytest
+
+from objreg_ros.report import clouds, thumbnails
+from objreg_ros.report import page as pages
+from objreg_ros.report.bundle import plotly_bundle
 from objreg_ros.report.page import page
 from objreg_ros.report.story import Story
 from objreg_ros.truth import Truth
@@ -37,6 +42,20 @@ def test_the_page_is_well_formed_and_loads_nothing() -> None:
     assert parser.open == []
     assert not re.search(r"https?://|<script[^>]* src|<link|url\(", text)
     assert "prefers-color-scheme: dark" in text
+
+
+def test_without_plotly_the_page_says_what_3d_needs_and_keeps_its_drawings(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pages, "plotly_bundle", lambda: "")
+    text = page([(Story.of("walk", summary(), TRUTH), None)])
+    assert text.count("pip install plotly") == 1 and 'class="plot"' not in text and 'class="line corrected"' in text
+
+
+def test_what_a_page_may_hold_leaves_2_mb_of_15_for_its_drawings() -> None:
+    assert thumbnails.PAGE_BYTES + clouds.PAGE_BYTES + len(plotly_bundle()) <= 13_000_000
+
+
+def test_a_run_with_nothing_in_space_does_not_carry_what_draws_it() -> None:
+    assert len(page([(Story.of("empty", {"frames": 3, "constraints": []}, Truth([])), None)])) < 100_000
 
 
 def test_the_head_tells_of_false_constraints_and_of_the_error() -> None:

@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: Apache-2.0
+"""plotly.js, which draws in 3D, as a page carries it; plotly need not be installed."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+from functools import cache
+
+
+@cache
+def plotly_bundle() -> str:
+    """The gzip of plotly.js in base64, 2 MB; empty where plotly is not installed."""
+    try:
+        from plotly.offline import get_plotlyjs
+    except ImportError:
+        return ""
+    return base64.b64encode(gzip.compress(get_plotlyjs().encode(), mtime=0)).decode("ascii")

@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Points come back from 16 bits a coordinate."""
+
+from __future__ import annotations
+
+import base64
+from typing import Any
+
+import numpy as np
+
+from objreg_ros.report.packed import packed
+
+
+def unpacked(told: dict[str, Any]) -> np.ndarray:
+    """As templates/space.js does."""
+    steps = np.frombuffer(base64.b64decode(told["xyz"]), "<u2").reshape(3, -1).T
+    return np.array(told["low"]) + told["step"] * steps
+
+
+def test_points_come_back_to_half_a_step() -> None:
+    xyz = np.random.default_rng(0).uniform((-1, 0, 5), (1, 20, 6), (500, 3))
+    told = packed(xyz)
+    assert told["step"] < 20 / 65000 and np.abs(unpacked(told) - xyz).max() <= 0.501 * told["step"]
+    assert len(told["xyz"]) == 500 * 8
+
+
+def test_one_point_and_none_are_packed_too() -> None:
+    assert np.array_equal(unpacked(packed(np.array([[1.0, 2.0, 3.0]]))), [[1.0, 2.0, 3.0]])
+    assert unpacked(packed(np.zeros((0, 3)))).shape == (0, 3)
