@@ -184,6 +184,7 @@ class Run:
             "constraints": [constraint_with_error(closure, truth) for closure in self.closures],
             "rejected": dict(sorted(self.rejected.items())),
             "dropped": dict(sorted(self.dropped.items())),
+            "complaints": dict(sorted(self.complaints.items())),
             "gravity": self.gravity(),
             "stage_ms": {stage: percentiles_ms(seconds) for stage, seconds in self.stage_s.items()},
             "truth": summarise(truth.errors(self.closures)),

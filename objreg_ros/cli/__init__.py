@@ -40,7 +40,7 @@ SUMMARIES = {
 }
 FOLDER = Path(__file__).parent
 NAME = "objreg"
-BROKEN, INTERRUPTED, UNHEARD, TERMINATED = 1, 130, 141, 143
+BROKEN, NOTHING, INTERRUPTED, UNHEARD, TERMINATED = 1, 3, 130, 141, 143  # nothing: what was read gave no frame
 AGAIN_S = 0.05  # after which an interrupt that was swallowed comes again
 FIRST_TIME = "the first time compiles for a minute"
 
@@ -114,6 +114,8 @@ loudness.heard_by(group)
 
 def main(*arguments: Any) -> None:
     """The executable. A broken input is one line on stderr and exit 1; anything else is a bug and shows itself.
+
+    A run of which no frame got through ends with 3, as does the inspection of what the graph cannot run on.
 
     SIGINT and SIGTERM end what was begun, with the usual status, and so does a reader of the output who has left.
     """

@@ -17,20 +17,26 @@ from objreg_ros.bridge import from_msg
 from objreg_ros.bridge.calibration import absolute
 from objreg_ros.cli import live_table, options
 from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
+from objreg_ros.cli.loudness import aside
 from objreg_ros.cli.played import as_rosbag2, simulated_room
 from objreg_ros.cli.settings import parse_change, read_settings, ros_argument, tell_ignored
+from objreg_ros.cli.told import closing_lines, exit_code, tell, tell_reasons
 from objreg_ros.data import ColourImage, Intrinsics
+from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import quaternion_from_rotation
 from objreg_ros.offline import constraint_with_error, refusal_with_evidence
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.mounts import TRANSFORMS, camera_on_body
 from objreg_ros.recording.told_camera import with_camera
+from objreg_ros.recording.troubles import troubles
 from objreg_ros.registration.params import RegistrarNodeParams
+from objreg_ros.report.findings import as_json, find, setting
 from objreg_ros.report.live_pictures import draw_sight, draw_way
 from objreg_ros.report.write import write_report
 from objreg_ros.segmenter.params import SegmenterNodeParams
 from objreg_ros.truth import Truth, summarise
+from objreg_ros.whole_file import write_whole
 
 SIMULATED = {"registrar.covariance_calibration": "0.01", "detector.model": share.EMBEDDED}
 """The camera is as its calibration says, and a model knows the objects."""
@@ -71,17 +77,19 @@ class Asked:
     show_default=True,
     help="Where everything is written.",
 )
-def command(**asked: Any) -> None:
+def command(**asked: Any) -> int:
     """Play RECORDING (or a simulated room) through three live nodes and show what came out.
 
     Ends with the books of every node, latencies, constraints and their true error, and with pictures in the folder of
-    --out. Of a recording that is no rosbag2, what the graph uses is written as one first.
+    --out. Of a recording that is no rosbag2, what the graph uses is written as one first. The last lines say whether it
+    worked, how well, and what to do next; it ends with 3 if no frame got through.
     """
-    run(Asked(**asked))
+    return run(Asked(**asked))
 
 
-def run(asked: Asked) -> None:
-    """The whole demo; ValueError or OSError if it cannot be, or if the books do not balance."""
+def run(asked: Asked) -> int:
+    """The whole demo and its exit code; ValueError or OSError if it cannot be, or if the books do not balance."""
+    own = asked.recording is not None
     asked = asked if asked.recording else calibrated(asked)
     recording = asked.recording or simulated_room(asked.out)
     inputs, camera = _inputs(recording, asked), camera_asked(asked)
@@ -89,19 +97,35 @@ def run(asked: Asked) -> None:
     with open_recording(bag) as opened:
         source = with_camera(opened, camera, inputs.outright)
         T_base_camera = mounting_of(asked) or _mounting_by_tf(source, inputs)
-        live = run_live(bag, setup_of(asked, inputs, camera), asked.out / "logs", _say)
+        logs = asked.out / "logs"
+        live = run_live(bag, setup_of(asked, inputs, camera), logs, _say)
         truth = Truth.of(source, inputs.ground_truth)
         for note in truth.notes:
             _say(f"! {note}")
-        told = {"recording": str(bag.resolve()), "name": recording.resolve().name, "inputs": inputs.outright,
-                "camera": absolute(camera)}  # fmt: skip
-        _write(asked.out / "demo.json", {**told, "T_base_camera": T_base_camera}, live, truth)
+        told = {
+            "recording": str(bag.resolve()),
+            "name": recording.resolve().name,
+            "inputs": inputs.outright,
+            "camera": absolute(camera),
+            "T_base_camera": T_base_camera,
+            "logs": str(logs.resolve()),
+            **setting(source, inputs, model_of(asked)),
+        }
+        told = summary_of(told, live, truth)
+        findings = find(told, troubles(source, inputs))
+        write_whole(asked.out / "demo.json", json.dumps({**told, "findings": as_json(findings)}, indent=1))
         _draw(asked.out, live, truth, source, inputs)
         sent = _sent(source, inputs, asked.seconds, live)
     write_report(asked.out / "report.html", [asked.out / "demo.json"])
     _say(f"wrote {asked.out / 'report.html'}")
-    click.echo("\n".join(live_table.lines(live, sent, summarise(truth.errors(live.closures)))))
+    with aside():
+        click.echo("\n".join(live_table.lines(live, sent, summarise(truth.errors(live.closures)))))
+        tell_reasons(live.refusals)
+        click.echo()
     live_table.require_balance(live, sent)
+    tell(findings)
+    click.echo("\n".join(closing_lines(told, findings, asked.out, own)))
+    return exit_code(told)
 
 
 def calibrated(asked: Asked) -> Asked:
@@ -191,9 +215,14 @@ def camera_asked(asked: Asked) -> str:
     return asked.camera or told
 
 
-def _write(file: Path, told: Mapping[str, Any], live: Live, truth: Truth) -> None:
+def model_of(asked: Asked) -> str:
+    """The detector's model, by its option or by its parameter."""
+    return asked.model or read_settings(asked.params_file, asked.changes).of("detector", DetectorParams).model
+
+
+def summary_of(told: Mapping[str, Any], live: Live, truth: Truth) -> dict[str, Any]:
     """The run as JSON, after what is told of its recording."""
-    summary = {
+    return {
         **told,
         "nodes": {room: asdict(books) for room, books in live.books.items()},
         "constraints": [constraint_with_error(closure, truth) for closure in live.closures],
@@ -202,7 +231,6 @@ def _write(file: Path, told: Mapping[str, Any], live: Live, truth: Truth) -> Non
         "refusals": [refusal_with_evidence(rejected) for rejected in live.refusals],
         "glimpses": live.glimpses,
     }
-    file.write_text(json.dumps(summary, indent=1))
 
 
 def _draw(out: Path, live: Live, truth: Truth, source: Recording, inputs: Inputs) -> None:

@@ -9,12 +9,14 @@ from pathlib import Path
 
 import click
 
-from objreg_ros.cli import options
+from objreg_ros.cli import NOTHING, options
+from objreg_ros.cli.told import tell
 from objreg_ros.memory.store_file import is_store
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import GRAPH_TOPICS, Inputs, choose_inputs, parse_remaps
-from objreg_ros.recording.summary import describe_lens, describe_topics, warnings
+from objreg_ros.recording.summary import describe_lens, describe_topics
 from objreg_ros.recording.told_camera import with_camera
+from objreg_ros.recording.troubles import warnings
 from objreg_ros.report.live_pictures import write_picture
 from objreg_ros.report.store_summary import describe, draw, survey
 from objreg_ros.truth import Truth
@@ -25,14 +27,15 @@ from objreg_ros.truth import Truth
 @options.remap
 @options.camera
 @click.option("--picture", type=click.Path(dir_okay=False, path_type=Path), help="Draw the objects of a store (PNG).")
-def command(recording: Path, remaps: tuple[str, ...], camera: str, picture: Path | None) -> None:
+def command(recording: Path, remaps: tuple[str, ...], camera: str, picture: Path | None) -> int:
     """Say what is in RECORDING, which topics the graph would use, and what would go wrong.
 
-    RECORDING may also be a store of the registrar: then its sessions, labels and objects are told.
+    Ends with 3 where the graph cannot run on it. RECORDING may also be a store of the registrar: then its sessions,
+    labels and objects are told.
     """
     if is_store(recording):
         _say_store(recording, picture)
-        return
+        return 0
     if picture is not None:
         raise ValueError(f"--picture: expected a store of the registrar, whose objects it draws, got {recording}")
     asked = parse_remaps(remaps)
@@ -44,8 +47,8 @@ def command(recording: Path, remaps: tuple[str, ...], camera: str, picture: Path
         _say_inputs(inputs)
         _say_lens(source, inputs)
         _say_truth(source, inputs)
-        for warning in warnings(source, inputs):
-            click.echo(f"! {warning}")
+        tell(warnings(source, inputs))
+    return 0 if inputs.complete else NOTHING
 
 
 def _say_store(store: Path, picture: Path | None) -> None:

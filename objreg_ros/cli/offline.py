@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -16,8 +15,10 @@ from tqdm import tqdm
 
 from objreg_ros.bridge.calibration import absolute
 from objreg_ros.cli import FIRST_TIME, options
+from objreg_ros.cli.loudness import aside
 from objreg_ros.cli.options import require_writable
 from objreg_ros.cli.settings import Settings, read_settings, tell_ignored
+from objreg_ros.cli.told import exit_code, json_to, tell, tell_reasons
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.offline import Run, Timing, build_rooms, run_offline
 from objreg_ros.recording import Record, Recording, open_recording
@@ -25,8 +26,10 @@ from objreg_ros.recording.drift import ODOM, with_drifting_odometry
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.mounts import static_frames
 from objreg_ros.recording.told_camera import with_camera
+from objreg_ros.recording.troubles import troubles
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.report.about import about
+from objreg_ros.report.findings import as_json, find, setting, verdict
 from objreg_ros.report.map_files import VOXEL_M, MapFiles
 from objreg_ros.report.story import Story
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
@@ -45,7 +48,7 @@ CAMERAS_OWN = (
 @options.model
 @options.labels
 @options.camera
-@click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the outcome here.")
+@options.json_out
 @click.option(
     "--tum", type=FILE, help="Write the corrected trajectory here: stamp tx ty tz qx qy qz qw, as evo reads it."
 )
@@ -84,7 +87,7 @@ def command(
     params_file: Path | None,
     changes: tuple[str, ...],
     remaps: tuple[str, ...],
-) -> None:
+) -> int:
     """Run RECORDING (rosbag1, rosbag2 or a TUM RGB-D folder) through detector, segmenter and registrar without ROS.
 
     Deterministic, and as fast as the CPU goes. Prints what came out and, where the recording has ground truth, the
@@ -92,6 +95,8 @@ def command(
 
     With odometry the constraints correct it: --tum, --kitti, --g2o and --map write what comes out, in the frame in
     which odometry began. Poses are of the camera's optical frame, at every frame of the recording.
+
+    Says where the run stopped if no loop was closed, and ends with 3 if no frame got through.
     """
     files = _files(tum, kitti, g2o, cloud, voxel)
     for option, file in (({"--json": json_file} if json_file else {}) | files.wanted).items():
@@ -100,7 +105,7 @@ def command(
     settings = read_settings(params_file, [*changes, *_named(model, labels, camera)])
     tell_ignored(settings)
     told = settings.of("segmenter", SegmenterNodeParams)
-    with open_recording(recording) as opened, TemporaryDirectory() as folder:
+    with open_recording(recording) as opened, TemporaryDirectory() as folder, json_to(json_file) as write_json:
         source = with_camera(opened, told.camera, parse_remaps(remaps), told.source)
         inputs = _inputs(source, remaps, odometry, told.source)
         _require_odometry(files, source, inputs)
@@ -109,21 +114,26 @@ def command(
             click.echo(f"! {note}", err=True)
         registrar = _remembering(settings.of("registrar", RegistrarParams), files, folder)
         run = _run(source, inputs, settings, registrar, max_frames, odometry)
-        summary = run.summary(truth)
+        detector = settings.of("detector", DetectorParams)
+        summary = {
+            "about": about(recording, detector.model, settings.changed(), sys.argv[1:]),
+            "recording": str(recording.resolve()),
+            "inputs": inputs.outright,
+            "odometry": inputs.odom,
+            "rectified": told.rectified,
+            "camera": absolute(told.camera),
+            **setting(source, inputs, detector.model),
+            **run.summary(truth),
+        }
         _say(run, summary)
-        if json_file is not None:
-            detector = settings.of("detector", DetectorParams)
-            told_of = {
-                "about": about(recording, detector.model, settings.changed(), sys.argv[1:]),
-                "recording": str(recording.resolve()),
-                "inputs": inputs.outright,
-                "odometry": inputs.odom,
-                "rectified": told.rectified,
-                "camera": absolute(told.camera),
-            }
-            json_file.write_text(json.dumps({**told_of, **summary}, indent=1))
-        if files.wanted:
+        tell_reasons(run.refusals)
+        findings = find(summary, troubles(source, inputs))
+        click.echo(verdict(summary, findings))
+        tell(findings)
+        write_json({**summary, "findings": as_json(findings)})
+        if files.wanted and run.frames:
             _map(files, Story.of(recording.name, summary, truth), Path(registrar.store))
+        return exit_code(summary)
 
 
 def _files(tum: Path | None, kitti: Path | None, g2o: Path | None, cloud: Path | None, voxel: float) -> MapFiles:
@@ -150,6 +160,7 @@ def _remembering(registrar: RegistrarParams, files: MapFiles, folder: str) -> Re
     return registrar.replaced(store=str(Path(folder, "keyframes.db")))
 
 
+@aside()
 def _map(files: MapFiles, story: Story, store: Path) -> None:
     """Write what is asked for of the corrected map, and say what became of it."""
     click.echo(f"  map: {len(story.graph.keyframes)} keyframes, {len(story.pruned)} constraints pruned")
@@ -250,6 +261,7 @@ def _records(source: Recording, inputs: Inputs, odometry: str | None) -> Iterato
     return with_drifting_odometry(records, inputs.ground_truth, int(odometry.removeprefix(DRIFT)))
 
 
+@aside()
 def _say(run: Run, summary: dict) -> None:
     click.echo(
         f"{run.frames} frames, {run.detections} detections, {run.objects} objects, {len(run.closures)} constraints"

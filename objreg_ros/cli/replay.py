@@ -12,13 +12,15 @@ import click
 from tqdm import tqdm
 
 from objreg_ros.bridge.receipts import DEPTH, IMAGE, Receipts
-from objreg_ros.cli import options
+from objreg_ros.cli import NOTHING, options
+from objreg_ros.cli.told import tell
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import SOURCES, Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.messages import header_stamp_ns
 from objreg_ros.recording.mounts import TRANSFORMS, static_topics
 from objreg_ros.recording.replay import Selection, graph_names, read_ahead, recorded_names
 from objreg_ros.recording.told_camera import with_camera
+from objreg_ros.recording.troubles import troubles
 
 if TYPE_CHECKING:
     from objreg_ros.bridge.player import Item, Player
@@ -62,11 +64,12 @@ def command(
     camera: str,
     depth_source: str,
     ros_args: tuple[str, ...],
-) -> None:
+) -> int:
     """Publish RECORDING under the names that the nodes listen to.
 
     With --all, topics of a type that is not installed here, or that ROS 2 has with other fields, or whose name it does
     not allow, are left out, and named. Arguments behind -- go to ROS, like -- --ros-args -r __ns:=/robot.
+    With --lossless it ends with 3 if no frame got through.
     """
     from objreg_ros.bridge import profile
     from objreg_ros.bridge.lifetime import begin, shutdown_as_interrupt
@@ -78,6 +81,7 @@ def command(
         for note in source.notes:
             click.echo(f"! {note}", err=True)
         inputs = choose_inputs(source.topics, asked, depth_source)
+        tell(troubles(source, inputs), err=True)
         names = playable_names(source, inputs) if everything else {**graph_names(source, inputs), **_mounts(source)}
         if not names:
             raise ValueError(f"{recording}: expected topics that the graph can use, got {', '.join(source.topics)}")
@@ -95,6 +99,15 @@ def command(
                 while again:
                     _play_once(player, source, selection, inputs, None if lossless else rate, receipts, patience)
                     again = loop
+    return _exit_code(receipts)
+
+
+def _exit_code(receipts: Receipts | None) -> int:
+    """`NOTHING` where the last node that receipts frames published none; without receipts nobody can tell."""
+    if receipts is None or receipts.outcomes[receipts.nodes[-1]]["published"]:
+        return 0
+    click.echo(f"! no frame got through the {receipts.nodes[-1]}; docs/troubleshooting.md#no-frame-got-through")
+    return NOTHING
 
 
 @contextmanager
@@ -145,6 +158,8 @@ def _prepare(player: Player, inputs: Inputs, names: dict[str, str], wait: float)
     needed = [names[topic] for topic in (inputs.image, inputs.depth or inputs.points) if topic in names]
     for topic in player.wait_for_listeners(needed, wait):
         click.echo(f"nobody listens to {topic}", err=True)
+    if inputs.missing:
+        click.echo(f"the graph waits for {inputs.missing}, which this replay does not send", err=True)
 
 
 def _play_once(

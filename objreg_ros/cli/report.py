@@ -19,7 +19,7 @@ from objreg_ros.report.write import write_report
 @click.option("--model", help="ONNX model for recordings: a path or the name of an installed one.")
 @click.option("--odometry", metavar="TOPIC|none|drift:SEED", help="For recordings: as in `objreg offline`.")
 @click.pass_context
-def command(context: click.Context, runs: tuple[Path, ...], out: Path, model: str | None, odometry: str | None) -> None:
+def command(context: click.Context, runs: tuple[Path, ...], out: Path, model: str | None, odometry: str | None) -> int:
     """Write one HTML page about runs: the JSON of `objreg offline`, or recordings, which are run now.
 
     It opens offline and holds the trajectory against the truth, a timeline of closures and refusals, pictures of
@@ -31,12 +31,13 @@ def command(context: click.Context, runs: tuple[Path, ...], out: Path, model: st
             f"expected the JSON of `objreg offline --json` or a recording, got nothing at {missing}"
         )
     with tempfile.TemporaryDirectory() as folder:
-        files = []
+        files, code = [], 0
         for number, run in enumerate(runs):
             file = run if run.suffix == ".json" else Path(folder, f"{number}.json")
             if file is not run:
-                context.invoke(offline.command, recording=run, model=model, odometry=odometry, json_file=file)
+                code |= context.invoke(offline.command, recording=run, model=model, odometry=odometry, json_file=file)
             files.append(file)
         for lacking in write_report(out, files):
             click.echo(f"! {lacking}", err=True)
     click.echo(f"wrote {out}")
+    return code

@@ -40,6 +40,10 @@ def _is_rows(value: Any) -> bool:
     return isinstance(value, list) and all(isinstance(row, dict) for row in value)
 
 
+def _is_findings(value: Any) -> bool:
+    return _is_rows(value) and all(isinstance(row.get(key), str) for row in value for key in FINDING)
+
+
 def _is_glimpses(value: Any) -> bool:
     return _is_rows(value) and all(isinstance(row.get("stamp_ns"), int) for row in value)
 
@@ -65,10 +69,10 @@ def _each(fits: Check) -> Check:
     return lambda value: isinstance(value, dict) and all(map(fits, value.values()))
 
 
+FINDING = ("what", "cause", "todo", "anchor")
 FIELDS: dict[str, tuple[str, Check]] = {
     "recording": ("the path of a recording", _is_text),
     "about": ("an object", lambda value: isinstance(value, dict)),
-    "findings": ("a list of objects of text", lambda value: _is_rows(value) and all(map(_each(_is_text), value))),
     "name": ("text", _is_text),
     "lens": ("text", _is_text),
     "rectified": ("auto, all or none", lambda value: value in ("auto", "all", "none")),
@@ -78,6 +82,7 @@ FIELDS: dict[str, tuple[str, Check]] = {
     "frames": ("a count", _is_count),
     "detections": ("a count", _is_count),
     "objects": ("a count", _is_count),
+    "findings": ("a list of objects of what, cause, todo and anchor", _is_findings),
     "rejected": ("an object of counts by reason", _each(_is_count)),
     "stage_ms": ("an object of p50 and p95 in ms by stage", _each(_is_stage)),
     "nodes": ("an object of published and stage_ms (p50, p95) by node", _each(_is_node)),

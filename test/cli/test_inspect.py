@@ -112,3 +112,9 @@ def test_a_camera_that_is_told_is_what_the_graph_would_use(tmp_path: Path) -> No
     told = CliRunner().invoke(command, [str(tum_folder(tmp_path / "tum")), "--camera", "50,50,31.5,23.5"])
     assert told.exit_code == 0 and "64 × 48 fx 50.0 fy 50.0" in told.output
     assert "! not used, as a camera is told: /camera_info" in told.output
+
+
+def test_what_the_graph_cannot_run_on_ends_with_three(tmp_path: Path) -> None:
+    folder = str(tum_folder(tmp_path))
+    for words, code in (([], 0), (["--remap", "image:="], 3)):
+        assert CliRunner().invoke(command, [folder, *words], standalone_mode=False).return_value == code

@@ -220,3 +220,13 @@ def test_a_map_that_cannot_be_written_is_refused_before_the_run(option: str, tmp
 def test_a_voxel_of_no_size_is_refused_before_the_run(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"--voxel: expected voxels of 0\.001 to 10 m, got nan"):
         offline(tmp_path / "no_recording", "--map", tmp_path / "map.ply", "--voxel", "nan")
+
+
+def test_a_run_of_which_no_frame_got_through_says_why_and_ends_with_three(model: Path, tmp_path: Path) -> None:
+    folder, file = tum_folder(tmp_path / "tum", frames=3), tmp_path / "out.json"
+    for picture in (folder / "depth").iterdir():
+        picture.write_bytes(b"no png")
+    words = [str(folder), "--model", str(model), "--json", str(file)]
+    result = CliRunner().invoke(command, words, catch_exceptions=False, standalone_mode=False)
+    assert result.return_value == 3 and "! no frame got through: 3 malformed_depth" in result.output
+    assert json.loads(file.read_text())["findings"][0]["anchor"] == "no-frame-got-through"

@@ -10,7 +10,7 @@ from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.recording import Record, messages, open_recording, write_rosbag2
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.mounts import TRANSFORMS, camera_on_body, static_frames, static_topics
-from objreg_ros.recording.summary import warnings
+from objreg_ros.recording.troubles import warnings
 
 from .folders import CAMERA
 
@@ -42,15 +42,15 @@ def test_the_camera_on_the_body_of_the_odometry_is_what_tf_static_says_whenever(
         assert static_topics(source) == ["/robot/tf_static"] and source.topics["/robot/tf_static"].msgtype == TRANSFORMS
         body, camera, T = camera_on_body(source, choose_inputs(source.topics))
         assert (body, camera) == ("base", "eye") and pytest.approx(T_BODY_CAMERA, abs=1e-9) == T
-        assert not [text for text in warnings(source, choose_inputs(source.topics)) if "tf_static" in text]
+        assert not [w for w in warnings(source, choose_inputs(source.topics)) if "tf_static" in w.text]
 
 
 def test_a_body_that_nothing_ties_to_the_camera_is_told_with_what_to_do(tmp_path: Path) -> None:
     with open_recording(bag(tmp_path / "bag")) as source:
         assert camera_on_body(source, choose_inputs(source.topics)) == ("base", "eye", None)
         assert static_frames(source).between("base", "eye") is None
-        (text,) = [text for text in warnings(source, choose_inputs(source.topics)) if "tf_static" in text]
-        assert text.startswith("odometry is of base and depth in eye") and "set T_base_camera" in text
+        (told,) = [w for w in warnings(source, choose_inputs(source.topics)) if "tf_static" in w.text]
+        assert told.text.startswith("odometry is of base and depth in eye") and "set T_base_camera" in told.text
 
 
 @pytest.mark.parametrize("names", [{"child": ""}, {"camera": ""}, {"child": "eye"}])
@@ -58,4 +58,4 @@ def test_odometry_of_the_camera_itself_and_frames_without_a_name_are_no_trouble(
     names: dict[str, str], tmp_path: Path
 ) -> None:
     with open_recording(bag(tmp_path / "bag", **names)) as source:
-        assert not [text for text in warnings(source, choose_inputs(source.topics)) if "tf_static" in text]
+        assert not [w for w in warnings(source, choose_inputs(source.topics)) if "tf_static" in w.text]

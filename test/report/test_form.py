@@ -37,6 +37,7 @@ BAD: list[tuple[str, Any]] = [
     ("refusals", [None]),
     ("glimpses", [3]),
     ("glimpses", [{}]),
+    ("findings", [{"what": "no more"}]),
 ]
 
 

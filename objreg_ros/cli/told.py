@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a run was found to have, in the terminal, and the exit code that goes with it."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stdout
+from pathlib import Path
+from typing import Any
+
+import click
+
+from objreg_ros.cli import NOTHING
+from objreg_ros.cli.loudness import aside, is_verbose
+from objreg_ros.data import Rejected
+from objreg_ros.recording.finding import Finding
+from objreg_ros.report.findings import Counts, verdict
+from objreg_ros.whole_file import write_whole
+
+STANDARD_OUTPUT = Path("-")
+
+
+@contextmanager
+def json_to(file: Path | None) -> Iterator[Callable[[Any], None]]:
+    """What writes something as JSON into ``file``, or into standard output where that is ``-``.
+
+    In the latter case all else that is said within goes to standard error. Without a file nothing is written.
+    """
+    if file != STANDARD_OUTPUT:
+        yield lambda content: None if file is None else write_whole(file, json.dumps(content, indent=1))
+        return
+    output = sys.stdout
+    with redirect_stdout(sys.stderr):
+        yield lambda content: click.echo(json.dumps(content, indent=1), file=output)
+
+
+def tell_reasons(refusals: Iterable[Rejected]) -> None:
+    """With -v a line for each refusal: both moments, the reason and the numbers behind it."""
+    for refused in refusals if is_verbose() else ():
+        click.echo(f"  {refused.from_ns} to {refused.to_ns} ns: {refused.reason.value}: {refused.detail}")
+
+
+@aside()
+def tell(findings: Iterable[Finding], err: bool = False) -> None:
+    """A block for each finding: what is seen, and below it the likely cause and what to do."""
+    for finding in findings:
+        click.echo(f"! {finding.what}", err=err)
+        if finding.cause:
+            click.echo(f"    likely: {finding.cause}", err=err)
+        if finding.todo:
+            click.echo(f"    next: {finding.todo}", err=err)
+        if finding.anchor:
+            click.echo(f"    more: docs/troubleshooting.md#{finding.anchor}", err=err)
+
+
+def closing_lines(summary: Mapping[str, Any], findings: Sequence[Finding], out: Path, own: bool) -> Iterator[str]:
+    """The end of a demo, whose files are in ``out``: whether it worked, how well, and what to do next.
+
+    ``own`` is whether the recording was the user's, not the simulated room.
+    """
+    yield verdict(summary, findings)
+    yield f"Look at {out / 'report.html'}; the nodes' logs are in {out / 'logs'}."
+    stopped = not summary["constraints"]
+    if stopped and findings:
+        yield f"Next: {findings[0].todo}."
+    elif own:
+        yield "Next: tie the constraints into your mapper, as docs/mappers.md says."
+    else:
+        yield "Next: `objreg inspect YOUR_RECORDING`, then `objreg demo YOUR_RECORDING`."
+
+
+def exit_code(summary: Mapping[str, Any]) -> int:
+    """0 for a run of which frames got through, `NOTHING` for another."""
+    return 0 if Counts.of(summary).frames else NOTHING

@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What would go wrong with a recording or be missed of it, before anything runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from objreg_ros.bridge import from_msg
+from objreg_ros.data import Array, Intrinsics
+from objreg_ros.recording.finding import Finding
+from objreg_ros.recording.inputs import Inputs
+from objreg_ros.recording.mounts import camera_on_body, first_readable, frame_of, static_frames
+from objreg_ros.recording.record import Record, Recording
+
+SAMPLE = 60  # messages of colour and depth whose stamps are compared
+NEAR_NS = 20_000_000  # how far apart colour and depth may be for the nodes' default slop
+FAR_NS = 200_000_000  # in so long a camera moves on: to let such frames meet makes wrong objects
+MOMENTS = 5  # of a recording at which its depth is looked at
+NEVER_ALL_BEYOND_M = 3.0  # a depth camera indoors always has something nearer: its floor, a table, a wall
+NEVER_ALL_WITHIN_M = 0.15  # nearer than any depth camera measures
+
+REGISTER = "record registered depth (RealSense: align_depth.enable:=true, OpenNI: depth_registered)"
+RECORD_UNITS = "record depth in mm (16UC1) or in m (32FC1); a TUM folder names its steps as depth_scale in camera.yaml"
+
+
+def missing(inputs: Inputs) -> Finding | None:
+    """What keeps the graph from running; None where nothing does."""
+    if not inputs.missing:
+        return None
+    lacks_camera = inputs.image and (inputs.points or inputs.depth)
+    return Finding(
+        f"the graph cannot run: expected {inputs.missing}",
+        "it is not recorded, or under a name that is not recognised",
+        "if it is there, name it with --remap input:=/topic" + (", or --camera fx,fy,cx,cy" if lacks_camera else ""),
+        "no-camera-info" if lacks_camera else "waits-for-a-topic",
+    )
+
+
+def warnings(recording: Recording, inputs: Inputs) -> list[Finding]:
+    """What would go wrong or be missed, and what to do; empty if nothing."""
+    lacking = missing(inputs)
+    found = [Finding(note) for note in recording.notes] + ([lacking] if lacking else [])
+    if inputs.odom is None:
+        found.append(Finding("no odometry: the registrar follows the camera by itself, and the gate is less strict"))
+    if inputs.ground_truth is None:
+        found.append(Finding("no ground truth: the true error of constraints cannot be told"))
+    found += map(Finding, [*_mount_of_camera(recording, inputs), *_mount_of_imu(recording, inputs)])
+    for look in (_first_messages, _frames, _stamps, _scale):
+        found += look(recording, inputs)
+    return found
+
+
+def troubles(recording: Recording, inputs: Inputs) -> list[Finding]:
+    """The warnings that a run of the recording repeats: those that may be why it finds little."""
+    return [finding for finding in warnings(recording, inputs) if finding.anchor]
+
+
+def _first_messages(recording: Recording, inputs: Inputs) -> list[Finding]:
+    """What the nodes would say of the first messages."""
+    found: list[Finding] = []
+    colour = _try(found, "image", recording, inputs.image, lambda m: from_msg.image(m).rgb.shape[:2])
+    depth = _try(found, "depth", recording, inputs.depth, lambda m: from_msg.depth(m).shape)
+    cloud = _try(found, "points", recording, inputs.points, from_msg.point_cloud)
+    read = from_msg.intrinsics if cloud is None else partial(from_msg.camera_of_cloud, cloud=cloud)
+    camera: Intrinsics | None = _try(found, "camera_info", recording, inputs.camera_info, read)
+    if camera and depth and depth != (camera.height, camera.width):
+        found.append(
+            Finding(
+                f"depth has {_size(depth)} pixels and its camera_info {camera.width} × {camera.height}",
+                "the camera_info is of another picture, so every frame would be dropped",
+                "name the right one with --remap camera_info:=/topic, or tell the camera with --camera fx,fy,cx,cy",
+                "no-camera-info",
+            )
+        )
+    if colour and depth and colour != depth:
+        found.append(
+            Finding(
+                f"colour has {_size(colour)} pixels and depth {_size(depth)}",
+                "they must show the same field of view, and depth that is not registered to colour seldom does",
+                REGISTER,
+                "depth-is-not-registered",
+            )
+        )
+    if cloud is not None and not cloud.organised and camera is None:
+        found.append(
+            Finding(
+                "points are not organised and there is no camera_info to project them with",
+                "they are of a driver that leaves out pixels without depth",
+                "name a camera_info with --remap camera_info:=/topic, or tell the camera with --camera fx,fy,cx,cy",
+                "no-camera-info",
+            )
+        )
+    return found
+
+
+def _try(
+    found: list[Finding], name: str, recording: Recording, topic: str | None, decode: Callable[[Any], Any]
+) -> Any | None:
+    record = _first(recording, topic)
+    try:
+        return None if record is None else decode(record.message)
+    except ValueError as error:
+        found.append(Finding(f"{name}: {error}"))
+        return None
+
+
+def _size(hw: tuple[int, int]) -> str:
+    return f"{hw[1]} × {hw[0]}"
+
+
+def _frames(recording: Recording, inputs: Inputs) -> list[Finding]:
+    """Whether a depth image is in the frame of colour, as one that is registered to it is."""
+    colour, depth = (_frame_id(recording, topic) for topic in (inputs.image, inputs.depth))
+    if not colour or not depth or colour == depth:
+        return []
+    return [
+        Finding(
+            f"colour is in the frame {colour} and depth in {depth}",
+            "depth that is not registered to colour gives wrong objects",
+            REGISTER,
+            "depth-is-not-registered",
+        )
+    ]
+
+
+def _mount_of_camera(recording: Recording, inputs: Inputs) -> list[str]:
+    """Whether it is known how the camera sits on the body of the odometry."""
+    body, camera, T_body_camera = camera_on_body(recording, inputs)
+    if body == camera or T_body_camera is not None:
+        return []
+    return [
+        f"odometry is of {body} and depth in {camera}, and no /tf_static ties them: they are taken to be one place; "
+        "set T_base_camera of registrar and mapper where they are not"
+    ]
+
+
+def _mount_of_imu(recording: Recording, inputs: Inputs) -> list[str]:
+    """Whether it is known how the IMU sits on the camera."""
+    camera, imu = (_frame_id(recording, topic) for topic in (inputs.depth or inputs.points, inputs.imu))
+    if not camera or not imu or camera == imu or static_frames(recording).between(camera, imu) is not None:
+        return []
+    return [
+        f"the IMU is in the frame {imu} and depth in {camera}, and no /tf_static ties them: it tells gravity only with "
+        "segmenter.T_camera_imu, its pose in the camera's optical frame"
+    ]
+
+
+def _frame_id(recording: Recording, topic: str | None) -> str:
+    """The frame of a topic's first message; empty if it tells none."""
+    return frame_of(first_readable(recording, topic))
+
+
+def _stamps(recording: Recording, inputs: Inputs) -> list[Finding]:
+    """Whether the stamps in the headers let colour and depth be brought together."""
+    topics = inputs.image, inputs.depth or inputs.points
+    begins = [record.stamp_ns for topic in topics if (record := _first(recording, topic)) is not None]
+    colour, depth = (_header_stamps(recording, topic, max(begins, default=0)) for topic in topics)
+    found = [*_course("colour", colour), *_course("depth", depth)]
+    readable = all(first_readable(recording, topic) is not None for topic in topics)
+    if readable and not (len(colour) and len(depth)):
+        what = "colour and depth were recorded at different times: none goes with the other"
+        found.append(Finding(what, "", "record both together", "streams-apart"))
+    if len(colour) and len(depth):
+        found += _distance(_apart_ns(colour, depth))
+    return found
+
+
+def _course(name: str, stamps: Array) -> Iterator[Finding]:
+    """Whether the stamps of a stream advance."""
+    if (np.diff(stamps) < 0).any():
+        yield Finding(f"the stamps of {name} go back in time: what waits is dropped there")
+    if len(stamps) > 1 and (stamps == stamps[0]).all():
+        yield Finding(
+            f"the first {len(stamps)} stamps of {name} are all {stamps[0]} ns",
+            "frames are told apart by them, and none closes a loop",
+            "record it again with the time in its headers",
+            "streams-apart",
+        )
+
+
+def _distance(apart_ns: float) -> Iterator[Finding]:
+    """Whether colour and depth are too far apart in time for the nodes' defaults."""
+    if apart_ns <= NEAR_NS:
+        return
+    what = f"colour and depth are {apart_ns * 1e-6:.0f} ms apart"
+    if apart_ns > FAR_NS:
+        cause, todo = "their stamps are of two clocks", "record both with stamps of one clock"
+    else:
+        cause = "the two streams of the camera are not synchronised, and frames meet within segmenter.slop"
+        todo = f"raise segmenter.slop above that: --set segmenter.slop={np.ceil(apart_ns * 1e-7 + 1) / 100:.2f}"
+    yield Finding(what, cause, todo, "streams-apart")
+
+
+def _scale(recording: Recording, inputs: Inputs) -> Iterator[Finding]:
+    """Whether what is told as depth can be metres or millimetres at all."""
+    ranges = [reach for metres in _depths(recording, inputs.depth) if (reach := _reach_m(metres)) is not None]
+    if not ranges:
+        return
+    near, far = np.median(ranges, axis=0)
+    if near > NEVER_ALL_BEYOND_M:
+        cause = "a room always has something nearer: depth is in other steps than its encoding says, as of 0.2 mm"
+        yield Finding(f"depth begins at {near:.1f} m", cause, RECORD_UNITS, "depth-scale")
+    elif far < NEVER_ALL_WITHIN_M:
+        cause = "no depth camera sees so near: these may be metres in a picture of millimetres"
+        yield Finding(f"depth ends at {far:.3g} m", cause, RECORD_UNITS, "depth-scale")
+
+
+def _depths(recording: Recording, topic: str | None) -> Iterator[Array]:
+    """Depth (H, W) m at some moments of the recording; those that do not decode are left out."""
+    span_ns = recording.end_ns - recording.start_ns
+    for k in range(MOMENTS if topic else 0):
+        record = next(recording.records([topic or ""], recording.start_ns + k * span_ns // MOMENTS), None)
+        message = None if record is None else record.read()
+        try:
+            if message is not None:
+                yield from_msg.depth(message)
+        except ValueError:
+            continue
+
+
+def _reach_m(metres: Array) -> tuple[float, float] | None:
+    """Where depth begins and ends, a twentieth of its pixels aside; None where there is none."""
+    told = metres[np.isfinite(metres) & (metres > 0)]
+    return None if not len(told) else (float(np.quantile(told, 0.05)), float(np.quantile(told, 0.95)))
+
+
+def _apart_ns(colour: np.ndarray, depth: np.ndarray) -> float:
+    """How far the stamps of the slower stream are from the nearest of the faster one; the median.
+
+    Only those within the time of both count, unless there are none.
+    """
+    slow, fast = sorted((colour, depth), key=_pace)
+    within = slow[(slow >= fast.min()) & (slow <= fast.max())]
+    slow = within if len(within) else slow
+    return float(np.median(np.abs(slow[:, None] - fast[None, :]).min(axis=1)))
+
+
+def _pace(stamps: np.ndarray) -> float:
+    """Stamps in a second; 0 for fewer than two."""
+    step_ns = float(np.median(np.abs(np.diff(stamps)))) if len(stamps) > 1 else 0.0
+    return 1e9 / step_ns if step_ns else 0.0
+
+
+def _header_stamps(recording: Recording, topic: str | None, start_ns: int) -> np.ndarray:
+    """The first `SAMPLE` stamps of what was recorded from a time on and decodes."""
+    messages = (record.read() for record in recording.records([topic], start_ns)) if topic else iter(())
+    readable = islice((message for message in messages if message is not None), SAMPLE)
+    return np.array([from_msg.stamp_ns(message) for message in readable], np.int64)
+
+
+def _first(recording: Recording, topic: str | None) -> Record | None:
+    return next(recording.records([topic]), None) if topic else None

@@ -1,0 +1,9 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from objreg_ros.recording.finding import Finding
+
+
+def test_a_finding_in_one_line_leaves_out_what_it_does_not_tell() -> None:
+    assert Finding("a").text == "a" and Finding("a", "b").text == "a: b"
+    assert Finding("a", "b", "c", "d").text == "a: b; c"
