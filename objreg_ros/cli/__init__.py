@@ -195,7 +195,9 @@ def _never_swallowed() -> Iterator[None]:
 
     def come_again(unraisable: sys.UnraisableHookArgs) -> None:
         if issubclass(unraisable.exc_type, KeyboardInterrupt):
-            threading.Timer(AGAIN_S, signal.raise_signal, (signal.SIGINT,)).start()
+            again = threading.Timer(AGAIN_S, signal.pthread_kill, (threading.main_thread().ident, signal.SIGINT))
+            again.daemon = True
+            again.start()
         else:
             before(unraisable)
 

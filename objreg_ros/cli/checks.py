@@ -28,18 +28,8 @@ LIBRARIES = {  # that Open3D loads, and the package of Debian and Ubuntu that ha
     "libX11.so.6": "libx11-6",
 }
 NEEDED = (
-    "click",
-    "cv2",
-    "jinja2",
-    "numba",
-    "numpy",
-    "onnxruntime",
-    "open3d",
-    "PIL",
-    "rosbags",
-    "scipy",
-    "tqdm",
-    "yaml",
+    *("click", "cv2", "jinja2", "numba", "numpy", "onnxruntime"),
+    *("open3d", "PIL", "rosbags", "scipy", "tqdm", "yaml"),
 )
 EXTRAS = {  # module: the extra that brings it, and what for
     "gtsam": ("mapper", "the mapper and corrected trajectories"),

@@ -7,9 +7,10 @@ Both are options of `objreg` and of each of its commands. What was asked for lie
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
-from typing import TextIO
+from functools import wraps
+from typing import Any, TextIO
 
 import click
 
@@ -18,32 +19,45 @@ QUIET, USUAL, VERBOSE = "quiet", "usual", "verbose"
 
 
 def _set(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:
-    """Take down what was asked for; with -q nothing goes to standard error before the command has ended, as errors do.
-
-    UsageError where both are asked for.
-    """
+    """Take down what was asked for; UsageError where both are."""
     if not wanted:
         return
     if context.meta.get(KEY, parameter.name) != parameter.name:
         raise click.UsageError("expected -q or -v, got both; leave one out", context)
-    if parameter.name == QUIET and not is_quiet():
-        context.with_resource(redirect_stderr(context.with_resource(_nowhere())))
     context.meta[KEY] = parameter.name
 
 
 def _options() -> list[click.Option]:
-    told = {"is_flag": True, "expose_value": False, "callback": _set}
+    helps = {
+        ("-q", "--quiet"): "Say errors and the result alone.",
+        ("-v", "--verbose"): "Say every reason, and where an error came from.",
+    }
     return [
-        click.Option(["-q", "--quiet"], help="Say errors and the result alone.", **told),
-        click.Option(["-v", "--verbose"], help="Say every reason, and where an error came from.", **told),
+        click.Option(names, is_flag=True, expose_value=False, callback=_set, help=text) for names, text in helps.items()
     ]
 
 
 def heard_by(command: click.Command) -> click.Command:
-    """The command with both options, if it has not got them."""
+    """The command with both options, if it has not got them.
+
+    With -q nothing that it says goes to standard error; what goes wrong is told when it has ended.
+    """
     if not any(parameter.name == QUIET for parameter in command.params):
         command.params.extend(_options())
+        if command.callback is not None:
+            command.callback = _hushed(command.callback)
     return command
+
+
+def _hushed(work: Callable[..., Any]) -> Callable[..., Any]:
+    @wraps(work)
+    def heard(*words: Any, **options: Any) -> Any:
+        if not is_quiet():
+            return work(*words, **options)
+        with _nowhere() as nowhere, redirect_stderr(nowhere):
+            return work(*words, **options)
+
+    return heard
 
 
 def is_quiet() -> bool:
