@@ -93,7 +93,7 @@ setup(
     },
     entry_points={
         "console_scripts": [
-            "objreg = objreg_ros.cli:main",
+            "objreg = objreg_ros.__main__:main",
             "objreg_graph = objreg_ros.graph:main",
             "detector = objreg_ros.detector.node:main",
             "segmenter = objreg_ros.segmenter.node:main",

@@ -42,7 +42,7 @@ FREE_BRIDGE = tuple(
         "static_frames",
     )
 )
-CORE = ("limits", "sensor", "data", "lens", "geometry", "params", "share")
+CORE = ("limits", "sensor", "whole_file", "data", "lens", "geometry", "params", "share")
 HOUSE = ("offline", "truth", "report")
 
 
@@ -92,7 +92,7 @@ def floor(module: str) -> int | None:
 def allowed(importer: str, imported: str) -> bool:
     """The table of the import law."""
     room = importer.split(".")[0]
-    if imported in ("limits", "sensor") and importer != "":
+    if imported in ("limits", "sensor", "whole_file") and importer != "":
         return True
     if importer == "":  # what `import objreg_ros` offers, loaded when it is asked for
         return imported == "library"
@@ -104,6 +104,8 @@ def allowed(importer: str, imported: str) -> bool:
         )
     if below(importer, "cli"):
         return True
+    if importer == "__main__":
+        return imported == "cli"
     if importer == "graph":  # all nodes in one process
         return imported in (*(f"{room}.node" for room in ROOMS), "bridge.door", "bridge.indoors", "bridge.spin")
     if room in ROOMS and importer.endswith(".node"):

@@ -6,15 +6,23 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import signal
 import sys
+import threading
+import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
+
+from objreg_ros.cli import loudness
+from objreg_ros.whole_file import unwritten
 
 # What `objreg --help` says without importing a command. A name without its file is not shown.
 SUMMARIES = {
@@ -28,9 +36,12 @@ SUMMARIES = {
     "fetch-model": "Get a detector model.",
     "report": "Draw pictures and tables of a run.",
     "params": "Show every parameter, or write the files that are made from them.",
+    "doctor": "Say whether a run can work here, and what is missing.",
 }
 FOLDER = Path(__file__).parent
-BROKEN, NOTHING, INTERRUPTED, TERMINATED = 1, 3, 130, 143  # nothing: what was read gave no frame, or cannot
+NAME = "objreg"
+BROKEN, NOTHING, INTERRUPTED, UNHEARD, TERMINATED = 1, 3, 130, 141, 143  # nothing: what was read gave no frame
+AGAIN_S = 0.05  # after which an interrupt that was swallowed comes again
 FIRST_TIME = "the first time compiles for a minute"
 
 
@@ -45,21 +56,60 @@ class LazyGroup(click.Group):
         """The command, imported; None if there is none of this name."""
         if cmd_name not in self.list_commands(ctx):
             return None
-        return import_module(f"objreg_ros.cli.{_module(cmd_name)}").command  # type: ignore[no-any-return]
+        command: click.Command = import_module(f"objreg_ros.cli.{_module(cmd_name)}").command
+        return loudness.heard_by(command)
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """What a tab brings: the commands without their import, and the options."""
+        names = [name for name in self.list_commands(ctx) if name.startswith(incomplete)]
+        items = [CompletionItem(name, help=SUMMARIES[name]) for name in names]
+        return items + click.Command.shell_complete(self, ctx, incomplete)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The list of `--help`, from the summaries."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, SUMMARIES[name]) for name in self.list_commands(ctx)])
 
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; with -v a broken input shows where it was met, before it is told.
+
+        A reader of the output who has left, as `head` does, ends it.
+        """
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError:
+            _leave_output()
+            ctx.exit(UNHEARD)
+        except (OSError, ValueError) as error:
+            if loudness.is_verbose():
+                traceback.print_exception(error)
+            raise
+
 
 def _module(name: str) -> str:
     return name.replace("-", "_")
 
 
+def _tell_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
+    if wanted:
+        from objreg_ros.report.about import version
+
+        click.echo(f"{NAME} {version()}")
+        context.exit()
+
+
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--version", is_flag=True, is_eager=True, expose_value=False, callback=_tell_version, help="Say which this is."
+)
 def group() -> None:
-    """Object-level loop closure: recordings, offline runs and the live graph."""
+    """Object-level loop closure: recordings, offline runs and the live graph.
+
+    `objreg COMMAND --help` says more of a command. -q and -v go before it or behind it.
+    """
+
+
+loudness.heard_by(group)
 
 
 def main(*arguments: Any) -> None:
@@ -67,40 +117,92 @@ def main(*arguments: Any) -> None:
 
     A run of which no frame got through ends with 3, as does the inspection of what the graph cannot run on.
 
-    SIGINT and SIGTERM end what was begun, with the usual status.
+    SIGINT and SIGTERM end what was begun, with the usual status, and so does a reader of the output who has left.
     """
     try:
-        with _ended_by_sigterm():
-            code = group.main(args=list(arguments) or None, standalone_mode=False)
+        with _ended_by_signals():
+            code = group.main(args=list(arguments) or None, prog_name=NAME, standalone_mode=False)
+            sys.stdout.flush()
         sys.exit(code if isinstance(code, int) else 0)
     except click.ClickException as error:
         error.show()
         sys.exit(error.exit_code)
+    except BrokenPipeError:
+        _leave_output()
+        sys.exit(UNHEARD)
     except (OSError, ValueError) as error:
-        click.echo(f"objreg: {' '.join(str(error).split())}", err=True)
+        click.echo(f"objreg: {' '.join(str(_named(error)).split())}", err=True)
         sys.exit(BROKEN)
     except (KeyboardInterrupt, click.Abort):
         sys.exit(INTERRUPTED)
 
 
+def _named(error: Exception) -> Exception:
+    """The error; where a disk is full and the error names no file, it is that of standard output: all others do."""
+    if isinstance(error, OSError) and error.errno == errno.ENOSPC and error.filename is None:
+        _leave_output()
+        return unwritten("standard output", error)
+    return error
+
+
+def _leave_output() -> None:
+    """Let go of an output that takes nothing, so that Python's end does not try it again."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 @contextmanager
-def _ended_by_sigterm() -> Iterator[None]:
+def _ended_by_signals() -> Iterator[None]:
     """Within the block SIGTERM leaves through every `with` and `finally`, as Ctrl-C does.
 
-    ROS hears it too and shuts down: what it says of that, even in place of the exit, is no bug.
+    Libraries hear of them too: ROS shuts down, an import fails. What they say of that, even in place of the exit, is
+    no bug. Where one swallows the interrupt, as a compiler does that calls back into Python, it comes again.
     """
     told: list[int] = []
 
     def end(number: int, _: object) -> None:
         told.append(number)
+        if number == signal.SIGINT:
+            raise KeyboardInterrupt
         sys.exit(TERMINATED)
 
-    before = signal.signal(signal.SIGTERM, end)
+    with _heard(end), _never_swallowed():
+        try:
+            yield
+        except (Exception, KeyboardInterrupt):
+            if not told:
+                raise
+            sys.exit(INTERRUPTED if told[0] == signal.SIGINT else TERMINATED)
+
+
+@contextmanager
+def _heard(end: Any) -> Iterator[None]:
+    """Both signals call ``end`` within the block; an interrupt that is ignored, as behind nohup, stays so."""
+    before = {signal.SIGTERM: signal.signal(signal.SIGTERM, end)}
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        before[signal.SIGINT] = signal.signal(signal.SIGINT, end)
     try:
         yield
-    except (Exception, KeyboardInterrupt):
-        if not told:
-            raise
-        sys.exit(TERMINATED)
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def _never_swallowed() -> Iterator[None]:
+    """Within the block an interrupt that can be raised nowhere is no traceback: it comes again a moment later."""
+    before = sys.unraisablehook
+
+    def come_again(unraisable: sys.UnraisableHookArgs) -> None:
+        if issubclass(unraisable.exc_type, KeyboardInterrupt):
+            again = threading.Timer(AGAIN_S, signal.pthread_kill, (threading.main_thread().ident, signal.SIGINT))
+            again.daemon = True
+            again.start()
+        else:
+            before(unraisable)
+
+    sys.unraisablehook = come_again
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before

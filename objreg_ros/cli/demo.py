@@ -17,9 +17,10 @@ from objreg_ros.bridge import from_msg
 from objreg_ros.bridge.calibration import absolute
 from objreg_ros.cli import live_table, options
 from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
+from objreg_ros.cli.loudness import aside
 from objreg_ros.cli.played import as_rosbag2, simulated_room
 from objreg_ros.cli.settings import parse_change, read_settings, ros_argument, tell_ignored
-from objreg_ros.cli.told import closing_lines, exit_code, tell
+from objreg_ros.cli.told import closing_lines, exit_code, tell, tell_reasons
 from objreg_ros.data import ColourImage, Intrinsics
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import quaternion_from_rotation
@@ -35,6 +36,7 @@ from objreg_ros.report.live_pictures import draw_sight, draw_way
 from objreg_ros.report.write import write_report
 from objreg_ros.segmenter.params import SegmenterNodeParams
 from objreg_ros.truth import Truth, summarise
+from objreg_ros.whole_file import write_whole
 
 SIMULATED = {"registrar.covariance_calibration": "0.01", "detector.model": share.EMBEDDED}
 """The camera is as its calibration says, and a model knows the objects."""
@@ -111,14 +113,16 @@ def run(asked: Asked) -> int:
         }
         told = summary_of(told, live, truth)
         findings = find(told, troubles(source, inputs))
-        (asked.out / "demo.json").write_text(json.dumps({**told, "findings": as_json(findings)}, indent=1))
+        write_whole(asked.out / "demo.json", json.dumps({**told, "findings": as_json(findings)}, indent=1))
         _draw(asked.out, live, truth, source, inputs)
         sent = _sent(source, inputs, asked.seconds, live)
     write_report(asked.out / "report.html", [asked.out / "demo.json"])
     _say(f"wrote {asked.out / 'report.html'}")
-    click.echo("\n".join(live_table.lines(live, sent, summarise(truth.errors(live.closures)))))
+    with aside():
+        click.echo("\n".join(live_table.lines(live, sent, summarise(truth.errors(live.closures)))))
+        tell_reasons(live.refusals)
+        click.echo()
     live_table.require_balance(live, sent)
-    click.echo()
     tell(findings)
     click.echo("\n".join(closing_lines(told, findings, asked.out, own)))
     return exit_code(told)

@@ -11,6 +11,7 @@ import urllib.request
 from dataclasses import dataclass
 from http.client import HTTPException, HTTPResponse
 from pathlib import Path, PurePosixPath
+from typing import BinaryIO
 from urllib.parse import urlsplit
 
 import click
@@ -18,6 +19,7 @@ from tqdm import tqdm
 
 from objreg_ros import share
 from objreg_ros.detector.runtime import Runtime
+from objreg_ros.whole_file import unwritten
 
 TIMEOUT_S = 30.0
 CHUNK = 1 << 16
@@ -154,11 +156,20 @@ def _receive(response: HTTPResponse, part: Path, have: int) -> None:
             if file.tell() + len(chunk) > MOST_BYTES:
                 part.unlink()
                 raise ValueError(f"{part.stem}: expected a model of at most {MOST_BYTES} bytes, got more; is it one?")
-            file.write(chunk)
+            _keep(file, chunk, part)
             bar.update(len(chunk))
         arrived = file.tell() - have
     if missing and arrived < missing:
         raise OSError(f"the connection ended after {arrived} of {missing} bytes")
+
+
+def _keep(file: BinaryIO, chunk: bytes, part: Path) -> None:
+    """ValueError, which no other place would mend, where the disk does not take what has come."""
+    try:
+        file.write(chunk)
+        file.flush()
+    except OSError as error:
+        raise ValueError(str(unwritten(part, error))) from error
 
 
 def checksum(path: Path) -> str:

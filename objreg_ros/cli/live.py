@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from objreg_ros.bridge.ledger import Balance
 from objreg_ros.cli import FIRST_TIME
+from objreg_ros.cli.loudness import is_quiet, is_verbose
 from objreg_ros.cli.processes import Processes
 from objreg_ros.data import LoopClosure, Rejected
 
@@ -51,13 +52,12 @@ def run_live(recording: Path, setup: Setup, folder: Path, say: Callable[[str], N
     environment = private_environment()
     with Processes(folder, environment) as processes, _listening(environment) as collector:
         for name, module, arguments in _programs(setup):
-            processes.start(name, module, arguments)
+            processes.start(name, module, arguments, quiet=not is_verbose())
         say(f"starting three nodes ({FIRST_TIME})")
         _wait_for_nodes(collector, processes)
         say("playing")
-        player = processes.start(
-            "player", "objreg_ros.cli", ["replay", str(recording), *setup.replay_args], quiet=False
-        )
+        words = ["replay", str(recording), *setup.replay_args]
+        player = processes.start("player", "objreg_ros.cli", words, quiet=is_quiet())
         collector.spin_until(lambda: player.poll() is not None, float("inf"))
         processes.require_alive()
         say("waiting for the last frames")

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -16,9 +15,10 @@ from tqdm import tqdm
 
 from objreg_ros.bridge.calibration import absolute
 from objreg_ros.cli import FIRST_TIME, options
+from objreg_ros.cli.loudness import aside
 from objreg_ros.cli.options import require_writable
 from objreg_ros.cli.settings import Settings, read_settings, tell_ignored
-from objreg_ros.cli.told import exit_code, tell
+from objreg_ros.cli.told import exit_code, json_to, tell, tell_reasons
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.offline import Run, Timing, build_rooms, run_offline
 from objreg_ros.recording import Record, Recording, open_recording
@@ -51,7 +51,7 @@ CAMERAS_OWN = (
 @options.model
 @options.labels
 @options.camera
-@click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the outcome here.")
+@options.json_out
 @click.option(
     "--tum", type=FILE, help="Write the corrected trajectory here: stamp tx ty tz qx qy qz qw, as evo reads it."
 )
@@ -112,7 +112,7 @@ def command(
     settings = read_settings(params_file, [*changes, *_named(model, labels, camera)])
     tell_ignored(settings)
     told = settings.of("segmenter", SegmenterNodeParams)
-    with open_recording(recording) as opened, TemporaryDirectory() as folder:
+    with open_recording(recording) as opened, TemporaryDirectory() as folder, json_to(json_file) as write_json:
         source = with_camera(opened, told.camera, parse_remaps(remaps), told.source)
         inputs = _inputs(source, remaps, odometry, told.source)
         _require_odometry(files, source, inputs)
@@ -134,11 +134,11 @@ def command(
             **run.summary(truth),
         }
         _say(run, summary)
+        tell_reasons(run.refusals)
         findings = find(summary, troubles(source, inputs))
         click.echo(verdict(summary, findings))
         tell(findings)
-        if json_file is not None:
-            json_file.write_text(json.dumps({**summary, "findings": as_json(findings)}, indent=1))
+        write_json({**summary, "findings": as_json(findings)})
         if scenes.wanted and run.frames:
             album = Album(source, inputs, told.rectified)
             scenes.write(scene_of(Story.of(recording.name, summary, truth), album), click.echo)
@@ -171,6 +171,7 @@ def _remembering(registrar: RegistrarParams, files: MapFiles, folder: str) -> Re
     return registrar.replaced(store=str(Path(folder, "keyframes.db")))
 
 
+@aside()
 def _map(files: MapFiles, story: Story, store: Path) -> None:
     """Write what is asked for of the corrected map, and say what became of it."""
     click.echo(f"  map: {len(story.graph.keyframes)} keyframes, {len(story.pruned)} constraints pruned")
@@ -271,6 +272,7 @@ def _records(source: Recording, inputs: Inputs, odometry: str | None) -> Iterato
     return with_drifting_odometry(records, inputs.ground_truth, int(odometry.removeprefix(DRIFT)))
 
 
+@aside()
 def _say(run: Run, summary: dict) -> None:
     click.echo(
         f"{run.frames} frames, {run.detections} detections, {run.objects} objects, {len(run.closures)} constraints"

@@ -34,6 +34,12 @@ camera = click.option(
     help="The camera in place of camera_info: pixels, or a YAML file as camera_calibration writes it.",
 )
 model = click.option("--model", help="ONNX model: a path or the name of an installed one.")
+json_out = click.option(
+    "--json",
+    "json_file",
+    type=click.Path(dir_okay=False, allow_dash=True, path_type=Path),
+    help="Write the outcome here; - is standard output, and all else then goes to standard error.",
+)
 labels = click.option("--labels", help="Text file of labels, one a line.")
 
 
@@ -47,9 +53,11 @@ def scene_files(command: Callable) -> Callable:
 
 def require_writable(option: str, file: Path) -> None:
     """OSError before the work rather than after it, where the ``file`` of an option could not be written."""
+    if str(file) == "-":  # standard output
+        return
     if not file.parent.is_dir():
         raise OSError(f"{option}: expected an existing folder {file.parent}, got none; create it or choose another")
-    if not os.access(file if file.exists() else file.parent, os.W_OK):
+    if not all(os.access(place, os.W_OK) for place in _places(file)):
         raise OSError(f"{option}: expected permission to write {file}, got none; choose another place")
     try:
         _try_to_write(file)
@@ -58,14 +66,22 @@ def require_writable(option: str, file: Path) -> None:
         raise OSError(f"{option}: expected a place that takes a file, got at {file}: {why}; choose another") from error
 
 
+def _places(file: Path) -> list[Path]:
+    """What has to be writable: a new file lies in the folder before it takes the place of an old one."""
+    if not file.exists():
+        return [file.parent]
+    return [file, file.resolve().parent] if file.is_file() else [file]
+
+
 def _try_to_write(file: Path) -> None:
     """OSError where a file can be neither made nor opened for writing, whatever its permissions say; leaves no trace.
 
     What is no plain file, as a pipe, is not opened: that would wait for its reader.
     """
-    if not file.exists():
-        with tempfile.TemporaryFile(dir=file.parent):
-            return
-    if file.is_file():
+    if file.exists() and not file.is_file():
+        return
+    with tempfile.TemporaryFile(dir=file.resolve().parent):
+        pass
+    if file.exists():
         with file.open("ab"):
-            return
+            pass

@@ -14,6 +14,7 @@ import click
 from objreg_ros.bridge.params import DoorParams
 from objreg_ros.cli.settings import KEY, NODES
 from objreg_ros.params import Declaration, Params
+from objreg_ros.whole_file import write_whole
 
 YAML_FILE, TABLE_FILE = "config/objreg.yaml", "docs/parameters.md"
 WIDTH = 120
@@ -39,7 +40,7 @@ def write_files(repository: Path) -> list[Path]:
         raise FileNotFoundError(f"{repository}: expected a checkout of the repository; --yaml and --table only print")
     files = {repository / YAML_FILE: yaml_text(), repository / TABLE_FILE: page_text()}
     for file, text in files.items():
-        file.write_text(text)
+        write_whole(file, text)
     return list(files)
 
 

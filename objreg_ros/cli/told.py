@@ -3,17 +3,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import json
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Any
 
 import click
 
 from objreg_ros.cli import NOTHING
+from objreg_ros.cli.loudness import aside, is_verbose
+from objreg_ros.data import Rejected
 from objreg_ros.recording.finding import Finding
 from objreg_ros.report.findings import Counts, verdict
+from objreg_ros.whole_file import write_whole
+
+STANDARD_OUTPUT = Path("-")
 
 
+@contextmanager
+def json_to(file: Path | None) -> Iterator[Callable[[Any], None]]:
+    """What writes something as JSON into ``file``, or into standard output where that is ``-``.
+
+    In the latter case all else that is said within goes to standard error. Without a file nothing is written.
+    """
+    if file != STANDARD_OUTPUT:
+        yield lambda content: None if file is None else write_whole(file, json.dumps(content, indent=1))
+        return
+    output = sys.stdout
+    with redirect_stdout(sys.stderr):
+        yield lambda content: click.echo(json.dumps(content, indent=1), file=output)
+
+
+def tell_reasons(refusals: Iterable[Rejected]) -> None:
+    """With -v a line for each refusal: both moments, the reason and the numbers behind it."""
+    for refused in refusals if is_verbose() else ():
+        click.echo(f"  {refused.from_ns} to {refused.to_ns} ns: {refused.reason.value}: {refused.detail}")
+
+
+@aside()
 def tell(findings: Iterable[Finding], err: bool = False) -> None:
     """A block for each finding: what is seen, and below it the likely cause and what to do."""
     for finding in findings:

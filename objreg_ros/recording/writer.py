@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import errno
 import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -15,9 +16,11 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from objreg_ros.recording.messages import standard_types
 from objreg_ros.recording.record import Record
+from objreg_ros.whole_file import unwritten
 
 STORAGES = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}
 METADATA_VERSION: Literal[9] = 9  # Jazzy's
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)  # what a disk says, and no reader of a recording
 
 
 def write_rosbag2(
@@ -38,7 +41,7 @@ def write_rosbag2(
     _make_parents(Path(path))
     count = 0
     with (
-        _whole_or_gone(Path(path)),
+        whole_or_gone(Path(path)),
         Writer(Path(path), version=METADATA_VERSION, storage_plugin=STORAGES[storage]) as writer,
     ):
         connections: dict[tuple[str, str], Any] = {}
@@ -52,12 +55,14 @@ def write_rosbag2(
 
 
 @contextmanager
-def _whole_or_gone(path: Path) -> Iterator[None]:
-    """Removes the folder where it could not be finished."""
+def whole_or_gone(path: Path) -> Iterator[None]:
+    """Removes the folder where it could not be finished. OSError that names it where the disk is why."""
     try:
         yield
-    except BaseException:
+    except BaseException as error:
         shutil.rmtree(path, ignore_errors=True)
+        if isinstance(error, OSError) and error.errno in FULL:
+            raise unwritten(path, error) from error
         raise
 
 

@@ -21,6 +21,7 @@ from objreg_ros.memory.store_file import StoreError
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.report.ply import write_ply
+from objreg_ros.whole_file import write_whole
 
 MOST_BYTES = 200  # of a label in the name of a file, which may have 255 in all
 
@@ -165,7 +166,7 @@ def constraint(closure: LoopClosure) -> dict[str, Any]:
 
 def _write_json(path: Path, content: dict[str, Any]) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    write_whole(path, json.dumps(content, indent=1) + "\n")
     return path
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from objreg_ros.data import Array, Detections, Intrinsics, LoopClosure, ObjectCloud
 from objreg_ros.truth import FALSE, Truth, within
+from objreg_ros.whole_file import whole_file, write_whole
 
 GOLDEN_ANGLE = 137.508  # degrees of hue between one object and the next: neighbours never look alike
 FONT, FONT_SIZE = cv2.FONT_HERSHEY_SIMPLEX, 0.42
@@ -32,11 +33,12 @@ def draw_sight(
 def write_picture(file: Path, rgb: Array) -> None:
     """Write (H, W, 3) uint8 RGB in the format of the file's name; OSError if it cannot be."""
     try:
-        written = cv2.imwrite(str(file), np.ascontiguousarray(rgb[..., ::-1]))
+        written, encoded = cv2.imencode(file.suffix, np.ascontiguousarray(rgb[..., ::-1]))
     except cv2.error as error:  # no format of this name
         raise OSError(f"{file}: expected a name like picture.png, got one of an unknown format; rename it") from error
     if not written:
-        raise OSError(f"{file}: expected a path that can be written; create its folder or choose another")
+        raise OSError(f"{file}: expected a picture of at most what its format takes, got {rgb.shape}; choose another")
+    write_whole(file, encoded.tobytes())
 
 
 def _colour(instance: int) -> tuple[int, int, int]:
@@ -86,7 +88,8 @@ def draw_way(file: Path, truth: Truth, closures: Sequence[LoopClosure]) -> None:
     for closure in closures:
         _draw_closure(plot, truth, closure, axes, positions.mean(axis=0))
     plot.set_title(f"{len(closures)} constraints, green where true, red where false")
-    figure.savefig(file, dpi=120)
+    with whole_file(file) as drawn:
+        figure.savefig(drawn, dpi=120, format=file.suffix.removeprefix(".") or None)
 
 
 def _draw_closure(plot: object, truth: Truth, closure: LoopClosure, axes: Array, middle: Array) -> None:

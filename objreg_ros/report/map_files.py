@@ -17,6 +17,7 @@ from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.report.ply import write_ply
 from objreg_ros.report.story import Story
 from objreg_ros.report.voxel_cloud import VoxelCloud, require_voxel
+from objreg_ros.whole_file import write_whole
 
 VOXEL_M = 0.02  # finer than what a depth camera errs by at 2 m
 OF_AN_OBJECT = 100.0  # so much surer is the colour of an object than the grey of a reduced picture
@@ -60,14 +61,14 @@ class MapFiles:
                 "no map; is the topic of the odometry the right one, and its stamps of the same clock (odom_slop)?"
             )
         if self.tum is not None:
-            self.tum.write_text(tum.trajectory_text(zip(stamps, corrected, strict=True)), encoding="ascii")
+            write_whole(self.tum, tum.trajectory_text(zip(stamps, corrected, strict=True)))
             tell(f"{self.tum}: {len(stamps)} poses")
         if self.kitti is not None:
-            self.kitti.write_text(kitti.trajectory_text(corrected), encoding="ascii")
+            write_whole(self.kitti, kitti.trajectory_text(corrected))
             tell(f"{self.kitti}: {len(stamps)} poses")
         if self.g2o is not None:
             keyframes, edges = story.graph.flat(left_out=story.pruned)
-            self.g2o.write_text(g2o.graph_text(keyframes, edges), encoding="ascii")
+            write_whole(self.g2o, g2o.graph_text(keyframes, edges))
             tell(f"{self.g2o}: {len(keyframes)} keyframes, {len(edges)} edges")
         if self.cloud is not None:
             poses = dict(zip(stamps, zip(odometry, corrected, strict=True), strict=True))

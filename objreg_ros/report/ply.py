@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from objreg_ros.data import Array
+from objreg_ros.whole_file import write_whole
 
 AXES = ("x", "y", "z")
 COLOURS = ("red", "green", "blue")
@@ -30,5 +31,5 @@ def write_ply(path: Path, xyz: Array, normals: Array | None = None, rgb: Array |
     header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(xyz)}"]
     header += [f"property {KINDS[kind]} {name}" for name, kind, _ in columns] + ["end_header", ""]
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes("\n".join(header).encode() + table.tobytes())
+    write_whole(path, "\n".join(header).encode() + table.tobytes())
     return path

@@ -24,6 +24,7 @@ from objreg_ros.report.page import page
 from objreg_ros.report.pictures import Album
 from objreg_ros.report.story import Story
 from objreg_ros.truth import Truth
+from objreg_ros.whole_file import write_whole
 
 ODOMETRY_SLOP_NS = 20_000_000  # as the registrar's default
 
@@ -37,7 +38,7 @@ def write_report(out: Path, runs: Sequence[Path]) -> list[str]:
     with ExitStack() as stack:
         chapters = [_chapter(file, stack) for file in runs]
         text = page(chapters)
-    out.write_text(text, encoding="utf-8")
+    write_whole(out, text)
     lacking = [file for file, (_, album) in zip(runs, chapters, strict=True) if album is None]
     return [
         f"{file} names a recording that is not there: the page shows neither truth nor pictures" for file in lacking

@@ -28,6 +28,7 @@ import numpy as np
 from objreg_ros.data import Array, Intrinsics
 from objreg_ros.geometry import back_project
 from objreg_ros.recording import Record, messages, write_rosbag2
+from objreg_ros.recording.writer import whole_or_gone
 from objreg_ros.simulation.camera import KINECT
 from objreg_ros.simulation.odometry import drifted
 from objreg_ros.simulation.params import (
@@ -128,7 +129,8 @@ def write_story(
             progress(k + 1)
 
     write_rosbag2(path, records())
-    truth.write(Path(path))
+    with whole_or_gone(Path(path)):
+        truth.write(Path(path))
 
 
 def _rendered(story: Story, seed: int, sensors: Sensors, rig: Rig | None, threads: int) -> Iterator[Rendering]:

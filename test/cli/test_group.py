@@ -98,3 +98,42 @@ def test_a_bug_shows_its_traceback(bug: type[Exception], monkeypatch: pytest.Mon
     monkeypatch.setattr(group, "main", fail)
     with pytest.raises(bug):
         main("offline")
+
+
+def completed(*words: str) -> list[str]:
+    """What a tab brings behind words, of which the last is not whole."""
+    from click.shell_completion import ShellComplete
+
+    completion = ShellComplete(group, {}, "objreg", "_OBJREG_COMPLETE")
+    return [item.value for item in completion.get_completions(list(words[:-1]), words[-1])]
+
+
+def test_a_tab_completes_commands_and_options() -> None:
+    assert completed("in") == ["inspect"] and set(completed("")) >= {"demo", "doctor", "fetch-model"}
+    assert completed("--ver") == ["--version", "--verbose"] and completed("offline", "--ma") == [
+        "--map",
+        "--max-frames",
+    ]
+
+
+def test_a_tab_behind_no_command_imports_none() -> None:
+    code = (
+        "import sys; from objreg_ros.cli import main\n"
+        "try: main()\nfinally: assert not {'numpy', 'cv2', 'rosbags'} & set(sys.modules)"
+    )
+    told = {"_OBJREG_COMPLETE": "bash_complete", "COMP_WORDS": "objreg rep", "COMP_CWORD": "1"}
+    shown = subprocess.run([sys.executable, "-c", code], env={**os.environ, **told}, capture_output=True, text=True)
+    assert shown.stdout.split() == ["plain,replay", "plain,report"] and not shown.stderr
+
+
+def test_a_broken_input_shows_where_it_was_met_if_that_is_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main("-v", "inspect", "/nowhere/at/all")
+    said = capsys.readouterr().err
+    assert said.startswith("Traceback") and said.splitlines()[-1].startswith("objreg: /nowhere/at/all: no such file")
+
+
+def test_an_error_is_told_although_all_else_is_hushed(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main("-q", "inspect", "/nowhere/at/all")
+    assert end.value.code == 1 and capsys.readouterr().err.startswith("objreg: /nowhere/at/all: no such file")

@@ -110,3 +110,16 @@ def test_a_file_that_refuses_to_be_written_is_refused_before_the_work(
     monkeypatch.setattr(Path, "open", refuse)
     with pytest.raises(OSError, match=r"got at .*old\.html: Read-only file system; choose another"):
         require_writable("--out", tmp_path / "old.html")
+
+
+def test_an_old_file_in_a_folder_that_takes_no_new_one_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "old").touch()
+    monkeypatch.setattr("os.access", lambda path, mode: path != tmp_path)  # as root may
+    with pytest.raises(OSError, match=r"^--out: expected permission to write .*old, got none"):
+        require_writable("--out", tmp_path / "old")
+
+
+def test_standard_output_is_taken_as_it_is() -> None:
+    require_writable("--json", Path("-"))

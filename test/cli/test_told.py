@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
+import click
 import pytest
+from click.testing import CliRunner
 
 from objreg_ros.cli import NOTHING
-from objreg_ros.cli.told import closing_lines, exit_code, tell
+from objreg_ros.cli.loudness import heard_by
+from objreg_ros.cli.told import closing_lines, exit_code, json_to, tell, tell_reasons
+from objreg_ros.data import Reason, Rejected
 from objreg_ros.recording.finding import Finding
 
 FINDING = Finding("nothing is seen", "it is dark", "put on the light", "no-detections")
@@ -30,3 +35,27 @@ def test_the_last_lines_say_whether_it_worked_where_to_look_and_what_to_do() -> 
     assert failed[0] == "No loop was closed: nothing is seen." and failed[-1] == "Next: put on the light."
     assert "out/report.html" in failed[1] and "out/logs" in failed[1]
     assert "YOUR_RECORDING" in list(closing_lines({**run, "constraints": [{}]}, [], Path("out"), own=False))[-1]
+
+
+def test_json_goes_into_its_file_or_nowhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for file in (tmp_path / "run.json", None):
+        with json_to(file) as write:
+            click.echo("said")
+            write({"frames": 1})
+    assert json.loads((tmp_path / "run.json").read_text()) == {"frames": 1}
+    assert capsys.readouterr().out == "said\nsaid\n"
+
+
+def test_json_for_standard_output_is_all_that_goes_there(capsys: pytest.CaptureFixture[str]) -> None:
+    with json_to(Path("-")) as write:
+        click.echo("said")
+        write({"frames": 1})
+    heard = capsys.readouterr()
+    assert json.loads(heard.out) == {"frames": 1} and heard.err == "said\n"
+
+
+def test_reasons_are_told_to_who_asks_for_them() -> None:
+    refused = Rejected(reason=Reason.NO_CANDIDATE, from_ns=2, to_ns=1, detail="none is near")
+    command = heard_by(click.Command("run", callback=lambda: tell_reasons([refused])))
+    assert CliRunner().invoke(command, []).output == ""
+    assert CliRunner().invoke(command, ["-v"]).output == "  2 to 1 ns: no_candidate: none is near\n"

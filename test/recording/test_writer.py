@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import errno
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,7 +11,7 @@ from rosbags.interfaces import QosDurability, QosReliability
 
 from objreg_ros.recording import Record, open_recording, write_rosbag2
 from objreg_ros.recording.bags import latched_qos
-from objreg_ros.recording.writer import STORAGES
+from objreg_ros.recording.writer import STORAGES, whole_or_gone
 
 from .folders import records, tum_folder
 
@@ -55,3 +57,12 @@ def test_what_fails_leaves_no_folder(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="a broken picture"):
         write_rosbag2(tmp_path / "bag", broken())
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_disk_that_is_full_is_named_with_the_folder_which_is_gone(tmp_path: Path) -> None:
+    said = r"room: expected a place that takes it, got: No space left on device; make room"
+    with pytest.raises(OSError, match=said), whole_or_gone(tmp_path / "room"):
+        (tmp_path / "room").mkdir()
+        (tmp_path / "room/half").touch()
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    assert not list(tmp_path.iterdir())

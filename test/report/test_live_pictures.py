@@ -44,7 +44,7 @@ def test_a_box_is_drawn_with_its_name(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "expected"),
-    [("nowhere/a.png", "expected a path that can be written"), ("a.xyz", r"expected a name like picture\.png")],
+    [("nowhere/a.png", "expected a place that takes it"), ("a.xyz", r"expected a name like picture\.png")],
 )
 def test_a_picture_that_cannot_be_written_is_refused(name: str, expected: str, tmp_path: Path) -> None:
     with pytest.raises(OSError, match=expected):

@@ -102,3 +102,37 @@ def test_where_no_lock_fits_pip_chooses_and_the_script_says_so(
 ) -> None:
     asked, said = heard(checkout, **variables)
     assert asked == [wanted] and reason in said
+
+
+OBJREG = """#!/bin/bash
+[[ "$_OBJREG_COMPLETE" == *_source ]] && echo "# of ${_OBJREG_COMPLETE%_source}"
+"""
+
+
+def test_completion_is_installed_and_the_environment_sources_it_once(checkout: Path) -> None:
+    objreg, activate = checkout / ".venv/bin/objreg", checkout / ".venv/bin/activate"
+    objreg.write_text(OBJREG)
+    objreg.chmod(0o755)
+    for script in ("activate", "activate.fish"):
+        (checkout / ".venv/bin" / script).write_text("# of venv\n")
+    for change in ("", "# it asks for more now\n"):
+        (checkout / "setup.py").write_text(change)
+        bootstrap(checkout)
+    environment = checkout / ".venv/share"
+    assert (environment / "bash-completion/completions/objreg").read_text() == "# of bash\n"
+    assert (environment / "zsh/site-functions/_objreg").read_text() == "# of zsh\n"
+    assert (environment / "fish/vendor_completions.d/objreg.fish").read_text() == "# of fish\n"
+    for script in ("activate", "activate.fish"):
+        assert (checkout / ".venv/bin" / script).read_text().count("# objreg: completion") == 1
+    (environment / "bash-completion/completions/objreg").write_text("echo completes\n")
+    for shell, heard_there in (("bash", "completes\n"), ("sh", "")):
+        sourced = f"set -eu; VIRTUAL_ENV={checkout / '.venv'}; . {activate}"
+        assert subprocess.run([shell, "-c", sourced], check=True, capture_output=True, text=True).stdout == heard_there
+
+
+def test_what_cannot_complete_is_no_obstacle(checkout: Path) -> None:
+    objreg = checkout / ".venv/bin/objreg"
+    objreg.write_text("#!/bin/bash\nexit 1\n")
+    objreg.chmod(0o755)
+    asked, said = heard(checkout)
+    assert asked and "objreg works without" in said

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The executable `objreg`, and `python -m objreg_ros`: the process is the command's, from its first line to its last.
+
+Until the command is imported, and when it has ended, Ctrl-C ends the process as it does any other, without a word of
+Python's.
+"""
+
+from __future__ import annotations
+
+import signal
+
+
+def main() -> None:
+    """Run the command line; it ends with `SystemExit`."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not ignored, as behind nohup
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    from objreg_ros.cli import main as run
+
+    run()
+
+
+if __name__ == "__main__":
+    main()

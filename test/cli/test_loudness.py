@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is heard of a command with -q, with -v, and with neither."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+import pytest
+from click.testing import CliRunner, Result
+
+from objreg_ros.cli.loudness import aside, heard_by, is_quiet, is_verbose
+
+
+def said(*words: str) -> Result:
+    """What a command in a group says, both of which hear of the options."""
+
+    @click.group()
+    def group() -> None:
+        pass
+
+    @group.command()
+    def run() -> None:
+        click.echo("a note", err=True)
+        with aside():
+            click.echo("a line")
+        if is_verbose():
+            click.echo("a reason")
+        click.echo("the result")
+
+    heard_by(heard_by(run))
+    return CliRunner().invoke(heard_by(group), words)
+
+
+def test_usually_all_but_the_reasons_is_heard() -> None:
+    result = said("run")
+    assert (result.stdout, result.stderr) == ("a line\nthe result\n", "a note\n")
+
+
+@pytest.mark.parametrize("words", [("-q", "run"), ("run", "-q"), ("--quiet", "run"), ("-q", "run", "--quiet")])
+def test_quiet_is_the_result_alone_wherever_it_is_said(words: tuple[str, ...]) -> None:
+    before = sys.stderr
+    result = said(*words)
+    assert (result.stdout, result.stderr, result.exit_code) == ("the result\n", "", 0)
+    assert sys.stderr is before
+
+
+@pytest.mark.parametrize("words", [("-v", "run"), ("run", "--verbose")])
+def test_verbose_has_the_reasons_too(words: tuple[str, ...]) -> None:
+    assert said(*words).stdout == "a line\na reason\nthe result\n"
+
+
+@pytest.mark.parametrize("words", [("-q", "-v", "run"), ("-q", "run", "-v"), ("run", "-v", "-q")])
+def test_both_are_refused(words: tuple[str, ...]) -> None:
+    result = said(*words)
+    assert result.exit_code == 2 and "expected -q or -v, got both" in result.output
+
+
+def test_outside_of_a_command_line_nothing_is_hushed(capsys: pytest.CaptureFixture[str]) -> None:
+    with aside():
+        click.echo("heard")
+    assert capsys.readouterr().out == "heard\n" and not is_quiet() and not is_verbose()
+
+
+@pytest.mark.parametrize("words", [("run", "-q", "--nothing"), ("-q", "fly")])
+def test_a_command_line_that_is_none_is_told_although_it_asks_for_quiet(words: tuple[str, ...]) -> None:
+    assert "No such" in said(*words).stderr

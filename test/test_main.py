@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The process of the command: signals, pipes and disks end it without a traceback."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+OBJREG = [sys.executable, "-m", "objreg_ros"]
+SIGNALLED = (128 + signal.SIGINT, -signal.SIGINT)  # told by the command, or by the system before it
+IN_IMPORT = """
+import signal, sys
+
+class Interrupting:
+    def find_spec(self, name, path=None, target=None):
+        if name == module:
+            signal.raise_signal(signal.SIGINT)
+
+module = sys.argv.pop(1)
+sys.meta_path.insert(0, Interrupting())
+from objreg_ros.__main__ import main
+main()
+"""
+SWALLOWED = """
+import signal, time, weakref
+from objreg_ros import cli
+from objreg_ros.__main__ import main
+
+class Thing:
+    pass
+
+def work(**_):
+    thing = Thing()
+    kept = weakref.ref(thing, lambda _: signal.raise_signal(signal.SIGINT))
+    del thing  # what a callback raises goes nowhere
+    time.sleep(20)
+
+cli.group.main = work
+main()
+"""
+
+
+def ended(words: list[str]) -> tuple[int, str]:
+    """The status of a command and what it says as it ends."""
+    told = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    return told.returncode, told.stderr
+
+
+@pytest.mark.parametrize("module", ["click", "objreg_ros.cli.inspect", "numpy", "cv2", "rosbags.interfaces"])
+def test_an_interrupt_during_an_import_says_nothing(module: str, tmp_path: Path) -> None:
+    status, said = ended([sys.executable, "-c", IN_IMPORT, module, "inspect", str(tmp_path)])
+    assert status in SIGNALLED and not said.strip()
+
+
+def test_an_interrupt_that_is_swallowed_comes_again() -> None:
+    began = time.monotonic()
+    status, said = ended([sys.executable, "-c", SWALLOWED])
+    assert status in SIGNALLED and not said.strip() and time.monotonic() - began < 15
+
+
+@pytest.mark.parametrize("delay_s", [0.3, 0.9, 1.5])
+def test_an_interrupt_at_any_moment_says_nothing(delay_s: float) -> None:
+    with subprocess.Popen([*OBJREG, "doctor"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        time.sleep(delay_s)
+        process.send_signal(signal.SIGINT)
+        said = process.communicate(timeout=60)[1]
+    assert process.returncode in (0, *SIGNALLED) and "Traceback" not in said and "ignored" not in said
+
+
+def test_an_interrupt_that_is_ignored_from_outside_stays_so(tmp_path: Path) -> None:
+    code = "import signal, sys; signal.signal(signal.SIGINT, signal.SIG_IGN);" + IN_IMPORT
+    status, said = ended([sys.executable, "-c", code, "numpy", "inspect", str(tmp_path / "nowhere")])
+    assert status == 1 and "no such file" in said
+
+
+def test_a_reader_who_leaves_ends_the_command_without_a_word() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    with os.fdopen(writing, "wb") as closed:
+        told = subprocess.run([*OBJREG, "params"], stdout=closed, stderr=subprocess.PIPE, text=True, check=False)
+    assert (told.returncode, told.stderr) == (141, "")
+
+
+def test_an_output_that_is_full_is_one_line() -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("this system has no /dev/full")
+    with Path("/dev/full").open("wb") as full:
+        told = subprocess.run([*OBJREG, "params"], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert told.returncode == 1 and told.stderr.count("\n") == 1
+    assert told.stderr.startswith("objreg: standard output: expected a place that takes it, got: No space left")
+
+
+def test_the_version_is_that_of_the_package(repository: Path) -> None:
+    told = subprocess.run([*OBJREG, "--version"], capture_output=True, text=True, check=True).stdout
+    assert f"<version>{told.split()[1]}</version>" in (repository / "package.xml").read_text()
