@@ -32,8 +32,9 @@ def test_the_page_of_parameters_is_that_of_the_code(repository: Path) -> None:
     assert (repository / TABLE_FILE).read_text() == page_text(), f"{TABLE_FILE} is {STALE}"
 
 
-def test_the_readme_speaks_of_parameters_that_exist(repository: Path) -> None:
-    rows = (repository / "README.md").read_text().partition("## Parameters")[2].partition("\n## ")[0]
+@pytest.mark.parametrize("document", ["README.md", "docs/tutorials/tune.md"])
+def test_a_document_speaks_of_parameters_that_exist(repository: Path, document: str) -> None:
+    rows = (repository / document).read_text().partition("## Parameters")[2].partition("\n## ")[0]
     spoken_of = re.findall(r"^\| `(\w+)\.(\w+)` \| `(.+?)` \|", rows, re.MULTILINE)
     declared = {
         (node, declaration.name): yaml_value(declaration.default)
