@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 
 from objreg_ros.cli import NOTHING, options
-from objreg_ros.cli.told import tell
+from objreg_ros.cli.told import tell, tell_next
 from objreg_ros.memory.store_file import is_store
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import GRAPH_TOPICS, Inputs, choose_inputs, parse_remaps
@@ -55,7 +55,11 @@ def command(recording: Path, remaps: tuple[str, ...], camera: str, picture: Path
         _say_lens(source, inputs)
         _say_truth(source, inputs)
         tell(warnings(source, inputs))
-    return 0 if inputs.complete else NOTHING
+    if not inputs.complete:
+        return NOTHING
+    told = [f"--remap={remap}" for remap in remaps] + ([f"--camera={camera}"] if camera else [])
+    tell_next("objreg", "offline", str(recording), *told, "--json", "run.json")
+    return 0
 
 
 def _say_store(store: Path, picture: Path | None, page: Path | None) -> None:

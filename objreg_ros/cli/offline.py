@@ -18,7 +18,7 @@ from objreg_ros.cli import FIRST_TIME, options
 from objreg_ros.cli.loudness import aside
 from objreg_ros.cli.options import require_writable
 from objreg_ros.cli.settings import Settings, read_settings, tell_ignored
-from objreg_ros.cli.told import exit_code, json_to, tell, tell_reasons
+from objreg_ros.cli.told import STANDARD_OUTPUT, exit_code, json_to, tell, tell_next, tell_reasons
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.offline import Run, Timing, build_rooms, run_offline
 from objreg_ros.recording import Record, Recording, open_recording
@@ -144,6 +144,8 @@ def command(
             scenes.write(scene_of(Story.of(recording.name, summary, truth), album), click.echo)
         if files.wanted and run.frames:
             _map(files, Story.of(recording.name, summary, truth), Path(registrar.store))
+        if run.closures:
+            _say_what_follows(recording, json_file)
         return exit_code(summary)
 
 
@@ -169,6 +171,13 @@ def _remembering(registrar: RegistrarParams, files: MapFiles, folder: str) -> Re
     if files.cloud is None or registrar.store:
         return registrar
     return registrar.replaced(store=str(Path(folder, "keyframes.db")))
+
+
+def _say_what_follows(recording: Path, json_file: Path | None) -> None:
+    """How one looks at the closed loops, unless this run is part of that already."""
+    asked = click.get_current_context().find_root().invoked_subcommand
+    if asked != "report" and json_file != STANDARD_OUTPUT:
+        tell_next("objreg", "report", str(json_file or recording))
 
 
 @aside()

@@ -25,6 +25,11 @@ from objreg_ros.recording.troubles import troubles
 if TYPE_CHECKING:
     from objreg_ros.bridge.player import Item, Player
 
+LISTEN = (
+    "start the nodes with `objreg_graph`, or play to the names that they have, "
+    "as with `objreg replay REC -- --ros-args -r __ns:=/ROBOT -r image:=/camera/rgb`"
+)
+
 
 @click.command()
 @options.recording
@@ -156,8 +161,11 @@ def _obstacles(source: Recording) -> dict[str, str]:
 
 def _prepare(player: Player, inputs: Inputs, names: dict[str, str], wait: float) -> None:
     needed = [names[topic] for topic in (inputs.image, inputs.depth or inputs.points) if topic in names]
-    for topic in player.wait_for_listeners(needed, wait):
+    alone = player.wait_for_listeners(needed, wait)
+    for topic in alone:
         click.echo(f"nobody listens to {topic}", err=True)
+    if alone:
+        click.echo(f"next: {LISTEN}", err=True)
     if inputs.missing:
         click.echo(f"the graph waits for {inputs.missing}, which this replay does not send", err=True)
 

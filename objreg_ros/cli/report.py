@@ -39,5 +39,5 @@ def command(context: click.Context, runs: tuple[Path, ...], out: Path, model: st
             files.append(file)
         for lacking in write_report(out, files):
             click.echo(f"! {lacking}", err=True)
-    click.echo(f"wrote {out}")
+    click.echo(f"wrote {out}; open it in a browser, it needs no network")
     return code

@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
+from objreg_ros.cli.told import tell_next
 from objreg_ros.data import Intrinsics
 from objreg_ros.params import Params
 from objreg_ros.simulation.camera import CAMERAS, LENSES, SENSORS
@@ -87,6 +88,7 @@ def command(
     click.echo(f"{out}: {scenario}, seed {seed}, {frames} frames at {story.rate:.3g} Hz, truth in {out / 'truth'}")
     if story.rate < rate - 1e-6:
         click.echo(f"note: {frames} frames are few for this path, so they come at {story.rate:.3g} Hz, not {rate:g}")
+    tell_next("objreg", "inspect", str(out))
 
 
 def camera_of(name: str, size: str | None) -> Intrinsics:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
@@ -53,6 +54,12 @@ def tell(findings: Iterable[Finding], err: bool = False) -> None:
             click.echo(f"    next: {finding.todo}", err=err)
         if finding.anchor:
             click.echo(f"    more: docs/troubleshooting.md#{finding.anchor}", err=err)
+
+
+@aside()
+def tell_next(*words: str) -> None:
+    """The command that comes after this one, as it may be typed."""
+    click.echo(f"next: {shlex.join(words)}")
 
 
 def closing_lines(summary: Mapping[str, Any], findings: Sequence[Finding], out: Path, own: bool) -> Iterator[str]:

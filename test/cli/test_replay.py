@@ -148,6 +148,7 @@ def test_it_waits_for_those_who_hear_colour_and_depth_and_names_what_nobody_hear
     stage.deaf = ["/image"]
     result = replay(folder, "--wait", "2")
     assert stage.asked == [(["image", "depth/image"], 2.0)] and "nobody listens to /image" in result.output
+    assert "next: start the nodes" in result.output
     assert stage.plays
 
 

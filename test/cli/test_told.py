@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from objreg_ros.cli import NOTHING
 from objreg_ros.cli.loudness import heard_by
-from objreg_ros.cli.told import closing_lines, exit_code, json_to, tell, tell_reasons
+from objreg_ros.cli.told import closing_lines, exit_code, json_to, tell, tell_next, tell_reasons
 from objreg_ros.data import Reason, Rejected
 from objreg_ros.recording.finding import Finding
 
@@ -23,6 +23,11 @@ def test_a_finding_is_a_block_and_a_remark_a_line(capsys: pytest.CaptureFixture[
         "! nothing is seen", "    likely: it is dark", "    next: put on the light",
         "    more: docs/troubleshooting.md#no-detections", "! no odometry",
     ]  # fmt: skip
+
+
+def test_the_next_command_may_be_typed_as_it_stands(capsys: pytest.CaptureFixture[str]) -> None:
+    tell_next("objreg", "inspect", "my bag")
+    assert capsys.readouterr().out == "next: objreg inspect 'my bag'\n"
 
 
 def test_a_run_without_frames_has_an_exit_code_of_its_own() -> None:

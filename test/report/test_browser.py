@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from objreg_ros.report.bundle import plotly_bundle
 from objreg_ros.report.page import page
 from objreg_ros.report.story import Story
 
+from .chromium import chromium
 from .runs import TRUTH, summary
 from .test_thumbnails import Wall
 
@@ -25,21 +25,9 @@ TELEPHONE = {"width": 420, "height": 900, "deviceScaleFactor": 1, "mobile": Fals
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     """Chromium without a window, with the page of two runs."""
-    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
-    chromium, driver = (shutil.which(name) for name in ("chromium", "chromedriver"))
-    if chromium is None or driver is None:
-        pytest.skip("chromium or chromedriver is not installed")
-    options = webdriver.ChromeOptions()
-    options.binary_location = chromium
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    for word in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", *WEBGL):
-        options.add_argument(word)
-    opened = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
-    try:
+    with chromium(*WEBGL) as opened:
         opened.get(_written(tmp_path_factory.mktemp("page")).as_uri())
         yield opened
-    finally:
-        opened.quit()
 
 
 def _written(folder: Path) -> Path:

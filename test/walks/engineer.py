@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A SLAM engineer starts the nodes in a namespace with a driver's topic names, and listens."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import Odometry
+from ros.graph import Graph
+
+from objreg_ros.bridge import from_msg, qos
+from objreg_ros.bridge.diagnostics import refusal_of
+
+from .walk import PATIENCE_S, Walk
+
+ROBOT = "/fleet/robot_7"
+DRIVER = {"image": "/kinect/rgb/raw", "depth/image": "/kinect/depth/raw", "camera_info": "/kinect/info"}
+RULES = [f"-r __ns:={ROBOT}", *(f"-r {name}:={topic}" for name, topic in DRIVER.items())]
+BEHIND = ["--", "--ros-args", *(word for rule in RULES for word in rule.split(" "))]
+
+
+def walk(graph: Graph, folder: Path, room: Path) -> None:
+    """Start, play, hear: constraints, refusals, and books that balance."""
+    for name in ("detector", "segmenter", "registrar"):
+        graph.start(f"{ROBOT}/{name}", name, *RULES, *(["-p reliable:=true"] if name != "registrar" else []))
+    graph.hear(Odometry, f"{ROBOT}/constraints", qos.latched(depth=1000))
+    graph.hear(DiagnosticArray, f"{ROBOT}/refusals")
+    graph.wait_for(lambda: len(graph.books) == 3, PATIENCE_S, "three nodes")
+
+    engineer = Walk(folder)
+    _play_where_nobody_listens(engineer, room)
+    played = engineer.type("replay", str(room), "--lossless", "--end", "22", "--wait", str(PATIENCE_S), *BEHIND)
+    assert DRIVER["image"] in played.text and "registrar: " in played.text, played.text
+
+    graph.wait_for(lambda: bool(graph.heard[f"{ROBOT}/constraints"]), what="a constraint")
+    closure = from_msg.loop_closure(graph.heard[f"{ROBOT}/constraints"][0])
+    assert closure.covariance.shape == (6, 6) and closure.from_ns != closure.to_ns
+    graph.wait_for(lambda: bool(graph.heard[f"{ROBOT}/refusals"]), what="a refusal")
+    assert refusal_of(graph.heard[f"{ROBOT}/refusals"][0].status[0])
+    _read_the_books(graph)
+
+
+def _play_where_nobody_listens(engineer: Walk, room: Path) -> None:
+    """A replay that forgets the namespace says that nobody listens, and how to look."""
+    forgot = engineer.type("replay", str(room), "--end", "1", "--wait", "1")
+    assert "nobody listens to /image" in forgot.text
+    assert forgot.advises("objreg_graph") and forgot.advises("-r __ns:=/")
+
+
+def _read_the_books(graph: Graph) -> None:
+    """Received is published, waiting or dropped, of each node."""
+    for books in graph.books.values():
+        assert books.received == books.published + books.waiting + sum(books.dropped.values())
+        assert books.published

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Five users walk through what there is, each by what the last command told, and none comes to a dead end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from report.chromium import chromium
+
+from . import odd_bags, reader, researcher, student
+from .walk import ROOM, Said, Walk
+
+pytestmark = pytest.mark.ros
+
+
+@pytest.fixture(scope="module")
+def room(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A simulated recording, from which the command leads on."""
+    folder = tmp_path_factory.mktemp("walks")
+    assert Walk(folder).type("simulate", "room", *ROOM).command() == ["inspect", "room"]
+    return folder / "room"
+
+
+@pytest.fixture(scope="module")
+def study(room: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder in which the researcher has worked."""
+    folder = tmp_path_factory.mktemp("study")
+    researcher.walk(folder, room)
+    return folder
+
+
+@pytest.fixture
+def browser() -> Iterator[Any]:
+    """Chromium without a window."""
+    with chromium() as opened:
+        yield opened
+
+
+def test_a_student_comes_from_a_tum_folder_to_a_page(room: Path, tmp_path: Path) -> None:
+    student.walk(tmp_path, room)
+
+
+@pytest.mark.parametrize(
+    "way",
+    [
+        odd_bags.colour_under_an_odd_name,
+        odd_bags.no_camera_info,
+        odd_bags.wrong_depth_scale,
+        odd_bags.garbage_in_place_of_depth,
+    ],
+)
+def test_an_odd_recording_is_put_right_by_what_is_told(way: Any, room: Path, tmp_path: Path) -> None:
+    way(tmp_path, room)
+
+
+def test_a_researcher_compares_two_runs_and_reads_what_they_wrote(study: Path) -> None:
+    assert (study / "both.html").is_file()
+
+
+def test_an_engineer_hears_constraints_refusals_and_diagnostics_of_a_robot(
+    room: Path, tmp_path: Path, domain: int
+) -> None:
+    pytest.importorskip("rclpy", reason="ROS is not installed")
+    from ros.graph import Graph
+
+    from . import engineer
+
+    graph = Graph(domain, tmp_path)
+    try:
+        engineer.walk(graph, tmp_path, room)
+    finally:
+        graph.close()
+
+
+def test_a_reader_finds_a_pair_on_the_page(browser: Any, study: Path) -> None:
+    reader.walk(browser, study / "both.html")
+
+
+def test_a_command_that_names_no_next_step_is_a_dead_end() -> None:
+    with pytest.raises(AssertionError, match="a dead end"):
+        Said("! nothing was detected\n", "").advice()
+    assert Said("    next: objreg report 'a b.json'\n", "").command() == ["report", "a b.json"]
