@@ -45,6 +45,21 @@ cli.group.main = work
 main()
 """
 
+MISTAKEN = """
+import signal
+from objreg_ros import cli
+from objreg_ros.__main__ import main
+
+def work(**_):
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt:
+        {end}
+
+cli.group.main = work
+main()
+"""
+
 
 def ended(words: list[str]) -> tuple[int, str]:
     """The status of a command and what it says as it ends."""
@@ -62,6 +77,12 @@ def test_an_interrupt_that_is_swallowed_comes_again() -> None:
     began = time.monotonic()
     status, said = ended([sys.executable, "-c", SWALLOWED])
     assert status in SIGNALLED and not said.strip() and time.monotonic() - began < 15
+
+
+@pytest.mark.parametrize("end", ["return 1", "raise SystemExit(1)"])
+def test_an_interrupt_that_a_library_made_an_error_of_ends_the_command(end: str) -> None:
+    status, said = ended([sys.executable, "-c", MISTAKEN.format(end=end)])
+    assert status in SIGNALLED and not said.strip()
 
 
 @pytest.mark.parametrize("delay_s", [0.3, 0.9, 1.5])

@@ -169,9 +169,10 @@ def _ended_by_signals() -> Iterator[None]:
     with _heard(end), _never_swallowed():
         try:
             yield
-        except (Exception, KeyboardInterrupt):
+        except BaseException:  # a library may leave with a status of its own
             if not told:
                 raise
+        if told:  # also where the command came to its end, with an import less
             sys.exit(INTERRUPTED if told[0] == signal.SIGINT else TERMINATED)
 
 
