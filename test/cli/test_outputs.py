@@ -39,7 +39,7 @@ def test_a_file_that_cannot_be_written_is_refused_before_the_run(tmp_path: Path)
 
 
 def test_a_map_wants_odometry_and_says_how_to_get_one(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="--tum: expected odometry.*--odometry drift:1"):
+    with pytest.raises(ValueError, match=r"--tum: expected odometry.*--odometry drift:1"):
         asked(tmp_path, "tum").require_way(*without_odometry(), has_truth=True)
 
 
