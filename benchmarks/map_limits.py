@@ -46,15 +46,29 @@ class Case:
     closures: list[LoopClosure]
 
 
-def found(path: Path, folder: Path) -> Case:
-    """Of a recording; out of a file where it was found before."""
+def kept(path: Path, folder: Path, make: Callable[[], Any], suffix: str = ".pickle") -> Any:
+    """What is made of a recording; out of a file in the folder where it was made before."""
     stat = path.stat()
     tag = hashlib.sha1(f"{path.resolve()} {stat.st_mtime_ns} {stat.st_size}".encode()).hexdigest()[:8]
-    file = folder / f"{path.name}_{tag}.pickle"
+    file = folder / f"{path.name}_{tag}{suffix}"
     if file.exists():
-        click.echo(f"{path.name}: closures as found before, in {file}", err=True)
-        case: Case = pickle.loads(file.read_bytes())
-        return case
+        click.echo(f"{path.name}: as found before, in {file}", err=True)
+        return pickle.loads(file.read_bytes())
+    made = make()
+    folder.mkdir(parents=True, exist_ok=True)
+    unfinished = file.with_suffix(".part")
+    unfinished.write_bytes(pickle.dumps(made))
+    os.replace(unfinished, file)
+    return made
+
+
+def found(path: Path, folder: Path) -> Case:
+    """Of a recording; out of a file where it was found before."""
+    case: Case = kept(path, folder, lambda: _found(path))
+    return case
+
+
+def _found(path: Path) -> Case:
     click.echo(f"{path.name}: finding closures", err=True)
     with read_source(path, detector_of(), SEED) as source:
         result = closers.ours(source, SEED)
@@ -63,12 +77,7 @@ def found(path: Path, folder: Path) -> Case:
             for frame in source.frames
             if source.truth.at(frame.stamp_ns) is not None
         ]
-        case = Case(path.name, bare, source.truth, result.closures)
-    folder.mkdir(parents=True, exist_ok=True)
-    unfinished = file.with_suffix(".part")
-    unfinished.write_bytes(pickle.dumps(case))
-    os.replace(unfinished, file)
-    return case
+        return Case(path.name, bare, source.truth, result.closures)
 
 
 Words = Callable[[Case, list[Frame]], list[LoopClosure]]

@@ -4,6 +4,7 @@
     python benchmarks/mapper.py robust --graphs 200 --seed 0
     python benchmarks/mapper.py scale --poses 40000 --closures 5000
     python benchmarks/mapper.py limits REC --simulate loop:0 --drifts 6
+    python benchmarks/mapper.py landmarks REC --simulate loop:0 --drifts 6
     python benchmarks/mapper.py public sphere2500.g2o
 
 ``robust``: random walks with 10, 20 or 30 % false closures of any size and claimed sigma, a third of the walks with up
@@ -14,8 +15,11 @@ have the same keyframes, steps and closures, those that our mapper refuses as im
 
 ``limits``: what the error of the trajectory comes from. Closures of a recording are found once and kept in a folder;
 odometry drifts anew from its truth. Beside our closures those of the same pairs with true poses and the same
-covariances, and with parts of the mapper, or of the closures, switched off or made perfect. And, by plain
-Levenberg-Marquardt, with an error of each keyframe that all its closures share.
+covariances, and with parts of the mapper, or of the closures, switched off or made perfect.
+
+``landmarks``: whether objects help as landmarks. By plain Levenberg-Marquardt, with an error of each keyframe that all
+its closures and sightings share: closures alone, and beside them ranges and bearings of objects, which are told apart
+by place, by closures, by both as the registrar does, or by truth.
 
 ``public``: pose graphs as g2o text. Chi-squared before and after, beside GTSAM's Levenberg-Marquardt.
 """
@@ -24,10 +28,12 @@ from __future__ import annotations
 
 import json
 import tempfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import click
+import map_landmarks
 import map_lies
 import map_limits
 import map_public
@@ -98,30 +104,49 @@ def scale(poses: int, closures: int, seed: int, json_file: Path | None) -> None:
     write(json_file, told)
 
 
-@main.command()
-@click.argument("recordings", nargs=-1, type=click.Path(exists=True, path_type=Path))
-@click.option("--simulate", "scenarios", multiple=True, metavar="SCENARIO:SEED,…", help="Such recordings too.")
-@click.option("--frames", default=600, show_default=True, type=click.IntRange(2), help="Of each that is simulated.")
-@click.option("--drifts", default=6, show_default=True, type=click.IntRange(1), help="Of odometry.")
-@click.option("--keep", type=click.Path(file_okay=False, path_type=Path), default=KEPT, show_default=True)
-@JSON
-def limits(
-    recordings: tuple[Path, ...],
-    scenarios: tuple[str, ...],
-    frames: int,
-    drifts: int,
-    keep: Path,
-    json_file: Path | None,
-) -> None:
-    """What limits the trajectory."""
+def _compared(command: Callable[..., None]) -> Callable[..., None]:
+    """The recordings, drifts and files of a command."""
+    for option in (
+        JSON,
+        click.option("--keep", type=click.Path(file_okay=False, path_type=Path), default=KEPT, show_default=True),
+        click.option("--drifts", default=6, show_default=True, type=click.IntRange(1), help="Of odometry."),
+        click.option("--frames", default=600, show_default=True, type=click.IntRange(2), help="Of each simulated one."),
+        click.option("--simulate", "scenarios", multiple=True, metavar="SCENARIO:SEED,…", help="Such recordings too."),
+        click.argument("recordings", nargs=-1, type=click.Path(exists=True, path_type=Path)),
+    ):
+        command = option(command)
+    return command
+
+
+def _cases(recordings: tuple[Path, ...], scenarios: tuple[str, ...], frames: int, keep: Path) -> Iterator[Path]:
     asked = stories(scenarios)
     if not recordings and not asked:
         raise click.UsageError("expected RECORDINGS or --simulate SCENARIO:SEED, got neither")
+    yield from recordings
+    yield from (simulated(keep, name, seed, frames) for name, seed in asked)
+
+
+@main.command()
+@_compared
+def limits(drifts: int, keep: Path, json_file: Path | None, **asked: Any) -> None:
+    """What limits the trajectory."""
     told = {}
-    for path in [*recordings, *(simulated(keep, name, seed, frames) for name, seed in asked)]:
+    for path in _cases(keep=keep, **asked):
         case = map_limits.found(path, keep)
         told[case.name] = map_limits.limits(case, drifts)
         click.echo(map_limits.table(case.name, told[case.name]) + "\n")
+        write(json_file, told)
+
+
+@main.command()
+@_compared
+def landmarks(drifts: int, keep: Path, json_file: Path | None, **asked: Any) -> None:
+    """Whether objects help as landmarks."""
+    told = {}
+    for path in _cases(keep=keep, **asked):
+        case = map_limits.found(path, keep)
+        told[case.name] = map_landmarks.compare(case, map_landmarks.seen(path, keep), drifts)
+        click.echo(map_landmarks.table(case.name, told[case.name]) + "\n")
         write(json_file, told)
 
 

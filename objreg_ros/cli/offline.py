@@ -15,10 +15,10 @@ from tqdm import tqdm
 
 from objreg_ros.bridge.calibration import absolute
 from objreg_ros.cli import FIRST_TIME, options
-from objreg_ros.cli.loudness import aside
 from objreg_ros.cli.options import require_writable
+from objreg_ros.cli.outputs import Outputs
 from objreg_ros.cli.settings import Settings, read_settings, tell_ignored
-from objreg_ros.cli.told import STANDARD_OUTPUT, exit_code, json_to, tell, tell_next, tell_reasons
+from objreg_ros.cli.told import STANDARD_OUTPUT, exit_code, json_to, tell, tell_next, tell_reasons, tell_run
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.offline import Run, Timing, build_rooms, run_offline
 from objreg_ros.recording import Record, Recording, open_recording
@@ -30,17 +30,14 @@ from objreg_ros.recording.troubles import troubles
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.report.about import about
 from objreg_ros.report.findings import as_json, find, setting, verdict
-from objreg_ros.report.map_files import VOXEL_M, MapFiles
+from objreg_ros.report.map_files import VOXEL_M
 from objreg_ros.report.pictures import Album
-from objreg_ros.report.run_scene import scene_of
-from objreg_ros.report.scene_files import SceneFiles
 from objreg_ros.report.story import Story
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_ros.truth import Truth
 
 FILE = click.Path(dir_okay=False, path_type=Path)
 DRIFT = "drift:"
-STILL = "all frames have the stamp {} ns, so none closes a loop: record them again with the time in their headers"
 CAMERAS_OWN = (
     "--odometry {} is the camera's own and not level: T_base_camera and segmenter.level_odom are left out of this run"
 )
@@ -104,10 +101,9 @@ def command(
 
     Says where the run stopped if no loop was closed, and ends with 3 if no frame got through.
     """
-    files = _files(tum, kitti, g2o, cloud, voxel)
-    scenes = SceneFiles(rerun, mcap)
-    for option, file in (({"--json": json_file} if json_file else {}) | files.wanted | scenes.wanted).items():
-        require_writable(option, file)
+    outputs = Outputs.of(tum, kitti, g2o, cloud, voxel, rerun, mcap)
+    if json_file is not None:
+        require_writable("--json", json_file)
     _require_seed(odometry)
     settings = read_settings(params_file, [*changes, *_named(model, labels, camera)])
     tell_ignored(settings)
@@ -115,12 +111,11 @@ def command(
     with open_recording(recording) as opened, TemporaryDirectory() as folder, json_to(json_file) as write_json:
         source = with_camera(opened, told.camera, parse_remaps(remaps), told.source)
         inputs = _inputs(source, remaps, odometry, told.source)
-        _require_odometry(files, source, inputs)
         truth = Truth.of(source, inputs.ground_truth)
-        scenes.require_way(recording, bool(inputs.odom or truth.poses))
+        outputs.require_way(source, inputs, bool(truth.poses))
         for note in (*source.notes, *truth.notes):
             click.echo(f"! {note}", err=True)
-        registrar = _remembering(settings.of("registrar", RegistrarParams), files, folder)
+        registrar = outputs.remembering(settings.of("registrar", RegistrarParams), folder)
         run = _run(source, inputs, settings, registrar, max_frames, odometry)
         detector = settings.of("detector", DetectorParams)
         summary = {
@@ -133,44 +128,18 @@ def command(
             **setting(source, inputs, detector.model),
             **run.summary(truth),
         }
-        _say(run, summary)
+        tell_run(run, summary)
         tell_reasons(run.refusals)
         findings = find(summary, troubles(source, inputs))
         click.echo(verdict(summary, findings))
         tell(findings)
         write_json({**summary, "findings": as_json(findings)})
-        if scenes.wanted and run.frames:
-            album = Album(source, inputs, told.rectified)
-            scenes.write(scene_of(Story.of(recording.name, summary, truth), album), click.echo)
-        if files.wanted and run.frames:
-            _map(files, Story.of(recording.name, summary, truth), Path(registrar.store))
+        if outputs.wanted:
+            story = Story.of(recording.name, summary, truth)
+            outputs.write(story, Album(source, inputs, told.rectified), Path(registrar.store))
         if run.closures:
             _say_what_follows(recording, json_file)
         return exit_code(summary)
-
-
-def _files(tum: Path | None, kitti: Path | None, g2o: Path | None, cloud: Path | None, voxel: float) -> MapFiles:
-    try:
-        return MapFiles(tum, kitti, g2o, cloud, voxel)
-    except ValueError as error:
-        raise ValueError(f"--voxel: {error}") from error
-
-
-def _require_odometry(files: MapFiles, source: Recording, inputs: Inputs) -> None:
-    """ValueError, before the long run, where a map is asked for and there is no odometry that it could correct."""
-    if files.wanted and inputs.odom is None:
-        there = ", ".join(source.topics)
-        raise ValueError(
-            f"{source.path}: {', '.join(files.wanted)}: expected odometry, which a map corrects, got none of {there}; "
-            "choose its topic with --odometry TOPIC, or make one that drifts from the truth with --odometry drift:1"
-        )
-
-
-def _remembering(registrar: RegistrarParams, files: MapFiles, folder: str) -> RegistrarParams:
-    """With a store in a file, in ``folder`` unless it has one, where the map is made of what it remembers."""
-    if files.cloud is None or registrar.store:
-        return registrar
-    return registrar.replaced(store=str(Path(folder, "keyframes.db")))
 
 
 def _say_what_follows(recording: Path, json_file: Path | None) -> None:
@@ -178,17 +147,6 @@ def _say_what_follows(recording: Path, json_file: Path | None) -> None:
     asked = click.get_current_context().find_root().invoked_subcommand
     if asked != "report" and json_file != STANDARD_OUTPUT:
         tell_next("objreg", "report", str(json_file or recording))
-
-
-@aside()
-def _map(files: MapFiles, story: Story, store: Path) -> None:
-    """Write what is asked for of the corrected map, and say what became of it."""
-    click.echo(f"  map: {len(story.graph.keyframes)} keyframes, {len(story.pruned)} constraints pruned")
-    if story.unsolved:
-        click.echo(f"  map: as odometry says: {story.unsolved}")
-    if story.left_out:
-        click.echo(f"  map: {story.left_out} frames at which time does not advance are left out")
-    files.write(story, store, lambda line: click.echo(f"  map: {line}"))
 
 
 def _require_seed(odometry: str | None) -> None:
@@ -279,45 +237,3 @@ def _records(source: Recording, inputs: Inputs, odometry: str | None) -> Iterato
     if odometry is None or not _drifts(odometry) or inputs.ground_truth is None:
         return records
     return with_drifting_odometry(records, inputs.ground_truth, int(odometry.removeprefix(DRIFT)))
-
-
-@aside()
-def _say(run: Run, summary: dict) -> None:
-    click.echo(
-        f"{run.frames} frames, {run.detections} detections, {run.objects} objects, {len(run.closures)} constraints"
-    )
-    if run.lens:
-        click.echo(f"  lens: {run.lens}")
-    if run.mount:
-        click.echo(f"  camera: {run.mount}")
-    if run.depth_to_colour:
-        click.echo(f"  depth is turned against colour by {run.depth_to_colour}; undone")
-    if run.depth_lag is not None:
-        click.echo(f"  depth is behind colour by {run.depth_lag.text()}")
-    if run.depth_noise is not None:
-        click.echo(f"  depth noise: {run.depth_noise:.2f} (a Kinect v1 has 1)")
-    if run.gravity_from:
-        click.echo(
-            f"  gravity from {', '.join(f'{name}: {count}' for name, count in sorted(run.gravity_from.items()))}"
-        )
-    apart = summary["gravity"]["imu_and_picture_apart_deg"]
-    if apart is not None:
-        click.echo(f"  imu and picture apart: {apart['p50']:.1f}° median, {apart['p95']:.1f}° p95")
-    for reason, count in summary["gravity"]["imu_passed_over"].items():
-        click.echo(f"  imu {reason}: {count}")
-    for title in ("rejected", "dropped"):
-        for reason, count in summary[title].items():
-            click.echo(f"  {title} {reason}: {count}")
-    for complaint in run.complaints.values():
-        click.echo(f"  first of them: {complaint}")
-    if run.frames > 1 and len({glimpse["stamp_ns"] for glimpse in run.glimpses}) == 1:
-        click.echo(f"  ! {STILL.format(run.glimpses[0]['stamp_ns'])}")
-    for stage, ms in summary["stage_ms"].items():
-        click.echo(f"  {stage}: {ms['p50']:.1f} ms median, {ms['p95']:.1f} ms p95")
-    truth = summary["truth"]
-    if truth["count"]:
-        degrees, centimetres = truth["rotation_deg"], truth["translation_cm"]
-        click.echo(f"  true error: {degrees['median']:.2f}° {centimetres['median']:.1f} cm median, "
-                   f"{degrees['max']:.2f}° {centimetres['max']:.1f} cm at most")  # fmt: skip
-        shares = ", ".join(f"{truth[name]} {name}" for name in ("strict", "loose", "false"))
-        click.echo(f"  of {truth['count']} constraints: {shares}")

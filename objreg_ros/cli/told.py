@@ -16,11 +16,13 @@ import click
 from objreg_ros.cli import NOTHING
 from objreg_ros.cli.loudness import aside, is_verbose
 from objreg_ros.data import Rejected
+from objreg_ros.offline import Run
 from objreg_ros.recording.finding import Finding
 from objreg_ros.report.findings import Counts, verdict
 from objreg_ros.whole_file import write_whole
 
 STANDARD_OUTPUT = Path("-")
+STILL = "all frames have the stamp {} ns, so none closes a loop: record them again with the time in their headers"
 
 
 @contextmanager
@@ -35,6 +37,49 @@ def json_to(file: Path | None) -> Iterator[Callable[[Any], None]]:
     output = sys.stdout
     with redirect_stdout(sys.stderr):
         yield lambda content: click.echo(json.dumps(content, indent=1), file=output)
+
+
+@aside()
+def tell_run(run: Run, summary: Mapping[str, Any]) -> None:
+    """What came out of a run, in numbers."""
+    click.echo(
+        f"{run.frames} frames, {run.detections} detections, {run.objects} objects, {len(run.closures)} constraints"
+    )
+    if run.lens:
+        click.echo(f"  lens: {run.lens}")
+    if run.mount:
+        click.echo(f"  camera: {run.mount}")
+    if run.depth_to_colour:
+        click.echo(f"  depth is turned against colour by {run.depth_to_colour}; undone")
+    if run.depth_lag is not None:
+        click.echo(f"  depth is behind colour by {run.depth_lag.text()}")
+    if run.depth_noise is not None:
+        click.echo(f"  depth noise: {run.depth_noise:.2f} (a Kinect v1 has 1)")
+    if run.gravity_from:
+        click.echo(
+            f"  gravity from {', '.join(f'{name}: {count}' for name, count in sorted(run.gravity_from.items()))}"
+        )
+    apart = summary["gravity"]["imu_and_picture_apart_deg"]
+    if apart is not None:
+        click.echo(f"  imu and picture apart: {apart['p50']:.1f}° median, {apart['p95']:.1f}° p95")
+    for reason, count in summary["gravity"]["imu_passed_over"].items():
+        click.echo(f"  imu {reason}: {count}")
+    for title in ("rejected", "dropped"):
+        for reason, count in summary[title].items():
+            click.echo(f"  {title} {reason}: {count}")
+    for complaint in run.complaints.values():
+        click.echo(f"  first of them: {complaint}")
+    if run.frames > 1 and len({glimpse["stamp_ns"] for glimpse in run.glimpses}) == 1:
+        click.echo(f"  ! {STILL.format(run.glimpses[0]['stamp_ns'])}")
+    for stage, ms in summary["stage_ms"].items():
+        click.echo(f"  {stage}: {ms['p50']:.1f} ms median, {ms['p95']:.1f} ms p95")
+    truth = summary["truth"]
+    if truth["count"]:
+        degrees, centimetres = truth["rotation_deg"], truth["translation_cm"]
+        click.echo(f"  true error: {degrees['median']:.2f}° {centimetres['median']:.1f} cm median, "
+                   f"{degrees['max']:.2f}° {centimetres['max']:.1f} cm at most")  # fmt: skip
+        shares = ", ".join(f"{truth[name]} {name}" for name in ("strict", "loose", "false"))
+        click.echo(f"  of {truth['count']} constraints: {shares}")
 
 
 def tell_reasons(refusals: Iterable[Rejected]) -> None:

@@ -43,6 +43,13 @@ def test_without_recordings_closure_says_what_it_needs(benchmark: Benchmark, tmp
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("command", ["limits", "landmarks"])
+def test_without_recordings_the_mappers_commands_say_what_they_need(benchmark: Benchmark, command: str) -> None:
+    pytest.importorskip("gtsam", reason="the map is solved with gtsam")
+    said = refusal(benchmark("mapper").main, command)
+    assert "expected RECORDINGS or --simulate SCENARIO:SEED, got neither" in said
+
+
 @pytest.mark.parametrize("story", ["foo:0", "loop:x", "loop:1,", "loop:-1"])
 def test_what_is_no_scenario_and_seed_is_refused(benchmark: Benchmark, tmp_path: Path, story: str) -> None:
     said = refusal(benchmark("closure").main, "--simulate", story, "--keep", str(tmp_path))

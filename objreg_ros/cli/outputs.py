@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `objreg offline` writes of a run beside its JSON: the corrected map as files, and scenes for viewers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+
+from objreg_ros.cli.loudness import aside
+from objreg_ros.cli.options import require_writable
+from objreg_ros.recording import Recording
+from objreg_ros.recording.inputs import Inputs
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.report.map_files import MapFiles
+from objreg_ros.report.pictures import Album
+from objreg_ros.report.run_scene import scene_of
+from objreg_ros.report.scene_files import SceneFiles
+from objreg_ros.report.story import Story
+
+
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """The files that are asked for. What cannot come of a recording is said before the long run."""
+
+    files: MapFiles
+    scenes: SceneFiles
+
+    @classmethod
+    def of(
+        cls,
+        tum: Path | None,
+        kitti: Path | None,
+        g2o: Path | None,
+        cloud: Path | None,
+        voxel: float,
+        rerun: Path | None,
+        mcap: Path | None,
+    ) -> Outputs:
+        """Those of the options. ValueError for a voxel that is none, OSError where a file cannot be written."""
+        try:
+            files = MapFiles(tum, kitti, g2o, cloud, voxel)
+        except ValueError as error:
+            raise ValueError(f"--voxel: {error}") from error
+        made = cls(files, SceneFiles(rerun, mcap))
+        for option, file in (made.files.wanted | made.scenes.wanted).items():
+            require_writable(option, file)
+        return made
+
+    @property
+    def wanted(self) -> bool:
+        """Whether any file is asked for."""
+        return bool(self.files.wanted or self.scenes.wanted)
+
+    def require_way(self, source: Recording, inputs: Inputs, has_truth: bool) -> None:
+        """ValueError where nothing will tell the way that is asked for: a map corrects odometry, a scene shows any."""
+        if self.files.wanted and inputs.odom is None:
+            there = ", ".join(source.topics)
+            raise ValueError(
+                f"{source.path}: {', '.join(self.files.wanted)}: expected odometry, which a map corrects, got none of "
+                f"{there}; choose its topic with --odometry TOPIC, or make one that drifts from the truth with "
+                "--odometry drift:1"
+            )
+        self.scenes.require_way(source.path, inputs.odom is not None or has_truth)
+
+    def remembering(self, registrar: RegistrarParams, folder: str) -> RegistrarParams:
+        """With a store in a file, in ``folder`` unless it has one, where the map is made of what it remembers."""
+        if self.files.cloud is None or registrar.store:
+            return registrar
+        return registrar.replaced(store=str(Path(folder, "keyframes.db")))
+
+    @aside()
+    def write(self, story: Story, album: Album, store: Path) -> None:
+        """Write what is asked for, and say what became of it; nothing of a run of which no frame got through."""
+        if not story.glimpses:
+            return
+        if self.scenes.wanted:
+            self.scenes.write(scene_of(story, album), click.echo)
+        if self.files.wanted:
+            click.echo(f"  map: {len(story.graph.keyframes)} keyframes, {len(story.pruned)} constraints pruned")
+            if story.unsolved:
+                click.echo(f"  map: as odometry says: {story.unsolved}")
+            if story.left_out:
+                click.echo(f"  map: {story.left_out} frames at which time does not advance are left out")
+            self.files.write(story, store, lambda line: click.echo(f"  map: {line}"))

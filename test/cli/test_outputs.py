@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is asked of a run beside its JSON is refused before the run where nothing can come of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from objreg_ros.cli.outputs import Outputs
+from objreg_ros.registration.params import RegistrarParams
+
+
+def asked(folder: Path, *options: str, voxel: float = 0.02) -> Outputs:
+    files = {option: folder / option for option in options}
+    names = ("tum", "kitti", "g2o", "cloud")
+    return Outputs.of(*(files.get(name) for name in names), voxel, None, files.get("mcap"))
+
+
+def without_odometry() -> tuple[Any, Any]:
+    return SimpleNamespace(path=Path("bag"), topics={"/image": None}), SimpleNamespace(odom=None)
+
+
+def test_nothing_is_wanted_of_no_options(tmp_path: Path) -> None:
+    assert not asked(tmp_path).wanted
+    assert asked(tmp_path, "tum").wanted and asked(tmp_path, "mcap").wanted
+
+
+def test_a_voxel_that_is_none_is_refused_by_the_name_of_its_option(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="--voxel: expected"):
+        asked(tmp_path, "cloud", voxel=-1.0)
+
+
+def test_a_file_that_cannot_be_written_is_refused_before_the_run(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="--g2o"):
+        asked(tmp_path / "nowhere", "g2o")
+
+
+def test_a_map_wants_odometry_and_says_how_to_get_one(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"--tum: expected odometry.*--odometry drift:1"):
+        asked(tmp_path, "tum").require_way(*without_odometry(), has_truth=True)
+
+
+def test_a_scene_is_content_with_truth(tmp_path: Path) -> None:
+    outputs = asked(tmp_path, "mcap")
+    outputs.require_way(*without_odometry(), has_truth=True)
+    with pytest.raises(ValueError, match="--mcap: expected odometry or a ground truth"):
+        outputs.require_way(*without_odometry(), has_truth=False)
+
+
+def test_a_cloud_is_made_of_a_store_in_a_file(tmp_path: Path) -> None:
+    usual, own = RegistrarParams(), RegistrarParams(store="mine.db")
+    assert asked(tmp_path, "tum").remembering(usual, "folder").store == ""
+    assert asked(tmp_path, "cloud").remembering(usual, "folder").store == "folder/keyframes.db"
+    assert asked(tmp_path, "cloud").remembering(own, "folder").store == "mine.db"
+
+
+def test_nothing_is_written_of_a_run_without_frames(tmp_path: Path) -> None:
+    story: Any = SimpleNamespace(glimpses=())
+    asked(tmp_path, "tum", "mcap").write(story, None, Path("store"))  # type: ignore[arg-type]
+    assert not list(tmp_path.iterdir())
