@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +30,10 @@ class Edges:
 
     def __len__(self) -> int:
         return len(self.k1)
+
+    def __iter__(self) -> Iterator[Edges]:
+        """Each by itself."""
+        return (self.taken(slice(k, k + 1)) for k in range(len(self)))
 
     def taken(self, which: Array | slice) -> Edges:
         """Those of these numbers, or of this mask."""

@@ -160,11 +160,15 @@ class IncrementalGraph:
         T[:, :3, :3], T[:, :3, 3] = rows[:, :9].reshape(-1, 3, 3), rows[:, 9:]
         return T
 
-    def expected_covariance(self, poses: Array, edge: Edges) -> Array:
-        """The covariance (6, 6) of the error of one whitened edge, [r t], as the graph without it knows its nodes."""
+    def error_covariance(self, poses: Array, edges: Edges) -> Array:
+        """(6 m, 6 m): how the whitened errors [r t] of edges, in the graph or not, vary as it knows its nodes."""
         self._update()
-        keys = [int(edge.k1[0]), int(edge.k2[0])]
-        joint = self._carefully(lambda: self._isam.jointMarginalCovariance(keys))
-        blocks = np.block([[joint.at(a, b) for b in keys] for a in keys])
-        J = np.hstack(error_jacobians(poses, edge))
-        return J @ blocks @ J.T + np.eye(6)
+        ends = np.unique([edges.k1, edges.k2])
+        joint = self._carefully(lambda: self._isam.jointMarginalCovariance(ends.tolist()))
+        blocks = np.block([[joint.at(a, b) for b in ends] for a in ends])
+        J = np.zeros((6 * len(edges), 6 * len(ends)))
+        for row, edge in enumerate(edges):
+            for end, part in zip((edge.k1[0], edge.k2[0]), error_jacobians(poses, edge), strict=True):
+                at = 6 * int(np.searchsorted(ends, end))
+                J[6 * row : 6 * row + 6, at : at + 6] = part
+        return J @ blocks @ J.T

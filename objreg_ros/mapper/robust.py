@@ -22,8 +22,7 @@ from objreg_ros.mapper.incremental import IncrementalGraph
 
 ROUNDS = 5  # most times that closures go in and out until none wants to
 LINEAR = 10.0  # a closure that is expected to cost so many limits is not tried: it is not for want of linearity
-DOUBTFUL = 12.6  # what one right closure in twenty costs: chi-squared of six freedoms
-MOST_DOUBTED, MOST_RETRIED = 5, 5
+MOST_DOUBTED, MOST_TOGETHER, MOST_RETRIED = 5, 10, 5
 NEAR_M = 10.0  # between the ends of two closures that may agree,
 AGREEING_M, AGREEING_SHARE = 0.1, 0.05  # and how far they may be from that, with every metre between them
 
@@ -120,8 +119,8 @@ class RobustGraph:
         elif expected < LINEAR * self.limit or self._is_agreed(newest):
             self._take(self._sorted_out(self._changed(self._state, [newest], []), stays_in=newest))
         self._take(self._sorted_out(self._state))
-        if self._state.cost - before.cost > DOUBTFUL:
-            self._doubt()
+        if not self.kept[newest]:
+            self._doubt(newest)
 
     def _welcome(self, closure: Edges) -> None:
         """Believe the newest closure, which is expected to fit: nothing is tried on a copy, as for those in doubt."""
@@ -170,7 +169,21 @@ class RobustGraph:
         error = whitened_errors(state.poses, closure)[0]
         if error @ error <= self.limit:
             return float(error @ error)
-        covariance = state.graph.expected_covariance(state.poses, closure)
+        covariance = np.eye(6) + state.graph.error_covariance(state.poses, closure)
+        return float(error @ np.linalg.solve(covariance, error))
+
+    def _expected_without(self, state: _State, number: int, gone: list[int]) -> float:
+        """What a closure that is left out would be expected to cost, were others not in the map, to first order.
+
+        Without them the solution moves by ``P J^T (1 - J P J^T)^-1 w``, and its covariance ``P`` grows alike; ``w`` and
+        ``J`` are their whitened errors and what these change with.
+        """
+        edges = self.closures.taken(np.array([number, *gone]))
+        w = whitened_errors(state.poses, edges)
+        M = state.graph.error_covariance(state.poses, edges)
+        gain = np.linalg.solve(np.eye(6 * len(gone)) - M[6:, 6:], M[6:, :6]).T
+        error = w[0] + gain @ w[1:].ravel()
+        covariance = np.eye(6) + M[:6, :6] + gain @ M[6:, :6]
         return float(error @ np.linalg.solve(covariance, error))
 
     def _is_agreed(self, number: int) -> bool:
@@ -189,24 +202,23 @@ class RobustGraph:
         near[number] = False  # that is itself
         return near
 
-    def _doubt(self) -> None:
-        """Leave out, one by one, those that were the most doubtful when they came, where all else is better then.
+    def _doubt(self, newest: int) -> None:
+        """Leave out, one by one, those that were the most doubtful when they came, if the newest fits without them.
 
         And each with those that say the same: lies that agree hold each other up.
         """
         kept = np.flatnonzero(self.kept)
         for k in kept[np.argsort(-self._expected[kept])][:MOST_DOUBTED].tolist():
-            self._leave_out([k])
             together = [k, *np.flatnonzero(self._saying_the_same(k) & self.kept).tolist()]
-            if len(together) > 1 and len(together) * self.limit < self._state.cost:  # it is the least to come of it
-                self._leave_out(together)
+            for gone in [k], together[:MOST_TOGETHER]:
+                if self.kept[gone].all() and self._expected_without(self._state, newest, gone) <= self.limit:
+                    self._leave_out(gone)
 
     def _leave_out(self, numbers: list[int]) -> None:
-        """Where all else is better then, and none of them is left out already."""
-        if self.kept[numbers].all():
-            without = self._sorted_out(self._changed(self._state, [], numbers), stays_out=numbers)
-            self._take(without)
-            self._take(self._tried_again(without, numbers))
+        """Where all else is better then."""
+        without = self._sorted_out(self._changed(self._state, [], numbers), stays_out=numbers)
+        self._take(without)
+        self._take(self._tried_again(without, numbers))
 
     def _tried_again(self, state: _State, stays_out: Sequence[int]) -> _State:
         """With a closure back in that fits a map which some less hold; others follow it by themselves."""

@@ -221,7 +221,7 @@ def raised_for(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(IncrementalGraph, name, failing)
 
 
-@pytest.mark.parametrize("name", ["add", "expected_covariance"])
+@pytest.mark.parametrize("name", ["add", "error_covariance"])
 def test_a_closure_on_which_gtsam_raises_is_left_out(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     raised_for(name, monkeypatch)
     clean, solver = solved([ONE], RIGHT), Solver()
