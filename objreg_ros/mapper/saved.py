@@ -49,6 +49,11 @@ KINDS: dict[str, Callable[[Any], Any]] = {
 }  # of a closure, by what makes each of what a file tells
 
 
+def beside(graph_path: Path) -> Path:
+    """Where the sessions of a map are whose g2o text is at ``graph_path``."""
+    return graph_path.with_name(f"{graph_path.stem if graph_path.suffix != '.npz' else graph_path.name}.npz")
+
+
 def packed(graph: PoseGraph) -> dict[str, Any]:
     """All of a graph in arrays, for `save`, which takes longer."""
     ties = graph.closure_ties
