@@ -91,5 +91,7 @@ class Mount:
             where = " ".join(f"{metres:.3f}" for metres in T[:3, 3])
             text = f"/tf_static has the camera's {camera!r} on the odometry's {body!r} at {where} m"
         if text != self._said.get((body, camera)):
+            if len(self._said) >= MOST_FRAMES:
+                self._said.clear()
             self._said[body, camera] = text
             self._say(text)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -119,3 +120,19 @@ def test_a_file_with_a_wrong_byte_is_refused_or_the_same_map(yesterday: PoseGrap
         except ValueError:
             continue
         assert len(found.closure_ties) == len(yesterday.closure_ties)
+
+
+def test_a_map_of_before_robots_is_of_one_without_a_name(yesterday: PoseGraph, tmp_path: Path) -> None:
+    arrays = saved.packed(yesterday)
+    told = json.loads(arrays["told"].tobytes())
+    del told["robots"]
+    for known in told["closures"]:
+        del known["from_robot"], known["to_robot"]
+    arrays["told"] = np.frombuffer(json.dumps(told | {"version": 1}).encode(), np.uint8)
+    saved.save(arrays, tmp_path / "map.npz")
+    found = saved.load(tmp_path / "map.npz", MapperParams())
+    assert [one.robot for one in found.sessions] == [""] and found.closure_ties[0].closure.robots == ("", "")
+    arrays["told"] = np.frombuffer(json.dumps(told | {"version": 3}).encode(), np.uint8)
+    saved.save(arrays, tmp_path / "map.npz")
+    with pytest.raises(ValueError, match="version: expected 1 or 2, got 3"):
+        saved.load(tmp_path / "map.npz", MapperParams())
