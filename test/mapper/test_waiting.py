@@ -16,7 +16,7 @@ from objreg_ros.mapper.waiting import Waiting
 
 from .bent import closure, odometry, square
 
-TRUE = square(laps=2)
+TRUE = square(per_side=12, laps=2)
 
 
 def driven(robots: tuple[str, ...] = ("",), steps: range = range(len(TRUE))) -> tuple[PoseGraph, Waiting, list[str]]:
