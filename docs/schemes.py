@@ -189,7 +189,7 @@ DROPS = {
     "constraint": picture(
         words(LEFT, 18, "A constraint at the mapper", anchor="start"),
         boxes(("arrives", "waits for odometry", "in the map"), 30, QUIET),
-        falls(75, 56, ("two_clocks", "disabled", "retracted")),
+        falls(75, 56, ("two_clocks", "unknown_robot", "disabled", "retracted")),
         falls(205, 56, ("before_odometry", "odometry_gap", "odometry_leap", "implausible", "time_jump, reset")),
         height=170,
     ),

@@ -464,6 +464,12 @@ class Observation:
 
 
 Moments = tuple[str, int, str, int]  # of a closure: camera and stamp in ns of *from*, and of *to*
+Robots = tuple[str, str]  # of a closure: that of *from* and that of *to*, empty where it is not told
+
+
+def may_be_same(robots: Robots, others: Robots) -> bool:
+    """Whether the robots of two closures are the same, as far as both are told."""
+    return all(a == b or not a or not b for a, b in zip(robots, others, strict=True))
 
 
 @word
@@ -473,7 +479,8 @@ class LoopClosure:
     ``covariance (6, 6) float64`` in ROS order [tx ty tz rx ry rz], of the pose in the *from* frame; ``labels`` of the
     objects that closed it; ``matches`` those with their landmarks; ``evidence`` named numbers of the verification;
     ``from_frame_id`` and ``to_frame_id`` the names of the two cameras, which may be two of one robot; ``from_session``
-    and ``to_session`` the runs of odometry that the moments belong to, None where it is not known.
+    and ``to_session`` the runs of odometry that the moments belong to, None where it is not known; ``from_robot`` and
+    ``to_robot`` the names of the robots whose runs these are, empty where it is not told.
     """
 
     from_ns: int
@@ -487,6 +494,8 @@ class LoopClosure:
     to_frame_id: str = "camera"
     from_session: int | None = None
     to_session: int | None = None
+    from_robot: str = ""
+    to_robot: str = ""
 
     def __post_init__(self) -> None:
         _hold_pose(self, "T_from_to")
@@ -501,6 +510,11 @@ class LoopClosure:
     def moments(self) -> Moments:
         """What is the same of a closure on every topic and whenever it is told."""
         return self.from_frame_id, self.from_ns, self.to_frame_id, self.to_ns
+
+    @property
+    def robots(self) -> Robots:
+        """Whose moments they are; the topic `constraints` does not tell it, objreg_msgs does."""
+        return self.from_robot, self.to_robot
 
     @property
     def moved(self) -> dict[str, float]:
@@ -567,8 +581,8 @@ class Rejected:
     """A refused closure: the reason, and the numbers behind it in ``detail``.
 
     ``T_from_to (4, 4)`` is the pose that was turned down, unchecked, for a look at it and nothing else; None where none
-    was found. ``evidence`` are named numbers of it. The frames and sessions are as in `LoopClosure`, empty and None
-    where they are not known.
+    was found. ``evidence`` are named numbers of it. The frames, sessions and robots are as in `LoopClosure`, empty and
+    None where they are not known.
     """
 
     reason: Reason
@@ -581,3 +595,5 @@ class Rejected:
     to_frame_id: str = ""
     from_session: int | None = None
     to_session: int | None = None
+    from_robot: str = ""
+    to_robot: str = ""

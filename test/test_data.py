@@ -256,3 +256,10 @@ def test_a_box_touches_the_pixels_that_it_covers_in_part_and_none_outside_the_pi
     assert [three.touched(k) for k in range(3)] == [
         (slice(2, 4), slice(1, 4)), (slice(40, 48), slice(0, 64)), (slice(0, 0), slice(64, 64))
     ]  # fmt: skip
+
+
+def test_robots_may_be_the_same_as_far_as_both_are_told() -> None:
+    one = closure(from_robot="a", to_robot="b")
+    assert one.robots == ("a", "b") and closure().robots == ("", "")
+    assert data.may_be_same(one.robots, ("", "")) and data.may_be_same(one.robots, ("a", ""))
+    assert not data.may_be_same(one.robots, ("a", "a")) and one.moments == closure().moments

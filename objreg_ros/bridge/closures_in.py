@@ -1,16 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a node hears closures: on `loop_closures` of objreg_msgs, on `constraints`, or on both and each once."""
+"""How a node hears closures: on `loop_closures` of objreg_msgs, on `constraints`, or on both and each once.
+
+Those of one robot come on topics of its own too, whose name tells the robot where the message does not.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 from nav_msgs.msg import Odometry
 
 from objreg_ros.bridge import closures_msg, from_msg, qos
 from objreg_ros.bridge.door import Door
-from objreg_ros.data import LoopClosure, Moments
+from objreg_ros.data import LoopClosure, Moments, Robots, may_be_same
 
 MOST_KNOWN = 100_000  # closures that are remembered, so that none is taken twice
 
@@ -18,8 +24,9 @@ MOST_KNOWN = 100_000  # closures that are remembered, so that none is taken twic
 class ClosuresIn:
     """The books of ``door`` count closures. ValueError for `loop_closures` where objreg_msgs is not installed.
 
-    ``take`` is given what was accepted, ``again`` what is known and now names its sessions, ``withdraw`` the moments of
-    what is taken back. `forget` lets a closure come once more.
+    ``take`` is given what was accepted, ``again`` what is known and now names its sessions, ``withdraw`` the moments
+    and robots of what is taken back. `forget` lets a closure come once more. ``prefixes`` has what stands before the
+    topics of each robot.
     """
 
     def __init__(
@@ -28,45 +35,53 @@ class ClosuresIn:
         topic: str,
         take: Callable[[LoopClosure], None],
         again: Callable[[LoopClosure], None],
-        withdraw: Callable[[Moments], None],
+        withdraw: Callable[[Moments, Robots], None],
+        prefixes: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         self._door, self._take, self._again, self._withdraw = door, take, again, withdraw
-        self._known: dict[Moments, None] = {}  # the oldest first
-        self._moments: dict[str, Moments] = {}  # by the id of objreg_msgs
+        self._known: dict[Moments, set[Robots]] = {}  # the oldest first
+        self._told: dict[str, tuple[Moments, Robots]] = {}  # by the id of objreg_msgs
         whole, kept = closures_msg.LoopClosureMsg, qos.latched(qos.KEPT_CONSTRAINTS)
         if topic == "loop_closures" and whole is None:
             raise ValueError("input: expected objreg_msgs, got none: build it with colcon, or set input:=constraints")
-        if topic != "constraints" and whole is not None:
-            door.listen(whole, "loop_closures", self._hear_whole, kept)
-        if topic != "loop_closures":
-            door.listen(Odometry, "constraints", self._hear_constraint, kept)
+        for robot, prefix in {"": "", **prefixes}.items():
+            if topic != "constraints" and whole is not None:
+                door.listen(whole, f"{prefix}loop_closures", partial(self._hear_whole, robot=robot), kept)
+            if topic != "loop_closures":
+                door.listen(Odometry, f"{prefix}constraints", partial(self._hear_constraint, robot=robot), kept)
 
     def know(self, closures: Iterable[LoopClosure]) -> None:
         """These were taken before."""
-        self._known.update((closure.moments, None) for closure in closures)
+        for closure in closures:
+            self._known.setdefault(closure.moments, set()).add(closure.robots)
 
     def forget(self, closure: LoopClosure) -> None:
         """It was not taken: told otherwise, or later, it may be."""
-        self._known.pop(closure.moments, None)
+        left = self._known.pop(closure.moments, set()) - {closure.robots}
+        if left:
+            self._known[closure.moments] = left
 
     def forget_all(self) -> None:
         """What comes is of another map."""
         self._known.clear()
 
-    def _hear_constraint(self, message: Any) -> None:
-        self._hear("constraints", message, from_msg.loop_closure)
+    def _hear_constraint(self, message: Any, robot: str = "") -> None:
+        self._hear("constraints", message, lambda told: _of(robot, from_msg.loop_closure(told)))
 
-    def _hear_whole(self, message: Any) -> None:
+    def _hear_whole(self, message: Any, robot: str = "") -> None:
         if message.retracted:
-            moments = self._moments.get(message.id)
-            if moments is not None:
-                self._withdraw(moments)
+            told = self._told.get(message.id)
+            if told is not None:
+                self._withdraw(*told)
             return
-        closure = self._hear("loop_closures", message, _whole)
+        closure = self._hear("loop_closures", message, lambda told: _of(robot, _whole(told)))
         if closure is not None:
-            self._moments[message.id] = closure.moments
-            while len(self._moments) > MOST_KNOWN:
-                del self._moments[next(iter(self._moments))]
+            self._told[message.id] = closure.moments, closure.robots
+            while len(self._told) > MOST_KNOWN:
+                del self._told[next(iter(self._told))]
+
+    def _is_known(self, closure: LoopClosure) -> bool:
+        return any(may_be_same(closure.robots, robots) for robots in self._known.get(closure.moments, ()))
 
     def _hear(self, topic: str, message: Any, decode: Callable[[Any], LoopClosure]) -> LoopClosure | None:
         closure = self._door.read_aside(topic, decode, message)
@@ -74,15 +89,21 @@ class ClosuresIn:
             stamp_ns = from_msg.stamp_ns(message)
             self._door.accept(stamp_ns)
             self._door.drop(stamp_ns, f"malformed_{topic}")
-        elif closure.moments in self._known:
+        elif self._is_known(closure):
             self._again(closure)
         else:
-            self._known[closure.moments] = None
+            self.know([closure])
             while len(self._known) > MOST_KNOWN:
                 del self._known[next(iter(self._known))]
             self._door.accept(closure.to_ns)
             self._take(closure)
         return closure
+
+
+def _of(robot: str, closure: LoopClosure) -> LoopClosure:
+    """The closure, of this robot where it tells none itself."""
+    one, other = closure.robots
+    return replace(closure, from_robot=one or robot, to_robot=other or robot) if robot else closure
 
 
 def _whole(message: Any) -> LoopClosure:

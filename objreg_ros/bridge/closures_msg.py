@@ -17,7 +17,7 @@ import numpy as np
 
 from objreg_ros import limits
 from objreg_ros.bridge import from_msg, to_msg
-from objreg_ros.data import LoopClosure, ObjectMatch, Observation, Reason, Rejected
+from objreg_ros.data import LoopClosure, ObjectMatch, Observation, Reason, Rejected, Robots
 
 try:
     from objreg_msgs.msg import Evidence, Moment, ObjectLandmark, ObjectLandmarks, Refusal
@@ -32,21 +32,27 @@ SESSION = re.compile("[0-9]{1,18}")
 
 
 def closure_id(closure: LoopClosure, robot: str) -> str:
-    """The text of a UUID: the same for the same two moments of the same robot, wherever and whenever it is made."""
+    """The text of a UUID: the same for the same two moments of the same robots, wherever and whenever it is made."""
     here = closure.from_session, closure.from_frame_id, closure.from_ns
     there = closure.to_session, closure.to_frame_id, closure.to_ns
-    return str(uuid.uuid5(NAMESPACE, json.dumps([robot, *here, *there])))
+    robots = _robots(closure, robot)
+    whose = robots[0] if robots[0] == robots[1] else robots
+    return str(uuid.uuid5(NAMESPACE, json.dumps([whose, *here, *there])))
 
 
 def loop_closure(closure: LoopClosure, robot: str = "") -> Any:
-    """An objreg_msgs/LoopClosure of the robot of this name; None where objreg_msgs is not installed."""
+    """An objreg_msgs/LoopClosure; None where objreg_msgs is not installed.
+
+    It is of the robot of this name where the closure tells no robot itself.
+    """
     if LoopClosureMsg is None:
         return None
+    robots = _robots(closure, robot)
     message = LoopClosureMsg(
         header=to_msg.header(closure.to_ns, closure.from_frame_id),
         id=closure_id(closure, robot),
-        from_moment=_moment(closure.from_ns, closure.from_frame_id, closure.from_session, robot),
-        to_moment=_moment(closure.to_ns, closure.to_frame_id, closure.to_session, robot),
+        from_moment=_moment(closure.from_ns, closure.from_frame_id, closure.from_session, robots[0]),
+        to_moment=_moment(closure.to_ns, closure.to_frame_id, closure.to_session, robots[1]),
         labels=list(closure.labels),
         objects=[ObjectMatchMsg(label=match.label, landmark_id=match.object_id) for match in closure.matches],
         evidence=_evidence(closure.evidence),
@@ -57,14 +63,14 @@ def loop_closure(closure: LoopClosure, robot: str = "") -> Any:
 
 
 def refusal(rejected: Rejected, robot: str = "") -> Any:
-    """An objreg_msgs/Refusal of the robot of this name; None where objreg_msgs is not installed."""
+    """An objreg_msgs/Refusal, with robots as in `loop_closure`; None where objreg_msgs is not installed."""
     if Refusal is None:
         return None
-    T = rejected.T_from_to
+    T, robots = rejected.T_from_to, _robots(rejected, robot)
     message = Refusal(
         header=to_msg.header(rejected.to_ns, rejected.from_frame_id),
-        from_moment=_moment(rejected.from_ns, rejected.from_frame_id, rejected.from_session, robot),
-        to_moment=_moment(rejected.to_ns, rejected.to_frame_id, rejected.to_session, robot),
+        from_moment=_moment(rejected.from_ns, rejected.from_frame_id, rejected.from_session, robots[0]),
+        to_moment=_moment(rejected.to_ns, rejected.to_frame_id, rejected.to_session, robots[1]),
         reason=rejected.reason.value,
         detail=rejected.detail,
         evidence=_evidence(rejected.evidence),
@@ -98,6 +104,10 @@ def _landmark(seen: Observation, class_id: int | None) -> Any:
     message = ObjectLandmark(id=seen.object_id, label=seen.label, class_id=NO_CLASS if class_id is None else class_id)
     message.position.x, message.position.y, message.position.z = seen.xyz.tolist()
     return message
+
+
+def _robots(told: LoopClosure | Rejected, robot: str) -> Robots:
+    return told.from_robot or robot, told.to_robot or robot
 
 
 def _moment(stamp_ns: int, frame_id: str, session: int | None, robot: str) -> Any:
@@ -159,12 +169,13 @@ def read_landmarks(message: Any) -> tuple[Observation, ...]:
 
 
 def _ends(message: Any) -> dict[str, Any]:
-    """Stamp, frame and session of both moments, as fields of a word."""
+    """Stamp, frame, session and robot of both moments, as fields of a word."""
     told: dict[str, Any] = {}
     for end, moment in (("from", message.from_moment), ("to", message.to_moment)):
         told[f"{end}_ns"] = from_msg.stamp_ns(moment)
         told[f"{end}_frame_id"] = from_msg.bounded(moment.frame_id, "frame_id")
         told[f"{end}_session"] = _session(moment.session)
+        told[f"{end}_robot"] = from_msg.bounded(moment.robot, "robot")
     return told
 
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -26,24 +26,30 @@ Array = NDArray[Any]
 
 
 class MapAnnouncements:
-    """Publishes for ``node``, in the frame of the map; each topic in one piece from whatever thread."""
+    """Publishes for ``node``, in the frame of the map; each topic in one piece from whatever thread.
 
-    def __init__(self, node: Node, map_frame: str) -> None:
+    ``path`` and ``correction`` are of one robot each: ``prefixes`` has what stands before their names, by robot.
+    """
+
+    def __init__(self, node: Node, map_frame: str, prefixes: Mapping[str, str]) -> None:
         self._node, self._map_frame = node, map_frame
-        self._path = node.create_publisher(Path, "path", qos.latched())
-        self._correction = node.create_publisher(TransformStamped, "correction", qos.latched())
+        latched = qos.latched()
+        self._paths = {robot: node.create_publisher(Path, f"{at}path", latched) for robot, at in prefixes.items()}
+        self._corrections = {
+            robot: node.create_publisher(TransformStamped, f"{at}correction", latched) for robot, at in prefixes.items()
+        }
         self._graph = node.create_publisher(MarkerArray, "graph", qos.latched())
         self._pruned = node.create_publisher(DiagnosticArray, "pruned", qos.latched())
         self._broadcaster: Any = None
 
-    def path(self, poses: Iterable[tuple[int, Array]], stamp_ns: int) -> None:
-        """Tell stamp and ``T_map_body`` of the keyframes, as they are known at a moment."""
-        self._path.publish(to_msg.path(poses, stamp_ns, self._map_frame))
+    def path(self, robot: str, poses: Iterable[tuple[int, Array]], stamp_ns: int) -> None:
+        """Tell stamp and ``T_map_body`` of a robot's keyframes, as they are known at a moment."""
+        self._paths[robot].publish(to_msg.path(poses, stamp_ns, self._map_frame))
 
-    def correction(self, T_map_odom: Array, stamp_ns: int, odom_frame: str, by_tf: bool) -> None:
-        """Tell where odometry's frame is in the map; ``by_tf`` on /tf too, where tf2_ros is installed."""
+    def correction(self, robot: str, T_map_odom: Array, stamp_ns: int, odom_frame: str, by_tf: bool) -> None:
+        """Tell where a robot's odometry's frame is in the map; ``by_tf`` on /tf too, where tf2_ros is installed."""
         message = to_msg.transform(T_map_odom, stamp_ns, self._map_frame, odom_frame)
-        self._correction.publish(message)
+        self._corrections[robot].publish(message)
         if by_tf and TransformBroadcaster is not None:
             self._broadcaster = self._broadcaster or TransformBroadcaster(self._node)
             self._broadcaster.sendTransform(message)
@@ -65,6 +71,7 @@ def _status(node: str, closure: LoopClosure, residual: float) -> DiagnosticStatu
         "from [ns]": closure.from_ns,
         "to [ns]": closure.to_ns,
         "residual [standard deviations]": f"{residual:.3g}",
+        **{key: robot for key, robot in zip(("from robot", "to robot"), closure.robots, strict=True) if robot},
     }
     return DiagnosticStatus(
         level=DiagnosticStatus.OK,

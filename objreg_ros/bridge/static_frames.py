@@ -69,7 +69,8 @@ class Mount:
     """
 
     def __init__(self, told: Array | None, find: FindPose, say: Callable[[str], None] = lambda text: None) -> None:
-        self._told, self._find, self._say, self._said = told, find, say, ""
+        self._told, self._find, self._say = told, find, say
+        self._said: dict[tuple[str, str], str] = {}
 
     def T_body_camera(self, words: Sequence[Odometry] | None, camera_frame: str) -> Array | None:
         """The pose (4, 4) of the camera on the body of these words of odometry; None where the two are one."""
@@ -89,6 +90,8 @@ class Mount:
         else:
             where = " ".join(f"{metres:.3f}" for metres in T[:3, 3])
             text = f"/tf_static has the camera's {camera!r} on the odometry's {body!r} at {where} m"
-        if text != self._said:
-            self._said = text
+        if text != self._said.get((body, camera)):
+            if len(self._said) >= MOST_FRAMES:
+                self._said.clear()
+            self._said[body, camera] = text
             self._say(text)

@@ -32,21 +32,22 @@ def between_keyframes(
     closure: LoopClosure,
     odometry: tuple[Trajectory, Trajectory],
     keyframes_ns: tuple[int, int],
-    T_body_camera: Array,
+    T_body_camera: Array | tuple[Array, Array],
     sigmas: tuple[float, float] = EXACT,
 ) -> Constraint:
     """The closure as a constraint between the bodies at a consumer's own keyframes, near *from* and near *to*.
 
     ``T_k1_k2 = O(k1)^-1 O(from) T_from_to O(to)^-1 O(k2)`` with O the odometry of the camera at the closure's moments
-    and of the body at the keyframes; that of *from* and that of *to*, which may be two sessions. ``sigmas`` m and rad
-    are how it wanders over one metre or one radian: a closure is known less well where it was not measured. ValueError
-    for a moment that odometry does not cover.
+    and of the body at the keyframes; that of *from* and that of *to*, which may be two sessions, or of two robots with
+    two cameras on them. ``sigmas`` m and rad are how it wanders over one metre or one radian: a closure is known less
+    well where it was not measured. ValueError for a moment that odometry does not cover.
     """
     (of_from, of_to), (k1_ns, k2_ns) = odometry, keyframes_ns
     T_k1_body = inverse(of_from.at(k1_ns)) @ of_from.at(closure.from_ns)  # at the closure's moments
     T_k2_body = inverse(of_to.at(k2_ns)) @ of_to.at(closure.to_ns)
     measured = Constraint(closure.T_from_to, closure.covariance)
-    moved = compensated(measured, T_k1_body @ T_body_camera, inverse(T_k2_body @ T_body_camera))
+    T_body_from, T_body_to = T_body_camera if isinstance(T_body_camera, tuple) else (T_body_camera, T_body_camera)
+    moved = compensated(measured, T_k1_body @ T_body_from, inverse(T_k2_body @ T_body_to))
     turned = _turning(moved.T_from_to[:3, 3] - T_k1_body[:3, 3])
     there, back = wandering(T_k1_body, sigmas), wandering(T_k2_body, sigmas)
     return moved._replace(covariance=moved.covariance + turned @ there @ turned.T + back)

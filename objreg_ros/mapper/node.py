@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,16 +23,17 @@ from objreg_ros.bridge.map_announcements import MapAnnouncements
 from objreg_ros.bridge.params import ManagedParams
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.transforms import hear_mount
-from objreg_ros.data import JUMP_NS, LoopClosure, Moments, Odometry
+from objreg_ros.data import LoopClosure, Moments, Robots, may_be_same
 from objreg_ros.mapper import saved
 from objreg_ros.mapper.adapters.g2o import graph_text
+from objreg_ros.mapper.follower import Follower, Followers
 from objreg_ros.mapper.incremental import load
 from objreg_ros.mapper.params import MapperNodeParams, MapperParams
-from objreg_ros.mapper.pose_graph import ImplausibleError, PoseGraph, Summary
-from objreg_ros.mapper.restart import Anew, Restart
+from objreg_ros.mapper.pose_graph import PoseGraph, Summary
+from objreg_ros.mapper.restart import Anew
 from objreg_ros.mapper.solver import Problem, Solution
+from objreg_ros.mapper.waiting import Waiting
 
-MOST_WAITING = qos.KEPT_CONSTRAINTS  # closures without odometry yet; the oldest go when there are more
 PACE = 20.0  # a path of many keyframes takes long to write: one in so many times as long
 LOOK_S = 0.1  # between two looks at whether the path is due
 
@@ -50,23 +52,26 @@ class MapperNode(Door):
         load()
         self._inputs = self.settings.of(MapperNodeParams)
         self._graph_lock = threading.Lock()
-        self._waiting: list[LoopClosure] = []
-        self._enabled, self._odom_frame = True, "odom"
-        self._odometry_count = self._passed_over_count = self._withdrawn_count = 0
-        self._ended_ns = 0  # the last moment of the run of the clock before this one
+        self._enabled, self._withdrawn_count = True, 0
         self._riding: list[int] = []  # moments of jobs that the next solution settles too
-        self._path_due_s, self._has_news = 0.0, False
-        self._mount = hear_mount(self, self._inputs.mounting)
-        self._newest: Odometry | None = None
-        self._restart = self._watch_odometry()
+        self._path_due_s = 0.0
+        self._shared_frames = set[str]()  # of which the log has told
+        self._followers = Followers()
+        mount = hear_mount(self, self._inputs.mounting)
+        self._waiting = Waiting(self._followers, mount.T_body_camera, qos.KEPT_CONSTRAINTS)
         self._begin(self._resumed())
-        self._out = MapAnnouncements(self, self._inputs.map_frame)
+        prefixes = {self._name_of(robot): f"{robot}/" for robot in self._inputs.robots} or {"": ""}
+        self._out = MapAnnouncements(self, self._inputs.map_frame, prefixes)
         self._serve()
-        self.listen(OdometryMsg, "odom", self._hear_odometry, self.sensor(qos.ODOMETRY), watched="odom")
-        self._closures = ClosuresIn(self, self._inputs.input, self._take, self._learn, self._withdraw)
+        for robot, prefix in prefixes.items():
+            self._follow(robot, f"{prefix}odom")
+        self._closures = ClosuresIn(self, self._inputs.input, self._take, self._learn, self._withdraw, prefixes)
         self._closures.know(tie.closure for tie in self._graph.closure_ties if tie.closure is not None)
-        self.expect("odom", "odom")
-        self.create_timer(LOOK_S, self._publish_path, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.create_timer(LOOK_S, self._publish_paths, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _name_of(self, robot: str) -> str:
+        """What closures call a robot: its whole namespace, as its registrar has it."""
+        return self.resolve_topic_name(f"{robot}/odom", only_expand=True).removesuffix("/odom").strip("/")
 
     def _serve(self) -> None:
         self.create_service(Trigger, "~/reset", self._reset)
@@ -77,7 +82,7 @@ class MapperNode(Door):
         """The map of another day, solved; None where none is asked for. ValueError, OSError where it cannot be read."""
         if not self._inputs.resume:
             return None
-        return saved.load(_saved_path(_absolute(self._inputs.graph_path)), self.settings.of(MapperParams))
+        return saved.load(saved.beside(_absolute(self._inputs.graph_path)), self.settings.of(MapperParams))
 
     def _begin(self, graph: PoseGraph | None = None) -> None:
         self._graph = graph or PoseGraph(self.settings.of(MapperParams))
@@ -88,8 +93,7 @@ class MapperNode(Door):
         with self._graph_lock:
             self._begin()
         self._closures.forget_all()
-        waiting, self._waiting = self._waiting, []
-        for closure in waiting:
+        for closure in self._waiting.take_out():
             self.drop(closure.to_ns, reason)
 
     def adopt(self) -> None:
@@ -100,50 +104,45 @@ class MapperNode(Door):
 
     # Odometry
 
-    def _hear_odometry(self, message: Any) -> None:
+    def _follow(self, robot: str, topic: str) -> None:
+        on_leap = partial(self._tell_leap, topic)
+        self._followers[robot] = Follower(robot, self.settings.of(MapperParams).max_speed, on_leap)
+        hear = partial(self._hear_odometry, robot=robot)
+        self.listen(OdometryMsg, topic, hear, self.sensor(qos.ODOMETRY), watched=topic)
+        self.expect(topic, topic)
+
+    def _hear_odometry(self, message: Any, robot: str = "") -> None:
         odometry = self.read_aside("odom", from_msg.odometry, message)
         if odometry is None:
             return
-        course = self._restart.admit(odometry)
+        follower = self._followers[robot]
+        course = follower.admit(odometry)
         if course.anew is not None:
-            self._begin_elsewhere(course.anew, course.poses[0].stamp_ns)
+            self._begin_elsewhere(follower, course.anew, course.poses[0].stamp_ns)
         for admitted in course.poses:
-            self._follow(admitted)
+            with self._graph_lock:
+                follower.follow(admitted, self._graph)
+            self._publish_correction(follower, self._inputs.publish_tf)
+            self._tie_what_waits()
 
-    def _watch_odometry(self) -> Restart:
-        return Restart(self.settings.of(MapperParams).max_speed, self._pass_over)
+    def _tell_leap(self, topic: str) -> None:
+        self.throttled.warn(
+            "odometry_leap",
+            "odometry passed over: it leapt faster than max_speed, or to its origin, and came back; "
+            f"is there more than one publisher on {topic}?",
+        )
 
-    def _pass_over(self, odometry: Odometry) -> None:
-        """Count a pose that was wrong; say so of one that leapt, and not of one that came again or late."""
-        self._passed_over_count += 1
-        known = self._graph.odometry.stamps_ns
-        if known and odometry.stamp_ns > known[-1]:
-            self.throttled.warn(
-                "odometry_leap",
-                "odometry passed over: it leapt faster than max_speed, or to its origin, and came back; "
-                "is there more than one publisher on odom?",
-            )
-
-    def _follow(self, odometry: Odometry) -> None:
-        self._odometry_count += 1
-        self._odom_frame, self._newest = odometry.frame_id, odometry
-        with self._graph_lock:
-            self._has_news = self._graph.add_odometry(odometry) or self._has_news
-        self._publish_correction(odometry.stamp_ns, self._inputs.publish_tf)
-        self._tie_what_waits()
-
-    def _begin_elsewhere(self, anew: Anew, stamp_ns: int) -> None:
+    def _begin_elsewhere(self, follower: Follower, anew: Anew, stamp_ns: int) -> None:
         """Time jumped back (a looped bag, a simulation begun anew), or odometry was started again elsewhere.
 
         Where that is on the map only closures can tell. Where they do not name their sessions, those of a clock that
-        runs again would be of both runs: that is a new map.
+        runs again would be of both runs: that is a new map, unless other robots are in it.
         """
         if anew is Anew.TIME:
-            self._ended_ns = self._graph.odometry.stamps_ns[-1]
-            back_s = 1e-9 * (self._ended_ns - stamp_ns)
-            told = "a new map" if not self._graph.sessions[-1].names else "another session of the map"
+            back_s, is_new = follower.jump_back(stamp_ns), follower.is_confusable(self._graph)
+            told = "a new map" if is_new else "another session of the map"
             self.get_logger().warning(f"time jumped back by {back_s:.3f} s: {told}")
-            if not self._graph.sessions[-1].names:
+            if is_new:
                 self._start_anew(anew.value)
                 return
         else:
@@ -153,7 +152,7 @@ class MapperNode(Door):
                 "correction is published, until constraints tie it there; ~/reset begins a new map",
             )
         with self._graph_lock:
-            self._graph.begin_session()
+            self._graph.begin_session(robot=follower.robot)
 
     # Closures
 
@@ -161,7 +160,7 @@ class MapperNode(Door):
         if not self._enabled:
             self._leave(closure, "disabled")
         elif self.let_in(closure.to_ns):
-            self._waiting.append(closure)
+            self._waiting.closures.append(closure)
             self._tie_what_waits()
 
     def _leave(self, closure: LoopClosure, reason: str, words: str = "") -> None:
@@ -174,53 +173,26 @@ class MapperNode(Door):
         with self._graph_lock:
             self._graph.learn_sessions(closure)
 
-    def _withdraw(self, moments: Moments) -> None:
-        for closure in [closure for closure in self._waiting if closure.moments == moments]:
-            self._waiting.remove(closure)
+    def _withdraw(self, moments: Moments, robots: Robots = ("", "")) -> None:
+        def is_meant(closure: LoopClosure) -> bool:
+            return closure.moments == moments and may_be_same(closure.robots, robots)
+
+        for closure in self._waiting.take_out(is_meant):
             self.drop(closure.to_ns, "retracted")
         with self._graph_lock:
-            count = self._graph.withdraw(lambda closure: closure.moments == moments)
+            count = self._graph.withdraw(is_meant)
         self._withdrawn_count += count
         if count:
             self.worker.put((moments[3], None))
 
     def _tie_what_waits(self) -> None:
-        """Odometry and closures come in any order: a closure waits until odometry covers both its moments."""
-        waiting, self._waiting = self._waiting, []
-        for closure in waiting:
-            try:
-                self._tie(closure)
-            except ImplausibleError as error:
-                self._leave(closure, "implausible", f"{_named(closure)}: {error}")
-            except ValueError as error:
-                self._leave(closure, "two_clocks", str(error))
-        while len(self._waiting) > MOST_WAITING:
-            self._leave(self._waiting.pop(0), "queue_full", "no odometry covers the moments of the constraint")
-
-    def _tie(self, closure: LoopClosure) -> None:
-        """Into the graph, or back to what waits; ValueError if it is implausible or not of one run of the clock."""
-        words = [] if self._newest is None else [self._newest]
-        T_body_camera = self._mount.T_body_camera(words, closure.to_frame_id)
         with self._graph_lock:
-            tied = self._graph.add_closure(closure, T_body_camera)
-        if tied:
-            self.worker.put((closure.to_ns, closure))
-        elif self._graph.in_gap(closure):
-            self._leave(closure, "odometry_gap", "no odometry came around a moment of the constraint")
-        elif self._graph.is_before_odometry(closure):
-            self._leave(closure, "before_odometry", "odometry begins after the first moment of the constraint")
-        elif self._is_of_old_run(closure):
-            self._leave(closure, "time_jump", "it was found before time jumped back, and came after that")
-        else:
-            self._waiting.append(closure)
-
-    def _is_of_old_run(self, closure: LoopClosure) -> bool:
-        """Whether a closure ends in what was before time jumped back: the registrar searches for a while.
-
-        It speaks of what was, so one of this run does not end long after the newest odometry.
-        """
-        known = self._graph.odometry.stamps_ns
-        return bool(known) and known[-1] + JUMP_NS < closure.to_ns <= self._ended_ns
+            fates = self._waiting.tie(self._graph)
+        for closure, reason, words in fates:
+            if reason:
+                self._leave(closure, reason, words)
+            else:
+                self.worker.put((closure.to_ns, closure))
 
     def _overtaken(self, job: tuple[int, LoopClosure | None]) -> None:
         if job[1] is not None:
@@ -238,12 +210,15 @@ class MapperNode(Door):
         with self._graph_lock:
             settled, self._riding = self._riding[:riding], self._riding[riding:]
             if graph is self._graph:
-                self._summary, self._has_news = graph.adopt(problem, solution), True
+                self._summary = graph.adopt(problem, solution)
+                for follower in self._followers.values():
+                    follower.has_news = True
             summary = self._summary
         for stamp in settled:
             self.conclude(stamp, lambda: True)
         # The topic alone: TF is sent with odometry only, for its time must not go back.
-        self._publish_correction(stamp_ns, by_tf=False)
+        for follower in self._followers.values():
+            self._publish_correction(follower, by_tf=False)
         self._out.pruned(summary.pruned, summary.residuals)
         return payload is not None
 
@@ -257,45 +232,59 @@ class MapperNode(Door):
 
     # Publish
 
-    def _publish_path(self) -> None:
-        """The path and the graph, where something is new and writing the last ones is not long enough ago."""
-        if not self.is_active or not self._has_news or self._newest is None or time.monotonic() < self._path_due_s:
+    def _publish_paths(self) -> None:
+        """The paths and the graph, where something is new and writing the last ones is not long enough ago."""
+        told = {f: f.newest.stamp_ns for f in self._followers.values() if f.has_news and f.newest is not None}
+        if not self.is_active or not told or time.monotonic() < self._path_due_s:
             return
-        begun, stamp_ns = time.monotonic(), self._newest.stamp_ns
+        begun = time.monotonic()
         with self._graph_lock:
-            self._has_news = False
-            path = self._graph.path() if self._graph.is_placed else []
+            for follower in told:
+                follower.has_news = False
+            placed = {f for f in told if self._graph.T_map_odom_of(f.robot) is not None}
+            paths = [(f.robot, self._graph.path(f.robot) if f in placed else [], told[f]) for f in told]
             edges = self._graph.edges()
-        self._out.path(path, stamp_ns)
-        self._out.graph(*edges, stamp_ns)
+        for path in paths:
+            self._out.path(*path)
+        self._out.graph(*edges, max(told.values()))
         self._path_due_s = time.monotonic() + PACE * (time.monotonic() - begun)
 
-    def _publish_correction(self, stamp_ns: int, by_tf: bool) -> None:
-        if not self.is_active:  # it follows odometry all the same, so that the map is whole
+    def _publish_correction(self, follower: Follower, by_tf: bool) -> None:
+        newest = follower.newest
+        if not self.is_active or newest is None:  # it follows odometry all the same, so that the map is whole
             return
         with self._graph_lock:
-            T_map_odom = self._graph.T_map_odom if self._graph.is_placed else None
+            T_map_odom = self._graph.T_map_odom_of(follower.robot)
         if T_map_odom is not None:
-            self._out.correction(T_map_odom, stamp_ns, self._odom_frame, by_tf)
+            by_tf = by_tf and self._may_broadcast(follower, newest.frame_id)
+            self._out.correction(follower.robot, T_map_odom, newest.stamp_ns, newest.frame_id, by_tf)
+
+    def _may_broadcast(self, follower: Follower, odom_frame: str) -> bool:
+        if not self._followers.share_frame(follower):
+            return True
+        if odom_frame not in self._shared_frames:
+            self._shared_frames.add(odom_frame)
+            self.get_logger().warning(
+                f"two robots tell their odometry in {odom_frame!r}: their corrections are not broadcast on /tf; "
+                "give the frames of each robot a prefix of its own"
+            )
+        return False
 
     def extra_diagnostics(self) -> Mapping[str, object]:
-        """What the last solution believed."""
-        return {
-            "odometry": self._odometry_count,
-            "odometry passed over": self._passed_over_count,
+        """What the last solution believed, and what is known of each robot."""
+        return self._followers.told(self._graph) | {
             "sessions": len(self._graph.sessions),
-            "placed in the map": self._graph.is_placed,
-            "keyframes": len(self._graph.keyframes),
             "constraints kept": len(self._summary.kept),
             "constraints pruned": len(self._summary.pruned),
             "constraints retracted": self._withdrawn_count,
-            "constraints without odometry": len(self._waiting),
+            "constraints without odometry": len(self._waiting.closures),
         }
 
     # Services
 
     def _reset(self, _: Any, response: Any) -> Any:
-        self._restart = self._watch_odometry()
+        for follower in self._followers.values():
+            follower.forget(self.settings.of(MapperParams).max_speed)
         self._start_anew("reset")
         response.success, response.message = True, "started a new map"
         return response
@@ -307,11 +296,11 @@ class MapperNode(Door):
                 poses, edges = self._graph.flat()
                 arrays = saved.packed(self._graph)
             path.write_text(graph_text(poses, edges), encoding="ascii")
-            saved.save(arrays, _saved_path(path))
+            saved.save(arrays, saved.beside(path))
         except (OSError, RuntimeError) as error:  # the latter of a home that there is not
             response.success, response.message = False, str(error)
         else:
-            response.success, response.message = True, f"{path} and {_saved_path(path).name}"
+            response.success, response.message = True, f"{path} and {saved.beside(path).name}"
         return response
 
     def _enable(self, request: Any, response: Any) -> Any:
@@ -322,15 +311,6 @@ class MapperNode(Door):
 
 def _absolute(graph_path: str) -> Path:
     return Path(graph_path).expanduser().absolute()
-
-
-def _saved_path(graph_path: Path) -> Path:
-    """What `resume` reads, beside the g2o text."""
-    return graph_path.with_name(f"{graph_path.stem if graph_path.suffix != '.npz' else graph_path.name}.npz")
-
-
-def _named(closure: LoopClosure) -> str:
-    return f"the constraint from {closure.from_ns} to {closure.to_ns} ns"
 
 
 def main() -> int:

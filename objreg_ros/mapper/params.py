@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
 
 from objreg_ros.mapper.steady import Steady
 from objreg_ros.params import MountedParams, Params, param
+
+NAMESPACE = re.compile("/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 
 
 @dataclass(frozen=True)
@@ -98,6 +101,11 @@ class MapperParams(Params):
 class MapperNodeParams(MountedParams):
     """Frames and files of the mapper's node."""
 
+    robots: tuple[str, ...] = param(
+        (),
+        "the namespaces of robots that drive at the same time, each with its own odom, path and correction there; "
+        "empty: one robot, whose topics are the mapper's own",
+    )
     map_frame: str = param("map", "the frame of the corrected map")
     input: str = param(
         "auto",
@@ -109,3 +117,8 @@ class MapperNodeParams(MountedParams):
         "objreg_map.g2o", "where ~/save writes the pose graph; beside it, as .npz, what resume needs", live=True
     )
     resume: bool = param(False, "whether the map that was saved at graph_path is gone on with; it has to be there")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if len(set(self.robots)) < len(self.robots) or not all(map(NAMESPACE.fullmatch, self.robots)):
+            raise ValueError(f"robots: expected distinct names of namespaces, got {list(self.robots)}")

@@ -1,25 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The map that a user sees: keyframes out of odometry, tied together by closures."""
+"""The map that a user sees: keyframes out of odometry of one robot or several, tied together by closures."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
-from objreg_ros.data import Array, LoopClosure, Odometry
+from objreg_ros.data import Array, LoopClosure, Odometry, may_be_same
 from objreg_ros.geometry import inverse, is_rigid
 from objreg_ros.mapper.constraint import Constraint, between_keyframes, floored
 from objreg_ros.mapper.pairwise import PairwiseConsistency
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.session import Session, stacked
+from objreg_ros.mapper.sessions import Sessions, moments_of
 from objreg_ros.mapper.solver import Course, End, Problem, Solution, Solver, Tie
 from objreg_ros.mapper.sparse import SparseTrajectory
 from objreg_ros.mapper.trajectory import Trajectory
 
 SLACK_M = 1.0  # that a closure may lead farther than any way: odometry at rest trembles, and is not the camera
+Mounting = Callable[[str, str], Array | None]  # T_body_camera of a robot and a camera's frame; None: they are one
 VAGUEST = 1e12  # m^2 and rad^2: ROS says "unknown" by less; what is known no better tells nothing
 
 
@@ -39,49 +40,61 @@ class ImplausibleError(ValueError):
     """A closure claims what cannot be: a way that no body went, or a pose of which nothing is known."""
 
 
+class UnknownRobotError(ValueError):
+    """A closure is of a robot of which there is no odometry."""
+
+
 class PoseGraph:
     """Sessions of odometry and the closures between their moments; `optimise` makes them agree.
 
-    The map's frame is that of the first session's odometry at its beginning. Another session is in it once closures tie
-    it there. What is asked of the graph without a session is asked of the newest, in which odometry goes on.
+    The map's frame is that of the first session's odometry at its beginning, whose ever that is. Another session is in
+    it once closures tie it there. What is asked of a robot is asked of its newest session, in which its odometry goes
+    on; where there is one robot, it needs no name.
     """
 
     def __init__(self, params: MapperParams | None = None) -> None:
         self.params = params or MapperParams()
-        self.sessions = [Session()]
+        self.sessions = Sessions()
+        self.sessions.begin()
         self._closures: list[Tie] = []
         self._withdrawn: set[int] = set()
         self._solver, self._pairwise = Solver(), PairwiseConsistency()
         self._solution = Solution((), np.zeros(0, bool), np.zeros(0))
-        self._T_map_odom = np.eye(4)
+        self._T_map_odom: dict[int, Array] = {}  # by session, as far as they are solved
 
     # What comes in
 
-    def begin_session(self, name: int | None = None) -> None:
-        """Odometry from now on is of another run; nothing ties it to the runs before."""
-        if len(self.sessions[-1].keyframes) == 0:
-            self.sessions.pop()
-        self.sessions.append(Session())
-        self._name(len(self.sessions) - 1, name)
-        self._T_map_odom = np.eye(4)
+    def begin_session(self, name: int | None = None, robot: str = "") -> None:
+        """Odometry of a robot from now on is of another run; nothing ties it to the runs before."""
+        self.sessions.begin(name, robot)
 
-    def add_odometry(self, odometry: Odometry) -> bool:
-        """Take the newest pose; True if it became a keyframe. ValueError if time does not advance."""
-        return self.sessions[-1].add(odometry, self.params)
+    def add_odometry(self, odometry: Odometry, robot: str = "") -> bool:
+        """Take the newest pose; True if it became a keyframe. ValueError if time does not advance.
 
-    def add_closure(self, closure: LoopClosure, T_body_camera: Array | None = None) -> bool:
+        The first session of a robot begins with its first pose.
+        """
+        if self.sessions.newest(robot) is None:
+            self.begin_session(robot=robot)
+        return self._going_on(robot).add(odometry, self.params)
+
+    def add_closure(self, closure: LoopClosure, T_body_camera: Array | Mounting | None = None) -> bool:
         """Tie the two keyframes nearest to the closure's moments; False if odometry does not cover both (yet).
 
         Moments nearest to one and the same keyframe tie nothing, which is True too. ``T_body_camera`` is where the
-        camera of the closure sits on the body of the odometry; the same place if None.
+        camera of the closure sits on the body of the odometry; the same place if None. What is called tells it of the
+        robot of a session and the name of a camera.
 
         In a gap of the odometry it never will (`in_gap`): where the camera was by then nobody knows. ValueError for a
         closure whose moments are of two runs of one clock that it does not name. `ImplausibleError` for one that leads
-        farther than odometry went, or knows nothing. No closure is believed to know better than the parameters' least
-        sigmas.
+        farther than odometry went, or knows nothing. `UnknownRobotError` for one of two robots whose odometry is one.
+        No closure is believed to know better than the parameters' least sigmas.
         """
-        one, other = self._of(closure.from_session, closure.from_ns), self._of(closure.to_session, closure.to_ns)
-        if closure.from_ns >= closure.to_ns and (one is None or one == other):
+        one, other = map(self.sessions.of, moments_of(closure))
+        of_two = not may_be_same((closure.from_robot,) * 2, (closure.to_robot,) * 2)
+        if of_two and one is not None and one == other:
+            robots = f"{closure.from_robot!r} and {closure.to_robot!r}"
+            raise UnknownRobotError(f"expected a constraint of one robot, as odometry is, got one of {robots}")
+        if closure.from_ns >= closure.to_ns and (one is None or one == other) and not of_two:
             raise ValueError(
                 f"expected a constraint whose *from* is before its *to* at {closure.to_ns} ns, got "
                 f"{closure.from_ns} ns: it ties two runs of the clock; give each run a store of its own"
@@ -90,9 +103,9 @@ class PoseGraph:
             return False
         ends = End(one, self._nearest(one, closure.from_ns)), End(other, self._nearest(other, closure.to_ns))
         if ends[0] != ends[1]:
-            self._tie(closure, ends, np.eye(4) if T_body_camera is None else T_body_camera)
-        self._name(one, closure.from_session)
-        self._name(other, closure.to_session)
+            self._tie(closure, ends, T_body_camera)
+        self.sessions.learn(one, closure.from_session)
+        self.sessions.learn(other, closure.to_session)
         return True
 
     def restore(self, tie: Tie) -> None:
@@ -111,15 +124,7 @@ class PoseGraph:
 
     def learn_sessions(self, closure: LoopClosure) -> None:
         """Take the names of sessions from a closure that is known without them."""
-        for name, stamp_ns in ((closure.from_session, closure.from_ns), (closure.to_session, closure.to_ns)):
-            with suppress(ValueError):
-                session = self._of(name, stamp_ns)
-                if session is not None:
-                    self._name(session, name)
-
-    def _name(self, session: int, name: int | None) -> None:
-        if name is not None:
-            self.sessions[session].names.add(name)
+        self.sessions.learn_from(closure)
 
     def withdraw(self, is_withdrawn: Callable[[LoopClosure], bool]) -> int:
         """Take closures out of the graph, for good; how many."""
@@ -128,41 +133,19 @@ class PoseGraph:
         self._withdrawn |= new
         return len(new)
 
-    def _of(self, name: int | None, stamp_ns: int) -> int | None:
-        """The session that has a moment: the one that does, and of two runs of a clock the one of this name.
-
-        None where none has it yet. ValueError where two may, and nothing says which is meant.
-        """
-        covering = [k for k, one in enumerate(self.sessions) if one.covers(stamp_ns)]
-        named = [k for k in covering if name in self.sessions[k].names]
-        if len(named) == 1 or (len(covering) == 1 and not self._may_come(stamp_ns)):
-            return (named or covering)[0]
-        if name is not None and covering and self._may_come(stamp_ns):
-            return None  # of the run that goes on, once it is there
-        nameless = [k for k in covering if not self.sessions[k].names]
-        if name is not None and len(nameless) == 1:
-            return nameless[0]
-        if covering:
-            raise ValueError(
-                f"expected a constraint that names its sessions, as {max(len(covering), 2)} runs of odometry have the "
-                f"moment {stamp_ns} ns, got none that tells; objreg_msgs/LoopClosure names them"
-            )
-        return None
-
-    def _may_come(self, stamp_ns: int) -> bool:
-        """Whether odometry that goes on has yet to come to a moment after it began."""
-        known = self.odometry.stamps_ns
-        return not known or (known[0] <= stamp_ns and known[-1] < stamp_ns)
-
     def _nearest(self, session: int, stamp_ns: int) -> int:
         return self.sessions[session].keyframes.nearest(stamp_ns)
 
-    def _tie(self, closure: LoopClosure, ends: tuple[End, End], T_body_camera: Array) -> None:
+    def _tie(self, closure: LoopClosure, ends: tuple[End, End], T_body_camera: Array | Mounting | None) -> None:
         one, other = (self.sessions[end.session] for end in ends)
+        mounts = (
+            _mounted(T_body_camera, one.robot, closure.from_frame_id),
+            _mounted(T_body_camera, other.robot, closure.to_frame_id),
+        )
         moments = one.keyframes.stamps_ns[ends[0].keyframe], other.keyframes.stamps_ns[ends[1].keyframe]
         ways = one.odometry, other.odometry
         with np.errstate(over="ignore", invalid="ignore"):  # what is no number then is refused
-            constraint = between_keyframes(closure, ways, moments, T_body_camera, self.params.odometry_sigmas)
+            constraint = between_keyframes(closure, ways, moments, mounts, self.params.odometry_sigmas)
         self._refuse_implausible(ends, constraint)
         covariance = floored(constraint.covariance, self.params.least_sigmas)
         self._closures.append(Tie(*ends, constraint._replace(covariance=covariance), closure))
@@ -189,13 +172,11 @@ class PoseGraph:
 
     def in_gap(self, closure: LoopClosure) -> bool:
         """Whether a moment of the closure lies in a gap of the newest odometry."""
-        return self.odometry.in_gap(closure.from_ns) or self.odometry.in_gap(closure.to_ns)
+        return any(map(self.sessions.in_gap, moments_of(closure)))
 
     def is_before_odometry(self, closure: LoopClosure) -> bool:
         """Whether odometry began after a moment of the closure that no other session has: it will never be covered."""
-        known = self.odometry.stamps_ns
-        stamps = closure.from_ns, closure.to_ns
-        return bool(known) and any(s < known[0] and not any(one.covers(s) for one in self.sessions) for s in stamps)
+        return any(map(self.sessions.is_before_odometry, moments_of(closure)))
 
     # Solving
 
@@ -226,7 +207,7 @@ class PoseGraph:
     def adopt(self, problem: Problem, solution: Solution) -> Summary:
         """Take over the solution of a problem of this graph; keyframes that came since then follow its last one."""
         self._solution = solution
-        self._T_map_odom = self._correction()
+        self._T_map_odom = {s: self._correction(s, course) for s, course in enumerate(solution.courses) if course}
         kept, pruned = list[tuple[LoopClosure, float]](), list[tuple[LoopClosure, float]]()
         for k, (is_kept, residual) in enumerate(zip(solution.kept, solution.residuals, strict=True)):
             closure = self._closures[k].closure
@@ -236,15 +217,24 @@ class PoseGraph:
 
     # What comes of it
 
+    def _going_on(self, robot: str) -> Session:
+        """The newest session of a robot; one of no odometry before it begins."""
+        session = self.sessions.newest(robot)
+        return Session(robot) if session is None else self.sessions[session]
+
     @property
     def odometry(self) -> SparseTrajectory:
-        """``T_odom_body`` of the newest session."""
-        return self.sessions[-1].odometry
+        """``T_odom_body`` of the one robot's newest session."""
+        return self._going_on("").odometry
 
     @property
     def keyframes(self) -> Trajectory:
-        """Those of the newest session, as odometry told them."""
-        return self.sessions[-1].keyframes
+        """Those of the one robot's newest session, as odometry told them."""
+        return self.keyframes_of("")
+
+    def keyframes_of(self, robot: str) -> Trajectory:
+        """Those of a robot's newest session, as odometry told them; none before it begins."""
+        return self._going_on(robot).keyframes
 
     @property
     def ties(self) -> list[Tie]:
@@ -263,20 +253,26 @@ class PoseGraph:
 
     @property
     def is_placed(self) -> bool:
-        """Whether it is known where the newest session is in the map: it is the first, or closures tie it there."""
-        return len(self.sessions) == 1 or self._course() is not None
+        """Whether it is known where the one robot is in the map: its session is the first, or closures tie it there."""
+        return self.T_map_odom_of("") is not None
 
     @property
     def T_map_odom(self) -> Array:
-        """The correction of the newest solved keyframe of the newest session; the identity before there is one."""
-        return self._T_map_odom
+        """The correction of the newest solved keyframe of the one robot; the identity before there is one."""
+        T_map_odom = self.T_map_odom_of("")
+        return np.eye(4) if T_map_odom is None else T_map_odom
 
-    def _correction(self) -> Array:
-        course = self._course()
-        if course is None:
-            return np.eye(4)
+    def T_map_odom_of(self, robot: str) -> Array | None:
+        """The correction of a robot's newest solved keyframe; None where it is not known where the robot is in the map.
+
+        The identity in the first session of all before it is solved.
+        """
+        session = self.sessions.newest(robot)
+        return None if session is None else self._T_map_odom.get(session, np.eye(4) if session == 0 else None)
+
+    def _correction(self, session: int, course: Course) -> Array:
         last = len(course) - 1
-        return course.of(np.array([last]))[0] @ inverse(self.keyframes.poses[last])
+        return course.of(np.array([last]))[0] @ inverse(self.sessions[session].keyframes.poses[last])
 
     def edges(self) -> tuple[Array, Array, Array]:
         """(m, 2, 3): where the ends of the kept closures are in the map, (n, 2, 3) those of the pruned ones, and (n,).
@@ -294,18 +290,18 @@ class PoseGraph:
         places = np.array(ends).reshape(-1, 2, 3)
         return places[kept[known]], places[~kept[known]], residuals[known][~kept[known]]
 
-    def path(self) -> list[tuple[int, Array]]:
-        """Stamp and ``T_map_body`` of every keyframe of the newest session."""
-        return list(zip(list(self.keyframes.stamps_ns), self._mapped_of(len(self.sessions) - 1), strict=True))
+    def path(self, robot: str = "") -> list[tuple[int, Array]]:
+        """Stamp and ``T_map_body`` of every keyframe of a robot's newest session; as odometry tells it, if unplaced."""
+        session = self.sessions.newest(robot)
+        return [] if session is None else self._path_of(session)
 
     def paths(self) -> list[list[tuple[int, Array]]]:
         """Those of every session; none for one that is not placed."""
         placed = [s == 0 or self._course(s) is not None for s in range(len(self.sessions))]
-        stamps = [list(session.keyframes.stamps_ns) for session in self.sessions]
-        return [
-            list(zip(stamps[s], self._mapped_of(s), strict=True)) if is_placed else []
-            for s, is_placed in enumerate(placed)
-        ]
+        return [self._path_of(s) if is_placed else [] for s, is_placed in enumerate(placed)]
+
+    def _path_of(self, session: int) -> list[tuple[int, Array]]:
+        return list(zip(list(self.sessions[session].keyframes.stamps_ns), self._mapped_of(session), strict=True))
 
     def flat(self, left_out: Sequence[LoopClosure] = ()) -> tuple[list[Array], list[tuple[int, int, Constraint]]]:
         """``T_map_body`` of the keyframes of all sessions that are placed, in one row, and the ties between them."""
@@ -318,14 +314,14 @@ class PoseGraph:
         ]
         return [T for path in paths for _, T in path], edges
 
-    def corrected(self, stamps_ns: Iterable[int]) -> list[Array]:
-        """``T_map_body`` at any moments that the newest odometry covers; ValueError for one that it does not."""
-        mapped = self._mapped_of(len(self.sessions) - 1)
-        return [self._corrected_at(stamp, self.odometry.at(stamp), mapped) for stamp in stamps_ns]
+    def corrected(self, stamps_ns: Iterable[int], robot: str = "") -> list[Array]:
+        """``T_map_body`` at any moments that a robot's newest odometry covers; ValueError for one that it does not."""
+        number, session = self.sessions.newest(robot), self._going_on(robot)
+        mapped = np.zeros((0, 4, 4)) if number is None else self._mapped_of(number)
+        return [_corrected_at(stamp, session, mapped) for stamp in stamps_ns]
 
-    def _course(self, session: int = -1) -> Course | None:
+    def _course(self, session: int) -> Course | None:
         """The course of a session as far as it is solved."""
-        session %= len(self.sessions)
         return self._solution.courses[session] if session < len(self._solution.courses) else None
 
     def _mapped_of(self, session: int) -> Array:
@@ -337,14 +333,21 @@ class PoseGraph:
         T_map_odom = solved[-1] @ inverse(odom[len(solved) - 1])
         return np.concatenate([solved, T_map_odom @ odom[len(solved) :]])
 
-    def _corrected_at(self, stamp_ns: int, T_odom_body: Array, mapped: Array) -> Array:
-        """``T_map_body``: between keyframes it goes over smoothly from the correction of the one to the other's.
 
-        What goes over is where they put the body. The corrections themselves turn about the origin of odometry, and
-        between two of them a body far from there would leave its way.
-        """
-        bodies, near = Trajectory(), self.keyframes.nearest(stamp_ns)
-        for k in range(max(near - 1, 0), min(near + 2, len(self.keyframes))):
-            T_map_odom = mapped[k] @ inverse(self.keyframes.poses[k])
-            bodies.append(self.keyframes.stamps_ns[k], T_map_odom @ T_odom_body)
-        return bodies.at(min(max(stamp_ns, bodies.stamps_ns[0]), bodies.stamps_ns[-1]))
+def _mounted(told: Array | Mounting | None, robot: str, frame_id: str) -> Array:
+    """``T_body_camera`` of a camera on a robot."""
+    T = told(robot, frame_id) if callable(told) else told
+    return np.eye(4) if T is None else T
+
+
+def _corrected_at(stamp_ns: int, session: Session, mapped: Array) -> Array:
+    """``T_map_body``: between keyframes it goes over smoothly from the correction of the one to the other's.
+
+    What goes over is where they put the body. The corrections themselves turn about the origin of odometry, and
+    between two of them a body far from there would leave its way.
+    """
+    T_odom_body, keyframes = session.odometry.at(stamp_ns), session.keyframes
+    bodies, near = Trajectory(), keyframes.nearest(stamp_ns)
+    for k in range(max(near - 1, 0), min(near + 2, len(keyframes))):
+        bodies.append(keyframes.stamps_ns[k], mapped[k] @ inverse(keyframes.poses[k]) @ T_odom_body)
+    return bodies.at(min(max(stamp_ns, bodies.stamps_ns[0]), bodies.stamps_ns[-1]))

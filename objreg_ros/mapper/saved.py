@@ -20,7 +20,7 @@ from objreg_ros.mapper.pose_graph import PoseGraph
 from objreg_ros.mapper.session import Session, stacked
 from objreg_ros.mapper.solver import End, Tie
 
-VERSION = 1
+VERSIONS = 1, 2  # before robots, and now
 MOST_BYTES = 2_000_000_000  # of a file and of what is unpacked from it
 BROKEN = (
     *(KeyError, IndexError, TypeError, ValueError, AttributeError, EOFError, MemoryError, RuntimeError),
@@ -44,17 +44,24 @@ KINDS: dict[str, Callable[[Any], Any]] = {
     "to_frame_id": str,
     "from_session": _session,
     "to_session": _session,
-}
-PLAIN = tuple(KINDS)  # of a closure, by what makes each of what a file tells
+    "from_robot": str,
+    "to_robot": str,
+}  # of a closure, by what makes each of what a file tells
+
+
+def beside(graph_path: Path) -> Path:
+    """Where the sessions of a map are whose g2o text is at ``graph_path``."""
+    return graph_path.with_name(f"{graph_path.stem if graph_path.suffix != '.npz' else graph_path.name}.npz")
 
 
 def packed(graph: PoseGraph) -> dict[str, Any]:
     """All of a graph in arrays, for `save`, which takes longer."""
     ties = graph.closure_ties
     told = {
-        "version": VERSION,
+        "version": VERSIONS[-1],
         "names": [sorted(session.names) for session in graph.sessions],
-        "closures": [{name: getattr(tie.closure, name) for name in PLAIN} for tie in ties],
+        "robots": [session.robot for session in graph.sessions],
+        "closures": [{name: getattr(tie.closure, name) for name in KINDS} for tie in ties],
     }
     arrays: dict[str, Any] = {
         "told": np.frombuffer(json.dumps(told).encode(), np.uint8),
@@ -78,7 +85,7 @@ def save(arrays: Mapping[str, Any], path: Path) -> None:
 
 
 def load(path: Path, params: MapperParams) -> PoseGraph:
-    """The graph of a file, unsolved, with a session after those of the file for odometry that comes.
+    """The graph of a file, unsolved; the odometry of each robot goes on in a session of its own.
 
     OSError where it cannot be read, ValueError where it is not what `save` writes.
     """
@@ -98,20 +105,22 @@ def load(path: Path, params: MapperParams) -> PoseGraph:
 
 def _graph(arrays: Mapping[str, Array], params: MapperParams) -> PoseGraph:
     told = json.loads(arrays["told"].tobytes())
-    if told["version"] != VERSION:
-        raise ValueError(f"version: expected {VERSION}, got {told['version']!r}")
+    if told["version"] not in VERSIONS:
+        raise ValueError(f"version: expected {' or '.join(map(str, VERSIONS))}, got {told['version']!r}")
     graph = PoseGraph(params)
-    graph.sessions = []
-    for number, names in enumerate(told["names"]):
+    graph.sessions.clear()
+    if not told["names"]:
+        raise ValueError("expected at least one session, got none")
+    robots = told.get("robots", [""] * len(told["names"]))
+    for number, (names, robot) in enumerate(zip(told["names"], robots, strict=True)):
         session = Session.of_arrays({key: arrays[f"{number}_{key}"] for key in Session.ARRAYS})
-        session.names = {int(name) for name in names}
+        session.names, session.robot = {int(name) for name in names}, str(robot)
         graph.sessions.append(session)
     for number, known in enumerate(told["closures"]):
-        known = {name: KINDS[name](known[name]) for name in PLAIN}
+        known = {name: make(known[name]) for name, make in KINDS.items() if name in known}
         T, C = arrays["T_from_to"][number], arrays["closure_covariances"][number]
         s1, k1, s2, k2 = arrays["ends"][number].tolist()
         constraint = Constraint(arrays["T_1_2"][number], arrays["covariances"][number])
         closure = LoopClosure(T_from_to=T, covariance=C, **known)
         graph.restore(Tie(End(s1, k1), End(s2, k2), constraint, closure))
-    graph.begin_session()
     return graph

@@ -20,11 +20,13 @@ LOST_S = 600.0  # a silence after which the body may be anywhere, so that a long
 class Session:
     """Its ``odometry`` gives back what was added to within 1 mm and 0.05°, and the poses of ``keyframes`` exactly.
 
-    ``names`` are the sessions that closures tell of its moments. Everything grows at the end alone, so
-    a length tells what was there at one moment.
+    ``robot`` is whose odometry it is, empty for the only one there is. ``names`` are the sessions that closures tell of
+    its moments. ``is_over``: no odometry comes any more. Everything grows at the end alone, so a length tells what was
+    there at one moment.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, robot: str = "") -> None:
+        self.robot, self.is_over = robot, False
         self.names = set[int]()
         self.odometry, self.keyframes = SparseTrajectory(), Trajectory()
         self.variances: list[tuple[float, float]] = []  # of each step between keyframes: m^2 and rad^2 in every axis
@@ -75,11 +77,17 @@ class Session:
         for stamp in keyframes.tolist():
             session.keyframes.append(stamp, session.odometry.at(stamp))
         session.variances, session._way = [tuple(row) for row in variances.tolist()], way.tolist()
+        session.is_over = True
         return session
 
     def covers(self, stamp_ns: int) -> bool:
         """Whether its odometry tells where the body was at a moment."""
         return self.odometry.covers(stamp_ns)
+
+    def is_ahead(self, stamp_ns: int) -> bool:
+        """Whether its odometry, which goes on, has yet to come to a moment after it began."""
+        known = self.odometry.stamps_ns
+        return not known or (known[0] <= stamp_ns and known[-1] < stamp_ns)
 
     def step(self, k: int) -> Constraint:
         """What odometry says from the keyframe before to this one."""

@@ -225,6 +225,11 @@ DROPS = {
         "A bag was looped. Build objreg_msgs, whose closures name their sessions, or begin with a new store and map.",
         ("mapper.input",),
     ),
+    "unknown_robot": Words(
+        "a constraint is of a robot that the mapper does not follow",
+        "Name the robot among the mapper's `robots`, by the namespace of its registrar.",
+        ("mapper.robots",),
+    ),
     "retracted": Words("the constraint was withdrawn while it waited", "Nothing is wrong."),
     "odometry_gap": Words(
         "one of the constraint's moments lies in a gap of the odometry",

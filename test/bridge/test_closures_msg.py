@@ -47,6 +47,10 @@ REJECTED = Rejected(
 )
 
 
+OF_ONE = {"from_robot": "robot1", "to_robot": "robot1"}
+OF_TWO = {"from_robot": "robot1", "to_robot": "robot2"}
+
+
 @pytest.fixture
 def there() -> None:
     if closures_msg.LoopClosureMsg is None:
@@ -68,7 +72,7 @@ def assert_same(one: Any, other: Any) -> None:
 @pytest.mark.usefixtures("there")
 def test_a_closure_comes_back_with_all_that_is_known_of_it() -> None:
     message = closures_msg.loop_closure(CLOSURE, "robot1")
-    assert_same(CLOSURE, closures_msg.read_loop_closure(message))
+    assert_same(replace(CLOSURE, **OF_ONE), closures_msg.read_loop_closure(message))
     assert (message.from_moment.robot, message.to_moment.session, message.retracted) == ("robot1", "12", False)
     assert message.header.frame_id == "front" and from_msg.stamp_ns(message) == STAMP
 
@@ -92,7 +96,7 @@ def test_a_refusal_comes_back_with_its_pose_and_without_one() -> None:
     for word in (REJECTED, replace(REJECTED, T_from_to=None, evidence={}, from_frame_id="", from_session=None)):
         message = closures_msg.refusal(word, "robot1")
         assert message.has_pose is (word.T_from_to is not None)
-        assert_same(word, closures_msg.read_refusal(message))
+        assert_same(replace(word, **OF_ONE), closures_msg.read_refusal(message))
 
 
 @pytest.mark.usefixtures("there")
@@ -169,3 +173,17 @@ def test_the_message_has_the_numbers_that_are_no_class(repository: Path) -> None
         "NO_CLASS": closures_msg.NO_CLASS,
         "NO_NAME": layout.UNNAMED_ID,
     }
+
+
+@pytest.mark.usefixtures("there")
+def test_what_is_of_two_robots_stays_so_whoever_tells_it() -> None:
+    between = replace(CLOSURE, **OF_TWO)
+    assert_same(between, closures_msg.read_loop_closure(closures_msg.loop_closure(between, "robot3")))
+    refused = replace(REJECTED, **OF_TWO)
+    assert_same(refused, closures_msg.read_refusal(closures_msg.refusal(refused, "robot3")))
+
+
+def test_an_id_is_of_the_robots_that_the_closure_tells_and_else_of_who_tells_it() -> None:
+    first = closures_msg.closure_id(CLOSURE, "robot1")
+    assert closures_msg.closure_id(replace(CLOSURE, **OF_ONE), "robot3") == first
+    assert closures_msg.closure_id(replace(CLOSURE, **OF_TWO), "robot1") != first

@@ -112,3 +112,12 @@ def test_odometry_of_the_camera_itself_and_none_need_no_word(told: object) -> No
     mount = Mount(None, StaticFrames().between, said_of_it.append)
     assert mount.T_body_camera(words(told) if isinstance(told, str) else told, "eye") is None  # type: ignore[arg-type]
     assert said_of_it == []
+
+
+def test_what_is_assumed_of_two_robots_in_turn_is_said_once_of_each() -> None:
+    texts: list[str] = []
+    mount = Mount(None, StaticFrames().between, texts.append)
+    for robot in ("a", "b") * 3:
+        word = Odometry(T_odom_body=np.eye(4), stamp_ns=0, child_frame_id=f"{robot}/base")
+        mount.T_body_camera([word], f"{robot}/camera")
+    assert len(texts) == 2 and "a/base" in texts[0] and "b/base" in texts[1]

@@ -330,12 +330,12 @@ def test_a_constraint_that_was_found_before_time_jumped_back_is_not_tied_after_i
     outside.wait(lambda: outside.door.extra_diagnostics()["constraints without odometry"] == 1)
 
 
-def test_without_odometry_the_oldest_constraints_make_room(outside: Outside, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("objreg_ros.mapper.node.MOST_WAITING", 2)
+def test_without_odometry_the_oldest_constraints_make_room(outside: Outside) -> None:
+    outside.door._waiting.most = 2
     outside.send(ROUND_TRIP[:3])
     outside.wait(lambda: outside.door.ledger.balance().received == 3)
     assert outside.door.ledger.balance().dropped == {"queue_full": 1}
-    assert [word.to_ns for word in outside.door._waiting] == [word.to_ns for word in ROUND_TRIP[1:3]]
+    assert [word.to_ns for word in outside.door._waiting.closures] == [word.to_ns for word in ROUND_TRIP[1:3]]
 
 
 def test_the_services_answer(outside: Outside, tmp_path: Path) -> None:
@@ -386,7 +386,7 @@ def test_a_saved_map_is_gone_on_with(outside: Outside) -> None:
     resumed = outside.door._resumed()
     outside.door._begin(resumed)
     told = outside.door.extra_diagnostics()
-    assert (told["sessions"], told["placed in the map"], told["constraints kept"]) == (2, False, len(ROUND_TRIP))
+    assert (told["sessions"], told["placed in the map"], told["constraints kept"]) == (1, False, len(ROUND_TRIP))
 
 
 def test_a_stamp_that_repeats_is_passed_over(outside: Outside) -> None:

@@ -34,3 +34,10 @@ def test_a_mounting_that_cannot_be_is_refused_when_it_is_set() -> None:
 def test_the_node_s_other_values_are_checked_too() -> None:
     with pytest.raises(ValueError, match="map_frame: expected str, got 3"):
         MapperNodeParams(map_frame=3)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("robots", [("a", "a"), ("",), ("a b",), ("a/",), ("1st",)])
+def test_robots_are_distinct_namespaces(robots: tuple[str, ...]) -> None:
+    with pytest.raises(ValueError, match="robots: expected distinct names of namespaces"):
+        MapperNodeParams(robots=robots)
+    assert MapperNodeParams(robots=("a", "fleet/b_2", "/c")).robots == ("a", "fleet/b_2", "/c")

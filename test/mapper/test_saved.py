@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -45,8 +46,8 @@ def test_a_map_comes_back_as_it_was(yesterday: PoseGraph, tmp_path: Path) -> Non
     saved.save(saved.packed(yesterday), tmp_path / "map.npz")
     found = saved.load(tmp_path / "map.npz", MapperParams())
     found.optimise()
-    (way, today), expected = found.paths(), yesterday.path()
-    assert today == [] and found.sessions[0].names == {7}
+    (way,), expected = found.paths(), yesterday.path()
+    assert not found.is_placed and found.path() == [] and found.sessions[0].names == {7}
     assert [stamp for stamp, _ in way] == [stamp for stamp, _ in expected]
     assert distances([T for _, T in way], [T for _, T in expected]).max() < 1e-3
     assert found.sessions[0].odometry.covers(5 * SECOND) and not found.sessions[0].covers(LATER_NS)
@@ -68,7 +69,6 @@ def test_the_next_day_goes_on_in_the_map_once_two_closures_agree_on_where(yester
     saved.save(saved.packed(today), tmp_path / "map.npz")
     assert [len(path) for path in saved.load(tmp_path / "map.npz", MapperParams()).paths()] == [
         len(today.keyframes),
-        0,
         0,
     ]
 
@@ -120,3 +120,19 @@ def test_a_file_with_a_wrong_byte_is_refused_or_the_same_map(yesterday: PoseGrap
         except ValueError:
             continue
         assert len(found.closure_ties) == len(yesterday.closure_ties)
+
+
+def test_a_map_of_before_robots_is_of_one_without_a_name(yesterday: PoseGraph, tmp_path: Path) -> None:
+    arrays = saved.packed(yesterday)
+    told = json.loads(arrays["told"].tobytes())
+    del told["robots"]
+    for known in told["closures"]:
+        del known["from_robot"], known["to_robot"]
+    arrays["told"] = np.frombuffer(json.dumps(told | {"version": 1}).encode(), np.uint8)
+    saved.save(arrays, tmp_path / "map.npz")
+    found = saved.load(tmp_path / "map.npz", MapperParams())
+    assert [one.robot for one in found.sessions] == [""] and found.closure_ties[0].closure.robots == ("", "")
+    arrays["told"] = np.frombuffer(json.dumps(told | {"version": 3}).encode(), np.uint8)
+    saved.save(arrays, tmp_path / "map.npz")
+    with pytest.raises(ValueError, match="version: expected 1 or 2, got 3"):
+        saved.load(tmp_path / "map.npz", MapperParams())

@@ -95,3 +95,9 @@ def test_a_turn_on_the_spot_is_a_keyframe_with_a_way_of_no_length() -> None:
 
 def test_no_poses_are_a_stack_of_none() -> None:
     assert stacked([]).shape == (0, 4, 4) and stacked(TRUE[:3]).shape == (3, 4, 4)
+
+
+def test_a_session_of_arrays_is_over_and_one_that_goes_on_is_ahead_of_what_it_has_yet_to_come_to() -> None:
+    session = told(straight(0.0, 0.5), [1.0, 1.1])
+    assert [session.is_ahead(round(s * SECOND)) for s in (0.9, 1.05, 1.2)] == [False, False, True]
+    assert Session("a").is_ahead(0) and not session.is_over and Session.of_arrays(session.arrays()).is_over

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Closures are heard once each, whatever topics they come on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from objreg_ros.bridge import closures_msg, to_msg
+from objreg_ros.bridge.closures_in import ClosuresIn
+from objreg_ros.data import LoopClosure
+
+CLOSURE = LoopClosure(from_ns=5, to_ns=9, T_from_to=np.eye(4), covariance=np.eye(6), labels=("cup",), to_session=1)
+
+
+class Hearer:
+    """Stands in for a door, keeps what it is told, and is given messages by topic."""
+
+    def __init__(self, topic: str = "auto", robots: tuple[str, ...] = ()) -> None:
+        self.heard: dict[str, Callable[[Any], None]] = {}
+        self.taken: list[LoopClosure] = []
+        self.again: list[LoopClosure] = []
+        self.withdrawn: list[Any] = []
+        self.dropped: list[str] = []
+        prefixes = {robot: f"{robot}/" for robot in robots}
+        told = self.taken.append, self.again.append, lambda *told: self.withdrawn.append(told)
+        self.closures = ClosuresIn(self, topic, *told, prefixes)  # type: ignore[arg-type]
+
+    def listen(self, kind: type, topic: str, heard: Callable[[Any], None], profile: Any) -> None:
+        self.heard[topic] = heard
+
+    def read_aside(self, topic: str, decode: Callable[[Any], LoopClosure], message: Any) -> LoopClosure | None:
+        try:
+            return decode(message)
+        except ValueError:
+            return None
+
+    def accept(self, stamp_ns: int) -> None:
+        pass
+
+    def drop(self, stamp_ns: int, reason: str) -> None:
+        self.dropped.append(reason)
+
+
+@pytest.fixture(autouse=True)
+def _messages(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The messages of `whole` are as good as those of objreg_msgs, which need not be installed."""
+    monkeypatch.setattr(closures_msg, "LoopClosureMsg", SimpleNamespace)
+
+
+def whole(closure: LoopClosure, robot: str) -> SimpleNamespace:
+    ends = {
+        end: SimpleNamespace(stamp=to_msg.stamp(stamp_ns), frame_id="camera", robot=robot, session="")
+        for end, stamp_ns in (("from_moment", closure.from_ns), ("to_moment", closure.to_ns))
+    }
+    pose = to_msg.constraint(closure).pose
+    name = closures_msg.closure_id(closure, robot)
+    return SimpleNamespace(id=name, retracted=False, labels=["cup"], objects=[], evidence=[], pose=pose, **ends)
+
+
+def test_what_comes_on_both_topics_is_taken_once_whichever_names_the_robot() -> None:
+    for whole_first in (True, False):
+        hearer = Hearer()
+        told = [("loop_closures", whole(CLOSURE, "x")), ("constraints", to_msg.constraint(CLOSURE))]
+        for topic, message in told if whole_first else told[::-1]:
+            hearer.heard[topic](message)
+        assert (len(hearer.taken), len(hearer.again)) == (1, 1)
+
+
+def test_equal_moments_of_two_robots_are_two_closures_and_one_is_taken_back() -> None:
+    hearer = Hearer()
+    messages = [whole(CLOSURE, robot) for robot in ("a", "b", "a")]
+    for message in messages:
+        hearer.heard["loop_closures"](message)
+    assert [told.robots for told in hearer.taken] == [("a", "a"), ("b", "b")] and len(hearer.again) == 1
+    messages[1].retracted = True
+    hearer.heard["loop_closures"](messages[1])
+    assert hearer.withdrawn == [(CLOSURE.moments, ("b", "b"))]
+    hearer.closures.forget(hearer.taken[0])
+    hearer.heard["loop_closures"](messages[0])
+    assert [told.robots for told in hearer.taken[2:]] == [("a", "a")]
+
+
+def test_the_topic_of_a_robot_names_it() -> None:
+    hearer = Hearer("constraints", ("a", "b"))
+    assert set(hearer.heard) == {"constraints", "a/constraints", "b/constraints"}
+    for topic in hearer.heard:
+        hearer.heard[topic](to_msg.constraint(replace(CLOSURE, to_ns=len(topic))))
+    assert [told.robots for told in hearer.taken] == [("", ""), ("a", "a"), ("b", "b")]
+
+
+def test_what_is_no_constraint_is_dropped_as_malformed() -> None:
+    hearer, message = Hearer("constraints"), to_msg.constraint(CLOSURE)
+    message.header.frame_id = "camera"
+    hearer.heard["constraints"](message)
+    assert hearer.dropped == ["malformed_constraints"] and not hearer.taken

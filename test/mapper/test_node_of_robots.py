@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The mapper's node behind its door, with two robots that drive at the same time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import rclpy
+from geometry_msgs.msg import TransformStamped
+from nav_msgs.msg import Odometry as OdometryMsg
+from nav_msgs.msg import Path as PathMsg
+from rclpy.executors import SingleThreadedExecutor
+from std_srvs.srv import Trigger
+
+from objreg_ros.bridge import from_msg, qos, to_msg
+from objreg_ros.data import LoopClosure
+from objreg_ros.geometry import pose, rotation_from_vector
+from objreg_ros.mapper.node import MapperNode
+
+from .bent import SECOND, closure, odometry, square
+from .test_node import Broadcaster
+
+TRUE = square(laps=2)
+HALF = len(TRUE) // 2
+ELSEWHERE = pose(rotation_from_vector(np.array([0.0, 0.0, 0.7])), np.array([5.0, -3.0, 0.0]))
+LAPS = {"a": TRUE[:HALF], "b": TRUE[HALF : 2 * HALF]}
+WALKS = {"a": odometry(LAPS["a"]), "b": odometry([ELSEWHERE @ T for T in LAPS["b"]])}
+
+
+def met(a: int, b: int) -> LoopClosure:
+    """What the one robot saw at its step and the other at its own."""
+    told = replace(closure(TRUE, a, HALF + b), from_ns=a * SECOND // 10, to_ns=b * SECOND // 10)
+    return replace(told, from_robot="fleet/a", to_robot="fleet/b", from_session=0, to_session=0)
+
+
+class Fleet:
+    """Two robots in the namespace of the mapper, each with its topics in one of its own."""
+
+    def __init__(self) -> None:
+        self.door = MapperNode()
+        self.node = rclpy.create_node("outside")
+        self.paths: dict[str, list[Any]] = {"a": [], "b": []}
+        self.corrections: dict[str, list[Any]] = {"a": [], "b": []}
+        self.odom = {}
+        for robot in "ab":
+            self.odom[robot] = self.node.create_publisher(OdometryMsg, f"{robot}/odom", qos.room(1000))
+            self.node.create_subscription(PathMsg, f"{robot}/path", self.paths[robot].append, qos.latched())
+            heard = self.corrections[robot].append
+            self.node.create_subscription(TransformStamped, f"{robot}/correction", heard, qos.latched())
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(self.door)
+        self.executor.add_node(self.node)
+        topics = {publisher.topic_name for publisher in self.odom.values()}
+        heard_of = [one for one in self.door.subscriptions if one.topic_name in topics]
+        self.wait(lambda: len(heard_of) == 2 and all(one.get_publisher_count() for one in heard_of))
+        self.wait(lambda: all(publisher.get_subscription_count() for publisher in self.odom.values()))
+
+    def wait(self, done: Callable[[], Any], seconds: float = 20.0) -> None:
+        end = time.monotonic() + seconds
+        while not done():
+            assert time.monotonic() < end, f"nothing came; known is {self.door.extra_diagnostics()}"
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def told(self, robot: str, key: str) -> Any:
+        return self.door.extra_diagnostics()[f"fleet/{robot}: {key}"]
+
+    def drive(self, steps: range) -> None:
+        """Odometry of both, pose by pose in turn."""
+        for k in steps:
+            for robot, walk in WALKS.items():
+                self.odom[robot].publish(to_msg.odometry(replace(walk[k], frame_id=f"{robot}/odom")))
+        self.wait(lambda: all(self.told(robot, "odometry") == steps.stop for robot in "ab"))
+
+    def close(self, word: LoopClosure) -> None:
+        """As a closure that objreg_msgs tells, which need not be installed."""
+        self.door.accept(word.to_ns)
+        self.door._take(word)
+
+
+@pytest.fixture
+def fleet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Fleet]:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    params = ["-p", f"graph_path:={tmp_path}/map.g2o", "-p", "robots:=[a, b]", "-r", "__ns:=/fleet"]
+    rclpy.init(args=["--ros-args", *params])
+    around = Fleet()
+    yield around
+    around.executor.shutdown()
+    around.door.close()
+    around.node.destroy_node()
+    rclpy.try_shutdown()
+
+
+def test_each_robot_has_its_path_and_correction_once_closures_tie_it_to_the_first(fleet: Fleet) -> None:
+    fleet.drive(range(HALF))
+    fleet.wait(lambda: fleet.paths["a"] and len(fleet.paths["a"][-1].poses) == fleet.told("a", "keyframes"))
+    assert (fleet.told("a", "placed in the map"), fleet.told("b", "placed in the map")) == (True, False)
+    assert not fleet.corrections["b"] and not any(path.poses for path in fleet.paths["b"])
+    for a, b in ((40, 10), (20, 20), (70, 72)):
+        fleet.close(met(a, b))
+    fleet.wait(lambda: fleet.corrections["b"] and fleet.paths["b"] and fleet.paths["b"][-1].poses)
+    fleet.wait(lambda: fleet.door.extra_diagnostics()["constraints kept"] == 3)
+    fleet.wait(lambda: fleet.door.ledger.balance().waiting == 0)
+    frames = {robot: (told[-1].header.frame_id, told[-1].child_frame_id) for robot, told in fleet.corrections.items()}
+    assert frames == {"a": ("map", "a/odom"), "b": ("map", "b/odom")}
+
+    def end() -> np.ndarray:
+        return from_msg.odometry(fleet.corrections["b"][-1]).T_odom_body @ WALKS["b"][-1].T_odom_body
+
+    fleet.wait(lambda: np.linalg.norm(end()[:3, 3] - LAPS["b"][-1][:3, 3]) < 0.05)
+
+
+def test_a_robot_whose_time_jumps_back_begins_a_session_and_leaves_the_other_alone(fleet: Fleet) -> None:
+    fleet.drive(range(40))
+    keyframes = fleet.told("a", "keyframes")
+    for word in WALKS["b"][:3]:
+        fleet.door._hear_odometry(to_msg.odometry(word), "fleet/b")
+    assert (fleet.told("b", "keyframes"), fleet.told("a", "keyframes")) == (1, keyframes)
+    assert fleet.door.extra_diagnostics()["sessions"] == 3 and fleet.told("a", "odometry passed over") == 0
+
+
+def test_a_closure_of_a_robot_that_is_not_named_is_dropped(fleet: Fleet) -> None:
+    fleet.drive(range(5))
+    fleet.close(replace(met(3, 4), to_robot="fleet/c"))
+    assert fleet.door.ledger.balance().dropped == {"unknown_robot": 1}
+
+
+def test_frames_of_one_name_are_not_broadcast_and_that_is_said_once(
+    fleet: Fleet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("objreg_ros.bridge.map_announcements.TransformBroadcaster", Broadcaster)
+    broadcaster = fleet.door._out._broadcaster = Broadcaster(fleet.door)
+    said: list[str] = []
+    monkeypatch.setattr(fleet.door, "get_logger", lambda: SimpleNamespace(warning=said.append))
+    for k in range(4):
+        for robot, frame in (("a", "odom"), ("b", "odom" if k else "b/odom")):
+            word = replace(WALKS[robot][k], frame_id=frame)
+            fleet.door._hear_odometry(to_msg.odometry(word), f"fleet/{robot}")
+    assert [message.child_frame_id for message in broadcaster.sent] == ["odom", "odom"]  # until b tells the same
+    assert len(said) == 1 and "two robots tell their odometry in 'odom'" in said[0]
+
+
+def test_a_saved_map_is_gone_on_with_by_both(fleet: Fleet) -> None:
+    fleet.drive(range(HALF))
+    for a, b in ((40, 10), (20, 20)):
+        fleet.close(met(a, b))
+    fleet.wait(lambda: fleet.told("b", "placed in the map"))
+    assert fleet.door._save(None, Trigger.Response()).success
+    fleet.door._inputs = fleet.door._inputs.replaced(resume=True)
+    fleet.door._begin(fleet.door._resumed())
+    assert [one.robot for one in fleet.door._graph.sessions] == ["fleet/a", "fleet/b"]
+    assert (fleet.told("a", "placed in the map"), fleet.told("b", "placed in the map")) == (False, False)
+    for robot in "ab":
+        later = replace(WALKS[robot][0], stamp_ns=1000 * SECOND)
+        fleet.door._followers[f"fleet/{robot}"].forget(5.0)
+        fleet.door._hear_odometry(to_msg.odometry(later), f"fleet/{robot}")
+    assert [one.robot for one in fleet.door._graph.sessions] == ["fleet/a", "fleet/b"] * 2

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What becomes of a closure at the mapper."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from objreg_ros.data import Array, LoopClosure
+from objreg_ros.geometry import pose
+from objreg_ros.mapper.follower import Follower, Followers
+from objreg_ros.mapper.pose_graph import PoseGraph
+from objreg_ros.mapper.waiting import Waiting
+
+from .bent import closure, odometry, square
+
+TRUE = square(per_side=12, laps=2)
+
+
+def driven(robots: tuple[str, ...] = ("",), steps: range = range(len(TRUE))) -> tuple[PoseGraph, Waiting, list[str]]:
+    """A graph, what waits for it, and the bodies that a camera was looked for on."""
+    graph, bodies = PoseGraph(), list[str]()
+    followers = Followers({robot: Follower(robot, 5.0, lambda: None) for robot in robots})
+    for word in (odometry(TRUE)[k] for k in steps):
+        for robot, follower in followers.items():
+            follower.follow(replace(word, child_frame_id=f"{robot}/base"), graph)
+
+    def find_mount(words: list, frame_id: str) -> Array | None:
+        bodies.append(words[0].child_frame_id)
+        return None
+
+    return graph, Waiting(followers, find_mount, most=2), bodies
+
+
+def of(told: LoopClosure, one: str, other: str) -> LoopClosure:
+    return replace(told, from_robot=one, to_robot=other)
+
+
+def test_a_closure_whose_odometry_is_there_is_tied_by_the_bodies_of_its_robots() -> None:
+    graph, waiting, bodies = driven(("a", "b"))
+    waiting.closures = [of(closure(TRUE, 10, 90), "a", "b")]
+    assert [fate.reason for fate in waiting.tie(graph)] == [""] and len(graph.closure_ties) == 1
+    assert bodies == ["a/base", "b/base"] and not waiting.closures
+
+
+@pytest.mark.parametrize(
+    ("told", "reason"),
+    [
+        (closure(TRUE, 10, 5), "two_clocks"),
+        (closure(TRUE, 10, 90, pose(np.eye(3), np.array([50.0, 0.0, 0.0]))), "implausible"),
+        (closure(TRUE, -10, 90), "before_odometry"),
+        (of(closure(TRUE, 10, 90), "x", "y"), "unknown_robot"),
+    ],
+)
+def test_a_closure_that_cannot_be_used_is_refused_by_reason(told: LoopClosure, reason: str) -> None:
+    graph, waiting, _ = driven()
+    waiting.closures = [told]
+    assert [fate.reason for fate in waiting.tie(graph)] == [reason] and not graph.closure_ties
+
+
+def test_a_robot_that_nobody_follows_is_named() -> None:
+    graph, waiting, _ = driven(("a", "b"))
+    waiting.closures = [of(closure(TRUE, 10, 90), "a", "c")]
+    (fate,) = waiting.tie(graph)
+    assert fate.reason == "unknown_robot" and "expected robots of a, b, got c" in fate.words
+
+
+def test_closures_wait_until_too_many_do() -> None:
+    graph, waiting, _ = driven(steps=range(20))
+    waiting.closures = ahead = [closure(TRUE, k, 90) for k in (5, 6)]
+    assert waiting.tie(graph) == [] and waiting.closures == ahead
+    waiting.closures.append(closure(TRUE, 7, 90))
+    assert [(fate.closure, fate.reason) for fate in waiting.tie(graph)] == [(ahead[0], "queue_full")]
+    assert waiting.take_out(lambda one: one is ahead[1]) == [ahead[1]] and len(waiting.take_out()) == 1
