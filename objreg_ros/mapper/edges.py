@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.geometry import inverses, skew
+from objreg_ros.geometry import inverses
 from objreg_ros.mapper.constraint import Constraint, local_covariance, rotation_first, rotation_vectors
 
 LEAST_FREEDOM = 1e-9  # of errors that go together: rounding must not make them more than one
@@ -30,10 +30,6 @@ class Edges:
 
     def __len__(self) -> int:
         return len(self.k1)
-
-    def __iter__(self) -> Iterator[Edges]:
-        """Each by itself."""
-        return (self.taken(slice(k, k + 1)) for k in range(len(self)))
 
     def taken(self, which: Array | slice) -> Edges:
         """Those of these numbers, or of this mask."""
@@ -70,16 +66,3 @@ def whitened_errors(poses: Array, edges: Edges) -> Array:
 def squared_residuals(poses: Array, edges: Edges) -> Array:
     """(m,): the squares of the same, summed up."""
     return np.square(whitened_errors(poses, edges)).sum(axis=1)
-
-
-def error_jacobians(poses: Array, edge: Edges) -> tuple[Array, Array]:
-    """Two (6, 6): how the whitened error of one edge changes with its two nodes, each moved by [r t] in its own axes.
-
-    ``T_2^-1 T_1 exp(x) = exp(Ad x) T_2^-1 T_1``, and the error is in the axes of *2*.
-    """
-    T_2_1 = inverses(poses[edge.k2]) @ poses[edge.k1]
-    R, t = T_2_1[0, :3, :3], T_2_1[0, :3, 3]
-    adjoint = np.zeros((6, 6))
-    adjoint[:3, :3] = adjoint[3:, 3:] = R
-    adjoint[3:, :3] = skew(t) @ R
-    return -edge.whitening[0] @ adjoint, edge.whitening[0]

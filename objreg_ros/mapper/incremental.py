@@ -6,7 +6,7 @@ Kaess et al., "iSAM2: Incremental Smoothing and Mapping Using the Bayes Tree" (2
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from importlib import import_module
 from typing import Any
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.mapper.edges import Edges, error_jacobians
+from objreg_ros.mapper.edges import Edges
 
 RELINEARISED = 0.05  # rad and m: a node that moves farther is linearised anew
 HELD_SIGMA = 1e-2  # rad and m; how fast the first node is held moves nothing, as nothing else holds it
@@ -106,12 +106,17 @@ class IncrementalGraph:
 
     def add(self, edges: Edges) -> list[int]:
         """Tie nodes that are there."""
-        gtsam, first = self._gtsam, len(self._edges)
+        first = len(self._edges)
+        for factor in self._factors(edges):
+            self._edges.append(factor)
+            self._new_factors.add(factor)
+        return list(range(first, len(self._edges)))
+
+    def _factors(self, edges: Edges) -> Iterator[Any]:
+        gtsam = self._gtsam
         for k1, k2, T, W in zip(edges.k1.tolist(), edges.k2.tolist(), edges.T_1_2, edges.whitening, strict=True):
             noise = gtsam.noiseModel.Gaussian.SqrtInformation(W, False)
-            self._edges.append(gtsam.BetweenFactorPose3(k1, k2, gtsam.Pose3(T), noise))
-            self._new_factors.add(self._edges[-1])
-        return list(range(first, len(self._edges)))
+            yield gtsam.BetweenFactorPose3(k1, k2, gtsam.Pose3(T), noise)
 
     def remove(self, numbers: Sequence[int]) -> None:
         """Take edges out."""
@@ -160,15 +165,18 @@ class IncrementalGraph:
         T[:, :3, :3], T[:, :3, 3] = rows[:, :9].reshape(-1, 3, 3), rows[:, 9:]
         return T
 
-    def error_covariance(self, poses: Array, edges: Edges) -> Array:
-        """(6 m, 6 m): how the whitened errors [r t] of edges, in the graph or not, vary as it knows its nodes."""
+    def error_covariance(self, edges: Edges) -> Array:
+        """(6 m, 6 m): how the whitened errors [r t] of edges, in the graph or not, vary as it knows its nodes.
+
+        All of it where the graph was linearised: elsewhere what is known well and what is not would mix.
+        """
         self._update()
         ends = np.unique([edges.k1, edges.k2])
         joint = self._carefully(lambda: self._isam.jointMarginalCovariance(ends.tolist()))
         blocks = np.block([[joint.at(a, b) for b in ends] for a in ends])
+        point, columns = self._isam.getLinearizationPoint(), np.arange(6)
         J = np.zeros((6 * len(edges), 6 * len(ends)))
-        for row, edge in enumerate(edges):
-            for end, part in zip((edge.k1[0], edge.k2[0]), error_jacobians(poses, edge), strict=True):
-                at = 6 * int(np.searchsorted(ends, end))
-                J[6 * row : 6 * row + 6, at : at + 6] = part
+        for row, factor in enumerate(self._factors(edges)):
+            sides = np.searchsorted(ends, factor.keys())
+            J[6 * row : 6 * row + 6, (6 * sides[:, None] + columns).ravel()] = factor.linearize(point).jacobian()[0]
         return J @ blocks @ J.T

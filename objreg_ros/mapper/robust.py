@@ -12,17 +12,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import inverses
-from objreg_ros.mapper.edges import Edges, edges_of, squared_residuals, whitened_errors
+from objreg_ros.mapper.edges import Edges, edges_of, squared_residuals
 from objreg_ros.mapper.incremental import IncrementalGraph
+from objreg_ros.mapper.influence import Influence
 
 ROUNDS = 5  # most times that closures go in and out until none wants to
 LINEAR = 10.0  # a closure that is expected to cost so many limits is not tried: it is not for want of linearity
-MOST_DOUBTED, MOST_TOGETHER, MOST_RETRIED = 5, 10, 5
+MOST_DOUBTED, MOST_ALIKE, MOST_RETRIED = 5, 5, 5
 NEAR_M = 10.0  # between the ends of two closures that may agree,
 AGREEING_M, AGREEING_SHARE = 0.1, 0.05  # and how far they may be from that, with every metre between them
 
@@ -104,7 +106,8 @@ class RobustGraph:
         """
         before, apart = self._state, apart or closure
         self.closures, self._apart = self.closures.joined(closure), self._apart.joined(apart)
-        expected = self._expected_cost(before, closure)
+        newest = len(self.closures) - 1
+        expected = self._expected_cost(before, newest)
         self._expected = np.append(self._expected, expected)
         residual = squared_residuals(before.poses, apart)
         self._state = replace(
@@ -113,7 +116,6 @@ class RobustGraph:
             residuals=np.append(before.residuals, residual),
             cost=before.cost + self.limit,
         )
-        newest = len(self.closures) - 1
         if expected <= self.limit:
             self._welcome(closure)
         elif expected < LINEAR * self.limit or self._is_agreed(newest):
@@ -161,30 +163,16 @@ class RobustGraph:
         if state.cost < self._state.cost:
             self._state = state
 
-    def _expected_cost(self, state: _State, closure: Edges) -> float:
+    def _expected_cost(self, state: _State, number: int) -> float:
         """What it will cost to believe a closure, were all of it linear: its error as the map expects it.
 
         What it costs where the nodes are is more; where that is little already, nothing has to be known of the map.
         """
-        error = whitened_errors(state.poses, closure)[0]
-        if error @ error <= self.limit:
-            return float(error @ error)
-        covariance = np.eye(6) + state.graph.error_covariance(state.poses, closure)
-        return float(error @ np.linalg.solve(covariance, error))
+        cost = float(squared_residuals(state.poses, self.closures.taken(slice(number, number + 1)))[0])
+        return cost if cost <= self.limit else self._influence(state, [number]).expected_cost(number)
 
-    def _expected_without(self, state: _State, number: int, gone: list[int]) -> float:
-        """What a closure that is left out would be expected to cost, were others not in the map, to first order.
-
-        Without them the solution moves by ``P J^T (1 - J P J^T)^-1 w``, and its covariance ``P`` grows alike; ``w`` and
-        ``J`` are their whitened errors and what these change with.
-        """
-        edges = self.closures.taken(np.array([number, *gone]))
-        w = whitened_errors(state.poses, edges)
-        M = state.graph.error_covariance(state.poses, edges)
-        gain = np.linalg.solve(np.eye(6 * len(gone)) - M[6:, 6:], M[6:, :6]).T
-        error = w[0] + gain @ w[1:].ravel()
-        covariance = np.eye(6) + M[:6, :6] + gain @ M[6:, :6]
-        return float(error @ np.linalg.solve(covariance, error))
+    def _influence(self, state: _State, numbers: Sequence[int]) -> Influence:
+        return Influence(state.graph, state.poses, self.closures, numbers)
 
     def _is_agreed(self, number: int) -> bool:
         """Whether another closure that is left out says the same."""
@@ -203,16 +191,19 @@ class RobustGraph:
         return near
 
     def _doubt(self, newest: int) -> None:
-        """Leave out, one by one, those that were the most doubtful when they came, if the newest fits without them.
+        """Leave out those that were the most doubtful when they came, one by one, if the newest fits without them.
 
         And each with those that say the same: lies that agree hold each other up.
         """
         kept = np.flatnonzero(self.kept)
-        for k in kept[np.argsort(-self._expected[kept])][:MOST_DOUBTED].tolist():
-            together = [k, *np.flatnonzero(self._saying_the_same(k) & self.kept).tolist()]
-            for gone in [k], together[:MOST_TOGETHER]:
-                if self.kept[gone].all() and self._expected_without(self._state, newest, gone) <= self.limit:
-                    self._leave_out(gone)
+        suspects = kept[np.argsort(-self._expected[kept])][:MOST_DOUBTED].tolist()
+        groups = [[k, *np.flatnonzero(self._saying_the_same(k) & self.kept)[:MOST_ALIKE].tolist()] for k in suspects]
+        influence = self._influence(self._state, np.unique([newest, *chain(*groups)]).tolist())
+        for gone in chain(*(([group[0]], group) for group in groups)):
+            if influence.expected_cost(newest, gone) <= self.limit and self.kept[gone].all():
+                self._leave_out(gone)
+                if self.kept[newest]:
+                    return
 
     def _leave_out(self, numbers: list[int]) -> None:
         """Where all else is better then."""
@@ -224,7 +215,7 @@ class RobustGraph:
         """With a closure back in that fits a map which some less hold; others follow it by themselves."""
         left_out = np.setdiff1d(np.flatnonzero(~state.kept), [*stays_out, *self._withdrawn])
         for k in left_out[np.argsort(state.residuals[left_out])][:MOST_RETRIED].tolist():
-            if not state.kept[k] and self._expected_cost(state, self.closures.taken(slice(k, k + 1))) <= self.limit:
+            if not state.kept[k] and self._expected_cost(state, k) <= self.limit:
                 state = self._sorted_out(self._changed(state, [k], []), stays_out=stays_out)
         return state
 

@@ -91,7 +91,7 @@ def test_a_step_gives_way_to_two_with_a_node_between() -> None:
     graph.grow(translation(1.0)[None], halves, whole)
     graph.settle()
     np.testing.assert_allclose(graph.poses()[:, 0, 3], [0.0, 2.0, 1.0], atol=1e-6)
-    covariance = np.eye(6) + graph.error_covariance(graph.poses(), edge(0, 1, translation(2.0)))
+    covariance = np.eye(6) + graph.error_covariance(edge(0, 1, translation(2.0)))
     assert covariance[3, 3] == pytest.approx(1.0 + 2.0, rel=0.01)  # its own, and those of both halves
 
 
@@ -113,7 +113,7 @@ def test_what_an_edge_is_expected_to_cost_is_what_it_costs(sideways: float) -> N
     graph, steps = row(), edges_of([(k, k + 1, Constraint(translation(1.0), 0.01 * np.eye(6))) for k in range(5)])
     new = edge(1, 5, translation(4.0, sideways), sigma=0.05)
     error = whitened_errors(graph.poses(), new)[0]
-    expected = error @ np.linalg.solve(np.eye(6) + graph.error_covariance(graph.poses(), new), error)
+    expected = error @ np.linalg.solve(np.eye(6) + graph.error_covariance(new), error)
     graph.add(new)
     graph.settle()
     assert squared_residuals(graph.poses(), steps.joined(new)).sum() == pytest.approx(expected, rel=0.02)

@@ -121,15 +121,6 @@ def test_the_expected_cost_is_the_rise_of_the_cost() -> None:
     assert graph.cost - before == pytest.approx(graph._expected[-1], rel=0.02)
 
 
-def test_what_a_closure_would_cost_without_others_is_told_as_of_a_map_without_them() -> None:
-    graph = closed([right(0, 9), lie(3, 11, 0.1), right(2, 10), lie(1, 8, 3.0)])
-    assert graph.kept.tolist() == [True, True, True, False]
-    without = closed([right(0, 9), right(2, 10)])
-    newest = graph.closures.taken(slice(3, 4))
-    told = graph._expected_without(graph._state, 3, [1])
-    assert told == pytest.approx(without._expected_cost(without._state, newest), rel=0.02)
-
-
 def test_a_lie_that_came_first_and_fitted_gives_way_to_what_is_true() -> None:
     graph = closed([lie(0, 10, 1.2), right(0, 9), right(1, 10), right(2, 11)])
     assert graph.kept.tolist() == [False, True, True, True]
