@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import cv2
@@ -17,6 +15,7 @@ from objreg_ros.recording import messages
 from objreg_ros.recording.record import Record
 from objreg_ros.recording.writer import write_rosbag2
 from objreg_ros.report.run_scene import Edge, Moment, RunScene, Way
+from objreg_ros.whole_file import folder_for, put_whole
 
 MAP, CAMERA = "map", "camera"  # frames
 POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("rgb", "<u4")])
@@ -34,11 +33,11 @@ def write_mcap(file: Path, scene: RunScene) -> int:
     the frame ``camera`` through the map, with ``/camera/image/compressed``, ``/camera/camera_info`` and
     ``/camera/points``. OSError where the file cannot be written; nothing is left of it then.
     """
-    with TemporaryDirectory(dir=file.parent, prefix=".objreg-") as folder:
-        bag = Path(folder, "run")
+    with folder_for(file) as folder:
+        bag = folder / "run"
         records = list(_records(scene))
         write_rosbag2(bag, sorted(records, key=lambda record: record.stamp_ns))
-        shutil.move(next(bag.glob("*.mcap")), file)
+        put_whole(next(bag.glob("*.mcap")), file)
     return sum(record.topic == "/camera/points" for record in records)
 
 

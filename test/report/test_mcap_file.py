@@ -77,3 +77,9 @@ def test_what_cannot_be_finished_leaves_nothing(tmp_path: Path, monkeypatch: pyt
     with pytest.raises(OSError, match="no space"):
         write_mcap(tmp_path / "run.mcap", walk())
     assert not list(tmp_path.iterdir())
+
+
+def test_a_link_stays_one(tmp_path: Path) -> None:
+    (tmp_path / "link.mcap").symlink_to("run.mcap")
+    write_mcap(tmp_path / "link.mcap", walk())
+    assert (tmp_path / "link.mcap").is_symlink() and (tmp_path / "run.mcap").stat().st_size
