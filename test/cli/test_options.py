@@ -127,5 +127,5 @@ def test_standard_output_is_taken_as_it_is() -> None:
 
 def test_links_in_a_circle_are_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "circle").symlink_to("circle")
-    with pytest.raises(OSError, match=r"^--out: expected a place .*, got at .*circle: Too many levels of symbolic links"):
+    with pytest.raises(OSError, match=r"^--out: expected a place .*, got at .*circle: Too many levels of symbolic"):
         require_writable("--out", tmp_path / "circle")
