@@ -36,9 +36,12 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Write a text in UTF-8, or bytes, as `whole_file` does."""
+    """Write a text in UTF-8, or bytes, as `whole_file` does.
+
+    What UTF-8 cannot say, as the name of a file in another encoding, is written as ``?``.
+    """
     with whole_file(path) as file:
-        file.write(content.encode() if isinstance(content, str) else content)
+        file.write(content.encode(errors="replace") if isinstance(content, str) else content)
 
 
 @contextmanager

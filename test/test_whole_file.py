@@ -20,10 +20,12 @@ def names(folder: Path) -> list[str]:
 
 def test_texts_and_bytes_are_written_and_nothing_else_is_left(tmp_path: Path) -> None:
     write_whole(tmp_path / "text", "größer\n")
+    write_whole(tmp_path / "name", os.fsdecode(b"r\xfcm"))
     write_whole(tmp_path / "bytes", b"\x00\xff")
     assert (tmp_path / "text").read_bytes() == "größer\n".encode()
     assert (tmp_path / "bytes").read_bytes() == b"\x00\xff"
-    assert names(tmp_path) == ["bytes", "text"]
+    assert (tmp_path / "name").read_bytes() == b"r?m"
+    assert names(tmp_path) == ["bytes", "name", "text"]
 
 
 @pytest.mark.parametrize("broken", [ValueError, KeyboardInterrupt])
