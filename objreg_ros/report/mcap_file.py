@@ -99,11 +99,11 @@ def _closures(edges: Sequence[Edge], stamp_ns: int) -> Iterator[Any]:
 
 def _objects(objects: Sequence[tuple[str, Array]], stamp_ns: int) -> Iterator[Any]:
     """The places of each label, with its name at the middle one."""
-    for number, label in enumerate(sorted({label for label, _ in objects})):
+    for label in sorted({label for label, _ in objects}):
         places = np.array([xyz for name, xyz in objects if name == label])
         points = [_point(xyz) for xyz in places]
         yield _marker(label, 0, SPHERE_LIST, stamp_ns, OBJECTS, BALL_M, points=points)
-        yield _marker("names", number, TEXT, stamp_ns, WORDS, WORD_M, at=_most_central(places), text=label)
+        yield _marker(label, 1, TEXT, stamp_ns, WORDS, WORD_M, at=_most_central(places), text=label)
 
 
 def _most_central(places: Array) -> Array:

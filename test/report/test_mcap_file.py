@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -55,6 +56,17 @@ def test_objects_are_where_they_were_seen(read: dict[str, list]) -> None:
     seen = {marker.ns: len(marker.points) for marker in array.markers if marker.points}
     labels = [label for label, _ in walk().objects]
     assert seen == {label: labels.count(label) for label in ("book", "cup")}
+
+
+def test_no_marker_takes_the_place_of_another_whatever_a_label_is(tmp_path: Path) -> None:
+    scene = walk()
+    named = {"cup": "names", "book": "words"}
+    renamed = replace(scene, objects=tuple((named[label], xyz) for label, xyz in scene.objects))
+    write_mcap(tmp_path / "run.mcap", renamed)
+    with AnyReader([tmp_path / "run.mcap"]) as reader:
+        (raw,) = (raw for connection, _, raw in reader.messages() if connection.topic == "/objects")
+        markers = reader.deserialize(raw, "visualization_msgs/msg/MarkerArray").markers
+    assert len(markers) == len({(marker.ns, marker.id) for marker in markers}) == 4
 
 
 def test_the_camera_goes_through_the_map_with_what_it_saw(read: dict[str, list]) -> None:
