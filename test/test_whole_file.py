@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from objreg_ros.whole_file import whole_file, write_whole
+from objreg_ros.whole_file import folder_for, put_whole, whole_file, write_whole
 
 
 def names(folder: Path) -> list[str]:
@@ -20,10 +20,12 @@ def names(folder: Path) -> list[str]:
 
 def test_texts_and_bytes_are_written_and_nothing_else_is_left(tmp_path: Path) -> None:
     write_whole(tmp_path / "text", "größer\n")
+    write_whole(tmp_path / "name", os.fsdecode(b"r\xfcm"))
     write_whole(tmp_path / "bytes", b"\x00\xff")
     assert (tmp_path / "text").read_bytes() == "größer\n".encode()
     assert (tmp_path / "bytes").read_bytes() == b"\x00\xff"
-    assert names(tmp_path) == ["bytes", "text"]
+    assert (tmp_path / "name").read_bytes() == b"r?m"
+    assert names(tmp_path) == ["bytes", "name", "text"]
 
 
 @pytest.mark.parametrize("broken", [ValueError, KeyboardInterrupt])
@@ -92,3 +94,41 @@ def test_a_pipe_is_written_into(tmp_path: Path) -> None:
     write_whole(pipe, "told")
     reader.join(5)
     assert heard == ["told"] and names(tmp_path) == ["pipe"]
+
+
+def test_links_in_a_circle_are_named_and_stay(tmp_path: Path) -> None:
+    (tmp_path / "circle").symlink_to("circle")
+    with pytest.raises(OSError, match=rf"^{tmp_path}/circle: expected .*, got: Too many levels of symbolic links"):
+        write_whole(tmp_path / "circle", "new")
+    assert (tmp_path / "circle").is_symlink() and names(tmp_path) == ["circle"]
+
+
+def made(path: Path) -> None:
+    """Make a file elsewhere and put it to its place."""
+    with folder_for(path) as folder:
+        (folder / "part").write_text("new")
+        put_whole(folder / "part", path)
+
+
+def test_what_is_made_elsewhere_takes_the_place_behind_a_link(tmp_path: Path) -> None:
+    (tmp_path / "real").write_text("old")
+    (tmp_path / "link").symlink_to("real")
+    made(tmp_path / "link")
+    assert (tmp_path / "link").is_symlink() and (tmp_path / "real").read_text() == "new"
+    assert names(tmp_path) == ["link", "real"]
+
+
+def test_what_is_made_elsewhere_is_written_into_a_pipe_which_stays_one(tmp_path: Path) -> None:
+    pipe, heard = tmp_path / "pipe", list[str]()
+    os.mkfifo(pipe)
+    reader = threading.Thread(target=lambda: heard.append(pipe.read_text()), daemon=True)
+    reader.start()
+    made(pipe)
+    reader.join(5)
+    assert heard == ["new"] and stat.S_ISFIFO(pipe.stat().st_mode) and names(tmp_path) == ["pipe"]
+
+
+def test_what_is_made_elsewhere_names_the_place_that_takes_nothing(tmp_path: Path) -> None:
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(IsADirectoryError, match=f"^{tmp_path}/folder: expected .*, got: Is a directory"):
+        made(tmp_path / "folder")

@@ -180,15 +180,20 @@ def _profile(environment: Mapping[str, str]) -> str:
 
 def of_machine() -> Iterator[Check]:
     """Where files and compiled code go, and shared memory."""
-    for name, folder in (("free disk here", Path.cwd()), ("free disk for a while", Path(tempfile.gettempdir()))):
-        yield free_disk(name, folder)
+    for name, find in (("free disk here", Path.cwd), ("free disk for a while", tempfile.gettempdir)):
+        yield free_disk(name, find)
     yield _shared_memory()
     yield compiled_code()
 
 
-def free_disk(name: str, folder: Path, least: int = LEAST_DISK_BYTES) -> Check:
-    """How much fits into a folder."""
-    free = shutil.disk_usage(folder).free
+def free_disk(name: str, find: Callable[[], Path | str], least: int = LEAST_DISK_BYTES) -> Check:
+    """How much fits into a folder; a full disk has none for what is temporary."""
+    try:
+        folder = find()
+        free = shutil.disk_usage(folder).free
+    except OSError as error:
+        todo = "make room, or go to a folder that can be written, and name one as TMPDIR"
+        return Check("machine", name, error.strerror or str(error), todo, stops=True)
     todo = f"make room: a run needs {least >> 20} MiB" if free < least else ""
     return Check("machine", name, f"{_size(free)} in {folder}", todo, stops=bool(todo))
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
@@ -31,6 +32,7 @@ from objreg_ros.recording.mounts import TRANSFORMS, camera_on_body
 from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.recording.troubles import troubles
 from objreg_ros.registration.params import RegistrarNodeParams
+from objreg_ros.report.about import about
 from objreg_ros.report.findings import as_json, find, setting
 from objreg_ros.report.live_pictures import draw_sight, draw_way
 from objreg_ros.report.write import write_report
@@ -96,22 +98,12 @@ def run(asked: Asked) -> int:
     bag = as_rosbag2(recording, inputs, asked.out, asked.seconds)
     with open_recording(bag) as opened:
         source = with_camera(opened, camera, inputs.outright)
-        T_base_camera = mounting_of(asked) or _mounting_by_tf(source, inputs)
-        logs = asked.out / "logs"
+        logs, told = asked.out / "logs", told_of(asked, recording, source, inputs)
         live = run_live(bag, setup_of(asked, inputs, camera), logs, _say)
         truth = Truth.of(source, inputs.ground_truth)
         for note in truth.notes:
             _say(f"! {note}")
-        told = {
-            "recording": str(bag.resolve()),
-            "name": recording.resolve().name,
-            "inputs": inputs.outright,
-            "camera": absolute(camera),
-            "T_base_camera": T_base_camera,
-            "logs": str(logs.resolve()),
-            **setting(source, inputs, model_of(asked)),
-        }
-        told = summary_of(told, live, truth)
+        told = summary_of({**told, "logs": str(logs.resolve())}, live, truth)
         findings = find(told, troubles(source, inputs))
         write_whole(asked.out / "demo.json", json.dumps({**told, "findings": as_json(findings)}, indent=1))
         _draw(asked.out, live, truth, source, inputs)
@@ -126,6 +118,20 @@ def run(asked: Asked) -> int:
     tell(findings)
     click.echo("\n".join(closing_lines(told, findings, asked.out, own)))
     return exit_code(told)
+
+
+def told_of(asked: Asked, recording: Path, source: Recording, inputs: Inputs) -> dict[str, Any]:
+    """What the JSON tells of the recording, of which ``source`` was played, and of how the run was made."""
+    changed = read_settings(asked.params_file, asked.changes).changed()
+    return {
+        "about": about(recording, model_of(asked), changed, sys.argv[1:]),
+        "recording": str(source.path.resolve()),
+        "name": recording.resolve().name,
+        "inputs": inputs.outright,
+        "camera": absolute(camera_asked(asked)),
+        "T_base_camera": mounting_of(asked) or _mounting_by_tf(source, inputs),
+        **setting(source, inputs, model_of(asked)),
+    }
 
 
 def calibrated(asked: Asked) -> Asked:

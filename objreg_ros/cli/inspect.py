@@ -23,6 +23,7 @@ from objreg_ros.report.store_drawing import draw
 from objreg_ros.report.store_page import store_page
 from objreg_ros.report.store_survey import describe, survey
 from objreg_ros.truth import Truth
+from objreg_ros.whole_file import write_whole
 
 FILE = click.Path(dir_okay=False, path_type=Path)
 
@@ -73,7 +74,7 @@ def _say_store(store: Path, picture: Path | None, page: Path | None) -> None:
         write_picture(picture, draw(found, pictures))
         click.echo(f"  drawn into {picture}")
     if page is not None:
-        page.write_text(store_page(found, pictures), encoding="utf-8")
+        write_whole(page, store_page(found, pictures))
         click.echo(f"  written into {page}")
     left_out = len(found.landmarks) - len(pictures)
     if (picture or page) and left_out:

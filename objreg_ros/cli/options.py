@@ -11,6 +11,7 @@ from pathlib import Path
 import click
 
 from objreg_ros.recording.inputs import GRAPH_TOPICS
+from objreg_ros.whole_file import resolved
 
 recording = click.argument("recording", type=click.Path(path_type=Path))
 remap = click.option(
@@ -70,7 +71,7 @@ def _places(file: Path) -> list[Path]:
     """What has to be writable: a new file lies in the folder before it takes the place of an old one."""
     if not file.exists():
         return [file.parent]
-    return [file, file.resolve().parent] if file.is_file() else [file]
+    return [file, resolved(file).parent] if file.is_file() else [file]
 
 
 def _try_to_write(file: Path) -> None:
@@ -80,7 +81,7 @@ def _try_to_write(file: Path) -> None:
     """
     if file.exists() and not file.is_file():
         return
-    with tempfile.TemporaryFile(dir=file.resolve().parent):
+    with tempfile.TemporaryFile(dir=resolved(file).parent):
         pass
     if file.exists():
         with file.open("ab"):

@@ -136,16 +136,21 @@ def most_agreeing(agree: Array) -> list[int]:
     From each of those that agree with most, whoever agrees with most of those left is taken in (Pattabiraman et al.,
     "Fast Algorithms for the Maximum Clique Problem on Massive Graphs", 2015).
     """
-    best = np.zeros(0, int)
-    for begin in np.argsort(-agree.sum(axis=1), kind="stable")[:MOST_BEGUN].tolist():
+    best: list[int] = []
+    degrees = agree.sum(axis=1)
+    for begin in np.argsort(-degrees, kind="stable")[:MOST_BEGUN].tolist():
+        if degrees[begin] <= len(best):
+            break
         inside, left = [begin], agree[begin].copy()
         left[begin] = False
+        counts = agree[:, left].sum(axis=1)
         while left.any() and len(inside) + int(left.sum()) > len(best):
-            choices = np.flatnonzero(left)
-            chosen = int(choices[agree[np.ix_(choices, choices)].sum(axis=1).argmax()])
+            chosen = int(np.where(left, counts, -1).argmax())
             inside.append(chosen)
-            left &= agree[chosen]
-            left[chosen] = False
+            gone = left & ~agree[chosen]
+            gone[chosen] = True
+            left &= ~gone
+            counts -= agree[:, gone].sum(axis=1)
         if len(inside) > len(best):
-            best = np.array(inside)
-    return sorted(best.tolist())
+            best = inside
+    return sorted(best)

@@ -18,7 +18,7 @@ from objreg_ros.report.packed import encoded, packed
 from objreg_ros.report.pairs import Pair, by_interest
 from objreg_ros.report.pictures import Album
 
-PAGE_BYTES = 4_000_000  # of all clouds of a page, which has 15 MB for everything
+PAGE_BYTES = 4_000_000  # of all clouds of a page; that of one run has 15 MB for everything
 MOST_POINTS = 64 * 48  # of one cloud
 LEFT_OUT = "left out, as the page would grow too large"
 

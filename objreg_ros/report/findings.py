@@ -13,14 +13,16 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from objreg_ros import share
-from objreg_ros.data import UNTRIED
+from objreg_ros.data import UNTRIED, Reason
 from objreg_ros.recording.finding import Finding
 from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.record import Recording
+from objreg_ros.report.reasons import REFUSALS
 
 MANY = 0.05  # of the frames of a node; fewer that are overtaken are usual
 SELDOM = 0.2  # of the frames; a model that knows what it sees finds more
 OVERTAKEN = "overtaken"
+PASSED_OVER = tuple(reason.value for reason in (Reason.OVER_BUDGET, Reason.CLOCK, Reason.UNREADABLE))
 LOOK = "objreg inspect {recording}"
 FETCH = "get a model of real things with `objreg fetch-model`, then run again"
 SIMULATED_TOPICS = ("/image", "/image/compressed")
@@ -75,10 +77,10 @@ class Counts:
 def find(summary: Mapping[str, Any], of_recording: Iterable[Finding] = ()) -> tuple[Finding, ...]:
     """Where the run stopped first, if no loop was closed; then what else it and its recording were found to have."""
     counts = Counts.of(summary)
-    steps = (_no_frame, _no_detections, _no_objects, _no_revisit, _all_refused)
+    steps = (_no_frame, _no_detections, _no_objects, _none_tried, _no_revisit, _all_refused)
     stopped = () if counts.constraints else (_first(steps, counts, summary),)
     found = (*stopped, *of_recording, _simulated_model(counts, summary), _overtaken(summary), _over_budget(summary))
-    return tuple(finding for finding in found if finding is not None)
+    return tuple(dict.fromkeys(finding for finding in found if finding is not None))
 
 
 def as_json(findings: Iterable[Finding]) -> list[dict[str, str]]:
@@ -138,6 +140,20 @@ def _no_objects(counts: Counts, summary: Mapping[str, Any]) -> Finding | None:
         f"look at the size, frame and range of depth with `{_look(summary)}`",
         "no-objects",
     )
+
+
+def _none_tried(counts: Counts, summary: Mapping[str, Any]) -> Finding | None:
+    """Where places looked like ones that were seen before, and all of them were passed over."""
+    rejected = summary.get("rejected", {})
+    passed_over = {reason: rejected[reason] for reason in PASSED_OVER if rejected.get(reason)}
+    if counts.tried or not passed_over:
+        return None
+    most = max(passed_over, key=lambda reason: passed_over[reason])
+    if most == Reason.OVER_BUDGET.value:
+        return _over_budget(summary)
+    words = REFUSALS[most]
+    what = f"{passed_over[most]} candidates were not tried: {words.meaning}"
+    return Finding(what, todo=words.remedy.removesuffix("."), anchor=most)
 
 
 def _no_revisit(counts: Counts, summary: Mapping[str, Any]) -> Finding | None:

@@ -64,6 +64,16 @@ def _is_node(value: Any) -> bool:
     return isinstance(value, dict) and _is_count(value.get("published")) and _each(_is_pair)(value.get("stage_ms"))
 
 
+def _is_about(value: Any) -> bool:
+    """Whether it is what `about` makes; what is missing or null is not told."""
+    if not isinstance(value, dict):
+        return False
+    model, params = value.get("model"), value.get("params", {})
+    told = [value.get(key) for key in ("version", "commit", "command", "date", "recording")]
+    fits = all(text is None or isinstance(text, str) for text in told)
+    return fits and (model is None or isinstance(model, dict)) and isinstance(params, dict)
+
+
 def _each(fits: Check) -> Check:
     """Whether a value is an object with nothing but such values."""
     return lambda value: isinstance(value, dict) and all(map(fits, value.values()))
@@ -72,7 +82,7 @@ def _each(fits: Check) -> Check:
 FINDING = ("what", "cause", "todo", "anchor")
 FIELDS: dict[str, tuple[str, Check]] = {
     "recording": ("the path of a recording", _is_text),
-    "about": ("an object", lambda value: isinstance(value, dict)),
+    "about": ("an object of texts, model and params", _is_about),
     "name": ("text", _is_text),
     "lens": ("text", _is_text),
     "rectified": ("auto, all or none", lambda value: value in ("auto", "all", "none")),

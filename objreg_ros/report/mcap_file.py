@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import cv2
@@ -17,6 +15,7 @@ from objreg_ros.recording import messages
 from objreg_ros.recording.record import Record
 from objreg_ros.recording.writer import write_rosbag2
 from objreg_ros.report.run_scene import Edge, Moment, RunScene, Way
+from objreg_ros.whole_file import folder_for, put_whole
 
 MAP, CAMERA = "map", "camera"  # frames
 POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("rgb", "<u4")])
@@ -34,11 +33,11 @@ def write_mcap(file: Path, scene: RunScene) -> int:
     the frame ``camera`` through the map, with ``/camera/image/compressed``, ``/camera/camera_info`` and
     ``/camera/points``. OSError where the file cannot be written; nothing is left of it then.
     """
-    with TemporaryDirectory(dir=file.parent, prefix=".objreg-") as folder:
-        bag = Path(folder, "run")
+    with folder_for(file) as folder:
+        bag = folder / "run"
         records = list(_records(scene))
         write_rosbag2(bag, sorted(records, key=lambda record: record.stamp_ns))
-        shutil.move(next(bag.glob("*.mcap")), file)
+        put_whole(next(bag.glob("*.mcap")), file)
     return sum(record.topic == "/camera/points" for record in records)
 
 
@@ -100,11 +99,11 @@ def _closures(edges: Sequence[Edge], stamp_ns: int) -> Iterator[Any]:
 
 def _objects(objects: Sequence[tuple[str, Array]], stamp_ns: int) -> Iterator[Any]:
     """The places of each label, with its name at the middle one."""
-    for number, label in enumerate(sorted({label for label, _ in objects})):
+    for label in sorted({label for label, _ in objects}):
         places = np.array([xyz for name, xyz in objects if name == label])
         points = [_point(xyz) for xyz in places]
         yield _marker(label, 0, SPHERE_LIST, stamp_ns, OBJECTS, BALL_M, points=points)
-        yield _marker("names", number, TEXT, stamp_ns, WORDS, WORD_M, at=_most_central(places), text=label)
+        yield _marker(label, 1, TEXT, stamp_ns, WORDS, WORD_M, at=_most_central(places), text=label)
 
 
 def _most_central(places: Array) -> Array:

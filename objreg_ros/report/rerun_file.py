@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from types import ModuleType
 from typing import Any
 
@@ -13,6 +11,7 @@ import cv2
 import numpy as np
 
 from objreg_ros.report.run_scene import Edge, Moment, RunScene
+from objreg_ros.whole_file import folder_for, put_whole
 
 COLOURS = {
     "odometry": (217, 89, 38),
@@ -44,9 +43,9 @@ def write_rerun(file: Path, scene: RunScene) -> int:
     file cannot be written; nothing is left of it then.
     """
     rr = require_rerun()
-    with TemporaryDirectory(dir=file.parent, prefix=".objreg-") as folder:
+    with folder_for(file) as folder:
         recording = rr.RecordingStream("objreg", recording_id=f"objreg {scene.name}")
-        recording.save(Path(folder, "run.rrd"))
+        recording.save(folder / "run.rrd")
         _log_ways(rr, recording, scene)
         _log_closures(rr, recording, scene.edges)
         _log_objects(rr, recording, scene)
@@ -54,7 +53,7 @@ def write_rerun(file: Path, scene: RunScene) -> int:
         for count, moment in enumerate(scene.moments(), start=1):  # noqa: B007
             _log_moment(rr, recording, moment)
         recording.disconnect()
-        shutil.move(Path(folder, "run.rrd"), file)
+        put_whole(folder / "run.rrd", file)
     return count
 
 

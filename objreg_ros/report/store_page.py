@@ -54,7 +54,7 @@ def _drawn(one: SessionMap, styles: Mapping[str, str], width: str) -> str:
 
 
 def _object(found: Survey, mark: Landmark, pictures: Mapping[int, Array]) -> dict[str, Any]:
-    rows = [sighting for sighting in found.sightings if sighting.landmark == mark.landmark]
+    rows = found.by_landmark[mark.landmark]
     return {
         "landmark": mark.landmark,
         "label": mark.label,

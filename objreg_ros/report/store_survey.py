@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from objreg_ros.sensor import measured_noise
 MOST_VIEWS = 100  # are read for the noise of their depth
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Survey:
     """The whole of a store without its points."""
 
@@ -51,7 +52,15 @@ class Survey:
             for session, rows in self.by_session.items()
         ]
 
-    @property
+    @cached_property
+    def by_landmark(self) -> dict[int, list[Sighting]]:
+        """The sightings of each landmark, the oldest first."""
+        landmarks: dict[int, list[Sighting]] = {}
+        for sighting in self.sightings:
+            landmarks.setdefault(sighting.landmark, []).append(sighting)
+        return landmarks
+
+    @cached_property
     def by_session(self) -> dict[int, list[Sighting]]:
         """The sightings of each session, the oldest first."""
         sessions: dict[int, list[Sighting]] = {}
@@ -61,8 +70,12 @@ class Survey:
 
     def moment(self, sighting: Sighting) -> str:
         """When something was seen: its session, and the time since that began."""
-        first_ns = min(s.stamp_ns for s in self.sightings if s.session == sighting.session)
-        return f"{1e-9 * (sighting.stamp_ns - first_ns):.1f} s of session {sighting.session}"
+        seconds = 1e-9 * (sighting.stamp_ns - self._began_ns[sighting.session])
+        return f"{seconds:.1f} s of session {sighting.session}"
+
+    @cached_property
+    def _began_ns(self) -> dict[int, int]:
+        return {session: min(s.stamp_ns for s in rows) for session, rows in self.by_session.items()}
 
 
 def survey(path: str | Path) -> Survey:

@@ -19,6 +19,7 @@ from objreg_ros.truth import FALSE, Error, Truth, within
 
 Row = TypeVar("Row")
 
+MOST_NS = 1 << 63
 PAUSE_NS = 3_600_000_000_000  # what is further from a run is not of it: one stamp of 0 would make it last for decades
 
 
@@ -243,7 +244,7 @@ def _laid_over(poses: Sequence[Array], true: Sequence[Array]) -> Array:
 def _read(name: str, summary: Mapping[str, Any], key: str, read: Callable[[Any], Row]) -> tuple[Row, ...]:
     try:
         return tuple(read(row) for row in summary.get(key, ()))
-    except (TypeError, KeyError, AttributeError, ValueError) as error:
+    except (TypeError, KeyError, AttributeError, ValueError, OverflowError) as error:
         got = " ".join(str(summary[key]).split())[:80]
         raise ValueError(
             f"{name}: expected {key} as `objreg offline --json` writes them, got {got} ({error!r}); run it again"
@@ -251,13 +252,45 @@ def _read(name: str, summary: Mapping[str, Any], key: str, read: Callable[[Any],
 
 
 def _glimpse(row: Mapping[str, Any]) -> Glimpse:
-    pose, stamp_ns = row.get("T_odom_camera"), int(row["stamp_ns"])
+    pose, stamp_ns = row.get("T_odom_camera"), _stamp(row["stamp_ns"])
     return Glimpse(
         stamp_ns=stamp_ns,
         T_odom_camera=None if pose is None else _rigid(pose, stamp_ns),
         labels=tuple(map(_spaced, row.get("labels", ()))),
-        objects=tuple((_spaced(label), np.array(xyz, float)) for label, xyz in row.get("objects", ())),
+        objects=tuple((_spaced(label), _place(xyz)) for label, xyz in row.get("objects", ())),
     )
+
+
+def _stamp(value: Any) -> int:
+    """A stamp in ns; ValueError for what a message cannot have."""
+    stamp_ns = int(value)
+    if abs(stamp_ns) >= MOST_NS:
+        raise ValueError(f"expected a stamp in ns, got {value}")
+    return stamp_ns
+
+
+def _place(xyz: Any) -> Array:
+    """A position (3,) m; ValueError if it is none."""
+    place = np.array(xyz, float)
+    if place.shape != (3,) or not np.isfinite(place).all():
+        raise ValueError(f"expected three finite numbers, got {xyz}")
+    return place
+
+
+def _tried_pose(pose: Any) -> Array | None:
+    """A pose that was turned down (4, 4), which may not be rigid; None where there is none to look at."""
+    if pose is None:
+        return None
+    T = np.array(pose, float)
+    if T.shape != (4, 4):
+        raise ValueError(f"expected a pose of 4 x 4 numbers, got {T.shape}")
+    return T if np.isfinite(T).all() else None
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise ValueError(f"expected text, got {value!r}")
+    return value
 
 
 def _rigid(pose: Any, stamp_ns: int) -> Array:
@@ -267,8 +300,8 @@ def _rigid(pose: Any, stamp_ns: int) -> Array:
 
 def _closure(row: Mapping[str, Any]) -> LoopClosure:
     return LoopClosure(
-        from_ns=int(row["from_ns"]),
-        to_ns=int(row["to_ns"]),
+        from_ns=_stamp(row["from_ns"]),
+        to_ns=_stamp(row["to_ns"]),
         T_from_to=np.array(row["T_from_to"], float),
         covariance=np.array(row["covariance"], float),
         labels=tuple(map(_spaced, row["labels"])),
@@ -277,7 +310,7 @@ def _closure(row: Mapping[str, Any]) -> LoopClosure:
 
 
 def _evidence(row: Mapping[str, Any]) -> dict[str, float]:
-    return {_spaced(name): number for name, number in row.get("evidence", {}).items()}
+    return {_spaced(name): float(number) for name, number in row.get("evidence", {}).items()}
 
 
 def _spaced(label: str) -> str:
@@ -286,12 +319,11 @@ def _spaced(label: str) -> str:
 
 
 def _refusal(row: Mapping[str, Any]) -> Rejected:
-    pose = row.get("T_from_to")
     return Rejected(
         reason=Reason(row["reason"]),
-        from_ns=int(row["from_ns"]),
-        to_ns=int(row["to_ns"]),
-        detail=row["detail"],
-        T_from_to=None if pose is None else np.array(pose, float),
+        from_ns=_stamp(row["from_ns"]),
+        to_ns=_stamp(row["to_ns"]),
+        detail=_text(row["detail"]),
+        T_from_to=_tried_pose(row.get("T_from_to")),
         evidence=_evidence(row),
     )

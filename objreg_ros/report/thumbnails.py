@@ -11,7 +11,7 @@ from objreg_ros.data import DepthImage
 from objreg_ros.report.pairs import Pair, by_interest
 from objreg_ros.report.pictures import Album, data_uri, overlay
 
-PAGE_BYTES = 7_000_000  # of all thumbnails of a page, which has 15 MB for everything
+PAGE_BYTES = 7_000_000  # of all thumbnails of a page; that of one run has 15 MB for everything
 QUALITY = 70  # of a JPEG: half the bytes of what the galleries show
 
 

@@ -86,9 +86,18 @@ def test_a_middleware_that_cannot_be_loaded_is_advice() -> None:
     assert checks._middleware(ask).todo.endswith("unset RMW_IMPLEMENTATION")
 
 
+def test_a_disk_without_a_place_for_what_is_temporary_stops_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    def nowhere() -> str:
+        raise FileNotFoundError(2, "No usable temporary directory found in ['/tmp']")
+
+    monkeypatch.setattr("tempfile.gettempdir", nowhere)
+    check = next(check for check in checks.of_machine() if check.name == "free disk for a while")
+    assert check.stops and check.found.startswith("No usable temporary directory") and "TMPDIR" in check.todo
+
+
 def test_a_disk_that_is_full_stops_runs(tmp_path: Path) -> None:
-    assert not checks.free_disk("here", tmp_path, least=0).stops
-    check = checks.free_disk("here", tmp_path, least=1 << 62)
+    assert not checks.free_disk("here", lambda: tmp_path, least=0).stops
+    check = checks.free_disk("here", lambda: tmp_path, least=1 << 62)
     assert check.stops and check.todo.startswith("make room")
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import json
 import sys
 from dataclasses import replace
 from itertools import permutations
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 from recording.folders import CAMERA, records, tum_folder, uncalibrated
 
-from objreg_ros.cli.demo import Asked, _draw, calibrated, camera_asked, camera_of, mounting_of, run, setup_of
+from objreg_ros.cli.demo import Asked, _draw, calibrated, camera_asked, camera_of, mounting_of, run, setup_of, told_of
 from objreg_ros.recording import open_recording, write_rosbag2
 from objreg_ros.recording.inputs import Inputs, parse_remaps
 from objreg_ros.truth import Truth
@@ -147,3 +148,16 @@ def test_a_camera_that_is_told_reaches_the_player_by_its_option_or_by_the_segmen
     assert camera_asked(replace(ASKED, camera="5,5,2,1")) == "5,5,2,1" and camera_asked(ASKED) == ""
     assert camera_asked(replace(ASKED, changes=("segmenter.camera=6,6,2,1",))) == "6,6,2,1"
     assert setup_of(ASKED, INPUTS, "5,5,2,1").replay_args[2:4] == ["--camera", "5,5,2,1"]
+
+
+@pytest.mark.parametrize("place", ["bag", "bag/bag.mcap"])
+def test_the_report_learns_how_the_run_was_made(place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "argv", ["objreg", "demo", "my room"])
+    write_rosbag2(tmp_path / "bag", records())
+    asked = replace(ASKED, model="objreg_ssd.onnx", changes=("detector.threshold=0.4",))
+    with open_recording(tmp_path / place) as source:
+        told = told_of(asked, tmp_path / "my room", source, INPUTS)
+    assert told["recording"] == str(tmp_path / place) and told["name"] == "my room"
+    assert told["about"]["command"] == "objreg demo 'my room'" and told["about"]["recording"].endswith("/my room")
+    assert told["about"]["params"] == {"detector.threshold": 0.4} and told["about"]["model"]["name"] == told["model"]
+    json.dumps(told)

@@ -123,3 +123,9 @@ def test_an_old_file_in_a_folder_that_takes_no_new_one_is_refused(
 
 def test_standard_output_is_taken_as_it_is() -> None:
     require_writable("--json", Path("-"))
+
+
+def test_links_in_a_circle_are_refused_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "circle").symlink_to("circle")
+    with pytest.raises(OSError, match=r"^--out: expected a place .*, got at .*circle: Too many levels of symbolic"):
+        require_writable("--out", tmp_path / "circle")

@@ -81,7 +81,8 @@ def test_the_table_is_sorted_by_error_with_what_has_none_at_the_end(browser: Any
 
 def test_a_row_opens_a_pair_with_both_pictures_and_the_overlay(browser: Any) -> None:
     click(browser, "tr[data-pair=c4]")
-    browser.execute_async_script("setTimeout(arguments[0], 50)")  # pictures inside the page are decoded by now
+    pictures = "[...document.querySelectorAll('dialog[open] img')].filter((image) => image.checkVisibility())"
+    browser.execute_async_script(f"Promise.all({pictures}.map((image) => image.decode())).then(() => arguments[0]())")
     shown = pane(browser)
     assert shown["drawn"] == 3 and shown["space"] == "c4" and "the pose is off by 0.0° and 50.0 cm" in shown["text"]
     click(browser, "dialog[open] .next")

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,20 @@ def test_the_first_step_that_gave_nothing_is_named() -> None:
     assert anchors(objects=0) == ["no-objects"] and anchors(rejected={"no_candidate": 4}) == ["no-revisit"]
     assert anchors(rejected={"low_overlap": 2, "no_candidate": 1}) == ["all-refused"]
     assert find(CLOSED) == ()
+
+
+@pytest.mark.parametrize(
+    ("reason", "anchor"),
+    [("over_budget", "over-budget"), ("clock_began_anew", "clock_began_anew"), ("unreadable", "unreadable")],
+)
+def test_candidates_that_were_passed_over_are_no_sign_of_a_camera_that_did_not_come_back(
+    reason: str, anchor: str, repository: Path
+) -> None:
+    (finding,) = find({**EMPTY, "rejected": {"no_candidate": 9, reason: 4}})
+    assert finding.anchor == anchor and finding.what.startswith("4 candidates were not tried: ") and finding.todo
+    assert anchors(rejected={"low_overlap": 1, reason: 4})[0] == "all-refused"
+    headings = (repository / "docs/troubleshooting.md").read_text(encoding="utf-8").lower().replace("-", " ")
+    assert re.search(rf"^#+ `?{anchor.replace('-', ' ')}`?$", headings, re.MULTILINE)
 
 
 def test_what_was_dropped_is_told_with_the_first_complaint() -> None:

@@ -38,6 +38,10 @@ BAD: list[tuple[str, Any]] = [
     ("glimpses", [3]),
     ("glimpses", [{}]),
     ("findings", [{"what": "no more"}]),
+    ("about", []),
+    ("about", {"model": "ssd.onnx"}),
+    ("about", {"params": ["detector.threshold"]}),
+    ("about", {"version": 2}),
 ]
 
 

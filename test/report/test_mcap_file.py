@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -57,6 +58,17 @@ def test_objects_are_where_they_were_seen(read: dict[str, list]) -> None:
     assert seen == {label: labels.count(label) for label in ("book", "cup")}
 
 
+def test_no_marker_takes_the_place_of_another_whatever_a_label_is(tmp_path: Path) -> None:
+    scene = walk()
+    named = {"cup": "names", "book": "words"}
+    renamed = replace(scene, objects=tuple((named[label], xyz) for label, xyz in scene.objects))
+    write_mcap(tmp_path / "run.mcap", renamed)
+    with AnyReader([tmp_path / "run.mcap"]) as reader:
+        (raw,) = (raw for connection, _, raw in reader.messages() if connection.topic == "/objects")
+        markers = reader.deserialize(raw, "visualization_msgs/msg/MarkerArray").markers
+    assert len(markers) == len({(marker.ns, marker.id) for marker in markers}) == 4
+
+
 def test_the_camera_goes_through_the_map_with_what_it_saw(read: dict[str, list]) -> None:
     assert len(read["/tf"]) == COUNT
     (stamped,) = read["/tf"][30].transforms
@@ -77,3 +89,9 @@ def test_what_cannot_be_finished_leaves_nothing(tmp_path: Path, monkeypatch: pyt
     with pytest.raises(OSError, match="no space"):
         write_mcap(tmp_path / "run.mcap", walk())
     assert not list(tmp_path.iterdir())
+
+
+def test_a_link_stays_one(tmp_path: Path) -> None:
+    (tmp_path / "link.mcap").symlink_to("run.mcap")
+    write_mcap(tmp_path / "link.mcap", walk())
+    assert (tmp_path / "link.mcap").is_symlink() and (tmp_path / "run.mcap").stat().st_size

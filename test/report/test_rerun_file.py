@@ -77,7 +77,7 @@ def test_what_cannot_be_finished_leaves_nothing(tmp_path: Path, monkeypatch: pyt
     def full(*words: object) -> None:
         raise OSError("no space left")
 
-    monkeypatch.setattr("objreg_ros.report.rerun_file.shutil.move", full)
+    monkeypatch.setattr("objreg_ros.whole_file.os.replace", full)
     with pytest.raises(OSError, match="no space"):
         write_rerun(tmp_path / "run.rrd", walk())
     assert not list(tmp_path.iterdir())

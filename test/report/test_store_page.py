@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 from registration.samples import box
 
+from objreg_ros.memory.sighting import Sighting
 from objreg_ros.memory.store import Store
 from objreg_ros.report.portraits import TILE
 from objreg_ros.report.store_page import store_page
@@ -55,3 +58,24 @@ def test_labels_are_escaped_and_an_empty_store_has_a_page(tmp_path: Path) -> Non
     assert "<b>" not in store_page(survey(file), {})
     Store(tmp_path / "empty.db").close()
     assert "The store is empty" in store_page(survey(tmp_path / "empty.db"), {})
+
+
+class Counted(tuple[Sighting, ...]):
+    """Sightings that count how often all of them are gone through."""
+
+    times = 0
+
+    def __iter__(self) -> Iterator[Sighting]:
+        self.times += 1
+        return super().__iter__()
+
+
+def test_how_often_the_sightings_are_gone_through_does_not_grow_with_the_objects(tmp_path: Path) -> None:
+    times = []
+    for count in (2, 12):
+        objects = tuple(box(f"thing {k}", (k, 0, 1), instance=k + 1) for k in range(count))
+        found = survey(store_of(tmp_path / f"{count}.db", [(1.0, 0, objects), (2.0, 1, objects)]))
+        sightings = Counted(found.sightings)
+        assert len(found.landmarks) >= count and store_page(replace(found, sightings=sightings), {})
+        times.append(sightings.times)
+    assert times[0] == times[1]

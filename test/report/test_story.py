@@ -43,6 +43,35 @@ def test_json_of_another_form_is_refused_by_the_name_of_its_run(key: str, value:
         Story.of("walk", {**summary(), key: value}, TRUTH)
 
 
+ODD = [
+    ("constraints", "to_ns", 1e300),
+    ("constraints", "from_ns", float("inf")),
+    ("constraints", "evidence", {"score": "high"}),
+    ("refusals", "from_ns", 1 << 63),
+    ("refusals", "detail", 5),
+    ("refusals", "T_from_to", [1.0]),
+    ("refusals", "evidence", {"score": None}),
+    ("glimpses", "stamp_ns", 1 << 70),
+    ("glimpses", "objects", [["cup", 1.0]]),
+    ("glimpses", "objects", [["cup", [0.0, 1.0]]]),
+    ("glimpses", "objects", [["cup", [0.0, 1.0, float("nan")]]]),
+]
+
+
+@pytest.mark.parametrize(("key", "field", "value"), ODD)
+def test_a_number_that_no_run_has_is_refused_by_the_name_of_its_run(key: str, field: str, value: object) -> None:
+    told = summary()
+    told[key][1][field] = value
+    with pytest.raises(ValueError, match=f"^walk: expected {key} as `objreg offline --json` writes them, got "):
+        Story.of("walk", told, TRUTH)
+
+
+def test_a_refused_pose_that_is_not_finite_is_none_to_look_at() -> None:
+    told = summary()
+    told["refusals"][1]["T_from_to"] = np.full((4, 4), np.inf).tolist()
+    assert Story.of("walk", told, TRUTH).refusals[1].T_from_to is None
+
+
 @pytest.mark.parametrize("pose", [[[float("nan")] * 4] * 4, np.eye(3).tolist(), np.zeros((4, 4)).tolist()])
 def test_a_frame_without_a_rigid_pose_is_refused_by_the_name_of_its_run(pose: list[list[float]]) -> None:
     told = summary()
