@@ -48,6 +48,8 @@ class Collector:
 
     frames: list[Frame] = field(default_factory=list)
 
+    tracked = None  # it follows no camera
+
     def process(self, frame: Frame) -> Outcome:
         """Keep it."""
         self.frames.append(frame)

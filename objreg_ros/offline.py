@@ -93,6 +93,11 @@ class Outcome(Protocol):
 class Registers(Protocol):
     """What the third room does."""
 
+    @property
+    def tracked(self) -> tuple[int, Array] | None:
+        """The session of the newest frame and where the camera is in it, if that was followed."""
+        ...
+
     def process(self, frame: Frame) -> Outcome: ...
 
     def finish(self) -> Outcome: ...
@@ -233,6 +238,14 @@ def glimpse(frame: Frame, labels: tuple[str, ...]) -> dict[str, Any]:
             [o.label, np.median(o.xyz, axis=0).astype(float).round(4).tolist()] for o in frame.objects if len(o)
         ],
     }
+
+
+def tracked(registrar: Registers) -> dict[str, Any] | None:
+    """Where the registrar's own tracking has the camera, as JSON: in which session, and ``T_session_camera``."""
+    if registrar.tracked is None:
+        return None
+    session, T_session_camera = registrar.tracked
+    return {"session": session, "T_session_camera": T_session_camera.round(6).tolist()}
 
 
 def percentiles_ms(seconds: list[float]) -> dict[str, float]:
@@ -393,6 +406,8 @@ class Line:
             self.run.glimpses.append(glimpse(frame, labels))
             with self._timed("register"):
                 outcome = self._rooms.registrar.process(frame)
+            if frame.T_odom_camera is None:
+                self.run.glimpses[-1]["tracked"] = tracked(self._rooms.registrar)
             self._note(outcome)
 
     def _hear_of_mount(self, text: str) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from objreg_ros.data import (
+    Array,
     ColourImage,
     DepthImage,
     Detections,
@@ -92,6 +93,10 @@ class Chain:
 
     frames: list[Frame] = field(default_factory=list)
     finished: bool = False
+
+    @property
+    def tracked(self) -> tuple[int, Array] | None:
+        return (0, np.eye(4)) if self.frames else None
 
     def process(self, frame: Frame) -> Outcome:
         self.frames.append(frame)

@@ -103,6 +103,13 @@ def test_a_depth_image_without_colour_is_dropped_with_a_reason() -> None:
     assert run.dropped == {"depth_unmatched": 1}
 
 
+def test_frames_without_odometry_tell_where_our_own_tracking_has_the_camera() -> None:
+    rooms, _ = simple_rooms()
+    run = run_offline(records(3), rooms, Inputs(image="/image", depth="/depth/image", camera_info="/camera_info"))
+    assert [row["tracked"] for row in run.glimpses] == [{"session": 0, "T_session_camera": np.eye(4).tolist()}] * 3
+    assert not any("tracked" in row for row in run_offline(records(3), simple_rooms()[0], INPUTS).glimpses)
+
+
 def test_a_frame_whose_odometry_was_lost_goes_through_without() -> None:
     rooms, chain = simple_rooms()
     run_offline(without("/odom", 1100 * MS), rooms, INPUTS)
@@ -360,7 +367,7 @@ def test_the_json_tells_of_every_refusal() -> None:
     rooms, _ = simple_rooms()
     run = run_offline(without("/odom", 1100 * MS), rooms, INPUTS)
     expected = {"reason": "no_candidate", "from_ns": 1100 * MS, "to_ns": 1200 * MS, "detail": "no odometry"}
-    assert run.summary(Truth([]))["refusals"][1] == expected | {"T_from_to": None}
+    assert run.summary(Truth([]))["refusals"][1] == expected | {"T_from_to": None, "evidence": {}}
 
 
 def of_a_lens(frames: int, model: str = "plumb_bob", **names: str) -> Iterator[Record]:

@@ -66,8 +66,7 @@ class FrameWindow:
     @classmethod
     def of(cls, frame: Frame) -> FrameWindow:
         """One frame by itself."""
-        still = np.eye(4)
-        return cls(frames=(alone(frame),), T_first_frame=(still,), T_session_first=still, session=0)
+        return cls(frames=(alone(frame),), T_first_frame=(np.eye(4),), T_session_first=np.eye(4), session=0)
 
 
 def _nbytes(frame: Frame) -> int:
@@ -106,8 +105,7 @@ class _Session:
         if self.odometry is None or frame.T_odom_camera is None:
             return False
         last_ns, T_odom_last = self.odometry
-        seconds = 1e-9 * (frame.stamp_ns - last_ns)
-        return leaps(T_odom_last, frame.T_odom_camera, seconds, max_speed, self.T_odom_first)
+        return leaps(T_odom_last, frame.T_odom_camera, 1e-9 * (frame.stamp_ns - last_ns), max_speed, self.T_odom_first)
 
     def silent_s(self, frame: Frame) -> float:
         """For how many seconds there was no frame before this one."""
@@ -165,17 +163,21 @@ class Keyframer:
     """
 
     def __init__(self, params: RegistrarParams, next_session: int = 0) -> None:
-        self.params = params
-        self.next_session = next_session
+        self.params, self.next_session = params, next_session
         self._clock = Clock(0, next_session)
         self._last_ns: int | None = None  # of the last frame
         self._open: _Open | None = None
         self._session: _Session | None = None
         self._last: tuple[int, Array, Counter[str]] | None = None  # session, pose and labels of the last frame window
 
+    @property
+    def tracked(self) -> tuple[int, Array] | None:
+        """The session of the newest frame that was followed, and ``T_session_camera`` of it; None if none is."""
+        window = self._open
+        return None if window is None else (window.session.number, window.T_session_first @ window.T_first_last)
+
     def add(self, frame: Frame) -> FrameWindow | None:
         """Track the frame and collect it. A lost track, odometry that leaps or a clock that does begins a new session.
-
         One that is not later than the last, but by no jump, is passed over.
         """
         last_ns, session = self._last_ns, self._session
@@ -282,10 +284,9 @@ class Keyframer:
         window = self._open
         if window is None:
             return False
-        lasted = 1e-9 * (frame.stamp_ns - window.first.stamp_ns)
         back = frame.T_odom_camera is not None and window.session.in_odometry and not window.by_odometry
         moved = self._moved(inverse(window.T_session_first) @ T_session_frame, 1.0)
-        return back or moved or lasted > self.params.keyframe_seconds
+        return back or moved or 1e-9 * (frame.stamp_ns - window.first.stamp_ns) > self.params.keyframe_seconds
 
     def _is_news(self, window: _Open, labels: Counter[str]) -> bool:
         if self._last is None or self._last[0] != window.session.number:
@@ -296,5 +297,4 @@ class Keyframer:
     def _moved(self, T: Array, share: float) -> bool:
         """Whether a motion exceeds ``share`` of what ends a keyframe."""
         metres, degrees = float(np.linalg.norm(T[:3, 3])), float(np.degrees(rotation_angle(T[:3, :3])))
-        most = self.params
-        return metres > share * most.keyframe_translation or degrees > share * most.keyframe_rotation
+        return metres > share * self.params.keyframe_translation or degrees > share * self.params.keyframe_rotation

@@ -17,7 +17,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from objreg_ros.data import Frame, LoopClosure, Reason, Rejected, Relocalised
+from objreg_ros.data import Array, Frame, LoopClosure, Reason, Rejected, Relocalised
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import Clock, FrameWindow, Keyframer
 from objreg_ros.memory.landmarks import Landmark, Landmarks
@@ -93,6 +93,11 @@ class Registrar:
             return self._landmarks.recent(self._session, RECENT)
 
     @property
+    def tracked(self) -> tuple[int, Array] | None:
+        """See `Keyframer.tracked`."""
+        return self._keyframer.tracked
+
+    @property
     def waiting(self) -> int:
         """How many poses wait for other keyframes to confirm them."""
         return len(self._confirmation)
@@ -108,10 +113,7 @@ class Registrar:
         return self._relocalisation.reason
 
     def counts(self) -> dict[str, int]:
-        """How many ``keyframes``, ``objects``, ``landmarks``, ``sessions`` and ``closures`` the store holds.
-
-        And how many keyframes were ``forgotten`` because there were more than ``max_keyframes``.
-        """
+        """How many keyframes, objects, landmarks, sessions and closures are stored, and keyframes ``forgotten`` by now."""
         with self._lock:
             return self._store.counts()
 
@@ -195,7 +197,6 @@ class Registrar:
 
     def save(self, path: str = "") -> str:
         """Bring the store's file up to date, or write a copy of it to ``path``; returns where it is.
-
         StoreError where that cannot be, and without ``path`` where the store is in memory only.
         """
         with self._lock:
@@ -272,10 +273,7 @@ class Registrar:
     def _remember(
         self, keyframe: Keyframe, sightings: Sequence[Sighting], accepted: Sequence[Accepted]
     ) -> tuple[tuple[LoopClosure, ...], tuple[Sighting, ...]]:
-        """Give the objects their landmarks, write everything down, and forget what has become superfluous.
-
-        Returns the closures, and the sightings with their landmarks.
-        """
+        """Give objects their landmarks and write all down; the closures, and the sightings with their landmarks."""
         stored = [list(self._store.sightings(item.target.keyframe_id)) for item in accepted]
         links = [link for item, seen in zip(accepted, stored, strict=True) for link in links_of(keyframe, item, seen)]
         named, merged = self._landmarks.assign(sightings, links)

@@ -138,7 +138,7 @@ def _change(before: float, after: float) -> str:
 
 
 def _way(story: Story, tracks: Tracks | None) -> View:
-    """The drawings of the way; of the truth where there is no odometry."""
+    """The drawings of the way; of the truth where there is no odometry, and of our own tracking without either."""
     if tracks is not None:
         stamps_ns, lines, words = tracks.stamps_ns, tracks.lines, _way_words(story)
     elif (true := story.true_way()) is not None:
@@ -146,10 +146,16 @@ def _way(story: Story, tracks: Tracks | None) -> View:
         words = (
             "From above. There is no odometry in this run: the way is that of the ground truth, and is not corrected."
         )
+    elif (tracked := story.tracked_way()) is not None:
+        stamps_ns, lines = tracked[0], {"tracked": tracked[1][:, :3, 3]}
+        words = (
+            "From above. There is neither odometry nor ground truth in this run: the way is that of our own tracking, "
+            f"in the longest of its stretches, {len(stamps_ns)} of {len(story.glimpses)} frames, and is not corrected."
+        )
     else:
-        words = "There is neither odometry nor ground truth in this run, so there is no way to draw."
+        words = "There is neither odometry nor ground truth in this run, and no track of the camera, so no way to draw."
         return {"words": words, "legend": [], "drawing": None, "error": None, "scene": None}
-    names = {"true": "truth", "accepted": "closure"}
+    names = {"true": "truth", "tracked": "our own tracking", "accepted": "closure"}
     marks = [*lines, *sorted({figures.verdict(story, closure) for closure in story.closures})]
     return {
         "words": words,

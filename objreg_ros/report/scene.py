@@ -18,6 +18,7 @@ from objreg_ros.report.story import Story, Tracks
 MOST_POSES = 5000  # of one way
 MOST_SIGHTINGS = 20_000  # of all objects
 NEAR_AXIS = np.cos(np.radians(30))  # of the mean up of a camera: a frame's axis so near is what is up
+NAMES = {"true": "truth", "tracked": "our own tracking"}
 APART_M = 0.4  # names nearer than this would cover each other
 
 
@@ -32,10 +33,7 @@ def scene(story: Story, stamps_ns: Array, lines: Mapping[str, Array], tracks: Tr
     T_level_map = T_level_drawn if tracks is None else T_level_drawn @ tracks.T_drawn_map
     at = transform(T_level_map, np.array([row[2] for row in kept])) if kept else np.zeros((0, 3))
     return {
-        "ways": [
-            {"name": "truth" if name == "true" else name, "style": name, **packed(xyz[::step])}
-            for name, xyz in flat.items()
-        ],
+        "ways": [{"name": NAMES.get(name, name), "style": name, **packed(xyz[::step])} for name, xyz in flat.items()],
         "closures": _closures(story, stamps_ns, last),
         **_objects([row[0] for row in kept], at),
         "words": f"Of {len(seen)} sightings of objects {len(kept)} are shown." if len(kept) < len(seen) else "",
@@ -47,6 +45,8 @@ def _levelling(story: Story, stamps_ns: Array, tracks: Tracks | None) -> Array:
     stamps_ns = stamps_ns[:: len(stamps_ns) // 100 or 1]
     if tracks is None:
         poses = [T for stamp in stamps_ns if (T := story.truth.at(int(stamp))) is not None]
+        if not poses and (tracked := story.tracked_way()) is not None:
+            poses = list(tracked[1])
     else:
         poses = [tracks.T_drawn_map @ T for T in story.graph.corrected(stamps_ns.tolist())]
     return levelling(np.array(poses).reshape(-1, 4, 4))

@@ -33,6 +33,7 @@ class Glimpse:
     stamp_ns: int
     T_odom_camera: Array | None = None
     labels: tuple[str, ...] = ()
+    tracked: tuple[int, Array] | None = None  # without odometry: session and T_session_camera by our own tracking
     objects: tuple[tuple[str, Array], ...] = ()
 
 
@@ -191,6 +192,20 @@ class Story:
             return None
         return np.array([stamp for stamp, _ in known]), positions([T for _, T in known])
 
+    def tracked_way(self) -> tuple[Array, Array] | None:
+        """The stamps of the longest session of our own tracking, and ``T_session_camera (N, 4, 4)`` there.
+
+        None for fewer than two frames. Another session begins where the track was lost.
+        """
+        sessions: dict[int, list[tuple[int, Array]]] = {}
+        for glimpse in self.glimpses:
+            if glimpse.tracked is not None:
+                sessions.setdefault(glimpse.tracked[0], []).append((glimpse.stamp_ns, glimpse.tracked[1]))
+        longest = max(sessions.values(), key=len, default=[])
+        if len(longest) < 2:
+            return None
+        return np.array([stamp for stamp, _ in longest]), np.array([T for _, T in longest])
+
     def objects(self) -> list[tuple[str, Array, Array]]:
         """(label, position by odometry, position in the map) of every object seen with odometry."""
         seen = [glimpse for glimpse in advancing(self.glimpses) if glimpse.objects]
@@ -252,11 +267,12 @@ def _read(name: str, summary: Mapping[str, Any], key: str, read: Callable[[Any],
 
 
 def _glimpse(row: Mapping[str, Any]) -> Glimpse:
-    pose, stamp_ns = row.get("T_odom_camera"), _stamp(row["stamp_ns"])
+    pose, stamp_ns, tracked = row.get("T_odom_camera"), _stamp(row["stamp_ns"]), row.get("tracked")
     return Glimpse(
         stamp_ns=stamp_ns,
         T_odom_camera=None if pose is None else _rigid(pose, stamp_ns),
         labels=tuple(map(_spaced, row.get("labels", ()))),
+        tracked=None if tracked is None else (int(tracked["session"]), _rigid(tracked["T_session_camera"], stamp_ns)),
         objects=tuple((_spaced(label), _place(xyz)) for label, xyz in row.get("objects", ())),
     )
 

@@ -62,6 +62,16 @@ def test_without_odometry_the_views_give_the_motion() -> None:
     assert np.allclose(windows[1].T_session_first, moved(0.12), atol=0.005)
 
 
+def test_where_the_newest_frame_is_in_its_session_is_told() -> None:
+    keyframer = Keyframer(PARAMS)
+    assert keyframer.tracked is None
+    for k in range(5):
+        keyframer.add(frame(0.1 * k, CUP, None, scene_view(moved(0.03 * k))))
+    assert keyframer.tracked is not None
+    session, T_session_camera = keyframer.tracked
+    assert session == 0 and np.allclose(T_session_camera, moved(0.12), atol=0.005)
+
+
 def test_our_own_tracking_stays_rigid_however_long_it_is() -> None:
     keyframer, sway = Keyframer(PARAMS), 0.1 * np.sin(0.2 * np.arange(150))
     windows = _run(keyframer, [frame(0.1 * i, CUP, None, scene_view(moved(x))) for i, x in enumerate(sway)])

@@ -58,3 +58,16 @@ def test_without_odometry_the_truth_is_drawn() -> None:
     assert "that of the ground truth" in way["words"] and [mark for mark, _ in way["legend"]] == ["true", "accepted"]
     assert 'data-pair="c0"' in way["drawing"]["wide"]
     assert "neither odometry nor ground truth" in view(told, Truth([]))["way"]["words"]
+
+
+def test_without_odometry_and_truth_our_own_tracking_is_drawn_in_its_longest_stretch() -> None:
+    told = summary()
+    rows, lost = told["glimpses"], len(told["glimpses"]) // 4
+    told["glimpses"] = [
+        {**row, "T_odom_camera": None, "tracked": {"session": int(k >= lost), "T_session_camera": row["T_odom_camera"]}}
+        for k, row in enumerate(rows)
+    ]
+    way = view(told, Truth([]))["way"]
+    assert f"{len(rows) - lost} of {len(rows)} frames" in way["words"]
+    assert way["legend"][0] == ("tracked", "our own tracking") and "line tracked" in way["drawing"]["wide"]
+    assert way["scene"]["ways"][0]["name"] == "our own tracking"
