@@ -191,16 +191,19 @@ class RobustGraph:
         return near
 
     def _doubt(self, newest: int) -> None:
-        """Leave out those that were the most doubtful when they came, one by one, if the newest fits without them.
+        """Leave out those that were the most doubtful when they came, one by one, where that is expected to cost less.
 
-        And each with those that say the same: lies that agree hold each other up.
+        And each with those that say the same: lies that agree hold each other up. For it speak the newest, and those
+        that were left out and say the same as it, as far as they fit then.
         """
-        kept = np.flatnonzero(self.kept)
+        kept, left_out = np.flatnonzero(self.kept), np.flatnonzero(~self.kept)
+        voters = np.setdiff1d(left_out[self._saying_the_same(newest)[left_out]], self._withdrawn)[:MOST_ALIKE].tolist()
         suspects = kept[np.argsort(-self._expected[kept])][:MOST_DOUBTED].tolist()
         groups = [[k, *np.flatnonzero(self._saying_the_same(k) & self.kept)[:MOST_ALIKE].tolist()] for k in suspects]
-        influence = self._influence(self._state, np.unique([newest, *chain(*groups)]).tolist())
+        influence = self._influence(self._state, np.unique([newest, *voters, *chain(*groups)]).tolist())
         for gone in chain(*(([group[0]], group) for group in groups)):
-            if influence.expected_cost(newest, gone) <= self.limit and self.kept[gone].all():
+            gains = [max(self.limit - influence.expected_cost(k, gone), 0.0) for k in (newest, *voters)]
+            if influence.relief(gone) + sum(gains) > self.limit * len(gone) and self.kept[gone].all():
                 self._leave_out(gone)
                 if self.kept[newest]:
                     return

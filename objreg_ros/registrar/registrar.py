@@ -113,7 +113,7 @@ class Registrar:
         return self._relocalisation.reason
 
     def counts(self) -> dict[str, int]:
-        """How many keyframes, objects, landmarks, sessions and closures are stored, and keyframes ``forgotten`` by now."""
+        """How many keyframes, objects, landmarks, sessions and closures are stored; how many ``forgotten`` by now."""
         with self._lock:
             return self._store.counts()
 

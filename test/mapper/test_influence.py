@@ -9,7 +9,7 @@ import pytest
 from objreg_ros.data import Array
 from objreg_ros.geometry import pose
 from objreg_ros.mapper.constraint import Constraint
-from objreg_ros.mapper.edges import Edges, edges_of
+from objreg_ros.mapper.edges import Edges, edges_of, squared_residuals
 from objreg_ros.mapper.incremental import IncrementalGraph
 from objreg_ros.mapper.influence import Influence
 
@@ -52,3 +52,17 @@ def test_a_closure_costs_more_where_the_map_knows_better() -> None:
     newest = edge(0, 11, 0.3)
     costs = [Influence(graph, poses, newest, [0]).expected_cost(0) for graph, poses in (loose, tight)]
     assert costs[0] < 2.0 < 50.0 < costs[1]
+
+
+@pytest.mark.parametrize("gone", [[1], [2, 3]])
+def test_what_the_rest_costs_less_is_told(gone: list[int]) -> None:
+    inside = [edge(0, 9, 0.01), edge(3, 11, 0.1), edge(2, 10, -0.05), edge(2, 9, -0.04)]
+    graph, poses = solved(inside)
+    told = Influence(graph, poses, joined(inside), list(range(4))).relief(gone)
+    rest = [closure for k, closure in enumerate(inside) if k not in gone]
+    without, there = solved(rest)
+    odometry = joined([edge(k, k + 1, sigma=0.1) for k in range(COUNT - 1)])
+    before = squared_residuals(poses, odometry.joined(joined(inside))).sum()
+    assert told == pytest.approx(
+        before - squared_residuals(there, odometry.joined(joined(rest))).sum(), rel=0.05, abs=0.1
+    )
