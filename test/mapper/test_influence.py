@@ -60,7 +60,7 @@ def test_what_the_rest_costs_less_is_told(gone: list[int]) -> None:
     graph, poses = solved(inside)
     told = Influence(graph, poses, joined(inside), list(range(4))).relief(gone)
     rest = [closure for k, closure in enumerate(inside) if k not in gone]
-    without, there = solved(rest)
+    _, there = solved(rest)
     odometry = joined([edge(k, k + 1, sigma=0.1) for k in range(COUNT - 1)])
     before = squared_residuals(poses, odometry.joined(joined(inside))).sum()
     assert told == pytest.approx(
