@@ -217,9 +217,14 @@ class RobustGraph:
     def _tried_again(self, state: _State, stays_out: Sequence[int]) -> _State:
         """With a closure back in that fits a map which some less hold; others follow it by themselves."""
         left_out = np.setdiff1d(np.flatnonzero(~state.kept), [*stays_out, *self._withdrawn])
-        for k in left_out[np.argsort(state.residuals[left_out])][:MOST_RETRIED].tolist():
-            if not state.kept[k] and self._expected_cost(state, k) <= self.limit:
+        again = left_out[np.argsort(state.residuals[left_out])][:MOST_RETRIED].tolist()
+        if not again:
+            return state
+        influence = self._influence(state, again)
+        for k in again:
+            if not state.kept[k] and influence.expected_cost(k) <= self.limit:
                 state = self._sorted_out(self._changed(state, [k], []), stays_out=stays_out)
+                influence = self._influence(state, again)
         return state
 
     def _sorted_out(self, state: _State, stays_in: int = -1, stays_out: Sequence[int] = ()) -> _State:
