@@ -32,7 +32,6 @@ NO_STEADY = {"steady_heading": 0.0, "steady_distance": 0.0}
 NEVER_PRUNED = {"max_residual": 1e3}
 STRETCHES_M = (0.5, 2.0, 4.0)
 WANDERING = {"odometry_translation_error": 0.014, "odometry_rotation_error": 0.32}  # of `with_drift`, by its model
-LEAST_SIGMAS = ((0.005, 0.2), (0.01, 0.5), (0.02, 1.0), (0.04, 2.0))  # m, degrees
 MOST_REVISITS = 200  # of all that there are, evenly
 
 
@@ -189,8 +188,7 @@ def variants() -> dict[str, Variant]:
     """What is compared, by name."""
     usual = MapperParams()
     steadfast, patient = usual.replaced(**NO_STEADY), usual.replaced(**NEVER_PRUNED)
-    trusted, lowest = usual.replaced(**WANDERING), LEAST_SIGMAS[2]
-    blunt = {"min_sigma_translation": lowest[0], "min_sigma_rotation": lowest[1]}
+    trusted = usual.replaced(**WANDERING)
     return {
         OURS: Variant(as_found),
         PERFECT: Variant(perfect),
@@ -204,20 +202,12 @@ def variants() -> dict[str, Variant]:
         "ours, twice as much shared": Variant(as_found, usual.replaced(**pictures(2.0))),
         "perfect, nothing shared": Variant(perfect, usual.replaced(**pictures(0.0))),
         **{f"ours, shared by {m:g} m": Variant(thinned(m)) for m in STRETCHES_M},
-        **{
-            f"ours, least {100 * m:g} cm, {deg:g} deg": Variant(
-                as_found, usual.replaced(min_sigma_translation=m, min_sigma_rotation=deg)
-            )
-            for m, deg in LEAST_SIGMAS
-        },
         "ours, covariance x 4": Variant(scaled(4.0)),
         "ours, covariance x 16": Variant(scaled(16.0)),
         "ours, covariances alike": Variant(alike()),
         "ours, odometry as it is": Variant(as_found, trusted),
         "perfect, odometry as it is": Variant(perfect, trusted),
         "ours, 2 m and odometry": Variant(thinned(STRETCHES_M[1]), trusted),
-        "ours, 2 m and 2 cm, 1 deg": Variant(thinned(STRETCHES_M[1]), usual.replaced(**blunt)),
-        "ours, those and 2 cm, 1 deg": Variant(thinned(STRETCHES_M[1]), trusted.replaced(**blunt)),
     }
 
 

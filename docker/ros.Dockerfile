@@ -16,7 +16,7 @@ RUN apt-get update \
     && rosdep install --rosdistro jazzy --from-paths src src/objreg_ros/objreg_msgs --ignore-src --as-root pip:false \
         --dependency-types exec --dependency-types build --dependency-types buildtool --default-yes \
     && python3 -m pip install --requirement src/objreg_ros/requirements/robot.txt \
-    && rm -rf /var/lib/apt/lists/* /root/.ros
+    && rm -rf /var/lib/apt/lists/* ~/.ros
 RUN . /opt/ros/jazzy/setup.bash \
     && colcon build --base-paths src src/objreg_ros/objreg_msgs \
     && rm -rf build log

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -23,6 +22,7 @@ from objreg_ros.mapper.adapters.g2o import graph_text
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.pose_graph import ImplausibleError, PoseGraph
 from objreg_ros.mapper.restart import Anew
+from objreg_ros.whole_file import write_whole
 
 
 class ToG2o(Adapter):
@@ -100,10 +100,8 @@ class ToG2o(Adapter):
             self.throttled.warn("unwritable", f"the graph is not written, and will be tried again: {error}")
 
     def write(self) -> None:
-        """Write the file whole, then put it in the place of the one before. OSError where that cannot be."""
-        part = self.path.with_name(f".{self.path.name}.part")
-        part.write_text(graph_text(*self._graph.flat()), encoding="ascii")
-        os.replace(part, self.path)
+        """Write the file, whole or not at all. OSError where that cannot be."""
+        write_whole(self.path, graph_text(*self._graph.flat()))
         self._has_news = False
 
     def _save(self, _: Any, response: Any) -> Any:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import click
 import numpy as np
@@ -78,18 +79,12 @@ def command(
     labels: str | None,
     camera: str,
     json_file: Path | None,
-    tum: Path | None,
-    kitti: Path | None,
-    g2o: Path | None,
-    cloud: Path | None,
-    voxel: float,
-    rerun: Path | None,
-    mcap: Path | None,
     max_frames: int | None,
     odometry: str | None,
     params_file: Path | None,
     changes: tuple[str, ...],
     remaps: tuple[str, ...],
+    **files: Any,
 ) -> int:
     """Run RECORDING (rosbag1, rosbag2 or a TUM RGB-D folder) through detector, segmenter and registrar without ROS.
 
@@ -101,7 +96,7 @@ def command(
 
     Says where the run stopped if no loop was closed, and ends with 3 if no frame got through.
     """
-    outputs = Outputs.of(tum, kitti, g2o, cloud, voxel, rerun, mcap)
+    outputs = Outputs.of(**files)
     if json_file is not None:
         require_writable("--json", json_file)
     _require_seed(odometry)

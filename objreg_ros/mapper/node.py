@@ -33,6 +33,7 @@ from objreg_ros.mapper.pose_graph import PoseGraph, Summary
 from objreg_ros.mapper.restart import Anew
 from objreg_ros.mapper.solver import Problem, Solution
 from objreg_ros.mapper.waiting import Waiting
+from objreg_ros.whole_file import write_whole
 
 PACE = 20.0  # a path of many keyframes takes long to write: one in so many times as long
 LOOK_S = 0.1  # between two looks at whether the path is due
@@ -295,7 +296,7 @@ class MapperNode(Door):
             with self._graph_lock:
                 poses, edges = self._graph.flat()
                 arrays = saved.packed(self._graph)
-            path.write_text(graph_text(poses, edges), encoding="ascii")
+            write_whole(path, graph_text(poses, edges))
             saved.save(arrays, saved.beside(path))
         except (OSError, RuntimeError) as error:  # the latter of a home that there is not
             response.success, response.message = False, str(error)

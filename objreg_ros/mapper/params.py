@@ -11,12 +11,18 @@ import numpy as np
 from objreg_ros.mapper.steady import Steady
 from objreg_ros.params import MountedParams, Params, param
 
+GONE = dict.fromkeys(
+    ("min_sigma_translation", "min_sigma_rotation"),
+    "it is LEAST_SIGMAS in mapper/pose_graph.py; what constraints share is picture_*_error",
+)
 NAMESPACE = re.compile("/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 
 
 @dataclass(frozen=True)
 class MapperParams(Params):
     """Everything that a user may set in this room."""
+
+    DROPPED = GONE
 
     keyframe_translation: float = param(0.25, "motion after which odometry becomes a keyframe", "m", ge=0.01, live=True)
     keyframe_rotation: float = param(
@@ -49,20 +55,6 @@ class MapperParams(Params):
         ge=0.0,
         live=True,
     )
-    min_sigma_translation: float = param(
-        0.001,
-        "a constraint that claims to know its position better is believed no better than this",
-        "m",
-        ge=1e-4,
-        live=True,
-    )
-    min_sigma_rotation: float = param(
-        0.025,
-        "a constraint that claims to know its rotation better is believed no better than this",
-        "deg",
-        ge=1e-3,
-        live=True,
-    )
     max_stretch: float = param(
         1.5,
         "a constraint over more than so many times the way of odometry, and a metre, is implausible",
@@ -85,11 +77,6 @@ class MapperParams(Params):
     def picture_sigmas(self) -> tuple[float, float]:
         """How far a picture is from its keyframe, m and rad."""
         return self.picture_translation_error, float(np.radians(self.picture_rotation_error))
-
-    @property
-    def least_sigmas(self) -> tuple[float, float]:
-        """The least that a constraint is believed to err, in m and rad."""
-        return self.min_sigma_translation, float(np.radians(self.min_sigma_rotation))
 
     @property
     def steady(self) -> Steady:

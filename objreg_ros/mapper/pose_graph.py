@@ -19,6 +19,7 @@ from objreg_ros.mapper.solver import Course, End, Problem, Solution, Solver, Tie
 from objreg_ros.mapper.sparse import SparseTrajectory
 from objreg_ros.mapper.trajectory import Trajectory
 
+LEAST_SIGMAS = 1e-3, float(np.radians(0.025))  # m and rad: no constraint is believed to know better, whatever it claims
 SLACK_M = 1.0  # that a closure may lead farther than any way: odometry at rest trembles, and is not the camera
 Mounting = Callable[[str, str], Array | None]  # T_body_camera of a robot and a camera's frame; None: they are one
 VAGUEST = 1e12  # m^2 and rad^2: ROS says "unknown" by less; what is known no better tells nothing
@@ -87,7 +88,7 @@ class PoseGraph:
         In a gap of the odometry it never will (`in_gap`): where the camera was by then nobody knows. ValueError for a
         closure whose moments are of two runs of one clock that it does not name. `ImplausibleError` for one that leads
         farther than odometry went, or knows nothing. `UnknownRobotError` for one of two robots whose odometry is one.
-        No closure is believed to know better than the parameters' least sigmas.
+        No closure is believed to know better than `LEAST_SIGMAS`.
         """
         one, other = map(self.sessions.of, moments_of(closure))
         of_two = not may_be_same((closure.from_robot,) * 2, (closure.to_robot,) * 2)
@@ -147,7 +148,7 @@ class PoseGraph:
         with np.errstate(over="ignore", invalid="ignore"):  # what is no number then is refused
             constraint = between_keyframes(closure, ways, moments, mounts, self.params.odometry_sigmas)
         self._refuse_implausible(ends, constraint)
-        covariance = floored(constraint.covariance, self.params.least_sigmas)
+        covariance = floored(constraint.covariance, LEAST_SIGMAS)
         self._closures.append(Tie(*ends, constraint._replace(covariance=covariance), closure))
 
     def _refuse_implausible(self, ends: tuple[End, End], constraint: Constraint) -> None:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import os
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping
@@ -19,6 +18,7 @@ from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.pose_graph import PoseGraph
 from objreg_ros.mapper.session import Session, stacked
 from objreg_ros.mapper.solver import End, Tie
+from objreg_ros.whole_file import whole_file
 
 VERSIONS = 1, 2  # before robots, and now
 MOST_BYTES = 2_000_000_000  # of a file and of what is unpacked from it
@@ -77,11 +77,9 @@ def packed(graph: PoseGraph) -> dict[str, Any]:
 
 
 def save(arrays: Mapping[str, Any], path: Path) -> None:
-    """Write what is `packed` whole, then put it in the place of the file before. OSError where that cannot be."""
-    part = path.with_name(f".{path.name}.part")
-    with part.open("wb") as file:
+    """Write what is `packed`, whole or not at all. OSError where that cannot be."""
+    with whole_file(path) as file:
         np.savez_compressed(file, **arrays)
-    os.replace(part, path)
 
 
 def load(path: Path, params: MapperParams) -> PoseGraph:

@@ -41,3 +41,8 @@ def test_robots_are_distinct_namespaces(robots: tuple[str, ...]) -> None:
     with pytest.raises(ValueError, match="robots: expected distinct names of namespaces"):
         MapperNodeParams(robots=robots)
     assert MapperNodeParams(robots=("a", "fleet/b_2", "/c")).robots == ("a", "fleet/b_2", "/c")
+
+
+def test_a_floor_that_a_user_could_set_before_is_refused_with_what_took_its_place() -> None:
+    with pytest.raises(ValueError, match="min_sigma_rotation: no parameter any more; it is LEAST_SIGMAS"):
+        MapperParams.from_mapping({"min_sigma_rotation": 0.1})
