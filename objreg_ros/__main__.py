@@ -7,16 +7,27 @@ Python's.
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
+from contextlib import suppress
 
 
 def main() -> None:
     """Run the command line; it ends with `SystemExit`."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not ignored, as behind nohup
         signal.signal(signal.SIGINT, signal.SIG_DFL)
+    from objreg_ros.cli import INTERRUPTED
     from objreg_ros.cli import main as run
 
-    run()
+    try:
+        run()
+    except SystemExit as ended:
+        if ended.code != INTERRUPTED:
+            raise
+        with suppress(OSError, ValueError):  # nobody may be there to read it
+            sys.stdout.flush()
+        os._exit(INTERRUPTED)  # at once: Open3D, interrupted as it is loaded, would end the process with 1
 
 
 if __name__ == "__main__":
