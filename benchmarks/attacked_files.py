@@ -103,7 +103,7 @@ def _said(path: Path, read_only: bool) -> dict[str, Any]:
     with closing(Store(path, read_only=read_only)) as store:
         ids = store.keyframe_ids()
         answers = {f"keyframe {k}": store.keyframe(k) for k in ids}
-        counts, last = store.counts(), store.last_session_beyond(10, 0)
+        counts, last = store.counts(), store.sessions_beyond("", 10, 0)
         nexts = store.next_keyframe(), store.next_landmark(), store.next_session()
         rest = {"ids": ids, "counts": counts, "next": nexts, "beyond": store.beyond(1), "last": last}
         told = {"sightings": list(store.sightings()), "closures": list(store.closures())}

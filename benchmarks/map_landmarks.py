@@ -22,6 +22,7 @@ from tqdm import tqdm
 
 from objreg_ros.data import UNNAMED, Array, Frame, LoopClosure
 from objreg_ros.geometry import inverse, transform
+from objreg_ros.keyframes.frame_window import SessionNumbers
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import Keyframer
 from objreg_ros.mapper.pose_graph import PoseGraph
@@ -61,7 +62,7 @@ def _seen(path: Path) -> list[Shown]:
 def shown_of(frames: Iterable[Frame]) -> list[Shown]:
     """The keyframes of frames, with their objects."""
     params = RegistrarParams()
-    keyframer = Keyframer(params, 1)
+    keyframer = Keyframer(params, SessionNumbers(1))
     windows = [keyframer.add(frame) for frame in frames] + [keyframer.finish()]
     keyframes = [fuse(window, params) for window in windows if window is not None]
     return [

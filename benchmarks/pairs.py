@@ -30,8 +30,9 @@ from sources import Source, detector_of, read_source
 
 from objreg_ros.data import Array, Frame, Reason
 from objreg_ros.geometry import back_project, pose_error
+from objreg_ros.keyframes.frame_window import FrameWindow
 from objreg_ros.keyframes.fusion import fuse
-from objreg_ros.keyframes.keyframer import FrameWindow, Keyframer
+from objreg_ros.keyframes.keyframer import Keyframer
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.engine import Engine
 from objreg_ros.registration.gate.verdict import judge

@@ -29,8 +29,8 @@ from sources import SIMULATED
 
 from objreg_ros.data import Array, DepthImage, Detections, Frame
 from objreg_ros.geometry import inverse, pose, rotation_from_vector, transform
+from objreg_ros.keyframes.frame_window import FrameWindow
 from objreg_ros.keyframes.fusion import fuse
-from objreg_ros.keyframes.keyframer import FrameWindow
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.engine import Engine
 from objreg_ros.registration.gate.verdict import judge

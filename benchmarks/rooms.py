@@ -41,6 +41,7 @@ from tqdm import tqdm
 
 from objreg_ros.data import Array, Frame, LoopClosure
 from objreg_ros.detector.params import DetectorParams
+from objreg_ros.keyframes.frame_window import SessionNumbers
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import Keyframer
 from objreg_ros.memory.retrieval import Index
@@ -116,14 +117,14 @@ def remember(store: Path, frames: Iterable[Frame]) -> None:
     """Store the keyframes of a room, and search for nothing."""
     with closing(Registrar(RegistrarParams(store=str(store)))) as registrar:
         windows = [registrar.track(frame) for frame in frames]
-        for window in (*windows, registrar.end()):
+        for window in (*windows, *registrar.end()):
             if window is not None:
                 registrar.search(window, seconds=0.0)
 
 
 def keyframes_of(frames: Iterable[Frame], params: RegistrarParams, session: int, first_id: int) -> list[Keyframe]:
     """The keyframes that the registrar makes of a recording, numbered."""
-    keyframer = Keyframer(params, session)
+    keyframer = Keyframer(params, SessionNumbers(session))
     windows = [*(keyframer.add(frame) for frame in frames), keyframer.finish()]
     made = [fuse(window, params) for window in windows if window is not None]
     return [keyframe.numbered(first_id + k) for k, keyframe in enumerate(made)]

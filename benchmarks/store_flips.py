@@ -71,7 +71,7 @@ def read_all(store: Store) -> Said:
     said: Said = {name: _asked(getattr(store, name)) for name in ("next_keyframe", "next_landmark", "next_session")}
     said["counts"] = _asked(store.counts)
     said["ids"] = store.keyframe_ids()
-    said["last"] = _asked(lambda: [store.last_session_beyond(9, k * 10**9) for k in range(60)])
+    said["last"] = _asked(lambda: [sorted(store.sessions_beyond("", 9, k * 10**9)) for k in range(60)])
     said["sightings"] = _asked(lambda: _plain(store.sightings()))
     said["closures"] = _asked(lambda: _plain(store.closures()))
     for number in store.keyframe_ids():

@@ -329,7 +329,8 @@ class Frame:
 
     ``objects`` with instance >= 1; ``support`` the points of the surfaces they stand on (instance 0) or None;
     ``gravity (3,) float64`` of length 1, the way things fall in the camera frame, or None; ``gravity_confidence`` 0..1;
-    ``T_odom_camera`` the odometry's pose of the camera or None.
+    ``T_odom_camera`` the odometry's pose of the camera or None; ``robot`` who carries the camera, empty where there is
+    but one.
     """
 
     objects: tuple[ObjectCloud, ...]
@@ -340,6 +341,7 @@ class Frame:
     T_odom_camera: Array | None
     stamp_ns: int
     frame_id: str = "camera"
+    robot: str = ""
 
     def __post_init__(self) -> None:
         few = len(self.objects) <= limits.MOST_OBJECTS

@@ -20,8 +20,8 @@ from objreg_ros.data import Array, ColourImage, DepthImage, Detections, Frame, I
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import inverse
+from objreg_ros.keyframes.frame_window import FrameWindow, alone
 from objreg_ros.keyframes.fusion import fuse, reference_index
-from objreg_ros.keyframes.keyframer import FrameWindow, alone
 from objreg_ros.lens import Lens
 from objreg_ros.registration import align
 from objreg_ros.registration.api import Gate, Method

@@ -11,7 +11,7 @@ import numpy as np
 
 from objreg_ros.data import UNNAMED, Array, Frame, ObjectCloud, PointFlag
 from objreg_ros.geometry import inverse, rigid, rotate, transform
-from objreg_ros.keyframes.keyframer import FrameWindow
+from objreg_ros.keyframes.frame_window import FrameWindow
 from objreg_ros.registration.keyframe import Context, Keyframe, KeyObject, bounding_box
 from objreg_ros.registration.labels import LabelGroups
 from objreg_ros.registration.params import RegistrarParams
@@ -48,6 +48,7 @@ def fuse(window: FrameWindow, params: RegistrarParams) -> Keyframe:
         by_odometry=window.by_odometry,
         travelled=window.travelled,
         turned=window.turned,
+        robot=reference.robot,
     )
 
 

@@ -9,13 +9,13 @@ camera that rests makes one keyframe, not one a second.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from objreg_ros.data import JUMP_NS, UNNAMED, Array, Frame
 from objreg_ros.geometry import inverse, leaps, rigid, rotation_angle
+from objreg_ros.keyframes.frame_window import Clock, FrameWindow, SessionNumbers, alone, with_gravity_of
 from objreg_ros.keyframes.gravity_filter import GravityFilter
 from objreg_ros.keyframes.odometry import TravelledPath
 from objreg_ros.keyframes.tracking import TrackedSurface, tracked_surface, view_motion
@@ -27,63 +27,6 @@ GRAVITY_PATH_M = 2.0  # path after which gravity carried by odometry counts half
 GRAVITY_TURN_DEG = 120.0  # turn after which gravity carried by odometry counts half
 SILENCE_S = 5.0  # odometry may have begun anew in it without a leap
 UNSET_NS = 0  # the stamp of a camera that starts before the simulated clock does: no clock began then
-
-
-class Clock(NamedTuple):
-    """A run of the clock: time has only grown since ``began_ns``, and ``session`` was the first in it.
-
-    It ends where time goes back: a looped bag, a simulation that begins anew, another start of the node.
-    """
-
-    began_ns: int
-    session: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class FrameWindow:
-    """Frames of one moment: ``T_first_frame`` maps the camera of each frame into that of the first.
-
-    ``T_session_first`` is the pose of the first camera in the frame of its session: the odometry's, or our own
-    tracking's where odometry had a gap or there is none; ``by_odometry`` says which. ``session`` counts and changes
-    where the track was lost; ``clock`` is the run of the clock that it is in. By then the camera had gone ``travelled``
-    m in it and turned ``turned`` degrees.
-    """
-
-    frames: tuple[Frame, ...]
-    T_first_frame: tuple[Array, ...]
-    T_session_first: Array
-    session: int
-    clock: Clock = Clock(0, 0)
-    by_odometry: bool = False
-    travelled: float = 0.0
-    turned: float = 0.0
-
-    @property
-    def nbytes(self) -> int:
-        """The memory of its frames: their views and clouds."""
-        return sum(map(_nbytes, self.frames))
-
-    @classmethod
-    def of(cls, frame: Frame) -> FrameWindow:
-        """One frame by itself."""
-        return cls(frames=(alone(frame),), T_first_frame=(np.eye(4),), T_session_first=np.eye(4), session=0)
-
-
-def _nbytes(frame: Frame) -> int:
-    clouds = frame.objects if frame.support is None else (*frame.objects, frame.support)
-    arrays = [frame.view.xyz, frame.view.grey]
-    arrays += [array for cloud in clouds for array in (cloud.xyz, cloud.normals, cloud.rgb, cloud.flags)]
-    return sum(array.nbytes for array in arrays if array is not None)
-
-
-def alone(frame: Frame) -> Frame:
-    """The frame with the weight that gravity has which no other view confirms."""
-    return _with_gravity_of(GravityFilter(1.0, 1.0), np.eye(4), frame)
-
-
-def _with_gravity_of(gravity_filter: GravityFilter, T_session_frame: Array, frame: Frame) -> Frame:
-    gravity, weight = gravity_filter.update(T_session_frame, frame.gravity, frame.gravity_confidence)
-    return replace(frame, gravity=gravity, gravity_confidence=weight)
 
 
 @dataclass(slots=True, eq=False)
@@ -135,7 +78,7 @@ def _with_session_gravity(session: _Session, frame: Frame) -> Frame:
     return (
         alone(frame)
         if frame.T_odom_camera is None
-        else _with_gravity_of(session.gravity_filter, frame.T_odom_camera, frame)
+        else with_gravity_of(session.gravity_filter, frame.T_odom_camera, frame)
     )
 
 
@@ -159,16 +102,22 @@ class _Open:
 class Keyframer:
     """Collects frames into frame windows. ``add`` returns the frame window that a frame ended, or None.
 
-    Sessions count from ``next_session`` on.
+    ``numbers`` gives each session its number; keyframers that share it have none in common.
     """
 
-    def __init__(self, params: RegistrarParams, next_session: int = 0) -> None:
-        self.params, self.next_session = params, next_session
-        self._clock = Clock(0, next_session)
+    def __init__(self, params: RegistrarParams, numbers: SessionNumbers | None = None) -> None:
+        self.params = params
+        self._numbers = SessionNumbers() if numbers is None else numbers
+        self._clock: Clock | None = None
         self._last_ns: int | None = None  # of the last frame
         self._open: _Open | None = None
         self._session: _Session | None = None
         self._last: tuple[int, Array, Counter[str]] | None = None  # session, pose and labels of the last frame window
+
+    @property
+    def session(self) -> int:
+        """The number of the session that goes on; -1 before the first frame."""
+        return -1 if self._session is None else self._session.number
 
     @property
     def tracked(self) -> tuple[int, Array] | None:
@@ -185,7 +134,7 @@ class Keyframer:
             return None
         self._last_ns = frame.stamp_ns
         if last_ns is None or frame.stamp_ns < last_ns or (last_ns == UNSET_NS and frame.stamp_ns > JUMP_NS):
-            self._clock = Clock(frame.stamp_ns, self.next_session)
+            self._clock = None
             return self._start(frame)
         if session is None or not session.goes_on(frame) or session.leaps(frame, self.params.max_speed):
             return self._start(frame)
@@ -213,10 +162,11 @@ class Keyframer:
 
     def _start(self, frame: Frame) -> FrameWindow | None:
         """End what is being collected, and start another session with this frame."""
-        ended = self._end()
+        ended, number = self._end(), self._numbers.take()
+        self._clock = self._clock or Clock(frame.stamp_ns, number)
         T_session_frame = np.eye(4) if frame.T_odom_camera is None else frame.T_odom_camera
         self._session = _Session(
-            number=self.next_session,
+            number=number,
             clock=self._clock,
             in_odometry=frame.T_odom_camera is not None,
             path=TravelledPath(T_session_frame),
@@ -226,7 +176,6 @@ class Keyframer:
             T_odom_first=T_session_frame,
         )
         self._session.follow(frame)
-        self.next_session += 1
         self._begin(self._session, _with_session_gravity(self._session, frame), T_session_frame)
         return ended
 

@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-HEAD = ("id", "session", "stamp_ns", "travelled", "by_odometry")  # of a keyframe: what its sightings say of it too
+# Of a keyframe: what its sightings say of it too, and where it comes from.
+HEAD = (*("id", "session", "stamp_ns", "robot", "origin"), *("travelled", "by_odometry"))
 LIGHT = (
     *("id", "keyframe", "instance", "landmark", "label", "score", "extent", "sightings", "density"),
     *("position", "camera", "R_landmark_session", "descriptor", "cloud_crc"),
@@ -41,9 +42,9 @@ def sealed(table: str, row: Mapping[str, Any]) -> dict[str, Any]:
     return {**row, "seal": seal(table, _without(row, "seal"))}
 
 
-def require_head(row: Mapping[str, Any]) -> None:
-    """ValueError unless the head of a keyframe says what was written."""
-    _require(f"keyframe {row['id']!r}", row["seal"], seal("keyframe", (row[name] for name in HEAD)))
+def require_head(row: Mapping[str, Any], head: Sequence[str] = HEAD) -> None:
+    """ValueError unless the ``head`` of a keyframe says what was written."""
+    _require(f"keyframe {row['id']!r}", row["seal"], seal("keyframe", (row[name] for name in head)))
 
 
 def require_keyframe(row: Mapping[str, Any]) -> None:

@@ -67,6 +67,8 @@ def keyframe_row(keyframe: Keyframe) -> Row:
     camera = {name: getattr(view.intrinsics, name) for name in Intrinsics.__slots__}  # type: ignore[attr-defined]
     row = {
         "id": int(keyframe.keyframe_id),
+        "robot": keyframe.robot,
+        "origin": keyframe.origin,
         "session": int(keyframe.session),
         "stamp_ns": int(keyframe.stamp_ns),
         "frame_id": keyframe.frame_id,
@@ -113,6 +115,10 @@ def closure_row(number: int, closure: LoopClosure) -> Row:
         "to_ns": int(closure.to_ns),
         "from_frame_id": closure.from_frame_id,
         "to_frame_id": closure.to_frame_id,
+        "from_robot": closure.from_robot,
+        "to_robot": closure.to_robot,
+        "from_session": closure.from_session,
+        "to_session": closure.to_session,
         "T_from_to": _bytes(closure.T_from_to),
         "covariance": _bytes(closure.covariance),
         "labels": json.dumps(closure.labels),
@@ -133,6 +139,10 @@ def closure_from_row(row: Mapping[str, Any]) -> LoopClosure:
         to_ns=row["to_ns"],
         from_frame_id=row["from_frame_id"],
         to_frame_id=row["to_frame_id"],
+        from_robot=row["from_robot"],
+        to_robot=row["to_robot"],
+        from_session=row["from_session"],
+        to_session=row["to_session"],
         T_from_to=np.frombuffer(_bytes_of(row, "T_from_to", 128)).reshape(4, 4),
         covariance=np.frombuffer(_bytes_of(row, "covariance", 288)).reshape(6, 6),
         labels=labels,
@@ -163,6 +173,8 @@ def keyframe_from_rows(row: Mapping[str, Any], objects: Sequence[Mapping[str, An
         by_odometry=bool(row["by_odometry"]),
         travelled=row["travelled"],
         turned=row["turned"],
+        robot=row["robot"],
+        origin=row["origin"],
     )
 
 
@@ -194,6 +206,7 @@ def _sighting(row: Mapping[str, Any], head: Mapping[str, Any]) -> Sighting:
         camera=numbers[3:6],
         travelled=head["travelled"],
         by_odometry=bool(head["by_odometry"]),
+        robot=head["robot"],
         landmark=row["landmark"],
         R_landmark_session=numbers[6:].reshape(3, 3),
     )

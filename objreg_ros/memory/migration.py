@@ -10,10 +10,27 @@ from pathlib import Path
 from typing import Any
 
 from objreg_ros.memory.books import MOST_IDS, Books, read_books
-from objreg_ros.memory.checksum import sealed, sealed_keyframe, sealed_object
+from objreg_ros.memory.checksum import (
+    require_head,
+    require_keyframe,
+    require_object,
+    require_sealed,
+    sealed,
+    sealed_keyframe,
+    sealed_object,
+)
+from objreg_ros.memory.store_file import SCHEMA as NEWEST
 from objreg_ros.memory.store_file import bear, check, read_only_uri
 
 LAST = 4  # the last version without checksums
+ROBOTLESS = 5  # the last that knew of one robot only
+HEAD = ("id", "session", "stamp_ns", "travelled", "by_odometry")  # of a keyframe, in that version
+SEALS = ("seal", "whole", "cloud_crc")
+ADDED: dict[str, dict[str, Any]] = {  # what a later version says besides, and what that is of an older one
+    "keyframe": {"robot": "", "origin": ""},
+    "object": {},
+    "closure": {"from_robot": "", "to_robot": "", "from_session": None, "to_session": None},
+}
 SCHEMA = """
 CREATE TABLE keyframe (
   id INTEGER PRIMARY KEY AUTOINCREMENT, session INTEGER NOT NULL, stamp_ns INTEGER NOT NULL, frame_id TEXT NOT NULL,
@@ -68,11 +85,13 @@ def renew(path: Path, target: sqlite3.Connection) -> None:
     """Write what the older store at ``path`` says into an empty database. ValueError if it cannot be understood."""
     with closing(sqlite3.connect(read_only_uri(path), uri=True)) as source:
         (version,) = source.execute("PRAGMA user_version").fetchone()
+        source.row_factory = sqlite3.Row
         _require_parts(source, version)
-        if version == LAST:
+        if version in (LAST, ROBOTLESS):
             _copy(source, target)
             return
         with closing(sqlite3.connect("")) as between:  # a file of SQLite's own
+            between.row_factory = sqlite3.Row
             source.backup(between)
             for old in range(version, LAST):
                 between.executescript(f"BEGIN; {RENEWALS[old]} PRAGMA user_version = {old + 1}; COMMIT;")
@@ -82,18 +101,29 @@ def renew(path: Path, target: sqlite3.Connection) -> None:
 def _copy(source: sqlite3.Connection, target: sqlite3.Connection) -> None:
     bear(target)
     with target as transaction:
-        books = Books()
-        books.keyframe = _highest(source, "SELECT COALESCE(MAX(seq), 0) FROM sqlite_sequence WHERE name = 'keyframe'")
-        books.landmark = _highest(source, "SELECT landmark FROM highest")
+        books = _given(source)
         for table, sealing in (("keyframe", sealed_keyframe), ("object", sealed_object), ("closure", _sealed_closure)):
             for row in _rows(source, table):
-                written = sealing(row)
+                written = sealing({**row, **ADDED[table]})
                 insert(transaction, table, written)
                 books.enter(table, written)
                 books.landmark = max(books.landmark, row.get("landmark", 0))
         for what in MOST_IDS:
             books.next(what)
         books.write(transaction)
+
+
+def _given(source: sqlite3.Connection) -> Books:
+    """Books of a store without rows, in which the ids of an older one are used up."""
+    if _has_seals(source):
+        old = read_books(source)
+        return Books(keyframe=old.keyframe, object=old.object, closure=old.closure, landmark=old.landmark)
+    keyframe = _highest(source, "SELECT COALESCE(MAX(seq), 0) FROM sqlite_sequence WHERE name = 'keyframe'")
+    return Books(keyframe=keyframe, landmark=_highest(source, "SELECT landmark FROM highest"))
+
+
+def _has_seals(source: sqlite3.Connection) -> bool:
+    return bool(source.execute("SELECT 1 FROM sqlite_master WHERE name = 'books'").fetchone())
 
 
 def insert(transaction: sqlite3.Connection, table: str, row: Mapping[str, Any]) -> None:
@@ -107,7 +137,10 @@ def _sealed_closure(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _rows(source: sqlite3.Connection, table: str) -> Iterator[dict[str, Any]]:
-    """The rows of a table in the order of their ids; ValueError where one holds what its column does not."""
+    """The rows of a table in the order of their ids, without seals.
+
+    ValueError where one holds what its column does not, or not what was written.
+    """
     columns = {name: (kind, needed) for _, name, kind, needed, *_ in source.execute(f"PRAGMA table_info({table})")}
     for values in source.execute(f"SELECT {', '.join(columns)} FROM {table} ORDER BY id"):
         row = dict(zip(columns, values, strict=True))
@@ -116,7 +149,19 @@ def _rows(source: sqlite3.Connection, table: str) -> Iterator[dict[str, Any]]:
                 raise ValueError(f"{table} {row['id']}: {name}: expected {kind}, got {str(row[name])[:40]!r}")
             if name in COUNTED and not -1 <= row[name] < MOST:
                 raise ValueError(f"{table} {row['id']}: {name}: expected less than {MOST}, got {row[name]}")
-        yield row
+        yield _opened(table, row)
+
+
+def _opened(table: str, row: dict[str, Any]) -> dict[str, Any]:
+    """A row without its seals; ValueError where they are not whole."""
+    if table == "keyframe" and "seal" in row:
+        require_head(row, HEAD)
+        require_keyframe(row)
+    elif table == "object" and "seal" in row:
+        require_object(row)
+    elif "seal" in row:
+        require_sealed(f"closure {row['id']}", "closure", row)
+    return {name: value for name, value in row.items() if name not in SEALS}
 
 
 def _highest(source: sqlite3.Connection, query: str) -> int:
@@ -129,7 +174,11 @@ def _highest(source: sqlite3.Connection, query: str) -> int:
 def _require_parts(source: sqlite3.Connection, version: int) -> None:
     """ValueError unless a database has the tables, columns and indices of that version, and nothing else."""
     with closing(sqlite3.connect(":memory:")) as model:
-        model.executescript(SCHEMA)
+        model.executescript(SCHEMA if version <= LAST else NEWEST)
+        if version == ROBOTLESS:
+            for table, names in ADDED.items():
+                for name in names:
+                    model.execute(f"ALTER TABLE {table} DROP COLUMN {name}")
         if version < 4:
             model.execute("DROP TABLE highest")
         if version < 2:

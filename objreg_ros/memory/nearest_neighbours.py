@@ -9,6 +9,8 @@ at once: 1e5 of them take about a third of a millisecond.
 from __future__ import annotations
 
 import heapq
+from collections.abc import Collection
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -22,6 +24,21 @@ from objreg_ros.registration.params import RegistrarParams
 LANES = 64
 NOWHERE = np.float32(np.inf)  # half the squared length of a row that is free
 NO_SESSION = -1  # of what our own tracking says where it is: nothing is left out for it
+
+
+class Sessions(NamedTuple):
+    """Those of the robot that asks, and those that are left out: (S,) int64 each, sorted."""
+
+    own: Array
+    hidden: Array
+
+    @classmethod
+    def of(cls, own: Collection[int], hidden: Collection[int]) -> Sessions:
+        """Of the numbers of sessions."""
+        return cls(*(np.array(sorted(numbers), np.int64) for numbers in (own, hidden)))
+
+
+NO_SESSIONS = Sessions.of((), ())
 
 
 class Block:
@@ -61,13 +78,13 @@ class Block:
         self._free.append(i)
 
     def nearest(
-        self, sighting: Sighting, params: RegistrarParams, most: int, margin: float, since: int = 0
+        self, sighting: Sighting, params: RegistrarParams, most: int, margin: float, sessions: Sessions = NO_SESSIONS
     ) -> tuple[Array, Array]:
         """The rows (at most ``most``) that look most like this one, and half their squared distances, (K,) each.
 
-        Left out are those farther away in half the squared distance than the nearest by ``margin``, nearer in time than
-        the least gap, of sessions before ``since``, and where odometry says that they cannot be here. Among equals the
-        older keyframe comes first.
+        Left out are those farther away in half the squared distance than the nearest by ``margin``, those of hidden
+        ``sessions``, those of the robot's own and of this one that are nearer in time than the least gap, and where
+        odometry says that they cannot be here. Among equals the older keyframe comes first.
         """
         tiles = -(-self._used // LANES)
         descriptor = EMPHASIS * np.asarray(sighting.descriptor, np.float32)
@@ -75,7 +92,8 @@ class Block:
         found, similarity = _likest(  # type: ignore[call-arg]
             self._descriptors[:tiles], self._half_norms[:tiles], self.where, self.when, descriptor,
             np.asarray(sighting.position, float), sighting.travelled, sighting.stamp_ns, session,
-            round(1e9 * params.min_gap), params.odometry_radius, params.odometry_drift, since, most, margin,
+            round(1e9 * params.min_gap), params.odometry_radius, params.odometry_drift, sessions.own, sessions.hidden,
+            most, margin,
         )  # fmt: skip
         return found, np.maximum(0.5 * float(descriptor @ descriptor) - similarity, 0.0)
 
@@ -88,8 +106,8 @@ class Block:
 
 @numba.njit(cache=True, nogil=True)
 def _likest(  # type: ignore[no-untyped-def]
-    descriptors, half_norms, where, when, descriptor, position, way, stamp_ns, session, gap_ns, radius, drift, since,
-    most, margin,
+    descriptors, half_norms, where, when, descriptor, position, way, stamp_ns, session, gap_ns, radius, drift, own,
+    hidden, most, margin,
 ):  # fmt: skip
     """The rows, the nearest first, and their similarity: half the squared distance below half a length.
 
@@ -100,7 +118,7 @@ def _likest(  # type: ignore[no-untyped-def]
     for tile in range(len(tops)):
         tops[tile] = _compare(descriptors[tile], half_norms[tile], descriptor, likeness[tile])
     floor = np.partition(tops, len(tops) - most)[len(tops) - most] if len(tops) > most else -NOWHERE
-    seen = (likeness, tops, where, when, position, way, stamp_ns, session, gap_ns, radius, drift, since, margin)
+    seen = (likeness, tops, where, when, position, way, stamp_ns, session, gap_ns, radius, drift, own, hidden, margin)
     best = _best(most, floor, *seen)
     if best[-1][0] == -NOWHERE and floor > -NOWHERE:
         best = _best(most, -NOWHERE, *seen)
@@ -112,7 +130,22 @@ def _likest(  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _best(  # type: ignore[no-untyped-def]
-    most, floor, likeness, tops, where, when, position, way, stamp_ns, session, gap_ns, radius, drift, since, margin
+    most,
+    floor,
+    likeness,
+    tops,
+    where,
+    when,
+    position,
+    way,
+    stamp_ns,
+    session,
+    gap_ns,
+    radius,
+    drift,
+    own,
+    hidden,
+    margin,
 ):
     """The best that are at least as similar as the floor, in falling order: similarity, how old, row; none is -inf."""
     best = [(-NOWHERE, 0, 0) for _ in range(most)]  # as a heap: the least is the first
@@ -123,7 +156,9 @@ def _best(  # type: ignore[no-untyped-def]
             continue
         for lane in range(LANES):
             row, like = tile * LANES + lane, likeness[tile, lane]
-            if like < least or like == -NOWHERE or when[row, 1] < since or abs(when[row, 0] - stamp_ns) < gap_ns:
+            if like < least or like == -NOWHERE or _holds(hidden, when[row, 1]):
+                continue
+            if abs(when[row, 0] - stamp_ns) < gap_ns and _holds(own, when[row, 1]):
                 continue
             if when[row, 1] == session and when[row, 3]:
                 reach = radius + drift * abs(way - where[row, 3])
@@ -134,6 +169,13 @@ def _best(  # type: ignore[no-untyped-def]
             likest = max(likest, like)
     best.sort(reverse=True)
     return best
+
+
+@numba.njit(cache=True, nogil=True)
+def _holds(numbers, number):  # type: ignore[no-untyped-def]
+    """Whether a number is among sorted ones."""
+    k = np.searchsorted(numbers, number)
+    return k < len(numbers) and numbers[k] == number
 
 
 @numba.njit(cache=True, nogil=True, fastmath=FAST)

@@ -12,7 +12,8 @@ share a landmark, or were registered with each other. `benchmarks/rooms.py` meas
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Sequence
 from itertools import chain
 from typing import NamedTuple
 
@@ -20,7 +21,7 @@ import numba
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.memory.nearest_neighbours import Block
+from objreg_ros.memory.nearest_neighbours import Block, Sessions
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.registration.labels import LabelGroups
 from objreg_ros.registration.params import RegistrarParams
@@ -43,6 +44,7 @@ class CandidateKeyframe(NamedTuple):
     """A stored keyframe that may show what a new one shows, with the votes of its objects."""
 
     keyframe_id: int
+    session: int
     stamp_ns: int
     votes: float
 
@@ -56,6 +58,7 @@ class Index:
         self._blocks: dict[str, Block] = {}
         self._rows: dict[int, list[tuple[Block, int]]] = {}  # of each keyframe
         self._met: dict[int, set[int]] = {}  # the sessions that are known to show one place, of each of them
+        self._sessions: defaultdict[str, set[int]] = defaultdict(set)  # of each robot
 
     def __len__(self) -> int:
         return sum(map(len, self._blocks.values()))
@@ -64,6 +67,7 @@ class Index:
         """Add the objects of keyframes. Sessions in which the same landmark was seen have met."""
         first_session: dict[int, int] = {}
         for sighting in sightings:
+            self._sessions[sighting.robot].add(sighting.session)
             if sighting.landmark:  # 0: it has none yet
                 self.meet(sighting.session, first_session.setdefault(sighting.landmark, sighting.session))
             block = self._blocks.setdefault(self._groups.of(sighting.label), Block())
@@ -80,12 +84,13 @@ class Index:
             together = self._met.get(session, {session}) | self._met.get(other, {other})
             self._met |= dict.fromkeys(together, together)
 
-    def query(self, sightings: Sequence[Sighting], since: int = 0) -> list[CandidateKeyframe]:
-        """Places of the sessions from ``since`` on for the objects of a new keyframe, the most promising first.
+    def query(self, sightings: Sequence[Sighting], hidden: Collection[int] = ()) -> list[CandidateKeyframe]:
+        """Places of all sessions but those ``hidden`` for the objects of a new keyframe, the most promising first.
 
         May be empty. There are more than ``candidates``, so that those which turn out to be redundant have successors.
         """
-        ballots = [self._ballot(sighting, len(self), since) for sighting in sightings]
+        sessions = Sessions.of(self._sessions.get(sightings[0].robot, ()), hidden)
+        ballots = [self._ballot(sighting, len(self), sessions) for sighting in sightings]
         where, when, votes = (np.concatenate(column) for column in zip(*ballots, strict=True))
         ballot = np.repeat(np.arange(len(ballots)), [len(ballot[-1]) for ballot in ballots])
         positions = np.array([sighting.position for sighting in sightings], float)
@@ -95,12 +100,12 @@ class Index:
         ranked = np.argsort(-votes, kind="stable")[:RANKED]  # the older first among equals
         taken = ranked[self._turns(where[ranked], when[ranked], votes[ranked])[: SPARE * self.params.candidates]]
         chosen = zip(when[taken].tolist(), votes[taken].tolist(), strict=True)
-        return [CandidateKeyframe(number, stamp_ns, vote) for (stamp_ns, _, number, _), vote in chosen]
+        return [CandidateKeyframe(number, session, stamp_ns, vote) for (stamp_ns, session, number, _), vote in chosen]
 
-    def _ballot(self, sighting: Sighting, stored: int, since: int) -> tuple[Array, Array, Array]:
+    def _ballot(self, sighting: Sighting, stored: int, sessions: Sessions) -> tuple[Array, Array, Array]:
         """Where and when the objects were seen that look most like this one, the nearest first, and their votes."""
         block = self._blocks.get(self._groups.of(sighting.label), EMPTY)
-        rows, halves = block.nearest(sighting, self.params, SHORTLIST, VOTE_CUTOFF, since)
+        rows, halves = block.nearest(sighting, self.params, SHORTLIST, VOTE_CUTOFF, sessions)
         rarity = math.log(2.0 + stored / max(len(block), 1))
         return block.where[rows], block.when[rows], rarity * np.exp(-halves / VOTE_DISTANCE**2)
 

@@ -19,9 +19,9 @@ class Sighting:
 
     ``extent`` m of the object, ``position (3,)`` of its middle and ``camera (3,)`` of the camera, m; ``travelled`` m
     of the camera's path in the session until then; ``by_odometry`` whether odometry told the pose, or our own tracking,
-    which may have slipped unnoticed; ``landmark`` the id that the object has wherever it is seen, 0
-    before it has one; ``R_landmark_session (3, 3)`` turns this session's axes into those of the session that saw the
-    landmark first.
+    which may have slipped unnoticed; ``robot`` whose session it is; ``landmark`` the id that the object has wherever it
+    is seen, 0 before it has one; ``R_landmark_session (3, 3)`` turns this session's axes into those of the session that
+    saw the landmark first.
     """
 
     keyframe_id: int
@@ -36,6 +36,7 @@ class Sighting:
     camera: Array
     travelled: float = 0.0
     by_odometry: bool = False
+    robot: str = ""
     landmark: int = 0
     R_landmark_session: Array = field(default_factory=lambda: np.eye(3))
 
@@ -66,6 +67,7 @@ def sightings_of(keyframe: Keyframe) -> tuple[Sighting, ...]:
             camera=np.array(T_session_camera[:3, 3]),
             travelled=keyframe.travelled,
             by_odometry=keyframe.by_odometry,
+            robot=keyframe.robot,
         )
         for item in keyframe.objects
     )

@@ -217,16 +217,19 @@ class Store:
         """The number of a session that nothing is stored of yet."""
         return max((head["session"] for head in self._heads.values()), default=-1) + 1
 
-    def last_session_beyond(self, session: int, stamp_ns: int) -> int:
-        """The last of the sessions before ``session`` that has a keyframe of ``stamp_ns`` or later; -1 if none has."""
-        heads = self._heads.values()
-        return max((h["session"] for h in heads if h["session"] < session and h["stamp_ns"] >= stamp_ns), default=-1)
+    def sessions_beyond(self, robot: str, session: int, stamp_ns: int) -> frozenset[int]:
+        """A robot's sessions before ``session``, up to the last that has a keyframe of ``stamp_ns`` or later."""
+        own = [h for h in self._heads.values() if h["robot"] == robot and h["session"] < session]
+        last = max((head["session"] for head in own if head["stamp_ns"] >= stamp_ns), default=-1)
+        return frozenset(head["session"] for head in own if head["session"] <= last)
+
+    def origins(self) -> dict[str, tuple[int, int]]:
+        """By origin the session of keyframes from elsewhere, and the newest stamp in it."""
+        heads = sorted((h for h in self._heads.values() if h["origin"]), key=lambda head: head["stamp_ns"])
+        return {head["origin"]: (head["session"], head["stamp_ns"]) for head in heads}
 
     def counts(self) -> dict[str, int]:
-        """How many keyframes, objects, landmarks, sessions and closures there are, and how many were forgotten.
-
-        ``forgotten`` are keyframes that went because there were too many; others go because newer ones show the same.
-        """
+        """How much is stored; ``forgotten`` are keyframes that went as there were too many."""
         with self._told("count"):
             landmarks = self._connection.execute("SELECT COUNT(DISTINCT landmark) FROM object").fetchone()[0]
         return {

@@ -12,10 +12,11 @@ from objreg_ros.memory.claim import StoreError, read_header
 
 MAGIC = b"SQLite format 3\0"
 APPLICATION_ID = 0x4F424A52  # "OBJR" at byte 68 of the file
-SCHEMA_VERSION = 5  # at byte 60
+SCHEMA_VERSION = 6  # at byte 60
 SCHEMA = """
 CREATE TABLE keyframe (
-  id INTEGER PRIMARY KEY, session INTEGER NOT NULL, stamp_ns INTEGER NOT NULL, frame_id TEXT NOT NULL,
+  id INTEGER PRIMARY KEY, robot TEXT NOT NULL, origin TEXT NOT NULL, session INTEGER NOT NULL,
+  stamp_ns INTEGER NOT NULL, frame_id TEXT NOT NULL,
   travelled REAL NOT NULL, turned REAL NOT NULL, T_odom_camera BLOB, by_odometry INTEGER NOT NULL,
   gravity BLOB, gravity_confidence REAL NOT NULL,
   camera TEXT NOT NULL, seal INTEGER NOT NULL, whole INTEGER NOT NULL, view BLOB NOT NULL, context BLOB NOT NULL);
@@ -29,7 +30,8 @@ CREATE INDEX object_of_keyframe ON object (keyframe);
 CREATE INDEX object_of_landmark ON object (landmark);
 CREATE TABLE closure (
   id INTEGER PRIMARY KEY, from_ns INTEGER NOT NULL, to_ns INTEGER NOT NULL,
-  from_frame_id TEXT NOT NULL, to_frame_id TEXT NOT NULL,
+  from_frame_id TEXT NOT NULL, to_frame_id TEXT NOT NULL, from_robot TEXT NOT NULL, to_robot TEXT NOT NULL,
+  from_session INTEGER, to_session INTEGER,
   T_from_to BLOB NOT NULL, covariance BLOB NOT NULL, labels TEXT NOT NULL, evidence TEXT NOT NULL,
   seal INTEGER NOT NULL);
 CREATE TABLE books (

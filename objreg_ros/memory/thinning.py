@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Several closures of one revisit say the same thing many times. The first of each pair of moments is kept."""
+"""Several closures of one revisit say the same thing many times. The first of each pair of moments is kept.
+
+Moments of different sessions may have one stamp, where they are of different robots.
+"""
 
 from __future__ import annotations
 
@@ -7,22 +10,25 @@ from collections import defaultdict
 
 
 class Thinning:
-    """Knows the accepted closures of a run of the clock, and says whether a new pair of moments adds to them."""
+    """Knows the accepted closures of a run of the clock, and says whether a new pair of moments adds to them.
+
+    A pair is of ``session`` and ``from_ns`` of the stored moment, and ``to_ns`` of the one that goes on.
+    """
 
     def __init__(self, seconds: float) -> None:
         self._span_ns = max(round(1e9 * seconds), 1)
-        self._pairs: defaultdict[int, list[tuple[int, int]]] = defaultdict(list)  # by the span that the later one is in
+        self._pairs: defaultdict[int, list[tuple[int, int, int]]] = defaultdict(list)  # by the span of the later one
 
-    def redundant(self, from_ns: int, to_ns: int) -> bool:
+    def redundant(self, session: int, from_ns: int, to_ns: int) -> bool:
         """Whether an accepted closure joins moments that are both nearer than the span to these."""
         span = self._span_ns
         pairs = (pair for k in (-1, 0, 1) for pair in self._pairs.get(to_ns // span + k, ()))
-        return any(abs(a - from_ns) < span and abs(b - to_ns) < span for a, b in pairs)
+        return any(one == session and abs(a - from_ns) < span and abs(b - to_ns) < span for one, a, b in pairs)
 
-    def withdraw(self, from_ns: int, to_ns: int) -> None:
+    def withdraw(self, session: int, from_ns: int, to_ns: int) -> None:
         """Forget a closure that was accepted, and came to nothing."""
-        self._pairs[to_ns // self._span_ns].remove((from_ns, to_ns))
+        self._pairs[to_ns // self._span_ns].remove((session, from_ns, to_ns))
 
-    def accept(self, from_ns: int, to_ns: int) -> None:
+    def accept(self, session: int, from_ns: int, to_ns: int) -> None:
         """Remember an accepted closure."""
-        self._pairs[to_ns // self._span_ns].append((from_ns, to_ns))
+        self._pairs[to_ns // self._span_ns].append((session, from_ns, to_ns))

@@ -77,20 +77,23 @@ class Search:
             if not self._trying:
                 break
             stored, ask = self._trying.popleft()
-            if ask is None or self._thinning.redundant(stored.stamp_ns, self._keyframe.stamp_ns):
+            if ask is None or self._is_redundant(stored):
                 found.refused.append(self._redundant(stored))
                 continue
             tries -= 1
             tried = ask()
             verdict = self._means.confirmation.hear(tried) if isinstance(tried, Tried) else tried
             if isinstance(verdict, Accepted):
-                self._thinning.accept(stored.stamp_ns, self._keyframe.stamp_ns)
+                self._thinning.accept(stored.session, stored.stamp_ns, self._keyframe.stamp_ns)
                 found.accepted.append(verdict)
             elif isinstance(verdict, Held):
                 found.held.append(verdict)
             else:
                 found.refused.append(verdict)
         return found
+
+    def _is_redundant(self, stored: CandidateKeyframe) -> bool:
+        return self._thinning.redundant(stored.session, stored.stamp_ns, self._keyframe.stamp_ns)
 
     def _redundant(self, stored: CandidateKeyframe) -> Rejected:
         return rejected(stored.stamp_ns, self._keyframe, redundant(self._params.thin_seconds))
@@ -106,7 +109,7 @@ class Search:
         most = min(tries, threads if busy == 0 else min(wanted, threads))
         while queue and busy < most:
             stored = queue.popleft()
-            redundant = self._thinning.redundant(stored.stamp_ns, self._keyframe.stamp_ns)
+            redundant = self._is_redundant(stored)
             self._trying.append((stored, None if redundant else self._try_candidate(stored)))
             busy += not redundant
 

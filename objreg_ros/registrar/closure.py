@@ -46,6 +46,13 @@ class Waiting:
     pairs: tuple[tuple[int, int], ...]
     R_there_here: Array
 
+    @property
+    def from_session(self) -> int:
+        """The session of the stored moment."""
+        session = self.closure.from_session
+        assert session is not None
+        return session
+
     def confirmed(self, support: Support) -> Waiting:
         """The same with what others say of it as evidence."""
         evidence = self.closure.evidence | support_evidence(support)
@@ -74,6 +81,8 @@ class Waiting:
             to_frame_id=closure.to_frame_id,
             from_session=closure.from_session,
             to_session=closure.to_session,
+            from_robot=closure.from_robot,
+            to_robot=closure.to_robot,
         )
 
 
@@ -89,6 +98,8 @@ def rejected(from_ns: int, keyframe: Keyframe, refusal: Refusal, target: Keyfram
         to_frame_id=keyframe.frame_id,
         from_session=None if target is None else target.session,
         to_session=keyframe.session,
+        from_robot="" if target is None else target.robot,
+        to_robot=keyframe.robot,
     )
 
 
@@ -117,6 +128,8 @@ def closure_of(
         to_frame_id=keyframe.frame_id,
         from_session=item.target.session,
         to_session=keyframe.session,
+        from_robot=item.target.robot,
+        to_robot=keyframe.robot,
     )
 
 

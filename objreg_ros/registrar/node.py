@@ -281,7 +281,7 @@ class RegistrarNode(MatchingDoor):
     def _store_the_rest(self) -> None:
         """Store the keyframes that were not searched for; of those that cannot be the log says how many and why."""
         lost = list[str]()
-        for window in (*(job.window for job in self.searcher.rest()), self._registrar.end()):
+        for window in (*(job.window for job in self.searcher.rest()), *self._registrar.end()):
             if window is not None:
                 try:
                     self._registrar.search(window, 0.0)

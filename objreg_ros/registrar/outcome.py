@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from objreg_ros.data import LoopClosure, Observation, Rejected
@@ -12,7 +13,7 @@ from objreg_ros.data import LoopClosure, Observation, Rejected
 class Outcome:
     """What became of a frame: accepted closures, refusals with reasons, and the keyframe that it completed, if any.
 
-    With the objects of that keyframe under the ids of their landmarks, its camera and its session.
+    With the objects of that keyframe under the ids of their landmarks, its camera, its session and its robot.
     """
 
     closures: tuple[LoopClosure, ...] = ()
@@ -21,7 +22,15 @@ class Outcome:
     observations: tuple[Observation, ...] = ()
     frame_id: str = "camera"
     session: int | None = None
+    robot: str = ""
 
     def with_late(self, late: Outcome) -> Outcome:
         """With what became of earlier keyframes' poses; a late constraint keeps its own stamps."""
         return replace(self, closures=self.closures + late.closures, rejected=self.rejected + late.rejected)
+
+
+def in_turn(outcomes: Sequence[Outcome]) -> Outcome:
+    """The last of several, with the closures and refusals of all; an empty one for none."""
+    closures = [closure for outcome in outcomes for closure in outcome.closures]
+    refused = [refusal for outcome in outcomes for refusal in outcome.rejected]
+    return replace(outcomes[-1] if outcomes else Outcome(), closures=tuple(closures), rejected=tuple(refused))

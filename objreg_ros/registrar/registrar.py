@@ -2,29 +2,28 @@
 """The room's one verb: frames in, closures and refusals out.
 
 `Registrar.track` is the part for every frame, `Registrar.search` the part for every keyframe; they may run in two
-threads, each in one. `Registrar.process` is both in a row: the same frames always give the same closures.
+threads, each in one. `Registrar.process` is both in a row: the same frames always give the same closures. Frames of
+several robots, and of several cameras of one, may come in turn. `Registrar.receive` takes keyframes of machines that
+track by themselves.
 """
 
 from __future__ import annotations
 
-import os
-import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 
 import numpy as np
 
 from objreg_ros.data import Array, Frame, LoopClosure, Reason, Rejected, Relocalised
+from objreg_ros.keyframes.frame_window import Arrival, Clock, FrameWindow, SessionNumbers
 from objreg_ros.keyframes.fusion import fuse
-from objreg_ros.keyframes.keyframer import Clock, FrameWindow, Keyframer
 from objreg_ros.memory.landmarks import Landmark, Landmarks
 from objreg_ros.memory.retrieval import Index
 from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.memory.store import Store, StoreError
-from objreg_ros.memory.thinning import Thinning
+from objreg_ros.registrar.camera_track import CameraTrack, CameraTracks, clock_refusals
 from objreg_ros.registrar.candidate_search import Budget, Found, Means, Search
 from objreg_ros.registrar.closure import (
     Accepted,
@@ -36,9 +35,9 @@ from objreg_ros.registrar.closure import (
     rejected,
     waiting_of,
 )
-from objreg_ros.registrar.confirmation import Confirmation
-from objreg_ros.registrar.outcome import Outcome
-from objreg_ros.registrar.relocalisation import Relocalisation
+from objreg_ros.registrar.origins import Origins
+from objreg_ros.registrar.outcome import Outcome, in_turn
+from objreg_ros.registrar.pools import Pools
 from objreg_ros.registration import gate_of, method_of
 from objreg_ros.registration.api import Gate, Method
 from objreg_ros.registration.keyframe import Keyframe
@@ -60,7 +59,7 @@ class Registrar:
         self._method, self._gate = method or method_of(params), gate
         self._confirm_seconds = params.confirm_seconds if gate is None else 0.0
         self._store, self._lock = Store(params.store), threading.RLock()
-        self._pools: dict[int, ThreadPoolExecutor] = {}
+        self._pools = Pools(params.threads)
         try:
             self._start(self._store.next_session())
         except BaseException:  # a damaged store: others may have it
@@ -69,16 +68,13 @@ class Registrar:
 
     def _start(self, session: int) -> None:
         """Everything that lives in memory, from what is in the store; ``session`` is the first that is new."""
-        self._keyframer, self._first_session = Keyframer(self.params, session), session
+        self._numbers, self._first_session = SessionNumbers(session), session
+        self._origins = Origins(self._store, self._numbers)
+        self._tracks = CameraTracks(self.params.replaced(confirm_seconds=self._confirm_seconds), self._numbers)
         self._index = Index(self.params)
         self._index.add(self._store.sightings())
         self._landmarks = Landmarks(self.params, self._store.sightings(), self._store.next_landmark())
-        self._clock: Clock | None = None  # the run of the clock that goes on
-        self._thinning = Thinning(self.params.thin_seconds)  # of what was accepted in it
-        self._confirmation = Confirmation(self.params.replaced(confirm_seconds=self._confirm_seconds))
-        self._since = 0  # the first session whose stamps are not of this run too
-        self._relocalisation = Relocalisation()
-        self._session: int | None = None  # the one that goes on, None before the first keyframe
+        self._session: int | None = None  # of the newest keyframe, None before the first
 
     @property
     def landmarks(self) -> tuple[Landmark, ...]:
@@ -88,29 +84,29 @@ class Registrar:
 
     @property
     def landmarks_here(self) -> tuple[Landmark, ...]:
-        """The landmarks of late whose position is in the frame of the session that goes on now, at most `RECENT`."""
+        """The landmarks of late whose position is in the frame of the newest keyframe's session, at most `RECENT`."""
         with self._lock:
             return self._landmarks.recent(self._session, RECENT)
 
     @property
     def tracked(self) -> tuple[int, Array] | None:
-        """See `Keyframer.tracked`."""
-        return self._keyframer.tracked
+        """See `Keyframer.tracked`, of the camera of the newest frame."""
+        return self._tracks.followed.keyframer.tracked
 
     @property
     def waiting(self) -> int:
         """How many poses wait for other keyframes to confirm them."""
-        return len(self._confirmation)
+        return sum(len(track.confirmation) for track in tuple(self._tracks.values()))
 
     @property
     def relocalised(self) -> Relocalised | None:
         """Where the newest frame is in the map of an earlier session of the store; None as `whereabouts` says."""
-        return self._relocalisation.relocalised
+        return self._tracks.followed.relocalisation.relocalised
 
     @property
     def whereabouts(self) -> str:
         """By what `relocalised` is known, or why it is not."""
-        return self._relocalisation.reason
+        return self._tracks.followed.relocalisation.reason
 
     def counts(self) -> dict[str, int]:
         """How many keyframes, objects, landmarks, sessions and closures are stored; how many ``forgotten`` by now."""
@@ -123,13 +119,12 @@ class Registrar:
         return Outcome() if window is None else self.search(window)
 
     def finish(self, seconds: float = np.inf, hurried: Callable[[], bool] = lambda: False) -> Outcome:
-        """`search` for the keyframe that was still being collected, and settle what waits: the end of a recording."""
-        window = self.end()
-        return (Outcome() if window is None else self.search(window, seconds, hurried)).with_late(self.settle())
+        """`search` for the keyframes that were still being collected, and settle what waits: the end of a recording."""
+        return in_turn([self.search(window, seconds, hurried) for window in self.end()]).with_late(self.settle())
 
-    def end(self) -> FrameWindow | None:
-        """The frame window that was still being collected, None if it shows nothing new."""
-        return self._keyframer.finish()
+    def end(self) -> list[FrameWindow]:
+        """The frame windows that were still being collected, one a camera, without those that show nothing new."""
+        return self._tracks.end()
 
     def adopt(self, params: RegistrarParams) -> None:
         """Take what is live of the parameters, from the next frame and the next search on."""
@@ -137,9 +132,10 @@ class Registrar:
 
     def track(self, frame: Frame) -> FrameWindow | None:
         """Follow the camera; returns the frame window that became a keyframe with this one, mostly None."""
-        self._keyframer.params = self._adopted
-        window = self._keyframer.add(frame)
-        self._relocalisation.follow(frame, self._keyframer.next_session - 1)
+        track = self._tracks.follow(frame)
+        track.keyframer.params = self._adopted
+        window = track.keyframer.add(frame)
+        track.relocalisation.follow(frame, track.keyframer.session)
         return window
 
     def search(
@@ -158,42 +154,54 @@ class Registrar:
             if window.session < self._first_session:  # `reset` came first
                 return Outcome()
             self.params = self._index.params = self._adopted
-            fused = fuse(window, self.params)
-            if not fused.objects:
-                return Outcome()
-            keyframe = fused.numbered(self._store.next_keyframe())
-            self._session = keyframe.session
-            before = self._follow(window.clock, keyframe)
-            sightings = sightings_of(keyframe)
-            found = self._find_closures(keyframe, sightings, budget)
-            try:
-                closures, named = self._remember(keyframe, sightings, found.accepted)
-            except StoreError:
-                for item in found.accepted:
-                    self._thinning.withdraw(item.target.stamp_ns, keyframe.stamp_ns)
-                raise
-            for number, item, refusal in found.held:
-                self._confirmation.hold(number, waiting_of(keyframe, named, item, refusal, self.params))
-            outcome = Outcome(
-                closures=closures,
-                rejected=(*before, *found.refused),
-                keyframe_ns=keyframe.stamp_ns,
-                observations=observations(keyframe, named),
-                frame_id=keyframe.frame_id,
-                session=keyframe.session,
-            )
-            return outcome.with_late(self._settled(keyframe.stamp_ns))
+            keyframe = fuse(window, self.params)
+            return self._search(keyframe, window.clock, budget) if keyframe.objects else Outcome()
+
+    def receive(
+        self, arrival: Arrival, seconds: float = np.inf, hurried: Callable[[], bool] = lambda: False
+    ) -> Outcome | None:
+        """`search` for a keyframe that a keyframer elsewhere has made; None for one that was received before."""
+        budget = Budget(time.monotonic() + seconds, hurried)
+        with self._lock:
+            self.params = self._index.params = self._adopted
+            received = self._origins.received(arrival)
+            return None if received is None else self._search(*received, budget)
+
+    def _search(self, made: Keyframe, clock: Clock, budget: Budget) -> Outcome:
+        keyframe, track = made.numbered(self._store.next_keyframe()), self._tracks.of(made.camera)
+        self._session = keyframe.session
+        before = self._follow(track, clock, keyframe)
+        sightings = sightings_of(keyframe)
+        found = self._find_closures(keyframe, sightings, track, budget)
+        try:
+            closures, named = self._remember(keyframe, sightings, found.accepted)
+        except StoreError:
+            for item in found.accepted:
+                track.thinning.withdraw(item.target.session, item.target.stamp_ns, keyframe.stamp_ns)
+            raise
+        for number, item, refusal in found.held:
+            track.confirmation.hold(number, waiting_of(keyframe, named, item, refusal, self.params))
+        outcome = Outcome(
+            closures=closures,
+            rejected=(*before, *found.refused),
+            keyframe_ns=keyframe.stamp_ns,
+            observations=observations(keyframe, named),
+            frame_id=keyframe.frame_id,
+            session=keyframe.session,
+            robot=keyframe.robot,
+        )
+        return outcome.with_late(self._settled(track, keyframe.stamp_ns))
 
     def settle(self) -> Outcome:
         """Publish or refuse what still waits for other keyframes to confirm it: the end of a recording, or a save."""
         with self._lock:
-            return self._settled(None)
+            return in_turn([self._settled(track, None) for track in tuple(self._tracks.values())])
 
     def reset(self) -> None:
         """Forget everything, in the store too; StoreError, and nothing is forgotten, where that cannot be."""
         with self._lock:
             self._store.clear()
-            self._start(self._keyframer.next_session)
+            self._start(self._numbers.next)
 
     def save(self, path: str = "") -> str:
         """Bring the store's file up to date, or write a copy of it to ``path``; returns where it is.
@@ -205,54 +213,48 @@ class Registrar:
     def close(self) -> None:
         """Let go of the store."""
         with self._lock:
-            for pool in self._pools.values():
-                pool.shutdown()
+            self._pools.shutdown()
             self._store.close()
 
-    def _pool(self) -> ThreadPoolExecutor:
-        """The threads that try candidates for this one: as nice as it is, and kept, since each new one costs memory."""
-        nice = os.getpriority(os.PRIO_PROCESS, threading.get_native_id()) if sys.platform == "linux" else 0
-        if nice not in self._pools:
-            self._pools[nice] = ThreadPoolExecutor(self.params.threads, "register")
-        return self._pools[nice]
-
-    def _follow(self, clock: Clock, keyframe: Keyframe) -> tuple[Rejected, ...]:
+    def _follow(self, track: CameraTrack, clock: Clock, keyframe: Keyframe) -> tuple[Rejected, ...]:
         """Where the clock began anew, leave out what an earlier run of it saw unless that was over by then.
 
         A stamp of it would name a moment of this run, and the session does not travel with a constraint.
         """
-        if clock == self._clock:
-            return ()
-        given_up = self._settled(None).rejected
-        last = self._store.last_session_beyond(clock.session, clock.began_ns)
-        self._clock, self._thinning, self._since = clock, Thinning(self.params.thin_seconds), last + 1
-        began = f"{1e-9 * clock.began_ns:.3f} s"
-        refusal = Reason.CLOCK, f"the clock began anew at {began}; sessions up to {last} had seen that time before"
-        return given_up if last < 0 else (*given_up, rejected(keyframe.stamp_ns, keyframe, refusal, keyframe))
+        given_up: tuple[Rejected, ...] = ()
+        if clock != track.clock:
+            hidden = self._tracks.hidden_from(clock, keyframe.camera, self._store)
+            given_up = self._settled(track, None).rejected + clock_refusals(clock, hidden, keyframe)
+            track.begin(clock, hidden, self.params)
+        track.see(keyframe)
+        return given_up
 
-    def _find_closures(self, keyframe: Keyframe, sightings: Sequence[Sighting], budget: Budget) -> Found:
+    def _find_closures(
+        self, keyframe: Keyframe, sightings: Sequence[Sighting], track: CameraTrack, budget: Budget
+    ) -> Found:
         """What the stored keyframes that may show the same place come to; a refusal where none may."""
-        candidates = self._index.query(sightings, self._since)
+        candidates = self._index.query(sightings, track.hidden)
         if not candidates:
             refusal = Reason.NO_CANDIDATE, f"none of {len(self._index)} stored objects is alike and may be here"
             return Found([], [], [rejected(keyframe.stamp_ns, keyframe, refusal, keyframe)])
-        means = Means(self._store, self._method, self._gate or gate_of(self.params), self._confirmation, self._pool())
-        return Search(keyframe, self._thinning, budget, means, self.params).run(candidates)
+        gate, pool = self._gate or gate_of(self.params), self._pools.fitting()
+        means = Means(self._store, self._method, gate, track.confirmation, pool)
+        return Search(keyframe, track.thinning, budget, means, self.params).run(candidates)
 
-    def _settled(self, now_ns: int | None) -> Outcome:
-        """What waits no more: late constraints, and refusals."""
-        confirmed, refused = self._confirmation.settle(now_ns)
+    def _settled(self, track: CameraTrack, now_ns: int | None) -> Outcome:
+        """What waits no more of a camera: late constraints, and refusals."""
+        confirmed, refused = track.confirmation.settle(now_ns)
         closures = []
         for waiting in confirmed:
             from_ns, to_ns = waiting.closure.from_ns, waiting.closure.to_ns
-            if self._thinning.redundant(from_ns, to_ns):
+            if track.thinning.redundant(waiting.from_session, from_ns, to_ns):
                 refused.append(waiting.refused(redundant(self.params.thin_seconds)))
                 continue
-            self._thinning.accept(from_ns, to_ns)
-            closures.append(self._remember_late(waiting))
+            track.thinning.accept(waiting.from_session, from_ns, to_ns)
+            closures.append(self._remember_late(waiting, track))
         return Outcome(closures=tuple(closures), rejected=tuple(refused))
 
-    def _remember_late(self, waiting: Waiting) -> LoopClosure:
+    def _remember_late(self, waiting: Waiting, track: CameraTrack) -> LoopClosure:
         """Write a late constraint down, and merge the landmarks that it says are one. It holds without that, too."""
         with suppress(StoreError, KeyError):  # the store fails, or has forgotten a keyframe of it meanwhile
             here, there = (
@@ -267,7 +269,7 @@ class Registrar:
             names = {instance: joined.get(seen.landmark, seen.landmark) for instance, seen in here.items()}
             waiting = waiting.renamed(names)
             ends = self._store.keyframe(waiting.source_id), self._store.keyframe(waiting.target_id)
-            self._relocalisation.hear(waiting.closure, *ends)
+            track.relocalisation.hear(waiting.closure, *ends)
         return waiting.closure
 
     def _remember(
@@ -283,7 +285,7 @@ class Registrar:
         self._index.add(named)
         for item, closure in zip(accepted, closures, strict=True):
             self._index.meet(keyframe.session, item.target.session)
-            self._relocalisation.hear(closure, keyframe, item.target)
+            self._tracks.of(keyframe.camera).relocalisation.hear(closure, keyframe, item.target)
         with suppress(StoreError):  # the keyframe is stored: what is left now goes another time
             self._forget_surplus(named)
         return closures, named

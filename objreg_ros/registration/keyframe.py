@@ -67,7 +67,8 @@ class Keyframe:
     nothing for one view, 1 for many from around. ``T_odom_camera`` is the pose of the reference frame in the frame of
     its session, and says something about another keyframe of the same session only: the odometry's where
     ``by_odometry``, else that of our own tracking, which may slip unnoticed. Until then the camera had gone
-    ``travelled`` m and turned ``turned`` degrees in the session.
+    ``travelled`` m and turned ``turned`` degrees in the session. ``robot`` carries the camera ``frame_id``.
+    ``origin`` says which session of which run of a keyframer elsewhere it is of, empty for one of this process.
     """
 
     keyframe_id: int
@@ -83,6 +84,13 @@ class Keyframe:
     by_odometry: bool = False
     travelled: float = 0.0
     turned: float = 0.0
+    robot: str = ""
+    origin: str = ""
+
+    @property
+    def camera(self) -> tuple[str, str]:
+        """Which camera saw it: its robot and its frame."""
+        return self.robot, self.frame_id
 
     @property
     def labels(self) -> tuple[str, ...]:

@@ -10,8 +10,8 @@ from registration.samples import box, cloud, frame, moved, scene_view
 from objreg_ros.data import UNNAMED, PointFlag
 from objreg_ros.geometry import inverse, transform
 from objreg_ros.keyframes import fusion
+from objreg_ros.keyframes.frame_window import FrameWindow
 from objreg_ros.keyframes.fusion import fuse, fuse_objects, reference_index
-from objreg_ros.keyframes.keyframer import FrameWindow
 from objreg_ros.registration.params import RegistrarParams
 
 PARAMS = RegistrarParams()

@@ -11,7 +11,8 @@ from registration.samples import CAMERA, SECOND, box, frame, moved, scene_view
 
 from objreg_ros.data import Frame, View
 from objreg_ros.geometry import inverse, is_rigid, pose, rotation_from_vector
-from objreg_ros.keyframes.keyframer import Clock, FrameWindow, Keyframer
+from objreg_ros.keyframes.frame_window import Clock, FrameWindow, SessionNumbers
+from objreg_ros.keyframes.keyframer import Keyframer
 from objreg_ros.registration.params import RegistrarParams
 
 PARAMS = RegistrarParams(keyframe_translation=0.1, keyframe_rotation=10.0, keyframe_seconds=1.0)
@@ -130,7 +131,7 @@ def test_a_first_stamp_that_nobody_set_begins_no_clock() -> None:
 def test_a_clock_runs_until_time_goes_back() -> None:
     frames = [frame(t, CUP, moved(t)) for t in (5.0, 6.0)] + [frame(7.0, CUP, None, scene_view(moved(9.0)))]
     frames += [frame(t, CUP, moved(t)) for t in (1.0, 2.0)]
-    clocks = [s.clock for s in _run(Keyframer(PARAMS, 4), frames)]
+    clocks = [s.clock for s in _run(Keyframer(PARAMS, SessionNumbers(4)), frames)]
     assert clocks[0] == Clock(5 * SECOND, 4) and clocks[-1].began_ns == SECOND
     assert clocks == sorted(clocks, key=lambda clock: clock.session)
     assert len(set(clocks)) == 2 and clocks[-1].session > 4

@@ -16,15 +16,16 @@ from objreg_ros.memory.store import Store
 from objreg_ros.memory.store_file import SCHEMA_VERSION, StoreError
 
 DATA = Path(__file__).parent / "data" / "store_v4.db"  # written by the last code of that version
+SEALED = DATA.with_name("store_v5.db")  # likewise
 FIRST = (
     "ALTER TABLE closure DROP COLUMN from_frame_id; ALTER TABLE closure RENAME COLUMN to_frame_id TO frame_id;"
     "DROP TABLE highest; PRAGMA user_version = 1;"
 )
 
 
-def _old(folder: Path, changes: str = "") -> Path:
+def _old(folder: Path, changes: str = "", data: Path = DATA) -> Path:
     path = folder / "place.db"
-    shutil.copy(DATA, path)
+    shutil.copy(data, path)
     with closing(sqlite3.connect(path)) as connection:
         connection.executescript(changes)
     return path
@@ -46,6 +47,33 @@ def test_a_store_of_the_fourth_version_says_all_that_it_said(tmp_path: Path) -> 
             ]
         assert [p.name for p in tmp_path.iterdir()] == ["place.db"]
     assert path.read_bytes()[63] == SCHEMA_VERSION
+
+
+def test_a_store_of_the_fifth_version_is_that_of_one_robot(tmp_path: Path) -> None:
+    path = _old(tmp_path, data=SEALED)
+    for read_only in (True, False, True):
+        with closing(Store(path, read_only=read_only)) as opened:
+            assert opened.keyframe_ids() == [1, 3] and (opened.next_keyframe(), opened.next_landmark()) == (5, 51)
+            assert [opened.keyframe(k).robot for k in (1, 3)] == ["", ""] and opened.origins() == {}
+            assert [(c.robots, c.from_session, c.labels) for c in opened.closures()] == [(("", ""), None, ("cup",))] * 3
+    assert path.read_bytes()[63] == SCHEMA_VERSION
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "UPDATE keyframe SET session = 7",
+        "UPDATE object SET cloud = x'00'",
+        "UPDATE closure SET to_ns = 9",
+        "DELETE FROM closure WHERE id = 1",
+    ],
+)
+def test_a_store_of_the_fifth_version_that_was_changed_is_refused_and_left(tmp_path: Path, change: str) -> None:
+    path = _old(tmp_path, change, SEALED)
+    before = path.read_bytes()
+    with pytest.raises(StoreError, match="damaged"):
+        Store(path)
+    assert path.read_bytes() == before
 
 
 def test_reading_an_older_store_does_not_renew_it(tmp_path: Path) -> None:
@@ -100,7 +128,8 @@ STRANGE = {
     "ALTER TABLE object ADD COLUMN more": "object more",
     "ALTER TABLE object DROP COLUMN density": "object density",
     "PRAGMA user_version = 0": "expected schema version 1 to",
-    "PRAGMA user_version = 5": "one that no store has|another or none",
+    "PRAGMA user_version = 5": "version 5",
+    "PRAGMA user_version = 6": "one that no store has|another or none",
     "PRAGMA user_version = 2": "version 2",
 }
 

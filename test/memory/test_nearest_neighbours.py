@@ -10,12 +10,13 @@ import pytest
 from numpy.random import Generator
 
 from objreg_ros.memory.descriptor import EMPHASIS, SIZE
-from objreg_ros.memory.nearest_neighbours import LANES, Block
+from objreg_ros.memory.nearest_neighbours import LANES, Block, Sessions
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.registration.params import RegistrarParams
 
 PARAMS = RegistrarParams(min_gap=2.0, odometry_radius=1.0, odometry_drift=0.1)
 MOST, MARGIN = 8, 8.0
+OWN = Sessions.of((0, 1), ())
 
 
 def _sighting(number: int, draw: Generator, spread: float = 1.0) -> Sighting:
@@ -60,7 +61,7 @@ def test_a_scan_finds_what_brute_force_finds(seed: int) -> None:
         stored.append(_sighting(number, draw, 0.1 + 0.1 * (seed % 5)))
         block.append(stored[-1])
     for row in (_sighting(9999, draw) for _ in range(10)):
-        rows, halves = block.nearest(row, PARAMS, MOST, MARGIN)
+        rows, halves = block.nearest(row, PARAMS, MOST, MARGIN, OWN)
         assert block.when[rows, 2].tolist() == _brute_force(stored, row)
         exact = [0.5 * np.sum((EMPHASIS * (stored[k].descriptor - row.descriptor)) ** 2) for k in block.when[rows, 2]]
         assert np.allclose(halves, exact, atol=1e-4)
@@ -78,8 +79,21 @@ def test_rows_that_were_given_up_are_not_found_and_are_used_again(seed: int) -> 
         held[number] = sighting, block.append(sighting)
     assert len(block) == len(held) and len(block.when) < 800
     row = _sighting(9999, draw)
-    rows, _ = block.nearest(row, PARAMS, MOST, MARGIN)
+    rows, _ = block.nearest(row, PARAMS, MOST, MARGIN, OWN)
     assert block.when[rows, 2].tolist() == _brute_force([sighting for sighting, _ in held.values()], row)
+
+
+def test_what_another_robot_saw_at_the_same_time_may_be_here_and_hidden_sessions_may_not() -> None:
+    draw = np.random.default_rng(0)
+    pattern, block = replace(_sighting(0, draw), by_odometry=False), Block()
+    for number, session in ((1, 3), (2, 5), (3, 7)):
+        block.append(replace(pattern, keyframe_id=number, session=session))
+    asked = replace(pattern, keyframe_id=9, session=3)
+    found = {
+        hidden: block.when[block.nearest(asked, PARAMS, MOST, MARGIN, Sessions.of((3, 5), hidden))[0], 2].tolist()
+        for hidden in ((), (7,))
+    }
+    assert found == {(): [3], (7,): []}
 
 
 def test_among_equals_the_older_keyframe_comes_first() -> None:
@@ -97,4 +111,4 @@ def test_a_block_of_nothing_that_may_be_here_answers_nothing() -> None:
     draw = np.random.default_rng(0)
     block, row = Block(), _sighting(1, draw)
     block.append(row)
-    assert [len(column) for column in block.nearest(row, PARAMS, MOST, MARGIN)] == [0, 0]
+    assert [len(column) for column in block.nearest(row, PARAMS, MOST, MARGIN, OWN)] == [0, 0]

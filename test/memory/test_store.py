@@ -186,21 +186,32 @@ def test_objects_of_one_landmark_are_counted_as_one() -> None:
     assert (store.counts()["objects"], store.counts()["landmarks"]) == (3, 2)
 
 
-def test_the_last_session_that_reached_a_moment_is_one_before_and_may_end_with_it() -> None:
+def test_sessions_that_may_have_reached_a_moment_are_those_up_to_the_last_that_did() -> None:
     store = Store()
     for session, seconds in ((0, 30.0), (1, 20.0), (2, 40.0)):
         _add(store, seconds, session=session)
     reached = {
-        s: [store.last_session_beyond(k, round(s * 1e9)) for k in (0, 1, 2, 3)] for s in (15, 20, 25, 30, 35, 45)
+        s: [set(store.sessions_beyond("", k, round(s * 1e9))) for k in (0, 1, 2, 3)] for s in (15, 25, 30, 35, 45)
     }
     assert reached == {
-        15: [-1, 0, 1, 2],
-        20: [-1, 0, 1, 2],
-        25: [-1, 0, 0, 2],
-        30: [-1, 0, 0, 2],
-        35: [-1, -1, -1, 2],
-        45: [-1, -1, -1, -1],
+        15: [set(), {0}, {0, 1}, {0, 1, 2}],
+        25: [set(), {0}, {0}, {0, 1, 2}],
+        30: [set(), {0}, {0}, {0, 1, 2}],
+        35: [set(), set(), set(), {0, 1, 2}],
+        45: [set(), set(), set(), set()],
     }
+    assert store.sessions_beyond("robot1", 3, 0) == frozenset()
+
+
+def test_sessions_of_keyframers_elsewhere_are_told_by_their_origin() -> None:
+    store = Store()
+    for number, (seconds, session, origin) in enumerate(
+        ((5.0, 3, "a/0"), (7.0, 3, "a/0"), (6.0, 4, "a/1"), (9.0, 5, ""))
+    ):
+        written = replace(keyframe(number + 1, seconds, session=session), robot="robot1", origin=origin)
+        store.add(written, sightings_of(written))
+    told = store.origins()
+    assert told == {"a/0": (3, 7 * 10**9), "a/1": (4, 6 * 10**9)}
 
 
 def test_clearing_forgets_all_but_the_ids() -> None:

@@ -66,7 +66,7 @@ def search(means: Means, params: RegistrarParams = PARAMS, budget: Budget = ENDL
 
 
 def ids(*numbers: int) -> list[CandidateKeyframe]:
-    return [CandidateKeyframe(number, round(1e9 * STORED[number - 1]), 1.0) for number in numbers]
+    return [CandidateKeyframe(number, 0, round(1e9 * STORED[number - 1]), 1.0) for number in numbers]
 
 
 def test_no_more_keyframes_are_tried_than_are_asked_for_best_first(means: Means) -> None:

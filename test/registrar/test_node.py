@@ -21,7 +21,7 @@ from std_srvs.srv import Trigger
 from objreg_ros.bridge.diagnostics import refusal_of
 from objreg_ros.data import Reason, Rejected
 from objreg_ros.geometry import pose
-from objreg_ros.keyframes.keyframer import FrameWindow
+from objreg_ros.keyframes.frame_window import FrameWindow
 from objreg_ros.memory.store import Store
 from objreg_ros.registrar.node import Job, RegistrarNode
 from objreg_ros.registrar.outcome import Outcome
@@ -69,8 +69,7 @@ def call(node: RegistrarNode, service: str) -> Any:
 def test_a_store_that_is_locked_refuses_a_reset_and_keeps_what_waits(make: Making, tmp_path: Path) -> None:
     node = make()
     node._registrar.track(frame(0, CUP))
-    window = node._registrar.end()
-    assert window is not None
+    (window,) = node._registrar.end()
     node._registrar.search(window)
     with held(tmp_path / "place.db"):
         answer, _ = call(node, "reset")
@@ -130,8 +129,7 @@ def test_the_keyframe_that_a_save_ends_comes_after_those_that_wait(
     monkeypatch.setattr(node._registrar, "search", slow)
     for seconds in (0, 10):
         node._registrar.track(frame(seconds, CUP))
-        window = node._registrar.end()
-        assert window is not None
+        (window,) = node._registrar.end()
         node.accept(seconds * SECOND)
         node.searcher.put(Job(seconds * SECOND, window, time.monotonic()))
     node._registrar.track(frame(20, CUP))
@@ -166,8 +164,7 @@ def test_a_full_store_says_what_goes(make: Making, monkeypatch: pytest.MonkeyPat
 def with_two_to_store(node: RegistrarNode) -> RegistrarNode:
     """The node with a keyframe that waits for its search, and another in hand."""
     node._registrar.track(frame(0, CUP))
-    waiting = node._registrar.end()
-    assert waiting is not None
+    (waiting,) = node._registrar.end()
     node.searcher.close()
     node.searcher.put(Job(0, waiting, time.monotonic()))
     node._registrar.track(frame(30, CUP))
@@ -210,8 +207,7 @@ def test_a_keyframe_that_cannot_be_stored_is_not_in_the_way_of_the_next(
 
 def window_at(node: RegistrarNode, seconds: int) -> FrameWindow:
     node._registrar.track(frame(seconds, CUP))
-    window = node._registrar.end()
-    assert window is not None
+    (window,) = node._registrar.end()
     node.accept(seconds * SECOND)
     return window
 
@@ -226,7 +222,7 @@ def test_keyframes_that_wait_behind_a_long_search_are_bounded_and_stored_in_the_
 
     def try_for_long(*arguments: Any) -> Any:
         begun.set()
-        budget = arguments[2]
+        *_, budget = arguments
         while budget.deadline > time.monotonic() and not budget.hurried():
             time.sleep(0.005)
         return try_candidates(*arguments)

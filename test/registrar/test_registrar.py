@@ -16,11 +16,13 @@ from registration.samples import SECOND, candidate, keyframe
 
 from objreg_ros.data import Array, Frame, LoopClosure, Reason, Rejected
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
+from objreg_ros.keyframes.frame_window import Arrival
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import StoreError
 from objreg_ros.registrar import registrar as module
 from objreg_ros.registrar.closure import links_of
+from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.engine import Engine
@@ -144,7 +146,6 @@ def test_a_search_without_time_refuses_as_over_budget_and_remembers_the_keyframe
     _run(registrar, _frame(0, HERE))
     assert registrar.track(_frame(30, BESIDE)) is None
     window = registrar.track(_frame(60, AWAY))
-    assert window is not None
     outcome = registrar.search(window, seconds=0.0)
     assert [r.reason for r in outcome.rejected] == [Reason.OVER_BUDGET] and outcome.closures == ()
     assert registrar.counts()["keyframes"] == 2
@@ -157,8 +158,7 @@ def test_a_search_that_is_hurried_tries_no_further_place_and_remembers_the_keyfr
         registrar = Registrar(PARAMS.replaced(threads=1, closures=4))
         _run(registrar, *frames)
         registrar.track(last)
-        window = registrar.end()
-        assert window is not None
+        (window,) = registrar.end()
         asked: list[None] = []
         outcome = registrar.search(window, hurried=lambda: asked.append(None) or len(asked) > most)  # noqa: B023
         tried = [r for r in outcome.rejected if r.reason not in (Reason.OVER_BUDGET, Reason.REDUNDANT)]
@@ -276,9 +276,9 @@ def refuse(*_: object) -> None:
 def test_a_keyframe_of_before_a_reset_is_not_stored_after_it() -> None:
     registrar = Registrar(PARAMS)
     registrar.track(_frame(0, HERE, True))
-    window = registrar.end()
+    (window,) = registrar.end()
     registrar.reset()
-    assert window is not None and registrar.search(window).keyframe_ns is None
+    assert registrar.search(window).keyframe_ns is None
     _run(registrar, _frame(10, HERE, True))
     assert registrar.counts()["keyframes"] == 1
 
@@ -394,8 +394,7 @@ def test_what_nobody_confirms_is_refused_at_the_end_and_at_once_without_time_to_
         registrar = Registrar(params, method=Odometrical(30))
         for frame in _passes(0.0):
             registrar.process(frame)
-        window = registrar.end()
-        assert window is not None
+        (window,) = registrar.end()
         outcome = registrar.search(window)
         assert outcome.closures == () and registrar.waiting == waiting
         rejected = (*outcome.rejected, *registrar.settle().rejected)
@@ -426,7 +425,6 @@ def test_live_parameters_hold_from_the_next_frame_and_the_next_search_on() -> No
     assert registrar.track(_frame(0, HERE, True)) is None and registrar.track(_frame(1, AWAY, True)) is None
     registrar.adopt(PARAMS)
     window = registrar.track(_frame(2, BESIDE, True))
-    assert window is not None
     registrar.search(window)
     registrar.adopt(PARAMS.replaced(min_gap=60.0))
     closures, rejected = _run(registrar, _frame(50, HERE, True))
@@ -446,3 +444,60 @@ def test_odds_that_are_asked_for_live_hold_for_our_gate_and_leave_one_of_ones_ow
         registrar.adopt(PARAMS.replaced(least_odds=1e6))
         assert len(_run(registrar, _frame(30, BESIDE))[0]) == found
     assert asked
+
+
+def _of(robot: str, frame: Frame, frame_id: str = "camera") -> Frame:
+    return replace(frame, robot=robot, frame_id=frame_id)
+
+
+def test_robots_that_see_one_place_at_the_same_time_close_a_loop_that_names_both() -> None:
+    frames = [_of("robot1", _frame(30.0, HERE, True)), _of("robot2", _frame(30.0, BESIDE, True))]
+    registrar = Registrar(PARAMS)
+    closures, rejected = _run(registrar, *frames)
+    (closure,) = closures
+    assert closure.robots == ("robot1", "robot2") and (closure.from_session, closure.to_session) == (0, 1)
+    assert (closure.from_ns, closure.to_ns) == (30 * SECOND, 30 * SECOND)
+    rotation, distance = pose_error(closure.T_from_to, inverse(HERE) @ BESIDE)
+    assert rotation < 1.0 and distance < 2.0
+    assert not [refusal for refusal in rejected if refusal.reason is Reason.CLOCK]
+
+
+def test_a_robot_that_starts_while_another_drives_hides_nothing_of_it() -> None:
+    first = [_of("robot1", _frame(t, T, True)) for t, T in ((10.0, HERE), (60.0, AWAY))]
+    closures, rejected = _run(Registrar(PARAMS), *first, _of("robot2", _frame(20.0, BESIDE, True)))
+    assert (("robot1", "robot2"), 10 * SECOND) in [(closure.robots, closure.from_ns) for closure in closures]
+    assert not [refusal for refusal in rejected if refusal.reason is Reason.CLOCK]
+
+
+def test_two_cameras_of_one_robot_are_followed_beside_each_other() -> None:
+    turns = [(0.0, HERE, "front"), (0.01, AWAY, "rear"), (1.0, HERE, "front"), (1.01, AWAY, "rear")]
+    registrar = Registrar(PARAMS)
+    _run(registrar, *(_of("robot1", _frame(t, T, True), camera) for t, T, camera in turns))
+    assert registrar.counts()["sessions"] == 2
+    closures, _ = _run(registrar, _of("robot1", _frame(30.0, BESIDE, True), "rear"))
+    assert ("front", "rear") in [(closure.from_frame_id, closure.to_frame_id) for closure in closures]
+
+
+def _arrived(registrar: Registrar, seconds: float, T: Array, robot: str, run: str) -> Outcome | None:
+    """What becomes of a keyframe that a robot has made by itself."""
+    elsewhere = Registrar(PARAMS)
+    elsewhere.track(_of(robot, _frame(seconds, T, True)))
+    (window,) = elsewhere.end()
+    elsewhere.close()
+    return registrar.receive(Arrival(fuse(window, PARAMS), window.clock, run))
+
+
+def test_keyframes_from_elsewhere_close_loops_and_are_taken_once_though_the_registrar_starts_anew(
+    tmp_path: Path,
+) -> None:
+    params = PARAMS.replaced(store=str(tmp_path / "place.db"))
+    registrar = Registrar(params)
+    assert _arrived(registrar, 30.0, HERE, "robot1", "a").closures == ()  # type: ignore[union-attr]
+    assert _arrived(registrar, 30.0, HERE, "robot1", "a") is None
+    registrar.close()
+    registrar = Registrar(params)
+    assert _arrived(registrar, 30.0, HERE, "robot1", "a") is None
+    (closure,) = _arrived(registrar, 31.0, BESIDE, "robot2", "b").closures  # type: ignore[union-attr]
+    assert closure.robots == ("robot1", "robot2")
+    assert [stored.robots for stored in registrar._store.closures()] == [("robot1", "robot2")]
+    registrar.close()

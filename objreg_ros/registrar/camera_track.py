@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the registrar knows of one camera that goes on. Robots, and cameras of one robot, have one each."""
+
+from __future__ import annotations
+
+from objreg_ros.data import Frame, Reason, Rejected
+from objreg_ros.keyframes.frame_window import Clock, FrameWindow, SessionNumbers
+from objreg_ros.keyframes.keyframer import Keyframer
+from objreg_ros.memory.store import Store
+from objreg_ros.memory.thinning import Thinning
+from objreg_ros.registrar.closure import rejected
+from objreg_ros.registrar.confirmation import Confirmation
+from objreg_ros.registrar.relocalisation import Relocalisation
+from objreg_ros.registration.keyframe import Keyframe
+from objreg_ros.registration.params import RegistrarParams
+
+MOST_CAMERAS = 64  # of all robots that are followed
+GOES_ON_NS = 1_000_000_000  # a clock that is not so far ahead of one that begins goes on beside it
+
+Camera = tuple[str, str]  # robot and frame_id
+
+
+class CameraTrack:
+    """Its frames become keyframes, by ``numbers`` of sessions that all share; what is likely waits for what comes next.
+
+    ``thinning`` knows what was accepted in the run of the clock that goes on, ``hidden`` are the sessions whose stamps
+    would name moments of that run.
+    """
+
+    def __init__(self, params: RegistrarParams, numbers: SessionNumbers) -> None:
+        self.keyframer = Keyframer(params, numbers)
+        self.relocalisation = Relocalisation()
+        self.confirmation = Confirmation(params)
+        self.thinning = Thinning(params.thin_seconds)
+        self.hidden: frozenset[int] = frozenset()
+        self.clock: Clock | None = None
+        self.sessions: set[int] = set()  # of the run of the clock
+        self.newest_ns = 0
+
+    def begin(self, clock: Clock, hidden: frozenset[int], params: RegistrarParams) -> None:
+        """Another run of the clock goes on from now."""
+        self.clock, self.hidden, self.sessions = clock, hidden, set()
+        self.thinning = Thinning(params.thin_seconds)
+
+    def see(self, keyframe: Keyframe) -> None:
+        """Go on to a keyframe."""
+        self.sessions.add(keyframe.session)
+        self.newest_ns = keyframe.stamp_ns
+
+    def goes_on_beside(self, clock: Clock) -> bool:
+        """Whether its run of the clock goes on, as another camera of the robot begins one."""
+        return self.clock is not None and self.newest_ns < clock.began_ns + GOES_ON_NS
+
+
+class CameraTracks(dict[Camera, CameraTrack]):
+    """One for each camera of each robot; of more than `MOST_CAMERAS` the oldest goes.
+
+    ``followed`` is that of the newest frame.
+    """
+
+    def __init__(self, params: RegistrarParams, numbers: SessionNumbers) -> None:
+        super().__init__()
+        self._params, self._numbers = params, numbers
+        self.followed = CameraTrack(params, numbers)
+
+    def of(self, camera: Camera) -> CameraTrack:
+        """That of a camera, a new one where it has none."""
+        if camera not in self:
+            self[camera] = CameraTrack(self._params, self._numbers)
+            while len(self) > MOST_CAMERAS:
+                del self[next(iter(self))]
+        return self[camera]
+
+    def follow(self, frame: Frame) -> CameraTrack:
+        """That of the camera of a frame, which is the newest."""
+        self.followed = self.of((frame.robot, frame.frame_id))
+        return self.followed
+
+    def end(self) -> list[FrameWindow]:
+        """The frame windows that were being collected, without those that show nothing new."""
+        ended = [track.keyframer.finish() for track in tuple(self.values())]
+        return [window for window in ended if window is not None]
+
+    def hidden_from(self, clock: Clock, camera: Camera, store: Store) -> frozenset[int]:
+        """The sessions of a camera's robot that may have seen the time that the run of its clock goes through.
+
+        What other cameras of the robot see in this very run is none of them, nor is what other robots see.
+        """
+        robot, _ = camera
+        beside = (track for of, track in tuple(self.items()) if of[0] == robot and of != camera)
+        together = set().union(*(track.sessions for track in beside if track.goes_on_beside(clock)))
+        return store.sessions_beyond(robot, clock.session, clock.began_ns) - together
+
+
+def clock_refusals(clock: Clock, hidden: frozenset[int], keyframe: Keyframe) -> tuple[Rejected, ...]:
+    """What is told where a run of the clock begins that leaves sessions out; nothing where it leaves none."""
+    if not hidden:
+        return ()
+    why = f"sessions up to {max(hidden)} had seen that time before"
+    refusal = Reason.CLOCK, f"the clock began anew at {1e-9 * clock.began_ns:.3f} s; {why}"
+    return (rejected(keyframe.stamp_ns, keyframe, refusal, keyframe),)
