@@ -50,12 +50,14 @@ class Link:
         self._free_s = -math.inf
         self._paused_until_s = -math.inf
         self.counts: Counter[str] = Counter()
+        self.longest_bytes = 0
 
     def pause(self, until_s: float) -> None:
         self._paused_until_s = until_s
 
     def arrival_s(self, now_s: float, size: int) -> float | None:
         """When a frame of so many bytes that is sent now arrives; None where it is lost."""
+        self.longest_bytes = max(self.longest_bytes, size)
         fate, arrival_s = self._send(now_s, size)
         self.counts[fate] += 1
         return arrival_s

@@ -21,7 +21,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import click
@@ -38,7 +38,6 @@ PROFILES = (OWN, "config/fastdds.xml", "config/fastdds_wifi.xml")
 TROUBLES = ("0:0", "0.05:0", "0.2:0", "0:30", "0.2:30")  # loss:pause
 PAUSE_AT_S = 10.0  # after the two ends met
 MEETING_S = 40.0  # in which they have to meet
-LINGER_S = 20.0  # in which what is late may still come
 
 
 @dataclass(frozen=True)
@@ -54,12 +53,16 @@ class Case:
     messages: int
     size: int
     peers: bool
+    linger_s: float
     seed: int
 
 
 @dataclass(frozen=True)
 class Result:
-    """Counts of messages; ages of those that came, in seconds, at their first coming; kB a second of either end."""
+    """Counts of messages; ages of those that came, in seconds, at their first coming; kB a second of either end.
+
+    The longest frame is in bytes, and None where netem carried them.
+    """
 
     met_s: float | None
     got: int = 0
@@ -68,6 +71,7 @@ class Result:
     age_p95_s: float | None = None
     sender_kb_s: float = 0.0
     receiver_kb_s: float = 0.0
+    longest_frame: int | None = None
 
 
 def installed(rmw: str) -> bool:
@@ -95,9 +99,9 @@ def summary(lines: Sequence[str], met_s: float, seconds: float, sent_bytes: tupl
     numbers = Counter(line.split()[0] for line in lines)
     first = {line.split()[0]: float(line.split()[1]) for line in reversed(lines)}
     p50, p95 = np.percentile(list(first.values()), [50, 95]).tolist() if first else (None, None)
-    rates = [sent / seconds / 1e3 for sent in sent_bytes]
+    sender_kb_s, receiver_kb_s = (sent / seconds / 1e3 for sent in sent_bytes)
     twice = sum(count > 1 for count in numbers.values())
-    return Result(met_s, len(numbers), twice, p50, p95, *rates)
+    return Result(met_s, len(numbers), twice, p50, p95, sender_kb_s, receiver_kb_s)
 
 
 def run(case: Case) -> Result:
@@ -114,7 +118,7 @@ def run(case: Case) -> Result:
             "--size",
             str(case.size),
             "--linger",
-            f"{LINGER_S}",
+            f"{case.linger_s}",
         ]
         sender = hosts.start(0, [*command, "--met", str(said)], environment_of(case, hosts.address(1)))
         while not said.exists():
@@ -123,8 +127,12 @@ def run(case: Case) -> Result:
             time.sleep(0.1)
         met = time.monotonic()
         carry(hosts, sender, case.pause_s)
-        sent = hosts.bytes_sent(0), hosts.bytes_sent(1)
-        return summary(heard.read_text().splitlines(), met - start, time.monotonic() - met - LINGER_S, sent)
+        seconds = time.monotonic() - met - case.linger_s
+        result = summary(
+            heard.read_text().splitlines(), met - start, seconds, (hosts.bytes_sent(0), hosts.bytes_sent(1))
+        )
+        longest = max(link.longest_bytes for link in hosts.relay.links) if hosts.relay else None
+        return replace(result, longest_frame=longest)
 
 
 def carry(hosts: Hosts, sender: subprocess.Popen[bytes], pause_s: float) -> None:
@@ -167,6 +175,7 @@ def cases(rmws: Sequence[str], profiles: Sequence[str], troubles: Sequence[str],
 @click.option("--messages", default=60, show_default=True, help="sent in a run, one a second")
 @click.option("--size", default=80_000, show_default=True, help="bytes of a message")
 @click.option("--peers", is_flag=True, help="the ends know each other's addresses, and use no multicast")
+@click.option("--linger", "linger_s", default=20.0, show_default=True, help="seconds in which what is late may come")
 @click.option("--seed", default=0, show_default=True, help="of the losses")
 @click.option("--jobs", default=3, show_default=True, help="runs at a time; each has hosts and a link of its own")
 @click.option("--json", "path", type=click.Path(path_type=Path), help="where all figures go")
