@@ -23,7 +23,6 @@ import signal
 import struct
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -32,7 +31,7 @@ from typing import Self
 import click
 from lossy_link import Conditions, Relay
 
-TUN = Path("/dev/net/tun")
+TUN, SHARED = Path("/dev/net/tun"), Path("/dev/shm")
 TUNSETIFF, TAP_OF_PLAIN_FRAMES = 0x400454CA, 0x0002 | 0x1000  # <linux/if_tun.h>: IFF_TAP | IFF_NO_PI
 PREFIX = "hosts"  # of all that is made; then the process that made it
 SMALLEST_FRAME = 1500  # bytes: what netem, which counts packets, holds at most in its queue of bytes
@@ -148,7 +147,8 @@ class Hosts:
         return int(link["stats64"]["tx"]["bytes"])
 
     def _make(self) -> None:
-        self._memory = Path(tempfile.mkdtemp(prefix=f"{PREFIX}-", dir="/dev/shm"))
+        self._memory = SHARED / f"{PREFIX}-{self._tag}"
+        self._memory.mkdir()
         self._ending.callback(shutil.rmtree, self._memory, ignore_errors=True)
         for host, name in enumerate(self.names):
             (self._memory / str(host)).mkdir()
@@ -209,10 +209,19 @@ def remove(name: str) -> None:
 def sweep() -> None:
     """Take away what a process left that was killed outright."""
     for line in ip("netns", "list").splitlines():
-        name = line.split()[0]
-        kind, _, rest = name.partition("-")
-        if kind == PREFIX and not Path("/proc", rest.partition("-")[0]).exists():
-            remove(name)
+        if is_left(name := line.split()[0]):
+            with contextlib.suppress(OSError):  # another one is at it too
+                remove(name)
+    for folder in SHARED.glob(f"{PREFIX}-*"):
+        if is_left(folder.name):
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def is_left(name: str) -> bool:
+    """Whether a name is of something that was made here, by a process that is no more."""
+    kind, _, rest = name.partition("-")
+    maker = rest.partition("-")[0]
+    return kind == PREFIX and maker.isdigit() and not Path("/proc", maker).exists()
 
 
 def conditions_of(loss: float, delay_ms: float, mbit: float | None, seed: int) -> Conditions:

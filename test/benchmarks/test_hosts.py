@@ -51,6 +51,13 @@ def able(hosts: ModuleType) -> ModuleType:
     return hosts
 
 
+def wait_for(hosts: ModuleType, mine: str) -> None:
+    deadline = time.monotonic() + 10
+    while hosts.ip("netns", "list").count(mine) < 2:
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
 def test_without_root_it_says_so_in_one_line(hosts: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("os.geteuid", lambda: 1000)
     result = CliRunner().invoke(hosts.main, ["true"])
@@ -79,7 +86,8 @@ def test_two_hosts_hear_each_other_and_leave_nothing(able: ModuleType, by_netem:
         sleeper = pair.start(0, ["sleep", "60"])
     assert sleeper.wait(timeout=1) == -signal.SIGTERM
     left = able.ip("netns", "list") + able.ip("link")
-    assert not [name for name in pair.names if name in left] and not list(Path("/dev/shm").glob(pair.names[0] + "*"))
+    assert not [name for name in pair.names if name in left]
+    assert not list(Path("/dev/shm").glob(f"hosts-{os.getpid()}-*"))
 
 
 def test_nothing_comes_through_a_link_that_loses_all(able: ModuleType) -> None:
@@ -88,13 +96,20 @@ def test_nothing_comes_through_a_link_that_loses_all(able: ModuleType) -> None:
         assert [pair.start(host, [sys.executable, "-c", script]).wait() for host in range(2)] == [7, 7]
 
 
+def test_what_a_killed_run_left_is_taken_away_by_the_next(able: ModuleType, repository: Path) -> None:
+    run = subprocess.Popen([sys.executable, repository / "benchmarks" / "hosts.py", "sleep", "60"])
+    mine = f"hosts-{run.pid}-"
+    wait_for(able, mine)
+    run.kill()
+    run.wait()
+    able.sweep()
+    assert mine not in able.ip("netns", "list") and not list(Path("/dev/shm").glob(mine + "*"))
+
+
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM])
 def test_a_run_that_is_ended_takes_its_hosts_away(able: ModuleType, end: signal.Signals, repository: Path) -> None:
     run = subprocess.Popen([sys.executable, repository / "benchmarks" / "hosts.py", "sleep", "60"])
     mine = f"hosts-{run.pid}-"
-    deadline = time.monotonic() + 10
-    while able.ip("netns", "list").count(mine) < 2 and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert able.ip("netns", "list").count(mine) == 2
+    wait_for(able, mine)
     run.send_signal(end)
     assert run.wait(timeout=10) != 0 and mine not in able.ip("netns", "list")

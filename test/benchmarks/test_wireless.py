@@ -50,6 +50,7 @@ def test_what_is_not_installed_is_skipped_by_name(wireless: ModuleType, monkeypa
     assert result.exit_code == 0 and "rmw_of_nobody_cpp is skipped: it is not installed" in result.output
 
 
+@pytest.mark.slow
 def test_keyframes_come_through_a_link_that_loses_a_fifth(wireless: ModuleType) -> None:
     pytest.importorskip("rclpy", reason="the ends are nodes of ROS 2")
     if (missing := importlib.import_module("hosts").lack()) is not None:
