@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The Fast DDS profile for big messages, unless the user has chosen one."""
+"""The Fast DDS profile for big messages, unless the user has chosen one: his own, or ours for Wi-Fi."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import MutableMapping
+from pathlib import Path
 
 from objreg_ros.share import find
 
 PROFILE = "config/fastdds.xml"
-VARIABLES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")  # since Fast DDS 2.13, and before
+WIFI = "config/fastdds_wifi.xml"
+VARIABLES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")  # since Fast DDS 3, and before
 TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"
+MODE = "RMW_FASTRTPS_PUBLICATION_MODE"
 
 
 def apply(environment: MutableMapping[str, str] = os.environ) -> str:
@@ -19,8 +22,19 @@ def apply(environment: MutableMapping[str, str] = os.environ) -> str:
     if "fastrtps" not in rmw:
         return f"{rmw}: check yourself that it carries messages of 10 MB"
     chosen = next((name for name in (*VARIABLES, TRANSPORTS) if environment.get(name)), None)
-    if chosen and environment[chosen] != str(find(PROFILE)):
+    if chosen and _is(environment[chosen], WIFI):
+        environment[MODE] = "AUTO"  # that of the profile: its flow controller takes no synchronous writer
+        return f"Fast DDS: small datagrams at 4 Mbit/s for Wi-Fi ({_name(environment, WIFI)})"
+    if chosen and not _is(environment[chosen], PROFILE):
         return f"Fast DDS: your own {chosen}={environment[chosen]}"
+    return f"Fast DDS: shared memory for big messages ({_name(environment, PROFILE)})"
+
+
+def _is(chosen: str, profile: str) -> bool:
+    return Path(chosen).resolve() == find(profile).resolve()
+
+
+def _name(environment: MutableMapping[str, str], profile: str) -> str:
     for name in VARIABLES:
-        environment[name] = str(find(PROFILE))
-    return f"Fast DDS: shared memory for big messages ({environment[VARIABLES[0]]})"
+        environment[name] = str(find(profile))
+    return environment[VARIABLES[0]]
