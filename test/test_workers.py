@@ -57,8 +57,6 @@ def test_any_cluster_is_taken_by_its_address() -> None:
     with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster:
         told = spread(os.path.basename, ["a/b"], scheduler=cluster.scheduler_address)
         assert [done.result() for done in told] == ["b"]
-            "b"
-        ]
 
 
 def test_a_scheduler_that_does_not_answer_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
