@@ -28,9 +28,9 @@ import pyarrow.parquet
 from objreg_ros.cli.batch_work import BatchWork
 from objreg_ros.cli.recorded import Asked
 from objreg_ros.cli.settings import read_settings
+from objreg_ros.cli.simulate import camera_of, sensors_of
 from objreg_ros.report.batch_rows import Row
 from objreg_ros.report.batch_tables import batch_tables
-from objreg_ros.simulation.camera import CAMERAS
 from objreg_ros.simulation.write import simulate
 from objreg_ros.workers import Done, spread
 
@@ -98,7 +98,14 @@ def simulated(folder: Path, count: int, frames: int) -> list[Path]:
         if not path.exists():
             part = path.with_name("part")
             shutil.rmtree(part, ignore_errors=True)
-            simulate(part, "loop", seed, frames, camera=CAMERAS["qvga"], jpeg=True)
+            simulate(
+                part,
+                "loop",
+                seed,
+                frames,
+                sensors=sensors_of(camera_of("qvga", None), False, (), "kinect_v1"),
+                jpeg=True,
+            )
             os.replace(part, path)
     return paths
 
@@ -129,7 +136,7 @@ def main(
     click.echo(HEAD)
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "warm").mkdir()
-            measure(paths[:1], 1, Path(folder, "warm"))
+        measure(paths[:1], 1, Path(folder, "warm"))
         for name, (number, killer) in runs.items():
             place = Path(folder, name)
             place.mkdir()

@@ -92,7 +92,7 @@ def _failures(work: BatchWork, waiting: Sequence[Path], workers: int | None, sch
             bar.update()
             if done.error is not None:
                 failures[done.item] = done.error
-                bar.write(f"! {done.item}: {Row.failed(done.item, done.error).error}", file=sys.stderr)
+                bar.write(f"! {done.item.name}: {Row.failed(done.item, done.error).error}", file=sys.stderr)
     return failures
 
 
