@@ -94,6 +94,7 @@ class Killer:
 def simulated(folder: Path, count: int, frames: int) -> list[Path]:
     """So many small loops, made where they are not there yet."""
     paths = [folder / f"loop_{seed}_{frames}" for seed in range(count)]
+    sensors = sensors_of(camera_of("qvga", None), False, (), "kinect_v1")
     for seed, path in enumerate(paths):
         if not path.exists():
             part = path.with_name("part")

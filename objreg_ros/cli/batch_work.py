@@ -11,7 +11,6 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from objreg_ros import share
 from objreg_ros.cli.recorded import Asked
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.recording.troubles import troubles
@@ -35,7 +34,7 @@ class BatchWork:
     def of(cls, asked: Asked, folder: Path, arguments: tuple[str, ...]) -> BatchWork:
         """The work of these settings; OSError where there is no such model."""
         model = asked.settings.of("detector", DetectorParams).model
-        told = about(Path(), share.model(model).name, asked.settings.changed(), arguments)
+        told = about(Path(), model, asked.settings.changed(), arguments)
         made = {name: told[name] for name in ("version", "commit", "model")}
         made |= {"odometry": asked.odometry, "remaps": list(asked.remaps), "max_frames": asked.max_frames}
         return cls(asked, folder, arguments, made | told["params"])
