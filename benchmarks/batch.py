@@ -104,7 +104,7 @@ def simulated(folder: Path, count: int, frames: int) -> list[Path]:
                 "loop",
                 seed,
                 frames,
-                sensors=sensors_of(camera_of("qvga", None), False, (), "kinect_v1"),
+                sensors=sensors,
                 jpeg=True,
             )
             os.replace(part, path)
