@@ -99,14 +99,7 @@ def simulated(folder: Path, count: int, frames: int) -> list[Path]:
         if not path.exists():
             part = path.with_name("part")
             shutil.rmtree(part, ignore_errors=True)
-            simulate(
-                part,
-                "loop",
-                seed,
-                frames,
-                sensors=sensors,
-                jpeg=True,
-            )
+            simulate(part, "loop", seed, frames, sensors=sensors, jpeg=True)
             os.replace(part, path)
     return paths
 
