@@ -83,6 +83,8 @@ setup(
         "mapper": ["gtsam>=4.3"],
         # The parts of a report that one can turn about. Without it the report has its flat pictures, and says so.
         "report": ["plotly>=5.9"],
+        # `objreg batch`: Dask's processes and clusters, and Parquet.
+        "batch": ["distributed>=2024.1", "pyarrow>=14"],
         # `--rerun`: a run as a recording for the Rerun viewer.
         "rerun": ["rerun-sdk>=0.23"],
         # The site of the documentation: `mkdocs build`.

@@ -22,7 +22,7 @@ import hashlib
 import json
 import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -39,6 +39,7 @@ import objreg_ros
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.simulation.scenarios import SCENARIOS
 from objreg_ros.simulation.write import simulate
+from objreg_ros.workers import spread
 
 OURS, ALONE, ORACLE = "objreg", "objreg, pairs alone", "oracle"
 QUICK = {"frames": 300, "names": ("orb_pnp",), "candidates": 1}
@@ -135,7 +136,7 @@ def simulated(folder: Path, scenario: str, seed: int, frames: int) -> Path:
         click.echo(f"{path.name}: simulating {frames} frames", err=True)
         unfinished = path.with_name("part")
         _remove(unfinished)
-        simulate(unfinished, scenario, seed, frames, jpeg=True, threads=len(os.sched_getaffinity(0)))
+        simulate(unfinished, scenario, seed, frames, jpeg=True, threads=1)
         os.replace(unfinished, path)
     return path
 
@@ -166,6 +167,15 @@ def _require_own_names(names: Sequence[str]) -> None:
         raise click.UsageError(f"expected recordings of different names, got more than one {', '.join(twice)}")
 
 
+def _compared(
+    make: Callable[[], Path], asked: Asked, frames: int, keep: Path, again: Sequence[str]
+) -> tuple[str, dict[str, Any]]:
+    """The name of a recording, which is made where it is not there, and its figures."""
+    path = make()
+    kept = Kept(keep / "figures" / f"{path.name}_{frames}_{asked.tag()}.json", again)
+    return path.name, compare(path, asked, kept)
+
+
 @click.command()
 @click.argument("recordings", nargs=-1, type=click.Path(exists=True, path_type=Path))
 @click.option(
@@ -190,6 +200,7 @@ def _require_own_names(names: Sequence[str]) -> None:
     "--keep", type=click.Path(file_okay=False, path_type=Path), default=Path("out/closure"), show_default=True
 )
 @click.option("--again", multiple=True, metavar="METHOD", help="Measure this method anew.")
+@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Recordings at once.")
 @click.option("--quick", is_flag=True, help="One peer, and one short loop without RECORDINGS.")
 @click.pass_context
 def main(
@@ -209,13 +220,15 @@ def main(
     asked = Asked(detector, options["names"], options["candidates"], options["seed"], options["drift"])
     paths = [partial(Path, path) for path in recordings]
     paths += [partial(simulated, keep, *story, options["frames"]) for story in told]
-    _require_own_names([*(path.name for path in recordings), *(f"{name}_{seed}" for name, seed in told)])
+    names = [*(path.name for path in recordings), *(f"{name}_{seed}" for name, seed in told)]
+    _require_own_names(names)
+    work = partial(_compared, asked=asked, frames=options["frames"], keep=keep, again=again)
     rows: dict[str, dict[str, Any]] = {}
-    for make in paths:
-        path = make()
-        kept = Kept(keep / "figures" / f"{path.name}_{options['frames']}_{asked.tag()}.json", again)
-        rows[path.name] = compare(path, asked, kept)
-        click.echo(table(path.name, rows[path.name]))
+    for done in spread(work, paths, options["workers"]):
+        name, row = done.result()
+        rows[name] = row
+        click.echo(table(name, row))
+    rows = {name: rows[name] for name in names}  # whichever ended first
     by_group = {group: totals(list(members.values())) for group, members in grouped(rows).items()}
     for group, methods in by_group.items():
         click.echo(table_of_totals(group, methods))

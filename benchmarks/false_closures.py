@@ -18,28 +18,25 @@ options of `objreg simulate` of the same name.
 from __future__ import annotations
 
 import json
-import multiprocessing
 import tempfile
 from collections import Counter
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import click
-import cv2
 from sources import detector_of, read_source
 
 from objreg_ros.cli.simulate import camera_of, distortion_of, sensors_of
 from objreg_ros.data import UNTRIED, LoopClosure, Rejected
 from objreg_ros.registrar.registrar import Registrar
-from objreg_ros.registrar.warm import warm
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.simulation.camera import CAMERAS, SENSORS
 from objreg_ros.simulation.scenarios import SCENARIOS
 from objreg_ros.simulation.write import simulate
 from objreg_ros.truth import LOOSE, Truth, summarise, within
+from objreg_ros.workers import spread
 
 EAGER = {"candidates": 10, "closures": 10, "thin_seconds": 0.2, "threads": 1}
 STORIES = (
@@ -185,26 +182,22 @@ def line(name: str, row: dict[str, Any], group: str = "all") -> str:
 @click.option("--model", default="", help="ONNX model; `truth` takes the true boxes.")
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
 @click.option("--processes", type=click.IntRange(min=1), default=2, show_default=True, help="Recordings at once.")
-def main(stories: list[Told], frames: int, model: str, json_file: Path | None, processes: int) -> None:
+@click.option("--scheduler", default="", metavar="tcp://HOST:PORT", help="A Dask cluster in place of this machine.")
+def main(stories: list[Told], frames: int, model: str, json_file: Path | None, processes: int, scheduler: str) -> None:
     """Hold every keyframe of simulated recordings against ten others, and count what is falsely accepted."""
     rows: dict[str, dict[str, Any]] = {}
     click.echo(HEAD)
-    with ProcessPoolExecutor(processes, multiprocessing.get_context("fork"), initializer=_begin) as pool:
-        for story, row in zip(stories, pool.map(partial(measure, frames=frames, model=model), stories), strict=True):
-            rows[story.name] = row
-            click.echo(line(story.name, row))
-            if json_file is not None:
-                total = added(list(rows.values()))
-                json_file.write_text(json.dumps({"frames": frames, "recordings": rows, "total": total}, indent=1))
+    for done in spread(partial(measure, frames=frames, model=model), stories, processes, scheduler):
+        rows[done.item.name] = done.result()
+        click.echo(line(done.item.name, rows[done.item.name]))
+        rows = {story.name: rows[story.name] for story in stories if story.name in rows}  # whichever ended first
+        if json_file is not None:
+            total = added(list(rows.values()))
+            json_file.write_text(json.dumps({"frames": frames, "recordings": rows, "total": total}, indent=1))
     total = added(list(rows.values()))
     click.echo(line("all of them", total))
     for group in ("one object", "several objects"):
         click.echo(line(f"  {group}", total, group))
-
-
-def _begin() -> None:
-    cv2.setNumThreads(1)
-    warm(RegistrarParams())
 
 
 if __name__ == "__main__":

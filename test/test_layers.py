@@ -164,6 +164,8 @@ def test_onnxruntime_is_imported_in_one_file_only() -> None:
         ("open3d", {"registration.paper", "segmenter.paper"}),
         ("matplotlib", {"report.live_pictures"}),
         ("rerun", {"report.rerun_file"}),
+        ("distributed", {"workers"}),
+        ("pyarrow", {"report.batch_tables"}),
         ("plotly", {"report.bundle"}),
     ],
 )

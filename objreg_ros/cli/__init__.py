@@ -29,6 +29,7 @@ SUMMARIES = {
     "demo": "Run a recording through the live graph and show what came out.",
     "inspect": "Say what is in a recording and what the graph would use of it, or what a store remembers.",
     "offline": "Run a recording through the three rooms without ROS.",
+    "batch": "Run many recordings, over the cores of this machine or a cluster.",
     "replay": "Publish a recording into the live graph.",
     "convert": "Write any recording as rosbag2.",
     "export": "Write the objects of a store as PLY and JSON.",

@@ -32,6 +32,7 @@ NEEDED = (
     *("open3d", "PIL", "rosbags", "scipy", "tqdm", "yaml"),
 )
 EXTRAS = {  # module: the extra that brings it, and what for
+    "distributed": ("batch", "many recordings at once"),
     "gtsam": ("mapper", "the mapper and corrected trajectories"),
     "matplotlib": ("simulation", "the demo's picture of the way"),
     "plotly": ("report", "what can be turned about in a report"),

@@ -43,6 +43,21 @@ json_out = click.option(
 )
 labels = click.option("--labels", help="Text file of labels, one a line.")
 
+max_frames = click.option("--max-frames", type=click.IntRange(min=1), help="Stop after this many frames.")
+odometry = click.option(
+    "--odometry",
+    metavar="TOPIC|none|drift:SEED",
+    help="Another topic, no odometry, or a synthetic one that drifts away from the recording's ground truth.",
+)
+OF_RUN = ("model", "labels", "camera", "max_frames", "odometry", "params_file", "changes", "remaps")
+
+
+def of_run(command: Callable) -> Callable:
+    """How a recording is run, in `OF_RUN`."""
+    for option in (remap, change, params, odometry, max_frames, camera, labels, model):
+        command = option(command)
+    return command
+
 
 def scene_files(command: Callable) -> Callable:
     """The files of a run for viewers, ``rerun`` and ``mcap``."""

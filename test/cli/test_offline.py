@@ -166,7 +166,7 @@ def test_the_segmenters_colour_reaches_the_run(
     colour: bool, model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen: list = []
-    monkeypatch.setattr("objreg_ros.cli.offline.run_offline", lambda *words: seen.append(words[3]) or Run())
+    monkeypatch.setattr("objreg_ros.cli.recorded.run_offline", lambda *words: seen.append(words[3]) or Run())
     offline(tum_folder(tmp_path), "--model", model, "--set", f"segmenter.colour={str(colour).lower()}")
     assert seen[0].colour is colour
 

@@ -22,7 +22,7 @@ def test_a_page_that_cannot_be_written_is_refused_before_anything_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recording = tum_folder(tmp_path / "tum")
-    monkeypatch.setattr("objreg_ros.cli.offline.run_offline", lambda *_: pytest.fail("a recording was run"))
+    monkeypatch.setattr("objreg_ros.cli.recorded.run_offline", lambda *_: pytest.fail("a recording was run"))
     with pytest.raises(OSError, match=r"--out: expected an existing folder .*nowhere, got none; create it"):
         CliRunner().invoke(command, [str(recording), "--out", str(tmp_path / "nowhere/x.html")], catch_exceptions=False)
     assert not (tmp_path / "nowhere").exists()

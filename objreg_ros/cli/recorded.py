@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A recording through the rooms as the options of a command ask: what `objreg offline` and `objreg batch` share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from objreg_ros.bridge.calibration import absolute
+from objreg_ros.cli.settings import Settings, read_settings
+from objreg_ros.detector.params import DetectorParams
+from objreg_ros.offline import Run, Timing, build_rooms, run_offline
+from objreg_ros.recording import Record, Recording, open_recording
+from objreg_ros.recording.drift import ODOM, with_drifting_odometry
+from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
+from objreg_ros.recording.mounts import static_frames
+from objreg_ros.recording.told_camera import with_camera
+from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
+from objreg_ros.report.about import about
+from objreg_ros.report.findings import setting
+from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
+from objreg_ros.truth import Truth
+
+DRIFT = "drift:"
+CAMERAS_OWN = (
+    "--odometry {} is the camera's own and not level: T_base_camera and segmenter.level_odom are left out of this run"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """How recordings are run: the settings of the nodes, the topics, and how far."""
+
+    settings: Settings
+    remaps: tuple[str, ...] = ()
+    odometry: str | None = None
+    max_frames: int | None = None
+
+    @classmethod
+    def of(
+        cls,
+        model: str | None,
+        labels: str | None,
+        camera: str,
+        params_file: Path | None,
+        changes: Sequence[str],
+        remaps: tuple[str, ...],
+        odometry: str | None,
+        max_frames: int | None,
+    ) -> Asked:
+        """What the options of `options.of_run` say; ValueError for what is refused before any recording is read."""
+        _require_seed(odometry)
+        named = {"detector.model": model, "detector.labels": labels, "segmenter.camera": camera}
+        words = [f"{name}={value}" for name, value in named.items() if value]
+        return cls(read_settings(params_file, [*changes, *words]), remaps, odometry, max_frames)
+
+    @property
+    def drifts(self) -> bool:
+        """Whether odometry is made that drifts from the ground truth."""
+        return (self.odometry or "").startswith(DRIFT)
+
+    @contextmanager
+    def opened(self, path: Path) -> Iterator[Opened]:
+        """A recording with the inputs that it is run on; OSError and ValueError where it has not got them."""
+        told = self.settings.of("segmenter", SegmenterNodeParams)
+        with open_recording(path) as recording:
+            source = with_camera(recording, told.camera, parse_remaps(self.remaps), told.source)
+            inputs = self._inputs(source, told.source)
+            yield Opened(self, path, source, inputs, Truth.of(source, inputs.ground_truth))
+
+    def _inputs(self, source: Recording, depth_source: str) -> Inputs:
+        asked = parse_remaps(self.remaps)
+        if self.odometry is not None:
+            asked["odom"] = "" if self.odometry == "none" or self.drifts else self.odometry
+            if asked["odom"] and asked["odom"] not in source.topics:
+                expected = f"a topic of {', '.join(source.topics)}, or none, or drift:SEED"
+                raise ValueError(f"--odometry: expected {expected}, got {self.odometry!r}")
+        inputs = choose_inputs(source.topics, asked, depth_source)
+        if not inputs.complete:
+            there = ", ".join(f"{topic.name} ({topic.msgtype})" for topic in source.topics.values()) or "no topics"
+            wanted = inputs.wanted(depth_source)
+            other = "" if depth_source == "auto" else ", or leave out segmenter.source"
+            raise ValueError(f"{source.path}: expected {wanted}, got {there}; choose with --remap input:=/topic{other}")
+        if self.drifts:
+            if inputs.ground_truth is None:
+                raise ValueError(f"{source.path}: --odometry {self.odometry} needs a ground truth, and there is none")
+            return Inputs(**{**inputs.chosen(), "odom": ODOM})
+        return inputs
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """A recording that is open, with what is taken of it."""
+
+    asked: Asked
+    path: Path
+    source: Recording
+    inputs: Inputs
+    truth: Truth
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is odd about the recording, its truth and what is asked of it, for the user."""
+        registrar = self.asked.settings.of("registrar", RegistrarNodeParams)
+        segmenter = self.asked.settings.of("segmenter", SegmenterNodeParams)
+        is_told = registrar.mounting is not None or segmenter.level_odom
+        left_out = [CAMERAS_OWN.format(self.asked.odometry)] if self.asked.drifts and is_told else []
+        return (*self.source.notes, *self.truth.notes, *left_out)
+
+    @property
+    def frames(self) -> int:
+        """How many frames will go through at most."""
+        count = self.source.topics[self.inputs.depth or self.inputs.points or ""].count
+        return min(count, self.asked.max_frames or count)
+
+    def run(self, registrar: RegistrarParams | None = None, on_frame: Callable[[int], None] = lambda n: None) -> Run:
+        """What comes out of the rooms; ``registrar`` in place of the settings' own. ``on_frame`` as `run_offline`."""
+        settings = self.asked.settings
+        detector = settings.of("detector", DetectorParams)
+        find_pose = static_frames(self.source).between
+        timing = replace(self._timing(), find_pose=find_pose, max_rate=detector.max_rate)
+        rooms, close = build_rooms(
+            detector,
+            settings.of("segmenter", SegmenterParams),
+            registrar or settings.of("registrar", RegistrarParams),
+        )
+        try:
+            return run_offline(self._records(), rooms, self.inputs, timing, self.asked.max_frames, on_frame)
+        finally:
+            close()
+
+    def summary(self, run: Run, arguments: Sequence[str]) -> dict[str, Any]:
+        """The run as JSON, with what it was made with; ``arguments`` are what stood behind `objreg`."""
+        settings, model = self.asked.settings, self.asked.settings.of("detector", DetectorParams).model
+        told = settings.of("segmenter", SegmenterNodeParams)
+        return {
+            "about": about(self.path, model, settings.changed(), arguments),
+            "recording": str(self.path.resolve()),
+            "inputs": self.inputs.outright,
+            "odometry": self.inputs.odom,
+            "rectified": told.rectified,
+            "camera": absolute(told.camera),
+            **setting(self.source, self.inputs, model),
+            **run.summary(self.truth),
+        }
+
+    def _timing(self) -> Timing:
+        settings = self.asked.settings
+        segmenter = settings.of("segmenter", SegmenterNodeParams)
+        registrar = settings.of("registrar", RegistrarNodeParams)
+        timing = Timing(
+            slop_ns=round(segmenter.slop * 1e9),
+            odom_slop_ns=round(registrar.odom_slop * 1e9),
+            T_base_camera=registrar.mounting,
+            colour=segmenter.colour,
+            level_odom=segmenter.level_odom,
+            T_level_camera=segmenter.mounting,
+            rectified=segmenter.rectified,
+            T_camera_imu=segmenter.imu_mounting,
+        )
+        if self.asked.drifts:
+            return replace(timing, T_base_camera=np.eye(4), level_odom=False, T_level_camera=None)
+        return timing
+
+    def _records(self) -> Iterator[Record]:
+        records = self.source.records(set(self.inputs.chosen().values()))
+        if not self.asked.drifts or self.inputs.ground_truth is None:
+            return records
+        seed = int(str(self.asked.odometry).removeprefix(DRIFT))
+        return with_drifting_odometry(records, self.inputs.ground_truth, seed)
+
+
+def _require_seed(odometry: str | None) -> None:
+    """ValueError for a drift that does not say its seed."""
+    is_drift = odometry is not None and (odometry + ":").startswith(DRIFT)
+    if is_drift and not str(odometry).removeprefix(DRIFT).isdecimal():
+        raise ValueError(f"--odometry: expected drift: and a seed like drift:1, got {odometry!r}")
