@@ -38,12 +38,13 @@ def place() -> Keyframe:
 
 PLACE = place()
 PACKED = pack_keyframe(PLACE)
+QUICK = [{"id": lzma.FILTER_LZMA2, "preset": 0, "dict_size": 1 << 20}]  # read as what others wrote
 
 
 def sealed(body: bytes, size: int | None = None, form: int = compact.FORMAT, magic: bytes = compact.MAGIC) -> bytes:
     """Bytes with a checksum that holds."""
     said = struct.pack("<I", len(body) if size is None else size)
-    rest = lzma.compress(body, lzma.FORMAT_RAW, filters=compact.FILTERS)
+    rest = lzma.compress(body, lzma.FORMAT_RAW, filters=QUICK)
     return compact.PREFIX.pack(magic, form, zlib.crc32(said + rest), *struct.unpack("<I", said)) + rest
 
 
@@ -153,7 +154,7 @@ def test_every_flipped_bit_is_refused(bit: int) -> None:
         unpack_keyframe(bytes(spoilt))
 
 
-@settings(max_examples=30, deadline=None, database=None)
+@settings(max_examples=20, deadline=None, database=None)
 @given(st.binary(max_size=3000), st.integers(0, len(body_of(PACKED))))
 def test_a_body_of_anything_under_a_checksum_that_holds_is_refused_or_a_keyframe(noise: bytes, at: int) -> None:
     body = body_of(PACKED)
@@ -162,6 +163,17 @@ def test_a_body_of_anything_under_a_checksum_that_holds_is_refused_or_a_keyframe
             assert isinstance(unpack_keyframe(sealed(hostile)), Keyframe)
         except ValueError as error:
             assert "expected" in str(error) and len(str(error)) < 1000
+
+
+@settings(max_examples=60, deadline=None, database=None)
+@given(st.binary(min_size=1, max_size=40), st.integers(0, len(PACKED) - compact.PREFIX.size - 1))
+def test_damaged_compression_under_a_checksum_that_holds_is_refused(noise: bytes, at: int) -> None:
+    size, rest = PACKED[compact.PREFIX.size - 4 : compact.PREFIX.size], PACKED[compact.PREFIX.size :]
+    for hostile in (rest[:at], rest[:at] + noise + rest[at + len(noise) + 1 :], rest + noise):
+        checksum = zlib.crc32(size + hostile)
+        packed = compact.PREFIX.pack(compact.MAGIC, compact.FORMAT, checksum, *struct.unpack("<I", size)) + hostile
+        with pytest.raises(ValueError, match="expected"):
+            unpack_keyframe(packed)
 
 
 anything = st.recursive(
@@ -177,7 +189,7 @@ anything = st.recursive(
 )
 
 
-@settings(max_examples=40, deadline=None, database=None)
+@settings(max_examples=25, deadline=None, database=None)
 @given(st.data())
 def test_a_head_that_lies_is_refused_or_a_keyframe(data: st.DataObject) -> None:
     def lie(head: dict[str, Any]) -> None:
