@@ -64,7 +64,6 @@ def unpack(blob: bytes) -> tuple[Any, ...]:
 def keyframe_row(keyframe: Keyframe) -> Row:
     """The columns of a keyframe."""
     view = keyframe.view
-    camera = {name: getattr(view.intrinsics, name) for name in Intrinsics.__slots__}  # type: ignore[attr-defined]
     row = {
         "id": int(keyframe.keyframe_id),
         "robot": keyframe.robot,
@@ -78,7 +77,7 @@ def keyframe_row(keyframe: Keyframe) -> Row:
         "by_odometry": int(keyframe.by_odometry),
         "gravity": _bytes(keyframe.gravity),
         "gravity_confidence": _real(keyframe.gravity_confidence),
-        "camera": json.dumps(camera),
+        "camera": camera_text(view.intrinsics),
         "view": pack(view.xyz[..., 2], view.grey),
         "context": pack(keyframe.context.xyz, keyframe.context.normals),
     }
@@ -155,7 +154,7 @@ def keyframe_from_rows(row: Mapping[str, Any], objects: Sequence[Mapping[str, An
     require_keyframe(row)
     for item in objects:
         require_object(item)
-    camera = _camera(row["camera"])
+    camera = camera_of(row["camera"])
     depth, grey = _unpacked(row, "view", 2)
     xyz = back_project(depth, camera.fx, camera.fy, camera.cx, camera.cy)
     context_xyz, context_normals = _unpacked(row, "context", 2)
@@ -257,26 +256,37 @@ def _finite(name: str, numbers: Array) -> Array:
     return numbers
 
 
-def _camera(text: str) -> Intrinsics:
+def camera_text(camera: Intrinsics) -> str:
+    """A camera as JSON."""
+    return json.dumps({name: getattr(camera, name) for name in Intrinsics.__slots__})  # type: ignore[attr-defined]
+
+
+def camera_of(text: str) -> Intrinsics:
+    """The camera of `camera_text`. ValueError if it is none."""
     try:
         return Intrinsics(**json.loads(text))
     except (TypeError, ValueError, RecursionError) as error:
         raise ValueError(f"camera: expected fx fy cx cy width height as JSON, got {text!r} ({error})") from error
 
 
-def _gravity(row: Mapping[str, Any]) -> Array | None:
-    if row["gravity"] is None:
-        return None
-    gravity = _finite("gravity", np.frombuffer(_bytes_of(row, "gravity", 24)))
-    if abs(np.linalg.norm(gravity) - 1.0) > 1e-4:
+def gravity_of(numbers: Array) -> Array:
+    """The direction (3,) of so many numbers. ValueError if they are none."""
+    gravity = _finite("gravity", numbers)
+    if gravity.shape != (3,) or abs(np.linalg.norm(gravity) - 1.0) > 1e-4:
         raise ValueError(f"gravity: expected a direction of length 1, got {gravity.tolist()}")
     return gravity
 
 
-def _pose(row: Mapping[str, Any]) -> Array | None:
-    if row["T_odom_camera"] is None:
-        return None
-    T = np.frombuffer(_bytes_of(row, "T_odom_camera", 128)).reshape(4, 4)
-    if not is_rigid(T, 1e-4):
-        raise ValueError(f"T_odom_camera: expected a rigid motion, got {T.tolist()}")
+def pose_of(numbers: Array) -> Array:
+    """The pose (4, 4) of a camera in the world, of 16 numbers. ValueError if they are none."""
+    if numbers.shape != (16,) or not is_rigid(T := numbers.reshape(4, 4), 1e-4):
+        raise ValueError(f"T_odom_camera: expected a rigid motion, got {numbers.tolist()}")
     return T
+
+
+def _gravity(row: Mapping[str, Any]) -> Array | None:
+    return None if row["gravity"] is None else gravity_of(np.frombuffer(_bytes_of(row, "gravity", 24)))
+
+
+def _pose(row: Mapping[str, Any]) -> Array | None:
+    return None if row["T_odom_camera"] is None else pose_of(np.frombuffer(_bytes_of(row, "T_odom_camera", 128)))
