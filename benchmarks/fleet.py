@@ -16,7 +16,7 @@ from typing import Any
 from closers import TOLERANCE_NS
 
 from objreg_ros.data import LoopClosure
-from objreg_ros.report.revisits import Revisit, Seen, revisit_of
+from objreg_ros.report.revisits import VIEW_CHANGES, Revisit, Seen, revisit_of
 from objreg_ros.truth import FALSE, LOOSE, Truths, within
 
 APART_NS = 2_000_000_000
@@ -71,8 +71,8 @@ def stretches(found: Iterable[Meeting]) -> list[list[Meeting]]:
 def judged(found: Sequence[Meeting], closures: Iterable[LoopClosure], truths: Truths) -> dict[str, Any]:
     """What the constraints between robots are worth: how many are right and false, and what they close.
 
-    ``keyframes`` are meetings and ``stretches`` runs of them, each as closed and of how many; ``robots`` has the
-    stretches by ``EARLIER-LATER``.
+    ``keyframes`` are meetings and ``stretches`` runs of them, each as closed and of how many; ``view_change`` has the
+    keyframes by degrees between the two views, and ``robots`` the stretches by ``EARLIER-LATER``.
     """
     between = [closure for closure in closures if closure.from_robot != closure.to_robot]
     errors = [(closure, error) for closure in between if (error := truths.error(closure)) is not None]
@@ -85,6 +85,10 @@ def judged(found: Sequence[Meeting], closures: Iterable[LoopClosure], truths: Tr
         "true": len(right),
         "false": sum(not within(error, FALSE) for _, error in errors),
         "keyframes": _counted(closed.values()),
+        "view_change": {
+            f"{low}-{min(high, 180)}": _counted(closed[m] for m in found if low <= m.revisit.view_change_deg < high)
+            for low, high in VIEW_CHANGES
+        },
         "stretches": _counted(is_closed for _, is_closed in parts),
         "robots": {
             f"{a}-{b}": _counted(is_closed for first, is_closed in parts if (first.earlier, first.later) == (a, b))

@@ -84,6 +84,7 @@ def test_a_right_constraint_closes_its_keyframe_and_its_stretch(seen: dict[str, 
     assert (told["constraints"], told["true"], told["false"]) == (3, 2, 1)
     assert told["stretches"] == {"closed": 2, "of": 5}
     assert told["keyframes"] == {"closed": 3, "of": 7}  # two of them within a second of one constraint
+    assert told["view_change"]["0-30"] == told["keyframes"] and told["view_change"]["60-120"]["of"] == 0
     assert told["robots"]["a-b"] == {"closed": 1, "of": 2} and told["robots"]["c-b"] == {"closed": 0, "of": 1}
 
 
