@@ -7,7 +7,8 @@ import numpy as np
 
 from objreg_ros.simulation import furniture
 from objreg_ros.simulation.objects import make_object
-from objreg_ros.simulation.scenarios import TABLE_CLASSES, Story
+from objreg_ros.simulation.rooms import TABLE_CLASSES
+from objreg_ros.simulation.scenarios import Story
 from objreg_ros.simulation.scene import furnished, number, spread
 from objreg_ros.simulation.trajectory import Hand, around, carried
 

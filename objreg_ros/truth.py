@@ -8,7 +8,7 @@ The truth is the pose of the colour camera's optical frame in the world over tim
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -75,6 +75,36 @@ class Truth:
         """(degrees, centimetres) between a pose and the truth; None where the truth does not tell or there is none."""
         T_from_to = self.between(closure.from_ns, closure.to_ns)
         return None if T_from_to is None or closure.T_from_to is None else pose_error(closure.T_from_to, T_from_to)
+
+    def errors(self, closures: Iterable[LoopClosure]) -> list[Error]:
+        """The error of every closure that the truth tells of."""
+        return [error for closure in closures if (error := self.error(closure)) is not None]
+
+
+class Truths:
+    """The true paths of several robots by name, all in one world: how wrong a constraint between two of them is.
+
+    A robot of which nothing is known has a `Truth` without poses. ValueError for a robot that is not among them.
+    """
+
+    def __init__(self, of_robots: Mapping[str, Truth]) -> None:
+        self.of_robots = dict(of_robots)
+
+    def at(self, robot: str, stamp_ns: int) -> Array | None:
+        """``T_world_camera`` of a robot at a moment; None where its truth does not tell."""
+        if robot not in self.of_robots:
+            raise ValueError(
+                f"robot: expected one of {', '.join(self.of_robots)}, got {robot!r}; name it in the closure"
+            )
+        return self.of_robots[robot].at(stamp_ns)
+
+    def error(self, closure: LoopClosure | Rejected) -> Error | None:
+        """(degrees, centimetres) between a pose and the truth; None where the truth does not tell or there is none."""
+        T_world_from = self.at(closure.from_robot, closure.from_ns)
+        T_world_to = self.at(closure.to_robot, closure.to_ns)
+        if T_world_from is None or T_world_to is None or closure.T_from_to is None:
+            return None
+        return pose_error(closure.T_from_to, inverse(T_world_from) @ T_world_to)
 
     def errors(self, closures: Iterable[LoopClosure]) -> list[Error]:
         """The error of every closure that the truth tells of."""

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from objreg_ros.data import LoopClosure
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
 from objreg_ros.recording import messages, open_recording, write_rosbag2
 from objreg_ros.recording.record import Record
-from objreg_ros.truth import MAX_GAP_NS, Truth, spread, summarise
+from objreg_ros.truth import MAX_GAP_NS, Truth, Truths, spread, summarise
 
 MS = 1_000_000
 
@@ -40,6 +41,37 @@ def test_a_closure_the_other_way_round_is_wrong() -> None:
     truth = Truth([(0, at(0)), (100 * MS, at(1))])
     error = truth.error(closure(at(-1)))
     assert error is not None and error[1] == pytest.approx(200)
+
+
+def of_two() -> Truths:
+    """One robot drives away from the origin; the other stands to its side, turned, by the same clock."""
+    return Truths({"a": Truth([(0, at(0)), (100 * MS, at(1))]), "b": Truth([(0, at(5, 0.5)), (100 * MS, at(5, 0.5))])})
+
+
+def tie(T_from_to: np.ndarray, from_robot: str, to_robot: str, to_ns: int = 100 * MS) -> LoopClosure:
+    return replace(closure(T_from_to, to_ns=to_ns), from_robot=from_robot, to_robot=to_robot)
+
+
+def test_a_constraint_between_two_robots_has_the_error_of_both_paths() -> None:
+    T_a_b = inverse(at(0)) @ at(5, 0.5)
+    assert of_two().error(tie(T_a_b, "a", "b")) == pytest.approx((0, 0), abs=1e-6)
+    turned = of_two().error(tie(T_a_b, "b", "a"))
+    assert turned is not None and turned[1] > 100
+
+
+def test_a_constraint_of_one_robot_is_judged_by_its_own_path() -> None:
+    assert of_two().error(tie(at(1.02), "a", "a")) == pytest.approx((0, 2), abs=1e-6)
+    assert of_two().error(tie(at(0.02), "b", "b")) == pytest.approx((0, 2), abs=1e-6)
+
+
+def test_between_robots_the_truth_tells_nothing_beyond_either_path() -> None:
+    late = tie(at(1), "a", "b", to_ns=900 * MS)
+    assert of_two().error(late) is None and of_two().errors([late, tie(at(1), "a", "a")]) == [pytest.approx((0, 0))]
+
+
+def test_a_robot_without_a_truth_is_refused_by_its_name() -> None:
+    with pytest.raises(ValueError, match="expected one of a, b, got ''"):
+        of_two().error(closure(at(1)))
 
 
 def test_errors_are_of_the_closures_that_the_truth_tells_of() -> None:

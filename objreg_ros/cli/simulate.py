@@ -13,9 +13,10 @@ from objreg_ros.cli.told import tell_next
 from objreg_ros.data import Intrinsics
 from objreg_ros.params import Params
 from objreg_ros.simulation.camera import CAMERAS, LENSES, SENSORS
+from objreg_ros.simulation.fleet import FLEETS, ROBOTS
 from objreg_ros.simulation.params import ColourParams, DepthParams, OdometryParams, RigParams, StressParams
-from objreg_ros.simulation.scenarios import SCENARIOS
-from objreg_ros.simulation.write import Sensors, simulate
+from objreg_ros.simulation.scenarios import SCENARIOS, Story
+from objreg_ros.simulation.write import Sensors, simulate, simulate_fleet
 
 SECTIONS: dict[str, type[Params]] = {
     "depth": DepthParams,
@@ -36,10 +37,16 @@ def _list(context: click.Context, _: click.Parameter, wanted: bool) -> None:
 @click.command()
 @click.argument("out", type=click.Path(path_type=Path))
 @click.option(
-    "--scenario", type=click.Choice(list(SCENARIOS)), default="loop", show_default=True, help="The path of the camera."
+    "--scenario",
+    type=click.Choice([*SCENARIOS, *FLEETS]),
+    default="loop",
+    show_default=True,
+    help="The path of the camera; of three robots' in `robots`.",
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Decides all that is random.")
-@click.option("--frames", type=click.IntRange(2), default=600, show_default=True, help="Number of image pairs.")
+@click.option(
+    "--frames", type=click.IntRange(2), default=600, show_default=True, help="Number of image pairs, of each robot."
+)
 @click.option("--rate", type=click.FloatRange(1.0, 240.0), default=30.0, show_default=True, help="Frames per second.")
 @click.option(
     "--sensor", type=click.Choice(list(SENSORS)), default="kinect_v1", show_default=True, help="How depth is measured."
@@ -78,17 +85,32 @@ def command(
     settings: tuple[str, ...],
     **rig: float,
 ) -> None:
-    """Simulate a depth camera that is carried through a room, and write OUT, a rosbag2 folder with OUT/truth in it."""
+    """Simulate a depth camera that is carried through a room, and write OUT, a rosbag2 folder with OUT/truth in it.
+
+    Of several robots each has such a folder in OUT: OUT/robot1, OUT/robot2 and so on.
+    """
     camera = camera_of(intrinsics or SENSORS[sensor][0], size)
     sensors = sensors_of(camera, stress, (*_rig_settings(lens, rig), *settings), sensor)
-    with tqdm(total=frames, unit="frame", desc=scenario, disable=None) as bar:
-        story = simulate(
-            out, scenario, seed, frames, rate, sensors, points, jpeg, progress=lambda n: bar.update(n - bar.n)
-        )
+    stories = _simulated(out, scenario, (seed, frames, rate, sensors, points, jpeg))
+    for story in stories:
+        _tell(out / story.robot, story, scenario, seed, rate)
+    tell_next("objreg", "inspect", str(out / stories[0].robot))
+
+
+def _simulated(out: Path, scenario: str, of: tuple[int, int, float, Sensors, bool, bool]) -> list[Story]:
+    """Write the recordings of a scenario under a bar; ``of`` are seed, frames and so on, as `simulate` takes them."""
+    robots = ROBOTS if scenario in FLEETS else 1
+    with tqdm(total=robots * of[1], unit="frame", desc=scenario, disable=None) as bar:
+        if scenario in FLEETS:
+            return simulate_fleet(out, scenario, *of, progress=lambda n: bar.update(n - bar.n))
+        return [simulate(out, scenario, *of, progress=lambda n: bar.update(n - bar.n))]
+
+
+def _tell(out: Path, story: Story, scenario: str, seed: int, rate: float) -> None:
+    frames = len(story)
     click.echo(f"{out}: {scenario}, seed {seed}, {frames} frames at {story.rate:.3g} Hz, truth in {out / 'truth'}")
     if story.rate < rate - 1e-6:
         click.echo(f"note: {frames} frames are few for this path, so they come at {story.rate:.3g} Hz, not {rate:g}")
-    tell_next("objreg", "inspect", str(out))
 
 
 def camera_of(name: str, size: str | None) -> Intrinsics:

@@ -51,11 +51,18 @@ def revisits(moments: Sequence[Seen], gap_ns: int, least: float = 0.25) -> list[
     found = []
     for k, later in enumerate(moments):
         earlier = [m for m in moments[:k] if later.stamp_ns - m.stamp_ns >= gap_ns]
-        best, partner = max(((overlap(m, later), m) for m in earlier), key=lambda item: item[0], default=(0.0, later))
-        if best >= least:
-            turn = rotation_angle(partner.T_world_camera[:3, :3].T @ later.T_world_camera[:3, :3])
-            found.append(Revisit(partner.stamp_ns, later.stamp_ns, float(np.degrees(turn)), best))
+        if (revisit := revisit_of(later, earlier, least)) is not None:
+            found.append(revisit)
     return found
+
+
+def revisit_of(later: Seen, earlier: Iterable[Seen], least: float = 0.25) -> Revisit | None:
+    """The revisit of that of the earlier moments which the later one overlaps most; None if none by ``least``."""
+    best, partner = max(((overlap(m, later), m) for m in earlier), key=lambda item: item[0], default=(0.0, later))
+    if best < least:
+        return None
+    turn = rotation_angle(partner.T_world_camera[:3, :3].T @ later.T_world_camera[:3, :3])
+    return Revisit(partner.stamp_ns, later.stamp_ns, float(np.degrees(turn)), best)
 
 
 def closed(revisit: Revisit, closures: Iterable[LoopClosure], truth: Truth, tolerance_ns: int) -> bool:

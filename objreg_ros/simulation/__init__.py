@@ -30,7 +30,8 @@ for the objects, ``scene.place_on(model, T_world_surface, x, y, yaw)`` to stand 
 Recordings: ``write.simulate(path, scenario, seed, frames)`` (command `objreg simulate`) writes a rosbag2 folder with
 ``truth/`` in it. ``truth.read_truth(path) -> Truth`` reads that: boxes, masks, poses of camera and objects, symmetries.
 ``scenarios.make_story(scenario, seed, frames) -> Story`` gives scenes and camera poses without rendering them, and
-``odometry.drifted`` the poses by drifting odometry.
+``odometry.drifted`` the poses by drifting odometry. ``write.simulate_fleet`` and ``fleet.make_fleet -> [Story, ..]``
+are the same of several robots in one world.
 
 | file | what |
 | --- | --- |
@@ -45,5 +46,6 @@ Recordings: ``write.simulate(path, scenario, seed, frames)`` (command `objreg si
 | `render` | all of it for one image |
 | `lens` `rig` | cameras as they are built and timed: lens, lag, rolling shutter, blur, misregistration |
 | `trajectory` `odometry` `scenarios` | how the camera is carried, what odometry makes of it, and through what |
+| `rooms` `visits` `building` `fleet` | what stories' rooms hold, how tables are visited; three rooms, three robots |
 | `write` `truth` | recordings, and the truth beside them |
 """

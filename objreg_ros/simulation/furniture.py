@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -124,17 +125,29 @@ class Room:
     ceiling: Mesh
 
 
-def room(rng: Random, half: tuple[float, float], height: float = 2.7) -> Room:
-    """A room of the given half widths with pictures, a window, a door, skirting, and perhaps a rug."""
+OPENING = (1.2, 2.1)
+"""Width and height of an opening in a wall, metres."""
+OVERHANG_M = 1.0
+"""So far what hangs on a wall may reach beyond the right end of the length that it is given."""
+
+
+def room(rng: Random, half: tuple[float, float], height: float = 2.7, open_to: Collection[float] = ()) -> Room:
+    """A room of the given half widths with pictures, a window, a door, skirting, and perhaps a rug.
+
+    ``open_to`` are the walls with an opening in their middle that one walks through, each by the degrees by which it is
+    turned from that at +y: 90 is the wall at -x, 270 that at +x.
+    """
     x, y = half
     floor = _floor_material(rng)
     parts = [box((2 * x, 2 * y, 0.1), floor, tile=rng.uniform(0.8, 2.0)).moved(z=-0.1)]
     paint = [_wall_material(rng)] * 4 if rng.random() < 0.6 else [_wall_material(rng) for _ in range(4)]
     skirting = Material(texture.speckled(rng, texture.grey(rng), 0.02))
-    for k, (T, length) in enumerate(_walls(half)):
-        wall = box((length + 0.2, 0.1, height), paint[k], tile=rng.uniform(1.0, 3.0)).moved(y=0.05)
-        base = box((length, 0.015, rng.uniform(0.05, 0.1)), skirting).moved(y=-0.007)
-        parts += [mesh.placed(T) for mesh in (wall, base, *_decoration(rng, length, height))]
+    for k, (degrees, T, length) in enumerate(_walls(half)):
+        if degrees in open_to:
+            wall = _open_wall(rng, length, height, paint[k], skirting, floor)
+        else:
+            wall = _wall(rng, length, height, paint[k], skirting)
+        parts += [mesh.placed(T) for mesh in wall]
     if rng.random() < 0.5:
         rug = box((rng.uniform(1.2, 2.4), rng.uniform(1.0, 2.0), 0.006), Material(texture.fabric(rng), 0.0), tile=1.0)
         parts.append(rug.placed(turn("z", rng.uniform(0, 360))).moved(*rng.uniform(-0.4, 0.4, 2) * half))
@@ -143,14 +156,37 @@ def room(rng: Random, half: tuple[float, float], height: float = 2.7) -> Room:
     return Room(half, height, merge(parts), ceiling)
 
 
-def _walls(half: tuple[float, float]) -> list[tuple[Array, float]]:
-    """Pose and length of each wall: in its own frame it runs along x and looks to -y."""
+def _wall(rng: Random, length: float, height: float, paint: Material, skirting: Material) -> list[Mesh]:
+    """A wall in its own frame with what hangs on it."""
+    wall = box((length + 0.2, 0.1, height), paint, tile=rng.uniform(1.0, 3.0)).moved(y=0.05)
+    base = box((length, 0.015, rng.uniform(0.05, 0.1)), skirting).moved(y=-0.007)
+    return [wall, base, *_decoration(rng, length, height)]
+
+
+def _open_wall(
+    rng: Random, length: float, height: float, paint: Material, skirting: Material, floor: Material
+) -> list[Mesh]:
+    """A wall in its own frame with an opening in its middle: two short walls, a lintel and a threshold."""
+    width, tall = OPENING
+    side = (length - width) / 2
+    short = box((side, 0.1, height), paint, tile=rng.uniform(1.0, 3.0)).moved(y=0.05)
+    base = box((side, 0.015, rng.uniform(0.05, 0.1)), skirting).moved(y=-0.007)
+    lintel = box((width, 0.1, height - tall), paint, tile=2.0).moved(0.0, 0.05, tall)
+    parts = [lintel, box((width, 0.1, 0.1), floor, tile=1.0).moved(0.0, 0.05, -0.1)]
+    for middle in (-(width + side) / 2, (width + side) / 2):
+        hung = [mesh.moved(x=-OVERHANG_M / 2) for mesh in _decoration(rng, side - OVERHANG_M, height)]
+        parts += [mesh.moved(x=middle) for mesh in (short, base, *hung)]
+    return parts
+
+
+def _walls(half: tuple[float, float]) -> list[tuple[int, Array, float]]:
+    """Degrees, pose and length of each wall: in its own frame it runs along x and looks to -y."""
     poses = []
     for degrees, reach, length in ((0, half[1], 2 * half[0]), (90, half[0], 2 * half[1])):
         for flip in (0, 180):
             T = turn("z", degrees + flip)
             T[:3, 3] = T[:3, :3] @ [0.0, reach, 0.0]
-            poses.append((T, length))
+            poses.append((degrees + flip, T, length))
     return poses
 
 

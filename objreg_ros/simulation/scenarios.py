@@ -25,16 +25,24 @@ from objreg_ros.simulation import distractors, furniture
 from objreg_ros.simulation.furniture import Furniture
 from objreg_ros.simulation.model import ObjectModel, turn
 from objreg_ros.simulation.objects import make_object
-from objreg_ros.simulation.scene import Place, Placed, Scene, furnished, number, place_on, spread
+from objreg_ros.simulation.rooms import (
+    Laid,
+    Spot,
+    along_the_walls,
+    chairs_at,
+    on_the_boards,
+    places_of,
+    table_with,
+    things,
+)
+from objreg_ros.simulation.scene import Placed, Scene, furnished, number
 from objreg_ros.simulation.trajectory import Hand, Waypoint, around, carried
+from objreg_ros.simulation.visits import Look, between
 
 Random = np.random.Generator
-Laid = list[tuple[ObjectModel, Array]]
 
 ROOM_HALF = (4.4, 3.2)
-TABLE_CLASSES = ("cereal_box", "soda_can", "bowl", "book", "cap", "flashlight", "keyboard", "monitor")
 HALF_WIDTH_OF_TABLES = 0.8
-OCCLUDERS = ("mug", "bottle", "carton", "vase", "tin", "plant", "ball")
 DETOUR_M = 1.4
 """How far from the straight line a round leads."""
 NEAR_M = 0.3
@@ -44,12 +52,18 @@ Plot = tuple[tuple[Scene, ...], list[Waypoint], Waypoint | None]
 
 @dataclass(frozen=True, eq=False)
 class Story:
-    """``scenes``; for every frame the number of its scene and its pose ``T_world_camera (N, 4, 4)``; the rate in Hz."""
+    """``scenes``; for every frame the number of its scene and its pose ``T_world_camera (N, 4, 4)``; the rate in Hz.
+
+    ``robot`` is the name of who carries the camera, empty where there is but one; it begins ``start_ns`` after the
+    first of all.
+    """
 
     scenes: tuple[Scene, ...]
     scene_of: Array
     T_world_camera: Array
     rate: float
+    robot: str = ""
+    start_ns: int = 0
 
     def __len__(self) -> int:
         return len(self.T_world_camera)
@@ -73,50 +87,24 @@ class _Setting:
         return transform(T, np.array([0.0, 0.0, piece.boards[0][2] + 0.08]))
 
 
-def _table_with(rng: Random, piece: Furniture, T: Array, models: list[ObjectModel], occluders: int) -> Laid:
-    """Models at random on a table, and small things close beside them."""
-    kinds = rng.choice(OCCLUDERS, occluders)
-    more = [distractors.make_distractor(str(kind), int(rng.integers(2**31))) for kind in kinds]
-    return [(model, T @ P) for model, P in spread(rng, [*models, *more], piece.boards[0], 0.02, beside=occluders)]
-
-
-def _things(rng: Random, count: int, extra: int) -> list[ObjectModel]:
-    """``count`` objects of different classes where possible, and ``extra`` distractors; the large ones first."""
-    labels = [*rng.permutation(TABLE_CLASSES), *rng.choice(TABLE_CLASSES, max(0, count - len(TABLE_CLASSES)))][:count]
-    models = [make_object(str(label), int(rng.integers(2**31))) for label in labels]
-    kinds = rng.choice(list(distractors.FAMILIES), extra)
-    models += [distractors.make_distractor(str(kind), int(rng.integers(2**31))) for kind in kinds]
-    return sorted(models, key=lambda model: -model.radius)
-
-
-def _chairs_at(rng: Random, piece: Furniture, T: Array, count: int) -> Laid:
-    """Chairs at the long sides of a table, turned to it."""
-    _, half_y = piece.boards[0][3:]
-    laid: Laid = []
-    for side in rng.permutation([-1, 1])[:count]:
-        model = make_object("chair", int(rng.integers(2**31)))
-        yaw = (0.0 if side > 0 else np.pi) + rng.normal(0, 0.25)
-        local = place_on(model, np.eye(4), rng.uniform(-0.35, 0.35), side * (half_y + rng.uniform(0.2, 0.4)), yaw)
-        laid.append((model, T @ local))
-    return laid
-
-
 def _setting(rng: Random, occluders: int, alike: bool = False) -> _Setting:
     """A room with two tables far apart, furniture along the walls, chairs, and things on everything."""
     room = furniture.room(rng, ROOM_HALF)
     tables = _two_tables(rng, alike)
-    walls = _along_the_walls(rng)
-    models = _things(rng, int(rng.integers(5, 8)), int(rng.integers(1, 4)))
-    second = _look_alikes(rng, models) if alike else _things(rng, int(rng.integers(4, 8)), int(rng.integers(1, 4)))
+    walls = along_the_walls(rng, _spots())
+    models = things(rng, int(rng.integers(5, 8)), int(rng.integers(1, 4)))
+    second = _look_alikes(rng, models) if alike else things(rng, int(rng.integers(4, 8)), int(rng.integers(1, 4)))
     both = zip(tables, (models, second), strict=True)
-    laid = tuple(_table_with(rng, piece, T, m, occluders) for (piece, T), m in both)
-    others = [item for piece, T in tables for item in _chairs_at(rng, piece, T, int(rng.integers(1, 3)))]
-    for piece, T in walls:
-        for board in piece.boards[:4]:
-            few = _things(rng, 2, 1)
-            others += [(m, T @ P) for m, P in spread(rng, few, board, clearance=piece.clearance)]
+    laid = tuple(table_with(rng, piece, T, m, occluders) for (piece, T), m in both)
+    others = [item for piece, T in tables for item in chairs_at(rng, piece, T, int(rng.integers(1, 3)))]
+    others += on_the_boards(rng, walls)
     scene = furnished(rng, [*tables, *walls], room, lamp_count=2)
-    return _Setting(replace(scene, places=_places(tables)), tables, laid, others)
+    return _Setting(replace(scene, places=places_of(tables)), tables, laid, others)
+
+
+def _spots() -> list[Spot]:
+    x, y = ROOM_HALF
+    return [(0, -2.6, y), (0, 0.2, y), (0, 2.8, y), (180, -2.4, y), (180, 2.2, y), (90, 0.0, x), (270, 0.3, x)]
 
 
 def _two_tables(rng: Random, alike: bool) -> tuple[tuple[Furniture, Array], ...]:
@@ -147,62 +135,13 @@ def _look_alikes(rng: Random, models: list[ObjectModel]) -> list[ObjectModel]:
     return out
 
 
-def _along_the_walls(rng: Random) -> list[tuple[Furniture, Array]]:
-    """Shelves and cupboards against the walls, their backs to them."""
-    x, y = ROOM_HALF
-    spots = [(0, -2.6, y), (0, 0.2, y), (0, 2.8, y), (180, -2.4, y), (180, 2.2, y), (90, 0.0, x), (270, 0.3, x)]
-    kinds = (furniture.shelf, furniture.cupboard, furniture.sofa)
-    out = []
-    for degrees, along, reach in spots:
-        if rng.random() < 0.25:
-            continue
-        piece = kinds[int(rng.choice(3, p=[0.5, 0.35, 0.15]))](rng)
-        T = turn("z", degrees)
-        T[:3, 3] = T[:3, :3] @ [along, reach - float(piece.mesh.bounds[1, 1]) - 0.02, 0.0]
-        out.append((piece, T))
-    return out
-
-
-def _places(tables: tuple[tuple[Furniture, Array], ...]) -> tuple[Place, ...]:
-    return tuple(Place(transform(T, np.array([0, 0, p.boards[0][2] + 0.08])), p.boards[0][3]) for p, T in tables)
-
-
-@dataclass(frozen=True)
-class _Look:
-    """How a table is looked at: from which azimuths in degrees, how far and how high above its top in metres."""
-
-    start: float
-    stop: float
-    radius: float
-    height: float
-
-    @classmethod
-    def at_random(cls, rng: Random, start: float, sweep: float) -> _Look:
-        return cls(start, start + sweep, float(rng.uniform(1.05, 1.3)), float(rng.uniform(0.5, 0.75)))
-
-    def waypoints(self, centre: Array) -> list[Waypoint]:
-        return around(centre, self.radius, self.height, self.start, self.stop)
-
-
-def _rounds(setting: _Setting, looks: list[_Look]) -> list[Waypoint]:
+def _rounds(setting: _Setting, looks: list[Look]) -> list[Waypoint]:
     """The way past the two tables in turn, seen as the looks say."""
     visits = [look.waypoints(setting.centre(k % 2)) for k, look in enumerate(looks)]
     way = visits[0]
     for k, visit in enumerate(visits[1:]):
-        way = [*way, *_between(way[-1], visit[0], DETOUR_M * (-1) ** k), *visit]
+        way = [*way, *between(way[-1], visit[0], DETOUR_M * (-1) ** k), *visit]
     return way
-
-
-def _between(before: Waypoint, after: Waypoint, detour: float) -> list[Waypoint]:
-    """From one place to another, ``detour`` to the side; the camera is held level and pans along the walls."""
-    out = []
-    start, stop = before.target - before.eye, after.target - after.eye
-    turned = np.unwrap([np.arctan2(start[1], start[0]), np.arctan2(stop[1], stop[0])])
-    for f in (0.2, 0.4, 0.6, 0.8):
-        eye = (1 - f) * before.eye + f * after.eye + np.array([0.0, detour * np.sin(np.pi * f), 0.0])
-        azimuth = (1 - f) * turned[0] + f * turned[1]
-        out.append(Waypoint(eye, eye + np.array([np.cos(azimuth), np.sin(azimuth), -0.2])))
-    return out
 
 
 def _facing(setting: _Setting, k: int) -> float:
@@ -211,18 +150,18 @@ def _facing(setting: _Setting, k: int) -> float:
     return float(np.degrees(np.arctan2(towards[1], towards[0])))
 
 
-def _looks(rng: Random, setting: _Setting, asides: list[float]) -> list[_Look]:
+def _looks(rng: Random, setting: _Setting, asides: list[float]) -> list[Look]:
     """A look at each table, and for every one of ``asides`` another at each, so many degrees further around."""
     sign = float(rng.choice([-1, 1]))
     front, back = _facing(setting, 0), _facing(setting, 1)
-    looks = [_Look.at_random(rng, front - sign * 70, sign * 40), _Look.at_random(rng, back + sign * 30, -sign * 40)]
+    looks = [Look.at_random(rng, front - sign * 70, sign * 40), Look.at_random(rng, back + sign * 30, -sign * 40)]
     for aside in asides:
-        looks.append(_Look.at_random(rng, front - sign * 50 + sign * aside, -sign * 25))
-        looks.append(_Look.at_random(rng, back + sign * 10 + sign * aside, sign * 25))
+        looks.append(Look.at_random(rng, front - sign * 50 + sign * aside, -sign * 25))
+        looks.append(Look.at_random(rng, back + sign * 10 + sign * aside, sign * 25))
     return looks
 
 
-def _a_little_aside(rng: Random, setting: _Setting) -> list[_Look]:
+def _a_little_aside(rng: Random, setting: _Setting) -> list[Look]:
     """Three rounds: the second and the third see both tables from a little to the left and to the right."""
     side = float(rng.choice([-1, 1]))
     return _looks(rng, setting, [side * float(rng.uniform(15, 35)), -side * float(rng.uniform(15, 35))])
@@ -231,7 +170,7 @@ def _a_little_aside(rng: Random, setting: _Setting) -> list[_Look]:
 def _orbit(rng: Random, occluders: int) -> Plot:
     setting = _setting(rng, occluders)
     start = float(rng.uniform(0, 360))
-    look = _Look.at_random(rng, start, float(rng.choice([-1, 1])) * 385)
+    look = Look.at_random(rng, start, float(rng.choice([-1, 1])) * 385)
     way = around(setting.centre(0), look.radius, look.height, look.start, look.stop, count=40)
     return (setting.scene_with(setting.on_table),), way, None
 
@@ -256,7 +195,7 @@ def _moved(rng: Random, occluders: int) -> Plot:
     setting = _setting(rng, occluders)
     looks = _a_little_aside(rng, setting)
     piece, T = setting.tables[0]
-    again = _table_with(rng, piece, T, [model for model, _ in setting.on_table[0]], 0)
+    again = table_with(rng, piece, T, [model for model, _ in setting.on_table[0]], 0)
     before = setting.scene_with(setting.on_table)
     after = _same_numbers(before, setting.scene_with((again, *setting.on_table[1:])))
     at_the_second = looks[1].waypoints(setting.centre(1))

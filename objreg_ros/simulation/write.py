@@ -10,6 +10,9 @@
 | `/odom` | nav_msgs/Odometry | drifting pose of `camera` in `odom` |
 | `/ground_truth` | geometry_msgs/PoseStamped | true pose of the camera in `world` |
 
+Of several robots each has a recording of its own. Its name is before its frames, as in `robot1/camera` and
+`robot1/odom`; the world and the clock are those of all.
+
 The folder also gets `truth/`, see `objreg_ros.simulation.truth`.
 """
 
@@ -19,6 +22,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +34,7 @@ from objreg_ros.geometry import back_project
 from objreg_ros.recording import Record, messages, write_rosbag2
 from objreg_ros.recording.writer import whole_or_gone
 from objreg_ros.simulation.camera import KINECT
+from objreg_ros.simulation.fleet import make_fleet
 from objreg_ros.simulation.odometry import drifted
 from objreg_ros.simulation.params import (
     ColourParams,
@@ -94,11 +99,45 @@ def simulate(
     for a folder that is already there.
     """
     sensors = sensors or Sensors()
-    if Path(path).exists():
-        raise FileExistsError(f"{path}: expected a new folder, got one that exists; choose another name or remove it")
+    _refuse_old(Path(path))
     story = make_story(scenario, seed, frames, rate, sensors.stress.occluders)
     write_story(path, story, scenario, seed, sensors, points, jpeg, threads, progress)
     return story
+
+
+def simulate_fleet(
+    path: Path | str,
+    scenario: str = "robots",
+    seed: int = 0,
+    frames: int = 600,
+    rate: float = 30.0,
+    sensors: Sensors | None = None,
+    points: bool = False,
+    jpeg: bool = False,
+    threads: int = 2,
+    progress: Callable[[int], object] = lambda done: None,
+) -> list[Story]:
+    """As `simulate`, of a scenario of several robots: a recording of each, by its name, in a new folder.
+
+    ``progress`` is called with the number of frames that are done of all robots together. What fails leaves the
+    recordings of the robots before.
+    """
+    sensors = sensors or Sensors()
+    _refuse_old(Path(path))
+    stories = make_fleet(scenario, seed, frames, rate, sensors.stress.occluders)
+    for k, story in enumerate(stories):
+        of_all = partial(_and_before, progress, k * frames)
+        write_story(Path(path) / story.robot, story, scenario, seed, sensors, points, jpeg, threads, of_all)
+    return stories
+
+
+def _and_before(progress: Callable[[int], object], before: int, done: int) -> None:
+    progress(before + done)
+
+
+def _refuse_old(path: Path) -> None:
+    if path.exists():
+        raise FileExistsError(f"{path}: expected a new folder, got one that exists; choose another name or remove it")
 
 
 def write_story(
@@ -113,24 +152,36 @@ def write_story(
     progress: Callable[[int], object] = lambda done: None,
 ) -> None:
     """As `simulate`, of a story of one's own; its truth calls it ``name``."""
-    sensors = sensors or Sensors()
+    sensors, sown = sensors or Sensors(), _sown(seed, story.robot)
     for scene in story.scenes:
         scene.prepare()
     truth = TruthWriter(story, name, seed, sensors.intrinsics, sensors.described())
-    rig = None if sensors.rig.is_plain else Rig(sensors.rig, sensors.intrinsics, seed)
-    T_odom_camera, covariance = drifted(story.T_world_camera, sensors.odometry, seed)
+    rig = None if sensors.rig.is_plain else Rig(sensors.rig, sensors.intrinsics, sown)
+    odom, camera = _of(story.robot, ODOM_FRAME), _of(story.robot, CAMERA_FRAME)
+    T_odom_camera, covariance = drifted(story.T_world_camera, sensors.odometry, sown)
 
     def records() -> Iterator[Record]:
-        for k, image in enumerate(_rendered(story, seed, sensors, rig, threads)):
-            stamp_ns = START_NS + round(k * 1e9 / story.rate)
+        for k, image in enumerate(_rendered(story, sown, sensors, rig, threads)):
+            stamp_ns = START_NS + story.start_ns + round(k * 1e9 / story.rate)
             truth.add(stamp_ns, int(story.scene_of[k]), image)
-            yield from _camera_records(image, stamp_ns, points, jpeg, rig)
-            yield from _pose_records(image.T_world_camera, T_odom_camera[k], covariance[k], stamp_ns)
+            odometry = messages.odometry(T_odom_camera[k], covariance[k], stamp_ns, odom, camera)
+            yield from _camera_records(image, stamp_ns, camera, points, jpeg, rig)
+            yield from _pose_records(image.T_world_camera, odometry, stamp_ns)
             progress(k + 1)
 
     write_rosbag2(path, records())
     with whole_or_gone(Path(path)):
         truth.write(Path(path))
+
+
+def _sown(seed: int, robot: str) -> int:
+    """The seed of what is random in a robot's sensors and odometry; the seed itself where there is but one robot."""
+    return int(np.random.default_rng([seed, *robot.encode()]).integers(2**31)) if robot else seed
+
+
+def _of(robot: str, frame: str) -> str:
+    """The name of a frame of a robot."""
+    return f"{robot}/{frame}" if robot else frame
 
 
 def _rendered(story: Story, seed: int, sensors: Sensors, rig: Rig | None, threads: int) -> Iterator[Rendering]:
@@ -154,31 +205,32 @@ def _frame(story: Story, k: int, seed: int, sensors: Sensors, rig: Rig | None) -
     return render(scene, story.T_world_camera[k], sensors.intrinsics, noise_seed, *of)
 
 
-def _camera_records(image: Rendering, stamp_ns: int, points: bool, jpeg: bool, rig: Rig | None) -> Iterator[Record]:
+def _camera_records(
+    image: Rendering, stamp_ns: int, frame: str, points: bool, jpeg: bool, rig: Rig | None
+) -> Iterator[Record]:
     assert image.rgb is not None
     millimetres = np.rint(image.depth * 1000.0).astype(np.uint16)
-    colour = _compressed(image.rgb, stamp_ns) if jpeg else messages.image(image.rgb, "rgb8", stamp_ns, CAMERA_FRAME)
+    colour = _compressed(image.rgb, stamp_ns, frame) if jpeg else messages.image(image.rgb, "rgb8", stamp_ns, frame)
     lens = rig.lens if rig is not None else None
     distortion = (0.0,) * 5 if lens is None else lens.distortion
-    info = messages.camera_info(image.intrinsics, stamp_ns, CAMERA_FRAME, distortion)
+    info = messages.camera_info(image.intrinsics, stamp_ns, frame, distortion)
     yield Record.of("/camera_info", info, stamp_ns)
     yield Record.of("/image/compressed" if jpeg else "/image", colour, stamp_ns)
-    yield Record.of("/depth/image", messages.image(millimetres, "16UC1", stamp_ns, CAMERA_FRAME), stamp_ns)
+    yield Record.of("/depth/image", messages.image(millimetres, "16UC1", stamp_ns, frame), stamp_ns)
     if points:
         cloud = organised(image, None if lens is None else lens.rays)
-        yield Record.of("/points", messages.point_cloud(cloud, stamp_ns, CAMERA_FRAME), stamp_ns)
+        yield Record.of("/points", messages.point_cloud(cloud, stamp_ns, frame), stamp_ns)
 
 
-def _pose_records(T_world_camera: Array, T_odom_camera: Array, covariance: Array, stamp_ns: int) -> Iterator[Record]:
-    odometry = messages.odometry(T_odom_camera, covariance, stamp_ns, ODOM_FRAME, CAMERA_FRAME)
+def _pose_records(T_world_camera: Array, odometry: object, stamp_ns: int) -> Iterator[Record]:
     yield Record.of("/odom", odometry, stamp_ns)
     yield Record.of("/ground_truth", messages.pose_stamped(T_world_camera, stamp_ns, WORLD_FRAME), stamp_ns)
 
 
-def _compressed(rgb: Array, stamp_ns: int) -> object:
+def _compressed(rgb: Array, stamp_ns: int, frame: str) -> object:
     """sensor_msgs/CompressedImage."""
     jpeg = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1]
-    header = messages.header(stamp_ns, CAMERA_FRAME)
+    header = messages.header(stamp_ns, frame)
     return messages.message(
         "sensor_msgs/CompressedImage", header=header, format="rgb8; jpeg compressed bgr8", data=jpeg
     )

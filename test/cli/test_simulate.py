@@ -23,6 +23,18 @@ def test_the_command_writes_a_recording_and_says_what_it_is(tmp_path: Path) -> N
     assert read_truth(out).intrinsics.width == 160
 
 
+def test_each_of_several_robots_has_a_recording_of_its_own(tmp_path: Path) -> None:
+    out = tmp_path / "bags"
+    result = CliRunner().invoke(command, [str(out), "--scenario", "robots", "--frames", "2", "--size", "80x60"])
+    assert result.exit_code == 0, result.output
+    truths = [read_truth(out / name) for name in ("robot1", "robot2", "robot3")]
+    starts = [truth.frames[0].stamp_ns for truth in truths]
+    assert starts == sorted(set(starts)) and starts[1] < truths[0].frames[-1].stamp_ns
+    assert truths[0].objects[0].keys() == truths[2].objects[0].keys()
+    assert f"{out / 'robot3'}: robots, seed 0, 2 frames" in result.output
+    assert result.output.endswith(f"next: objreg inspect {out / 'robot1'}\n")
+
+
 def test_a_folder_that_exists_ends_with_one_line_and_exit_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:
         main("simulate", str(tmp_path), "--frames", "2")

@@ -10,7 +10,7 @@ import pytest
 
 from objreg_ros.data import Intrinsics, LoopClosure, View
 from objreg_ros.geometry import inverse, pose, rotation_from_vector
-from objreg_ros.report.revisits import Seen, closed, overlap, recall_by_view_change, revisits
+from objreg_ros.report.revisits import Seen, closed, overlap, recall_by_view_change, revisit_of, revisits
 from objreg_ros.truth import Truth
 
 CAMERA = Intrinsics(fx=150.0, fy=150.0, cx=79.5, cy=59.5, width=160, height=120)
@@ -48,6 +48,12 @@ def test_a_place_is_revisited_after_the_gap_and_not_before() -> None:
     found = revisits([wall(0), wall(1), wall(3, x=0.1), wall(4, x=9.0)], gap_ns=2 * SECOND)
     assert [r.to_ns // SECOND for r in found] == [3]
     assert found[0].view_change_deg == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_revisit_is_of_the_moment_that_overlaps_most_or_of_none() -> None:
+    best = revisit_of(wall(5), [wall(0, x=1.0), wall(1, x=0.2), wall(2, x=0.8)])
+    assert best is not None and (best.from_ns, best.to_ns) == (SECOND, 5 * SECOND)
+    assert revisit_of(wall(5), [wall(0, x=9.0)]) is None and revisit_of(wall(5), []) is None
 
 
 def closure(a: Seen, b: Seen, off: float = 0.0) -> LoopClosure:

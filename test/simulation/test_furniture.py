@@ -41,3 +41,18 @@ def test_a_room_is_closed_on_all_sides() -> None:
             view = looking(np.array([0.0, 0.0, 1.3]), np.array(target, float), np.array([0.0, 0.3, 1.0]))
             depth, _ = rasterise(mesh.vertices, mesh.faces, mesh.open_surface, view, WIDE)
             assert (depth > 0).all() and depth.max() < 4.0
+
+
+def test_an_open_wall_lets_one_see_out_of_its_middle_and_nowhere_else() -> None:
+    for seed in range(3):
+        room = furniture.room(np.random.default_rng(seed), (2.5, 2.0), open_to=(270,))
+        out, left, above = (_depth(room, np.array([3.0, y, z])) for y, z in ((0.0, 1.2), (1.1, 1.2), (0.0, 2.5)))
+        assert (out == 0).all() and (left > 0).all() and (above > 0).all()
+
+
+def _depth(room: furniture.Room, target: np.ndarray) -> np.ndarray:
+    """What a camera of a small view in the middle of a room measures towards a point."""
+    narrow = Intrinsics(fx=400.0, fy=400.0, cx=9.5, cy=9.5, width=20, height=20)
+    view = looking(np.array([0.0, 0.0, 1.3]), target, np.array([0.0, 0.0, 1.0]))
+    mesh = merge([room.mesh, room.ceiling])
+    return rasterise(mesh.vertices, mesh.faces, mesh.open_surface, view, narrow)[0]

@@ -14,8 +14,9 @@ from objreg_ros.data import Intrinsics
 from objreg_ros.recording import open_recording
 from objreg_ros.simulation.camera import LENSES
 from objreg_ros.simulation.params import RigParams
+from objreg_ros.simulation.scenarios import make_story
 from objreg_ros.simulation.truth import read_truth
-from objreg_ros.simulation.write import Sensors, simulate
+from objreg_ros.simulation.write import Sensors, simulate, write_story
 
 SMALL = Sensors(intrinsics=Intrinsics(fx=131.25, fy=131.25, cx=79.5, cy=59.5, width=160, height=120))
 FRAMES = 4
@@ -125,6 +126,36 @@ def test_a_rig_changes_the_pictures_and_not_the_truth(recorded: Path, bent: Path
         assert [s.pixels for s in a.seen] == [s.pixels for s in b.seen]
     assert plain.sensors["rig"]["lag_ms"] == 0 and other.sensors["rig"]["lag_ms"] == 20.0
     assert plain.sensors["sensor"] == "structured light"
+
+
+@pytest.fixture(scope="module")
+def of_robots(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """The same story of two robots, of which the second begins seven seconds later."""
+    story, folder = make_story("orbit", 1, frames=2), tmp_path_factory.mktemp("robots")
+    for robot, start_ns in (("robot1", 0), ("robot2", 7 * 10**9)):
+        write_story(folder / robot, replace(story, robot=robot, start_ns=start_ns), "orbit", 1, SMALL, points=True)
+    return [folder / "robot1", folder / "robot2"]
+
+
+def test_a_robots_frames_have_its_name_and_its_stamps_begin_when_it_does(of_robots: list[Path]) -> None:
+    first, second = (read_truth(path) for path in of_robots)
+    assert [b.stamp_ns - a.stamp_ns for a, b in zip(first.frames, second.frames, strict=True)] == [7 * 10**9] * 2
+    with open_recording(of_robots[1]) as recording:
+        frames = {record.topic: record.message.header.frame_id for record in recording.records()}
+        child = next(recording.records(["/odom"])).message.child_frame_id
+    assert frames.pop("/odom") == "robot2/odom" and frames.pop("/ground_truth") == "world"
+    assert set(frames.values()) == {child} == {"robot2/camera"}
+
+
+def test_another_robot_has_other_noise_and_another_odometry(of_robots: list[Path]) -> None:
+    last = []
+    for path in of_robots:
+        with open_recording(path) as recording:
+            last.append({record.topic: record.message for record in recording.records()})
+    one, two = last
+    assert repr(one["/ground_truth"].pose) == repr(two["/ground_truth"].pose)
+    assert repr(one["/odom"].pose.pose) != repr(two["/odom"].pose.pose)
+    assert not np.array_equal(one["/depth/image"].data, two["/depth/image"].data)
 
 
 def test_colour_can_be_compressed(tmp_path: Path) -> None:
