@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Several robots in the same rooms: which meetings are tied, how many ties are false, and how true one map of all is.
+
+    python benchmarks/robots.py FOLDER… --json robots.json
+    python benchmarks/robots.py --simulate 1,2 --json robots.json
+
+A FOLDER holds a recording for each robot, as `objreg simulate --scenario robots` writes them. ``one registrar`` takes
+all frames by their stamps; ``packed`` takes the keyframes that each robot made, packed to be sent and unpacked; of
+``each its own`` every robot has a registrar, which asks for what the summaries of others promise (``--kilobytes`` a
+second). Meetings are as `fleet` tells them. ``map_cm`` is the error of one map of all robots (aligned once), of the map
+with the same closures and perfect ties between robots, and of odometry; ``alone_cm`` that of each robot's own map.
+"""
+
+from __future__ import annotations
+
+import heapq
+import json
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import click
+import fleet
+import numpy as np
+from closers import keyframes_of, perfect
+from map_limits import kept
+from sources import SIMULATED, detector_of, read_source
+from tqdm import tqdm
+
+from objreg_ros.data import Array, Frame, LoopClosure, Odometry
+from objreg_ros.geometry import inverse
+from objreg_ros.keyframes.frame_window import Arrival
+from objreg_ros.keyframes.fusion import fuse
+from objreg_ros.keyframes.keyframer import Keyframer
+from objreg_ros.mapper.pose_graph import PoseGraph
+from objreg_ros.memory.compact import pack_keyframe, unpack_keyframe
+from objreg_ros.registrar.registrar import Registrar
+from objreg_ros.registrar.warm import warm
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.report.revisits import Seen
+from objreg_ros.report.trajectory_error import absolute_trajectory_error
+from objreg_ros.simulation.write import simulate
+from objreg_ros.truth import FALSE, Truth, Truths, within
+
+PARAMS = RegistrarParams(seed=1).replaced(**SIMULATED)
+SEED = 1
+
+
+@dataclass(frozen=True)
+class Robot:
+    """What a robot saw, and where it was."""
+
+    frames: list[Frame]
+    truth: Truth
+
+
+Team = Mapping[str, Robot]
+Way = Callable[[Team], "tuple[list[LoopClosure], dict[str, Any]]"]
+
+
+def team_of(folder: Path, keep: Path, model: str) -> Team:
+    """The robots of a folder; frames out of a file where they were made before."""
+    paths = sorted(path for path in folder.iterdir() if path.is_dir())
+    return {path.name: kept(path, keep / (model or "own"), partial(_robot, path, model)) for path in paths}
+
+
+def _robot(path: Path, model: str) -> Robot:
+    click.echo(f"{path}: detecting and segmenting", err=True)
+    with read_source(path, detector_of(model), SEED) as source:
+        return Robot([replace(frame, robot=path.name) for frame in source.frames], source.truth)
+
+
+def in_order(team: Team) -> Iterator[Frame]:
+    """The frames of all robots by their stamps."""
+    return heapq.merge(*(robot.frames for robot in team.values()), key=lambda frame: frame.stamp_ns)
+
+
+def one_registrar(team: Team) -> tuple[list[LoopClosure], dict[str, Any]]:
+    """All frames into one registrar."""
+    registrar, closures = Registrar(PARAMS), list[LoopClosure]()
+    for frame in tqdm(list(in_order(team)), desc="one registrar"):
+        closures += registrar.process(frame).closures
+    closures += registrar.finish().closures
+    counts = registrar.counts()
+    registrar.close()
+    return closures, {"keyframes": counts["keyframes"]}
+
+
+def arrivals(team: Team) -> Iterator[Arrival]:
+    """The keyframes that each robot makes, in the order in which they are ready."""
+    keyframers = {name: Keyframer(PARAMS) for name in team}
+    for frame in in_order(team):
+        window = keyframers[frame.robot].add(frame)
+        if window is not None:
+            yield Arrival(fuse(window, PARAMS), window.clock, frame.robot)
+    for name, keyframer in keyframers.items():
+        if (window := keyframer.finish()) is not None:
+            yield Arrival(fuse(window, PARAMS), window.clock, name)
+
+
+def packed(team: Team) -> tuple[list[LoopClosure], dict[str, Any]]:
+    """All keyframes into one registrar, as they come over the air."""
+    registrar, closures, sizes = Registrar(PARAMS), list[LoopClosure](), list[int]()
+    for arrival in tqdm([one for one in arrivals(team) if one.keyframe.objects], desc="packed"):
+        data = pack_keyframe(arrival.keyframe)
+        sizes.append(len(data))
+        came = replace(unpack_keyframe(data), robot=arrival.keyframe.robot)
+        outcome = registrar.receive(arrival._replace(keyframe=came))
+        closures += () if outcome is None else outcome.closures
+    closures += registrar.settle().closures
+    registrar.close()
+    p50, p95, most = np.percentile(sizes, (50, 95, 100)).tolist()
+    return closures, {"keyframes": len(sizes), "bytes": {"p50": p50, "p95": p95, "most": most}}
+
+
+WAYS: dict[str, Way] = {"one registrar": one_registrar, "packed": packed}
+
+
+def meetings_of(team: Team) -> list[fleet.Meeting]:
+    """The meetings that there were, by the truth of frames as far apart as keyframes are."""
+    seen = {
+        name: [
+            Seen(frame.stamp_ns, frame.view, T)
+            for frame in keyframes_of(robot.frames)
+            if (T := robot.truth.at(frame.stamp_ns)) is not None
+        ]
+        for name, robot in team.items()
+    }
+    return fleet.meetings(seen)
+
+
+def map_error_cm(team: Team, closures: Sequence[LoopClosure]) -> float | None:
+    """The error of all robots in one map, aligned once; None where one is not in the map."""
+    graph = PoseGraph()
+    for frame in in_order(team):
+        if frame.T_odom_camera is not None:
+            graph.add_odometry(Odometry(T_odom_body=frame.T_odom_camera, stamp_ns=frame.stamp_ns), frame.robot)
+    for closure in closures:
+        graph.add_closure(closure)
+    graph.optimise()
+    estimated, true = list[Array](), list[Array]()
+    for name, robot in team.items():
+        if graph.T_map_odom_of(name) is None:
+            return None
+        posed = [frame.stamp_ns for frame in robot.frames if frame.T_odom_camera is not None]
+        known = [(stamp, T) for stamp in posed if (T := robot.truth.at(stamp)) is not None]
+        estimated += graph.corrected([stamp for stamp, _ in known], name)
+        true += [T for _, T in known]
+    return 100.0 * absolute_trajectory_error(estimated, true)
+
+
+def with_perfect_ties(closures: Sequence[LoopClosure], truths: Truths) -> list[LoopClosure]:
+    """The same closures; those between robots with true poses, and known well."""
+    out = []
+    for closure in closures:
+        ends = truths.at(closure.from_robot, closure.from_ns), truths.at(closure.to_robot, closure.to_ns)
+        if closure.from_robot != closure.to_robot and ends[0] is not None and ends[1] is not None:
+            true = perfect(closure.from_ns, closure.to_ns, inverse(ends[0]) @ ends[1])
+            closure = replace(closure, T_from_to=true.T_from_to, covariance=true.covariance)
+        out.append(closure)
+    return out
+
+
+def measured(team: Team, found: Sequence[fleet.Meeting], way: Way) -> dict[str, Any]:
+    """One way's figures."""
+    closures, said = way(team)
+    truths = Truths({name: robot.truth for name, robot in team.items()})
+    errors = truths.errors(closures)
+    own = {n: [c for c in closures if c.robots == (n, n)] for n in team}
+    alone = {name: map_error_cm({name: team[name]}, own[name]) for name in team}
+    return {
+        **said,
+        "constraints": len(closures),
+        "false": sum(not within(error, FALSE) for error in errors),
+        "between": fleet.judged(found, closures, truths),
+        "pairs": {" ".join(pair): n for pair, n in sorted(Counter(c.robots for c in closures).items())},
+        "map_cm": map_error_cm(team, closures),
+        "perfect_ties_cm": map_error_cm(team, with_perfect_ties(closures, truths)),
+        "alone_cm": alone,
+        "moments": [[*closure.robots, closure.from_ns, closure.to_ns] for closure in closures],
+    }
+
+
+def line(name: str, row: Mapping[str, Any]) -> str:
+    """A way in one line."""
+    between = row["between"]
+    shares = ", ".join(f"{what} {between[what]['closed']}/{between[what]['of']}" for what in ("stretches", "keyframes"))
+    alone = ", ".join("-" if cm is None else f"{cm:.1f}" for cm in row["alone_cm"].values())
+    maps = ["-" if row[key] is None else f"{row[key]:.1f}" for key in ("map_cm", "perfect_ties_cm")]
+    return (
+        f"{name:14} {row['constraints']:4} constraints, {row['false']} false; between robots {between['constraints']} "
+        f"({between['false']} false), {shares}; map {maps[0]} cm, perfect ties {maps[1]} cm, alone {alone} cm"
+    )
+
+
+def simulated(seed: int, frames: int, folder: Path) -> Path:
+    """The recordings of one seed, made where they are not there yet."""
+    path = folder / f"robots_{seed}_{frames}"
+    if not path.exists():
+        simulate(path, "robots", seed, frames, jpeg=True)
+    return path
+
+
+@click.command()
+@click.argument("folders", nargs=-1, type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option("--simulate", "seeds", default="", metavar="SEED,SEED…", help="Simulate these and use them.")
+@click.option("--frames", default=500, show_default=True, help="Frames of each simulated robot.")
+@click.option("--ways", default=",".join(WAYS), show_default=True)
+@click.option("--model", default="", help="ONNX model; `truth`: a simulation's boxes.")
+@click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
+@click.option("--keep", type=click.Path(file_okay=False, path_type=Path), default=Path("out/robots"), show_default=True)
+def main(
+    folders: tuple[Path, ...], seeds: str, frames: int, ways: str, model: str, json_file: Path | None, keep: Path
+) -> None:
+    """Tie the robots of FOLDERS, and say how well."""
+    warm(PARAMS)
+    paths = [*folders, *(simulated(int(seed), frames, keep) for seed in seeds.split(",") if seed)]
+    figures: dict[str, Any] = {}
+    for path in paths:
+        team = team_of(path, keep, model)
+        found = meetings_of(team)
+        figures[path.name] = {way: measured(team, found, WAYS[way]) for way in ways.split(",")}
+        for way, row in figures[path.name].items():
+            click.echo(line(f"{path.name} {way}", row))
+        if json_file is not None:
+            json_file.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
