@@ -6,12 +6,27 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from objreg_ros.params import MountedParams, Params, param
+from objreg_ros.params import MountedParams, Params, param, require_namespaces
 from objreg_ros.registration.dropped import DROPPED
 
 
 @dataclass(frozen=True)
-class RegistrarParams(Params):
+class KeyframeParams(Params):
+    """What becomes a keyframe, and what it keeps; of the registrar, and of a keyframer that works for one elsewhere."""
+
+    keyframe_translation: float = param(0.15, "motion that ends a keyframe", "m", ge=0.0, live=True)
+    keyframe_rotation: float = param(8.0, "rotation that ends a keyframe", "deg", ge=0.0, le=180.0, live=True)
+    keyframe_seconds: float = param(1.0, "longest time that a keyframe spans", "s", ge=0.0, live=True)
+    max_speed: float = param(5.0, "odometry that leaps faster than this has begun anew: another session", "m/s", ge=0.1)
+    context_range: float = param(4.0, "context farther from the camera is left out", "m", ge=0.5)
+    label_groups: tuple[str, ...] = param(
+        ("cup mouse bottle", "book remote cell_phone", "tv laptop"),
+        "labels that detectors confuse: one group an item, spaces between (an underscore for a space in a name)",
+    )
+
+
+@dataclass(frozen=True)
+class RegistrarParams(KeyframeParams):
     """Everything that a user may set in this room."""
 
     DROPPED = DROPPED
@@ -25,18 +40,7 @@ class RegistrarParams(Params):
     max_views: int = param(8, "views of one object that are kept, the most diverse", ge=1)
     max_keyframes: int = param(20000, "most keyframes that are kept; the oldest go first", ge=1)
 
-    # What becomes a keyframe, and what it keeps.
-    keyframe_translation: float = param(0.15, "motion that ends a keyframe", "m", ge=0.0, live=True)
-    keyframe_rotation: float = param(8.0, "rotation that ends a keyframe", "deg", ge=0.0, le=180.0, live=True)
-    keyframe_seconds: float = param(1.0, "longest time that a keyframe spans", "s", ge=0.0, live=True)
-    max_speed: float = param(5.0, "odometry that leaps faster than this has begun anew: another session", "m/s", ge=0.1)
-    context_range: float = param(4.0, "context farther from the camera is left out", "m", ge=0.5)
-
     # Which stored keyframes a new one is compared with.
-    label_groups: tuple[str, ...] = param(
-        ("cup mouse bottle", "book remote cell_phone", "tv laptop"),
-        "labels that detectors confuse: one group an item, spaces between (an underscore for a space in a name)",
-    )
     min_gap: float = param(2.0, "least time between the two moments of a constraint", "s", ge=0.0, live=True)
     odometry_radius: float = param(
         1.0, "stored objects of the session that odometry puts farther away are not tried", "m", ge=0.0, live=True
@@ -85,8 +89,8 @@ class RegistrarParams(Params):
 
 
 @dataclass(frozen=True)
-class RegistrarNodeParams(MountedParams):
-    """How the registrar's node brings its inputs together."""
+class FramesParams(MountedParams):
+    """How frames are brought together with odometry."""
 
     odom_slop: float = param(
         0.02,
@@ -94,10 +98,41 @@ class RegistrarNodeParams(MountedParams):
         "s",
         ge=0.0,
     )
+
+
+@dataclass(frozen=True)
+class KeyframerNodeParams(FramesParams):
+    """What a keyframer sends."""
+
+    kilobytes: int = param(
+        100,
+        "most that a keyframe takes on the air; its objects are thinned where it would take more",
+        "kB",
+        ge=10,
+        live=True,
+    )
+
+
+@dataclass(frozen=True)
+class RegistrarNodeParams(FramesParams):
+    """How the registrar's node brings its inputs together, and when it searches."""
+
+    robots: tuple[str, ...] = param(
+        (),
+        "the namespaces of robots whose keyframers send keyframes; empty: the frames of one robot are followed here",
+    )
+    cameras: tuple[str, ...] = param(
+        (), "the namespaces of a robot's keyframers below its own, one a camera; empty: one, in the robot's own"
+    )
     search_seconds: float = param(
         0.0, "longest search for one keyframe; 0: as long as it takes", "s", ge=0.0, live=True
     )
     waiting_megabytes: int = param(200, "most memory of the keyframes that wait for a search", "MB", ge=1)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_namespaces("robots", self.robots)
+        require_namespaces("cameras", self.cameras)
 
     @property
     def limit(self) -> float:
