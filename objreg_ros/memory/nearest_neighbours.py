@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The stored objects of one label group, and the scan that finds the nearest of them.
 
-A scan is exact. Descriptors lie by dimension in tiles of `LANES` objects, so that the processor compares many at once,
-and twice: rounded to bytes, and as they are. The bytes are a quarter of what a scan has to read. They tell the most that
-an object of a tile can be alike; the descriptors themselves, and the other columns of an object, are looked at only in
-tiles that may hold one of the nearest.
+A scan is exact. Descriptors lie by dimension in tiles of `LANES` objects, so that the processor compares many at once.
+They are compared twice: rounded to bytes, a quarter of what a scan would have to read, and as they are. The bytes tell
+the most that an object of a tile can be alike. The descriptors themselves, and the other columns of an object, are
+looked at only in tiles that may hold one of the nearest.
 """
 
 from __future__ import annotations
@@ -82,8 +82,8 @@ class Block:
         descriptor = EMPHASIS * np.asarray(sighting.descriptor, np.float32)
         session = sighting.session if sighting.by_odometry else NO_SESSION
         found, similarity = _likest(  # type: ignore[call-arg]
-            self._descriptors[:tiles], self._bytes[:tiles], self._half_norms[:tiles], self._spans, self.where, self.when, descriptor,
-            np.asarray(sighting.position, float), sighting.travelled, sighting.stamp_ns, session,
+            self._descriptors[:tiles], self._bytes[:tiles], self._half_norms[:tiles], self._spans, self.where,
+            self.when, descriptor, np.asarray(sighting.position, float), sighting.travelled, sighting.stamp_ns, session,
             round(1e9 * params.min_gap), params.odometry_radius, params.odometry_drift, since, most, margin,
         )  # fmt: skip
         return found, np.maximum(0.5 * float(descriptor @ descriptor) - similarity, 0.0)

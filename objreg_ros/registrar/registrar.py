@@ -71,8 +71,8 @@ class Registrar:
         """Everything that lives in memory, from what is in the store; ``session`` is the first that is new."""
         self._keyframer, self._first_session = Keyframer(self.params, session), session
         self._index = Index(self.params)
-        self._index.add(self._store.sightings())
-        self._landmarks = Landmarks(self.params, self._store.sightings(), self._store.next_landmark())
+        self._landmarks = Landmarks(self.params, first=self._store.next_landmark())
+        self._index.add(self._landmarks.passing(self._store.sightings()))
         self._clock: Clock | None = None  # the run of the clock that goes on
         self._thinning = Thinning(self.params.thin_seconds)  # of what was accepted in it
         self._confirmation = Confirmation(self.params.replaced(confirm_seconds=self._confirm_seconds))
