@@ -139,7 +139,8 @@ class Landmarks:
             self._merge(old, merge)
         for sighting in sightings:
             number, last = sighting.landmark, last_of(sighting)
-            known = self._known[number] = self._known.pop(number, None) or Known(last)
+            known = self._known.pop(number) if number in self._known else Known(last)
+            self._known[number] = known  # at the end: seen last
             self._leave(known.last, number)
             self._there[self._cell(last)].add(number)
             known.last = last
