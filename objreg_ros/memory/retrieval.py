@@ -48,7 +48,7 @@ class CandidateKeyframe(NamedTuple):
 
 
 class Index:
-    """The objects of a store in memory, about 200 bytes each."""
+    """The objects of a store in memory, about 300 bytes each."""
 
     def __init__(self, params: RegistrarParams) -> None:
         self.params = params
