@@ -82,6 +82,6 @@ class FramesDoor(MatchingDoor):
             self.throttled.remind(
                 "camera",
                 f"expected frames of one camera, got one of {frame_id!r} after one of {self._camera!r}: those that "
-                "come late are dropped; give each camera a keyframer, and name it in registrar.cameras",
+                "come late are dropped; give each camera a keyframer, and name it in registrar.robots",
             )
         self._camera = frame_id

@@ -31,21 +31,28 @@ class FromRobot(NamedTuple):
 class KeyframesIn:
     """The books of ``door`` count keyframes; ``take`` is given each that may come in.
 
-    ``prefixes`` has what stands before the topics of each robot, ``cameras`` the namespaces behind that.
+    ``prefixes`` has what stands before the topics of each robot, ``cameras`` the namespaces of each one's keyframers
+    behind that; none where it has one, in its own.
     """
 
     def __init__(
-        self, door: FramesDoor, prefixes: Mapping[str, str], cameras: Sequence[str], take: Callable[[FromRobot], None]
+        self,
+        door: FramesDoor,
+        prefixes: Mapping[str, str],
+        cameras: Sequence[Sequence[str]],
+        take: Callable[[FromRobot], None],
     ) -> None:
         self._door, self._take = door, take
         self._counts = Counter[tuple[str, str]]()  # by robot, and what became of its keyframes
-        for robot, prefix in prefixes.items():
+        for (robot, prefix), names in zip(prefixes.items(), cameras, strict=True):
             door.listen(String, f"{prefix}labels", door.hear_labels, qos.latched())
-            for camera in (f"{name}/" for name in cameras) if cameras else ("",):
-                topic = f"{prefix}{camera}keyframes"
-                hear = partial(self._hear, robot)
-                door.listen(CompressedImage, topic, hear, qos.latched(qos.KEPT_KEYFRAMES), watched=topic)
-                door.expect(topic, topic)
+            for camera in (f"{name}/" for name in names) if names else ("",):
+                self._listen(robot, f"{prefix}{camera}keyframes")
+
+    def _listen(self, robot: str, topic: str) -> None:
+        hear, kept = partial(self._hear, robot), qos.latched(qos.KEPT_KEYFRAMES)
+        self._door.listen(CompressedImage, topic, hear, kept, watched=topic)
+        self._door.expect(topic, topic)
 
     def _hear(self, robot: str, message: Any) -> None:
         sent, stamp_ns = self._door.read_aside("keyframes", read_keyframe, message), from_msg.stamp_ns(message)

@@ -13,11 +13,12 @@ def prefixes_of(node: Node, robots: Sequence[str]) -> dict[str, str]:
 
     A robot is called by its whole namespace, as it calls itself.
     """
-    return {_name_of(node, robot): f"{robot}/" for robot in robots} or {"": ""}
+    return {_name_of(node, robot): f"{robot}/" if robot else "" for robot in robots} or {"": ""}
 
 
 def _name_of(node: Node, robot: str) -> str:
-    return node.resolve_topic_name(f"{robot}/odom", only_expand=True).removesuffix("/odom").strip("/")
+    topic = f"{robot}/odom" if robot else "odom"
+    return node.resolve_topic_name(topic, only_expand=True).removesuffix("/odom").strip("/")
 
 
 def framed(robot: str, frame_id: str) -> str:

@@ -39,6 +39,7 @@ from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 
 PATIENCE_S = 1.0  # a newer keyframe waits before the search in hand is cut short, if some were overtaken of late
 WAITING_KEYFRAMES = 8  # most that wait for a search; no frame is followed while so many do
+WAITING_BYTES = 200_000_000  # most memory of those
 BEHIND = 32  # keyframes of a robot that may wait for their search: those of a link that was away come all at once
 GIVING_WAY = 10  # niceness of the search: the next image must not wait for it
 
@@ -58,7 +59,7 @@ class RegistrarNode(FramesDoor):
     stored without a search: nothing that was seen is lost. A search that newer ones wait for is cut short, and no frame
     is followed while too many wait.
 
-    With ``robots`` or ``cameras`` it follows no frame: keyframes come from keyframers. Robots take turns, each with its
+    With ``robots`` it follows no frame: keyframes come from keyframers. Robots take turns, each with its
     oldest keyframe; `BEHIND` of them may wait before the oldest is stored without a search.
     """
 
@@ -83,8 +84,8 @@ class RegistrarNode(FramesDoor):
         self._counts = dict(self._registrar.counts())
         self._unsearched = 0
         self._scene = Scene()
-        self._robots = prefixes_of(self, inputs.robots) if inputs.robots or inputs.cameras else {}
-        limit, nice = self._limit(inputs), self._niceness()
+        self._robots = prefixes_of(self, list(inputs.cameras)) if inputs.robots else {}
+        limit, nice = self._limit(), self._niceness()
         self.searcher: Backlog[Job] = Backlog(
             self._search, self._keep, self.fail, limit, lambda job: job.seen.nbytes, nice, lambda job: job.seen.robot
         )
@@ -95,16 +96,15 @@ class RegistrarNode(FramesDoor):
         self.create_service(Trigger, "~/save", self._save, callback_group=self.apart)
         self.create_service(SetBool, "~/enable", self._enable)
         if self._robots:
-            self._keyframes = KeyframesIn(self, self._robots, inputs.cameras, self._take)
+            self._keyframes = KeyframesIn(self, self._robots, list(inputs.cameras.values()), self._take)
         else:
             self.listen_to_frames(hear_mount(self, inputs.mounting), round(inputs.odom_slop * 1e9))
 
-    def _limit(self, inputs: RegistrarNodeParams) -> Limit:
+    def _limit(self) -> Limit:
         """How many keyframes may wait for their search."""
-        nbytes = inputs.waiting_megabytes * 1_000_000
         if self._robots:
-            return Limit(2 * BEHIND * len(self._robots), nbytes, PATIENCE_S, BEHIND)
-        return Limit(WAITING_KEYFRAMES, nbytes, PATIENCE_S)
+            return Limit(2 * BEHIND * len(self._robots), WAITING_BYTES, PATIENCE_S, BEHIND)
+        return Limit(WAITING_KEYFRAMES, WAITING_BYTES, PATIENCE_S)
 
     def adopt(self) -> None:
         """Live parameters hold from the next frame and the next search on."""

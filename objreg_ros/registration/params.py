@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from objreg_ros.params import MountedParams, Params, param, require_namespaces
 from objreg_ros.registration.dropped import DROPPED
 
+OWN = "."  # in place of a robot's namespace: that of the registrar itself
+
 
 @dataclass(frozen=True)
 class KeyframeParams(Params):
@@ -119,20 +121,25 @@ class RegistrarNodeParams(FramesParams):
 
     robots: tuple[str, ...] = param(
         (),
-        "the namespaces of robots whose keyframers send keyframes; empty: the frames of one robot are followed here",
-    )
-    cameras: tuple[str, ...] = param(
-        (), "the namespaces of a robot's keyframers below its own, one a camera; empty: one, in the robot's own"
+        "robots whose keyframers send keyframes, by their namespaces (. for this node's own), each with those of its "
+        "cameras behind it, as in 'robot1 front rear', where it has several; empty: one robot is followed here",
     )
     search_seconds: float = param(
         0.0, "longest search for one keyframe; 0: as long as it takes", "s", ge=0.0, live=True
     )
-    waiting_megabytes: int = param(200, "most memory of the keyframes that wait for a search", "MB", ge=1)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_namespaces("robots", self.robots)
-        require_namespaces("cameras", self.cameras)
+        told = [words.split() or [""] for words in self.robots]
+        require_namespaces("robots", ["own" if robot == OWN else robot for robot, *_ in told])
+        for robot, *cameras in told:
+            require_namespaces(f"robots: cameras of {robot}", cameras)
+
+    @property
+    def cameras(self) -> dict[str, tuple[str, ...]]:
+        """The namespace of each robot, empty for this node's own, with those of its cameras below it, if they have."""
+        told = (words.split() for words in self.robots)
+        return {"" if robot == OWN else robot: tuple(cameras) for robot, *cameras in told}
 
     @property
     def limit(self) -> float:

@@ -74,7 +74,7 @@ def test_a_scan_of_many_tiles_leaves_out_none_of_the_nearest(spread: float) -> N
     for sighting in stored:
         block.append(sighting)
     for row in (*(_sighting(9999, draw, spread) for _ in range(5)), replace(stored[70], stamp_ns=10**12)):
-        rows, _ = block.nearest(row, PARAMS, MOST, MARGIN)
+        rows, _ = block.nearest(row, PARAMS, MOST, MARGIN, OWN)
         assert block.when[rows, 2].tolist() == _brute_force(stored, row)
 
 
