@@ -13,7 +13,8 @@ from objreg_ros.keyframes import keyframer, fusion, warm
 from objreg_ros.registration.params import KeyframeParams
 
 def compiled():
-    return {(d.py_func.__module__, d.py_func.__name__): len(d.signatures) for d in gc.get_objects() if isinstance(d, Dispatcher)}
+    kernels = (d for d in gc.get_objects() if isinstance(d, Dispatcher))
+    return {(d.py_func.__module__, d.py_func.__name__): len(d.signatures) for d in kernels}
 
 warm.warm(KeyframeParams())
 before = compiled()
