@@ -6,5 +6,6 @@ every frame, `search` for every keyframe, `process` for both, with an `outcome` 
 keyframes; what a registered pair comes to is a `closure` or a refusal, or waits for its `confirmation` by others whose
 `consistency` with it odometry tells. `relocalisation` says where the camera is in the map of an earlier session. Each
 camera of each robot has a `camera_track`; `origins` numbers the keyframes that were made elsewhere; `pools` are the
-threads of the search. `warm` compiles every kernel before the first frame comes; `node` is the door.
+threads of the search; `thinning` leaves out what would be said twice. `warm` compiles every kernel before the first
+frame comes; `node` is the door.
 """
