@@ -12,9 +12,9 @@ from typing import NamedTuple
 from objreg_ros.data import Reason, Rejected
 from objreg_ros.memory.retrieval import CandidateKeyframe
 from objreg_ros.memory.store import Store, StoreError
-from objreg_ros.memory.thinning import Thinning
 from objreg_ros.registrar.closure import Accepted, redundant, rejected
 from objreg_ros.registrar.confirmation import Confirmation, Held, Tried
+from objreg_ros.registrar.thinning import Thinning
 from objreg_ros.registration import align
 from objreg_ros.registration.api import Gate, Method
 from objreg_ros.registration.keyframe import Keyframe

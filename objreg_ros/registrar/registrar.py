@@ -72,8 +72,8 @@ class Registrar:
         self._origins = Origins(self._store, self._numbers)
         self._tracks = CameraTracks(self.params.replaced(confirm_seconds=self._confirm_seconds), self._numbers)
         self._index = Index(self.params)
-        self._index.add(self._store.sightings())
-        self._landmarks = Landmarks(self.params, self._store.sightings(), self._store.next_landmark())
+        self._landmarks = Landmarks(self.params, first=self._store.next_landmark())
+        self._index.add(self._landmarks.passing(self._store.sightings()))
         self._session: int | None = None  # of the newest keyframe, None before the first
 
     @property

@@ -15,9 +15,9 @@ from objreg_ros.data import Reason
 from objreg_ros.memory.retrieval import CandidateKeyframe
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store
-from objreg_ros.memory.thinning import Thinning
 from objreg_ros.registrar.candidate_search import Budget, Means, Search
 from objreg_ros.registrar.confirmation import Confirmation
+from objreg_ros.registrar.thinning import Thinning
 from objreg_ros.registration.candidate import Candidate
 from objreg_ros.registration.params import RegistrarParams
 
