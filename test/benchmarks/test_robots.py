@@ -16,7 +16,6 @@ from objreg_ros.registrar.warm import drawn
 from objreg_ros.truth import Truth, Truths
 
 SECOND = 10**9
-CENTIMETRE = 0.01
 
 
 @pytest.fixture
@@ -70,13 +69,16 @@ def test_ties_between_robots_become_true_and_those_of_one_stay(robots: ModuleTyp
     assert np.trace(found[1].covariance) < np.trace(tie.covariance)
 
 
-def test_one_map_of_all_is_true_with_a_true_tie_and_none_without(robots: ModuleType) -> None:
+def test_the_map_of_all_is_as_true_as_two_ties_are_and_none_with_one(robots: ModuleType) -> None:
     pytest.importorskip("gtsam", reason="maps are solved by GTSAM")
-    both = team(robots)
-    assert robots.map_error_cm(both, []) is None
-    assert robots.map_error_cm(both, [closure(("a", "b"), 0, 1, at(1.0))]) == pytest.approx(0.0, abs=0.01)
-    aside = robots.map_error_cm(both, [closure(("a", "b"), 0, 1, at(1.0 + 10 * CENTIMETRE))])
-    assert aside > 1.0
+
+    def error_cm(*ties: tuple[int, int, float]) -> float | None:
+        closures = [closure(("a", "b"), from_s, to_s, at(metres)) for from_s, to_s, metres in ties]
+        return robots.map_error_cm(team(robots), closures)
+
+    assert error_cm((0, 1, 1.0)) is None, "the mapper does not place a robot by one tie"
+    assert error_cm((0, 1, 1.0), (4, 5, 1.0)) == pytest.approx(0.0, abs=0.01)
+    assert error_cm((0, 1, 1.1), (4, 5, 1.1)) == pytest.approx(5.0, abs=0.2), "half of 10 cm on either side"
 
 
 def test_each_robot_makes_keyframes_under_its_name(robots: ModuleType) -> None:
