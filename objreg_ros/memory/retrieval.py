@@ -73,6 +73,10 @@ class Index:
             block = self._blocks.setdefault(self._groups.of(sighting.label), Block())
             self._rows.setdefault(sighting.keyframe_id, []).append((block, block.append(sighting)))
 
+    def sessions_of(self, robot: str) -> frozenset[int]:
+        """Those of which a robot's objects were added."""
+        return frozenset(self._sessions.get(robot, ()))
+
     def remove(self, keyframe_ids: Iterable[int]) -> None:
         """Forget every object of these keyframes."""
         for block, row in chain.from_iterable(self._rows.pop(number, ()) for number in keyframe_ids):
