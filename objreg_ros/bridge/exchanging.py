@@ -94,7 +94,9 @@ class Exchanging:
         self._exchange.note(packed, time.monotonic())
 
     def _deliver(self, stamp_ns: int, packed: bytes) -> None:
-        self._take(Delivered(stamp_ns, packed))
+        self._door.accept(stamp_ns)
+        if self._door.let_in(stamp_ns):
+            self._take(Delivered(stamp_ns, packed))
 
     def _answer(self) -> None:
         packed = self._exchange.answer(time.monotonic()) if self._exchange.waiting else None

@@ -32,7 +32,10 @@ Cell = tuple[int, str, int, int, int]  # session, label group, and where
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Landmark:
-    """A known object: ``position (3,)`` m in the frame of the ``session`` of a ``robot`` that saw it last, at ``stamp_ns``."""
+    """A known object: ``position (3,)`` m in the frame of the ``session`` of ``robot`` that saw it last.
+
+    It was seen so at ``stamp_ns``.
+    """
 
     landmark: int
     label: str

@@ -144,7 +144,7 @@ def test_a_full_store_says_what_goes(make: Making, monkeypatch: pytest.MonkeyPat
     full = {**node._registrar.counts(), "keyframes": 2, "forgotten": 3}
     monkeypatch.setattr(node._registrar, "counts", lambda: full)
     for _ in range(2):
-        node._tell(Outcome())
+        node._publish(Outcome())
     (line,) = said
     assert "keeps 2 keyframes (max_keyframes), and has forgotten the oldest 3" in line
     assert node.extra_diagnostics()["forgotten keyframes"] == 3
