@@ -285,3 +285,15 @@ def test_a_running_node_takes_live_parameters_and_refuses_the_others(
     (result,) = node.set_parameters([Parameter("store", value="other.db")])
     assert not result.successful
     node.close()
+
+
+@pytest.mark.parametrize(("words", "got"), [((), "none"), (("-p", "robots:=[r1]", "-r", "__ns:=/r1"), "robots")])
+def test_keyframes_are_exchanged_by_one_robot_that_its_namespace_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], got: str
+) -> None:
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
+    monkeypatch.setattr("objreg_ros.registrar.node.warm", lambda params: None)
+    rclpy.init(args=["registrar", "--ros-args", "-p", "exchange:=/fleet", *words])
+    with pytest.raises(ValueError, match=f"exchange: expected a namespace, which names one robot, got {got}"):
+        RegistrarNode()
+    rclpy.try_shutdown()
