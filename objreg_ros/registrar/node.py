@@ -113,10 +113,8 @@ class RegistrarNode(FramesDoor):
         """Our own robot's name if keyframes are exchanged; empty if not. ValueError where it has none."""
         robot, topics = self.get_namespace().strip("/"), self.settings.of(ExchangeParams).exchange
         if topics and (self._robots or not robot):
-            got = f"robots {', '.join(self._robots)}" if self._robots else "none"
-            raise ValueError(
-                f"exchange: expected a namespace that names the one robot, got {got}; set it by -r __ns:=/NAME"
-            )
+            got = "robots" if self._robots else "none"
+            raise ValueError(f"exchange: expected a namespace, which names one robot, got {got}; add -r __ns:=/NAME")
         return robot if topics else ""
 
     def _limit(self) -> Limit:

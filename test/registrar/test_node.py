@@ -294,6 +294,8 @@ def test_keyframes_are_exchanged_by_one_robot_that_its_namespace_names(
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
     monkeypatch.setattr("objreg_ros.registrar.node.warm", lambda params: None)
     rclpy.init(args=["registrar", "--ros-args", "-p", "exchange:=/fleet", *words])
-    with pytest.raises(ValueError, match=f"exchange: expected a namespace, which names one robot, got {got}"):
-        RegistrarNode()
-    rclpy.try_shutdown()
+    try:
+        with pytest.raises(ValueError, match=f"exchange: expected a namespace, which names one robot, got {got}"):
+            RegistrarNode()
+    finally:
+        rclpy.try_shutdown()
