@@ -100,6 +100,7 @@ setup(
             "detector = objreg_ros.detector.node:main",
             "segmenter = objreg_ros.segmenter.node:main",
             "registrar = objreg_ros.registrar.node:main",
+            "keyframer = objreg_ros.keyframes.node:main",
             "mapper = objreg_ros.mapper.node:main",
             "objreg_to_rtabmap = objreg_ros.adapters.rtabmap:main",
             "objreg_to_lio_sam = objreg_ros.adapters.lio_sam:main",

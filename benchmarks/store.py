@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the store costs at 10^2 to 10^5 objects: a frame, inserting, querying, size on disk, memory; and kill -9.
+"""What the store costs at 10^2 to 10^6 objects: a frame, inserting, querying, size on disk, memory; and kill -9.
 
-    python benchmarks/store.py --json OUT [--quick] [--kills N]
+    python benchmarks/store.py --json OUT [--quick] [--sizes 100,100000] [--kills N]
 
 ``sizes``: for each number of stored objects ``insert_ms`` (one keyframe, on the disk), ``query_ms`` (one object against
-the index), ``keyframe_query_ms`` (all objects of a keyframe), each with p50 and p95, ``open_s``, ``memory_mb``, and
-``disk_mb`` (none at 10^5, where the stored objects are light to spare the disk). ``kills``: how often a writing process
+the index), ``keyframe_query_ms`` (all objects of a keyframe), each with p50 and p95, ``memory_mb`` of all that a
+registrar holds of the store, ``open_s`` until it holds that, and ``disk_mb`` (none from 10^5 on, where the stored
+objects are light to spare the disk). ``kills``: how often a writing process
 was killed at a random moment, how many keyframes it had acknowledged, how many of those were lost. The content is made
 up, of the size that a Kinect gives; all objects are of one of nine labels, and all in reach by odometry. ``frames``:
-what a frame costs the registrar, everything included, beside so many light objects of other places (`frame_cost`), and
+what a frame costs the registrar, everything included, beside so many light objects of other places (`frame_cost`), as
+far as it keeps so many, and
 ``frame_ratio`` that of the most to the fewest.
 """
 
@@ -36,6 +38,7 @@ from objreg_ros.data import Intrinsics, ObjectCloud, View
 from objreg_ros.memory.books import Books
 from objreg_ros.memory.checksum import sealed_keyframe, sealed_object
 from objreg_ros.memory.descriptor import SIZE
+from objreg_ros.memory.landmarks import Landmarks
 from objreg_ros.memory.migration import insert
 from objreg_ros.memory.retrieval import Index
 from objreg_ros.memory.sighting import Sighting, sightings_of
@@ -46,12 +49,13 @@ from objreg_ros.registration.params import RegistrarParams
 CAMERA = Intrinsics(fx=131.25, fy=131.25, cx=79.625, cy=59.625, width=160, height=120)
 LABELS = ("cup", "book", "chair", "tv", "keyboard", "bottle", "bowl", "mouse", "laptop")
 PER_KEYFRAME = 8
-SIZES = (100, 1_000, 10_000, 100_000)
+SIZES = (100, 1_000, 10_000, 100_000, 1_000_000)
+HEAVY = 10_000  # the most objects of full size: more would fill the disk
 PARTS = ("sizes", "frames", "kills")
 SAMPLES = 60
 QUICK_KILLS = 10
 POINTS = 1500  # of an object
-LIGHT = 30  # of an object where as many as 10^5 would fill the disk
+LIGHT = 30  # of an object beyond that
 VIEWS = 8  # keyframes that a landmark is seen in
 
 
@@ -91,12 +95,11 @@ def write_forever(path: str, seed: int) -> None:
 def measure_size(objects: int, folder: Path) -> dict[str, Any]:
     """The costs at one number of stored objects."""
     path, draw = folder / f"{objects}.db", np.random.default_rng(0)
-    _fill(path, objects, draw, POINTS if objects < SIZES[-1] else LIGHT)
-    disk = path.stat().st_size / 1e6 if objects < SIZES[-1] else None
+    _fill(path, objects, draw, POINTS if objects <= HEAVY else LIGHT)
+    disk = path.stat().st_size / 1e6 if objects <= HEAVY else None
     before, began = _resident_mb(), time.perf_counter()
     with closing(Store(path)) as store:
-        index = Index(RegistrarParams(min_gap=0.0))
-        index.add(store.sightings())
+        index, landmarks = _remembered(store)
         opened, memory = time.perf_counter() - began, _resident_mb() - before
         asked = [sightings_of(make_keyframe(10**6 + i, draw)) for i in range(SAMPLES)]
         single = [_ms(index.query, [row]) for rows in asked for row in rows[:4]]
@@ -111,7 +114,15 @@ def measure_size(objects: int, folder: Path) -> dict[str, Any]:
         "open_s": opened,
         "disk_mb": disk,
         "memory_mb": memory,
+        "landmarks": len(landmarks),
     }
+
+
+def _remembered(store: Store) -> tuple[Index, Landmarks]:
+    """What a registrar holds in memory beside the heads of the keyframes."""
+    index, landmarks = Index(RegistrarParams(min_gap=0.0)), Landmarks(RegistrarParams(), first=store.next_landmark())
+    index.add(landmarks.passing(store.sightings()))
+    return index, landmarks
 
 
 def measure_kills(kills: int, folder: Path) -> dict[str, int]:
@@ -233,23 +244,37 @@ def _parts(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
     return parts
 
 
+def _sizes(_: click.Context, __: click.Parameter, text: str) -> tuple[int, ...]:
+    try:
+        sizes = tuple(map(int, text.split(",")))
+    except ValueError:
+        sizes = ()
+    if not sizes or min(sizes) < PER_KEYFRAME:
+        raise click.BadParameter(f"expected numbers of objects from {PER_KEYFRAME} on, got {text!r}")
+    return sizes
+
+
 @click.command(help=__doc__)
 @click.option("--json", "out", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
 @click.option("--quick", is_flag=True, help="Up to 10^4 objects and fewer kills.")
+@click.option("--sizes", default=",".join(map(str, SIZES)), show_default=True, callback=_sizes, help="Stored objects.")
 @click.option("--kills", type=click.IntRange(min=0), default=200, show_default=True)
 @click.option("--parts", default=",".join(PARTS), show_default=True, callback=_parts, help="What is measured.")
 @click.pass_context
-def main(context: click.Context, out: Path | None, quick: bool, kills: int, parts: tuple[str, ...]) -> None:
+def main(
+    context: click.Context, out: Path | None, quick: bool, sizes: tuple[int, ...], kills: int, parts: tuple[str, ...]
+) -> None:
     """Measure and print."""
-    sizes = SIZES[:3] if quick else SIZES
-    kills = quick_values(context, quick, {"kills": QUICK_KILLS}).get("kills", kills)
+    fewer = quick_values(context, quick, {"kills": QUICK_KILLS, "sizes": SIZES[:3]})
+    kills, sizes = fewer.get("kills", kills), fewer.get("sizes", sizes)
     figures: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         if "sizes" in parts:
             figures["sizes"] = {str(n): measure_size(n, folder) for n in tqdm(sizes, desc="sizes")}
-        if "frames" in parts:
-            figures |= measure_frames(sizes, folder)
+        few = [n for n in sizes if n <= PER_KEYFRAME * RegistrarParams().max_keyframes]
+        if "frames" in parts and few:
+            figures |= measure_frames(few, folder)
         if "kills" in parts:
             figures["kills"] = measure_kills(kills, folder)
     print(json.dumps(figures, indent=1))

@@ -62,6 +62,7 @@ OPTIONS = {
     "T_base_camera": "where the camera sits on the body of odom, seven numbers with commas; else /tf_static is asked",
     "use_sim_time": "true to follow /clock",
     "reliable": "true to ask cameras for reliable delivery",
+    "keyframer": "true to start a keyframer in the registrar's place, which sends keyframes to a registrar elsewhere",
     "mapper": "true to start the reference mapper too, which publishes path and correction",
     "composed": "true for all nodes in one process, which takes half of the memory",
     "managed": "true for nodes with a life cycle (~/change_state); not with composed",
@@ -76,11 +77,11 @@ CHOICES = {
     "source": ("", "auto", "points", "depth"),
     "detections": ("", "auto", "table", "vision_msgs", "masks"),
     "log_level": ("", "debug", "info", "warn", "error", "fatal"),
-    **dict.fromkeys((*SWITCHES, "mapper", "composed", "respawn", "rviz"), SWITCH),
+    **dict.fromkeys((*SWITCHES, "keyframer", "mapper", "composed", "respawn", "rviz"), SWITCH),
 }
 FOREIGN = ("vision_msgs", "masks")  # detections that are another detector's
 RESPAWN_S = 2.0
-OWN = {"detector": ("model",), "segmenter": ("source", "detections", "camera"), "registrar": (), "mapper": ()}
+OWN = {"detector": ("model",), "segmenter": ("source", "detections", "camera")}
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -112,7 +113,7 @@ def _nodes(context: LaunchContext) -> list[Node]:
 
 
 def _alone(room: str, said: dict[str, str], alike: dict) -> Node:
-    words = ["-m", f"objreg_ros.{room}.node"]
+    words = ["-m", f"objreg_ros.{'keyframes' if room == 'keyframer' else room}.node"]
     kind = LifecycleNode if _is_true(said["managed"]) else Node  # which events of a launch file around this one reach
     return kind(
         executable=sys.executable,
@@ -167,6 +168,8 @@ def _rviz(said: dict[str, str], alike: dict) -> list[Node]:
 
 def _rooms(said: dict[str, str]) -> tuple[str, ...]:
     rooms = tuple(room for room in ROOMS if room != "detector" or said["detections"] not in FOREIGN)
+    if _is_true(said["keyframer"]):
+        rooms = tuple("keyframer" if room == "registrar" else room for room in rooms)
     return (*rooms, "mapper") if _is_true(said["mapper"]) else rooms
 
 
@@ -177,7 +180,7 @@ def _is_true(text: str) -> bool:
 def _parameters(room: str, said: dict[str, str]) -> list:
     """The user's file, and over it what was said on the command line."""
     values: dict = {name: _is_true(said[name]) for name in SWITCHES if said[name]}
-    values |= {name: said[name] for name in OWN[room] if said[name]}
+    values |= {name: said[name] for name in OWN.get(room, ()) if said[name]}
     if said["T_base_camera"] and room != "detector":
         values["T_base_camera"] = [float(number) for number in said["T_base_camera"].split(",")]
     return [given for given in (said["params_file"], values) if given]

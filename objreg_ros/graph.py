@@ -17,6 +17,7 @@ from objreg_ros.bridge.door import Door
 from objreg_ros.bridge.indoors import Indoors
 from objreg_ros.bridge.spin import run_together
 from objreg_ros.detector.node import DetectorNode
+from objreg_ros.keyframes.node import KeyframerNode
 from objreg_ros.mapper.node import MapperNode
 from objreg_ros.registrar.node import RegistrarNode
 from objreg_ros.segmenter.node import SegmenterNode
@@ -26,6 +27,7 @@ NODES: dict[str, Callable[[Indoors], Door]] = {
     "detector": DetectorNode,
     "segmenter": SegmenterNode,
     "registrar": RegistrarNode,
+    "keyframer": KeyframerNode,
     "mapper": MapperNode,
 }
 ROOMS = ("detector", "segmenter", "registrar")

@@ -13,12 +13,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 import types
 import typing
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Self
 
 from objreg_ros.geometry import Array, mounting
+
+NAMESPACE = re.compile("/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -149,6 +152,12 @@ class MountedParams(Params):
     def mounting(self) -> Array | None:
         """``T_base_camera`` as a (4, 4) pose, None where none is set."""
         return mounting(self.T_base_camera)
+
+
+def require_namespaces(name: str, values: Sequence[str]) -> None:
+    """ValueError for a parameter ``name`` unless its values are distinct names of ROS namespaces."""
+    if len(set(values)) < len(values) or not all(map(NAMESPACE.fullmatch, values)):
+        raise ValueError(f"{name}: expected distinct names of namespaces, got {list(values)}")
 
 
 def _declaration(field: dataclasses.Field[Any], hint: Any) -> Declaration:

@@ -9,7 +9,7 @@ import sys
 import pytest
 
 HEAVY = ("distributed", "gtsam", "matplotlib", "open3d", "plotly", "pyarrow", "rerun")
-NODES = ("detector", "segmenter", "registrar", "mapper")
+NODES = ("detector", "segmenter", "registrar", "keyframes", "mapper")
 CODE = "import importlib, sys; importlib.import_module(sys.argv[1]); print(*(set(sys.argv[2:]) & set(sys.modules)))"
 
 

@@ -107,12 +107,22 @@ def allowed(importer: str, imported: str) -> bool:
     if importer == "__main__":
         return imported == "cli"
     if importer == "graph":  # all nodes in one process
-        return imported in (*(f"{room}.node" for room in ROOMS), "bridge.door", "bridge.indoors", "bridge.spin")
+        return imported in (
+            *(f"{room}.node" for room in ROOMS),
+            "keyframes.node",
+            "bridge.door",
+            "bridge.indoors",
+            "bridge.spin",
+        )
     if room in ROOMS and importer.endswith(".node"):
         return below(imported, room, "data", "bridge", "share") or (room == "registrar" and floor(imported) is not None)
+    if importer == "keyframes.node":
+        return below(imported, "keyframes", "memory", "registration", "data", "bridge", "share")
     if floor(importer) is not None:
         return below(imported, "data", "geometry", "params") or (
-            imported != "registrar.node" and floor(imported) is not None and floor(imported) <= floor(importer)
+            imported not in ("registrar.node", "keyframes.node")
+            and floor(imported) is not None
+            and floor(imported) <= floor(importer)
         )
     if room in ROOMS:
         return below(imported, room, "data", "geometry", "params")

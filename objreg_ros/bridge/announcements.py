@@ -22,7 +22,10 @@ from objreg_ros.data import LoopClosure, Observation, Rejected
 
 
 class Announcements:
-    """Publishes for ``node``, whose namespace is the name of the robot, and counts. Not for two threads at once."""
+    """Publishes for ``node``, and counts. Not for two threads at once.
+
+    What names no robot is of the one that the node's namespace is called.
+    """
 
     def __init__(self, node: Node) -> None:
         self._node, self._robot = node, node.get_namespace().strip("/")
@@ -65,12 +68,13 @@ class Announcements:
         frame_id: str,
         names: to_msg.Labels,
         session: int | None,
+        robot: str = "",
     ) -> None:
         """Tell the objects of a keyframe, in the camera ``frame_id`` at ``stamp_ns``."""
         seen = observations, stamp_ns, frame_id, names
         self._landmarks.publish(to_msg.landmarks(*seen))
         if self._whole is not None:
-            self._whole.landmarks.publish(closures_msg.object_landmarks(*seen, session, self._robot))
+            self._whole.landmarks.publish(closures_msg.object_landmarks(*seen, session, robot or self._robot))
 
     def markers(self, scene: MarkerArray) -> None:
         """Show the scene in RViz."""

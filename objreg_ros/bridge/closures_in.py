@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How a node hears closures: on `loop_closures` of objreg_msgs, on `constraints`, or on both and each once.
 
-Those of one robot come on topics of its own too, whose name tells the robot where the message does not.
+Those of one robot come on topics of its own too, whose name tells the robot where the message does not. On
+`constraints` the prefixes of frames tell it.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from nav_msgs.msg import Odometry
 
 from objreg_ros.bridge import closures_msg, from_msg, qos
 from objreg_ros.bridge.door import Door
+from objreg_ros.bridge.robots import robot_of
 from objreg_ros.data import LoopClosure, Moments, Robots, may_be_same
 
 MOST_KNOWN = 100_000  # closures that are remembered, so that none is taken twice
@@ -39,6 +41,7 @@ class ClosuresIn:
         prefixes: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         self._door, self._take, self._again, self._withdraw = door, take, again, withdraw
+        self._robots = [robot for robot in prefixes if robot]
         self._known: dict[Moments, set[Robots]] = {}  # the oldest first
         self._told: dict[str, tuple[Moments, Robots]] = {}  # by the id of objreg_msgs
         whole, kept = closures_msg.LoopClosureMsg, qos.latched(qos.KEPT_CONSTRAINTS)
@@ -66,7 +69,13 @@ class ClosuresIn:
         self._known.clear()
 
     def _hear_constraint(self, message: Any, robot: str = "") -> None:
-        self._hear("constraints", message, lambda told: _of(robot, from_msg.loop_closure(told)))
+        self._hear("constraints", message, lambda told: _of(robot, self._by_frames(from_msg.loop_closure(told))))
+
+    def _by_frames(self, closure: LoopClosure) -> LoopClosure:
+        """The closure of the robots whose prefixes its frames have."""
+        frames = closure.from_frame_id, closure.to_frame_id
+        one, other = (robot_of(frame_id, self._robots) for frame_id in frames)
+        return replace(closure, from_robot=one, to_robot=other)
 
     def _hear_whole(self, message: Any, robot: str = "") -> None:
         if message.retracted:

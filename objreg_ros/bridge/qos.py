@@ -7,6 +7,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 ODOMETRY = 1000  # words of odometry, some seconds of the fastest
 KEPT_CONSTRAINTS = 1000  # of the latched constraints: what a mapper that comes late still gets
+KEPT_KEYFRAMES = 64  # packed ones of a camera: a minute of a link that is away
 REFUSALS = 100  # messages, one a searched keyframe
 SINGLE_REFUSALS = 1000  # messages, one a refusal
 

@@ -7,8 +7,8 @@ import os
 import sys
 import threading
 import time
-from collections import deque
-from collections.abc import Callable, Iterable
+from collections import Counter, deque
+from collections.abc import Callable, Hashable, Iterable
 from typing import Generic, NamedTuple, TypeVar
 
 Job = TypeVar("Job")
@@ -66,21 +66,28 @@ class Worker(Generic[Job]):
 
 
 class Limit(NamedTuple):
-    """How many jobs may wait, of how many bytes together, and how many seconds before the work in hand is hurried."""
+    """How many jobs may wait, of how many bytes together, and how many seconds before the work in hand is hurried.
+
+    A job is overtaken where more than ``behind`` newer ones of its lane wait.
+    """
 
     jobs: int
     nbytes: int
     patience_s: float
+    behind: int = 0
 
 
 class _Waiting(NamedTuple, Generic[Job]):
     job: Job
     nbytes: int
     since: float
+    lane: Hashable
 
 
 class Backlog(Generic[Job]):
     """Runs ``work`` on the newest job, and before it ``settle`` on each that it overtook, the oldest first.
+
+    Jobs of different lanes (``lane_of``) take turns, and overtake each other never.
 
     Memory is bounded: who puts a job beyond the ``limit`` waits until there is room, and the work in hand is `hurried`
     meanwhile. ``nbytes_of`` says how large a job is; one that is larger than the limit waits alone.
@@ -101,9 +108,12 @@ class Backlog(Generic[Job]):
         limit: Limit,
         nbytes_of: Callable[[Job], int],
         nice: int = 0,
+        lane_of: Callable[[Job], Hashable] = lambda job: None,
     ) -> None:
         self._work, self._settle, self._failed = work, settle, failed
-        self._limit, self._nbytes_of, self._nice = limit, nbytes_of, nice
+        self._limit, self._nbytes_of, self._nice, self._lane_of = limit, nbytes_of, nice, lane_of
+        self._served = Counter[Hashable]()  # the turn in which each lane had its last one
+        self._turns = 0
         self._changed = threading.Condition()
         self._waiting: deque[_Waiting[Job]] = deque()
         self._nbytes = 0  # of all that wait
@@ -126,11 +136,11 @@ class Backlog(Generic[Job]):
         nbytes = self._nbytes_of(job)
         with self._changed:
             self._changed.wait_for(lambda: not self._open or self._has_room(nbytes))
-            now = time.monotonic()
-            if self._waiting:
+            now, lane = time.monotonic(), self._lane_of(job)
+            if self._count(lane) > self._limit.behind:
                 self._overtaken_at = now
             self._pressed = now - self._overtaken_at < PRESSED_S
-            self._waiting.append(_Waiting(job, nbytes, now))
+            self._waiting.append(_Waiting(job, nbytes, now, lane))
             self._nbytes += nbytes
             self._changed.notify_all()
 
@@ -160,7 +170,7 @@ class Backlog(Generic[Job]):
         """What `rest` took, before all that came since; never waits."""
         now = time.monotonic()
         with self._changed:
-            back = [_Waiting(job, self._nbytes_of(job), now) for job in jobs]
+            back = [_Waiting(job, self._nbytes_of(job), now, self._lane_of(job)) for job in jobs]
             self._waiting.extendleft(reversed(back))
             self._nbytes += sum(waiting.nbytes for waiting in back)
             self._changed.notify_all()
@@ -188,25 +198,39 @@ class Backlog(Generic[Job]):
             return True
         return len(self._waiting) < self._limit.jobs and self._nbytes + nbytes <= self._limit.nbytes
 
-    def _take(self, pressed: bool) -> Job | None:
-        """The oldest job; with those behind it still in the queue, so that none is lost whatever this one raises."""
+    def _count(self, lane: Hashable) -> int:
+        """How many jobs of a lane wait."""
+        return sum(waiting.lane == lane for waiting in self._waiting)
+
+    def _next(self) -> int:
+        """Which job is next: the oldest of the lane whose last turn is the longest ago."""
+        first = {waiting.lane: k for k, waiting in reversed(list(enumerate(self._waiting)))}
+        return first[min(first, key=lambda lane: (self._served[lane], first[lane]))]
+
+    def _take(self, pressed: bool) -> tuple[Callable[[Job], None], Job] | None:
+        """The next job and what to do with it; those behind it stay in the queue, whatever this one raises."""
         with self._changed:
             mine = lambda: self._waiting and not self._busy and self._pressed is pressed  # noqa: E731
             self._changed.wait_for(lambda: not self._open or mine())
             if not self._open:
                 return None
             self._busy = True
-            job, nbytes, _ = self._waiting.popleft()
+            chosen = self._next()
+            job, nbytes, _, lane = self._waiting[chosen]
+            del self._waiting[chosen]
             self._nbytes -= nbytes
+            self._turns += 1
+            self._served[lane] = self._turns
             self._changed.notify_all()
-            return job
+            return self._settle if self._count(lane) > self._limit.behind else self._work, job
 
     def _run(self, pressed: bool) -> None:
         try:
             if not pressed:
                 give_way(self._nice)
-            while (job := self._take(pressed)) is not None:
-                (self._settle if self._waiting else self._work)(job)
+            while (taken := self._take(pressed)) is not None:
+                do, job = taken
+                do(job)
                 self._finish()
         except BaseException as error:
             self.shut()

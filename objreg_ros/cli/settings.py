@@ -24,7 +24,7 @@ from objreg_ros.detector.params import DetectorParams
 from objreg_ros.mapper.params import MapperNodeParams, MapperParams
 from objreg_ros.params import Declaration, Params
 from objreg_ros.recording.text import SETTINGS_BYTES, read_text
-from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
+from objreg_ros.registration.params import KeyframeParams, KeyframerNodeParams, RegistrarNodeParams, RegistrarParams
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 
 Kind = TypeVar("Kind", bound=Params)
@@ -33,6 +33,7 @@ NODES: dict[str, tuple[type[Params], ...]] = {
     "detector": (DetectorParams, ManagedParams, DoorParams),
     "segmenter": (SegmenterParams, SegmenterNodeParams, ManagedParams, DoorParams),
     "registrar": (RegistrarParams, RegistrarNodeParams, RelocalisedParams, ManagedParams, DoorParams),
+    "keyframer": (KeyframeParams, KeyframerNodeParams, ManagedParams, DoorParams),
     "mapper": (MapperParams, MapperNodeParams, ManagedParams, DoorParams),
     "objreg_to_rtabmap": (ToRtabmapParams, BodyParams, AdapterParams, DoorParams),
     "objreg_to_lio_sam": (ToLioSamParams, AdapterParams, DoorParams),

@@ -61,6 +61,11 @@ class FrameWindow:
         """The memory of its frames: their views and clouds."""
         return sum(map(_nbytes, self.frames))
 
+    @property
+    def robot(self) -> str:
+        """Whose camera it is of."""
+        return self.frames[0].robot
+
     @classmethod
     def of(cls, frame: Frame) -> FrameWindow:
         """One frame by itself."""

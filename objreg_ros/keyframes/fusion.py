@@ -14,7 +14,7 @@ from objreg_ros.geometry import inverse, rigid, rotate, transform
 from objreg_ros.keyframes.frame_window import FrameWindow
 from objreg_ros.registration.keyframe import Context, Keyframe, KeyObject, bounding_box
 from objreg_ros.registration.labels import LabelGroups
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.params import KeyframeParams
 from objreg_ros.registration.prepare.normals import view_normals
 from objreg_ros.registration.prepare.voxels import _keys, thin
 
@@ -27,7 +27,7 @@ SPARE = 3  # points of each sighting for each one that is kept of the object
 CENTRE_SPREAD = 0.05  # m: how far the middle of one small object wanders between neighbouring frames
 
 
-def fuse(window: FrameWindow, params: RegistrarParams) -> Keyframe:
+def fuse(window: FrameWindow, params: KeyframeParams) -> Keyframe:
     """The keyframe of a frame window, in the camera frame of its reference; its id is 0 until a store gives one."""
     chosen = reference_index(window.frames)
     reference = window.frames[chosen]

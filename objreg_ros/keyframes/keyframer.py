@@ -19,7 +19,7 @@ from objreg_ros.keyframes.frame_window import Clock, FrameWindow, SessionNumbers
 from objreg_ros.keyframes.gravity_filter import GravityFilter
 from objreg_ros.keyframes.odometry import TravelledPath
 from objreg_ros.keyframes.tracking import TrackedSurface, tracked_surface, view_motion
-from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.registration.params import KeyframeParams
 
 MOST_FRAMES = 4  # that are fused into one keyframe
 LEAST_OBJECTS = 1  # of a keyframe: one without objects proposes nothing
@@ -105,7 +105,7 @@ class Keyframer:
     ``numbers`` gives each session its number; keyframers that share it have none in common.
     """
 
-    def __init__(self, params: RegistrarParams, numbers: SessionNumbers | None = None) -> None:
+    def __init__(self, params: KeyframeParams, numbers: SessionNumbers | None = None) -> None:
         self.params = params
         self._numbers = SessionNumbers() if numbers is None else numbers
         self._clock: Clock | None = None

@@ -21,6 +21,7 @@ from objreg_ros.bridge.door import Door
 from objreg_ros.bridge.indoors import Indoors
 from objreg_ros.bridge.map_announcements import MapAnnouncements
 from objreg_ros.bridge.params import ManagedParams
+from objreg_ros.bridge.robots import prefixes_of
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.transforms import hear_mount
 from objreg_ros.data import LoopClosure, Moments, Robots, may_be_same
@@ -61,7 +62,7 @@ class MapperNode(Door):
         mount = hear_mount(self, self._inputs.mounting)
         self._waiting = Waiting(self._followers, mount.T_body_camera, qos.KEPT_CONSTRAINTS)
         self._begin(self._resumed())
-        prefixes = {self._name_of(robot): f"{robot}/" for robot in self._inputs.robots} or {"": ""}
+        prefixes = prefixes_of(self, self._inputs.robots)
         self._out = MapAnnouncements(self, self._inputs.map_frame, prefixes)
         self._serve()
         for robot, prefix in prefixes.items():
@@ -69,10 +70,6 @@ class MapperNode(Door):
         self._closures = ClosuresIn(self, self._inputs.input, self._take, self._learn, self._withdraw, prefixes)
         self._closures.know(tie.closure for tie in self._graph.closure_ties if tie.closure is not None)
         self.create_timer(LOOK_S, self._publish_paths, clock=Clock(clock_type=ClockType.STEADY_TIME))
-
-    def _name_of(self, robot: str) -> str:
-        """What closures call a robot: its whole namespace, as its registrar has it."""
-        return self.resolve_topic_name(f"{robot}/odom", only_expand=True).removesuffix("/odom").strip("/")
 
     def _serve(self) -> None:
         self.create_service(Trigger, "~/reset", self._reset)

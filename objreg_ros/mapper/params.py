@@ -3,19 +3,17 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
 import numpy as np
 
 from objreg_ros.mapper.steady import Steady
-from objreg_ros.params import MountedParams, Params, param
+from objreg_ros.params import MountedParams, Params, param, require_namespaces
 
 GONE = dict.fromkeys(
     ("min_sigma_translation", "min_sigma_rotation"),
     "it is LEAST_SIGMAS in mapper/pose_graph.py; what constraints share is picture_*_error",
 )
-NAMESPACE = re.compile("/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 
 
 @dataclass(frozen=True)
@@ -107,5 +105,4 @@ class MapperNodeParams(MountedParams):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if len(set(self.robots)) < len(self.robots) or not all(map(NAMESPACE.fullmatch, self.robots)):
-            raise ValueError(f"robots: expected distinct names of namespaces, got {list(self.robots)}")
+        require_namespaces("robots", self.robots)

@@ -79,8 +79,10 @@ class Waiting:
             raise UnknownRobotError(f"expected robots of {expected}, got {got}; the parameter robots names them")
 
     def _T_body_camera(self, robot: str, frame_id: str) -> Array | None:
+        """By a frame without the robot's prefix where the odometry's body has none: then it has none on /tf either."""
         words = [one.newest for one in self._followers.meant(robot) if one.newest is not None]
-        return self._find_mount(words, frame_id)
+        is_bare = robot and not any(word.child_frame_id.startswith(f"{robot}/") for word in words)
+        return self._find_mount(words, frame_id.removeprefix(f"{robot}/") if is_bare else frame_id)
 
 
 def _named(closure: LoopClosure) -> str:

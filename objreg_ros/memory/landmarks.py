@@ -8,15 +8,17 @@ counts for more than a place, which drifts with the session; and two that one ke
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence, Set
-from dataclasses import dataclass, field
+from array import array
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass
 from itertools import islice, product
 from math import prod
 
 import numpy as np
 
 from objreg_ros.data import Array
+from objreg_ros.memory.known import Known, Last, last_of
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.registration.labels import LabelGroups
 from objreg_ros.registration.params import RegistrarParams
@@ -63,15 +65,6 @@ class Merge:
     R_into_old: Array
 
 
-@dataclass(slots=True, eq=False)
-class _Known:
-    """What is kept of one landmark: its latest sighting, votes for its label, and from where each keyframe saw it."""
-
-    last: Sighting
-    votes: Counter[str] = field(default_factory=Counter)
-    views: dict[int, Array] = field(default_factory=dict)
-
-
 class Landmarks:
     """All known objects. Deterministic: the same sightings in the same order give the same ids.
 
@@ -81,9 +74,9 @@ class Landmarks:
     def __init__(self, params: RegistrarParams, sightings: Iterable[Sighting] = (), first: int = 1) -> None:
         self._params = params
         self._groups = LabelGroups(params.label_groups)
-        self._known: dict[int, _Known] = {}  # the one seen last comes last
+        self._known: dict[int, Known] = {}  # the one seen last comes last
         self._there: defaultdict[Cell, set[int]] = defaultdict(set)
-        self._shown: defaultdict[int, set[int]] = defaultdict(set)  # the landmarks of each keyframe
+        self._shown: dict[int, array[int]] = {}  # the landmarks of each keyframe
         self._next = first
         self.add(sightings)
 
@@ -145,21 +138,34 @@ class Landmarks:
         for old, merge in (merged or {}).items():
             self._merge(old, merge)
         for sighting in sightings:
-            number = sighting.landmark
-            known = self._known[number] = self._known.pop(number, _Known(sighting))
+            number, last = sighting.landmark, last_of(sighting)
+            known = self._known.pop(number) if number in self._known else Known(last)
+            self._known[number] = known  # at the end: seen last
             self._leave(known.last, number)
-            self._there[self._cell(sighting)].add(number)
-            known.last = sighting
-            known.votes[sighting.label] += round(1000 * sighting.score)
+            self._there[self._cell(last)].add(number)
+            known.last = last
+            known.votes[last.label] += round(1000 * sighting.score)
             known.views[sighting.keyframe_id] = sighting.viewpoint
-            self._shown[sighting.keyframe_id].add(number)
+            shown = self._shown.setdefault(sighting.keyframe_id, array("q"))
+            if number not in shown:
+                shown.append(number)
             self._next = max(self._next, number + 1)
+
+    def passing(self, sightings: Iterable[Sighting]) -> Iterator[Sighting]:
+        """The sightings as they come, each taken in on its way to what else needs it: a store is read but once."""
+        for sighting in sightings:
+            self.add((sighting,))
+            yield sighting
 
     def surplus(self, landmarks: Iterable[int]) -> list[int]:
         """Keyframes of these landmarks that show each of their objects from where better spread keyframes do too."""
-        spare = {number: self._spare(self._known[number]) for number in set(landmarks) if number in self._known}
+        spare = {
+            number: self._known[number].spare(self._params.max_views)
+            for number in set(landmarks)
+            if number in self._known
+        }
         spared = set().union(*spare.values()) if spare else set()
-        return sorted(k for k in spared if all(k in spare.get(number, ()) for number in self._shown[k]))
+        return sorted(k for k in spared if all(k in spare.get(number, ()) for number in self._shown.get(k, ())))
 
     def forget(self, keyframe_ids: Iterable[int]) -> None:
         """Forget from where these keyframes saw their objects, and the landmarks that no other keyframe shows."""
@@ -171,9 +177,9 @@ class Landmarks:
                     self._leave(known.last, number)
                     del self._known[number]
 
-    def _leave(self, sighting: Sighting, number: int) -> None:
+    def _leave(self, last: Last, number: int) -> None:
         """A landmark is no longer where it was seen so."""
-        cell = self._cell(sighting)
+        cell = self._cell(last)
         self._there[cell].discard(number)
         if not self._there[cell]:
             del self._there[cell]
@@ -201,11 +207,11 @@ class Landmarks:
             return set().union(*(there for cell, there in self._there.items() if cell[:2] == (session, group)))
         return set().union(*(self._there.get((session, group, x, y, z), ()) for x, y, z in product(*spans)))
 
-    def _cell(self, sighting: Sighting) -> Cell:
+    def _cell(self, sighting: Sighting | Last) -> Cell:
         x, y, z = np.floor(sighting.position / CELL).astype(int).tolist()
         return sighting.session, self._groups.of(sighting.label), x, y, z
 
-    def _reach(self, sighting: Sighting, last: Sighting) -> float:
+    def _reach(self, sighting: Sighting, last: Last) -> float:
         """How far apart two sightings of one object may be: the middle of a large one wanders with the side seen."""
         params = self._params
         drift = params.odometry_drift * abs(sighting.travelled - last.travelled)
@@ -231,7 +237,7 @@ class Landmarks:
 
     def _shown_beside(self, number: int, others: Iterable[int]) -> bool:
         """Whether some keyframe shows a landmark together with another one of ``others``."""
-        mine = self._known[number].views.keys() if number in self._known else frozenset()
+        mine = frozenset(self._known[number].views) if number in self._known else frozenset()
         return any(
             other != number and other in self._known and not mine.isdisjoint(self._known[other].views)
             for other in others
@@ -242,37 +248,19 @@ class Landmarks:
         if gone is None:
             return
         self._leave(gone.last, old)
-        gone.last = gone.last.of_landmark(new, merge.R_into_old @ gone.last.R_landmark_session)
-        gone.views = {keyframe_id: merge.R_into_old @ view for keyframe_id, view in gone.views.items()}
+        gone.last.numbers[3:12] = (merge.R_into_old @ gone.last.R_landmark_session).ravel()
+        for keyframe_id, view in gone.views.items():
+            gone.views[keyframe_id] = merge.R_into_old @ view
         known = self._known.setdefault(new, gone)
         self._there[self._cell(known.last)].add(new)
         for keyframe_id in gone.views:
-            self._shown[keyframe_id] = self._shown[keyframe_id] - {old} | {new}
+            self._shown[keyframe_id] = array("q", {*self._shown[keyframe_id]} - {old} | {new})
         if known is not gone:
             known.votes.update(gone.votes)
             known.views.update(gone.views)
 
-    def _spare(self, known: _Known) -> set[int]:
-        """The keyframes that are left when the most diverse viewpoints are taken one after the other."""
-        limit = self._params.max_views
-        if len(known.views) <= limit:
-            return set()
-        keys = sorted(known.views)
-        points = np.array([known.views[k] for k in keys])
-        directions = points / np.maximum(np.linalg.norm(points, axis=1, keepdims=True), 1e-9)
-        chosen = [len(keys) - 1]  # the newest stays: it shows the place as it is
-        distance = np.full(len(keys), np.inf)
-        while len(chosen) < limit:
-            last = chosen[-1]
-            step = np.linalg.norm(directions - directions[last], axis=1)
-            step += 0.5 * np.abs(np.linalg.norm(points, axis=1) - np.linalg.norm(points[last]))
-            distance = np.minimum(distance, step)
-            distance[chosen] = -1.0
-            chosen.append(int(distance.argmax()))
-        return set(keys) - {keys[i] for i in chosen}
 
-
-def _landmark(number: int, known: _Known) -> Landmark:
+def _landmark(number: int, known: Known) -> Landmark:
     return Landmark(
         landmark=number,
         label=max(known.votes, key=lambda label: (known.votes[label], label)),

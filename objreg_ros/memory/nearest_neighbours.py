@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The stored objects of one label group, and the scan that finds the nearest of them.
 
-A scan is exact: it compares every descriptor of the group, and looks at the other columns of an object only where it is
-among the nearest so far. Descriptors lie by dimension in tiles of `LANES` objects, so that the processor compares many
-at once: 1e5 of them take about a third of a millisecond.
+A scan is exact. Descriptors lie by dimension in tiles of `LANES` objects, so that the processor compares many at once.
+They are compared twice: rounded to bytes, a quarter of what a scan would have to read, and as they are. The bytes tell
+the most that an object of a tile can be alike. The descriptors themselves, and the other columns of an object, are
+looked at only in tiles that may hold one of the nearest.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ from objreg_ros.registration.params import RegistrarParams
 
 LANES = 64
 NOWHERE = np.float32(np.inf)  # half the squared length of a row that is free
+STEP = np.repeat(np.array([1 / 32, 1 / 64], np.float32), [3, SIZE - 3])  # of the bytes: sizes lie in ±4, shares in ±2
+ROUNDING = 1e-5  # relative: what single precision may lose in a comparison, with room to spare
 NO_SESSION = -1  # of what our own tracking says where it is: nothing is left out for it
 
 
@@ -51,7 +54,9 @@ class Block:
     def __init__(self) -> None:
         self.where, self.when = np.zeros((LANES, 4)), np.zeros((LANES, 4), np.int64)
         self._descriptors = np.zeros((1, SIZE, LANES), np.float32)
+        self._bytes = np.zeros((1, SIZE, LANES), np.int8)  # the descriptors in steps of `STEP`
         self._half_norms = np.full((1, LANES), NOWHERE)
+        self._spans = np.zeros((1, 2), np.float32)  # of a tile: the most that the bytes are off, the greatest length
         self._used = 0  # rows below which all others are
         self._free: list[int] = []
 
@@ -68,6 +73,10 @@ class Block:
         descriptor = EMPHASIS * sighting.descriptor
         self._descriptors[tile, :, lane] = descriptor
         self._half_norms[tile, lane] = 0.5 * float(descriptor @ descriptor)
+        rounded = np.rint(descriptor / STEP).clip(-128, 127)
+        self._bytes[tile, :, lane] = rounded
+        span = np.linalg.norm(descriptor - STEP * rounded), np.linalg.norm(descriptor)
+        self._spans[tile] = np.maximum(self._spans[tile], span)
         self.where[i] = *sighting.position, sighting.travelled
         self.when[i] = sighting.stamp_ns, sighting.session, sighting.keyframe_id, sighting.by_odometry
         return i
@@ -90,8 +99,8 @@ class Block:
         descriptor = EMPHASIS * np.asarray(sighting.descriptor, np.float32)
         session = sighting.session if sighting.by_odometry else NO_SESSION
         found, similarity = _likest(  # type: ignore[call-arg]
-            self._descriptors[:tiles], self._half_norms[:tiles], self.where, self.when, descriptor,
-            np.asarray(sighting.position, float), sighting.travelled, sighting.stamp_ns, session,
+            self._descriptors[:tiles], self._bytes[:tiles], self._half_norms[:tiles], self._spans, self.where,
+            self.when, descriptor, np.asarray(sighting.position, float), sighting.travelled, sighting.stamp_ns, session,
             round(1e9 * params.min_gap), params.odometry_radius, params.odometry_drift, sessions.own, sessions.hidden,
             most, margin,
         )  # fmt: skip
@@ -101,27 +110,28 @@ class Block:
         self.where = np.concatenate([self.where, np.zeros_like(self.where)])
         self.when = np.concatenate([self.when, np.zeros_like(self.when)])
         self._descriptors = np.concatenate([self._descriptors, np.zeros_like(self._descriptors)])
+        self._bytes = np.concatenate([self._bytes, np.zeros_like(self._bytes)])
         self._half_norms = np.concatenate([self._half_norms, np.full_like(self._half_norms, NOWHERE)])
+        self._spans = np.concatenate([self._spans, np.zeros_like(self._spans)])
 
 
 @numba.njit(cache=True, nogil=True)
 def _likest(  # type: ignore[no-untyped-def]
-    descriptors, half_norms, where, when, descriptor, position, way, stamp_ns, session, gap_ns, radius, drift, own,
-    hidden, most, margin,
+    descriptors, steps, half_norms, spans, where, when, descriptor, position, way, stamp_ns, session, gap_ns, radius,
+    drift, own, hidden, most, margin,
 ):  # fmt: skip
     """The rows, the nearest first, and their similarity: half the squared distance below half a length.
 
-    So many tiles have an object that is at least as similar as the floor: where odometry lets them, no other need be
-    seen.
+    The tiles that promise most come first. What they hold is mostly so alike that few others need be seen.
     """
-    likeness, tops = np.empty(half_norms.shape, np.float32), np.empty(len(half_norms), np.float32)
-    for tile in range(len(tops)):
-        tops[tile] = _compare(descriptors[tile], half_norms[tile], descriptor, likeness[tile])
+    tops = _promised(steps, half_norms, spans, descriptor)
     floor = np.partition(tops, len(tops) - most)[len(tops) - most] if len(tops) > most else -NOWHERE
-    seen = (likeness, tops, where, when, position, way, stamp_ns, session, gap_ns, radius, drift, own, hidden, margin)
-    best = _best(most, floor, *seen)
-    if best[-1][0] == -NOWHERE and floor > -NOWHERE:
-        best = _best(most, -NOWHERE, *seen)
+    seen = (descriptors, half_norms, tops, where, when, descriptor, position, way, stamp_ns, session, gap_ns, radius,
+            drift, own, hidden, margin)  # fmt: skip
+    best = [(-NOWHERE, 0, 0) for _ in range(most)]  # as a heap: the least is the first
+    likest = _look(best, -NOWHERE, floor, NOWHERE, *seen)
+    _look(best, likest, -NOWHERE, floor, *seen)
+    best.sort(reverse=True)
     near = 0
     while near < most and best[near][0] > max(best[0][0] - margin, -NOWHERE):
         near += 1
@@ -129,33 +139,36 @@ def _likest(  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def _best(  # type: ignore[no-untyped-def]
-    most,
-    floor,
-    likeness,
-    tops,
-    where,
-    when,
-    position,
-    way,
-    stamp_ns,
-    session,
-    gap_ns,
-    radius,
-    drift,
-    own,
-    hidden,
-    margin,
-):
-    """The best that are at least as similar as the floor, in falling order: similarity, how old, row; none is -inf."""
-    best = [(-NOWHERE, 0, 0) for _ in range(most)]  # as a heap: the least is the first
-    likest = -NOWHERE
+def _promised(steps, half_norms, spans, descriptor):  # type: ignore[no-untyped-def]
+    """The most that an object of each tile can be similar, by the bytes."""
+    tops, out = np.empty(len(half_norms), np.float32), np.empty(LANES, np.float32)
+    length, scaled = np.sqrt(np.sum(descriptor * descriptor)), descriptor * STEP
     for tile in range(len(tops)):
-        least = max(best[0][0], likest - margin, floor)
-        if tops[tile] < least or tops[tile] == -NOWHERE:
+        off, reach = spans[tile]
+        unsure = length * off + ROUNDING * reach * (reach + length)
+        tops[tile] = _compare_bytes(steps[tile], half_norms[tile], scaled, out) + unsure
+    return tops
+
+
+@numba.njit(cache=True, nogil=True)
+def _look(  # type: ignore[no-untyped-def]
+    best, likest, low, high, descriptors, half_norms, tops, where, when, descriptor, position, way, stamp_ns, session,
+    gap_ns, radius, drift, own, hidden, margin,
+):  # fmt: skip
+    """Put the most similar of the tiles that promise from ``low`` to below ``high`` on the heap ``best``.
+
+    An item is similarity, how old, row; none is -inf. The similarity of the likest so far goes in and comes back.
+    """
+    likeness = np.empty(LANES, np.float32)
+    for tile in range(len(tops)):
+        least = max(best[0][0], likest - margin, low)
+        if tops[tile] < least or tops[tile] >= high or tops[tile] == -NOWHERE:
+            continue
+        least = max(best[0][0], likest - margin)
+        if _compare(descriptors[tile], half_norms[tile], descriptor, likeness) < least:
             continue
         for lane in range(LANES):
-            row, like = tile * LANES + lane, likeness[tile, lane]
+            row, like = tile * LANES + lane, likeness[lane]
             if like < least or like == -NOWHERE or _holds(hidden, when[row, 1]):
                 continue
             if abs(when[row, 0] - stamp_ns) < gap_ns and _holds(own, when[row, 1]):
@@ -167,8 +180,7 @@ def _best(  # type: ignore[no-untyped-def]
                     continue
             heapq.heappushpop(best, (like, -when[row, 2], row))
             likest = max(likest, like)
-    best.sort(reverse=True)
-    return best
+    return likest
 
 
 @numba.njit(cache=True, nogil=True)
@@ -186,6 +198,21 @@ def _compare(descriptors, half_norms, descriptor, out):  # type: ignore[no-untyp
     for k in range(len(descriptor)):
         for lane in range(LANES):
             out[lane] += descriptor[k] * descriptors[k, lane]
+    largest = out[0]
+    for lane in range(LANES):
+        largest = max(largest, out[lane])
+    return largest
+
+
+@numba.njit(cache=True, nogil=True, fastmath=FAST)
+def _compare_bytes(steps, half_norms, descriptor, out):  # type: ignore[no-untyped-def]
+    """The same by the bytes, three dimensions at once: a third less time. `SIZE` is a multiple of three."""
+    for lane in range(LANES):
+        out[lane] = -half_norms[lane]
+    for k in range(0, SIZE, 3):
+        a, b, c = descriptor[k], descriptor[k + 1], descriptor[k + 2]
+        for lane in range(LANES):
+            out[lane] += a * steps[k, lane] + b * steps[k + 1, lane] + c * steps[k + 2, lane]
     largest = out[0]
     for lane in range(LANES):
         largest = max(largest, out[lane])

@@ -7,12 +7,12 @@ from objreg_ros.data import Frame, Reason, Rejected
 from objreg_ros.keyframes.frame_window import Clock, FrameWindow, SessionNumbers
 from objreg_ros.keyframes.keyframer import Keyframer
 from objreg_ros.memory.store import Store
-from objreg_ros.memory.thinning import Thinning
 from objreg_ros.registrar.closure import redundant, rejected
 from objreg_ros.registrar.confirmation import Confirmation
 from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.recollection import Recollection
 from objreg_ros.registrar.relocalisation import Relocalisation
+from objreg_ros.registrar.thinning import Thinning
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
 

@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
@@ -12,9 +15,9 @@ from typing import NamedTuple
 from objreg_ros.data import Reason, Rejected
 from objreg_ros.memory.retrieval import CandidateKeyframe
 from objreg_ros.memory.store import Store, StoreError
-from objreg_ros.memory.thinning import Thinning
 from objreg_ros.registrar.closure import Accepted, redundant, rejected
 from objreg_ros.registrar.confirmation import Confirmation, Held, Tried
+from objreg_ros.registrar.thinning import Thinning
 from objreg_ros.registration import align
 from objreg_ros.registration.api import Gate, Method
 from objreg_ros.registration.keyframe import Keyframe
@@ -44,6 +47,25 @@ class Means(NamedTuple):
     gate: Gate
     confirmation: Confirmation
     pool: ThreadPoolExecutor
+
+
+class Pools:
+    """Pools of so many ``threads`` for tries, one for each niceness: a thread may not take it back."""
+
+    def __init__(self, threads: int) -> None:
+        self._threads, self._pools = threads, dict[int, ThreadPoolExecutor]()
+
+    def fitting(self) -> ThreadPoolExecutor:
+        """That of the niceness of the thread that asks; kept, since each new one costs memory."""
+        nice = os.getpriority(os.PRIO_PROCESS, threading.get_native_id()) if sys.platform == "linux" else 0
+        if nice not in self._pools:
+            self._pools[nice] = ThreadPoolExecutor(self._threads, "register")
+        return self._pools[nice]
+
+    def shutdown(self) -> None:
+        """Wait for what they are at, and end them."""
+        for pool in self._pools.values():
+            pool.shutdown()
 
 
 class Found(NamedTuple):

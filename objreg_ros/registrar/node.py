@@ -1,59 +1,66 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The door of the registrar: objects, views, gravity and odometry in; constraints, refusals and landmarks out."""
+"""The door of the registrar: objects, views, gravity and odometry in; constraints, refusals and landmarks out.
+
+Or the keyframes of robots in, which track by themselves (`keyframes/node.py`).
+"""
 
 from __future__ import annotations
 
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import ExitStack
+from dataclasses import replace
 from typing import Any, NamedTuple
 
-from geometry_msgs.msg import Vector3Stamped
-from nav_msgs.msg import Odometry
-from sensor_msgs.msg import CameraInfo, PointCloud2
-from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
-from objreg_ros.bridge import from_msg, qos
 from objreg_ros.bridge.announcements import Announcements
 from objreg_ros.bridge.door import DroppedError
+from objreg_ros.bridge.frames_in import FramesDoor
 from objreg_ros.bridge.indoors import Indoors
+from objreg_ros.bridge.keyframes_in import FromRobot, KeyframesIn
 from objreg_ros.bridge.lifetime import await_kernels
 from objreg_ros.bridge.markers import Scene
-from objreg_ros.bridge.matching import MatchingDoor
 from objreg_ros.bridge.params import ManagedParams, RelocalisedParams
 from objreg_ros.bridge.relocalised import Whereabouts
+from objreg_ros.bridge.robots import framed, prefixes_of
 from objreg_ros.bridge.spin import run
-from objreg_ros.bridge.sync import Match, Need, Stream
+from objreg_ros.bridge.sync import Match
 from objreg_ros.bridge.transforms import hear_mount
 from objreg_ros.bridge.worker import Backlog, Limit
-from objreg_ros.data import Array, Frame
+from objreg_ros.keyframes.frame_window import Arrival, Clock, FrameWindow
+from objreg_ros.memory.compact import unpack_keyframe
 from objreg_ros.registrar.outcome import Outcome
-from objreg_ros.registrar.registrar import FrameWindow, Registrar
+from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 
 PATIENCE_S = 1.0  # a newer keyframe waits before the search in hand is cut short, if some were overtaken of late
 WAITING_KEYFRAMES = 8  # most that wait for a search; no frame is followed while so many do
+WAITING_BYTES = 200_000_000  # most memory of those
+BEHIND = 32  # keyframes of a robot that may wait for their search: those of a link that was away come all at once
 GIVING_WAY = 10  # niceness of the search: the next image must not wait for it
 
 
 class Job(NamedTuple):
-    """A keyframe that waits for its search, and since when, by `time.monotonic`."""
+    """A keyframe that waits for its search, made here or sent by a robot, and since when, by `time.monotonic`."""
 
     stamp_ns: int
-    window: FrameWindow
+    seen: FrameWindow | FromRobot
     since: float
 
 
-class RegistrarNode(MatchingDoor):
+class RegistrarNode(FramesDoor):
     """Follows every frame; searches, in a second worker, for the places that a keyframe shows again.
 
     A frame that completes a keyframe is in the books until its search is over. A keyframe that a newer one overtakes is
     stored without a search: nothing that was seen is lost. A search that newer ones wait for is cut short, and no frame
     is followed while too many wait.
+
+    With ``robots`` it follows no frame: keyframes come from keyframers. Robots take turns, each with its
+    oldest keyframe; `BEHIND` of them may wait before the oldest is stored without a search.
     """
 
     def __init__(self, indoors: Indoors | None = None) -> None:
@@ -63,7 +70,7 @@ class RegistrarNode(MatchingDoor):
     def open(self) -> None:
         """Load the kernels, open the store, publish and listen."""
         inputs = self.settings.of(RegistrarNodeParams)
-        self._mount, self._seconds = hear_mount(self, inputs.mounting), inputs.limit
+        self._seconds = inputs.limit
         await_kernels(lambda: warm(self.settings.of(RegistrarParams)), self.get_logger().info)
         self._registrar = Registrar(self.settings.of(RegistrarParams))
         with ExitStack() as refused:  # a store that stays open could not be opened again
@@ -75,12 +82,12 @@ class RegistrarNode(MatchingDoor):
         self._tracking, self._telling = threading.Lock(), threading.Lock()
         self._enabled = True
         self._counts = dict(self._registrar.counts())
-        self._unsearched, self._without_odometry = 0, 0
-        self._camera: str | None = None  # the frame_id of the last frame
-        self._names, self._scene, self._odom_frame = dict[int, str](), Scene(), "odom"
-        limit = Limit(WAITING_KEYFRAMES, inputs.waiting_megabytes * 1_000_000, PATIENCE_S)
+        self._unsearched = 0
+        self._scene = Scene()
+        self._robots = prefixes_of(self, list(inputs.cameras)) if inputs.robots else {}
+        limit, nice = self._limit(), self._niceness()
         self.searcher: Backlog[Job] = Backlog(
-            self._search, self._keep, self.fail, limit, lambda job: job.window.nbytes, self._niceness()
+            self._search, self._keep, self.fail, limit, lambda job: job.seen.nbytes, nice, lambda job: job.seen.robot
         )
         refused.callback(self.searcher.close)
         self._announcements = Announcements(self)
@@ -88,7 +95,16 @@ class RegistrarNode(MatchingDoor):
         self.create_service(Trigger, "~/reset", self._reset, callback_group=self.apart)
         self.create_service(Trigger, "~/save", self._save, callback_group=self.apart)
         self.create_service(SetBool, "~/enable", self._enable)
-        self._listen(round(inputs.odom_slop * 1e9))
+        if self._robots:
+            self._keyframes = KeyframesIn(self, self._robots, list(inputs.cameras.values()), self._take)
+        else:
+            self.listen_to_frames(hear_mount(self, inputs.mounting), round(inputs.odom_slop * 1e9))
+
+    def _limit(self) -> Limit:
+        """How many keyframes may wait for their search."""
+        if self._robots:
+            return Limit(2 * BEHIND * len(self._robots), WAITING_BYTES, PATIENCE_S, BEHIND)
+        return Limit(WAITING_KEYFRAMES, WAITING_BYTES, PATIENCE_S)
 
     def adopt(self) -> None:
         """Live parameters hold from the next frame and the next search on."""
@@ -97,36 +113,7 @@ class RegistrarNode(MatchingDoor):
 
     def _niceness(self) -> int:
         """None where other rooms share Python's lock: a nice thread that holds it and has no processor holds up all."""
-        return 0 if self.indoors.offers(self.resolve_topic_name("objects")) else GIVING_WAY
-
-    def _listen(self, odom_slop_ns: int) -> None:
-        room: dict[str, type] = {"objects": PointCloud2}
-        if not self.indoors.offers(self.resolve_topic_name("objects")):  # else the word holds these too
-            room |= {"view": PointCloud2, "view/camera_info": CameraInfo, "gravity": Vector3Stamped}
-        self.listen(String, "labels", self._hear_labels, qos.latched())
-        self.listen(Odometry, "odom", self._hear_odom, self.sensor(qos.ODOMETRY))
-        for topic, kind in room.items():
-            self.listen(kind, topic, self._hear(topic), qos.room(), watched=topic)
-        self.expect("objects", "objects")
-        exact = [Stream(topic) for topic in room]
-        odom = Stream("odom", Need.OPTIONAL, odom_slop_ns, depth=1000, enclosing=True)
-        self.begin([*exact, Stream("labels", Need.LATCHED), odom])
-
-    # Hear
-
-    def _hear_labels(self, message: Any) -> None:
-        names = self.read_aside("labels", from_msg.labels, message)
-        if names is not None:
-            self._names = names
-            self.feed("labels", 0, names)
-
-    def _hear_odom(self, message: Any) -> None:
-        odometry = self.read_aside("odom", from_msg.odometry, message)
-        if odometry is not None:
-            self.feed("odom", odometry.stamp_ns, odometry)
-
-    def _hear(self, topic: str) -> Callable[[Any], None]:
-        return lambda message: self.feed(topic, from_msg.stamp_ns(message), message)
+        return 0 if self.hears_words else GIVING_WAY
 
     # Compute
 
@@ -134,8 +121,7 @@ class RegistrarNode(MatchingDoor):
         """Follow one frame; a keyframe goes on to the searcher."""
         if not self._enabled:
             raise DroppedError("disabled", "")
-        frame, T_body_camera = self._frame(payload)
-        self._watch_camera(frame.frame_id)
+        frame, T_body_camera = self.frame_of(payload)
         self._scene.see(frame)
         with self._tracking:  # until it waits: none that a service ends comes before it
             with self.ledger.timed("track"):
@@ -146,42 +132,40 @@ class RegistrarNode(MatchingDoor):
         self._whereabouts.look()
         return window is None
 
-    def _frame(self, match: Match) -> tuple[Frame, Array | None]:
-        """With where the camera sits on the body of its odometry."""
-        odom, camera = match["odom"], from_msg.frame_id(match["objects"])
-        self._without_odometry += odom is None
-        self._odom_frame = odom[0].frame_id if odom else self._odom_frame
-        T_body_camera = self._mount.T_body_camera(odom, camera)
-        if isinstance(match["objects"], Frame):
-            return self.read("frame", from_msg.followed, match["objects"], odom, T_body_camera), T_body_camera
-        topics = ("objects", "view", "view/camera_info", "gravity", "labels", "odom")
-        return self.read("frame", from_msg.frame, *(match[topic] for topic in topics), T_body_camera), T_body_camera
-
-    def _watch_camera(self, frame_id: str) -> None:
-        """Say so where the frames of two cameras come in turn."""
-        if self._camera not in (None, frame_id):
-            self.throttled.remind(
-                "camera",
-                f"expected frames of one camera, got one of {frame_id!r} after one of {self._camera!r}: every change "
-                "begins another session; give each camera a registrar of its own",
-            )
-        self._camera = frame_id
+    def _take(self, seen: FromRobot) -> None:
+        """A keyframe of a robot goes on to the searcher."""
+        stamp_ns = seen.sent.stamp_ns
+        if self._enabled:
+            self.searcher.put(Job(stamp_ns, seen, time.monotonic()))
+        else:
+            self.drop(stamp_ns, "disabled")
 
     def _search(self, job: Job) -> None:
         self.ledger.spend("wait", time.monotonic() - job.since)
-        self.conclude(job.stamp_ns, lambda: self._find(job.window, "search", self._seconds))
+        self.conclude(job.stamp_ns, lambda: self._find(job, "search", self._seconds))
 
     def _keep(self, job: Job) -> None:
         """Store a keyframe without a search: a newer one waits."""
         self._unsearched += 1
         self.throttled.warn("unsearched", "a keyframe was stored without a search: a newer one came before its turn")
-        self.conclude(job.stamp_ns, lambda: self._find(job.window, "keep", 0.0))
+        self.conclude(job.stamp_ns, lambda: self._find(job, "keep", 0.0))
 
-    def _find(self, window: FrameWindow, stage: str, seconds: float) -> bool:
+    def _find(self, job: Job, stage: str, seconds: float) -> bool:
         with self.ledger.timed(stage):
-            outcome = self._registrar.search(window, seconds, self.searcher.hurried)
+            outcome = self._outcome(job.seen, seconds)
+        if outcome is None:
+            self.leave_out(job.stamp_ns, "known")
+            return False
+        if isinstance(job.seen, FromRobot):
+            self._keyframes.count(job.seen.robot, "searched" if seconds else "stored unsearched")
         self._publish(outcome)
         return True
+
+    def _outcome(self, seen: FrameWindow | FromRobot, seconds: float) -> Outcome | None:
+        """What becomes of a keyframe; None for one of a robot that is known."""
+        if isinstance(seen, FrameWindow):
+            return self._registrar.search(seen, seconds, self.searcher.hurried)
+        return self._registrar.receive(self.read("keyframes", arrival_of, seen), seconds, self.searcher.hurried)
 
     def _publish(self, outcome: Outcome) -> None:
         with self._telling:  # the searcher's thread and that of ~/save
@@ -194,10 +178,10 @@ class RegistrarNode(MatchingDoor):
         self._whereabouts.look()
         if outcome.keyframe_ns is not None:
             seen = outcome.observations, outcome.keyframe_ns, outcome.frame_id
-            self._announcements.landmarks(*seen, self._names, outcome.session)
+            self._announcements.landmarks(*seen, self.names, outcome.session, outcome.robot)
             self._scene.settle(outcome.keyframe_ns, outcome.closures, outcome.rejected)
             objects = [(known.landmark, known.label, known.position) for known in self._registrar.landmarks_here]
-            self._announcements.markers(self._scene.markers(objects, outcome.keyframe_ns, self._odom_frame))
+            self._announcements.markers(self._scene.markers(objects, outcome.keyframe_ns, self.odom_frame))
 
     def _count(self) -> None:
         """Count what is stored, and say so where the oldest had to go."""
@@ -217,9 +201,10 @@ class RegistrarNode(MatchingDoor):
             "forgotten keyframes": self._counts["forgotten"],
             "waiting keyframes": len(self.searcher),
             "waiting poses": self._registrar.waiting,
-            "frames without odometry": self._without_odometry,
+            "frames without odometry": self.without_odometry,
         }
-        return {**super().extra_diagnostics(), **stored, **counts, **self._announcements.told()}
+        robots = self._keyframes.told() if self._robots else {}
+        return {**super().extra_diagnostics(), **stored, **counts, **robots, **self._announcements.told()}
 
     # Services
 
@@ -281,14 +266,23 @@ class RegistrarNode(MatchingDoor):
     def _store_the_rest(self) -> None:
         """Store the keyframes that were not searched for; of those that cannot be the log says how many and why."""
         lost = list[str]()
-        for window in (*(job.window for job in self.searcher.rest()), *self._registrar.end()):
-            if window is not None:
-                try:
-                    self._registrar.search(window, 0.0)
-                except (ValueError, OSError) as error:
-                    lost.append(str(error))
+        for seen in (*(job.seen for job in self.searcher.rest()), *self._registrar.end()):
+            try:
+                self._outcome(seen, 0.0)
+            except (ValueError, OSError, DroppedError) as error:
+                lost.append(str(error))
         if lost:
             self.get_logger().error(f"the last keyframes could not be stored, {len(lost)} are lost: {lost[-1]}")
+
+
+def arrival_of(seen: FromRobot) -> Arrival:
+    """The keyframe that a robot sent, with its frame under the robot's prefix. ValueError where it is damaged."""
+    robot, sent = seen
+    keyframe = unpack_keyframe(sent.packed)
+    if keyframe.stamp_ns != sent.stamp_ns:
+        raise ValueError(f"keyframe: expected the stamp {sent.stamp_ns} of its header, got {keyframe.stamp_ns}")
+    named = replace(keyframe, robot=robot, frame_id=framed(robot, keyframe.frame_id))
+    return Arrival(named, Clock(sent.began_ns, sent.first), sent.run)
 
 
 def main() -> int:

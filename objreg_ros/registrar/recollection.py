@@ -24,8 +24,8 @@ class Recollection:
     def __init__(self, params: RegistrarParams, store: Store) -> None:
         self._params, self.store = params, store
         self.index = Index(params)
-        self.index.add(store.sightings())
-        self.landmarks = Landmarks(params, store.sightings(), store.next_landmark())
+        self.landmarks = Landmarks(params, first=store.next_landmark())
+        self.index.add(self.landmarks.passing(store.sightings()))
 
     @property
     def params(self) -> RegistrarParams:

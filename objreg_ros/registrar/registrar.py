@@ -23,7 +23,7 @@ from objreg_ros.memory.retrieval import CandidateKeyframe
 from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.registrar.camera_track import CameraTrack, CameraTracks
-from objreg_ros.registrar.candidate_search import Budget, Found, Means, Search
+from objreg_ros.registrar.candidate_search import Budget, Found, Means, Pools, Search
 from objreg_ros.registrar.closure import (
     observations,
     rejected,
@@ -32,7 +32,6 @@ from objreg_ros.registrar.closure import (
 from objreg_ros.registrar.confirmation import Held
 from objreg_ros.registrar.origins import Origins
 from objreg_ros.registrar.outcome import Outcome, in_turn
-from objreg_ros.registrar.pools import Pools
 from objreg_ros.registrar.recollection import Recollection
 from objreg_ros.registration import gate_of, method_of
 from objreg_ros.registration.api import Gate, Method

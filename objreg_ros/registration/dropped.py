@@ -26,6 +26,7 @@ CONSTANT_OF = {
     "registrar/node.py": {
         "patience": "PATIENCE_S",
         "waiting_keyframes": "WAITING_KEYFRAMES",
+        "waiting_megabytes": "WAITING_BYTES",
     },
     "registration/certainty/covariance.py": {
         "covariance_disliked": "SCALE_GROWTH",

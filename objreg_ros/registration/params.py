@@ -6,12 +6,29 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from objreg_ros.params import MountedParams, Params, param
+from objreg_ros.params import MountedParams, Params, param, require_namespaces
 from objreg_ros.registration.dropped import DROPPED
+
+OWN = "."  # in place of a robot's namespace: that of the registrar itself
 
 
 @dataclass(frozen=True)
-class RegistrarParams(Params):
+class KeyframeParams(Params):
+    """What becomes a keyframe, and what it keeps; of the registrar, and of a keyframer that works for one elsewhere."""
+
+    keyframe_translation: float = param(0.15, "motion that ends a keyframe", "m", ge=0.0, live=True)
+    keyframe_rotation: float = param(8.0, "rotation that ends a keyframe", "deg", ge=0.0, le=180.0, live=True)
+    keyframe_seconds: float = param(1.0, "longest time that a keyframe spans", "s", ge=0.0, live=True)
+    max_speed: float = param(5.0, "odometry that leaps faster than this has begun anew: another session", "m/s", ge=0.1)
+    context_range: float = param(4.0, "context farther from the camera is left out", "m", ge=0.5)
+    label_groups: tuple[str, ...] = param(
+        ("cup mouse bottle", "book remote cell_phone", "tv laptop"),
+        "labels that detectors confuse: one group an item, spaces between (an underscore for a space in a name)",
+    )
+
+
+@dataclass(frozen=True)
+class RegistrarParams(KeyframeParams):
     """Everything that a user may set in this room."""
 
     DROPPED = DROPPED
@@ -25,18 +42,7 @@ class RegistrarParams(Params):
     max_views: int = param(8, "views of one object that are kept, the most diverse", ge=1)
     max_keyframes: int = param(20000, "most keyframes that are kept; the oldest go first", ge=1)
 
-    # What becomes a keyframe, and what it keeps.
-    keyframe_translation: float = param(0.15, "motion that ends a keyframe", "m", ge=0.0, live=True)
-    keyframe_rotation: float = param(8.0, "rotation that ends a keyframe", "deg", ge=0.0, le=180.0, live=True)
-    keyframe_seconds: float = param(1.0, "longest time that a keyframe spans", "s", ge=0.0, live=True)
-    max_speed: float = param(5.0, "odometry that leaps faster than this has begun anew: another session", "m/s", ge=0.1)
-    context_range: float = param(4.0, "context farther from the camera is left out", "m", ge=0.5)
-
     # Which stored keyframes a new one is compared with.
-    label_groups: tuple[str, ...] = param(
-        ("cup mouse bottle", "book remote cell_phone", "tv laptop"),
-        "labels that detectors confuse: one group an item, spaces between (an underscore for a space in a name)",
-    )
     min_gap: float = param(2.0, "least time between the two moments of a constraint", "s", ge=0.0, live=True)
     odometry_radius: float = param(
         1.0, "stored objects of the session that odometry puts farther away are not tried", "m", ge=0.0, live=True
@@ -85,8 +91,8 @@ class RegistrarParams(Params):
 
 
 @dataclass(frozen=True)
-class RegistrarNodeParams(MountedParams):
-    """How the registrar's node brings its inputs together."""
+class FramesParams(MountedParams):
+    """How frames are brought together with odometry."""
 
     odom_slop: float = param(
         0.02,
@@ -94,10 +100,46 @@ class RegistrarNodeParams(MountedParams):
         "s",
         ge=0.0,
     )
+
+
+@dataclass(frozen=True)
+class KeyframerNodeParams(FramesParams):
+    """What a keyframer sends."""
+
+    kilobytes: int = param(
+        100,
+        "most that a keyframe takes on the air; its objects are thinned where it would take more",
+        "kB",
+        ge=10,
+        live=True,
+    )
+
+
+@dataclass(frozen=True)
+class RegistrarNodeParams(FramesParams):
+    """How the registrar's node brings its inputs together, and when it searches."""
+
+    robots: tuple[str, ...] = param(
+        (),
+        "robots whose keyframers send keyframes, by their namespaces (. for this node's own), each with those of its "
+        "cameras behind it, as in 'robot1 front rear', where it has several; empty: one robot is followed here",
+    )
     search_seconds: float = param(
         0.0, "longest search for one keyframe; 0: as long as it takes", "s", ge=0.0, live=True
     )
-    waiting_megabytes: int = param(200, "most memory of the keyframes that wait for a search", "MB", ge=1)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        told = [words.split() or [""] for words in self.robots]
+        require_namespaces("robots", ["own" if robot == OWN else robot for robot, *_ in told])
+        for robot, *cameras in told:
+            require_namespaces(f"robots: cameras of {robot}", cameras)
+
+    @property
+    def cameras(self) -> dict[str, tuple[str, ...]]:
+        """The namespace of each robot, empty for this node's own, with those of its cameras below it, if they have."""
+        told = (words.split() for words in self.robots)
+        return {"" if robot == OWN else robot: tuple(cameras) for robot, *cameras in told}
 
     @property
     def limit(self) -> float:

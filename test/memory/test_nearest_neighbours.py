@@ -67,6 +67,17 @@ def test_a_scan_finds_what_brute_force_finds(seed: int) -> None:
         assert np.allclose(halves, exact, atol=1e-4)
 
 
+@pytest.mark.parametrize("spread", [0.01, 0.3, 1.0, 10.0])  # the last is far beyond what bytes can say
+def test_a_scan_of_many_tiles_leaves_out_none_of_the_nearest(spread: float) -> None:
+    draw = np.random.default_rng(7)
+    block, stored = Block(), [_sighting(number, draw, spread) for number in range(4 * MOST * LANES)]
+    for sighting in stored:
+        block.append(sighting)
+    for row in (*(_sighting(9999, draw, spread) for _ in range(5)), replace(stored[70], stamp_ns=10**12)):
+        rows, _ = block.nearest(row, PARAMS, MOST, MARGIN, OWN)
+        assert block.when[rows, 2].tolist() == _brute_force(stored, row)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_rows_that_were_given_up_are_not_found_and_are_used_again(seed: int) -> None:
     draw = np.random.default_rng(seed)

@@ -144,7 +144,7 @@ def test_frames_of_two_cameras_are_told_with_what_to_do(make: Making) -> None:
     for frame_id in ("front", "front", "rear", "front"):
         node._watch_camera(frame_id)
     (line,) = said
-    assert "got one of 'rear' after one of 'front'" in line and "a registrar of its own" in line
+    assert "got one of 'rear' after one of 'front'" in line and "give each camera a keyframer" in line
     node.close()
 
 
@@ -271,7 +271,7 @@ def test_a_running_node_takes_live_parameters_and_refuses_the_others(
     make: Making, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     node = make()
-    monkeypatch.setattr(node, "_frame", lambda seen: (seen, None))
+    monkeypatch.setattr(node, "frame_of", lambda seen: (seen, None))
 
     def see(seconds: int) -> None:
         """One frame, which ends the keyframe of the one before; that one is searched for when this returns."""

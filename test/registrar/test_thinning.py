@@ -6,7 +6,7 @@ from __future__ import annotations
 import pytest
 from registration.samples import SECOND
 
-from objreg_ros.memory.thinning import Thinning
+from objreg_ros.registrar.thinning import Thinning
 
 HERE, ELSEWHERE = 0, 1  # sessions
 

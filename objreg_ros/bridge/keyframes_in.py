@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How a registrar hears keyframers elsewhere: those of each camera of each robot on a topic of their own."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+from sensor_msgs.msg import CompressedImage
+from std_msgs.msg import String
+
+from objreg_ros.bridge import from_msg, qos
+from objreg_ros.bridge.frames_in import FramesDoor
+from objreg_ros.bridge.keyframes_msg import SentKeyframe, read_keyframe
+
+
+class FromRobot(NamedTuple):
+    """A keyframe that a robot sent."""
+
+    robot: str
+    sent: SentKeyframe
+
+    @property
+    def nbytes(self) -> int:
+        """The memory that it takes while it waits."""
+        return len(self.sent.packed)
+
+
+class KeyframesIn:
+    """The books of ``door`` count keyframes; ``take`` is given each that may come in.
+
+    ``prefixes`` has what stands before the topics of each robot, ``cameras`` the namespaces of each one's keyframers
+    behind that; none where it has one, in its own.
+    """
+
+    def __init__(
+        self,
+        door: FramesDoor,
+        prefixes: Mapping[str, str],
+        cameras: Sequence[Sequence[str]],
+        take: Callable[[FromRobot], None],
+    ) -> None:
+        self._door, self._take = door, take
+        self._counts = Counter[tuple[str, str]]()  # by robot, and what became of its keyframes
+        for (robot, prefix), names in zip(prefixes.items(), cameras, strict=True):
+            door.listen(String, f"{prefix}labels", door.hear_labels, qos.latched())
+            for camera in (f"{name}/" for name in names) if names else ("",):
+                self._listen(robot, f"{prefix}{camera}keyframes")
+
+    def _listen(self, robot: str, topic: str) -> None:
+        hear, kept = partial(self._hear, robot), qos.latched(qos.KEPT_KEYFRAMES)
+        self._door.listen(CompressedImage, topic, hear, kept, watched=topic)
+        self._door.expect(topic, topic)
+
+    def _hear(self, robot: str, message: Any) -> None:
+        sent, stamp_ns = self._door.read_aside("keyframes", read_keyframe, message), from_msg.stamp_ns(message)
+        self._door.accept(stamp_ns)
+        if sent is None:
+            self._door.drop(stamp_ns, "malformed_keyframes")
+        elif self._door.let_in(stamp_ns):
+            self.count(robot, "received")
+            self._take(FromRobot(robot, sent))
+
+    def count(self, robot: str, what: str) -> None:
+        """One more keyframe of a robot of which this became."""
+        self._counts[robot, what] += 1
+
+    def told(self) -> dict[str, object]:
+        """For diagnostics: what became of the keyframes of each robot."""
+        return {
+            f"{robot}: keyframes {what}" if robot else f"keyframes {what}": count
+            for (robot, what), count in sorted(self._counts.items())
+        }

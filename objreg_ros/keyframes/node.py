@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The door of the keyframer: objects, views, gravity and odometry in; packed keyframes out, for a registrar."""
+
+from __future__ import annotations
+
+import math
+import sys
+import uuid
+from typing import Any
+
+from sensor_msgs.msg import CompressedImage
+
+from objreg_ros.bridge import qos
+from objreg_ros.bridge.frames_in import FramesDoor
+from objreg_ros.bridge.indoors import Indoors
+from objreg_ros.bridge.keyframes_msg import SentKeyframe, keyframe
+from objreg_ros.bridge.lifetime import await_kernels
+from objreg_ros.bridge.params import ManagedParams
+from objreg_ros.bridge.spin import run
+from objreg_ros.bridge.sync import Match
+from objreg_ros.bridge.transforms import hear_mount
+from objreg_ros.bridge.worker import Backlog, Limit
+from objreg_ros.keyframes.frame_window import FrameWindow
+from objreg_ros.keyframes.fusion import fuse
+from objreg_ros.keyframes.keyframer import Keyframer
+from objreg_ros.keyframes.warm import warm
+from objreg_ros.memory.compact import pack_keyframe
+from objreg_ros.registration.params import KeyframeParams, KeyframerNodeParams
+
+WAITING = Limit(8, 200_000_000, math.inf)  # keyframes that wait to be fused and packed
+
+
+class KeyframerNode(FramesDoor):
+    """Follows every frame of one camera, and sends the keyframes that come of them.
+
+    A frame that completes a keyframe is in the books until that was sent. What was sent is kept for who was away.
+    """
+
+    def __init__(self, indoors: Indoors | None = None) -> None:
+        super().__init__("keyframer", KeyframeParams, KeyframerNodeParams, ManagedParams, indoors=indoors)
+
+    def open(self) -> None:
+        """Load the kernels, publish and listen."""
+        inputs = self.settings.of(KeyframerNodeParams)
+        mount = hear_mount(self, inputs.mounting)
+        await_kernels(lambda: warm(self.settings.of(KeyframeParams)), self.get_logger().info)
+        self._run = uuid.uuid4().hex
+        self._keyframer = Keyframer(self.settings.of(KeyframeParams))
+        self._sent, self._sent_bytes = 0, 0
+        self._keyframes = self.create_publisher(CompressedImage, "keyframes", qos.latched(qos.KEPT_KEYFRAMES))
+        self._sender: Backlog[tuple[int, FrameWindow]] = Backlog(
+            self._send, self._send, self.fail, WAITING, lambda job: job[1].nbytes
+        )
+        self.listen_to_frames(mount, round(inputs.odom_slop * 1e9))
+
+    def adopt(self) -> None:
+        """Live parameters hold from the next frame on."""
+        self._keyframer.params = self.settings.of(KeyframeParams)
+
+    def compute(self, stamp_ns: int, payload: Match) -> bool:
+        """Follow one frame; what becomes a keyframe goes on to be sent."""
+        frame, _ = self.frame_of(payload)
+        with self.ledger.timed("track"):
+            window = self._keyframer.add(frame)
+        if window is not None:
+            self._sender.put((stamp_ns, window))
+        return window is None
+
+    def _send(self, job: tuple[int, FrameWindow]) -> None:
+        stamp_ns, window = job
+        self.conclude(stamp_ns, lambda: self._publish(window))
+
+    def _publish(self, window: FrameWindow) -> bool:
+        with self.ledger.timed("pack"):
+            made = fuse(window, self.settings.of(KeyframeParams))
+            packed = pack_keyframe(made, 1000 * self.settings.of(KeyframerNodeParams).kilobytes)
+        if made.objects and self.context.ok():
+            clock = window.clock
+            sent = SentKeyframe(made.stamp_ns, made.frame_id, self._run, clock.began_ns, clock.session, packed)
+            self._keyframes.publish(keyframe(sent))
+            self._sent, self._sent_bytes = self._sent + 1, self._sent_bytes + len(packed)
+        return True
+
+    def extra_diagnostics(self) -> dict[str, Any]:
+        """How many keyframes were sent, and how large they are."""
+        mean = {"kilobytes a keyframe": round(1e-3 * self._sent_bytes / self._sent, 1)} if self._sent else {}
+        lost = {"frames without odometry": self.without_odometry}
+        return {**super().extra_diagnostics(), "keyframes sent": self._sent, **mean, **lost}
+
+    def shut(self) -> None:
+        """Send what is left, and end both workers."""
+        self.end_aside()
+        self.end_work()
+        self._sender.drain()
+        self._sender.close()
+        window = self._keyframer.finish()
+        if window is not None:
+            self._publish(window)
+
+
+def main() -> int:
+    """The executable ``keyframer``."""
+    return run(KeyframerNode)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

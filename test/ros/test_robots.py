@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Two robots with a keyframer each, one registrar and one mapper for both: live, in processes of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import TransformStamped
+from nav_msgs.msg import Odometry as OdometryMsg
+from sensor_msgs.msg import CompressedImage
+from std_msgs.msg import Header
+
+from objreg_ros.bridge import from_msg, qos, to_msg
+from objreg_ros.bridge.keyframes_msg import read_keyframe
+from objreg_ros.data import Array, Frame, Odometry
+from objreg_ros.geometry import inverse, pose, pose_error
+from objreg_ros.memory.store import Store
+
+from .graph import Graph
+from .test_relocalised import BESIDE, HERE, frame
+
+pytestmark = pytest.mark.ros
+
+SECOND = 1_000_000_000
+MOUNT = "-p T_base_camera:=[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]"
+BEHIND = pose(np.eye(3), np.array([0.05, 0.1, 0.0]))  # a step aside
+SEEN = {"r1": (HERE, HERE @ BEHIND), "r2": (BESIDE, BESIDE @ BEHIND)}
+
+
+@pytest.fixture
+def fleet(domain: int, tmp_path: Path) -> Iterator[Graph]:
+    made = Graph(domain, tmp_path)
+    yield made
+    made.close()
+
+
+def tell(graph: Graph, robot: str, seen: Frame, names: dict[int, str]) -> None:
+    """What a segmenter in the robot's namespace says of a frame."""
+    assert seen.T_odom_camera is not None
+    word = Odometry(T_odom_body=seen.T_odom_camera, stamp_ns=seen.stamp_ns, child_frame_id=seen.frame_id)
+    graph.publish(f"{robot}/labels", to_msg.labels(names), listeners=2)  # its keyframer, and the registrar
+    graph.publish(f"{robot}/odom", to_msg.odometry(replace(word, frame_id=f"{robot}/odom")), listeners=2)
+    for topic, message in {
+        "objects": to_msg.objects(seen, names),
+        "view": to_msg.view(seen),
+        "view/camera_info": to_msg.view_camera_info(seen),
+        "gravity": to_msg.gravity(seen),
+    }.items():
+        graph.publish(f"{robot}/{topic}", message)
+
+
+def drive(graph: Graph, robot: str, begin_s: int) -> None:
+    """Frames at two places in turn, far enough apart for a keyframe each; all but the last make one."""
+    names = {0: "cup"}
+    for k in range(5):
+        T = SEEN[robot][k % 2]
+        seen = frame(begin_s + 2 * k, T, T)
+        names = names | dict(enumerate(sorted({cloud.label for cloud in seen.objects})))
+        tell(graph, robot, seen, names)
+        graph.answer("keyframer", seen.stamp_ns, f"{robot}/finished")
+    graph.wait_for(lambda: len(graph.heard[f"{robot}/keyframes"]) == 4, what=f"keyframes of {robot}")
+
+
+def place(robot: str, since_ns: int) -> Array:
+    """Where a robot was so long after its first frame."""
+    return SEEN[robot][since_ns // SECOND // 2 % 2]
+
+
+def test_keyframes_of_two_robots_close_loops_in_one_registrar_and_tie_them_in_one_map(
+    fleet: Graph, tmp_path: Path
+) -> None:
+    store = tmp_path / "fleet.db"
+    for topic in ("r1/finished", "r2/finished", "finished"):
+        fleet.hear(Header, topic)
+    for robot in SEEN:
+        fleet.hear(CompressedImage, f"{robot}/keyframes", qos.latched(qos.KEPT_KEYFRAMES))
+        fleet.hear(TransformStamped, f"{robot}/correction", qos.latched())
+        fleet.start(f"{robot}/keyframer", "keyframes", f"-r __ns:=/{robot}", "-p reliable:=true", MOUNT)
+    fleet.hear(OdometryMsg, "constraints", qos.latched(qos.KEPT_CONSTRAINTS))
+    fleet.hear(DiagnosticArray, "refusals", qos.room(depth=100))
+    fleet.start("registrar", "registrar", "-p robots:=[r1, r2]", f"-p store:={store}")
+    fleet.start("mapper", "mapper", "-p robots:=[r1, r2]", "-p publish_tf:=false", MOUNT)
+    drive(fleet, "r1", 100)
+    drive(fleet, "r2", 101)  # at the same time, by the same clock
+    keyframes = {robot: [read_keyframe(m) for m in fleet.heard[f"{robot}/keyframes"]] for robot in SEEN}
+    assert all(max(len(s.packed) for s in sent) < 100_000 for sent in keyframes.values())
+    for sent in (s for of in keyframes.values() for s in of):
+        assert fleet.answer("registrar", sent.stamp_ns) == "published"
+    closures = [from_msg.loop_closure(message) for message in fleet.heard["constraints"]]
+    between = [c for c in closures if (c.from_frame_id, c.to_frame_id) == ("r1/camera", "r2/camera")]
+    assert between
+    for closure in between:
+        there, here = place("r1", closure.from_ns - 100 * SECOND), place("r2", closure.to_ns - 101 * SECOND)
+        degrees, centimetres = pose_error(closure.T_from_to, inverse(there) @ here)
+        assert degrees < 2.0 and centimetres < 3.0
+    fleet.wait_for(lambda: bool(fleet.heard["r2/correction"]), what="the second robot in the map")
+    fleet.stop("registrar")
+    stored = Store(store, read_only=True)
+    assert {stored.keyframe(k).robot for k in stored.keyframe_ids()} == {"r1", "r2"} and len(stored.keyframe_ids()) == 8
+    stored.close()
+
+
+def test_a_registrar_that_starts_anew_takes_what_was_sent_meanwhile_and_nothing_twice(
+    fleet: Graph, tmp_path: Path
+) -> None:
+    store = tmp_path / "fleet.db"
+    fleet.hear(Header, "r1/finished")
+    fleet.hear(Header, "finished")
+    fleet.hear(CompressedImage, "r1/keyframes", qos.latched(qos.KEPT_KEYFRAMES))
+    fleet.start("r1/keyframer", "keyframes", "-r __ns:=/r1", "-p reliable:=true", MOUNT)
+    started = "-p robots:=[r1]", f"-p store:={store}"
+    fleet.start("registrar", "registrar", *started)
+    fleet.start("mapper", "mapper", "-p robots:=[r1]", "-p publish_tf:=false", MOUNT)
+    drive(fleet, "r1", 100)
+    stamps = [read_keyframe(message).stamp_ns for message in fleet.heard["r1/keyframes"]]
+    assert [fleet.answer("registrar", stamp) for stamp in stamps] == ["published"] * 4
+    fleet.stop("registrar")
+    fleet.books.clear()
+    fleet.start("registrar", "registrar", *started)
+    assert fleet.balance("/registrar", 4).dropped == {"known": 4}
+    fleet.stop("registrar")
+    stored = Store(store, read_only=True)
+    assert [stored.keyframe(k).stamp_ns for k in stored.keyframe_ids()] == stamps
+    stored.close()
