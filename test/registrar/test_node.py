@@ -138,16 +138,6 @@ def test_the_keyframe_that_a_save_ends_comes_after_those_that_wait(
     node.close()
 
 
-def test_frames_of_two_cameras_are_told_with_what_to_do(make: Making) -> None:
-    node, said = make(), []
-    node.throttled._write = said.append
-    for frame_id in ("front", "front", "rear", "front"):
-        node._watch_camera(frame_id)
-    (line,) = said
-    assert "got one of 'rear' after one of 'front'" in line and "give each camera a keyframer" in line
-    node.close()
-
-
 def test_a_full_store_says_what_goes(make: Making, monkeypatch: pytest.MonkeyPatch) -> None:
     node, said = make(), []
     node.throttled._write = said.append
