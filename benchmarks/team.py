@@ -8,8 +8,11 @@ FOLDER holds a recording for each robot, as `objreg simulate --scenario robots` 
 it is published at ``--rate`` frames a second; the robots start as far apart as they were recorded. All run on this host
 without ``--trouble``. With LOSS:PAUSE each robot is a host of its own (benchmarks/hosts.py), and so is the registrar;
 ``config/fastdds_wifi.xml`` carries what passes between them, and the link of the second robot pauses for so many
-seconds. The store keeps fewer keyframes than were searched for, where others show the same objects from beside
-(``max_views``). ``common`` counts the constraints that the first run has too: the same two moments within a second.
+seconds.
+
+The store keeps fewer keyframes than were searched for, where others show the same objects from beside (``max_views``).
+A search is cut short while more keyframes of a robot wait than may. ``common`` counts the constraints that the first
+run has too: the same two moments within a second.
 """
 
 from __future__ import annotations
@@ -141,7 +144,7 @@ class Field:
     def told(self) -> dict[str, Any]:
         """What the witness wrote down last."""
         path = self.folder / TOLD
-        return dict(json.loads(path.read_text())) if path.exists() else {"told": {}, "closures": []}
+        return dict(json.loads(path.read_text())) if path.exists() else {"told": {}, "closures": [], "hurried": 0}
 
 
 def _bare(words: Mapping[str, Any]) -> dict[str, Any]:
@@ -185,7 +188,8 @@ def measure(team: Team, trouble: Trouble, laid: Path) -> dict[str, Any]:
         folder = Path(ends.enter_context(tempfile.TemporaryDirectory()))
         for file in laid.iterdir():
             Path(folder, file.name).symlink_to(file)
-        places = ends.enter_context(Hosts(len(team) + 1, conditions) if trouble.hosts else Here())
+        places: Here | Hosts = Hosts(len(team) + 1, conditions) if trouble.hosts else Here()
+        ends.enter_context(places)
         field = Field(places, trouble, list(team), folder)
         load = [os.getloadavg()[0]]
         start_all(field)
@@ -201,7 +205,7 @@ def measure(team: Team, trouble: Trouble, laid: Path) -> dict[str, Any]:
         before = field.told()
         last = end_all(field)
         words = field.told()
-        figures = figures_of(team, before["told"], words["closures"], field.folder / "team.db")
+        figures = figures_of(team, before["told"], words, field.folder / "team.db")
         return {**figures, "settled": settled, "last": last, **usage, "load": load}
 
 
@@ -283,7 +287,7 @@ def machine_seconds() -> float:
 
 
 def figures_of(
-    team: Team, told: Mapping[str, Mapping[str, str]], closures: Sequence[Mapping[str, Any]], store: Path
+    team: Team, told: Mapping[str, Mapping[str, str]], heard: Mapping[str, Any], store: Path
 ) -> dict[str, Any]:
     """What a run came to."""
     here = told["registrar"]
@@ -309,12 +313,14 @@ def figures_of(
         for node, words in told.items()
     }
     truths = Truths({name: robot.truth for name, robot in team.items()})
-    found = [closure_of(words, list(team)) for words in closures]
+    found = [closure_of(words, list(team)) for words in heard["closures"]]
     errors = [(closure, error) for closure in found if (error := truths.error(closure)) is not None]
     wrong = [closure for closure, error in errors if not within(error, FALSE)]
     return {
         "robots": robots,
         "ms": stages,
+        "hurried": heard["hurried"] - sum(n["stored unsearched"] for n in robots.values()),
+        "refused": {key.split()[1]: int(value) for key, value in here.items() if key.startswith("rejected: ")},
         "dropped": {node: words for node, words in dropped.items() if words},
         "closures": len(found),
         "false": len(wrong),
@@ -385,6 +391,7 @@ def table_of(name: str, row: Mapping[str, Any]) -> str:
             f"{n['searched']} ({share:.2f}), unsearched {n['stored unsearched']}, kept {n['kept']} "
             f"({n['kept twice']} twice), {n['kilobytes']} kB each"
         )
+    lines.append(f"  searches cut short: {row['hurried']}; refused: {row['refused']}")
     stages = ", ".join(f"{stage} {p50:.0f} / {p95:.0f} ms" for stage, (p50, p95) in row["ms"].items())
     lines.append(f"  p50 / p95: {stages}; dropped: {row['dropped'] or 'nothing'}; settled: {row['settled']}")
     lines.append(

@@ -89,7 +89,10 @@ def _await(node: Any, there: Callable[[], bool]) -> None:
 @main.command()
 @click.argument("folder", type=FOLDER)
 def hear(folder: Path) -> None:
-    """Write down once a second what nodes tell of themselves and the constraints so far, until the process is ended."""
+    """Write down once a second what nodes tell of themselves, until the process is ended.
+
+    And the constraints so far, and for how many keyframes some place was not looked at, for want of time.
+    """
     import rclpy
     from diagnostic_msgs.msg import DiagnosticArray
     from nav_msgs.msg import Odometry
@@ -102,11 +105,14 @@ def hear(folder: Path) -> None:
     node = rclpy.create_node("witness")
     told: dict[str, dict[str, str]] = {}
     closures: list[dict[str, Any]] = []
+    hurried: set[int] = set()  # stamps of keyframes
     node.create_subscription(DiagnosticArray, "/diagnostics", lambda message: _note(told, message), qos.room(100))
     kept = qos.latched(qos.KEPT_CONSTRAINTS)
     node.create_subscription(Odometry, "constraints", lambda message: closures.append(_closure(message)), kept)
+    node.create_subscription(DiagnosticArray, "refusals", lambda m: hurried.update(_hurried(m)), qos.room(qos.REFUSALS))
     saver = node.create_client(Trigger, "registrar/save")
-    node.create_timer(1.0, lambda: _write(folder / TOLD, {"told": told, "closures": closures}))
+    words = lambda: {"told": told, "closures": closures, "hurried": len(hurried)}  # noqa: E731
+    node.create_timer(1.0, lambda: _write(folder / TOLD, words()))
     _await(node, Path(folder, SAVE).exists)
     done = saver.call_async(Trigger.Request())
     _await(node, done.done)
@@ -119,6 +125,14 @@ def _note(told: dict[str, dict[str, str]], message: Any) -> None:
         name, _, what = status.name.strip("/").partition(": ")
         if what == "frames":
             told[name] = {pair.key: pair.value for pair in status.values}
+
+
+def _hurried(message: Any) -> set[int]:
+    from objreg_ros.bridge.diagnostics import refusal_of
+    from objreg_ros.data import Reason
+
+    refused = [refusal_of(status) for status in message.status]
+    return {rejected.to_ns for rejected in refused if rejected.reason == Reason.OVER_BUDGET}
 
 
 def _closure(message: Any) -> dict[str, Any]:
