@@ -7,8 +7,9 @@
 A FOLDER holds a recording for each robot, as `objreg simulate --scenario robots` writes them. ``one registrar`` takes
 all frames by their stamps; ``packed`` takes the keyframes that each robot made, packed to be sent and unpacked; of
 ``each its own`` every robot has a registrar, which asks for what the summaries of others promise (``--kilobytes`` a
-second). Meetings are as `fleet` tells them. ``map_cm`` is the error of one map of all robots (aligned once), of the map
-with the same closures and perfect ties between robots, and of odometry; ``alone_cm`` that of each robot's own map.
+second; ``kB_per_s`` is what it sent from its first frame to the last of all). Meetings are as `fleet` tells them.
+``map_cm`` is the error of one map of all robots (aligned once), of the map with the same closures and perfect ties
+between robots, and of odometry; ``alone_cm`` that of each robot's own map.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from typing import Any
 import click
 import fleet
 import numpy as np
-from closers import keyframes_of, perfect
+from closers import TOLERANCE_NS, keyframes_of, perfect
 from map_limits import kept
 from sources import SIMULATED, detector_of, read_source
 from tqdm import tqdm
@@ -37,6 +38,8 @@ from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import Keyframer
 from objreg_ros.mapper.pose_graph import PoseGraph
 from objreg_ros.memory.compact import pack_keyframe, unpack_keyframe
+from objreg_ros.registrar.exchange import Exchange
+from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
 from objreg_ros.registration.params import RegistrarParams
@@ -116,7 +119,79 @@ def packed(team: Team) -> tuple[list[LoopClosure], dict[str, Any]]:
     return closures, {"keyframes": len(sizes), "bytes": {"p50": p50, "p95": p95, "most": most}}
 
 
+class Peers:
+    """A registrar for each robot; what one says all others hear at once. ``now`` is of the frames, in s."""
+
+    def __init__(self, team: Team, bytes_per_second: float) -> None:
+        self.registrars = {name: Registrar(PARAMS) for name in team}
+        self.exchanges = {
+            name: Exchange(registrar, name, bytes_per_second, run=name) for name, registrar in self.registrars.items()
+        }
+        self.closures = list[LoopClosure]()
+        self.sizes = list[int]()  # of summaries
+
+    def tell(self, name: str, outcome: Outcome, now: float) -> None:
+        """What a robot's search came to, and its summary to all others."""
+        self.closures += outcome.closures
+        summary = self.exchanges[name].announce(outcome)
+        if summary is None:
+            return
+        self.sizes.append(len(summary))
+        for other in self._others(name):
+            if (request := other.hear(summary)) is not None:
+                self.exchanges[name].note(request, now)
+
+    def answer(self, now: float) -> None:
+        """All that may be sent now."""
+        for name, exchange in self.exchanges.items():
+            while (packed := exchange.answer(now)) is not None:
+                outcomes = [other.take(packed) for other in self._others(name)]
+                self.closures += [c for outcome in outcomes if outcome is not None for c in outcome.closures]
+
+    def _others(self, name: str) -> list[Exchange]:
+        return [exchange for other, exchange in self.exchanges.items() if other != name]
+
+
+def each_its_own(team: Team, kilobytes: float) -> tuple[list[LoopClosure], dict[str, Any]]:
+    """A registrar for each robot, which exchange what looks alike; 0 kilobytes a second are no limit."""
+    peers, now = Peers(team, 1e3 * kilobytes if kilobytes else np.inf), 0.0
+    for frame in tqdm(list(in_order(team)), desc="each its own"):
+        now = 1e-9 * frame.stamp_ns
+        peers.tell(frame.robot, peers.registrars[frame.robot].process(frame), now)
+        peers.answer(now)
+    for name, registrar in peers.registrars.items():
+        peers.tell(name, registrar.finish(), now)
+    peers.answer(now)
+    for registrar in peers.registrars.values():
+        peers.closures += registrar.settle().closures
+        registrar.close()
+    return peers.closures, {
+        "summary_bytes": dict(zip(("p50", "most"), np.percentile(peers.sizes, (50, 100)).tolist(), strict=True)),
+        "kB_per_s": {
+            name: 1e-3 * exchange.books["bytes sent"] / (now - 1e-9 * team[name].frames[0].stamp_ns)
+            for name, exchange in peers.exchanges.items()
+        },
+        "books": {name: dict(sorted(exchange.books.items())) for name, exchange in peers.exchanges.items()},
+        "waiting": {name: exchange.waiting for name, exchange in peers.exchanges.items()},
+    }
+
+
+def in_common(moments: Sequence[Sequence[Any]], others: Sequence[Sequence[Any]]) -> dict[str, int]:
+    """How many closures between robots join moments that one of the ``others`` joins too, within `TOLERANCE_NS`."""
+
+    def ends(moment: Sequence[Any]) -> list[tuple[str, int]]:
+        return sorted(zip(moment[:2], moment[2:], strict=True))
+
+    def alike(one: Sequence[Any], other: Sequence[Any]) -> bool:
+        pairs = zip(ends(one), ends(other), strict=True)
+        return all(a == b and abs(s - t) <= TOLERANCE_NS for (a, s), (b, t) in pairs)
+
+    between = [moment for moment in moments if moment[0] != moment[1]]
+    return {"common": sum(any(alike(one, other) for other in others) for one in between), "of": len(between)}
+
+
 WAYS: dict[str, Way] = {"one registrar": one_registrar, "packed": packed}
+EACH = "each its own"
 
 
 def meetings_of(team: Team) -> list[fleet.Meeting]:
@@ -189,11 +264,28 @@ def line(name: str, row: Mapping[str, Any]) -> str:
     between = row["between"]
     shares = ", ".join(f"{what} {between[what]['closed']}/{between[what]['of']}" for what in ("stretches", "keyframes"))
     alone = ", ".join("-" if cm is None else f"{cm:.1f}" for cm in row["alone_cm"].values())
+    own = ""
+    if "kB_per_s" in row:
+        own = "; kB/s " + ", ".join(f"{rate:.1f}" for rate in row["kB_per_s"].values())
+    if "in_common" in row:
+        own += "; in common with one registrar {common}/{of}".format(**row["in_common"])
     maps = ["-" if row[key] is None else f"{row[key]:.1f}" for key in ("map_cm", "perfect_ties_cm")]
     return (
         f"{name:14} {row['constraints']:4} constraints, {row['false']} false; between robots {between['constraints']} "
-        f"({between['false']} false), {shares}; map {maps[0]} cm, perfect ties {maps[1]} cm, alone {alone} cm"
+        f"({between['false']} false), {shares}; map {maps[0]} cm, perfect ties {maps[1]} cm, alone {alone} cm{own}"
     )
+
+
+def chosen(ways: str, kilobytes: str) -> dict[str, Way]:
+    """The ways by name; ``each its own`` once for each number of kilobytes."""
+    runs: dict[str, Way] = {}
+    for way in ways.split(","):
+        if way != EACH:
+            runs[way] = WAYS[way]
+            continue
+        for each in kilobytes.split(","):
+            runs[f"{way}, {each} kB/s" if float(each) else way] = partial(each_its_own, kilobytes=float(each))
+    return runs
 
 
 def simulated(seed: int, frames: int, folder: Path) -> Path:
@@ -208,12 +300,20 @@ def simulated(seed: int, frames: int, folder: Path) -> Path:
 @click.argument("folders", nargs=-1, type=click.Path(exists=True, file_okay=False, path_type=Path))
 @click.option("--simulate", "seeds", default="", metavar="SEED,SEED…", help="Simulate these and use them.")
 @click.option("--frames", default=500, show_default=True, help="Frames of each simulated robot.")
-@click.option("--ways", default=",".join(WAYS), show_default=True)
+@click.option("--ways", default=",".join((*WAYS, EACH)), show_default=True)
+@click.option("--kilobytes", default="0,20", show_default=True, help="A second, of each robot its own; 0: no limit.")
 @click.option("--model", default="", help="ONNX model; `truth`: a simulation's boxes.")
 @click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
 @click.option("--keep", type=click.Path(file_okay=False, path_type=Path), default=Path("out/robots"), show_default=True)
 def main(
-    folders: tuple[Path, ...], seeds: str, frames: int, ways: str, model: str, json_file: Path | None, keep: Path
+    folders: tuple[Path, ...],
+    seeds: str,
+    frames: int,
+    ways: str,
+    kilobytes: str,
+    model: str,
+    json_file: Path | None,
+    keep: Path,
 ) -> None:
     """Tie the robots of FOLDERS, and say how well."""
     warm(PARAMS)
@@ -222,9 +322,12 @@ def main(
     for path in paths:
         team = team_of(path, keep, model)
         found = meetings_of(team)
-        figures[path.name] = {way: measured(team, found, WAYS[way]) for way in ways.split(",")}
-        for way, row in figures[path.name].items():
-            click.echo(line(f"{path.name} {way}", row))
+        rows = figures[path.name] = {}
+        for way, run in chosen(ways, kilobytes).items():
+            rows[way] = measured(team, found, run)
+            if "one registrar" in rows:
+                rows[way]["in_common"] = in_common(rows["one registrar"]["moments"], rows[way]["moments"])
+            click.echo(line(f"{path.name} {way}", rows[way]))
         if json_file is not None:
             json_file.write_text(json.dumps(figures, indent=1), encoding="utf-8")
 

@@ -7,6 +7,10 @@ what both ends sent. It needs root; benchmarks/hosts.py has the hosts.
 
     python benchmarks/wireless.py --json OUT
     python benchmarks/wireless.py --trouble 0.2:30 --profiles config/fastdds_wifi.xml --peers
+
+A test sends three messages so, on a machine that does little else:
+
+    OBJREG_WIRELESS=1 python -m pytest test/benchmarks/test_wireless.py
 """
 
 from __future__ import annotations

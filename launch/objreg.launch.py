@@ -63,6 +63,7 @@ OPTIONS = {
     "use_sim_time": "true to follow /clock",
     "reliable": "true to ask cameras for reliable delivery",
     "keyframer": "true to start a keyframer in the registrar's place, which sends keyframes to a registrar elsewhere",
+    "exchange": "namespace of the topics by which registrars of several robots exchange keyframes, as /fleet",
     "mapper": "true to start the reference mapper too, which publishes path and correction",
     "composed": "true for all nodes in one process, which takes half of the memory",
     "managed": "true for nodes with a life cycle (~/change_state); not with composed",
@@ -81,7 +82,7 @@ CHOICES = {
 }
 FOREIGN = ("vision_msgs", "masks")  # detections that are another detector's
 RESPAWN_S = 2.0
-OWN = {"detector": ("model",), "segmenter": ("source", "detections", "camera")}
+OWN = {"detector": ("model",), "segmenter": ("source", "detections", "camera"), "registrar": ("exchange",)}
 
 
 def generate_launch_description() -> LaunchDescription:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum, IntFlag
 from typing import Any, TypeVar, dataclass_transform
@@ -472,6 +473,16 @@ Robots = tuple[str, str]  # of a closure: that of *from* and that of *to*, empty
 def may_be_same(robots: Robots, others: Robots) -> bool:
     """Whether the robots of two closures are the same, as far as both are told."""
     return all(a == b or not a or not b for a, b in zip(robots, others, strict=True))
+
+
+def framed(robot: str, frame_id: str) -> str:
+    """A frame under the prefix of its robot, which it may have already."""
+    return frame_id if not robot or frame_id.startswith(f"{robot}/") else f"{robot}/{frame_id}"
+
+
+def robot_of(frame_id: str, robots: Sequence[str]) -> str:
+    """The robot whose prefix a frame has, the longest name first; empty for none."""
+    return next((robot for robot in sorted(robots, key=len, reverse=True) if frame_id.startswith(f"{robot}/")), "")
 
 
 @word

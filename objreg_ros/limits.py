@@ -27,6 +27,8 @@ MOST_VIEW_PIXELS = 4_000_000  # of a reduced view, which has some 20 000
 MOST_OBJECT_POINTS = 4_000_000  # of the objects of one frame
 MOST_PACKED_KEYFRAME = 1_000_000  # bytes of a keyframe that is sent, which has some 70 000
 MOST_UNPACKED_KEYFRAME = 4_000_000  # bytes that it unpacks to: about one for each of its numbers
+MOST_SUMMARY = 100_000  # bytes of what is told of a keyframe to others, which has some 1000
+MOST_UNPACKED_SUMMARY = 400_000  # bytes that it unpacks to
 
 LEAST_FOCAL_LENGTH, MOST_FOCAL_LENGTH = 1e-3, 1e6  # px: beyond them rays do not fit into float32
 LEAST_RANGE = 1e-3  # m along the optical axis: what is nearer has no place in the picture

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from objreg_ros import data
-from objreg_ros.data import PointFlag
+from objreg_ros.data import PointFlag, framed, robot_of
 
 NAN = np.float32(np.nan)
 CAMERA = data.Intrinsics(fx=50.0, fy=60.0, cx=31.5, cy=23.5, width=64, height=48)
@@ -263,3 +263,15 @@ def test_robots_may_be_the_same_as_far_as_both_are_told() -> None:
     assert one.robots == ("a", "b") and closure().robots == ("", "")
     assert data.may_be_same(one.robots, ("", "")) and data.may_be_same(one.robots, ("a", ""))
     assert not data.may_be_same(one.robots, ("a", "a")) and one.moments == closure().moments
+
+
+def test_a_frame_gets_the_prefix_of_its_robot_once() -> None:
+    assert framed("r1", "camera") == framed("r1", "r1/camera") == "r1/camera"
+    assert framed("", "camera") == "camera"
+    assert framed("r1", "r10/camera") == "r1/r10/camera"
+
+
+def test_a_frame_tells_its_robot_by_the_longest_name() -> None:
+    robots = ["r1", "fleet", "fleet/r1"]
+    told = [robot_of(frame_id, robots) for frame_id in ("r1/camera", "fleet/r1/camera", "r10/camera", "camera")]
+    assert told == ["r1", "fleet/r1", "", ""]

@@ -17,8 +17,7 @@ from nav_msgs.msg import Odometry
 
 from objreg_ros.bridge import closures_msg, from_msg, qos
 from objreg_ros.bridge.door import Door
-from objreg_ros.bridge.robots import robot_of
-from objreg_ros.data import LoopClosure, Moments, Robots, may_be_same
+from objreg_ros.data import LoopClosure, Moments, Robots, may_be_same, robot_of
 
 MOST_KNOWN = 100_000  # closures that are remembered, so that none is taken twice
 

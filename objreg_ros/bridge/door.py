@@ -22,6 +22,7 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 from std_msgs.msg import Header
+from std_srvs.srv import Trigger
 
 from objreg_ros.bridge import qos, to_msg
 from objreg_ros.bridge.choice import Choice
@@ -325,6 +326,15 @@ class Door(ManagedNode):
         self._aside = [*(other for other in self._aside if other.is_alive()), thread]
         thread.start()
         return future
+
+    def serve_aside(self, name: str, work: Callable[[], tuple[bool, str]]) -> None:
+        """A service of std_srvs/Trigger: ``work`` is done `aside`, and says whether it could be, and what to know."""
+
+        async def answer(_: Any, response: Any) -> Any:
+            response.success, response.message = await self.aside(work)
+            return response
+
+        self.create_service(Trigger, name, answer, callback_group=self.apart)
 
     def end_aside(self) -> None:
         """Wait for what is done `aside`."""

@@ -23,6 +23,11 @@ class FromRobot(NamedTuple):
     sent: SentKeyframe
 
     @property
+    def stamp_ns(self) -> int:
+        """When it was seen."""
+        return self.sent.stamp_ns
+
+    @property
     def nbytes(self) -> int:
         """The memory that it takes while it waits."""
         return len(self.sent.packed)

@@ -53,3 +53,13 @@ class RelocalisedParams(Params):
         "earlier_map", "name of the frame of an earlier session's map, in which `relocalised` is; for Nav2: map"
     )
     initialpose: bool = param(False, "tell it on `initialpose` too, projected to the plane, as AMCL takes it")
+
+
+@dataclass(frozen=True)
+class ExchangeParams(Params):
+    """How registrars that each keep their own store close loops between their robots."""
+
+    exchange: str = param(
+        "", "namespace of the topics by which registrars of several robots exchange keyframes, as /fleet; empty: none"
+    )
+    exchange_kilobytes: float = param(50.0, "most that is told to the others, on average", "kB/s", ge=0.1)

@@ -8,7 +8,8 @@ import sys
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Mapping
+from types import MappingProxyType
 from typing import Generic, NamedTuple, TypeVar
 
 Job = TypeVar("Job")
@@ -68,13 +69,13 @@ class Worker(Generic[Job]):
 class Limit(NamedTuple):
     """How many jobs may wait, of how many bytes together, and how many seconds before the work in hand is hurried.
 
-    A job is overtaken where more than ``behind`` newer ones of its lane wait.
+    A job is overtaken where newer ones of its lane wait, more than ``behind`` says of that lane.
     """
 
     jobs: int
     nbytes: int
     patience_s: float
-    behind: int = 0
+    behind: Mapping[Hashable, int] = MappingProxyType({})
 
 
 class _Waiting(NamedTuple, Generic[Job]):
@@ -137,7 +138,7 @@ class Backlog(Generic[Job]):
         with self._changed:
             self._changed.wait_for(lambda: not self._open or self._has_room(nbytes))
             now, lane = time.monotonic(), self._lane_of(job)
-            if self._count(lane) > self._limit.behind:
+            if self._is_behind(lane):
                 self._overtaken_at = now
             self._pressed = now - self._overtaken_at < PRESSED_S
             self._waiting.append(_Waiting(job, nbytes, now, lane))
@@ -198,9 +199,9 @@ class Backlog(Generic[Job]):
             return True
         return len(self._waiting) < self._limit.jobs and self._nbytes + nbytes <= self._limit.nbytes
 
-    def _count(self, lane: Hashable) -> int:
-        """How many jobs of a lane wait."""
-        return sum(waiting.lane == lane for waiting in self._waiting)
+    def _is_behind(self, lane: Hashable) -> bool:
+        """Whether so many jobs of a lane wait that the one before them is overtaken."""
+        return sum(waiting.lane == lane for waiting in self._waiting) > self._limit.behind.get(lane, 0)
 
     def _next(self) -> int:
         """Which job is next: the oldest of the lane whose last turn is the longest ago."""
@@ -222,7 +223,7 @@ class Backlog(Generic[Job]):
             self._turns += 1
             self._served[lane] = self._turns
             self._changed.notify_all()
-            return self._settle if self._count(lane) > self._limit.behind else self._work, job
+            return self._settle if self._is_behind(lane) else self._work, job
 
     def _run(self, pressed: bool) -> None:
         try:

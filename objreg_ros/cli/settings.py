@@ -19,7 +19,7 @@ from objreg_ros.adapters.params import (
     ToLioSamParams,
     ToRtabmapParams,
 )
-from objreg_ros.bridge.params import DoorParams, ManagedParams, RelocalisedParams
+from objreg_ros.bridge.params import DoorParams, ExchangeParams, ManagedParams, RelocalisedParams
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.mapper.params import MapperNodeParams, MapperParams
 from objreg_ros.params import Declaration, Params
@@ -32,7 +32,14 @@ Kind = TypeVar("Kind", bound=Params)
 NODES: dict[str, tuple[type[Params], ...]] = {
     "detector": (DetectorParams, ManagedParams, DoorParams),
     "segmenter": (SegmenterParams, SegmenterNodeParams, ManagedParams, DoorParams),
-    "registrar": (RegistrarParams, RegistrarNodeParams, RelocalisedParams, ManagedParams, DoorParams),
+    "registrar": (
+        RegistrarParams,
+        RegistrarNodeParams,
+        ExchangeParams,
+        RelocalisedParams,
+        ManagedParams,
+        DoorParams,
+    ),
     "keyframer": (KeyframeParams, KeyframerNodeParams, ManagedParams, DoorParams),
     "mapper": (MapperParams, MapperNodeParams, ManagedParams, DoorParams),
     "objreg_to_rtabmap": (ToRtabmapParams, BodyParams, AdapterParams, DoorParams),

@@ -149,21 +149,21 @@ def _object_head(item: KeyObject) -> dict[str, Any]:
 
 def _keyframe(head: Head, columns: Columns) -> Keyframe:
     view = _view(head, columns)
-    xyz, normals = _oriented(columns, _whole(head, "context", 0, limits.MOST_VIEW_PIXELS), quantised.CONTEXT_STEP_UM)
+    xyz, normals = _oriented(columns, whole(head, "context", 0, limits.MOST_VIEW_PIXELS), quantised.CONTEXT_STEP_UM)
     return Keyframe(
         keyframe_id=0,
-        session=_whole(head, "session", 0, MOST_WHOLE),
-        stamp_ns=_whole(head, "stamp_ns", limits.LEAST_STAMP_NS, limits.MOST_STAMP_NS),
-        frame_id=_text(head, "frame_id"),
+        session=whole(head, "session", 0, MOST_WHOLE),
+        stamp_ns=whole(head, "stamp_ns", limits.LEAST_STAMP_NS, limits.MOST_STAMP_NS),
+        frame_id=text(head, "frame_id"),
         objects=_objects(head["objects"], columns),
         context=Context(xyz=xyz, normals=normals),
         view=view,
         gravity=None if head["gravity"] is None else gravity_of(np.array(head["gravity"], float)),
-        gravity_confidence=_real(head, "gravity_confidence", 1.0),
+        gravity_confidence=real(head, "gravity_confidence", 1.0),
         T_odom_camera=None if head["T_odom_camera"] is None else pose_of(np.array(head["T_odom_camera"], float)),
-        by_odometry=bool(_whole(head, "by_odometry", 0, 1)),
-        travelled=_real(head, "travelled", limits.MOST_DISTANCE),
-        turned=_real(head, "turned", limits.MOST_DISTANCE),
+        by_odometry=bool(whole(head, "by_odometry", 0, 1)),
+        travelled=real(head, "travelled", limits.MOST_DISTANCE),
+        turned=real(head, "turned", limits.MOST_DISTANCE),
     )
 
 
@@ -180,12 +180,12 @@ def _view_columns(view: View) -> list[bytes]:
 def _view(head: Head, columns: Columns) -> View:
     camera = camera_of(head["camera"])
     shape = camera.height, camera.width
-    pixels = _within("pixels of a view", shape[0] * shape[1], limits.MOST_VIEW_PIXELS)
+    pixels = within("pixels of a view", shape[0] * shape[1], limits.MOST_VIEW_PIXELS)
     known = np.cumsum(columns.take(pixels)) > 0
     depth = np.full(pixels, np.nan, np.float32)
     depth[known] = quantised.depth_of(np.cumsum(columns.take(int(known.sum()))))
     grey = None
-    if _whole(head, "grey", 0, 1):
+    if whole(head, "grey", 0, 1):
         grey = quantised.grey_of(np.cumsum(np.cumsum(columns.take(pixels).reshape(shape), axis=0), axis=1))
     xyz = back_project(depth.reshape(shape), camera.fx, camera.fy, camera.cx, camera.cy)
     return View(xyz=xyz, grey=grey, intrinsics=camera)
@@ -208,12 +208,12 @@ def _object_columns(objects: Sequence[KeyObject]) -> list[bytes]:
 
 
 def _objects(heads: Sequence[Head], columns: Columns) -> tuple[KeyObject, ...]:
-    _within("objects", len(heads), limits.MOST_OBJECTS)
-    counts = [_whole(head, "points", 1, limits.MOST_OBJECT_POINTS) for head in heads]
-    total = _within("points of objects", sum(counts), limits.MOST_OBJECT_POINTS)
+    within("objects", len(heads), limits.MOST_OBJECTS)
+    counts = [whole(head, "points", 1, limits.MOST_OBJECT_POINTS) for head in heads]
+    total = within("points of objects", sum(counts), limits.MOST_OBJECT_POINTS)
     if not heads:
         return ()
-    steps_um = np.repeat([_whole(head, "step_um", 1, 10 * quantised.MOST_STEP_UM) for head in heads], counts)
+    steps_um = np.repeat([whole(head, "step_um", 1, 10 * quantised.MOST_STEP_UM) for head in heads], counts)
     xyz, normals = _oriented(columns, total, steps_um[:, None])
     if (nearest := float(xyz[:, 2].min())) < limits.LEAST_RANGE:
         raise ValueError(f"expected objects {limits.LEAST_RANGE} m before the camera or farther, got {nearest:g} m")
@@ -224,18 +224,18 @@ def _objects(heads: Sequence[Head], columns: Columns) -> tuple[KeyObject, ...]:
 
 
 def _object(head: Head, columns: Columns, *, xyz: Array, normals: Array, flags: Array) -> KeyObject:
-    coloured = _whole(head, "rgb", 0, 1)
+    coloured = whole(head, "rgb", 0, 1)
     cloud = ObjectCloud(
-        label=_text(head, "label"),
-        score=_real(head, "score", 1.0),
-        instance=_whole(head, "instance", 0, MOST_WHOLE),
+        label=text(head, "label"),
+        score=real(head, "score", 1.0),
+        instance=whole(head, "instance", 0, MOST_WHOLE),
         xyz=xyz,
         normals=normals,
         rgb=quantised.rgb_of(columns.take(3 * len(xyz)).reshape(3, -1).T) if coloured else None,
         flags=flags,
-        density=_real(head, "density", limits.MOST_DENSITY),
+        density=real(head, "density", limits.MOST_DENSITY),
     )
-    return KeyObject(cloud=cloud, sightings=_whole(head, "sightings", 1, MOST_WHOLE))
+    return KeyObject(cloud=cloud, sightings=whole(head, "sightings", 1, MOST_WHOLE))
 
 
 def _oriented_columns(steps: Array, normals: Array) -> list[bytes]:
@@ -248,25 +248,29 @@ def _oriented(columns: Columns, count: int, each_um: Array | int) -> tuple[Array
     return quantised.points_of(steps, each_um), quantised.normals_of(columns.take(2 * count).reshape(2, count).T)
 
 
-def _within(name: str, number: Any, most: int, least: int = 0) -> int:
+def within(name: str, number: Any, most: int, least: int = 0) -> int:
+    """A whole number within bounds; ValueError, with its ``name``, for anything else."""
     if type(number) is not int or not least <= number <= most:
         raise ValueError(f"expected {name} of {least} to {most}, got {number!r}")
     return number
 
 
-def _whole(head: Head, name: str, least: int, most: int) -> int:
-    return _within(name, head[name], most, least)
+def whole(head: Head, name: str, least: int, most: int) -> int:
+    """`within` of what a head has under a name; KeyError if it has nothing."""
+    return within(name, head[name], most, least)
 
 
-def _real(head: Head, name: str, most: float) -> float:
+def real(head: Head, name: str, most: float) -> float:
+    """A number of 0 to ``most`` of a head; KeyError if it has nothing, ValueError for anything else."""
     number = head[name]
     if type(number) not in (int, float) or not 0.0 <= number <= most:
         raise ValueError(f"{name}: expected a number of 0 to {most:g}, got {number!r}")
     return float(number)
 
 
-def _text(head: Head, name: str) -> str:
-    text = head[name]
-    if not isinstance(text, str) or len(text) > limits.MOST_NAME or SURROGATE.search(text):
-        raise ValueError(f"{name}: expected at most {limits.MOST_NAME} characters, got {ascii(text)[:100]}")
-    return text
+def text(head: Head, name: str) -> str:
+    """A name of a head; KeyError if it has nothing, ValueError for anything else."""
+    said = head[name]
+    if not isinstance(said, str) or len(said) > limits.MOST_NAME or SURROGATE.search(said):
+        raise ValueError(f"{name}: expected at most {limits.MOST_NAME} characters, got {ascii(said)[:100]}")
+    return said

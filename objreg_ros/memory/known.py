@@ -65,6 +65,7 @@ class Last:
     session: int
     stamp_ns: int
     label: str
+    robot: str
     numbers: Array
 
     @property
@@ -118,4 +119,5 @@ class Known:
 def last_of(sighting: Sighting) -> Last:
     """What is kept of a sighting as the latest of its landmark."""
     numbers = (*sighting.position, *sighting.R_landmark_session.ravel(), sighting.extent, sighting.travelled)
-    return Last(sighting.session, sighting.stamp_ns, sys.intern(sighting.label), np.array(numbers, float))
+    label, robot = sys.intern(sighting.label), sys.intern(sighting.robot)
+    return Last(sighting.session, sighting.stamp_ns, label, robot, np.array(numbers, float))

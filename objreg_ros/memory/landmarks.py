@@ -32,7 +32,10 @@ Cell = tuple[int, str, int, int, int]  # session, label group, and where
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Landmark:
-    """A known object: ``position (3,)`` m in the frame of the ``session`` that saw it last, at ``stamp_ns``."""
+    """A known object: ``position (3,)`` m in the frame of the ``session`` of ``robot`` that saw it last.
+
+    It was seen so at ``stamp_ns``.
+    """
 
     landmark: int
     label: str
@@ -40,6 +43,7 @@ class Landmark:
     session: int
     stamp_ns: int
     sightings: int
+    robot: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -268,4 +272,5 @@ def _landmark(number: int, known: Known) -> Landmark:
         session=known.last.session,
         stamp_ns=known.last.stamp_ns,
         sightings=len(known.views),
+        robot=known.last.robot,
     )

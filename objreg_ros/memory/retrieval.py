@@ -77,6 +77,10 @@ class Index:
             row = self._blocks[group].append(sighting)
             self._rows.setdefault(sighting.keyframe_id, array("q")).extend((self._numbers[group], row))
 
+    def sessions_of(self, robot: str) -> frozenset[int]:
+        """Those of which a robot's objects were added."""
+        return frozenset(self._sessions.get(robot, ()))
+
     def remove(self, keyframe_ids: Iterable[int]) -> None:
         """Forget every object of these keyframes."""
         blocks = list(self._blocks.values())

@@ -7,8 +7,10 @@ from objreg_ros.data import Frame, Reason, Rejected
 from objreg_ros.keyframes.frame_window import Clock, FrameWindow, SessionNumbers
 from objreg_ros.keyframes.keyframer import Keyframer
 from objreg_ros.memory.store import Store
-from objreg_ros.registrar.closure import rejected
+from objreg_ros.registrar.closure import redundant, rejected
 from objreg_ros.registrar.confirmation import Confirmation
+from objreg_ros.registrar.outcome import Outcome
+from objreg_ros.registrar.recollection import Recollection
 from objreg_ros.registrar.relocalisation import Relocalisation
 from objreg_ros.registrar.thinning import Thinning
 from objreg_ros.registration.keyframe import Keyframe
@@ -51,6 +53,22 @@ class CameraTrack:
         """Whether its run of the clock goes on, as another camera of the robot begins one."""
         return self.clock is not None and self.newest_ns < clock.began_ns + GOES_ON_NS
 
+    def settle(self, now_ns: int | None, recollection: Recollection) -> Outcome:
+        """What waits no more: late constraints, which are written down, and refusals; all where there is no now."""
+        confirmed, refused = self.confirmation.settle(now_ns)
+        closures = []
+        for waiting in confirmed:
+            moments = waiting.from_session, waiting.closure.from_ns, waiting.closure.to_ns
+            if self.thinning.redundant(*moments):
+                refused.append(waiting.refused(redundant(recollection.params.thin_seconds)))
+                continue
+            self.thinning.accept(*moments)
+            settled, ends = recollection.remember_late(waiting)
+            if ends is not None:
+                self.relocalisation.hear(settled.closure, *ends)
+            closures.append(settled.closure)
+        return Outcome(closures=tuple(closures), rejected=tuple(refused))
+
 
 class CameraTracks(dict[Camera, CameraTrack]):
     """One for each camera of each robot; of more than `MOST_CAMERAS` the oldest goes.
@@ -80,6 +98,21 @@ class CameraTracks(dict[Camera, CameraTrack]):
         """The frame windows that were being collected, without those that show nothing new."""
         ended = [track.keyframer.finish() for track in tuple(self.values())]
         return [window for window in ended if window is not None]
+
+    def go_on(self, keyframe: Keyframe, clock: Clock, recollection: Recollection) -> tuple[Rejected, ...]:
+        """Follow a camera to a keyframe; what is given up where its clock began anew.
+
+        Then what an earlier run of the clock saw is left out, unless that was over by then: a stamp of it would name a
+        moment of this run, and the session does not travel with a constraint.
+        """
+        track = self.of(keyframe.camera)
+        given_up: tuple[Rejected, ...] = ()
+        if clock != track.clock:
+            hidden = self.hidden_from(clock, keyframe.camera, recollection.store)
+            given_up = track.settle(None, recollection).rejected + clock_refusals(clock, hidden, keyframe)
+            track.begin(clock, hidden, recollection.params)
+        track.see(keyframe)
+        return given_up
 
     def hidden_from(self, clock: Clock, camera: Camera, store: Store) -> frozenset[int]:
         """The sessions of a camera's robot that may have seen the time that the run of its clock goes through.

@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
@@ -34,6 +37,25 @@ class Budget(NamedTuple):
         if late > 0:
             return f"{1e3 * late:.0f} ms after the end of the search"
         return "cut short: newer keyframes wait, or the node ends" if self.hurried() else ""
+
+
+class Pools:
+    """Threads that try candidates: so many for each niceness, which a thread may not take back."""
+
+    def __init__(self, threads: int) -> None:
+        self._threads, self._pools = threads, dict[int, ThreadPoolExecutor]()
+
+    def fitting(self) -> ThreadPoolExecutor:
+        """That of the niceness of the thread that asks; kept, since each new one costs memory."""
+        nice = os.getpriority(os.PRIO_PROCESS, threading.get_native_id()) if sys.platform == "linux" else 0
+        if nice not in self._pools:
+            self._pools[nice] = ThreadPoolExecutor(self._threads, "register")
+        return self._pools[nice]
+
+    def shutdown(self) -> None:
+        """Wait for what they are at, and end them."""
+        for pool in self._pools.values():
+            pool.shutdown()
 
 
 class Means(NamedTuple):

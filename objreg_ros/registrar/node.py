@@ -14,24 +14,27 @@ from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from std_srvs.srv import SetBool, Trigger
+from std_srvs.srv import SetBool
 
 from objreg_ros.bridge.announcements import Announcements
 from objreg_ros.bridge.door import DroppedError
+from objreg_ros.bridge.exchanging import Delivered, Exchanging
 from objreg_ros.bridge.frames_in import FramesDoor
 from objreg_ros.bridge.indoors import Indoors
 from objreg_ros.bridge.keyframes_in import FromRobot, KeyframesIn
 from objreg_ros.bridge.lifetime import await_kernels
 from objreg_ros.bridge.markers import Scene
-from objreg_ros.bridge.params import ManagedParams, RelocalisedParams
+from objreg_ros.bridge.params import ExchangeParams, ManagedParams, RelocalisedParams
 from objreg_ros.bridge.relocalised import Whereabouts
-from objreg_ros.bridge.robots import framed, prefixes_of
+from objreg_ros.bridge.robots import prefixes_of
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.sync import Match
 from objreg_ros.bridge.transforms import hear_mount
 from objreg_ros.bridge.worker import Backlog, Limit
-from objreg_ros.keyframes.frame_window import Arrival, Clock, FrameWindow
-from objreg_ros.memory.compact import unpack_keyframe
+from objreg_ros.data import framed
+from objreg_ros.keyframes.frame_window import FrameWindow
+from objreg_ros.registrar.exchange import Exchange
+from objreg_ros.registrar.origins import arrival_of
 from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
@@ -48,7 +51,7 @@ class Job(NamedTuple):
     """A keyframe that waits for its search, made here or sent by a robot, and since when, by `time.monotonic`."""
 
     stamp_ns: int
-    seen: FrameWindow | FromRobot
+    seen: FrameWindow | FromRobot | Delivered
     since: float
 
 
@@ -59,12 +62,13 @@ class RegistrarNode(FramesDoor):
     stored without a search: nothing that was seen is lost. A search that newer ones wait for is cut short, and no frame
     is followed while too many wait.
 
-    With ``robots`` it follows no frame: keyframes come from keyframers. Robots take turns, each with its
-    oldest keyframe; `BEHIND` of them may wait before the oldest is stored without a search.
+    With ``robots`` it follows no frame: keyframes come from keyframers. Robots take turns, each with its oldest
+    keyframe; `BEHIND` of them may wait before the oldest is stored without a search. With ``exchange`` it asks other
+    registrars for keyframes that look alike, and compares them with its own.
     """
 
     def __init__(self, indoors: Indoors | None = None) -> None:
-        kinds = RegistrarParams, RegistrarNodeParams, RelocalisedParams, ManagedParams
+        kinds = RegistrarParams, RegistrarNodeParams, ExchangeParams, RelocalisedParams, ManagedParams
         super().__init__("registrar", *kinds, indoors=indoors)
 
     def open(self) -> None:
@@ -85,6 +89,7 @@ class RegistrarNode(FramesDoor):
         self._unsearched = 0
         self._scene = Scene()
         self._robots = prefixes_of(self, list(inputs.cameras)) if inputs.robots else {}
+        self._robot = self._asked_to_exchange()
         limit, nice = self._limit(), self._niceness()
         self.searcher: Backlog[Job] = Backlog(
             self._search, self._keep, self.fail, limit, lambda job: job.seen.nbytes, nice, lambda job: job.seen.robot
@@ -92,19 +97,31 @@ class RegistrarNode(FramesDoor):
         refused.callback(self.searcher.close)
         self._announcements = Announcements(self)
         self._whereabouts = Whereabouts(self, lambda: (self._registrar.relocalised, self._registrar.whereabouts))
-        self.create_service(Trigger, "~/reset", self._reset, callback_group=self.apart)
-        self.create_service(Trigger, "~/save", self._save, callback_group=self.apart)
+        self.serve_aside("~/reset", self._forget)
+        self.serve_aside("~/save", self._settle_and_save)
         self.create_service(SetBool, "~/enable", self._enable)
+        if self._robot:
+            asked = self.settings.of(ExchangeParams)
+            self._exchange = Exchange(self._registrar, self._robot, 1000.0 * asked.exchange_kilobytes)
+            self._others = Exchanging(self, asked.exchange, self._exchange, self._take)
         if self._robots:
             self._keyframes = KeyframesIn(self, self._robots, list(inputs.cameras.values()), self._take)
         else:
             self.listen_to_frames(hear_mount(self, inputs.mounting), round(inputs.odom_slop * 1e9))
 
+    def _asked_to_exchange(self) -> str:
+        """Our own robot's name if keyframes are exchanged; empty if not. ValueError where it has none."""
+        robot, topics = self.get_namespace().strip("/"), self.settings.of(ExchangeParams).exchange
+        if topics and (self._robots or not robot):
+            got = "robots" if self._robots else "none"
+            raise ValueError(f"exchange: expected a namespace, which names one robot, got {got}; add -r __ns:=/NAME")
+        return robot if topics else ""
+
     def _limit(self) -> Limit:
         """How many keyframes may wait for their search."""
-        if self._robots:
-            return Limit(2 * BEHIND * len(self._robots), WAITING_BYTES, PATIENCE_S, BEHIND)
-        return Limit(WAITING_KEYFRAMES, WAITING_BYTES, PATIENCE_S)
+        lanes = [*self._robots, *([""] if self._robot else [])]
+        jobs = max(WAITING_KEYFRAMES, 2 * BEHIND * len(lanes))
+        return Limit(jobs, WAITING_BYTES, PATIENCE_S, dict.fromkeys(lanes, BEHIND))
 
     def adopt(self) -> None:
         """Live parameters hold from the next frame and the next search on."""
@@ -122,6 +139,8 @@ class RegistrarNode(FramesDoor):
         if not self._enabled:
             raise DroppedError("disabled", "")
         frame, T_body_camera = self.frame_of(payload)
+        if self._robot:
+            frame = replace(frame, robot=self._robot, frame_id=framed(self._robot, frame.frame_id))
         self._scene.see(frame)
         with self._tracking:  # until it waits: none that a service ends comes before it
             with self.ledger.timed("track"):
@@ -132,13 +151,12 @@ class RegistrarNode(FramesDoor):
         self._whereabouts.look()
         return window is None
 
-    def _take(self, seen: FromRobot) -> None:
-        """A keyframe of a robot goes on to the searcher."""
-        stamp_ns = seen.sent.stamp_ns
+    def _take(self, seen: FromRobot | Delivered) -> None:
+        """A keyframe of a robot that is in the books goes on to the searcher."""
         if self._enabled:
-            self.searcher.put(Job(stamp_ns, seen, time.monotonic()))
+            self.searcher.put(Job(seen.stamp_ns, seen, time.monotonic()))
         else:
-            self.drop(stamp_ns, "disabled")
+            self.drop(seen.stamp_ns, "disabled")
 
     def _search(self, job: Job) -> None:
         self.ledger.spend("wait", time.monotonic() - job.since)
@@ -161,27 +179,31 @@ class RegistrarNode(FramesDoor):
         self._publish(outcome)
         return True
 
-    def _outcome(self, seen: FrameWindow | FromRobot, seconds: float) -> Outcome | None:
-        """What becomes of a keyframe; None for one of a robot that is known."""
-        if isinstance(seen, FrameWindow):
-            return self._registrar.search(seen, seconds, self.searcher.hurried)
-        return self._registrar.receive(self.read("keyframes", arrival_of, seen), seconds, self.searcher.hurried)
+    def _outcome(self, seen: FrameWindow | FromRobot | Delivered, seconds: float) -> Outcome | None:
+        """What becomes of a keyframe; None for one of another robot that is known, or was not asked for."""
+        hurried = self.searcher.hurried
+        if isinstance(seen, FromRobot):
+            arrival = self.read("keyframes", arrival_of, seen.robot, seen.sent)
+            return self._registrar.receive(arrival, seconds, hurried)
+        if isinstance(seen, Delivered):
+            return self._exchange.take(seen.packed, seconds, hurried)
+        outcome = self._registrar.search(seen, seconds, hurried)
+        if self._robot and outcome.keyframe_ns is not None:
+            self._others.tell(outcome.keyframe_ns, self._exchange.announce(outcome))
+        return outcome
 
     def _publish(self, outcome: Outcome) -> None:
         with self._telling:  # the searcher's thread and that of ~/save
-            self._tell(outcome)
-
-    def _tell(self, outcome: Outcome) -> None:
-        self._announcements.closures(outcome.closures)
-        self._announcements.refusals(outcome.rejected)
-        self._count()
-        self._whereabouts.look()
-        if outcome.keyframe_ns is not None:
-            seen = outcome.observations, outcome.keyframe_ns, outcome.frame_id
-            self._announcements.landmarks(*seen, self.names, outcome.session, outcome.robot)
-            self._scene.settle(outcome.keyframe_ns, outcome.closures, outcome.rejected)
-            objects = [(known.landmark, known.label, known.position) for known in self._registrar.landmarks_here]
-            self._announcements.markers(self._scene.markers(objects, outcome.keyframe_ns, self.odom_frame))
+            self._announcements.closures(outcome.closures)
+            self._announcements.refusals(outcome.rejected)
+            self._count()
+            self._whereabouts.look()
+            if outcome.keyframe_ns is not None:
+                seen = outcome.observations, outcome.keyframe_ns, outcome.frame_id
+                self._announcements.landmarks(*seen, self.names, outcome.session, outcome.robot)
+                self._scene.settle(outcome.keyframe_ns, outcome.closures, outcome.rejected)
+                objects = [(known.landmark, known.label, known.position) for known in self._registrar.landmarks_here]
+                self._announcements.markers(self._scene.markers(objects, outcome.keyframe_ns, self.odom_frame))
 
     def _count(self) -> None:
         """Count what is stored, and say so where the oldest had to go."""
@@ -196,25 +218,19 @@ class RegistrarNode(FramesDoor):
     def extra_diagnostics(self) -> Mapping[str, object]:
         """What is stored and what waits, and what was told of closures."""
         stored = {f"stored {what}": count for what, count in self._counts.items() if what != "forgotten"}
-        counts = {
-            "stored unsearched": self._unsearched,
-            "forgotten keyframes": self._counts["forgotten"],
-            "waiting keyframes": len(self.searcher),
-            "waiting poses": self._registrar.waiting,
-            "frames without odometry": self.without_odometry,
-        }
-        robots = self._keyframes.told() if self._robots else {}
+        counts = {"stored unsearched": self._unsearched, "forgotten keyframes": self._counts["forgotten"]}
+        counts |= {"waiting keyframes": len(self.searcher), "waiting poses": self._registrar.waiting}
+        counts["frames without odometry"] = self.without_odometry
+        robots = self._keyframes.told() if self._robots else self._others.told() if self._robot else {}
         return {**super().extra_diagnostics(), **stored, **counts, **robots, **self._announcements.told()}
 
     # Services
 
-    async def _reset(self, _: Any, response: Any) -> Any:
-        """Once the search in hand is over; the keyframes that wait for theirs are dropped."""
-        response.success, response.message = await self.aside(self._forget)
-        return response
-
     def _forget(self) -> tuple[bool, str]:
-        """Whether everything is forgotten; if the store does not let it, why, and nothing is."""
+        """Whether everything is forgotten; if the store does not let it, why, and nothing is.
+
+        Once the search in hand is over; the keyframes that wait for theirs are dropped.
+        """
         with self._tracking:
             waiting = self.searcher.rest()
             try:
@@ -230,16 +246,11 @@ class RegistrarNode(FramesDoor):
         self._whereabouts.look()
         return True, "forgot every keyframe"
 
-    async def _save(self, _: Any, response: Any) -> Any:
-        """Also ends the keyframe in hand and settles what waits: what can be published is, before the answer.
-
-        With odometry the session goes on; without, our own tracking begins another.
-        """
-        response.success, response.message = await self.aside(self._settle_and_save)
-        return response
-
     def _settle_and_save(self) -> tuple[bool, str]:
-        """Whether it could be, and where it is or what was in the way. The last keyframe comes after all others."""
+        """Whether it could be, and where it is or what was in the way. The last keyframe comes after all others.
+
+        It ends the keyframe in hand. With odometry the session goes on; without, our own tracking begins another.
+        """
         try:
             with self._tracking:
                 self.searcher.drain()
@@ -259,6 +270,8 @@ class RegistrarNode(FramesDoor):
         self.end_aside()
         self.end_work()
         self.searcher.close()
+        if self._robot:
+            self._others.close()
         with ExitStack() as ends:
             ends.callback(self._registrar.close)
             self._store_the_rest()
@@ -273,16 +286,6 @@ class RegistrarNode(FramesDoor):
                 lost.append(str(error))
         if lost:
             self.get_logger().error(f"the last keyframes could not be stored, {len(lost)} are lost: {lost[-1]}")
-
-
-def arrival_of(seen: FromRobot) -> Arrival:
-    """The keyframe that a robot sent, with its frame under the robot's prefix. ValueError where it is damaged."""
-    robot, sent = seen
-    keyframe = unpack_keyframe(sent.packed)
-    if keyframe.stamp_ns != sent.stamp_ns:
-        raise ValueError(f"keyframe: expected the stamp {sent.stamp_ns} of its header, got {keyframe.stamp_ns}")
-    named = replace(keyframe, robot=robot, frame_id=framed(robot, keyframe.frame_id))
-    return Arrival(named, Clock(sent.began_ns, sent.first), sent.run)
 
 
 def main() -> int:

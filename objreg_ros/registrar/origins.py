@@ -4,8 +4,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Protocol
 
+from objreg_ros.data import framed
 from objreg_ros.keyframes.frame_window import Arrival, Clock, SessionNumbers
+from objreg_ros.memory.compact import unpack_keyframe
 from objreg_ros.memory.store import Store
 from objreg_ros.registration.keyframe import Keyframe
 
@@ -42,3 +45,27 @@ class Origins:
         if there not in known:
             known[there] = self._numbers.take()
         return known[there]
+
+
+class Sent(Protocol):
+    """A packed keyframe as its keyframer names it."""
+
+    @property
+    def stamp_ns(self) -> int: ...
+    @property
+    def run(self) -> str: ...
+    @property
+    def began_ns(self) -> int: ...
+    @property
+    def first(self) -> int: ...
+    @property
+    def packed(self) -> bytes: ...
+
+
+def arrival_of(robot: str, sent: Sent) -> Arrival:
+    """The keyframe that a robot sent, with its frame under the robot's prefix. ValueError where it is damaged."""
+    keyframe = unpack_keyframe(sent.packed)
+    if keyframe.stamp_ns != sent.stamp_ns:
+        raise ValueError(f"keyframe: expected the stamp {sent.stamp_ns} of its header, got {keyframe.stamp_ns}")
+    named = replace(keyframe, robot=robot, frame_id=framed(robot, keyframe.frame_id))
+    return Arrival(named, Clock(sent.began_ns, sent.first), sent.run)

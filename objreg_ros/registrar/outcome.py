@@ -19,6 +19,7 @@ class Outcome:
     closures: tuple[LoopClosure, ...] = ()
     rejected: tuple[Rejected, ...] = ()
     keyframe_ns: int | None = None
+    keyframe_id: int | None = None
     observations: tuple[Observation, ...] = ()
     frame_id: str = "camera"
     session: int | None = None

@@ -12,32 +12,27 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 
 import numpy as np
 
-from objreg_ros.data import Array, Frame, LoopClosure, Reason, Rejected, Relocalised
+from objreg_ros.data import Array, Frame, Reason, Relocalised
 from objreg_ros.keyframes.frame_window import Arrival, Clock, FrameWindow, SessionNumbers
 from objreg_ros.keyframes.fusion import fuse
-from objreg_ros.memory.landmarks import Landmark, Landmarks
-from objreg_ros.memory.retrieval import Index
+from objreg_ros.memory.landmarks import Landmark
+from objreg_ros.memory.retrieval import CandidateKeyframe
 from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.memory.store import Store, StoreError
-from objreg_ros.registrar.camera_track import CameraTrack, CameraTracks, clock_refusals
-from objreg_ros.registrar.candidate_search import Budget, Found, Means, Search
+from objreg_ros.registrar.camera_track import CameraTrack, CameraTracks
+from objreg_ros.registrar.candidate_search import Budget, Found, Means, Pools, Search
 from objreg_ros.registrar.closure import (
-    Accepted,
-    Waiting,
-    closure_of,
-    links_of,
     observations,
-    redundant,
     rejected,
     waiting_of,
 )
+from objreg_ros.registrar.confirmation import Held
 from objreg_ros.registrar.origins import Origins
 from objreg_ros.registrar.outcome import Outcome, in_turn
-from objreg_ros.registrar.pools import Pools
+from objreg_ros.registrar.recollection import Recollection
 from objreg_ros.registration import gate_of, method_of
 from objreg_ros.registration.api import Gate, Method
 from objreg_ros.registration.keyframe import Keyframe
@@ -71,22 +66,20 @@ class Registrar:
         self._numbers, self._first_session = SessionNumbers(session), session
         self._origins = Origins(self._store, self._numbers)
         self._tracks = CameraTracks(self.params.replaced(confirm_seconds=self._confirm_seconds), self._numbers)
-        self._index = Index(self.params)
-        self._landmarks = Landmarks(self.params, first=self._store.next_landmark())
-        self._index.add(self._landmarks.passing(self._store.sightings()))
+        self._recollection = Recollection(self.params, self._store)
         self._session: int | None = None  # of the newest keyframe, None before the first
 
     @property
     def landmarks(self) -> tuple[Landmark, ...]:
         """Every known object with its id, label and position in the frame of its session, the oldest first."""
         with self._lock:
-            return self._landmarks.known()
+            return self._recollection.landmarks.known()
 
     @property
     def landmarks_here(self) -> tuple[Landmark, ...]:
         """The landmarks of late whose position is in the frame of the newest keyframe's session, at most `RECENT`."""
         with self._lock:
-            return self._landmarks.recent(self._session, RECENT)
+            return self._recollection.landmarks.recent(self._session, RECENT)
 
     @property
     def tracked(self) -> tuple[int, Array] | None:
@@ -153,7 +146,7 @@ class Registrar:
         with self._lock:
             if window.session < self._first_session:  # `reset` came first
                 return Outcome()
-            self.params = self._index.params = self._adopted
+            self.params = self._recollection.params = self._adopted
             keyframe = fuse(window, self.params)
             return self._search(keyframe, window.clock, budget) if keyframe.objects else Outcome()
 
@@ -163,39 +156,102 @@ class Registrar:
         """`search` for a keyframe that a keyframer elsewhere has made; None for one that was received before."""
         budget = Budget(time.monotonic() + seconds, hurried)
         with self._lock:
-            self.params = self._index.params = self._adopted
+            self.params = self._recollection.params = self._adopted
             received = self._origins.received(arrival)
             return None if received is None else self._search(*received, budget)
 
     def _search(self, made: Keyframe, clock: Clock, budget: Budget) -> Outcome:
         keyframe, track = made.numbered(self._store.next_keyframe()), self._tracks.of(made.camera)
         self._session = keyframe.session
-        before = self._follow(track, clock, keyframe)
+        before = self._tracks.go_on(keyframe, clock, self._recollection)
         sightings = sightings_of(keyframe)
         found = self._find_closures(keyframe, sightings, track, budget)
         try:
-            closures, named = self._remember(keyframe, sightings, found.accepted)
+            closures, named = self._recollection.remember(keyframe, sightings, found.accepted)
         except StoreError:
             for item in found.accepted:
                 track.thinning.withdraw(item.target.session, item.target.stamp_ns, keyframe.stamp_ns)
             raise
-        for number, item, refusal in found.held:
-            track.confirmation.hold(number, waiting_of(keyframe, named, item, refusal, self.params))
+        for item, closure in zip(found.accepted, closures, strict=True):
+            track.relocalisation.hear(closure, keyframe, item.target)
+        for held in found.held:
+            self._hold(held, keyframe, named, track)
         outcome = Outcome(
             closures=closures,
             rejected=(*before, *found.refused),
             keyframe_ns=keyframe.stamp_ns,
+            keyframe_id=keyframe.keyframe_id,
             observations=observations(keyframe, named),
             frame_id=keyframe.frame_id,
             session=keyframe.session,
             robot=keyframe.robot,
         )
-        return outcome.with_late(self._settled(track, keyframe.stamp_ns))
+        return outcome.with_late(track.settle(keyframe.stamp_ns, self._recollection))
+
+    def moment(self, keyframe_id: int) -> tuple[Keyframe, Clock]:
+        """A stored keyframe, and the run of its camera's clock that goes on. KeyError where it is not stored, or no
+        frame of its camera came since the start; StoreError where it is damaged.
+        """
+        with self._lock:
+            keyframe = self._store.keyframe(keyframe_id)
+            clock = self._tracks[keyframe.camera].clock
+        if clock is None:
+            raise KeyError(keyframe_id)
+        return keyframe, clock
+
+    @property
+    def newest_keyframe(self) -> int:
+        """The id of the keyframe that came last, 0 before the first."""
+        with self._lock:
+            return self._store.next_keyframe() - 1
+
+    def take_session(self) -> int:
+        """A number for a session of a keyframe that others store, which no session here has."""
+        return self._numbers.take()
+
+    def places(self, sightings: Sequence[Sighting], frame_id: str) -> list[CandidateKeyframe]:
+        """What `compare` would try for a keyframe with these objects, the most promising first; may be empty.
+
+        Places of its own robot are none, nor are those that an accepted closure ties to it already.
+        """
+        with self._lock:
+            robot, stamp_ns = sightings[0].robot, sightings[0].stamp_ns
+            found = self._recollection.index.query(sightings, self._recollection.index.sessions_of(robot))
+            track = self._tracks.get((robot, frame_id))
+            if track is None:
+                return found
+            return [one for one in found if not track.thinning.redundant(one.session, one.stamp_ns, stamp_ns)]
+
+    def compare(
+        self,
+        keyframe: Keyframe,
+        clock: Clock,
+        candidates: Sequence[CandidateKeyframe],
+        seconds: float = np.inf,
+        hurried: Callable[[], bool] = lambda: False,
+    ) -> Outcome:
+        """`search` among ``candidates`` for a keyframe that others store: it has a session of `take_session`, and id 0.
+
+        Its closures are remembered, it is not. The outcome has no keyframe.
+        """
+        budget = Budget(time.monotonic() + seconds, hurried)
+        with self._lock:
+            self.params = self._recollection.params = self._adopted
+            track, stored = self._tracks.of(keyframe.camera), set(self._store.keyframe_ids())
+            first, before = track.clock is None, self._tracks.go_on(keyframe, clock, self._recollection)
+            if first:
+                track.thinning.recall(self._recollection.ties_of(keyframe.camera))
+            found = self._try([one for one in candidates if one.keyframe_id in stored], keyframe, track, budget)
+            closures = self._recollection.remember_closures(keyframe, found.accepted)
+            for held in found.held:
+                self._hold(held, keyframe, self._recollection.as_known(keyframe, held.item), track)
+            outcome = Outcome(closures=closures, rejected=(*before, *found.refused), robot=keyframe.robot)
+            return outcome.with_late(track.settle(keyframe.stamp_ns, self._recollection))
 
     def settle(self) -> Outcome:
         """Publish or refuse what still waits for other keyframes to confirm it: the end of a recording, or a save."""
         with self._lock:
-            return in_turn([self._settled(track, None) for track in tuple(self._tracks.values())])
+            return in_turn([track.settle(None, self._recollection) for track in tuple(self._tracks.values())])
 
     def reset(self) -> None:
         """Forget everything, in the store too; StoreError, and nothing is forgotten, where that cannot be."""
@@ -216,85 +272,26 @@ class Registrar:
             self._pools.shutdown()
             self._store.close()
 
-    def _follow(self, track: CameraTrack, clock: Clock, keyframe: Keyframe) -> tuple[Rejected, ...]:
-        """Where the clock began anew, leave out what an earlier run of it saw unless that was over by then.
-
-        A stamp of it would name a moment of this run, and the session does not travel with a constraint.
-        """
-        given_up: tuple[Rejected, ...] = ()
-        if clock != track.clock:
-            hidden = self._tracks.hidden_from(clock, keyframe.camera, self._store)
-            given_up = self._settled(track, None).rejected + clock_refusals(clock, hidden, keyframe)
-            track.begin(clock, hidden, self.params)
-        track.see(keyframe)
-        return given_up
-
     def _find_closures(
         self, keyframe: Keyframe, sightings: Sequence[Sighting], track: CameraTrack, budget: Budget
     ) -> Found:
         """What the stored keyframes that may show the same place come to; a refusal where none may."""
-        candidates = self._index.query(sightings, track.hidden)
+        candidates = self._recollection.index.query(sightings, track.hidden)
         if not candidates:
-            refusal = Reason.NO_CANDIDATE, f"none of {len(self._index)} stored objects is alike and may be here"
+            refusal = (
+                Reason.NO_CANDIDATE,
+                f"none of {len(self._recollection.index)} stored objects is alike and may be here",
+            )
             return Found([], [], [rejected(keyframe.stamp_ns, keyframe, refusal, keyframe)])
+        return self._try(candidates, keyframe, track, budget)
+
+    def _try(
+        self, candidates: Sequence[CandidateKeyframe], keyframe: Keyframe, track: CameraTrack, budget: Budget
+    ) -> Found:
         gate, pool = self._gate or gate_of(self.params), self._pools.fitting()
         means = Means(self._store, self._method, gate, track.confirmation, pool)
         return Search(keyframe, track.thinning, budget, means, self.params).run(candidates)
 
-    def _settled(self, track: CameraTrack, now_ns: int | None) -> Outcome:
-        """What waits no more of a camera: late constraints, and refusals."""
-        confirmed, refused = track.confirmation.settle(now_ns)
-        closures = []
-        for waiting in confirmed:
-            from_ns, to_ns = waiting.closure.from_ns, waiting.closure.to_ns
-            if track.thinning.redundant(waiting.from_session, from_ns, to_ns):
-                refused.append(waiting.refused(redundant(self.params.thin_seconds)))
-                continue
-            track.thinning.accept(waiting.from_session, from_ns, to_ns)
-            closures.append(self._remember_late(waiting, track))
-        return Outcome(closures=tuple(closures), rejected=tuple(refused))
-
-    def _remember_late(self, waiting: Waiting, track: CameraTrack) -> LoopClosure:
-        """Write a late constraint down, and merge the landmarks that it says are one. It holds without that, too."""
-        with suppress(StoreError, KeyError):  # the store fails, or has forgotten a keyframe of it meanwhile
-            here, there = (
-                {sighting.instance: sighting for sighting in self._store.sightings(number)}
-                for number in (waiting.source_id, waiting.target_id)
-            )
-            pairs = [(here[a], there[b]) for a, b in waiting.pairs if a in here and b in there]
-            merged = self._landmarks.joined(pairs, waiting.R_there_here)
-            self._store.add_closure(waiting.closure, merged)
-            self._landmarks.add((), merged)
-            joined = {old: merge.into for old, merge in merged.items()}
-            names = {instance: joined.get(seen.landmark, seen.landmark) for instance, seen in here.items()}
-            waiting = waiting.renamed(names)
-            ends = self._store.keyframe(waiting.source_id), self._store.keyframe(waiting.target_id)
-            track.relocalisation.hear(waiting.closure, *ends)
-        return waiting.closure
-
-    def _remember(
-        self, keyframe: Keyframe, sightings: Sequence[Sighting], accepted: Sequence[Accepted]
-    ) -> tuple[tuple[LoopClosure, ...], tuple[Sighting, ...]]:
-        """Give objects their landmarks and write all down; the closures, and the sightings with their landmarks."""
-        stored = [list(self._store.sightings(item.target.keyframe_id)) for item in accepted]
-        links = [link for item, seen in zip(accepted, stored, strict=True) for link in links_of(keyframe, item, seen)]
-        named, merged = self._landmarks.assign(sightings, links)
-        closures = tuple(closure_of(keyframe, named, item, self.params) for item in accepted)
-        self._store.add(keyframe, named, closures, merged)
-        self._landmarks.add(named, merged)
-        self._index.add(named)
-        for item, closure in zip(accepted, closures, strict=True):
-            self._index.meet(keyframe.session, item.target.session)
-            self._tracks.of(keyframe.camera).relocalisation.hear(closure, keyframe, item.target)
-        with suppress(StoreError):  # the keyframe is stored: what is left now goes another time
-            self._forget_surplus(named)
-        return closures, named
-
-    def _forget_surplus(self, named: Sequence[Sighting]) -> None:
-        spare = self._landmarks.surplus(sighting.landmark for sighting in named)
-        beyond = [k for k in self._store.beyond(self.params.max_keyframes) if k not in spare]
-        spare += beyond
-        if spare:
-            self._store.remove(spare, forgotten=len(beyond))
-            self._index.remove(spare)
-            self._landmarks.forget(spare)
+    def _hold(self, held: Held, keyframe: Keyframe, named: Sequence[Sighting], track: CameraTrack) -> None:
+        number, item, refusal = held
+        track.confirmation.hold(number, waiting_of(keyframe, named, item, refusal, self.params))

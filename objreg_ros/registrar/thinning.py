@@ -7,6 +7,7 @@ Moments of different sessions may have one stamp, where they are of different ro
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Iterable
 
 
 class Thinning:
@@ -32,3 +33,8 @@ class Thinning:
     def accept(self, session: int, from_ns: int, to_ns: int) -> None:
         """Remember an accepted closure."""
         self._pairs[to_ns // self._span_ns].append((session, from_ns, to_ns))
+
+    def recall(self, accepted: Iterable[tuple[int, int, int]]) -> None:
+        """Remember what was accepted before: pairs as `accept` has them."""
+        for pair in accepted:
+            self.accept(*pair)

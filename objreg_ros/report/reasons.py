@@ -220,6 +220,9 @@ DROPS = {
         ("detector.autostart",),
     ),
     "reset": Words("`~/reset` came while it waited", "Nothing is wrong."),
+    "known": Words(
+        "a keyframe of a robot was received before", "Nothing is wrong: after a break all that is kept is sent."
+    ),
     "two_clocks": Words(
         "a constraint ties two runs of one clock",
         "A bag was looped. Build objreg_msgs, whose closures name their sessions, or begin with a new store and map.",

@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import importlib
-from types import ModuleType
+import os
+from types import ModuleType, SimpleNamespace
 
 import pytest
 from click.testing import CliRunner
@@ -44,6 +45,28 @@ def test_a_node_has_the_profile_of_its_case_and_none_of_ours(
     assert environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "SUBNET"
 
 
+def test_a_run_is_told_in_a_row_and_one_whose_ends_never_met_too(wireless: ModuleType) -> None:
+    (case,) = wireless.cases(["rmw_fastrtps_cpp"], ["config/fastdds_wifi.xml"], ["0.2:30"], **REST)
+    result = wireless.Result(1.0, 2, 1, 0.123, 4.567, 96.4, 1.6, 1442)
+    link = "| rmw_fastrtps_cpp, fastdds_wifi.xml | 20%, pause of 30 s |"
+    assert wireless.row(case, result) == f"{link} 2 of 3 | 1 | 0.12 / 4.57 | 96 + 2 |"
+    assert wireless.row(case, wireless.Result(None)) == f"{link} never met | | | |"
+
+
+def test_the_link_is_cut_once_both_ends_talk_and_the_sender_ends_the_run(
+    wireless: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done: list[object] = []
+    monkeypatch.setattr(wireless.time, "sleep", done.append)
+    hosts, sender = (
+        SimpleNamespace(pause=lambda s: done.append(("cut", s))),
+        SimpleNamespace(wait=lambda: done.append("end")),
+    )
+    wireless.carry(hosts, sender, 0.0)
+    wireless.carry(hosts, sender, 30.0)
+    assert done == ["end", wireless.PAUSE_AT_S, ("cut", 30.0), "end"]
+
+
 def test_what_is_not_installed_is_skipped_by_name(wireless: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wireless, "lack", lambda: None)
     result = CliRunner().invoke(wireless.main, ["--rmw", "rmw_of_nobody_cpp"])
@@ -51,6 +74,7 @@ def test_what_is_not_installed_is_skipped_by_name(wireless: ModuleType, monkeypa
 
 
 @pytest.mark.slow
+@pytest.mark.skipif("OBJREG_WIRELESS" not in os.environ, reason="set OBJREG_WIRELESS=1 to send over a bad link")
 def test_keyframes_come_through_a_link_that_loses_a_fifth(wireless: ModuleType) -> None:
     pytest.importorskip("rclpy", reason="the ends are nodes of ROS 2")
     if (missing := importlib.import_module("hosts").lack()) is not None:

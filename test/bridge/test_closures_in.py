@@ -99,3 +99,24 @@ def test_what_is_no_constraint_is_dropped_as_malformed() -> None:
     message.header.frame_id = "camera"
     hearer.heard["constraints"](message)
     assert hearer.dropped == ["malformed_constraints"] and not hearer.taken
+
+
+def test_on_constraints_the_prefixes_of_frames_name_the_robots_and_both_topics_tell_one_closure() -> None:
+    between = replace(
+        CLOSURE, from_robot="r1", to_robot="r2", from_frame_id="r1/camera", to_frame_id="r2/camera", to_session=None
+    )
+    hearer = Hearer(robots=("r1", "r2"))
+    hearer.heard["constraints"](to_msg.constraint(between))
+    (told,) = hearer.taken
+    assert told.robots == ("r1", "r2") and told.moments == between.moments
+    message = whole(between, "")
+    for end, robot in ((message.from_moment, "r1"), (message.to_moment, "r2")):
+        end.robot, end.frame_id = robot, f"{robot}/camera"
+    hearer.heard["loop_closures"](message)
+    assert len(hearer.taken) == 1 and len(hearer.again) == 1
+
+
+def test_a_frame_without_a_prefix_is_of_the_robot_whose_topic_tells_it() -> None:
+    hearer = Hearer(robots=("r1", "r2"))
+    hearer.heard["r2/constraints"](to_msg.constraint(CLOSURE))
+    assert hearer.taken[0].robots == ("r2", "r2")

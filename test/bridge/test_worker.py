@@ -265,7 +265,7 @@ def test_a_thread_that_gives_way_and_those_that_it_starts_are_nice() -> None:
 
 
 def _laned(work: Callable[[str], None], settle: Callable[[str], None], behind: int) -> Backlog[str]:
-    limit = Limit(99, 10**9, 1e9, behind)
+    limit = Limit(99, 10**9, 1e9, dict.fromkeys("abc", behind))
     return Backlog(work, settle, lambda error: None, limit, len, lane_of=lambda job: job[0])
 
 

@@ -74,3 +74,15 @@ def test_closures_wait_until_too_many_do() -> None:
     waiting.closures.append(closure(TRUE, 7, 90))
     assert [(fate.closure, fate.reason) for fate in waiting.tie(graph)] == [(ahead[0], "queue_full")]
     assert waiting.take_out(lambda one: one is ahead[1]) == [ahead[1]] and len(waiting.take_out()) == 1
+
+
+@pytest.mark.parametrize(("prefix", "asked"), [("a/", "a/camera"), ("", "camera")])
+def test_a_camera_is_looked_for_under_the_prefix_of_its_robot_where_the_body_has_it(prefix: str, asked: str) -> None:
+    graph, frames = PoseGraph(), list[str]()
+    followers = Followers({"a": Follower("a", 5.0, lambda: None)})
+    for word in odometry(TRUE):
+        followers["a"].follow(replace(word, child_frame_id=f"{prefix}base"), graph)
+    waiting = Waiting(followers, lambda words, frame_id: frames.append(frame_id), most=2)
+    told = replace(of(closure(TRUE, 10, 90), "a", "a"), from_frame_id="a/camera", to_frame_id="a/camera")
+    waiting.closures = [told]
+    assert [fate.reason for fate in waiting.tie(graph)] == [""] and set(frames) == {asked}

@@ -275,3 +275,12 @@ def test_a_late_closure_joins_no_two_that_a_keyframe_shows_together() -> None:
     landmarks.add(first)
     assert landmarks.joined([(first[1], first[0])], np.eye(3)) == {}
     assert landmarks.joined([(first[0], first[0])], np.eye(3)) == {}
+
+
+def test_a_landmark_tells_the_robot_that_saw_it_last() -> None:
+    landmarks = Landmarks(PARAMS)
+    _take(landmarks, _seen(1, CUP))
+    (later,) = _seen(2, CUP, session=1)
+    link = Link(index=0, of=_seen(1, CUP)[0].of_landmark(1, np.eye(3)), R_there_here=np.eye(3))
+    assert _take(landmarks, (replace(later, robot="robot2"),), [link]) == [1]
+    assert [(known.landmark, known.robot, known.session) for known in landmarks.known()] == [(1, "robot2", 1)]

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -11,11 +12,12 @@ from typing import Any
 import pytest
 from registration.samples import box, candidate, keyframe
 
+from objreg_ros.bridge.worker import give_way
 from objreg_ros.data import Reason
 from objreg_ros.memory.retrieval import CandidateKeyframe
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store
-from objreg_ros.registrar.candidate_search import Budget, Means, Search
+from objreg_ros.registrar.candidate_search import Budget, Means, Pools, Search
 from objreg_ros.registrar.confirmation import Confirmation
 from objreg_ros.registrar.thinning import Thinning
 from objreg_ros.registration.candidate import Candidate
@@ -98,3 +100,19 @@ def test_what_waits_for_others_counts_as_tried_and_closes_nothing(means: Means) 
     waits = means._replace(confirmation=Confirmation(PARAMS.replaced(confirm_seconds=10.0)))
     accepted, held, refused = search(waits).run(ids(3, 1, 5, 2))
     assert [one.item.target.keyframe_id for one in held] == [3, 1, 5] and not accepted and not refused
+
+
+def test_a_nicer_thread_gets_a_pool_of_its_own_and_the_same_one_again() -> None:
+    pools, nicer = Pools(2), list[ThreadPoolExecutor]()
+
+    def ask() -> None:
+        give_way(5)
+        nicer.extend(pools.fitting() for _ in range(2))
+
+    thread = threading.Thread(target=ask)
+    thread.start()
+    thread.join()
+    assert pools.fitting() is pools.fitting() and nicer[0] is nicer[1] and nicer[0] is not pools.fitting()
+    pools.shutdown()
+    with pytest.raises(RuntimeError, match="shutdown"):
+        pools.fitting().submit(print)

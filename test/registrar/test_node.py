@@ -138,23 +138,13 @@ def test_the_keyframe_that_a_save_ends_comes_after_those_that_wait(
     node.close()
 
 
-def test_frames_of_two_cameras_are_told_with_what_to_do(make: Making) -> None:
-    node, said = make(), []
-    node.throttled._write = said.append
-    for frame_id in ("front", "front", "rear", "front"):
-        node._watch_camera(frame_id)
-    (line,) = said
-    assert "got one of 'rear' after one of 'front'" in line and "give each camera a keyframer" in line
-    node.close()
-
-
 def test_a_full_store_says_what_goes(make: Making, monkeypatch: pytest.MonkeyPatch) -> None:
     node, said = make(), []
     node.throttled._write = said.append
     full = {**node._registrar.counts(), "keyframes": 2, "forgotten": 3}
     monkeypatch.setattr(node._registrar, "counts", lambda: full)
     for _ in range(2):
-        node._tell(Outcome())
+        node._publish(Outcome())
     (line,) = said
     assert "keeps 2 keyframes (max_keyframes), and has forgotten the oldest 3" in line
     assert node.extra_diagnostics()["forgotten keyframes"] == 3
@@ -295,3 +285,17 @@ def test_a_running_node_takes_live_parameters_and_refuses_the_others(
     (result,) = node.set_parameters([Parameter("store", value="other.db")])
     assert not result.successful
     node.close()
+
+
+@pytest.mark.parametrize(("words", "got"), [((), "none"), (("-p", "robots:=[r1]", "-r", "__ns:=/r1"), "robots")])
+def test_keyframes_are_exchanged_by_one_robot_that_its_namespace_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], got: str
+) -> None:
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
+    monkeypatch.setattr("objreg_ros.registrar.node.warm", lambda params: None)
+    rclpy.init(args=["registrar", "--ros-args", "-p", "exchange:=/fleet", *words])
+    try:
+        with pytest.raises(ValueError, match=f"exchange: expected a namespace, which names one robot, got {got}"):
+            RegistrarNode()
+    finally:
+        rclpy.try_shutdown()

@@ -61,3 +61,10 @@ def test_moments_of_different_sessions_are_not_near_each_other() -> None:
     thinning = Thinning(1.0)
     thinning.accept(HERE, 5, 7)
     assert thinning.redundant(HERE, 5, 7) and not thinning.redundant(ELSEWHERE, 5, 7)
+
+
+def test_what_was_accepted_before_is_recalled() -> None:
+    thinning = Thinning(1.0)
+    thinning.recall([(0, 0, 30 * SECOND), (2, 5 * SECOND, 60 * SECOND)])
+    assert thinning.redundant(2, 5 * SECOND, 60 * SECOND) and thinning.redundant(0, 0, 30 * SECOND)
+    assert not thinning.redundant(0, 5 * SECOND, 60 * SECOND)

@@ -17,7 +17,7 @@ from std_msgs.msg import Header
 
 from objreg_ros.bridge import from_msg, qos, to_msg
 from objreg_ros.bridge.keyframes_msg import read_keyframe
-from objreg_ros.data import Array, Frame, Odometry
+from objreg_ros.data import Array, Frame, LoopClosure, Odometry
 from objreg_ros.geometry import inverse, pose, pose_error
 from objreg_ros.memory.store import Store
 
@@ -40,10 +40,10 @@ def fleet(domain: int, tmp_path: Path) -> Iterator[Graph]:
 
 
 def tell(graph: Graph, robot: str, seen: Frame, names: dict[int, str]) -> None:
-    """What a segmenter in the robot's namespace says of a frame."""
+    """What a segmenter in the robot's namespace says of a frame, to who follows it and to registrar or mapper."""
     assert seen.T_odom_camera is not None
     word = Odometry(T_odom_body=seen.T_odom_camera, stamp_ns=seen.stamp_ns, child_frame_id=seen.frame_id)
-    graph.publish(f"{robot}/labels", to_msg.labels(names), listeners=2)  # its keyframer, and the registrar
+    graph.publish(f"{robot}/labels", to_msg.labels(names))
     graph.publish(f"{robot}/odom", to_msg.odometry(replace(word, frame_id=f"{robot}/odom")), listeners=2)
     for topic, message in {
         "objects": to_msg.objects(seen, names),
@@ -54,7 +54,7 @@ def tell(graph: Graph, robot: str, seen: Frame, names: dict[int, str]) -> None:
         graph.publish(f"{robot}/{topic}", message)
 
 
-def drive(graph: Graph, robot: str, begin_s: int) -> None:
+def drive(graph: Graph, robot: str, begin_s: int, node: str = "keyframer", sent: int = 4) -> None:
     """Frames at two places in turn, far enough apart for a keyframe each; all but the last make one."""
     names = {0: "cup"}
     for k in range(5):
@@ -62,8 +62,8 @@ def drive(graph: Graph, robot: str, begin_s: int) -> None:
         seen = frame(begin_s + 2 * k, T, T)
         names = names | dict(enumerate(sorted({cloud.label for cloud in seen.objects})))
         tell(graph, robot, seen, names)
-        graph.answer("keyframer", seen.stamp_ns, f"{robot}/finished")
-    graph.wait_for(lambda: len(graph.heard[f"{robot}/keyframes"]) == 4, what=f"keyframes of {robot}")
+        graph.answer(node, seen.stamp_ns, f"{robot}/finished")
+    graph.wait_for(lambda: len(graph.heard[f"{robot}/keyframes"]) == sent, what=f"keyframes of {robot}")
 
 
 def place(robot: str, since_ns: int) -> Array:
@@ -127,3 +127,29 @@ def test_a_registrar_that_starts_anew_takes_what_was_sent_meanwhile_and_nothing_
     stored = Store(store, read_only=True)
     assert [stored.keyframe(k).stamp_ns for k in stored.keyframe_ids()] == stamps
     stored.close()
+
+
+def test_two_registrars_that_each_keep_a_store_close_loops_between_their_robots(fleet: Graph, tmp_path: Path) -> None:
+    for robot in SEEN:
+        fleet.hear(Header, f"{robot}/finished")
+        fleet.hear(OdometryMsg, f"{robot}/constraints", qos.latched(qos.KEPT_CONSTRAINTS))
+        own = "-p exchange:=/fleet", f"-p store:={tmp_path / robot}.db", "-p reliable:=true", MOUNT
+        fleet.start(f"/{robot}/registrar", "registrar", f"-r __ns:=/{robot}", *own)
+    fleet.start("mapper", "mapper", "-p robots:=[r1, r2]", "-p publish_tf:=false", MOUNT)
+    drive(fleet, "r1", 100, "registrar", 0)
+    drive(fleet, "r2", 101, "registrar", 0)
+
+    def between() -> list[LoopClosure]:
+        told = [from_msg.loop_closure(m) for robot in SEEN for m in fleet.heard[f"{robot}/constraints"]]
+        return [one for one in told if one.from_frame_id.split("/")[0] != one.to_frame_id.split("/")[0]]
+
+    fleet.wait_for(lambda: bool(between()), what="a closure between the robots")
+    for closure in between():
+        ends = (closure.from_frame_id, closure.from_ns), (closure.to_frame_id, closure.to_ns)
+        there, here = (place(camera[:2], ns - (100 if camera[:2] == "r1" else 101) * SECOND) for camera, ns in ends)
+        degrees, centimetres = pose_error(closure.T_from_to, inverse(there) @ here)
+        assert degrees < 2.0 and centimetres < 3.0
+    for robot in SEEN:
+        stored = Store(tmp_path / f"{robot}.db", read_only=True)
+        assert {stored.keyframe(k).robot for k in stored.keyframe_ids()} == {robot}
+        stored.close()

@@ -13,6 +13,7 @@ HASHES = r"(?: \\\n    --hash=sha256:[0-9a-f]{64})+"
 PIN = re.compile(rf"^(?P<name>[a-z0-9.-]+)==(?P<version>\S+){HASHES}$", re.MULTILINE)
 PYTHONS = ("3.11", "3.12")
 RUN = ("ros", "simulation", "mapper", "report")  # the extras that scripts/bootstrap installs where there is no ROS
+TEST = ("test", "docs", "batch")  # those that it adds with --test
 
 
 def pins(repository: Path, name: str) -> dict[str, str]:
@@ -42,7 +43,7 @@ def numbers(version: str) -> tuple[int, ...]:
 def test_a_lock_has_a_version_of_all_that_setup_py_asks_for_and_none_too_old(repository: Path, python: str) -> None:
     run = pins(repository, f"python{python}")
     every = {**run, **pins(repository, f"python{python}-test")}
-    for locked, asked in ((run, wanted(repository, *RUN)), (every, wanted(repository, *RUN, "test", "docs"))):
+    for locked, asked in ((run, wanted(repository, *RUN)), (every, wanted(repository, *RUN, *TEST))):
         assert set(asked) <= set(locked), f"run scripts/lock: python{python} lacks {set(asked) - set(locked)}"
         assert not {name for name, oldest in asked.items() if numbers(locked[name]) < numbers(oldest)}
 

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What registrars say to each other, as bytes: the summary of a keyframe, the request for it, and the keyframe itself.
+
+The bytes are a prefix (which of the three, format, checksum, size) and a body that is deflated: a line of JSON, then
+the objects' positions in float32 and descriptors in float16, or a packed keyframe.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+import zlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from objreg_ros import limits
+from objreg_ros.data import Array
+from objreg_ros.keyframes.frame_window import Clock
+from objreg_ros.memory.compact import MOST_SAID, MOST_WHOLE, pack_keyframe, real, text, unpack_keyframe, whole, within
+from objreg_ros.memory.descriptor import SIZE
+from objreg_ros.memory.sighting import Sighting
+from objreg_ros.registration.keyframe import Keyframe
+
+SUMMARY, REQUEST, DELIVERY = b"OXS", b"OXR", b"OXD"
+FORMAT = 1
+PREFIX = struct.Struct("<3sBII")  # kind, format, checksum of all that follows, bytes of the unpacked body
+MOST = {
+    SUMMARY: (limits.MOST_SUMMARY, limits.MOST_UNPACKED_SUMMARY),
+    REQUEST: (limits.MOST_SUMMARY, limits.MOST_UNPACKED_SUMMARY),
+    DELIVERY: (limits.MOST_PACKED_KEYFRAME, limits.MOST_PACKED_KEYFRAME),
+}
+"""Bytes of each kind, packed and unpacked."""
+
+MOST_DESCRIPTOR = 100.0  # of a part of one
+MOST_VOTES = 1e9
+MOST_HEARD = 64  # runs of other registrars that a summary tells of
+Head = Mapping[str, Any]
+T = TypeVar("T")
+
+
+class Name(NamedTuple):
+    """Which keyframe it is, of all robots: ``run`` names one start of the registrar that stores it."""
+
+    run: str
+    keyframe_id: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Summary:
+    """What others need to know of a keyframe to tell whether it may show a place of theirs.
+
+    ``sightings``, at least one, have their robot, session and positions as the registrar that tells it has them, and no
+    extent, score or camera. ``heard`` has the newest keyframe of each other run that had been heard of when this one
+    was told.
+    """
+
+    name: Name
+    frame_id: str
+    clock: Clock
+    sightings: tuple[Sighting, ...]
+    heard: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def robot(self) -> str:
+        """Whose keyframe it is."""
+        return self.sightings[0].robot
+
+
+class Request(NamedTuple):
+    """A wish for a keyframe; the more ``votes``, the more it promises."""
+
+    name: Name
+    votes: float
+
+
+def pack_summary(summary: Summary) -> bytes:
+    """A summary as bytes: about 60 for each object."""
+    first = summary.sightings[0]
+    head = {
+        "run": summary.name.run,
+        "keyframe": summary.name.keyframe_id,
+        "robot": first.robot,
+        "frame_id": summary.frame_id,
+        "clock": list(summary.clock),
+        "session": first.session,
+        "stamp_ns": first.stamp_ns,
+        "travelled": first.travelled,
+        "by_odometry": int(first.by_odometry),
+        "heard": dict(summary.heard),
+        "labels": [sighting.label for sighting in summary.sightings],
+    }
+    positions = np.array([sighting.position for sighting in summary.sightings], "<f4")
+    descriptors = np.array([sighting.descriptor for sighting in summary.sightings], "<f2")
+    return _sealed(SUMMARY, head, positions.tobytes() + descriptors.tobytes())
+
+
+def unpack_summary(packed: bytes) -> Summary:
+    """The summary of `pack_summary`; ValueError if it is damaged, of another format, or too large."""
+    return _read(SUMMARY, packed, _summary)
+
+
+def pack_request(request: Request) -> bytes:
+    """A request as bytes."""
+    return _sealed(REQUEST, {"run": request.name.run, "keyframe": request.name.keyframe_id, "votes": request.votes})
+
+
+def unpack_request(packed: bytes) -> Request:
+    """The request of `pack_request`; ValueError as in `unpack_summary`."""
+    return _read(REQUEST, packed, lambda head, _: Request(_name(head), real(head, "votes", MOST_VOTES)))
+
+
+def pack_delivery(run: str, keyframe: Keyframe) -> bytes:
+    """A keyframe under its name, as bytes; ValueError if it is too large for it."""
+    return _sealed(DELIVERY, {"run": run, "keyframe": keyframe.keyframe_id}, pack_keyframe(keyframe))
+
+
+def unpack_delivery(packed: bytes) -> tuple[Name, Keyframe]:
+    """The keyframe of `pack_delivery`, with id 0 and without a robot; ValueError as in `unpack_summary`."""
+    return _read(DELIVERY, packed, lambda head, rest: (_name(head), unpack_keyframe(rest)))
+
+
+def _name(head: Head) -> Name:
+    return Name(text(head, "run"), whole(head, "keyframe", 1, MOST_WHOLE))
+
+
+def _summary(head: Head, rest: bytes) -> Summary:
+    count = within("objects", len(head["labels"]), limits.MOST_OBJECTS, 1)
+    labels = [text({"label": label}, "label") for label in head["labels"]]
+    if len(rest) != count * (12 + 2 * SIZE):
+        raise ValueError(f"expected {count * (12 + 2 * SIZE)} bytes of {count} objects, got {len(rest)}")
+    positions = _bounded("position", np.frombuffer(rest, "<f4", 3 * count).reshape(count, 3), limits.MOST_DISTANCE)
+    descriptors = np.frombuffer(rest, "<f2", SIZE * count, 12 * count).reshape(count, SIZE)
+    descriptors = _bounded("descriptor", descriptors, MOST_DESCRIPTOR).astype(np.float32)
+    told: dict[str, Any] = {
+        "keyframe_id": _name(head).keyframe_id,
+        "session": whole(head, "session", 0, MOST_WHOLE),
+        "stamp_ns": whole(head, "stamp_ns", limits.LEAST_STAMP_NS, limits.MOST_STAMP_NS),
+        "travelled": real(head, "travelled", limits.MOST_DISTANCE),
+        "by_odometry": bool(whole(head, "by_odometry", 0, 1)),
+        "robot": text(head, "robot"),
+        "score": 0.0,
+        "extent": 0.0,
+        "camera": np.zeros(3),
+    }
+    objects = enumerate(zip(labels, positions, descriptors, strict=True))
+    return Summary(
+        name=_name(head),
+        frame_id=text(head, "frame_id"),
+        clock=_clock(head),
+        heard=_heard(head),
+        sightings=tuple(
+            Sighting(instance=k, label=label, position=position, descriptor=descriptor, **told)
+            for k, (label, position, descriptor) in objects
+        ),
+    )
+
+
+def _clock(head: Head) -> Clock:
+    began_ns, session = head["clock"]
+    return Clock(
+        within("clock", began_ns, limits.MOST_STAMP_NS, limits.LEAST_STAMP_NS), within("clock", session, MOST_WHOLE)
+    )
+
+
+def _heard(head: Head) -> dict[str, int]:
+    within("runs that were heard", len(head["heard"]), MOST_HEARD)
+    return {text({"run": run}, "run"): within("heard", number, MOST_WHOLE) for run, number in head["heard"].items()}
+
+
+def _bounded(name: str, numbers: Array, most: float) -> Array:
+    if not (np.abs(numbers) <= most).all():
+        raise ValueError(f"{name}: expected numbers up to {most:g}, got {np.abs(numbers).max():g}")
+    return numbers.astype(float)
+
+
+def _sealed(kind: bytes, head: Head, rest: bytes = b"") -> bytes:
+    body = json.dumps(head, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode() + b"\n" + rest
+    size = struct.pack("<I", len(body))
+    packed = zlib.compress(body, 9)
+    sealed = PREFIX.pack(kind, FORMAT, zlib.crc32(size + packed), len(body)) + packed
+    most_packed, most = MOST[kind]
+    if len(sealed) > most_packed or len(body) > most:
+        raise ValueError(f"expected at most {most_packed} bytes to be sent, got {len(sealed)}; show fewer objects")
+    return sealed
+
+
+def _read(kind: bytes, packed: bytes, made: Callable[[Head, bytes], T]) -> T:
+    line, _, rest = _body(kind, packed).partition(b"\n")
+    try:
+        return made(json.loads(line), rest)
+    except (LookupError, TypeError, AttributeError, ValueError, RecursionError, OverflowError) as error:
+        raise ValueError(
+            f"expected {kind!r} of a registrar, got {len(packed)} bytes that are none ({str(error)[:MOST_SAID]})"
+        ) from error
+
+
+def _body(kind: bytes, packed: bytes) -> bytes:
+    """What is sealed, of which no more is unpacked than it says and than may be."""
+    most_packed, most = MOST[kind]
+    if not PREFIX.size < len(packed) <= most_packed:
+        raise ValueError(f"expected {kind!r} of {PREFIX.size + 1} to {most_packed} bytes, got {len(packed)}")
+    said, form, checksum, size = PREFIX.unpack_from(packed)
+    if (said, form) != (kind, FORMAT):
+        raise ValueError(
+            f"expected {kind!r} of format {FORMAT}, got {said!r} of format {form}; both ends must run the same version"
+        )
+    if checksum != (got := zlib.crc32(packed[PREFIX.size - 4 :])):
+        raise ValueError(f"expected {kind!r} with the checksum {checksum:08x}, got {got:08x}; it was damaged")
+    if size > most:
+        raise ValueError(f"expected at most {most} bytes of {kind!r}, got {size}")
+    reader = zlib.decompressobj()
+    try:
+        body = reader.decompress(packed[PREFIX.size :], size + 1)
+    except zlib.error as error:
+        raise ValueError(f"expected {kind!r}, got what cannot be inflated ({error})") from error
+    if len(body) != size or not reader.eof or reader.unused_data:
+        raise ValueError(f"expected a body of {size} bytes and nothing after it, got {len(body)} or another end")
+    return body

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How registrars speak to each other: what is heard goes to the exchange, and what it says goes out."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import rclpy
+from sensor_msgs.msg import CompressedImage
+
+from objreg_ros import limits
+from objreg_ros.bridge import to_msg
+from objreg_ros.bridge.door import Door
+from objreg_ros.bridge.exchanging import FORMAT, Delivered, Exchanging
+
+
+class Spoken:
+    """An exchange that asks for everything, and answers what it was asked for."""
+
+    def __init__(self) -> None:
+        self.books = Counter({"summaries heard": 2})
+        self.notes = list[bytes]()
+
+    @property
+    def waiting(self) -> int:
+        return len(self.notes)
+
+    def hear(self, packed: bytes) -> bytes | None:
+        if packed == b"bad":
+            raise ValueError("expected a summary, got none")
+        return b"ask " + packed if packed != b"unlike" else None
+
+    def note(self, packed: bytes, now: float) -> None:
+        self.notes.append(packed)
+
+    def answer(self, now: float) -> bytes | None:
+        return b"keyframe " + self.notes.pop()
+
+
+@pytest.fixture
+def door(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Door]:
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
+    rclpy.init(args=["registrar", "--ros-args", "-r", "__ns:=/r1"])
+    made = Door("registrar")
+    made.throttled._write = lambda line: None
+    yield made
+    made.close()
+    rclpy.try_shutdown()
+
+
+def message(packed: bytes, form: str = FORMAT) -> CompressedImage:
+    return CompressedImage(header=to_msg.header(7, ""), format=form, data=packed)
+
+
+def said(made: Exchanging, monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, bytes]]:
+    """What is published from now on, by topic."""
+    out = list[tuple[str, bytes]]()
+    for publisher in (made._summaries, made._requests, made._keyframes):
+        name = publisher.topic_name
+        monkeypatch.setattr(publisher, "publish", lambda m, name=name: out.append((name, bytes(m.data))))
+    return out
+
+
+def test_a_summary_that_looks_alike_is_answered_by_a_request_and_one_that_does_not_by_nothing(
+    door: Door, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = Exchanging(door, "/fleet", Spoken(), lambda seen: None)
+    out = said(made, monkeypatch)
+    for packed in (b"alike", b"unlike", b"bad"):
+        made._read_later(7, packed)
+    made._reader.shutdown()
+    assert out == [("/fleet/requests", b"ask alike")] and made._unread == 0
+    assert door._ignored == {"malformed summaries": 1}
+
+
+def test_a_request_is_answered_by_the_keyframe(door: Door, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = Exchanging(door, "/fleet", Spoken(), lambda seen: None)
+    out = said(made, monkeypatch)
+    made._answer()
+    made._note(7, b"k")
+    made._answer()
+    made.tell(7, None)
+    made.tell(7, b"summary")
+    assert out == [("/fleet/keyframes", b"keyframe k"), ("/fleet/summaries", b"summary")]
+    assert made.told() == {"exchange: summaries heard": 2}
+    made.close()
+
+
+def test_a_keyframe_that_comes_is_in_the_books_and_handed_on(door: Door) -> None:
+    taken = list[Delivered]()
+    made = Exchanging(door, "/fleet", Spoken(), taken.append)
+    made._deliver(7, b"keyframe")
+    assert taken == [Delivered(7, b"keyframe")] and taken[0].nbytes == 8 and door.ledger.balance().waiting == 1
+    made.close()
+
+
+@pytest.mark.parametrize(("packed", "form"), [(b"x", "jpeg"), (bytes(limits.MOST_PACKED_KEYFRAME + 1), FORMAT)])
+def test_pictures_and_what_is_too_large_are_counted_and_left_out(door: Door, packed: bytes, form: str) -> None:
+    taken = list[Delivered]()
+    made = Exchanging(door, "/fleet", Spoken(), taken.append)
+    (subscription,) = [s for s in door.subscriptions if s.topic_name == "/fleet/keyframes"]
+    subscription.callback(message(packed, form), {"publication_sequence_number": 1})
+    assert taken == [] and door._ignored == {"malformed /fleet/keyframes": 1}
+    made.close()

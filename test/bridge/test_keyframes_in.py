@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Keyframes of robots, each heard on a topic of its own, and counted by robot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import rclpy
+
+from objreg_ros.bridge.frames_in import FramesDoor
+from objreg_ros.bridge.keyframes_in import FromRobot, KeyframesIn
+from objreg_ros.bridge.keyframes_msg import SentKeyframe, keyframe
+
+SENT = SentKeyframe(12_000_000_000, "camera", "0123456789abcdef" * 2, 0, 0, b"packed")
+PREFIXES = {"fleet/r1": "r1/", "fleet/r2": "r2/"}
+
+
+@pytest.fixture
+def door(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[FramesDoor]:
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
+    rclpy.init(args=["registrar", "--ros-args", "-r", "__ns:=/fleet"])
+    made = FramesDoor("registrar")
+    made.throttled._write = lambda line: None
+    yield made
+    made.close()
+    rclpy.try_shutdown()
+
+
+def test_each_camera_of_each_robot_has_a_topic(door: FramesDoor) -> None:
+    KeyframesIn(door, PREFIXES, [("front", "rear"), ()], lambda seen: None)
+    heard = {s.topic_name for s in door.subscriptions}
+    keyframes = {topic for topic in heard if topic.endswith("keyframes")}
+    assert keyframes == {"/fleet/r1/front/keyframes", "/fleet/r1/rear/keyframes", "/fleet/r2/keyframes"}
+    assert {"/fleet/r1/labels", "/fleet/r2/labels"} <= heard
+
+
+def test_a_keyframe_is_handed_on_with_its_robot_and_is_in_the_books(door: FramesDoor) -> None:
+    taken = list[FromRobot]()
+    heard = KeyframesIn(door, PREFIXES, [(), ()], taken.append)
+    heard._hear("fleet/r1", keyframe(SENT))
+    heard.count("fleet/r1", "searched")
+    assert taken == [FromRobot("fleet/r1", SENT)] and taken[0].nbytes == len(b"packed")
+    assert door.ledger.balance().waiting == 1
+    assert heard.told() == {"fleet/r1: keyframes received": 1, "fleet/r1: keyframes searched": 1}
+
+
+def test_a_picture_is_dropped_and_counted_and_ends_nothing(door: FramesDoor) -> None:
+    taken = list[FromRobot]()
+    heard = KeyframesIn(door, PREFIXES, [(), ()], taken.append)
+    message = keyframe(SENT)
+    message.format = "jpeg"
+    heard._hear("fleet/r2", message)
+    balance = door.ledger.balance()
+    assert taken == [] and balance.dropped == {"malformed_keyframes": 1} and balance.waiting == 0

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The keyframer: frames in, packed keyframes out, the last one too."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rclpy
+from registration.samples import SECOND, box, frame
+
+from objreg_ros.bridge.keyframes_msg import SentKeyframe, read_keyframe
+from objreg_ros.geometry import pose
+from objreg_ros.keyframes.node import KeyframerNode
+from objreg_ros.memory.compact import unpack_keyframe
+
+CUP = (box("cup", (0, 0, 1)),)
+Making = Callable[..., KeyframerNode]
+
+
+@pytest.fixture
+def make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Making]:
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
+    monkeypatch.setattr("objreg_ros.keyframes.node.warm", lambda params: None)
+
+    def made(*words: str) -> KeyframerNode:
+        rclpy.init(args=["keyframer", "--ros-args", "-r", "__ns:=/robot1", *words])
+        node = KeyframerNode()
+        node.frame_of = lambda seen: (seen, None)  # type: ignore[method-assign,assignment]
+        return node
+
+    yield made
+    rclpy.try_shutdown()
+
+
+def heard(node: KeyframerNode, monkeypatch: pytest.MonkeyPatch) -> list[SentKeyframe]:
+    """What is published from now on."""
+    sent = list[SentKeyframe]()
+    monkeypatch.setattr(node._keyframes, "publish", lambda message: sent.append(read_keyframe(message)))
+    return sent
+
+
+def see(node: KeyframerNode, seconds: int, metres: float) -> bool:
+    node.accept(seconds * SECOND)
+    seen: Any = frame(seconds, CUP, pose(np.eye(3), np.array([metres, 0.0, 0.0])))
+    done = node.compute(seconds * SECOND, seen)
+    if done:
+        node.ledger.publish(seconds * SECOND)
+    return done
+
+
+def test_what_becomes_a_keyframe_is_sent_packed_with_the_run_of_its_clock(
+    make: Making, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node = make()
+    sent = heard(node, monkeypatch)
+    assert [see(node, k, 0.3 * k) for k in range(3)] == [True, False, False]
+    node._sender.drain()
+    assert [keyframe.stamp_ns for keyframe in sent] == [0, SECOND]
+    assert {(keyframe.run, keyframe.began_ns, keyframe.first) for keyframe in sent} == {(node._run, 0, 0)}
+    back = unpack_keyframe(sent[1].packed)
+    assert back.labels == ("cup",) and back.stamp_ns == SECOND and back.by_odometry
+    assert np.allclose(back.T_odom_camera, pose(np.eye(3), np.array([0.3, 0.0, 0.0])))
+    told = node.extra_diagnostics()
+    assert told["keyframes sent"] == 2 and told["kilobytes a keyframe"] > 0
+    assert node.ledger.balance().published == 3
+    node.close()
+
+
+def test_the_keyframe_in_hand_is_sent_at_the_end(make: Making, monkeypatch: pytest.MonkeyPatch) -> None:
+    node = make()
+    sent = heard(node, monkeypatch)
+    see(node, 1, 0.0)
+    node.close()
+    assert [keyframe.stamp_ns for keyframe in sent] == [SECOND]
+
+
+def test_a_keyframe_is_thinned_for_the_sake_of_its_size(make: Making, monkeypatch: pytest.MonkeyPatch) -> None:
+    node = make("-p", "kilobytes:=10")
+    asked = list[int]()
+
+    def pack(keyframe: object, most_bytes: int) -> bytes:
+        asked.append(most_bytes)
+        return b""
+
+    monkeypatch.setattr("objreg_ros.keyframes.node.pack_keyframe", pack)
+    heard(node, monkeypatch)
+    see(node, 1, 0.0)
+    node.close()
+    assert asked == [10_000]

@@ -1,0 +1,338 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Registrars that each keep their own store find what one for all would, and look at every pair once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from registration import rooms
+from registration.samples import SECOND, candidate
+
+from objreg_ros.data import Array, Frame, LoopClosure, Reason
+from objreg_ros.geometry import inverse, pose_error
+from objreg_ros.registrar import exchange as module
+from objreg_ros.registrar.exchange import Allowance, Exchange
+from objreg_ros.registrar.outcome import Outcome
+from objreg_ros.registrar.registrar import Registrar
+from objreg_ros.registrar.summary import Name, Request, pack_delivery, pack_request, unpack_request
+from objreg_ros.registration import method_of
+from objreg_ros.registration.candidate import ObjectPair
+from objreg_ros.registration.params import RegistrarParams
+
+PARAMS = RegistrarParams()
+HERE = rooms.look_at((0.2, 0.0, 1.3), (1.8, 0.0, 0.75))
+BESIDE = rooms.look_at((0.35, 0.25, 1.25), (1.8, 0.0, 0.75))
+AWAY = rooms.look_at((0.2, 0.0, 1.3), (2.8, -1.4, 1.0))
+NOW = 100.0
+
+
+class Knowing:
+    """A method that proposes the true pose: odometry is in the world here. ``tried`` has the stamps of the pairs."""
+
+    def __init__(self, **evidence: object) -> None:
+        self.tried: list[tuple[int, int]] = []
+        self.evidence: dict[str, object] = evidence
+
+    def prepare(self, keyframe: object) -> None:
+        """Nothing to make ready."""
+
+    def propose(self, source: Any, target: Any, prior: object = None) -> tuple:
+        self.tried.append((target.stamp_ns // SECOND, source.stamp_ns // SECOND))
+        pairs = tuple(
+            ObjectPair(a, b, one.label)
+            for a, one in enumerate(source.objects)
+            for b, other in enumerate(target.objects)
+            if one.label == other.label
+        )
+        T = inverse(target.T_odom_camera) @ source.T_odom_camera
+        return (candidate(T, matched=pairs[:2], **self.evidence),)
+
+
+class Robot:
+    """A registrar with its exchange, which makes a keyframe of each view."""
+
+    def __init__(self, name: str, params: RegistrarParams = PARAMS, method: Any = None, **how: Any) -> None:
+        self.name, self.method = name, method or Knowing()
+        self.registrar = Registrar(params, method=self.method)
+        self.exchange = Exchange(self.registrar, name, **{"run": name, **how})
+
+    def sees(self, seconds: float, T_world_camera: Array) -> bytes:
+        """The summary of what it sees."""
+        summary = self.exchange.announce(self.searched(seconds, T_world_camera))
+        assert summary is not None
+        return summary
+
+    def searched(self, seconds: float, T_world_camera: Array) -> Outcome:
+        self.registrar.track(replace(_frame(seconds, T_world_camera), robot=self.name))
+        (window,) = self.registrar.end()
+        return self.registrar.search(window)
+
+    def fetches(self, summary: bytes, other: Robot) -> Outcome | None:
+        """What the keyframe of another's summary comes to here; None where it is not asked for."""
+        request = self.exchange.hear(summary)
+        if request is None:
+            return None
+        other.exchange.note(request, NOW)
+        packed = other.exchange.answer(NOW)
+        assert packed is not None
+        return self.exchange.take(packed)
+
+
+def _frame(seconds: float, T_world_camera: Array) -> Frame:
+    seen = rooms.keyframe(T_world_camera, seed=round(10 * seconds))
+    return Frame(
+        objects=tuple(item.cloud for item in seen.objects),
+        support=None,
+        view=seen.view,
+        gravity=seen.gravity,
+        gravity_confidence=1.0,
+        T_odom_camera=T_world_camera,
+        stamp_ns=round(1e9 * seconds),
+    )
+
+
+def _moments(closures: Iterable[LoopClosure]) -> list[tuple[tuple[str, str], int, int]]:
+    return [(one.robots, one.from_ns // SECOND, one.to_ns // SECOND) for one in closures]
+
+
+def test_a_place_of_two_robots_closes_a_loop_at_the_true_pose_that_names_both() -> None:
+    a = Robot("a", method=method_of(PARAMS))
+    b = Robot("b", method=method_of(PARAMS))
+    a.sees(10, HERE)
+    outcome = a.fetches(b.sees(30, BESIDE), b)
+    assert outcome is not None and outcome.keyframe_ns is None
+    (closure,) = outcome.closures
+    assert _moments([closure]) == [(("a", "b"), 10, 30)]
+    rotation, distance = pose_error(closure.T_from_to, inverse(HERE) @ BESIDE)
+    assert rotation < 1.0 and distance < 2.0
+    assert [stored.robots for stored in a.registrar._store.closures()] == [("a", "b")]
+
+
+def test_what_is_fetched_is_not_stored_and_its_objects_go_by_our_landmarks() -> None:
+    a, b = Robot("a"), Robot("b")
+    b.sees(1, AWAY)
+    a.sees(10, HERE)
+    known = {landmark.landmark: landmark.sightings for landmark in a.registrar.landmarks}
+    outcome = a.fetches(b.sees(30, BESIDE), b)
+    assert outcome is not None
+    (closure,) = outcome.closures
+    assert len(closure.matches) == 2 and {match.object_id for match in closure.matches} <= set(known)
+    assert {landmark.landmark: landmark.sightings for landmark in a.registrar.landmarks} == known
+    assert a.registrar.counts()["keyframes"] == 1 and a.registrar.counts()["closures"] == 1
+
+
+def test_sessions_of_others_have_numbers_that_none_of_ours_has() -> None:
+    a, b = Robot("a"), Robot("b")
+    a.sees(10, HERE)
+    (closure,) = a.fetches(b.sees(30, BESIDE), b).closures  # type: ignore[union-attr]
+    assert closure.from_session == 0 and closure.to_session not in (0, None)
+    a.registrar.reset()
+    a.searched(40, AWAY)
+    assert a.registrar.landmarks and a.registrar.landmarks[0].session not in (0, closure.to_session)
+
+
+def test_a_keyframe_without_objects_of_ours_is_not_asked_for() -> None:
+    a, b = Robot("a"), Robot("b")
+    assert a.exchange.hear(b.sees(30, HERE)) is None
+    assert a.exchange.books["dropped: unlike"] == 1 and a.exchange.books["summaries heard"] == 1
+
+
+def test_a_summary_that_is_heard_twice_asks_nothing_twice() -> None:
+    a, b = Robot("a"), Robot("b")
+    a.sees(10, HERE)
+    summary = b.sees(30, BESIDE)
+    assert a.exchange.hear(summary) is not None
+    assert a.exchange.hear(summary) is None and a.exchange.books["dropped: heard before"] == 1
+
+
+def test_ones_own_summary_and_that_of_a_robot_of_ones_name_ask_nothing() -> None:
+    a, namesake = Robot("a"), Robot("a", run="another")
+    a.sees(10, HERE)
+    assert a.exchange.hear(a.sees(20, BESIDE)) is None and not a.exchange.books["summaries heard"]
+    assert a.exchange.hear(namesake.sees(30, BESIDE)) is None
+    assert a.exchange.books["dropped: a robot of our name"] == 1
+
+
+def test_a_later_keyframe_of_ours_is_looked_at_by_the_other() -> None:
+    a, b = Robot("a"), Robot("b")
+    assert a.exchange.hear(b.sees(10, HERE)) is None
+    outcome = b.fetches(a.sees(30, BESIDE), a)
+    assert outcome is not None and _moments(outcome.closures) == [(("b", "a"), 10, 30)]
+
+
+@pytest.mark.parametrize(("of_a", "of_b"), [(30, 31), (31, 30), (30, 30)])
+def test_of_two_that_are_told_before_either_is_heard_that_of_the_older_is_compared(of_a: int, of_b: int) -> None:
+    a, b = Robot("a"), Robot("b")
+    told_by_a, told_by_b = a.sees(of_a, HERE), b.sees(of_b, BESIDE)
+    asked = a.exchange.hear(told_by_b) is not None, b.exchange.hear(told_by_a) is not None
+    assert asked == ((True, False) if of_a <= of_b else (False, True))
+
+
+def test_whoever_has_a_keyframe_when_it_hears_looks_though_clocks_differ() -> None:
+    a, b = Robot("a"), Robot("b")
+    b.exchange.hear(a.sees(5000, HERE))
+    outcome = a.fetches(b.sees(30, BESIDE), b)
+    assert outcome is not None and _moments(outcome.closures) == [(("a", "b"), 5000, 30)]
+
+
+def test_a_keyframe_that_is_stored_but_not_told_yet_is_left_to_the_other() -> None:
+    a, b = Robot("a"), Robot("b")
+    searched = a.searched(10, HERE)
+    assert a.exchange.hear(b.sees(30, BESIDE)) is None
+    summary = a.exchange.announce(searched)
+    assert summary is not None and b.exchange.hear(summary) is not None
+
+
+def test_every_pair_of_three_robots_is_looked_at_once() -> None:
+    params = PARAMS.replaced(candidates=20, closures=20, thin_seconds=0.0)
+    robots = [Robot(name, params) for name in "abc"]
+    views = [HERE, BESIDE, AWAY]
+    for k in range(6):
+        robot = robots[k % 3]
+        summary = robot.sees(10 + k, views[k // 2])
+        for other in (one for one in robots if one is not robot):
+            other.fetches(summary, robot)
+    between = [pair for robot in robots for pair in robot.method.tried if (pair[0] - pair[1]) % 3]
+    assert len(between) == len(set(between)) == 12
+
+
+def test_the_most_promising_is_answered_first_and_one_answer_serves_all() -> None:
+    b = Robot("b")
+    b.sees(1, HERE), b.sees(2, AWAY), b.sees(3, BESIDE)
+    for number, votes in ((1, 2.0), (2, 1.5), (3, 2.5), (2, 1.5)):
+        b.exchange.note(pack_request(Request(Name("b", number), votes)), NOW)
+    assert b.exchange.waiting == 3
+    order = [module.unpack_delivery(packed)[0].keyframe_id for packed in iter(lambda: b.exchange.answer(NOW), None)]
+    assert order == [2, 3, 1] and b.exchange.books["keyframes sent"] == 3
+
+
+def test_what_is_sent_stays_within_bytes_per_second_and_what_waits_too_long_is_dropped() -> None:
+    b = Robot("b", bytes_per_second=1000.0)
+    sent = len(b.sees(1, HERE)) + len(b.sees(2, AWAY))
+    for number in (1, 2):
+        b.exchange.note(pack_request(Request(Name("b", number), 1.0)), NOW)
+    first = b.exchange.answer(NOW)
+    assert first is not None and b.exchange.answer(NOW) is None
+    paid = NOW + (sent + len(first) - 2000) / 1000.0
+    assert b.exchange.answer(paid - 1.0) is None
+    assert b.exchange.books["bytes sent"] == sent + len(first)
+    assert b.exchange.answer(NOW + module.PATIENCE_S + 1.0) is None
+    assert b.exchange.books["dropped: waited too long"] == 1 and b.exchange.waiting == 0
+
+
+def test_an_allowance_adds_up_to_a_burst_and_debts_are_made_up_for() -> None:
+    allowance = Allowance(100.0)
+    assert allowance.some_left(1000.0)
+    allowance.spend(450)
+    assert [allowance.some_left(1000.0 + s) for s in (0.0, 2.0, 2.6, 1.0)] == [False, False, True, True]
+    allowance.spend(260)
+    assert not allowance.some_left(1003.0) and allowance.some_left(9000.0)
+    endless = Allowance(np.inf)
+    endless.spend(10**9)
+    assert endless.some_left(0.0) and endless.some_left(0.0)
+
+
+def test_a_request_for_what_is_not_ours_or_not_there_any_more_is_not_answered() -> None:
+    b = Robot("b")
+    b.sees(1, HERE)
+    b.exchange.note(pack_request(Request(Name("another", 1), 1.0)), NOW)
+    assert b.exchange.waiting == 0
+    b.exchange.note(pack_request(Request(Name("b", 77), 1.0)), NOW)
+    assert b.exchange.answer(NOW) is None and b.exchange.books["dropped: not to be had"] == 1
+
+
+def test_of_too_many_requests_the_least_promising_goes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MOST_WAITING", 2)
+    b = Robot("b")
+    for number, votes in ((1, 3.0), (2, 1.0), (3, 2.0)):
+        b.exchange.note(pack_request(Request(Name("b", number), votes)), NOW)
+    assert b.exchange.waiting == 2 and b.exchange.books["dropped: crowded"] == 1
+    assert 2 not in b.exchange._wishes
+
+
+def test_a_keyframe_that_was_not_asked_for_comes_to_nothing_and_another_one_is_refused() -> None:
+    a, b = Robot("a"), Robot("b")
+    a.sees(10, HERE)
+    summary = b.sees(30, BESIDE)
+    request = a.exchange.hear(summary)
+    assert request is not None and unpack_request(request).name == Name("b", 1)
+    keyframe, _ = b.registrar.moment(1)
+    with pytest.raises(ValueError, match="expected the keyframe at 30000000000 ns of its summary, got one at 31"):
+        a.exchange.take(pack_delivery("b", replace(keyframe, stamp_ns=31 * SECOND)))
+    assert a.exchange.take(pack_delivery("b", keyframe)) is None
+    assert a.exchange.books["dropped: not asked for"] == 1
+
+
+def test_what_a_closure_ties_already_is_not_asked_for() -> None:
+    a, b = Robot("a"), Robot("b")
+    a.sees(10, HERE)
+    assert a.fetches(b.sees(30, BESIDE), b).closures  # type: ignore[union-attr]
+    assert a.exchange.hear(b.sees(30.5, HERE)) is None
+
+
+def test_a_stored_keyframe_that_was_forgotten_meanwhile_is_not_tried() -> None:
+    a, b = Robot("a", PARAMS.replaced(max_keyframes=1)), Robot("b")
+    a.sees(10, HERE)
+    request = a.exchange.hear(b.sees(30, BESIDE))
+    a.sees(50, AWAY)
+    b.exchange.note(request, NOW)  # type: ignore[arg-type]
+    outcome = a.exchange.take(b.exchange.answer(NOW))  # type: ignore[arg-type]
+    assert outcome is not None and (outcome.closures, outcome.rejected) == ((), ())
+    assert b.exchange.announce(Outcome()) is None
+
+
+def test_no_time_refuses_as_over_budget() -> None:
+    a, b = Robot("a"), Robot("b")
+    a.sees(10, HERE)
+    b.exchange.note(a.exchange.hear(b.sees(30, BESIDE)), NOW)  # type: ignore[arg-type]
+    outcome = a.exchange.take(b.exchange.answer(NOW), seconds=0.0)  # type: ignore[arg-type]
+    assert outcome is not None and {refusal.reason for refusal in outcome.rejected} == {Reason.OVER_BUDGET}
+
+
+def test_what_waits_for_others_is_published_late_by_our_landmarks() -> None:
+    method, doubts = Knowing(), {"texture": 0.1, "tested": 2000, "perturbation_margin": 0.1}
+    params = PARAMS.replaced(thin_seconds=0.1, closures=1, candidates=1)
+    a, b = Robot("a", params, method), Robot("b", params)
+    sides = [rooms.look_at((0.2, 0.2 * side, 1.3), (1.8, 0.0, 0.75)) for side in (-1.0, 0.0, 1.0, 2.0)]
+    for k, T in enumerate(sides):
+        a.sees(10 + k, T)
+    closures: list[LoopClosure] = []
+    for k, T in enumerate(sides):
+        method.evidence = doubts if k == 0 else {}
+        outcome = a.fetches(b.sees(30 + k, T), b)
+        closures += () if outcome is None else outcome.closures
+        assert k or a.registrar.waiting == 1
+    (late,) = [one for one in closures if one.to_ns == 30 * SECOND]
+    assert late.evidence["agreeing"] >= 3 and late.robots == ("a", "b") and a.registrar.waiting == 0
+    assert {match.object_id for match in late.matches} <= {one.landmark for one in a.registrar.landmarks}
+    assert 30 * SECOND in [stored.to_ns for stored in a.registrar._store.closures()]
+
+
+def test_after_a_restart_what_the_store_has_is_not_published_again(tmp_path: Path) -> None:
+    params = PARAMS.replaced(store=str(tmp_path / "place.db"))
+    a, b = Robot("a", params), Robot("b")
+    a.sees(10, HERE)
+    summary = b.sees(30, BESIDE)
+    assert len(a.fetches(summary, b).closures) == 1  # type: ignore[union-attr]
+    a.registrar.close()
+    a = Robot("a", params, run="a again")
+    outcome = a.fetches(summary, b)
+    assert outcome is not None and outcome.closures == ()
+    assert {refusal.reason for refusal in outcome.rejected} == {Reason.REDUNDANT}
+    later = a.fetches(b.sees(60, HERE), b)
+    assert later is not None and _moments(later.closures) == [(("a", "b"), 10, 60)]
+    a.registrar.close()
+
+
+def test_frames_without_a_robot_go_by_the_name_of_the_exchange() -> None:
+    a, b = Robot("a"), Robot("b")
+    a.registrar.track(_frame(10, HERE))
+    (window,) = a.registrar.end()
+    a.exchange.announce(a.registrar.search(window))
+    (closure,) = a.fetches(b.sees(30, BESIDE), b).closures  # type: ignore[union-attr]
+    assert closure.robots == ("a", "b")
