@@ -41,9 +41,8 @@ from sources import SIMULATED
 from team_ends import GO, READY, SAVE, SAVED, SPENT, TOLD
 
 from objreg_ros.bridge import to_msg
-from objreg_ros.bridge.robots import robot_of
 from objreg_ros.cli.live import private_environment
-from objreg_ros.data import Frame, LoopClosure, Odometry
+from objreg_ros.data import Frame, LoopClosure, Odometry, robot_of
 from objreg_ros.memory.store import Store
 from objreg_ros.truth import FALSE, Truths, within
 
