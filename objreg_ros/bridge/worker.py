@@ -83,6 +83,7 @@ class _Waiting(NamedTuple, Generic[Job]):
     nbytes: int
     since: float
     lane: Hashable
+    number: int  # of its `put`; 0 for what was given back
 
 
 class Backlog(Generic[Job]):
@@ -114,11 +115,12 @@ class Backlog(Generic[Job]):
         self._work, self._settle, self._failed = work, settle, failed
         self._limit, self._nbytes_of, self._nice, self._lane_of = limit, nbytes_of, nice, lane_of
         self._served = Counter[Hashable]()  # the turn in which each lane had its last one
-        self._turns = 0
+        self._turns = self._puts = 0
         self._changed = threading.Condition()
         self._waiting: deque[_Waiting[Job]] = deque()
         self._nbytes = 0  # of all that wait
         self._busy, self._open = False, True
+        self._begun, self._begun_at = 0, 0.0  # the number of the job in hand, and since when it is
         self._overtaken_at = -PRESSED_S
         self._pressed = False  # as of the last `put`
         self._threads = [
@@ -141,12 +143,13 @@ class Backlog(Generic[Job]):
             if self._is_behind(lane):
                 self._overtaken_at = now
             self._pressed = now - self._overtaken_at < PRESSED_S
-            self._waiting.append(_Waiting(job, nbytes, now, lane))
+            self._puts += 1
+            self._waiting.append(_Waiting(job, nbytes, now, lane, self._puts))
             self._nbytes += nbytes
             self._changed.notify_all()
 
     def hurried(self) -> bool:
-        """Whether the work in hand is to end soon: it is closed, or jobs are overtaken and the next has waited enough.
+        """Whether the work in hand is to end soon: it is closed, or jobs are overtaken and one waits enough for it.
 
         Or there is no room for more. To be asked by ``work``.
         """
@@ -155,7 +158,7 @@ class Backlog(Generic[Job]):
                 return True
             if not self._pressed or not self._waiting:
                 return False
-            waited_s = time.monotonic() - self._waiting[0].since
+            waited_s = time.monotonic() - max(self._waiting[0].since, self._begun_at)  # for this work, not others
             return waited_s >= self._limit.patience_s or not self._has_room(self._waiting[-1].nbytes)
 
     def rest(self) -> list[Job]:
@@ -171,15 +174,16 @@ class Backlog(Generic[Job]):
         """What `rest` took, before all that came since; never waits."""
         now = time.monotonic()
         with self._changed:
-            back = [_Waiting(job, self._nbytes_of(job), now, self._lane_of(job)) for job in jobs]
+            back = [_Waiting(job, self._nbytes_of(job), now, self._lane_of(job), 0) for job in jobs]
             self._waiting.extendleft(reversed(back))
             self._nbytes += sum(waiting.nbytes for waiting in back)
             self._changed.notify_all()
 
     def drain(self) -> None:
-        """Wait until every job is done, or the backlog is closed."""
+        """Wait until every job that was put by now is done, or the backlog is closed."""
         with self._changed:
-            self._changed.wait_for(lambda: not (self._waiting or self._busy) or not self._open)
+            last = self._puts
+            self._changed.wait_for(lambda: not self._open or not self._has_any_of(last))
 
     def shut(self) -> None:
         """Begin no job any more, hurry the one in hand, let nobody wait; does not wait for it."""
@@ -199,6 +203,10 @@ class Backlog(Generic[Job]):
             return True
         return len(self._waiting) < self._limit.jobs and self._nbytes + nbytes <= self._limit.nbytes
 
+    def _has_any_of(self, last: int) -> bool:
+        """Whether a job up to this number waits, or is in hand."""
+        return (self._busy and self._begun <= last) or any(waiting.number <= last for waiting in self._waiting)
+
     def _is_behind(self, lane: Hashable) -> bool:
         """Whether so many jobs of a lane wait that the one before them is overtaken."""
         return sum(waiting.lane == lane for waiting in self._waiting) > self._limit.behind.get(lane, 0)
@@ -217,7 +225,8 @@ class Backlog(Generic[Job]):
                 return None
             self._busy = True
             chosen = self._next()
-            job, nbytes, _, lane = self._waiting[chosen]
+            job, nbytes, _, lane, self._begun = self._waiting[chosen]
+            self._begun_at = time.monotonic()
             del self._waiting[chosen]
             self._nbytes -= nbytes
             self._turns += 1

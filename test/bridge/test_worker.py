@@ -4,6 +4,7 @@ from __future__ import annotations
 import os
 import sys
 import threading
+import time
 from collections.abc import Callable
 
 import pytest
@@ -305,3 +306,48 @@ def test_of_a_lane_that_is_too_far_behind_the_oldest_is_settled_and_other_lanes_
     backlog.drain()
     backlog.close()
     assert done == ["a0", "b1", "kept a1", "b2", "a2", "a3"]
+
+
+def test_work_in_hand_is_hurried_by_how_long_others_wait_for_it_and_not_for_those_before() -> None:
+    begun, go, asked = threading.Event(), threading.Event(), list[bool]()
+    limit = Limit(99, 10**9, patience_s=0.3, behind={"a": 2})
+
+    def work(job: str) -> None:
+        begun.set()
+        assert go.wait(PATIENCE)
+        asked.append(backlog.hurried())
+
+    backlog = Backlog(work, lambda job: None, print, limit, len, lane_of=lambda job: job[0])
+    backlog.put("a0")
+    assert begun.wait(PATIENCE)
+    for k in range(1, 5):
+        backlog.put(f"a{k}")
+    time.sleep(0.4)  # all wait longer than the patience by now
+    go.set()
+    backlog.drain()
+    backlog.close()
+    assert asked == [True, False, False, False]
+
+
+def test_who_drains_does_not_wait_for_what_is_put_meanwhile() -> None:
+    backlog: Backlog[str] = Backlog(lambda job: time.sleep(0.01), lambda job: None, print, ROOMY, len)
+    ended, drained = threading.Event(), threading.Event()
+
+    def feed() -> None:
+        while not ended.wait(0.002):
+            backlog.put("job")
+
+    def drain() -> None:
+        backlog.drain()
+        drained.set()
+
+    threads = [threading.Thread(target=work) for work in (feed, drain)]
+    for thread in threads:
+        thread.start()
+        time.sleep(0.1)
+    in_time = drained.wait(3.0)
+    ended.set()
+    for thread in threads:
+        thread.join()
+    backlog.close()
+    assert in_time
