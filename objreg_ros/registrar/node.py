@@ -282,8 +282,8 @@ class RegistrarNode(FramesDoor):
         for seen in (*(job.seen for job in self.searcher.rest()), *self._registrar.end()):
             try:
                 self._outcome(seen, 0.0)
-            except (ValueError, OSError, DroppedError) as error:
-                lost.append(str(error))
+            except Exception as error:  # whatever is wrong with one, the others are stored
+                lost.append(f"{type(error).__name__}: {error}")
         if lost:
             self.get_logger().error(f"the last keyframes could not be stored, {len(lost)} are lost: {lost[-1]}")
 
