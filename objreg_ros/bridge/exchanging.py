@@ -56,16 +56,16 @@ class Delivered(NamedTuple):
 class Exchanging:
     """``exchange`` on the topics below ``namespace``. The books of ``door`` count keyframes, which ``take`` is given.
 
-    Summaries are compared in a thread of their own: that waits for a search that is under way.
+    Summaries are compared, and requests answered, in a thread of their own: that waits for a search that is under way.
     """
 
     def __init__(self, door: Door, namespace: str, exchange: Exchanges, take: Callable[[Delivered], None]) -> None:
         self._door, self._exchange, self._take = door, exchange, take
-        self._reader, self._unread = ThreadPoolExecutor(1, "summaries"), 0
+        self._reader, self._unread, self._answering = ThreadPoolExecutor(1, "exchange"), 0, False
         self._summaries = self._both(f"{namespace}/summaries", self._read_later, qos.latched(qos.KEPT_SUMMARIES))
         self._requests = self._both(f"{namespace}/requests", self._note, qos.room(depth=100))
         self._keyframes = self._both(f"{namespace}/keyframes", self._deliver, qos.room(depth=qos.KEPT_KEYFRAMES))
-        door.create_timer(LOOK_S, self._answer, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        door.create_timer(LOOK_S, self._answer_later, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _both(self, topic: str, hear: Callable[[int, bytes], None], profile: QoSProfile) -> Publisher:
         def heard(message: Any) -> None:
@@ -98,9 +98,14 @@ class Exchanging:
         if self._door.let_in(stamp_ns):
             self._take(Delivered(stamp_ns, packed))
 
-    def _answer(self) -> None:
-        packed = self._exchange.answer(time.monotonic()) if self._exchange.waiting else None
-        self._publish(self._keyframes, 0, packed)
+    def _answer_later(self) -> None:
+        if self._exchange.waiting and not self._answering:
+            self._answering = True
+            self._reader.submit(self._door.read_aside, "requests", self._answer, time.monotonic())
+
+    def _answer(self, now: float) -> None:
+        self._answering = False
+        self._publish(self._keyframes, 0, self._exchange.answer(now))
 
     def _publish(self, publisher: Publisher, stamp_ns: int, packed: bytes | None) -> None:
         if packed is None or not self._door.context.ok():

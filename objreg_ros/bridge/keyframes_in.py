@@ -14,6 +14,7 @@ from std_msgs.msg import String
 from objreg_ros.bridge import from_msg, qos
 from objreg_ros.bridge.frames_in import FramesDoor
 from objreg_ros.bridge.keyframes_msg import SentKeyframe, read_keyframe
+from objreg_ros.data import framed
 
 
 class FromRobot(NamedTuple):
@@ -37,7 +38,8 @@ class KeyframesIn:
     """The books of ``door`` count keyframes; ``take`` is given each that may come in.
 
     ``prefixes`` has what stands before the topics of each robot, ``cameras`` the namespaces of each one's keyframers
-    behind that; none where it has one, in its own.
+    behind that; none where it has one, in its own. Two cameras of a robot are told apart by their frames: of two that
+    have one, the first to come is taken.
     """
 
     def __init__(
@@ -49,24 +51,37 @@ class KeyframesIn:
     ) -> None:
         self._door, self._take = door, take
         self._counts = Counter[tuple[str, str]]()  # by robot, and what became of its keyframes
+        self._frames = dict[tuple[str, str], str]()  # of the camera of each robot and topic
         for (robot, prefix), names in zip(prefixes.items(), cameras, strict=True):
             door.listen(String, f"{prefix}labels", door.hear_labels, qos.latched())
             for camera in (f"{name}/" for name in names) if names else ("",):
                 self._listen(robot, f"{prefix}{camera}keyframes")
 
     def _listen(self, robot: str, topic: str) -> None:
-        hear, kept = partial(self._hear, robot), qos.latched(qos.KEPT_KEYFRAMES)
+        hear, kept = partial(self._hear, robot, topic), qos.latched(qos.KEPT_KEYFRAMES)
         self._door.listen(CompressedImage, topic, hear, kept, watched=topic)
         self._door.expect(topic, topic)
 
-    def _hear(self, robot: str, message: Any) -> None:
+    def _hear(self, robot: str, topic: str, message: Any) -> None:
         sent, stamp_ns = self._door.read_aside("keyframes", read_keyframe, message), from_msg.stamp_ns(message)
         self._door.accept(stamp_ns)
         if sent is None:
             self._door.drop(stamp_ns, "malformed_keyframes")
+        elif (other := self._other(robot, topic, sent.frame_id)) is not None:
+            expected = f"expected each camera of a robot with a frame of its own, got {sent.frame_id!r} on {topic}"
+            self._door.drop(stamp_ns, "same_camera", f"{expected} and on {other}; name their frames apart")
         elif self._door.let_in(stamp_ns):
             self.count(robot, "received")
             self._take(FromRobot(robot, sent))
+
+    def _other(self, robot: str, topic: str, frame_id: str) -> str | None:
+        """The topic of another camera of the robot that has this frame; None where it is its own."""
+        framed_id = framed(robot, frame_id)
+        for (whose, other), taken in self._frames.items():
+            if whose == robot and other != topic and taken == framed_id:
+                return other
+        self._frames[robot, topic] = framed_id
+        return None
 
     def count(self, robot: str, what: str) -> None:
         """One more keyframe of a robot of which this became."""

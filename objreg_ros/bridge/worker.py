@@ -149,7 +149,7 @@ class Backlog(Generic[Job]):
             self._changed.notify_all()
 
     def hurried(self) -> bool:
-        """Whether the work in hand is to end soon: it is closed, or jobs are overtaken and one has waited for it enough.
+        """Whether the work in hand is to end soon: it is closed, or jobs are overtaken and one waits enough for it.
 
         Or there is no room for more. To be asked by ``work``.
         """

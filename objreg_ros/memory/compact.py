@@ -160,11 +160,20 @@ def _keyframe(head: Head, columns: Columns) -> Keyframe:
         view=view,
         gravity=None if head["gravity"] is None else gravity_of(np.array(head["gravity"], float)),
         gravity_confidence=real(head, "gravity_confidence", 1.0),
-        T_odom_camera=None if head["T_odom_camera"] is None else pose_of(np.array(head["T_odom_camera"], float)),
+        T_odom_camera=_pose(head),
         by_odometry=bool(whole(head, "by_odometry", 0, 1)),
         travelled=real(head, "travelled", limits.MOST_DISTANCE),
         turned=real(head, "turned", limits.MOST_DISTANCE),
     )
+
+
+def _pose(head: Head) -> Array | None:
+    if head["T_odom_camera"] is None:
+        return None
+    T = pose_of(np.array(head["T_odom_camera"], float))
+    if (farthest := float(np.abs(T[:3, 3]).max())) > limits.MOST_DISTANCE:
+        raise ValueError(f"T_odom_camera: expected a camera within {limits.MOST_DISTANCE:g} m, got {farthest:g} m")
+    return T
 
 
 def _view_columns(view: View) -> list[bytes]:

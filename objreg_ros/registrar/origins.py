@@ -53,6 +53,8 @@ class Sent(Protocol):
     @property
     def stamp_ns(self) -> int: ...
     @property
+    def frame_id(self) -> str: ...
+    @property
     def run(self) -> str: ...
     @property
     def began_ns(self) -> int: ...
@@ -65,7 +67,8 @@ class Sent(Protocol):
 def arrival_of(robot: str, sent: Sent) -> Arrival:
     """The keyframe that a robot sent, with its frame under the robot's prefix. ValueError where it is damaged."""
     keyframe = unpack_keyframe(sent.packed)
-    if keyframe.stamp_ns != sent.stamp_ns:
-        raise ValueError(f"keyframe: expected the stamp {sent.stamp_ns} of its header, got {keyframe.stamp_ns}")
+    got, expected = (keyframe.stamp_ns, keyframe.frame_id), (sent.stamp_ns, sent.frame_id)
+    if got != expected:
+        raise ValueError(f"keyframe: expected the stamp and frame {expected} of its header, got {got}")
     named = replace(keyframe, robot=robot, frame_id=framed(robot, keyframe.frame_id))
     return Arrival(named, Clock(sent.began_ns, sent.first), sent.run)

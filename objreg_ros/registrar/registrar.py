@@ -153,7 +153,9 @@ class Registrar:
     def receive(
         self, arrival: Arrival, seconds: float = np.inf, hurried: Callable[[], bool] = lambda: False
     ) -> Outcome | None:
-        """`search` for a keyframe that a keyframer elsewhere has made; None for one that was received before."""
+        """`search` for a keyframe of a keyframer elsewhere, if it has objects; None for one that came before."""
+        if not arrival.keyframe.objects:
+            return Outcome()
         budget = Budget(time.monotonic() + seconds, hurried)
         with self._lock:
             self.params = self._recollection.params = self._adopted

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import threading
+import time
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -79,14 +81,39 @@ def test_a_summary_that_looks_alike_is_answered_by_a_request_and_one_that_does_n
 def test_a_request_is_answered_by_the_keyframe(door: Door, monkeypatch: pytest.MonkeyPatch) -> None:
     made = Exchanging(door, "/fleet", Spoken(), lambda seen: None)
     out = said(made, monkeypatch)
-    made._answer()
+    made._answer_later()
     made._note(7, b"k")
-    made._answer()
+    made._answer_later()
+    made._reader.shutdown()
     made.tell(7, None)
     made.tell(7, b"summary")
     assert out == [("/fleet/keyframes", b"keyframe k"), ("/fleet/summaries", b"summary")]
     assert made.told() == {"exchange: summaries heard": 2}
     made.close()
+
+
+def test_an_answer_that_waits_for_a_search_keeps_no_subscription_waiting_and_one_at_most_waits_behind(
+    door: Door,
+) -> None:
+    ended, asked = threading.Event(), list[float]()
+
+    class Searching(Spoken):
+        def answer(self, now: float) -> bytes | None:
+            asked.append(now)
+            assert ended.wait(10.0)
+            return None
+
+    made = Exchanging(door, "/fleet", Searching(), lambda seen: None)
+    made._note(7, b"k")
+    made._answer_later()
+    while not asked:
+        time.sleep(0.001)
+    for _ in range(5):
+        made._answer_later()
+    assert len(asked) == 1
+    ended.set()
+    made._reader.shutdown()
+    assert len(asked) == 2
 
 
 def test_a_keyframe_that_comes_is_in_the_books_and_handed_on(door: Door) -> None:

@@ -39,7 +39,7 @@ def test_each_camera_of_each_robot_has_a_topic(door: FramesDoor) -> None:
 def test_a_keyframe_is_handed_on_with_its_robot_and_is_in_the_books(door: FramesDoor) -> None:
     taken = list[FromRobot]()
     heard = KeyframesIn(door, PREFIXES, [(), ()], taken.append)
-    heard._hear("fleet/r1", keyframe(SENT))
+    heard._hear("fleet/r1", "r1/keyframes", keyframe(SENT))
     heard.count("fleet/r1", "searched")
     assert taken == [FromRobot("fleet/r1", SENT)] and taken[0].nbytes == len(b"packed")
     assert door.ledger.balance().waiting == 1
@@ -51,6 +51,26 @@ def test_a_picture_is_dropped_and_counted_and_ends_nothing(door: FramesDoor) -> 
     heard = KeyframesIn(door, PREFIXES, [(), ()], taken.append)
     message = keyframe(SENT)
     message.format = "jpeg"
-    heard._hear("fleet/r2", message)
+    heard._hear("fleet/r2", "r2/keyframes", message)
     balance = door.ledger.balance()
     assert taken == [] and balance.dropped == {"malformed_keyframes": 1} and balance.waiting == 0
+
+
+def test_of_two_cameras_of_a_robot_under_one_frame_the_first_is_taken_and_robots_may_share_frames(
+    door: FramesDoor,
+) -> None:
+    taken = list[FromRobot]()
+    heard = KeyframesIn(door, PREFIXES, [("front", "rear"), ()], taken.append)
+    said = [("fleet/r1", "r1/front/keyframes", "camera"), ("fleet/r1", "r1/rear/keyframes", "fleet/r1/camera")]
+    said += [("fleet/r2", "r2/keyframes", "camera"), ("fleet/r1", "r1/rear/keyframes", "rear_camera")]
+    said += [("fleet/r1", "r1/front/keyframes", "camera")]
+    for robot, topic, frame_id in said:
+        heard._hear(robot, topic, keyframe(SENT._replace(frame_id=frame_id)))
+    frames = [(one.robot, one.sent.frame_id) for one in taken]
+    assert frames == [
+        ("fleet/r1", "camera"),
+        ("fleet/r2", "camera"),
+        ("fleet/r1", "rear_camera"),
+        ("fleet/r1", "camera"),
+    ]
+    assert door.ledger.balance().dropped == {"same_camera": 1}

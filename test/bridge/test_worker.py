@@ -309,22 +309,24 @@ def test_of_a_lane_that_is_too_far_behind_the_oldest_is_settled_and_other_lanes_
 
 
 def test_work_in_hand_is_hurried_by_how_long_others_wait_for_it_and_not_for_those_before() -> None:
-    go, asked = threading.Event(), list[bool]()
+    begun, go, asked = threading.Event(), threading.Event(), list[bool]()
     limit = Limit(99, 10**9, patience_s=0.3, behind={"a": 2})
 
     def work(job: str) -> None:
-        if job == "a0":
-            assert go.wait(PATIENCE)
+        begun.set()
+        assert go.wait(PATIENCE)
         asked.append(backlog.hurried())
 
     backlog = Backlog(work, lambda job: None, print, limit, len, lane_of=lambda job: job[0])
-    for k in range(5):
+    backlog.put("a0")
+    assert begun.wait(PATIENCE)
+    for k in range(1, 5):
         backlog.put(f"a{k}")
     time.sleep(0.4)  # all wait longer than the patience by now
     go.set()
     backlog.drain()
     backlog.close()
-    assert asked == [True, False, False]
+    assert asked == [True, False, False, False]
 
 
 def test_who_drains_does_not_wait_for_what_is_put_meanwhile() -> None:

@@ -219,6 +219,10 @@ def test_a_head_that_lies_is_refused_or_a_keyframe(data: st.DataObject) -> None:
         (lambda head: head.update(session=True), "got True"),
         (lambda head: head.update(gravity=[0, 0, 2]), "expected a direction of length 1"),
         (lambda head: head.update(T_odom_camera=[1.0] * 16), "expected a rigid motion"),
+        (
+            lambda head: head.update(T_odom_camera=[1, 0, 0, 1e300, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]),
+            "expected a camera within 1e+08 m, got 1e+300 m",
+        ),
         (lambda head: head.update(camera='{"fx": 1}'), "expected fx fy cx cy width height"),
         (lambda head: head.update(camera=head["camera"].replace("160", "60000")), "expected pixels of a view"),
         (lambda head: head.pop("turned"), "turned"),

@@ -176,6 +176,26 @@ def test_the_node_ends_well_where_its_last_keyframes_cannot_be_stored(
     assert not list(node.publishers)  # it was destroyed
 
 
+def test_a_bug_in_one_of_the_last_keyframes_loses_no_other(
+    make: Making, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    node = with_two_to_store(make())
+    search, seen = node._registrar.search, list[FrameWindow]()
+
+    def broken_once(window: FrameWindow, *rest: Any) -> Outcome:
+        seen.append(window)
+        if len(seen) == 1:
+            raise KeyError("bug")
+        return search(window, *rest)
+
+    monkeypatch.setattr(node._registrar, "search", broken_once)
+    node.close()
+    assert "1 are lost: KeyError" in capfd.readouterr().err
+    left = Store(tmp_path / "place.db")
+    assert left.counts()["keyframes"] == 1
+    left.close()
+
+
 def test_a_keyframe_that_cannot_be_stored_is_not_in_the_way_of_the_next(
     make: Making, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -4,13 +4,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
+import pytest
 from registration.samples import SECOND, keyframe
 
 from objreg_ros.keyframes.frame_window import Arrival, Clock, SessionNumbers
+from objreg_ros.memory.compact import pack_keyframe
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store
-from objreg_ros.registrar.origins import Origins
+from objreg_ros.registrar.origins import Origins, arrival_of
 
 
 def _arrival(run: str, seconds: float, session: int = 0, robot: str = "robot1") -> Arrival:
@@ -51,3 +54,15 @@ def test_a_store_that_is_opened_anew_goes_on_with_the_same_sessions_and_knows_wh
     assert _sessions(again, _arrival("a", 5), _arrival("a", 6), _arrival("c", 6)) == [None, 3, 4]
     assert again.received(_arrival("a", 7))[1] == Clock(0, 3)  # type: ignore[index]
     assert stored.stamp_ns == 5 * SECOND and stored.origin == "a/0"
+
+
+@pytest.mark.parametrize("told", [{}, {"stamp_ns": 6 * SECOND}, {"frame_id": "other"}])
+def test_what_is_packed_is_what_the_header_tells_and_comes_under_the_robots_prefix(told: dict[str, object]) -> None:
+    header = {"stamp_ns": 5 * SECOND, "frame_id": "camera", "run": "a", "began_ns": 0, "first": 0, **told}
+    sent = SimpleNamespace(**header, packed=pack_keyframe(keyframe(0, 5)))
+    if told:
+        with pytest.raises(ValueError, match="expected the stamp and frame"):
+            arrival_of("robot1", sent)
+        return
+    arrived = arrival_of("robot1", sent).keyframe
+    assert (arrived.robot, arrived.frame_id, arrived.stamp_ns) == ("robot1", "robot1/camera", 5 * SECOND)

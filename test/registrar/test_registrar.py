@@ -16,7 +16,7 @@ from registration.samples import SECOND, candidate, keyframe
 
 from objreg_ros.data import Array, Frame, LoopClosure, Reason, Rejected
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
-from objreg_ros.keyframes.frame_window import Arrival
+from objreg_ros.keyframes.frame_window import Arrival, Clock
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import StoreError
@@ -485,6 +485,13 @@ def _arrived(registrar: Registrar, seconds: float, T: Array, robot: str, run: st
     (window,) = elsewhere.end()
     elsewhere.close()
     return registrar.receive(Arrival(fuse(window, PARAMS), window.clock, run))
+
+
+def test_of_a_keyframe_from_elsewhere_without_objects_nothing_comes() -> None:
+    registrar = Registrar(PARAMS)
+    bare = replace(rooms.keyframe(HERE), objects=(), robot="robot1")
+    assert registrar.receive(Arrival(bare, Clock(0, 0), "a")) == Outcome()
+    assert registrar.counts()["keyframes"] == 0
 
 
 def test_keyframes_from_elsewhere_close_loops_and_are_taken_once_though_the_registrar_starts_anew(
