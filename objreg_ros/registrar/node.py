@@ -119,12 +119,9 @@ class RegistrarNode(FramesDoor):
         return robot if topics else ""
 
     def _limit(self) -> Limit:
-        """How many keyframes may wait for their search."""
+        """How many keyframes may wait for their search. A robot that is behind cuts no other one's search short."""
         lanes = [*self._robots, *([""] if self._robot else [])]
-        jobs = max(WAITING_KEYFRAMES, 2 * BEHIND * len(lanes))
-        patience_s = (
-            math.inf if self._robots else PATIENCE_S
-        )  # a lane that is far behind cuts no other one's search short
+        jobs, patience_s = max(WAITING_KEYFRAMES, 2 * BEHIND * len(lanes)), math.inf if self._robots else PATIENCE_S
         return Limit(jobs, WAITING_BYTES, patience_s, dict.fromkeys(lanes, BEHIND))
 
     def adopt(self) -> None:
