@@ -34,7 +34,7 @@ from objreg_ros.memory.landmarks import Merge
 from objreg_ros.memory.migration import renew, renewed
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.memory.store_file import SCHEMA_VERSION, bear, check, connect, create, read_only_uri, require_place
-from objreg_ros.memory.transaction import OBJECTS, delete, rename_landmarks, write, write_closures
+from objreg_ros.memory.transaction import OBJECTS, SESSION, delete, rename_landmarks, write, write_closures
 from objreg_ros.registration.keyframe import Keyframe
 
 LEFT = "; it was left as it is. Use a copy of it or another path"
@@ -172,8 +172,7 @@ class Store:
                 delete(transaction, books, "keyframe", "WHERE id = ?", (keyframe_id,))
             books.forgotten += forgotten
         for keyframe_id in keyframe_ids:
-            self._cache.pop(keyframe_id, None)
-            self._heads.pop(keyframe_id, None)
+            self._cache.pop(keyframe_id, None), self._heads.pop(keyframe_id, None)
         self._shrink(STEP)
 
     def clear(self) -> None:
@@ -182,8 +181,7 @@ class Store:
             for table in ("closure", "object", "keyframe"):
                 delete(transaction, books, table)
             books.forgotten = 0
-        self._cache.clear()
-        self._heads.clear()
+        self._cache.clear(), self._heads.clear()
         self._shrink()
 
     def _shrink(self, most: int = 0) -> None:
@@ -214,8 +212,10 @@ class Store:
             return self._books.next("landmark")
 
     def next_session(self) -> int:
-        """The number of a session that nothing is stored of yet."""
-        return max((head["session"] for head in self._heads.values()), default=-1) + 1
+        """The number of a session that nothing is stored of yet, nor is a closure to it, as to a keyframe elsewhere."""
+        with self._told("number a session"):
+            (told,) = self._connection.execute(SESSION).fetchone()
+        return max([told, *(head["session"] for head in self._heads.values())]) + 1
 
     def sessions_beyond(self, robot: str, session: int, stamp_ns: int) -> frozenset[int]:
         """A robot's sessions before ``session``, up to the last that has a keyframe of ``stamp_ns`` or later."""

@@ -17,6 +17,7 @@ from objreg_ros.memory.landmarks import Merge
 from objreg_ros.memory.migration import insert
 
 OLDEST = "WHERE id IN (SELECT id FROM closure ORDER BY id LIMIT ?)"
+SESSION = "SELECT COALESCE(MAX(MAX(COALESCE(from_session, -1), COALESCE(to_session, -1))), -1) FROM closure"  # newest
 OBJECTS = f"SELECT {', '.join(LIGHT)}, seal FROM object"
 
 

@@ -37,7 +37,7 @@ class CameraTrack:
         self.hidden: frozenset[int] = frozenset()
         self.clock: Clock | None = None
         self.sessions: set[int] = set()  # of the run of the clock
-        self.newest_ns = 0
+        self.newest_ns, self.newest_id = 0, 0
 
     def begin(self, clock: Clock, hidden: frozenset[int], params: RegistrarParams) -> None:
         """Another run of the clock goes on from now."""
@@ -47,11 +47,15 @@ class CameraTrack:
     def see(self, keyframe: Keyframe) -> None:
         """Go on to a keyframe."""
         self.sessions.add(keyframe.session)
-        self.newest_ns = keyframe.stamp_ns
+        self.newest_ns, self.newest_id = keyframe.stamp_ns, keyframe.keyframe_id
 
     def goes_on_beside(self, clock: Clock) -> bool:
         """Whether its run of the clock goes on, as another camera of the robot begins one."""
         return self.clock is not None and self.newest_ns < clock.began_ns + GOES_ON_NS
+
+    def is_abreast(self, stamp_ns: int, keyframe_id: int) -> bool:
+        """Whether it has come to about this time, by a keyframe that came after the one of this id."""
+        return self.newest_id > keyframe_id and abs(self.newest_ns - stamp_ns) < GOES_ON_NS
 
     def settle(self, now_ns: int | None, recollection: Recollection) -> Outcome:
         """What waits no more: late constraints, which are written down, and refusals; all where there is no now."""
@@ -111,8 +115,18 @@ class CameraTracks(dict[Camera, CameraTrack]):
             hidden = self.hidden_from(clock, keyframe.camera, recollection.store)
             given_up = track.settle(None, recollection).rejected + clock_refusals(clock, hidden, keyframe)
             track.begin(clock, hidden, recollection.params)
+        self._show_beside(track, keyframe)
         track.see(keyframe)
         return given_up
+
+    def _show_beside(self, track: CameraTrack, keyframe: Keyframe) -> None:
+        """Hide no more what cameras of the robot see whose keyframes come in turn with those of this one.
+
+        Where a link was away, or this node, what it kept of one camera comes before what it kept of another.
+        """
+        for (robot, _), other in tuple(self.items()):
+            if robot == keyframe.robot and other.is_abreast(keyframe.stamp_ns, track.newest_id):
+                track.hidden, other.hidden = track.hidden - other.sessions, other.hidden - track.sessions
 
     def hidden_from(self, clock: Clock, camera: Camera, store: Store) -> frozenset[int]:
         """The sessions of a camera's robot that may have seen the time that the run of its clock goes through.

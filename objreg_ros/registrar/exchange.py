@@ -99,7 +99,10 @@ class Exchange:
         return len(self._wishes)
 
     def announce(self, outcome: Outcome) -> bytes | None:
-        """The summary of the keyframe that a search made, for all others; None where it made none, or keeps it not."""
+        """The summary of the keyframe that a search made, for all others.
+
+        None where it made none, or keeps it not, or where that is too large to be told.
+        """
         if outcome.keyframe_id is None:
             return None
         try:
@@ -113,7 +116,11 @@ class Exchange:
             summary = Summary(
                 name=name, frame_id=keyframe.frame_id, clock=clock, sightings=sightings, heard=dict(self._heard)
             )
-            return self._sent("summaries", pack_summary(summary))
+            try:
+                return self._sent("summaries", pack_summary(summary))
+            except ValueError:
+                self.books["dropped: too large to be told"] += 1
+                return None
 
     def hear(self, packed: bytes) -> bytes | None:
         """A request for the keyframe of a summary, where it may show a place that is stored here; else None.

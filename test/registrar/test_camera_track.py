@@ -12,6 +12,7 @@ from objreg_ros.keyframes.frame_window import Clock, SessionNumbers
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store
 from objreg_ros.registrar.camera_track import MOST_CAMERAS, CameraTracks, clock_refusals
+from objreg_ros.registrar.recollection import Recollection
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
 
@@ -77,3 +78,43 @@ def test_a_clock_that_hides_sessions_says_so_and_one_that_hides_none_says_nothin
     assert told.reason is Reason.CLOCK and told.to_ns == 20 * SECOND
     assert told.detail == "the clock began anew at 20.000 s; sessions up to 2 had seen that time before"
     assert clock_refusals(Clock(20 * SECOND, 3), frozenset(), shown) == ()
+
+
+def _goes_on(
+    recollection: Recollection, tracks: CameraTracks, camera: tuple[str, str], clock: Clock, seconds: float
+) -> None:
+    """A keyframe of the first session of a run of the clock is followed, and stored."""
+    store = recollection.store
+    robot, frame_id = camera
+    made = replace(
+        keyframe(store.next_keyframe(), seconds, session=clock.session),
+        robot=robot,
+        frame_id=frame_id,
+    )
+    tracks.go_on(made, clock, recollection)
+    store.add(made, sightings_of(made))
+
+
+def test_cameras_whose_keyframes_came_one_after_the_other_hide_nothing_once_they_go_on_together() -> None:
+    recollection, tracks = Recollection(PARAMS, Store()), _tracks()
+    front, rear = Clock(0, 0), Clock(0, 1)
+    for seconds in (0.0, 10.0, 20.0):  # what a link kept of the front camera, and of the rear one then
+        _goes_on(recollection, tracks, FRONT, front, seconds)
+    for seconds in (0.1, 10.1):
+        _goes_on(recollection, tracks, REAR, rear, seconds)
+    assert tracks.of(REAR).hidden == {0}
+    for camera, clock, seconds in ((REAR, rear, 20.1), (FRONT, front, 20.9), (REAR, rear, 21.1)):
+        _goes_on(recollection, tracks, camera, clock, seconds)
+    assert tracks.of(REAR).hidden == tracks.of(FRONT).hidden == frozenset()
+
+
+def test_what_the_other_camera_saw_before_the_clock_began_anew_stays_hidden_though_the_last_of_it_came_late() -> None:
+    recollection, tracks = Recollection(PARAMS, Store()), _tracks()
+    before, rear = Clock(0, 0), Clock(0, 1)
+    for seconds in (0.0, 20.0):
+        _goes_on(recollection, tracks, FRONT, before, seconds)
+    _goes_on(recollection, tracks, REAR, rear, 0.1)
+    _goes_on(recollection, tracks, FRONT, before, 20.5)
+    for seconds in (0.3, 20.4, 20.6):
+        _goes_on(recollection, tracks, REAR, rear, seconds)
+    assert tracks.of(REAR).hidden == {0}

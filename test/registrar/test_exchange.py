@@ -136,6 +136,27 @@ def test_sessions_of_others_have_numbers_that_none_of_ours_has() -> None:
     assert a.registrar.landmarks and a.registrar.landmarks[0].session not in (0, closure.to_session)
 
 
+def test_a_session_of_another_that_a_stored_closure_names_keeps_its_number_to_itself(tmp_path: Path) -> None:
+    params = PARAMS.replaced(store=str(tmp_path / "a.db"))
+    a, b = Robot("a", params), Robot("b")
+    a.sees(10, HERE)
+    (closure,) = a.fetches(b.sees(30, BESIDE), b).closures  # type: ignore[union-attr]
+    a.registrar.close()
+    again = Registrar(params)
+    assert again.take_session() not in (closure.from_session, closure.to_session)
+    again.close()
+
+
+def test_what_is_too_large_to_be_told_is_counted_and_its_outcome_stays() -> None:
+    a = Robot("a")
+    seen = _frame(10, HERE)
+    named = [replace(seen.objects[0], label=f"{k:0900d}", instance=k + 1) for k in range(480)]
+    a.registrar.track(replace(seen, objects=tuple(named), robot="a"))
+    (window,) = a.registrar.end()
+    assert a.exchange.announce(a.registrar.search(window)) is None
+    assert a.exchange.books == {"dropped: too large to be told": 1}
+
+
 def test_a_keyframe_without_objects_of_ours_is_not_asked_for() -> None:
     a, b = Robot("a"), Robot("b")
     assert a.exchange.hear(b.sees(30, HERE)) is None
