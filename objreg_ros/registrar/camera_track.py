@@ -75,9 +75,9 @@ class CameraTrack:
 
 
 class CameraTracks(dict[Camera, CameraTrack]):
-    """One for each camera of each robot; of more than `MOST_CAMERAS` the oldest goes.
+    """One for each camera of each robot; of more than `MOST_CAMERAS` the oldest goes but for ``followed``.
 
-    ``followed`` is that of the newest frame.
+    That is the one of the newest frame.
     """
 
     def __init__(self, params: RegistrarParams, numbers: SessionNumbers) -> None:
@@ -90,7 +90,7 @@ class CameraTracks(dict[Camera, CameraTrack]):
         if camera not in self:
             self[camera] = CameraTrack(self._params, self._numbers)
             while len(self) > MOST_CAMERAS:
-                del self[next(iter(self))]
+                del self[next(oldest for oldest, track in tuple(self.items()) if track is not self.followed)]
         return self[camera]
 
     def follow(self, frame: Frame) -> CameraTrack:

@@ -234,6 +234,7 @@ class RegistrarNode(FramesDoor):
         """
         with self._tracking:
             waiting = self.searcher.rest()
+            self.searcher.drain()  # what is in hand may still be unpacked, and would be stored after the reset
             try:
                 self._registrar.reset()
                 self._counts = dict(self._registrar.counts())
@@ -255,7 +256,9 @@ class RegistrarNode(FramesDoor):
         try:
             with self._tracking:
                 self.searcher.drain()
-                self._publish(self._registrar.finish(self._seconds, self.searcher.hurried))
+                for window in self._registrar.end():
+                    self._publish(self._outcome(window, self._seconds))
+                self._publish(self._registrar.settle())
             return True, self._registrar.save()
         except (ValueError, OSError) as error:
             return False, str(error)

@@ -140,7 +140,7 @@ def _summary(head: Head, rest: bytes) -> Summary:
         "stamp_ns": whole(head, "stamp_ns", limits.LEAST_STAMP_NS, limits.MOST_STAMP_NS),
         "travelled": real(head, "travelled", limits.MOST_DISTANCE),
         "by_odometry": bool(whole(head, "by_odometry", 0, 1)),
-        "robot": text(head, "robot"),
+        "robot": _robot(head),
         "score": 0.0,
         "extent": 0.0,
         "camera": np.zeros(3),
@@ -156,6 +156,13 @@ def _summary(head: Head, rest: bytes) -> Summary:
             for k, (label, position, descriptor) in objects
         ),
     )
+
+
+def _robot(head: Head) -> str:
+    """Whose keyframe it is: a closure to nobody's could be anyone's."""
+    if not (robot := text(head, "robot")):
+        raise ValueError("robot: expected the name of one, got none")
+    return robot
 
 
 def _clock(head: Head) -> Clock:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from registration.samples import SECOND, keyframe
+from registration.samples import SECOND, frame, keyframe
 
 from objreg_ros.data import Reason
 from objreg_ros.keyframes.frame_window import Clock, SessionNumbers
@@ -41,6 +41,14 @@ def test_each_camera_of_each_robot_has_a_track_of_its_own_and_of_too_many_the_ol
     for k in range(MOST_CAMERAS):
         tracks.of(("robot", str(k)))
     assert len(tracks) == MOST_CAMERAS and FRONT not in tracks
+
+
+def test_the_camera_that_is_followed_here_stays_however_many_others_there_are() -> None:
+    tracks = _tracks()
+    here = tracks.follow(frame(0, ()))
+    for k in range(2 * MOST_CAMERAS):
+        tracks.of(("robot", str(k)))
+    assert tracks.follow(frame(1, ())) is here and len(tracks) == MOST_CAMERAS
 
 
 def test_sessions_of_another_robot_at_the_same_time_are_not_hidden_and_own_earlier_ones_are() -> None:

@@ -9,19 +9,22 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 import rclpy
 from rclpy.parameter import Parameter
-from registration.samples import SECOND, box, frame
+from registration.samples import SECOND, box, frame, keyframe
 from std_srvs.srv import Trigger
 
 from objreg_ros.bridge.diagnostics import refusal_of
+from objreg_ros.bridge.keyframes_in import FromRobot
+from objreg_ros.bridge.keyframes_msg import SentKeyframe
 from objreg_ros.data import Reason, Rejected
 from objreg_ros.geometry import pose
-from objreg_ros.keyframes.frame_window import FrameWindow
+from objreg_ros.keyframes.frame_window import Arrival, Clock, FrameWindow
 from objreg_ros.memory.store import Store
 from objreg_ros.registrar.node import Job, RegistrarNode
 from objreg_ros.registrar.outcome import Outcome
@@ -135,6 +138,38 @@ def test_the_keyframe_that_a_save_ends_comes_after_those_that_wait(
     node._registrar.track(frame(20, CUP))
     answer, _ = call(node, "save")
     assert answer.success and stored == [0, 10, 20]
+    node.close()
+
+
+def test_others_are_told_of_the_keyframe_that_a_save_ends(make: Making) -> None:
+    node, told = make(), []
+    node._robot, node._exchange = "robot", SimpleNamespace(announce=lambda outcome: outcome.keyframe_id)
+    node._others = SimpleNamespace(tell=lambda stamp_ns, summary: told.append((stamp_ns, summary)), close=lambda: None)
+    node._registrar.track(frame(20, CUP))
+    assert node._settle_and_save()[0] and told == [(20 * SECOND, 1)]
+    node.close()
+
+
+def test_a_keyframe_that_is_being_unpacked_is_not_stored_after_a_reset(
+    make: Making, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node, begun = make(), threading.Event()
+    arrival = Arrival(keyframe(0, 5), Clock(0, 0), "a" * 32)
+
+    def unpacked_slowly(*_: object) -> Arrival:
+        begun.set()
+        time.sleep(0.3)
+        return arrival
+
+    monkeypatch.setattr("objreg_ros.registrar.node.arrival_of", unpacked_slowly)
+    node._keyframes = SimpleNamespace(count=lambda robot, what: None)
+    node.accept(5 * SECOND)
+    sent = SentKeyframe(5 * SECOND, "camera", "a" * 32, 0, 0, b"packed")
+    node.searcher.put(Job(5 * SECOND, FromRobot("robot", sent), time.monotonic()))
+    assert begun.wait(10.0)
+    assert node._forget()[0]
+    node.searcher.drain()
+    assert node._registrar.counts()["keyframes"] == 0
     node.close()
 
 

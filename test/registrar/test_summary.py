@@ -127,6 +127,7 @@ def test_anything_under_a_checksum_that_holds_is_refused_or_read(noise: bytes, a
 @pytest.mark.parametrize(
     ("lie", "said"),
     [
+        (lambda head: head.update(robot=""), "robot: expected the name of one, got none"),
         (lambda head: head.update(labels=head["labels"] * 200), "expected objects of 1 to 500, got 600"),
         (lambda head: head.update(labels=[]), "expected objects of 1 to 500, got 0"),
         (lambda head: head.update(labels=["cup"]), "expected 66 bytes of 1 objects, got 198"),
