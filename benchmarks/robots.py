@@ -45,7 +45,7 @@ from objreg_ros.registrar.warm import warm
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.report.revisits import Seen
 from objreg_ros.report.trajectory_error import absolute_trajectory_error
-from objreg_ros.simulation.write import simulate
+from objreg_ros.simulation.write import simulate_fleet
 from objreg_ros.truth import FALSE, Truth, Truths, within
 
 PARAMS = RegistrarParams(seed=1).replaced(**SIMULATED)
@@ -292,7 +292,7 @@ def simulated(seed: int, frames: int, folder: Path) -> Path:
     """The recordings of one seed, made where they are not there yet."""
     path = folder / f"robots_{seed}_{frames}"
     if not path.exists():
-        simulate(path, "robots", seed, frames, jpeg=True)
+        simulate_fleet(path, "robots", seed, frames, jpeg=True)
     return path
 
 

@@ -3,6 +3,10 @@
 
 from __future__ import annotations
 
+import importlib.util
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +25,7 @@ from objreg_ros.data import Array, Frame, LoopClosure, Odometry
 from objreg_ros.geometry import inverse, pose, pose_error
 from objreg_ros.memory.store import Store
 
-from .graph import Graph
+from .graph import START_S, Graph
 from .test_relocalised import BESIDE, HERE, frame
 
 pytestmark = pytest.mark.ros
@@ -30,6 +34,19 @@ SECOND = 1_000_000_000
 MOUNT = "-p T_base_camera:=[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]"
 BEHIND = pose(np.eye(3), np.array([0.05, 0.1, 0.0]))  # a step aside
 SEEN = {"r1": (HERE, HERE @ BEHIND), "r2": (BESIDE, BESIDE @ BEHIND)}
+
+
+RMWS = "rmw_fastrtps_cpp", "rmw_cyclonedds_cpp", "rmw_zenoh_cpp"
+SAID = """
+import rclpy
+from rclpy.utilities import get_rmw_implementation_identifier
+from objreg_ros.keyframes.node import KeyframerNode
+rclpy.init()
+node = KeyframerNode()
+topics = [publisher.topic_name for publisher in node.publishers]
+print(get_rmw_implementation_identifier(), *(topic for topic in topics if topic.endswith("keyframes")))
+node.close()
+"""
 
 
 @pytest.fixture
@@ -153,3 +170,16 @@ def test_two_registrars_that_each_keep_a_store_close_loops_between_their_robots(
         stored = Store(tmp_path / f"{robot}.db", read_only=True)
         assert {stored.keyframe(k).robot for k in stored.keyframe_ids()} == {robot}
         stored.close()
+
+
+@pytest.mark.parametrize("rmw", RMWS)
+def test_a_keyframer_publishes_under_any_rmw_that_is_installed(fleet: Graph, rmw: str) -> None:
+    prefixes = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+    if importlib.util.find_spec(rmw) is None and not any((Path(p) / "share" / rmw).is_dir() for p in prefixes if p):
+        pytest.skip(f"{rmw} is not installed")
+    environment = {**fleet.environment(), "RMW_IMPLEMENTATION": rmw}
+    said = subprocess.run(
+        [sys.executable, "-c", SAID], env=environment, capture_output=True, text=True, timeout=START_S
+    )
+    assert said.returncode == 0, said.stderr
+    assert said.stdout.split()[-2:] == [rmw, "/keyframes"]
