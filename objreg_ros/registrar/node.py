@@ -200,7 +200,7 @@ class RegistrarNode(FramesDoor):
             self._whereabouts.look()
             if outcome.keyframe_ns is not None:
                 seen = outcome.observations, outcome.keyframe_ns, outcome.frame_id
-                self._announcements.landmarks(*seen, self.names, outcome.session, outcome.robot)
+                self._announcements.landmarks(*seen, self.names_of(outcome.robot), outcome.session, outcome.robot)
                 self._scene.settle(outcome.keyframe_ns, outcome.closures, outcome.rejected)
                 objects = [(known.landmark, known.label, known.position) for known in self._registrar.landmarks_here]
                 self._announcements.markers(self._scene.markers(objects, outcome.keyframe_ns, self.odom_frame))
