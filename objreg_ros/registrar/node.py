@@ -256,7 +256,7 @@ class RegistrarNode(FramesDoor):
             with self._tracking:
                 self.searcher.drain()
                 for window in self._registrar.end():
-                    self._publish(self._outcome(window, self._seconds))
+                    self._publish(self._outcome(window, self._seconds) or Outcome())
                 self._publish(self._registrar.settle())
             return True, self._registrar.save()
         except (ValueError, OSError) as error:
