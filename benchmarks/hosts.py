@@ -131,14 +131,18 @@ class Hosts:
         variables = {**(os.environ if environment is None else environment), "HOST": str(host)}
         return subprocess.Popen(["ip", "netns", "exec", self.names[host], *memory, *command], env=variables)
 
-    def pause(self, seconds: float) -> None:
-        """Nothing comes through for so long. Returns at once where a relay carries the frames, else after the pause."""
+    def pause(self, seconds: float, hosts: Sequence[int] | None = None) -> None:
+        """Nothing comes to these hosts or from them for so long, to any where None.
+
+        Returns at once where a relay carries the frames, else after the pause.
+        """
         if self.relay is not None:
-            return self.relay.pause(seconds)
-        for port in self._bridge_ports:
+            return self.relay.pause(seconds, hosts)
+        ports = self._bridge_ports if hosts is None else [self._bridge_ports[host] for host in hosts]
+        for port in ports:
             ip("link", "set", port, "nomaster")
         time.sleep(seconds)
-        for port in self._bridge_ports:
+        for port in ports:
             ip("link", "set", port, "master", self._bridge)
 
     def bytes_sent(self, host: int) -> int:

@@ -2,7 +2,8 @@
 """A link that is slow, late and loses frames, and the relay that carries Ethernet frames between hosts over such links.
 
 Every host sends over a link of its own. A frame waits until those before it are sent, as long as the queue has room,
-takes its time at the link's rate, is lost or not, and arrives after the delay. A pause loses all that is sent in it.
+takes its time at the link's rate, is lost or not, and arrives after the delay. A pause loses all that is sent in it,
+and all that is sent to the host.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import select
 import threading
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 LONGEST_FRAME = 65_536  # bytes
@@ -55,6 +56,9 @@ class Link:
     def pause(self, until_s: float) -> None:
         self._paused_until_s = until_s
 
+    def is_paused(self, now_s: float) -> bool:
+        return now_s < self._paused_until_s
+
     def arrival_s(self, now_s: float, size: int) -> float | None:
         """When a frame of so many bytes that is sent now arrives; None where it is lost."""
         self.longest_bytes = max(self.longest_bytes, size)
@@ -63,7 +67,7 @@ class Link:
         return arrival_s
 
     def _send(self, now_s: float, size: int) -> tuple[str, float | None]:
-        if now_s < self._paused_until_s:
+        if self.is_paused(now_s):
             return "paused", None
         rate = self._conditions.bits_per_second / 8
         start_s = max(now_s, self._free_s)
@@ -103,9 +107,10 @@ class Relay(threading.Thread):
         self._numbers = itertools.count()
         self._ended = threading.Event()
 
-    def pause(self, seconds: float) -> None:
-        for link in self.links:
-            link.pause(time.monotonic() + seconds)
+    def pause(self, seconds: float, ports: Iterable[int] | None = None) -> None:
+        """Nothing comes or goes by these ports for so long, by any where None."""
+        for port in range(len(self.links)) if ports is None else ports:
+            self.links[port].pause(time.monotonic() + seconds)
 
     def stop(self) -> None:
         self._ended.set()
@@ -119,10 +124,12 @@ class Relay(threading.Thread):
             self._deliver(time.monotonic())
 
     def _take(self, port: int, frame: bytes) -> None:
-        arrival_s = self.links[port].arrival_s(time.monotonic(), len(frame))
+        now_s = time.monotonic()
+        arrival_s = self.links[port].arrival_s(now_s, len(frame))
         if arrival_s is not None:
             for target in self._switch.targets(port, frame):
-                heapq.heappush(self._under_way, (arrival_s, next(self._numbers), target, frame))
+                if not self.links[target].is_paused(now_s):
+                    heapq.heappush(self._under_way, (arrival_s, next(self._numbers), target, frame))
 
     def _deliver(self, now_s: float) -> None:
         while self._under_way and self._under_way[0][0] <= now_s:

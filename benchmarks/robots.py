@@ -7,8 +7,9 @@
 A FOLDER holds a recording for each robot, as `objreg simulate --scenario robots` writes them. ``one registrar`` takes
 all frames by their stamps; ``packed`` takes the keyframes that each robot made, packed to be sent and unpacked; of
 ``each its own`` every robot has a registrar, which asks for what the summaries of others promise (``--kilobytes`` a
-second). Meetings are as `fleet` tells them. ``map_cm`` is the error of one map of all robots (aligned once), of the map
-with the same closures and perfect ties between robots, and of odometry; ``alone_cm`` that of each robot's own map.
+second; ``kB_per_s`` is what it sent from its first frame to the last of all). Meetings are as `fleet` tells them.
+``map_cm`` is the error of one map of all robots (aligned once), of the map with the same closures and perfect ties
+between robots, and of odometry; ``alone_cm`` that of each robot's own map.
 """
 
 from __future__ import annotations
@@ -166,15 +167,13 @@ def each_its_own(team: Team, kilobytes: float) -> tuple[list[LoopClosure], dict[
         registrar.close()
     return peers.closures, {
         "summary_bytes": dict(zip(("p50", "most"), np.percentile(peers.sizes, (50, 100)).tolist(), strict=True)),
-        "kB_per_s": {name: _rate(exchange, team[name]) for name, exchange in peers.exchanges.items()},
+        "kB_per_s": {
+            name: 1e-3 * exchange.books["bytes sent"] / (now - 1e-9 * team[name].frames[0].stamp_ns)
+            for name, exchange in peers.exchanges.items()
+        },
         "books": {name: dict(sorted(exchange.books.items())) for name, exchange in peers.exchanges.items()},
         "waiting": {name: exchange.waiting for name, exchange in peers.exchanges.items()},
     }
-
-
-def _rate(exchange: Exchange, robot: Robot) -> float:
-    """What was sent, in kB for each second of the robot's recording."""
-    return 1e6 * exchange.books["bytes sent"] / (robot.frames[-1].stamp_ns - robot.frames[0].stamp_ns)
 
 
 def in_common(moments: Sequence[Sequence[Any]], others: Sequence[Sequence[Any]]) -> dict[str, int]:

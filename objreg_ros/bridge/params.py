@@ -62,4 +62,4 @@ class ExchangeParams(Params):
     exchange: str = param(
         "", "namespace of the topics by which registrars of several robots exchange keyframes, as /fleet; empty: none"
     )
-    exchange_kilobytes: float = param(50.0, "most that is told to the others, on average", "kB/s", ge=0.1)
+    exchange_kilobytes: float = param(150.0, "most that is told to the others, on average", "kB/s", ge=0.1)

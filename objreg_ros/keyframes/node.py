@@ -5,9 +5,12 @@ from __future__ import annotations
 
 import math
 import sys
+import threading
+import time
 import uuid
 from typing import Any
 
+from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import CompressedImage
 
 from objreg_ros.bridge import qos
@@ -22,11 +25,12 @@ from objreg_ros.bridge.transforms import hear_mount
 from objreg_ros.bridge.worker import Backlog, Limit
 from objreg_ros.keyframes.frame_window import FrameWindow
 from objreg_ros.keyframes.fusion import fuse
-from objreg_ros.keyframes.keyframer import Keyframer
+from objreg_ros.keyframes.keyframer import SILENCE_S, Keyframer
 from objreg_ros.keyframes.warm import warm
 from objreg_ros.memory.compact import pack_keyframe
 from objreg_ros.registration.params import KeyframeParams, KeyframerNodeParams
 
+LOOK_S = 1.0  # between two looks at whether frames still come
 WAITING = Limit(8, 200_000_000, math.inf)  # keyframes that wait to be fused and packed
 
 
@@ -46,11 +50,14 @@ class KeyframerNode(FramesDoor):
         await_kernels(lambda: warm(self.settings.of(KeyframeParams)), self.get_logger().info)
         self._run = uuid.uuid4().hex
         self._keyframer = Keyframer(self.settings.of(KeyframeParams))
+        self._tracking = threading.Lock()
+        self._seen_s = math.inf  # when the last frame was followed, by `time.monotonic`
         self._sent, self._sent_bytes = 0, 0
         self._keyframes = self.create_publisher(CompressedImage, "keyframes", qos.latched(qos.KEPT_KEYFRAMES))
         self._sender: Backlog[tuple[int, FrameWindow]] = Backlog(
             self._send, self._send, self.fail, WAITING, lambda job: job[1].nbytes
         )
+        self.create_timer(LOOK_S, self._end_what_rests, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.listen_to_frames(mount, round(inputs.odom_slop * 1e9))
 
     def adopt(self) -> None:
@@ -60,11 +67,23 @@ class KeyframerNode(FramesDoor):
     def compute(self, stamp_ns: int, payload: Match) -> bool:
         """Follow one frame; what becomes a keyframe goes on to be sent."""
         frame, _ = self.frame_of(payload)
-        with self.ledger.timed("track"):
+        with self._tracking, self.ledger.timed("track"):
             window = self._keyframer.add(frame)
+            self._seen_s = time.monotonic()
         if window is not None:
             self._sender.put((stamp_ns, window))
         return window is None
+
+    def _end_what_rests(self) -> None:
+        """Send the keyframe in hand once no frame came for a while: none that follows ends it."""
+        with self._tracking:
+            if time.monotonic() - self._seen_s < SILENCE_S:
+                return
+            self._seen_s, window = math.inf, self._keyframer.finish()
+        if window is not None:
+            stamp_ns = window.frames[-1].stamp_ns
+            self.accept(stamp_ns)
+            self._sender.put((stamp_ns, window))
 
     def _send(self, job: tuple[int, FrameWindow]) -> None:
         stamp_ns, window = job
@@ -88,7 +107,7 @@ class KeyframerNode(FramesDoor):
         return {**super().extra_diagnostics(), "keyframes sent": self._sent, **mean, **lost}
 
     def shut(self) -> None:
-        """Send what is left, and end both workers."""
+        """Send what is left, unless a signal has ended ROS before, and end both workers."""
         self.end_aside()
         self.end_work()
         self._sender.drain()

@@ -4,9 +4,9 @@
 `registrar` is the facade over `objreg_ros.keyframes`, `objreg_ros.memory` and `objreg_ros.registration`: `track` for
 every frame, `search` for every keyframe, `process` for both, with an `outcome` each. A `candidate_search` tries stored
 keyframes; what a registered pair comes to is a `closure` or a refusal, or waits for its `confirmation` by others whose
-`consistency` with it odometry tells. `relocalisation` says where the camera is in the map of an earlier session. Each
-camera of each robot has a `camera_track`; `origins` numbers the keyframes that were made elsewhere; `thinning` leaves
-out what would be said twice; a `recollection` keeps store, index and landmarks in step. Registrars of several robots
-`exchange` keyframes by a `summary` of each. `warm` compiles every kernel before the first frame comes; `node` is the
-door.
+`consistency` with it odometry tells. What is stored, and what is known of it in memory, is the `recollection`.
+`relocalisation` says where the camera is in the map of an earlier session. Each camera of each robot has a
+`camera_track`; `origins` numbers the keyframes that were made elsewhere; `thinning` leaves out what would be said
+twice. An `exchange` tells the registrars of other robots a `summary` of each keyframe, and fetches what looks alike.
+`warm` compiles every kernel before the first frame comes; `node` is the door.
 """

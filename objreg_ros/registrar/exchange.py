@@ -145,7 +145,7 @@ class Exchange:
             return self._sent("requests", pack_request(Request(summary.name, ours[0].votes)))
 
     def note(self, packed: bytes, now: float) -> None:
-        """Let a request wait for `answer`; ValueError where the bytes are none."""
+        """Let a request wait for `answer`: what several wish for promises more. ValueError where the bytes are none."""
         request = unpack_request(packed)
         if request.name.run != self.run:
             return
@@ -153,7 +153,7 @@ class Exchange:
         with self._lock:
             self.books["requests heard"] += 1
             before = self._wishes.get(number, _Wish(0.0, now))
-            self._wishes[number] = _Wish(max(before.votes, request.votes), before.since)
+            self._wishes[number] = _Wish(before.votes + request.votes, before.since)
             if len(self._wishes) > MOST_WAITING:
                 self._give_up(min(self._wishes, key=lambda n: self._wishes[n].votes), "crowded")
 

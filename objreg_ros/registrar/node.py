@@ -6,6 +6,7 @@ Or the keyframes of robots in, which track by themselves (`keyframes/node.py`).
 
 from __future__ import annotations
 
+import math
 import sys
 import threading
 import time
@@ -43,7 +44,7 @@ from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 PATIENCE_S = 1.0  # a newer keyframe waits before the search in hand is cut short, if some were overtaken of late
 WAITING_KEYFRAMES = 8  # most that wait for a search; no frame is followed while so many do
 WAITING_BYTES = 200_000_000  # most memory of those
-BEHIND = 32  # keyframes of a robot that may wait for their search: those of a link that was away come all at once
+BEHIND = 64  # keyframes of a robot that may wait for their search: those of a link that was away come all at once
 GIVING_WAY = 10  # niceness of the search: the next image must not wait for it
 
 
@@ -118,10 +119,10 @@ class RegistrarNode(FramesDoor):
         return robot if topics else ""
 
     def _limit(self) -> Limit:
-        """How many keyframes may wait for their search."""
+        """How many keyframes may wait for their search. A robot that is behind cuts no other one's search short."""
         lanes = [*self._robots, *([""] if self._robot else [])]
-        jobs = max(WAITING_KEYFRAMES, 2 * BEHIND * len(lanes))
-        return Limit(jobs, WAITING_BYTES, PATIENCE_S, dict.fromkeys(lanes, BEHIND))
+        jobs, patience_s = max(WAITING_KEYFRAMES, 2 * BEHIND * len(lanes)), math.inf if self._robots else PATIENCE_S
+        return Limit(jobs, WAITING_BYTES, patience_s, dict.fromkeys(lanes, BEHIND))
 
     def adopt(self) -> None:
         """Live parameters hold from the next frame and the next search on."""

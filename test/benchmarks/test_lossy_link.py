@@ -105,3 +105,21 @@ def test_the_relay_carries_frames_whole_and_late_and_not_in_a_pause(
     with pytest.raises(TimeoutError):
         third.recv(100)
     assert relay.links[0].counts == {"carried": 1, "paused": 1}
+
+
+def test_a_pause_of_one_port_cuts_that_one_off_both_ways_and_leaves_the_others(
+    lossy_link: ModuleType, wires: list[tuple[socket.socket, socket.socket]]
+) -> None:
+    relay = lossy_link.Relay([inner.fileno() for _, inner in wires], lossy_link.Conditions())
+    relay.start()
+    (first, _), (second, _), (third, _) = wires
+    relay.pause(60.0, [0])
+    first.send(ALL + A + b"lost")
+    second.send(ALL + B + b"to the third")
+    for end, words in ((third, [ALL + B + b"to the third"]), (second, []), (first, [])):
+        end.settimeout(5.0 if words else 0.05)
+        assert [end.recv(100) for _ in words] == words
+        end.settimeout(0.05)
+        with pytest.raises(TimeoutError):
+            end.recv(100)
+    relay.stop()

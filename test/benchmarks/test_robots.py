@@ -98,3 +98,26 @@ def test_a_way_is_told_in_one_line(robots: ModuleType) -> None:
     told = robots.line("seed1 packed", {**row, "alone_cm": {"a": 1.25, "b": None}})
     assert told.startswith("seed1 packed") and "8 constraints, 2 false; between robots 3 (1 false)" in told
     assert "stretches 2/9, keyframes 4/30; map 4.0 cm, perfect ties - cm, alone 1.2, - cm" in told
+
+
+def test_each_its_own_ties_the_robots_and_says_what_it_sent(robots: ModuleType) -> None:
+    two = team(robots)
+    closures, said = robots.each_its_own(two, 0.0)
+    between = [closure for closure in closures if closure.from_robot != closure.to_robot]
+    assert between and all(closure.from_ns < closure.to_ns for closure in between)
+    for name, seconds in (("a", 5), ("b", 4)):
+        books = said["books"][name]
+        assert said["kB_per_s"][name] == pytest.approx(1e-3 * books["bytes sent"] / seconds)
+        assert books["summaries sent"] == 3 and said["waiting"][name] == 0
+    assert 200 < said["summary_bytes"]["p50"] <= said["summary_bytes"]["most"] < 2000
+
+
+def test_closures_are_in_common_within_a_second_at_both_ends_whichever_is_named_first(robots: ModuleType) -> None:
+    one = [["a", "b", 0, 10 * SECOND], ["a", "b", 0, 20 * SECOND], ["a", "a", 0, 10 * SECOND]]
+    other = [["b", "a", 10.5 * SECOND, 0], ["a", "b", 2 * SECOND, 20 * SECOND], ["a", "c", 0, 20 * SECOND]]
+    assert robots.in_common(one, other) == {"common": 1, "of": 2}
+    assert robots.in_common(other, one) == {"common": 1, "of": 3}
+
+
+def test_each_its_own_is_run_once_for_each_number_of_kilobytes(robots: ModuleType) -> None:
+    assert list(robots.chosen("packed,each its own", "0,20")) == ["packed", "each its own", "each its own, 20 kB/s"]

@@ -91,3 +91,19 @@ def test_a_keyframe_is_thinned_for_the_sake_of_its_size(make: Making, monkeypatc
     see(node, 1, 0.0)
     node.close()
     assert asked == [10_000]
+
+
+def test_the_keyframe_in_hand_is_sent_once_no_frame_came_for_a_while(
+    make: Making, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    node, now = make(), [100.0]
+    monkeypatch.setattr("objreg_ros.keyframes.node.time.monotonic", lambda: now[0])
+    sent = heard(node, monkeypatch)
+    see(node, 1, 0.0)
+    for seconds in (101.0, 104.9, 105.1, 120.0):
+        now[0] = seconds
+        node._end_what_rests()
+        node._sender.drain()
+        assert len(sent) == (seconds > 105.0)
+    assert node.ledger.balance().published == 2 and not node.ledger.balance().waiting
+    node.close()

@@ -225,7 +225,7 @@ def test_every_pair_of_three_robots_is_looked_at_once() -> None:
 def test_the_most_promising_is_answered_first_and_one_answer_serves_all() -> None:
     b = Robot("b")
     b.sees(1, HERE), b.sees(2, AWAY), b.sees(3, BESIDE)
-    for number, votes in ((1, 2.0), (2, 1.0), (3, 2.5), (2, 3.0)):
+    for number, votes in ((1, 2.0), (2, 1.5), (3, 2.5), (2, 1.5)):
         b.exchange.note(pack_request(Request(Name("b", number), votes)), NOW)
     assert b.exchange.waiting == 3
     order = [module.unpack_delivery(packed)[0].keyframe_id for packed in iter(lambda: b.exchange.answer(NOW), None)]

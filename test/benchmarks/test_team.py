@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Robots live: which constraints two runs have in common, when a run is over, and how it is started."""
+
+from __future__ import annotations
+
+import importlib
+import signal
+import sys
+import time
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import click
+import pytest
+from click.testing import CliRunner
+
+SECOND = 1_000_000_000
+
+
+@pytest.fixture
+def team() -> ModuleType:
+    pytest.importorskip("rclpy", reason="the benchmark runs nodes of ROS 2")
+    return importlib.import_module("team")
+
+
+def moments(from_robot: str, from_s: float, to_robot: str, to_s: float) -> list[Any]:
+    return [from_robot, to_robot, round(from_s * SECOND), round(to_s * SECOND)]
+
+
+def test_constraints_are_alike_a_second_off_and_from_either_end(team: ModuleType) -> None:
+    one = moments("r1", 10.0, "r2", 20.0)
+    assert team.are_alike(one, moments("r1", 10.9, "r2", 19.1))
+    assert team.are_alike(one, moments("r2", 20.5, "r1", 9.5))
+    assert not team.are_alike(one, moments("r1", 11.1, "r2", 20.0))
+    assert not team.are_alike(one, moments("r2", 10.0, "r1", 20.0))
+    assert not team.are_alike(one, moments("r1", 10.0, "r1", 20.0))
+
+
+def test_each_constraint_is_in_common_once(team: ModuleType) -> None:
+    base = [moments("r1", 10.0, "r2", 20.0), moments("r1", 10.5, "r2", 20.0), moments("r1", 5.0, "r1", 50.0)]
+    assert team.in_common(base, [moments("r2", 20.0, "r1", 10.2), moments("r1", 50.0, "r1", 5.0)]) == 2
+    assert team.in_common(base, base[::-1]) == 3
+
+
+def test_a_run_is_over_when_every_keyframe_of_every_frame_was_searched_for(team: ModuleType) -> None:
+    keyframer = {"received": "9", "waiting": "0", "keyframes sent": "2"}
+    told = {"r1/keyframer": keyframer, "registrar": {"received": "2", "waiting": "0"}}
+    assert team.is_settled(told, {"r1": 9})
+    assert not team.is_settled(told, {"r1": 10})
+    assert not team.is_settled({**told, "registrar": {"received": "1", "waiting": "0"}}, {"r1": 9})
+    assert not team.is_settled({**told, "registrar": {"received": "2", "waiting": "1"}}, {"r1": 9})
+    assert not team.is_settled({**told, "r1/keyframer": {**keyframer, "waiting": "1"}}, {"r1": 9})
+
+
+def test_trouble_is_a_loss_and_a_pause(team: ModuleType) -> None:
+    assert team.trouble_of("0.2:30").name == "hosts, 20% lost, pause of 30 s"
+    assert team.trouble_of("0").name == "hosts, 0% lost"
+    with pytest.raises(click.BadParameter, match="expected LOSS:PAUSE"):
+        team.trouble_of("bad")
+
+
+def test_hosts_without_root_are_refused_in_one_line(
+    team: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("os.geteuid", lambda: 1000)
+    result = CliRunner().invoke(team.main, [str(tmp_path), "--trouble", "0:0"])
+    assert result.exit_code == 1 and "expected to run as root" in result.output
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes die with the script on Linux only")
+def test_what_was_started_here_ends_with_the_run(team: ModuleType) -> None:
+    with team.Here() as here:
+        started = time.monotonic()
+        process = here.start(0, ["sleep", "60"], {})
+    assert process.returncode == -signal.SIGKILL and time.monotonic() - started < 10.0
