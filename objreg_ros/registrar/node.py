@@ -85,9 +85,8 @@ class RegistrarNode(FramesDoor):
 
     def _open_to(self, inputs: RegistrarNodeParams, refused: ExitStack) -> None:
         self._tracking, self._telling = threading.Lock(), threading.Lock()
-        self._enabled = True
+        self._enabled, self._unsearched = True, 0
         self._counts = dict(self._registrar.counts())
-        self._unsearched = 0
         self._scene = Scene()
         self._robots = prefixes_of(self, list(inputs.cameras)) if inputs.robots else {}
         self._robot = self._asked_to_exchange()
