@@ -25,7 +25,7 @@ class FramesDoor(MatchingDoor):
         """As any door; nothing is known of labels and odometry."""
         super().prepare()
         self.without_odometry = 0  # frames
-        self.names = dict[int, str]()
+        self._names = dict[str, dict[int, str]]()  # by robot
         self.odom_frame = "odom"
         self._camera: str | None = None  # the frame_id of the last frame
 
@@ -49,12 +49,16 @@ class FramesDoor(MatchingDoor):
         """Whether the segmenter is in this process and hands its words over."""
         return self.indoors.offers(self.resolve_topic_name("objects"))
 
-    def hear_labels(self, message: Any) -> None:
-        """Learn what numbers are called."""
+    def hear_labels(self, message: Any, robot: str = "") -> None:
+        """Learn what numbers are called; robots may call one otherwise."""
         names = self.read_aside("labels", from_msg.labels, message)
         if names is not None:
-            self.names = {**self.names, **names}
+            self._names[robot] = {**self._names.get(robot, {}), **names}
             self.feed("labels", 0, names)
+
+    def names_of(self, robot: str) -> dict[int, str]:
+        """What numbers are called by a robot, or by the only one there is."""
+        return self._names.get(robot) or self._names.get("", {})
 
     def _hear_odom(self, message: Any) -> None:
         odometry = self.read_aside("odom", from_msg.odometry, message)

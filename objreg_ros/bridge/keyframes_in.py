@@ -53,7 +53,7 @@ class KeyframesIn:
         self._counts = Counter[tuple[str, str]]()  # by robot, and what became of its keyframes
         self._frames = dict[tuple[str, str], str]()  # of the camera of each robot and topic
         for (robot, prefix), names in zip(prefixes.items(), cameras, strict=True):
-            door.listen(String, f"{prefix}labels", door.hear_labels, qos.latched())
+            door.listen(String, f"{prefix}labels", partial(door.hear_labels, robot=robot), qos.latched())
             for camera in (f"{name}/" for name in names) if names else ("",):
                 self._listen(robot, f"{prefix}{camera}keyframes")
 

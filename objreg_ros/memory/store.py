@@ -181,7 +181,7 @@ class Store:
             for table in ("closure", "object", "keyframe"):
                 delete(transaction, books, table)
             books.forgotten = 0
-        self._cache.clear(), self._heads.clear()
+        self._cache, self._heads = OrderedDict(), {}
         self._shrink()
 
     def _shrink(self, most: int = 0) -> None:

@@ -85,9 +85,8 @@ class RegistrarNode(FramesDoor):
 
     def _open_to(self, inputs: RegistrarNodeParams, refused: ExitStack) -> None:
         self._tracking, self._telling = threading.Lock(), threading.Lock()
-        self._enabled = True
+        self._enabled, self._unsearched = True, 0
         self._counts = dict(self._registrar.counts())
-        self._unsearched = 0
         self._scene = Scene()
         self._robots = prefixes_of(self, list(inputs.cameras)) if inputs.robots else {}
         self._robot = self._asked_to_exchange()
@@ -201,7 +200,7 @@ class RegistrarNode(FramesDoor):
             self._whereabouts.look()
             if outcome.keyframe_ns is not None:
                 seen = outcome.observations, outcome.keyframe_ns, outcome.frame_id
-                self._announcements.landmarks(*seen, self.names, outcome.session, outcome.robot)
+                self._announcements.landmarks(*seen, self.names_of(outcome.robot), outcome.session, outcome.robot)
                 self._scene.settle(outcome.keyframe_ns, outcome.closures, outcome.rejected)
                 objects = [(known.landmark, known.label, known.position) for known in self._registrar.landmarks_here]
                 self._announcements.markers(self._scene.markers(objects, outcome.keyframe_ns, self.odom_frame))
@@ -257,7 +256,7 @@ class RegistrarNode(FramesDoor):
             with self._tracking:
                 self.searcher.drain()
                 for window in self._registrar.end():
-                    self._publish(self._outcome(window, self._seconds))
+                    self._publish(self._outcome(window, self._seconds) or Outcome())
                 self._publish(self._registrar.settle())
             return True, self._registrar.save()
         except (ValueError, OSError) as error:

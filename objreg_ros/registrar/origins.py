@@ -18,7 +18,7 @@ class Origins:
 
     def __init__(self, store: Store, numbers: SessionNumbers) -> None:
         self._numbers = numbers
-        self._known: dict[str, dict[int, int]] = {}  # by run, the number here by that there
+        self._known: dict[str, dict[int, int]] = {}  # by robot and run, the number here by that there
         self._newest_ns: dict[int, int] = {}  # of each session
         for origin, (session, stamp_ns) in store.origins().items():
             run, _, there = origin.rpartition("/")
@@ -31,14 +31,15 @@ class Origins:
         Those of a session come in the order of their stamps.
         """
         keyframe = arrival.keyframe
-        known = self._known.setdefault(arrival.run, {})
+        run = f"{keyframe.robot} {arrival.run}"  # what one robot sent may be played again as another's
+        known = self._known.setdefault(run, {})
         since = [here for there, here in sorted(known.items()) if arrival.clock.session <= there <= keyframe.session]
         began = since[0] if since else self._number(known, arrival.clock.session)
         session = self._number(known, keyframe.session)
         if keyframe.stamp_ns <= self._newest_ns.get(session, keyframe.stamp_ns - 1):
             return None
         self._newest_ns[session] = keyframe.stamp_ns
-        received = replace(keyframe, session=session, origin=f"{arrival.run}/{keyframe.session}")
+        received = replace(keyframe, session=session, origin=f"{run}/{keyframe.session}")
         return received, Clock(arrival.clock.began_ns, began)
 
     def _number(self, known: dict[int, int], there: int) -> int:

@@ -71,13 +71,13 @@ def test_a_frame_comes_with_its_names_and_the_pose_that_odometry_has_of_its_came
     assert [item.label for item in seen.objects] == ["cup"] and door.odom_frame == "r1/odom"
     assert np.allclose(seen.T_odom_camera, T_ODOM_BODY @ T_BODY_CAMERA)
     assert T_body_camera is not None and np.allclose(T_body_camera, T_BODY_CAMERA)
-    assert door.without_odometry == 0 and door.names == {3: "cup"}
+    assert door.without_odometry == 0 and door.names_of("") == {3: "cup"}
 
 
 def test_names_that_come_later_are_added_to_those_that_are_known(door: Frames) -> None:
     for names in ({3: "cup"}, {4: "book"}, {3: "mug"}):
         door.hear_labels(to_msg.labels(names))
-    assert door.names == {3: "mug", 4: "book"}
+    assert door.names_of("") == {3: "mug", 4: "book"}
 
 
 def test_frames_of_two_cameras_are_told_with_what_to_do(door: Frames) -> None:

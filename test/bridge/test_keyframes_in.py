@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import rclpy
+from std_msgs.msg import String
 
 from objreg_ros.bridge.frames_in import FramesDoor
 from objreg_ros.bridge.keyframes_in import FromRobot, KeyframesIn
@@ -54,6 +55,15 @@ def test_a_picture_is_dropped_and_counted_and_ends_nothing(door: FramesDoor) -> 
     heard._hear("fleet/r2", "r2/keyframes", message)
     balance = door.ledger.balance()
     assert taken == [] and balance.dropped == {"malformed_keyframes": 1} and balance.waiting == 0
+
+
+def test_robots_may_call_one_number_otherwise(door: FramesDoor) -> None:
+    KeyframesIn(door, PREFIXES, [(), ()], lambda seen: None)
+    for subscription in door.subscriptions:
+        if subscription.topic_name.endswith("labels"):
+            name = "cup" if "r1" in subscription.topic_name else "chair"
+            subscription.callback(String(data=f'{{"1": "{name}"}}'), {"publication_sequence_number": 1})
+    assert [door.names_of(robot) for robot in (*PREFIXES, "r3")] == [{1: "cup"}, {1: "chair"}, {}]
 
 
 def test_of_two_cameras_of_a_robot_under_one_frame_the_first_is_taken_and_robots_may_share_frames(

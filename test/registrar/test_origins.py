@@ -32,6 +32,11 @@ def test_sessions_of_different_runs_get_numbers_of_their_own_that_stay() -> None
     assert told == [5, 6, 5, 7]
 
 
+def test_what_one_robot_sent_and_is_played_as_anothers_is_of_that_ones_own_session() -> None:
+    origins = Origins(Store(), SessionNumbers())
+    assert _sessions(origins, _arrival("a", 1), _arrival("a", 1, robot="robot2"), _arrival("a", 2)) == [0, 1, 0]
+
+
 def test_what_comes_again_or_late_is_not_received_again() -> None:
     origins = Origins(Store(), SessionNumbers())
     assert _sessions(origins, *(_arrival("a", s) for s in (1, 2, 1, 2, 3))) == [0, 0, None, None, 0]
@@ -53,7 +58,7 @@ def test_a_store_that_is_opened_anew_goes_on_with_the_same_sessions_and_knows_wh
     again = Origins(store, SessionNumbers(store.next_session()))
     assert _sessions(again, _arrival("a", 5), _arrival("a", 6), _arrival("c", 6)) == [None, 3, 4]
     assert again.received(_arrival("a", 7))[1] == Clock(0, 3)  # type: ignore[index]
-    assert stored.stamp_ns == 5 * SECOND and stored.origin == "a/0"
+    assert stored.stamp_ns == 5 * SECOND and stored.origin == "robot1 a/0"
 
 
 @pytest.mark.parametrize("told", [{}, {"stamp_ns": 6 * SECOND}, {"frame_id": "other"}])
