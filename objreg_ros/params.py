@@ -156,7 +156,7 @@ class MountedParams(Params):
 
 def require_namespaces(name: str, values: Sequence[str]) -> None:
     """ValueError for a parameter ``name`` unless its values are distinct names of ROS namespaces."""
-    if len(set(values)) < len(values) or not all(map(NAMESPACE.fullmatch, values)):
+    if len({value.strip("/") for value in values}) < len(values) or not all(map(NAMESPACE.fullmatch, values)):
         raise ValueError(f"{name}: expected distinct names of namespaces, got {list(values)}")
 
 

@@ -53,13 +53,14 @@ class KeyframesIn:
         self._counts = Counter[tuple[str, str]]()  # by robot, and what became of its keyframes
         self._frames = dict[tuple[str, str], str]()  # of the camera of each robot and topic
         for (robot, prefix), names in zip(prefixes.items(), cameras, strict=True):
-            door.listen(String, f"{prefix}labels", partial(door.hear_labels, robot=robot), qos.latched())
             for camera in (f"{name}/" for name in names) if names else ("",):
-                self._listen(robot, f"{prefix}{camera}keyframes")
+                self._listen(robot, f"{prefix}{camera}")
 
-    def _listen(self, robot: str, topic: str) -> None:
-        hear, kept = partial(self._hear, robot, topic), qos.latched(qos.KEPT_KEYFRAMES)
-        self._door.listen(CompressedImage, topic, hear, kept, watched=topic)
+    def _listen(self, robot: str, prefix: str) -> None:
+        """Hear the keyframer of this namespace, and what its detector's numbers are called."""
+        topic, kept = f"{prefix}keyframes", qos.latched(qos.KEPT_KEYFRAMES)
+        self._door.listen(String, f"{prefix}labels", partial(self._door.hear_labels, robot=robot), qos.latched())
+        self._door.listen(CompressedImage, topic, partial(self._hear, robot, topic), kept, watched=topic)
         self._door.expect(topic, topic)
 
     def _hear(self, robot: str, topic: str, message: Any) -> None:

@@ -34,7 +34,7 @@ def test_each_camera_of_each_robot_has_a_topic(door: FramesDoor) -> None:
     heard = {s.topic_name for s in door.subscriptions}
     keyframes = {topic for topic in heard if topic.endswith("keyframes")}
     assert keyframes == {"/fleet/r1/front/keyframes", "/fleet/r1/rear/keyframes", "/fleet/r2/keyframes"}
-    assert {"/fleet/r1/labels", "/fleet/r2/labels"} <= heard
+    assert {"/fleet/r1/front/labels", "/fleet/r1/rear/labels", "/fleet/r2/labels"} <= heard
 
 
 def test_a_keyframe_is_handed_on_with_its_robot_and_is_in_the_books(door: FramesDoor) -> None:

@@ -31,3 +31,15 @@ def test_a_mounting_that_cannot_be_is_refused_when_it_is_set() -> None:
 def test_the_node_s_other_values_are_checked_too() -> None:
     with pytest.raises(ValueError, match="odom_slop: expected at least 0, got -1"):
         RegistrarNodeParams(odom_slop=-1.0)
+
+
+def test_robots_are_namespaces_with_cameras_behind_them() -> None:
+    told = RegistrarNodeParams(robots=("r1 front rear", "fleet/r2", ". left"))
+    assert told.cameras == {"r1": ("front", "rear"), "fleet/r2": (), "": ("left",)}
+    assert RegistrarNodeParams().cameras == {}
+
+
+@pytest.mark.parametrize("robots", [("r1", "r1"), ("r1", "/r1"), ("1r",), ("",), ("r1 a a",), ("r1 a-b",)])
+def test_what_names_no_robot_or_one_twice_is_refused(robots: tuple[str, ...]) -> None:
+    with pytest.raises(ValueError, match="robots.*: expected distinct names of namespaces"):
+        RegistrarNodeParams(robots=robots)
