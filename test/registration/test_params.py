@@ -41,5 +41,5 @@ def test_robots_are_namespaces_with_cameras_behind_them() -> None:
 
 @pytest.mark.parametrize("robots", [("r1", "r1"), ("r1", "/r1"), ("1r",), ("",), ("r1 a a",), ("r1 a-b",)])
 def test_what_names_no_robot_or_one_twice_is_refused(robots: tuple[str, ...]) -> None:
-    with pytest.raises(ValueError, match="robots.*: expected distinct names of namespaces"):
+    with pytest.raises(ValueError, match=r"robots.*: expected distinct names of namespaces"):
         RegistrarNodeParams(robots=robots)
