@@ -118,7 +118,8 @@ def test_keyframes_of_two_robots_close_loops_in_one_registrar_and_tie_them_in_on
     fleet.wait_for(lambda: bool(fleet.heard["r2/correction"]), what="the second robot in the map")
     fleet.stop("registrar")
     stored = Store(store, read_only=True)
-    assert {stored.keyframe(k).robot for k in stored.keyframe_ids()} == {"r1", "r2"} and len(stored.keyframe_ids()) == 8
+    assert {stored.keyframe(k).robot for k in stored.keyframe_ids()} == {"r1", "r2"}
+    assert 8 <= len(stored.keyframe_ids()) <= 10  # a robot that rests for a while sends the one that it has in hand
     stored.close()
 
 
