@@ -19,4 +19,4 @@ def test_nodes_are_made_in_the_order_of_a_frame_whatever_the_order_of_their_name
 def test_a_name_that_there_is_not_ends_it_with_the_names_there_are(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit, match="2"):
         chosen(["detectr"])
-    assert "expected nodes of detector, segmenter, registrar, mapper, got detectr" in capsys.readouterr().err
+    assert "expected nodes of detector, segmenter, registrar, keyframer, mapper, got detectr" in capsys.readouterr().err

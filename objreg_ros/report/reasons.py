@@ -223,6 +223,10 @@ DROPS = {
     "known": Words(
         "a keyframe of a robot was received before", "Nothing is wrong: after a break all that is kept is sent."
     ),
+    "same_camera": Words(
+        "two cameras of a robot have one frame",
+        "Nobody could tell whose moment a constraint names. Give each camera of a robot a frame of its own.",
+    ),
     "two_clocks": Words(
         "a constraint ties two runs of one clock",
         "A bag was looped. Build objreg_msgs, whose closures name their sessions, or begin with a new store and map.",

@@ -93,7 +93,7 @@ def test_a_change_wins_over_every_section_of_the_parameter_file(titles: tuple[st
     [
         (
             "seed=4",
-            r"expected node\.parameter=value with a node of detector, segmenter, registrar, mapper, .*, got 'seed=4'",
+            r"expected node\.parameter=value with a node of detector, segmenter, registrar, .*, got 'seed=4'",
         ),
         ("mapper.map_frame=m", r"expected a node of the demo \(detector, segmenter, registrar\), got mapper"),
     ],
