@@ -181,10 +181,10 @@ DROPS = {
     "frame": picture(
         words(LEFT, 18, "A frame ends once: as published, or with one of these reasons", anchor="start"),
         boxes(("arrives", "is matched", "is worked on", "published"), 30, QUIET),
-        falls(60, 56, ("malformed", "odd_stamp", "late", "surplus", "inactive")),
+        falls(60, 56, ("malformed", "same_camera, known", "odd_stamp", "late", "surplus", "inactive")),
         falls(160, 56, ("unmatched", "queue_full", "time_jump")),
         falls(260, 56, ("overtaken", "refused", "bug", "disabled", "reset")),
-        height=170,
+        height=185,
     ),
     "constraint": picture(
         words(LEFT, 18, "A constraint at the mapper", anchor="start"),
