@@ -265,47 +265,36 @@ def test_a_thread_that_gives_way_and_those_that_it_starts_are_nice() -> None:
     assert os.getpriority(os.PRIO_PROCESS, threading.get_native_id()) < 19
 
 
-def _laned(work: Callable[[str], None], settle: Callable[[str], None], behind: int) -> Backlog[str]:
+@pytest.mark.parametrize(
+    ("behind", "jobs", "expected"),
+    [
+        (9, "a1 a2 a3 b1 b2 c1", "a0 b1 c1 a1 b2 a2 a3"),
+        (1, "a1 a2 a3 b1 b2", "a0 b1 (a1) b2 a2 a3"),  # in brackets what is settled
+    ],
+)
+def test_lanes_take_turns_and_what_a_lane_is_too_far_behind_with_is_settled(
+    behind: int, jobs: str, expected: str
+) -> None:
+    begun, go, done = threading.Event(), threading.Event(), list[str]()
+
+    def work(job: str) -> None:
+        begun.set()
+        go.wait(PATIENCE)
+        done.append(job)
+
+    def settle(job: str) -> None:
+        done.append(f"({job})")
+
     limit = Limit(99, 10**9, 1e9, dict.fromkeys("abc", behind))
-    return Backlog(work, settle, lambda error: None, limit, len, lane_of=lambda job: job[0])
-
-
-def test_lanes_take_turns_and_overtake_each_other_never() -> None:
-    begun, go, done = threading.Event(), threading.Event(), list[str]()
-
-    def work(job: str) -> None:
-        begun.set()
-        go.wait(10.0)
-        done.append(job)
-
-    backlog = _laned(work, lambda job: done.append(f"kept {job}"), behind=9)
+    backlog = Backlog(work, settle, print, limit, len, lane_of=lambda job: job[0])
     backlog.put("a0")
-    assert begun.wait(10.0)
-    for job in ("a1", "a2", "a3", "b1", "b2", "c1"):
+    assert begun.wait(PATIENCE)
+    for job in jobs.split():
         backlog.put(job)
     go.set()
     backlog.drain()
     backlog.close()
-    assert done == ["a0", "b1", "c1", "a1", "b2", "a2", "a3"]
-
-
-def test_of_a_lane_that_is_too_far_behind_the_oldest_is_settled_and_other_lanes_are_not() -> None:
-    begun, go, done = threading.Event(), threading.Event(), list[str]()
-
-    def work(job: str) -> None:
-        begun.set()
-        go.wait(10.0)
-        done.append(job)
-
-    backlog = _laned(work, lambda job: done.append(f"kept {job}"), behind=1)
-    backlog.put("a0")
-    assert begun.wait(10.0)
-    for job in ("a1", "a2", "a3", "b1", "b2"):
-        backlog.put(job)
-    go.set()
-    backlog.drain()
-    backlog.close()
-    assert done == ["a0", "b1", "kept a1", "b2", "a2", "a3"]
+    assert " ".join(done) == expected
 
 
 def test_work_in_hand_is_hurried_by_how_long_others_wait_for_it_and_not_for_those_before() -> None:
