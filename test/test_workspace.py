@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -31,12 +32,18 @@ def workspace(tmp_path: Path, repository: Path) -> Path:
     """A workspace with this repository in it, and nothing built."""
     if shutil.which("colcon") is None:
         pytest.skip("colcon is not installed")
-    absent = [package for package in NEEDED if not is_there(package)]
-    if absent:
-        pytest.skip(f"{' and '.join(absent)} not installed: no messages can be built")
     (tmp_path / "src").mkdir()
     (tmp_path / "src/objreg_ros").symlink_to(repository)
     return tmp_path
+
+
+@pytest.fixture
+def workspace_with_messages(workspace: Path) -> Path:
+    """A workspace on a machine that can build messages."""
+    absent = [package for package in NEEDED if not is_there(package)]
+    if absent:
+        pytest.skip(f"{' and '.join(absent)} not installed: no messages can be built")
+    return workspace
 
 
 def told(workspace: Path, *words: str) -> str:
@@ -46,12 +53,27 @@ def told(workspace: Path, *words: str) -> str:
 
 
 @pytest.mark.slow
-def test_a_clean_workspace_builds_both_packages(workspace: Path) -> None:
+@pytest.mark.parametrize("how", [(), ("--symlink-install",)], ids=["copied", "linked"])
+def test_a_clean_workspace_builds_both_packages(workspace_with_messages: Path, how: tuple[str, ...]) -> None:
+    workspace = workspace_with_messages
     paths = ("--base-paths", "src/objreg_ros", "src/objreg_ros/objreg_msgs")
     assert told(workspace, "colcon", "list", "--names-only", *paths).split() == ["objreg_msgs", "objreg_ros"]
-    told(workspace, "colcon", "build", *paths)
+    told(workspace, "colcon", "build", *how, *paths)
     found = told(workspace, "bash", "-c", f". install/setup.bash && python3 -c '{IMPORTS}'").split()[-1]
     assert Path(found).is_relative_to(workspace / "install")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", [(), ("--symlink-install",)], ids=["copied", "linked"])
+def test_a_clean_workspace_builds_the_nodes_without_the_messages(workspace: Path, how: tuple[str, ...]) -> None:
+    told(workspace, "colcon", "build", *how, "--base-paths", "src", "--packages-select", "objreg_ros")
+    assert (workspace / "install/objreg_ros/share/objreg_ros/package.xml").exists()
+
+
+def test_setup_runs_beside_a_link_to_it_as_colcon_makes_one(tmp_path: Path, repository: Path) -> None:
+    (tmp_path / "setup.py").symlink_to(repository / "setup.py")
+    shown = told(tmp_path, sys.executable, "setup.py", "--name")
+    assert shown.split()[-1] == "objreg_ros"
 
 
 def test_no_other_package_is_found_where_only_one_path_is_named(workspace: Path) -> None:
