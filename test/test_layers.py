@@ -128,17 +128,21 @@ def allowed(importer: str, imported: str) -> bool:
         return below(imported, room, "data", "geometry", "params")
     if room == "adapters":
         return below(imported, "adapters", "mapper", "bridge", *CORE) and imported != "mapper.node"
+    if room == "plausibility":
+        return below(imported, "plausibility", "data", "geometry")
     if importer in FREE_BRIDGE:
-        return below(imported, "data", "lens", "geometry", *FREE_BRIDGE)
+        return below(imported, "plausibility", "data", "lens", "geometry", *FREE_BRIDGE)
     if room == "bridge":
-        return below(imported, "bridge", *CORE)
+        return below(imported, "bridge", "plausibility", *CORE)
     if room == "recording":
-        return below(imported, "recording", "data", "lens", "geometry", *FREE_BRIDGE)
+        return below(imported, "recording", "plausibility", "data", "lens", "geometry", *FREE_BRIDGE)
     if room == "simulation":
         return below(imported, "simulation", "recording", "data", "geometry", "params")
     if room in HOUSE:
         return below(
-            imported, *ROOMS, "registration", "keyframes", "memory", *CORE, *HOUSE, *FREE_BRIDGE, "recording"
+            imported,
+            *(*ROOMS, "registration", "keyframes", "memory", "plausibility", "recording"),
+            *(*CORE, *HOUSE, *FREE_BRIDGE),
         ) and not imported.endswith(".node")
     return False
 

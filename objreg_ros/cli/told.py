@@ -17,7 +17,7 @@ from objreg_ros.cli import NOTHING
 from objreg_ros.cli.loudness import aside, is_verbose
 from objreg_ros.data import Rejected
 from objreg_ros.offline import Run
-from objreg_ros.recording.finding import Finding
+from objreg_ros.plausibility.finding import Finding
 from objreg_ros.report.findings import Counts, verdict
 from objreg_ros.whole_file import write_whole
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from objreg_ros.bridge import from_msg
 from objreg_ros.data import Array, Intrinsics
-from objreg_ros.recording.finding import Finding
+from objreg_ros.plausibility.finding import Finding
 from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.mounts import camera_on_body, first_readable, frame_of, static_frames
 from objreg_ros.recording.record import Record, Recording

@@ -14,7 +14,7 @@ from typing import Any
 
 from objreg_ros import share
 from objreg_ros.data import UNTRIED, Reason
-from objreg_ros.recording.finding import Finding
+from objreg_ros.plausibility.finding import Finding
 from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.record import Recording
 from objreg_ros.report.reasons import REFUSALS

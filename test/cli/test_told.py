@@ -12,7 +12,7 @@ from objreg_ros.cli import NOTHING
 from objreg_ros.cli.loudness import heard_by
 from objreg_ros.cli.told import closing_lines, exit_code, json_to, tell, tell_next, tell_reasons
 from objreg_ros.data import Reason, Rejected
-from objreg_ros.recording.finding import Finding
+from objreg_ros.plausibility.finding import Finding
 
 FINDING = Finding("nothing is seen", "it is dark", "put on the light", "no-detections")
 

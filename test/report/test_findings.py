@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from recording.folders import records, tum_folder
 
+from objreg_ros.plausibility.finding import Finding
 from objreg_ros.recording import open_recording, write_rosbag2
-from objreg_ros.recording.finding import Finding
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.report.findings import as_json, find, setting, verdict
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
-from objreg_ros.recording.finding import Finding
+from objreg_ros.plausibility.finding import Finding
 
 
 def test_a_finding_in_one_line_leaves_out_what_it_does_not_tell() -> None:

@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the stream of one camera shows of itself while it runs, beside what it says.
+
+`follow` takes every view, `take_odometry` every sample of odometry. What does not fit is in `findings`. While the
+camera is not what it says, `doubt` says why: no closure is to be made then. Odometry that is not this camera's is
+`disowned`, and a mount that nobody knows is measured (`T_body_camera`).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import asdict, dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from objreg_ros.data import JUMP_NS, Array, Intrinsics, Odometry, View
+from objreg_ros.geometry import inverses, rotation_angle
+from objreg_ros.plausibility import findings
+from objreg_ros.plausibility.camera_fit import MOST_MISFIT, CameraFit, fit_camera
+from objreg_ros.plausibility.corner_tracks import CornerTracks, Span
+from objreg_ros.plausibility.finding import Finding
+from objreg_ros.plausibility.hand_eye import HandEye, hand_eye
+from objreg_ros.plausibility.odometry_fit import LEAST_TURNS, find_shift, likeness
+from objreg_ros.plausibility.odometry_track import OdometryTrack
+from objreg_ros.plausibility.pinhole import implausible
+
+SHARE, SIGMAS = 0.05, 4.0  # a number that is off by more than both is wrong
+LEAST_SPANS, LEAST_STRANGE = 4, 6
+MOST_SPANS = 48  # the newest
+OFTEN, SELDOM = 12, 6  # up to so many spans each is followed by a look at all; then every so many are
+STRANGE_SHARE = 0.7  # of spans that do not fit, where colour is not that of depth
+MOST_REST = 0.8  # of the motions of one body, in the deviations of `hand_eye`; those of two come to 1 and more
+WRONG_DEG = 10.0  # a mount that is off by more is wrong
+ENOUGH_DEG, ENOUGH_M = 3.0, 0.12  # deviations of a mount that is measured well enough to be used
+LEAST_METRES = 0.5  # that the body moved in all its spans, for a scale
+STAMPS = 1000  # of frames whose mounts are remembered
+GAP_SHARE, LEAST_FRAMES = 0.8, 50  # of so many frames and more, that have odometry
+
+
+class _Leg(NamedTuple):
+    """A span with the mounts at its first and last moment, None where they are unknown."""
+
+    span: Span
+    mounts: tuple[Array, Array] | None
+
+
+@dataclass(slots=True, eq=False)
+class StreamMonitor:
+    """One for each camera."""
+
+    camera: Intrinsics | None = None
+    fit: CameraFit | None = None
+    mount: HandEye | None = None
+    findings: tuple[Finding, ...] = ()
+    doubt: str = ""
+    disowned: str = ""
+    frames: int = 0
+    with_odometry: int = 0
+    _corners: CornerTracks = field(default_factory=CornerTracks)
+    _odometry: OdometryTrack = field(default_factory=OdometryTrack)
+    _legs: deque[_Leg] = field(default_factory=lambda: deque(maxlen=MOST_SPANS))
+    _mounts: dict[int, Array | None] = field(default_factory=dict)
+    _spans: int = 0
+    _first_ns: int = 0
+    _last_ns: int | None = None
+    _ahead_s: float | None = None  # by how much later odometry is stamped than the camera, as they arrive
+    _frames: tuple[str, str] = ("", "")  # of the body and of the camera
+
+    @property
+    def T_body_camera(self) -> Array | None:
+        """The measured mount (4, 4), for a camera whose mount nothing else says; None where it is not known well."""
+        return self.mount.T_body_camera if self.mount is not None and _is_enough(self.mount) else None
+
+    def take_odometry(self, sample: Odometry) -> None:
+        """A sample of odometry, whether or not a frame comes by it."""
+        if self._last_ns is not None and self._ahead_s is None:
+            self._ahead_s = 1e-9 * (sample.stamp_ns - self._last_ns)
+        self._odometry.add(sample)
+
+    def follow(
+        self, stamp_ns: int, view: View, camera_frame: str, mount: Array | None, has_odometry: bool = False
+    ) -> None:
+        """The next view. ``mount`` is what is known of ``T_body_camera``, None where nothing says it."""
+        if self._is_another(stamp_ns, view.intrinsics):
+            self._begin_anew()
+        if self.camera is None:
+            self.camera, self._first_ns = view.intrinsics, stamp_ns
+            self._judge_pinhole(view.intrinsics)
+        self._last_ns, self._frames = stamp_ns, (self._odometry.child_frame_id, camera_frame)
+        self.frames, self.with_odometry = self.frames + 1, self.with_odometry + has_odometry
+        self._remember(stamp_ns, mount)
+        span = self._corners.add(stamp_ns, view)
+        if span is not None:
+            mounts = self._mounts.get(span.first_ns), self._mounts.get(span.last_ns)
+            self._legs.append(_Leg(span, None if mounts[0] is None or mounts[1] is None else (mounts[0], mounts[1])))
+            self._spans += 1
+            if self._spans <= OFTEN or self._spans % SELDOM == 0:
+                self._judge()
+
+    def finish(self) -> None:
+        """Judge what has come by the end of a recording."""
+        if self.camera is not None and self._legs:
+            self._judge()
+
+    def _is_another(self, stamp_ns: int, camera: Intrinsics) -> bool:
+        """Whether a view is of another camera than the one before, or of another run of the clock."""
+        another = self.camera is not None and asdict(self.camera) != asdict(camera)
+        return another or (self._last_ns is not None and self._last_ns - stamp_ns >= JUMP_NS)
+
+    def _begin_anew(self) -> None:
+        """Another camera, or another run of the clock."""
+        self._corners, self.camera, self.fit = CornerTracks(), None, None
+        self.doubt, self.findings = "", ()
+        self._legs.clear()
+        self._mounts.clear()
+        self._spans = 0
+
+    def _remember(self, stamp_ns: int, mount: Array | None) -> None:
+        self._mounts[stamp_ns] = mount
+        while len(self._mounts) > STAMPS:
+            del self._mounts[next(iter(self._mounts))]
+
+    def _judge_pinhole(self, camera: Intrinsics) -> None:
+        why = implausible(camera)
+        if why:
+            self.findings, self.doubt = (findings.no_camera(why),), f"camera_info: {why}"
+
+    def _judge(self) -> None:
+        """Look at all spans again."""
+        assert self.camera is not None
+        if implausible(self.camera):
+            return
+        self.fit = fit_camera([leg.span for leg in self._legs], self.camera, self.fit)
+        of_camera = self._of_camera(self.fit, self.camera)
+        of_odometry, of_scale = self._of_odometry(self.fit) if len(self._odometry) > 1 else ((), ())
+        doubted = (*of_camera, *of_scale)
+        self.doubt = doubted[0].what if doubted else ""
+        self.findings = (*doubted, *of_odometry, *self._of_gaps())
+
+    def _of_camera(self, fit: CameraFit, camera: Intrinsics) -> tuple[Finding, ...]:
+        strange = float(np.mean(fit.misfit > MOST_MISFIT))
+        if len(fit.misfit) >= LEAST_STRANGE and strange >= STRANGE_SHARE:
+            return (findings.other_colour(strange),)
+        if fit.count < LEAST_SPANS:
+            return ()
+        found = []
+        if _is_off(abs(np.log(fit.focal)), fit.focal_sigma):
+            found.append(findings.focal_length(fit, camera))
+        if any(_is_off(abs(off), sigma) for off, sigma in zip(fit.centre, fit.centre_sigma, strict=True)):
+            found.append(findings.principal_point(fit, camera))
+        return tuple(found)
+
+    def _of_odometry(self, fit: CameraFit) -> tuple[tuple[Finding, ...], tuple[Finding, ...]]:
+        """What is found of the odometry and its mount, and of the scale of depth."""
+        fits = fit.misfit < MOST_MISFIT
+        if not fits.any():
+            return (), ()
+        legs = [leg for leg, kept in zip(self._legs, fits, strict=True) if kept]
+        T_camera = inverses(fit.T_last_first[fits])
+        T_body, known = self._motions(legs, 0.0)
+        alike = likeness(T_body[known], T_camera[known])
+        mount = hand_eye(T_body[known], T_camera[known]) if alike.is_alike else None
+        two_bodies = alike.is_unlike or (mount is not None and mount.rest > MOST_REST)
+        if known.mean() < 0.5 or two_bodies:
+            return self._of_others(legs, T_camera, alike.share, two_bodies), ()
+        if mount is None:
+            return (), ()
+        self.disowned = ""
+        mounted = known & np.array([leg.mounts is not None for leg in legs])
+        if np.count_nonzero(mounted) >= LEAST_TURNS:
+            return self._of_known_mount(
+                [leg for leg, kept in zip(legs, mounted, strict=True) if kept], T_camera[mounted]
+            )
+        return self._of_unknown_mount(mount, T_body[known])
+
+    def _of_others(self, legs: list[_Leg], T_camera: Array, share: float, unlike: bool) -> tuple[Finding, ...]:
+        """Odometry that does not turn as the camera does now: at another time, or never."""
+        if len(legs) < LEAST_TURNS:
+            return ()
+        abouts = {0.0} if self._ahead_s is None or abs(self._ahead_s) < 30.0 else {0.0, self._ahead_s}
+        for about_s in sorted(abouts):
+            shift = find_shift(lambda seconds: self._motions(legs, seconds), T_camera, about_s)
+            if shift is not None:
+                found = findings.other_clock(shift.seconds, shift.likeness.share)
+                self.disowned = found.what
+                return (found,)
+        if not unlike:
+            return ()
+        found = findings.other_robot(share)
+        self.disowned = found.what
+        return (found,)
+
+    def _of_known_mount(self, legs: list[_Leg], T_camera: Array) -> tuple[tuple[Finding, ...], tuple[Finding, ...]]:
+        """A mount that is known is right where the camera by way of odometry moves as it was seen to."""
+        mounts = [leg.mounts for leg in legs if leg.mounts is not None]
+        T_odom = [self._odometry.at(np.array([leg.span[end] for leg in legs]))[0] for end in (0, 1)]
+        first, last = (T @ np.array([pair[end] for pair in mounts]) for end, T in enumerate(T_odom))
+        T_by_odometry = inverses(first) @ last
+        beside = hand_eye(T_by_odometry, T_camera)
+        degrees = float(np.degrees(rotation_angle(beside.T_body_camera[:3, :3])))
+        if degrees > max(WRONG_DEG, SIGMAS * beside.rotation_sigma_deg):
+            self.mount = HandEye(mounts[-1][1] @ beside.T_body_camera, *_rest_of(beside))
+            found = findings.mount_wrong(mounts[-1][1], self.mount, degrees)
+            self.disowned = found.what
+            return (found,), ()
+        return (), self._of_scale(hand_eye(T_by_odometry, T_camera, np.eye(4)), T_by_odometry)
+
+    def _of_unknown_mount(self, fit: HandEye, T_body: Array) -> tuple[tuple[Finding, ...], tuple[Finding, ...]]:
+        """A mount that nothing says is measured; the surest measurement is kept."""
+        if self.mount is None or fit.rotation_sigma_deg < self.mount.rotation_sigma_deg:
+            self.mount = fit
+        used = self.mount if _is_enough(self.mount) else None
+        finding = findings.mount_unknown(*self._frames, used, _left_open(self.mount))
+        return (finding,), self._of_scale(fit, T_body)
+
+    def _of_scale(self, fit: HandEye, T_body: Array) -> tuple[Finding, ...]:
+        metres = float(np.linalg.norm(T_body[:, :3, 3], axis=1).sum())
+        off = metres > LEAST_METRES and fit.rest < MOST_REST and _is_off(abs(np.log(fit.scale)), fit.scale_sigma)
+        return (findings.depth_scale(fit),) if off else ()
+
+    def _of_gaps(self) -> tuple[Finding, ...]:
+        share = self.with_odometry / self.frames
+        if self.disowned or not len(self._odometry) or self.frames < LEAST_FRAMES or share >= GAP_SHARE:
+            return ()
+        if any(leg.mounts is None for leg in self._legs):
+            return ()
+        assert self._last_ns is not None
+        first_ns, last_ns = self._odometry.span_ns
+        covered = max(0, min(last_ns, self._last_ns) - max(first_ns, self._first_ns))
+        return (findings.odometry_gaps(share, 1e-9 * covered, 1e-9 * (self._last_ns - self._first_ns)),)
+
+    def _motions(self, legs: list[_Leg], later_s: float) -> tuple[Array, Array]:
+        """The motions (n, 4, 4) of the body from the first to the last moment of spans by stamps that are so much
+        later, and which of them are known."""
+        first, last = (
+            self._odometry.at(np.array([leg.span[end] for leg in legs], np.int64) + round(1e9 * later_s))
+            for end in (0, 1)
+        )
+        return inverses(first[0]) @ last[0], first[1] & last[1]
+
+
+def _is_off(size: float, sigma: float) -> bool:
+    return bool(size > SHARE and size > SIGMAS * sigma)
+
+
+def _is_enough(mount: HandEye) -> bool:
+    """Whether a measured mount may be used: its rotation is known, and all but one direction of its position."""
+    return mount.rotation_sigma_deg <= ENOUGH_DEG and float(np.sort(mount.lever_sigma_m)[1]) <= ENOUGH_M
+
+
+def _left_open(mount: HandEye) -> str:
+    """What the motion does not say of a mount, in words."""
+    axes = [axis for axis, sigma in zip("xyz", mount.lever_sigma_m, strict=True) if sigma > ENOUGH_M]
+    return f"; its {' and '.join(axes)} cannot be seen from such motion and is near 0" if axes else ""
+
+
+def _rest_of(fit: HandEye) -> tuple[float, float, Array, float, float]:
+    return fit.scale, fit.rotation_sigma_deg, fit.lever_sigma_m, fit.scale_sigma, fit.rest
