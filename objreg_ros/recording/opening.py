@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from objreg_ros.recording.bag_files import METADATA, bag_files, is_bag
 from objreg_ros.recording.bags import BagRecording
 from objreg_ros.recording.record import Recording
 from objreg_ros.recording.text import require_regular
@@ -14,7 +15,6 @@ EXPECTED = (
     "expected a rosbag1 file (.bag), a rosbag2 folder (metadata.yaml) or file (.mcap, .db3), or a TUM RGB-D folder "
     "(rgb/, depth/ and associations.txt or rgb.txt and depth.txt)"
 )
-BAG_FILES = (".bag", ".mcap", ".db3")
 
 
 def open_recording(path: Path | str) -> Recording:
@@ -25,18 +25,25 @@ def open_recording(path: Path | str) -> Recording:
     if place.is_dir():
         return _open_folder(place)
     require_regular(place)
-    if place.suffix not in BAG_FILES:
+    if not is_bag(place):
         raise ValueError(f"{place}: {EXPECTED}, got a file {place.suffix or 'without a suffix'}")
     return BagRecording(place)
 
 
 def _open_folder(folder: Path) -> Recording:
-    if (folder / "metadata.yaml").exists():
+    bags = bag_files(folder)
+    if bags and (folder / METADATA).exists():
         return BagRecording(folder)
     if (folder / "rgb").is_dir() or (folder / "rgb.txt").exists():
-        return TumRecording(folder)
-    bags = sorted(file for file in folder.iterdir() if file.suffix in BAG_FILES)
-    if len(bags) == 1:
-        return BagRecording(bags[0])
+        return _beside(TumRecording(folder), bags)
+    if bags or (folder / METADATA).exists():
+        return BagRecording(folder)
     got = ", ".join(sorted(file.name for file in folder.iterdir())[:5]) or "nothing"
     raise ValueError(f"{folder}: {EXPECTED}, got a folder with {got}")
+
+
+def _beside(recording: Recording, bags: list[Path]) -> Recording:
+    """The recording of pictures with a note on the bags that lie in its folder too."""
+    if bags:
+        recording.notes.append(f"also there, and not read: {', '.join(bag.name for bag in bags)}; name one to read it")
+    return recording
