@@ -141,6 +141,7 @@ def test_a_text_of_another_encoding_is_refused_by_name(tmp_path: Path) -> None:
 def test_colour_is_not_turned_as_its_camera_was_held_since_depth_is_not(tmp_path: Path) -> None:
     folder = numbered_folder(tmp_path, {"1.0": 0})
     (folder / "rgb/1.0.png").unlink()
+    cv2.imwrite(str(folder / "depth/1.0.png"), np.full((4, 8), 5000, np.uint16))
     _, jpeg = cv2.imencode(".jpg", np.zeros((4, 8, 3), np.uint8))
     turned = b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0\0"  # TIFF: orientation 6
     exif = b"\xff\xe1" + (len(turned) + 8).to_bytes(2, "big") + b"Exif\0\0" + turned
@@ -210,7 +211,7 @@ def test_a_broken_first_picture_keeps_no_folder_from_being_read(tmp_path: Path) 
         ],
         ("groundtruth.txt", "0.0 0 0 0 0 0 0 one", "expected timestamp tx ty tz"),
         ("camera.yaml", "fx: [", "expected YAML"),
-        ("camera.yaml", "525", "expected a mapping"),
+        ("camera.yaml", "525", "expected a file of ROS .*, got int"),
         ("camera.yaml", "fx: 0", "expected numbers fx fy"),
         ("camera.yaml", "fx: wide", "expected numbers fx fy"),
         *[
