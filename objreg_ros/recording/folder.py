@@ -25,7 +25,7 @@ TYPES = {
     DEPTH: "sensor_msgs/msg/Image",
 }
 CAMERA_FRAME, WORLD_FRAME, ODOM_FRAME = "camera", "world", "odom"
-FRAME_RATE_HZ = 30.0  # of a depth camera whose pictures are numbered and have no times
+NUMBERED = "times are the numbers of frames: each is taken for a second"
 
 Pair = tuple[int, str, int, str]  # colour stamp, colour file, depth stamp, depth file
 

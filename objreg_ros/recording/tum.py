@@ -21,7 +21,7 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.geometry import is_rigid, pose, rotation_from_quaternion
 from objreg_ros.recording import messages
-from objreg_ros.recording.folder import IMU, FolderRecording, Moment, Pair, moments_of_pairs, true_moment
+from objreg_ros.recording.folder import IMU, NUMBERED, FolderRecording, Moment, Pair, moments_of_pairs, true_moment
 from objreg_ros.recording.picture_files import (
     first_depth_size,
     first_size,
@@ -32,7 +32,7 @@ from objreg_ros.recording.picture_files import (
 )
 from objreg_ros.recording.poses import passed_over
 from objreg_ros.recording.tum_camera import TumCamera, camera_file, read_camera
-from objreg_ros.recording.tum_lists import FRAME_RATE_HZ, are_frame_numbers, pose_columns, read_table, stamp_of
+from objreg_ros.recording.tum_lists import are_frame_numbers, pose_columns, read_table, stamp_of
 
 IMU_FRAME = "accelerometer"
 ASSOCIATION_NS = 20_000_000  # as the benchmark's associate.py
@@ -91,7 +91,7 @@ def _pairs(folder: Path) -> Pairs:
     if not pairs:
         raise FileNotFoundError(f"{folder}: expected colour and depth pictures within 20 ms of each other, got none")
     if frame_numbers:
-        notes.append(f"times are the numbers of frames: {FRAME_RATE_HZ:g} frames a second are assumed")
+        notes.append(NUMBERED)
     return Pairs(pairs, notes, frame_numbers)
 
 
@@ -99,7 +99,7 @@ def _listed(folder: Path, file: Path) -> Pairs:
     """The pairs of a list, in whose first columns may be depth."""
     rows = read_table(file, 4).rows
     numbers = are_frame_numbers(row[k] for row in rows for k in (0, 2)) and len(rows) > 1
-    pairs = [(stamp_of(r[0], file, numbers), r[1], stamp_of(r[2], file, numbers), r[3]) for r in rows]
+    pairs = [(stamp_of(r[0], file), r[1], stamp_of(r[2], file), r[3]) for r in rows]
     require_pictures(folder, dict.fromkeys(name for _, a, _, b in pairs for name in (a, b)))
     if not _is_depth_first(folder, pairs):
         return Pairs(pairs, [], numbers)
@@ -121,7 +121,7 @@ def _by_time(folder: Path) -> Pairs:
     colour, depth = _pictures(folder, "rgb"), _pictures(folder, "depth")
     stamps = [text for text, _ in (*colour, *depth)]
     numbers = are_frame_numbers(stamps) and len(stamps) > 2
-    at = {text: stamp_of(text, folder, numbers) for text in stamps}
+    at = {text: stamp_of(text, folder) for text in stamps}
     pairs = _associate([(at[text], name) for text, name in colour], [(at[text], name) for text, name in depth])
     return Pairs(pairs, _unpaired(len(pairs), len(colour), len(depth)) + _strangers(folder), numbers)
 
@@ -191,28 +191,27 @@ def _acceleration(row: list[str], file: Path) -> Moment:
 
 
 def _ground_truth(file: Path, frame_numbers: bool) -> tuple[list[Moment], list[str]]:
-    """The poses of a file, none where there is no such file, and notes on it; its stamps as those of the pictures."""
+    """The poses of a file, none where there is no such file, and notes on it. ``frame_numbers`` is of the pictures."""
     if not file.exists():
         return [], []
     rows, names = read_table(file, 8)
     columns = pose_columns(names)
-    numbers = frame_numbers and are_frame_numbers(row[0] for row in rows)
-    told = [_true_moment(row, columns, file, numbers) for row in rows]
+    told = [_true_moment(row, columns, file) for row in rows]
     moments = [moment for moment in told if moment is not None]
     notes = passed_over(len(told) - len(moments), len(told), file.name)
-    if frame_numbers and not numbers and rows:
+    if frame_numbers and rows and not are_frame_numbers(row[0] for row in rows):
         notes.append(f"{file.name} has other times than the pictures, which are the numbers of frames")
     return moments, notes
 
 
-def _true_moment(row: list[str], columns: Sequence[int], file: Path, frame_numbers: bool) -> Moment | None:
+def _true_moment(row: list[str], columns: Sequence[int], file: Path) -> Moment | None:
     """A row of the ground truth; None where its numbers are no pose. ValueError where they are no numbers."""
     try:
         numbers = np.array([float(row[k]) for k in columns])
     except ValueError as error:
         raise ValueError(f"{file}: expected timestamp tx ty tz qx qy qz qw, got {' '.join(row)}") from error
     T_world_camera = _true_pose(numbers)
-    stamp_ns = stamp_of(row[0], file, frame_numbers)
+    stamp_ns = stamp_of(row[0], file)
     return None if T_world_camera is None else true_moment(T_world_camera, stamp_ns)
 
 

@@ -13,7 +13,6 @@ from decimal import Decimal
 from pathlib import Path
 from typing import NamedTuple
 
-from objreg_ros.recording.folder import FRAME_RATE_HZ
 from objreg_ros.recording.text import read_text
 
 NS_DIGITS = 19
@@ -65,13 +64,8 @@ def are_frame_numbers(stamps: Iterable[str]) -> bool:
     return all(text.isdecimal() and len(text) <= FRAME_DIGITS for text in stamps)
 
 
-def stamp_of(text: str, file: Path, frame_numbers: bool = False) -> int:
-    """Nanoseconds of a time in seconds, or of 19 digits that are nanoseconds already: those of 2001 and later.
-
-    Of the number of a frame they are those at `FRAME_RATE_HZ`.
-    """
-    if frame_numbers:
-        return round(int(text) * 1e9 / FRAME_RATE_HZ)
+def stamp_of(text: str, file: Path) -> int:
+    """Nanoseconds of a time in seconds, or of 19 digits that are nanoseconds already: those of 2001 and later."""
     is_ns = len(text) == NS_DIGITS and text.isdecimal()
     try:
         seconds = Decimal(text) / (10**9 if is_ns else 1)
