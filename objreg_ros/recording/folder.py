@@ -8,7 +8,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from objreg_ros.data import Array
+from objreg_ros.geometry import is_rigid, pose, rigid, rotation_from_quaternion
 from objreg_ros.recording import messages
 from objreg_ros.recording.picture_files import colour_message, depth_message
 from objreg_ros.recording.record import Record, Recording, Topic
@@ -25,6 +28,7 @@ TYPES = {
     DEPTH: "sensor_msgs/msg/Image",
 }
 CAMERA_FRAME, WORLD_FRAME, ODOM_FRAME = "camera", "world", "odom"
+T_ODOM_ARKIT = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 NUMBERED = "times are the numbers of frames: each is taken for a second"
 
 Pair = tuple[int, str, int, str]  # colour stamp, colour file, depth stamp, depth file
@@ -85,7 +89,17 @@ def true_moment(T_world_camera: Array, stamp_ns: int) -> Moment:
     return Moment(stamp_ns, GROUND_TRUTH, partial(messages.pose_stamped, T_world_camera, stamp_ns, WORLD_FRAME))
 
 
-def odometry_moment(T_odom_camera: Array, covariance: Array, stamp_ns: int) -> Moment:
-    """A pose (4, 4) of the camera, optical frame, that a device measured as it moved, with its covariance (6, 6)."""
-    make = partial(messages.odometry, T_odom_camera, covariance, stamp_ns, ODOM_FRAME, CAMERA_FRAME)
+def odometry_moment(T_world_camera: Array, stamp_ns: int) -> Moment:
+    """A pose (4, 4) of the camera, optical frame, in ARKit's world, whose y is up: odometry in a frame with z up."""
+    T_odom_camera = rigid(T_ODOM_ARKIT @ T_world_camera)
+    make = partial(messages.odometry, T_odom_camera, np.zeros((6, 6)), stamp_ns, ODOM_FRAME, CAMERA_FRAME)
     return Moment(stamp_ns, ODOM, make)
+
+
+def pose_of_numbers(numbers: Array) -> Array | None:
+    """The pose (4, 4) of x y z qx qy qz qw; None where they are none."""
+    try:
+        T = pose(rotation_from_quaternion(numbers[3:]), numbers[:3])
+    except ValueError:
+        return None
+    return T if is_rigid(T) else None

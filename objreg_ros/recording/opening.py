@@ -3,17 +3,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from objreg_ros.recording.bag_files import METADATA, bag_files, is_bag
 from objreg_ros.recording.bags import BagRecording
 from objreg_ros.recording.record import Recording
+from objreg_ros.recording.scannet import ScanNetRecording, is_scannet
+from objreg_ros.recording.stray_scanner import StrayRecording, is_stray
 from objreg_ros.recording.text import require_regular
 from objreg_ros.recording.tum import TumRecording
 
 EXPECTED = (
-    "expected a rosbag1 file (.bag), a rosbag2 folder (metadata.yaml) or file (.mcap, .db3), or a TUM RGB-D folder "
-    "(rgb/, depth/ and associations.txt or rgb.txt and depth.txt)"
+    "expected a rosbag1 file (.bag), a rosbag2 folder (metadata.yaml) or file (.mcap, .db3), a TUM RGB-D folder "
+    "(rgb/, depth/ and associations.txt or rgb.txt and depth.txt), or a folder of ScanNet or Stray Scanner"
 )
 
 
@@ -34,12 +37,24 @@ def _open_folder(folder: Path) -> Recording:
     bags = bag_files(folder)
     if bags and (folder / METADATA).exists():
         return BagRecording(folder)
-    if (folder / "rgb").is_dir() or (folder / "rgb.txt").exists():
-        return _beside(TumRecording(folder), bags)
+    for fits, kind in FOLDERS:
+        if fits(folder):
+            return _beside(kind(folder), bags)
     if bags or (folder / METADATA).exists():
         return BagRecording(folder)
     got = ", ".join(sorted(file.name for file in folder.iterdir())[:5]) or "nothing"
     raise ValueError(f"{folder}: {EXPECTED}, got a folder with {got}")
+
+
+def _is_tum(folder: Path) -> bool:
+    return (folder / "rgb").is_dir() or (folder / "rgb.txt").exists()
+
+
+FOLDERS: tuple[tuple[Callable[[Path], bool], Callable[[Path], Recording]], ...] = (
+    (is_stray, StrayRecording),
+    (_is_tum, TumRecording),
+    (is_scannet, ScanNetRecording),
+)
 
 
 def _beside(recording: Recording, bags: list[Path]) -> Recording:

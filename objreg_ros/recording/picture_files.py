@@ -85,6 +85,14 @@ def same_shape(a: Size, b: Size) -> bool:
     return abs(a[0] * b[1] / (a[1] * b[0]) - 1.0) <= SAME_SHAPE
 
 
+def larger_colour(colour: Size, depth: Size) -> list[str]:
+    """A note for the user where colour is brought to the size of depth."""
+    if colour[0] <= depth[0] or not same_shape(colour, depth):
+        return []
+    sizes = f"colour has {colour[0]} × {colour[1]} pixels and depth {depth[0]} × {depth[1]}"
+    return [f"{sizes}: colour is brought to the size of depth"]
+
+
 def brought_to(rgb: Array, size: Size) -> Array:
     """A picture (H, W, 3) with the pixels of a smaller size; as it is where that is not smaller or of another shape."""
     had = rgb.shape[1], rgb.shape[0]

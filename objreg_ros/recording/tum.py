@@ -19,14 +19,23 @@ from typing import NamedTuple
 import numpy as np
 
 from objreg_ros.data import Array
-from objreg_ros.geometry import is_rigid, pose, rotation_from_quaternion
 from objreg_ros.recording import messages
-from objreg_ros.recording.folder import IMU, NUMBERED, FolderRecording, Moment, Pair, moments_of_pairs, true_moment
+from objreg_ros.recording.folder import (
+    IMU,
+    NUMBERED,
+    FolderRecording,
+    Moment,
+    Pair,
+    moments_of_pairs,
+    pose_of_numbers,
+    true_moment,
+)
 from objreg_ros.recording.picture_files import (
     first_depth_size,
     first_size,
     is_depth,
     is_picture,
+    larger_colour,
     require_pictures,
     same_shape,
 )
@@ -73,14 +82,6 @@ def camera_of_pairs(folder: Path, pairs: Sequence[Pair]) -> tuple[TumCamera, lis
     depth = first_depth_size(folder, list(dict.fromkeys(name for _, _, _, name in pairs))) or colour
     camera = read_camera(camera_file(folder), *depth, colour if same_shape(colour, depth) else depth)
     return camera, [*camera.notes, *larger_colour(colour, depth)]
-
-
-def larger_colour(colour: tuple[int, int], depth: tuple[int, int]) -> list[str]:
-    """A note for the user where colour is brought to the size of depth."""
-    if colour[0] <= depth[0] or not same_shape(colour, depth):
-        return []
-    sizes = f"colour has {colour[0]} × {colour[1]} pixels and depth {depth[0]} × {depth[1]}"
-    return [f"{sizes}: colour is brought to the size of depth"]
 
 
 def _pairs(folder: Path) -> Pairs:
@@ -210,15 +211,6 @@ def _true_moment(row: list[str], columns: Sequence[int], file: Path) -> Moment |
         numbers = np.array([float(row[k]) for k in columns])
     except ValueError as error:
         raise ValueError(f"{file}: expected timestamp tx ty tz qx qy qz qw, got {' '.join(row)}") from error
-    T_world_camera = _true_pose(numbers)
+    T_world_camera = pose_of_numbers(numbers)
     stamp_ns = stamp_of(row[0], file)
     return None if T_world_camera is None else true_moment(T_world_camera, stamp_ns)
-
-
-def _true_pose(numbers: Array) -> Array | None:
-    """``T_world_camera`` of tx ty tz qx qy qz qw; None where they are no pose."""
-    try:
-        T_world_camera = pose(rotation_from_quaternion(numbers[3:]), numbers[:3])
-    except ValueError:
-        return None
-    return T_world_camera if is_rigid(T_world_camera) else None
