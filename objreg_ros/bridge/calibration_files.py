@@ -62,7 +62,7 @@ def parse_camera(text: str) -> CameraFile:
 
 def _mapping(text: str) -> Mapping[str, Any]:
     begins = text.lstrip()[:6]
-    if begins.startswith(("%YAML:", "<?xml")):
+    if begins.startswith(("%YAML:", "<?xml")) or "!!opencv-" in text:
         return _of_file_storage(text)
     try:
         values = json.loads(text) if begins.startswith("{") else _first_document(text)
@@ -88,6 +88,8 @@ def _first_document(text: str) -> Any:
 
 def _of_file_storage(text: str) -> dict[str, Any]:
     """What OpenCV's storage of settings holds, in YAML or XML."""
+    if not text.lstrip().startswith("<"):  # of its versions one reads what another writes only with this header
+        text = "%YAML:1.0\n" + re.sub(r"\A\s*%YAML.*\n", "", text)
     try:
         storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
         root = storage.root()

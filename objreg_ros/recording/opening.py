@@ -9,6 +9,7 @@ from pathlib import Path
 from objreg_ros.recording.bag_files import METADATA, bag_files, is_bag
 from objreg_ros.recording.bags import BagRecording
 from objreg_ros.recording.record import Recording
+from objreg_ros.recording.record3d import Record3dRecording, is_record3d
 from objreg_ros.recording.scannet import ScanNetRecording, is_scannet
 from objreg_ros.recording.stray_scanner import StrayRecording, is_stray
 from objreg_ros.recording.text import require_regular
@@ -16,7 +17,8 @@ from objreg_ros.recording.tum import TumRecording
 
 EXPECTED = (
     "expected a rosbag1 file (.bag), a rosbag2 folder (metadata.yaml) or file (.mcap, .db3), a TUM RGB-D folder "
-    "(rgb/, depth/ and associations.txt or rgb.txt and depth.txt), or a folder of ScanNet or Stray Scanner"
+    "(rgb/, depth/ and associations.txt or rgb.txt and depth.txt), a folder of ScanNet or Stray "
+    "Scanner, or a file (.r3d) or folder of Record3D"
 )
 
 
@@ -28,6 +30,8 @@ def open_recording(path: Path | str) -> Recording:
     if place.is_dir():
         return _open_folder(place)
     require_regular(place)
+    if place.suffix.lower() == ".r3d":
+        return Record3dRecording(place)
     if not is_bag(place):
         raise ValueError(f"{place}: {EXPECTED}, got a file {place.suffix or 'without a suffix'}")
     return BagRecording(place)
@@ -52,6 +56,7 @@ def _is_tum(folder: Path) -> bool:
 
 FOLDERS: tuple[tuple[Callable[[Path], bool], Callable[[Path], Recording]], ...] = (
     (is_stray, StrayRecording),
+    (is_record3d, Record3dRecording),
     (_is_tum, TumRecording),
     (is_scannet, ScanNetRecording),
 )

@@ -104,7 +104,11 @@ def brought_to(rgb: Array, size: Size) -> Array:
 def read_picture(file: Path, flags: int) -> Array:
     """The pixels of a picture as OpenCV gives them; ValueError for what does not decode, or is too large."""
     require_regular(file)
-    data = file.read_bytes()
+    return decode_picture(file.read_bytes(), str(file), flags)
+
+
+def decode_picture(data: bytes, file: str, flags: int) -> Array:
+    """As `read_picture`, of the bytes of a file."""
     try:
         require_picture(data, PICTURES, limits.MOST_PIXELS_OF_PICTURE)
         pixels = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
