@@ -157,7 +157,7 @@ def _inputs(recording: Path, asked: Asked) -> Inputs:
             return inputs
         wanted = inputs.wanted(depth_source)
         other = "" if depth_source == "auto" else ", or leave out segmenter.source"
-        choose = FOLDER if source.of_pictures else f"see --remap{other}"
+        choose = f"{FOLDER}{other}" if source.of_pictures else f"see --remap{other}"
         raise ValueError(f"{recording}: expected {wanted}, got {', '.join(source.topics)}; {choose}")
 
 

@@ -86,7 +86,7 @@ class Asked:
             there = ", ".join(f"{topic.name} ({topic.msgtype})" for topic in source.topics.values()) or "no topics"
             wanted = inputs.wanted(depth_source)
             other = "" if depth_source == "auto" else ", or leave out segmenter.source"
-            choose = FOLDER if source.of_pictures else f"choose with --remap input:=/topic{other}"
+            choose = f"{FOLDER}{other}" if source.of_pictures else f"choose with --remap input:=/topic{other}"
             raise ValueError(f"{source.path}: expected {wanted}, got {there}; {choose}")
         if self.drifts:
             if inputs.ground_truth is None:

@@ -68,7 +68,7 @@ def open_bag(path: Path) -> OpenBag:
             require_room(path)
             return _with_notes(OpenBag(_opened([path]), _named(path, files)), path)
     except ValueError as error:
-        if not files or isinstance(error.__cause__, UnpackingError):
+        if not files or isinstance(error.__cause__, UnpackingError | RecursionError):
             raise
         return _without_metadata(path, files, error)
 

@@ -20,6 +20,7 @@ from rosbags.interfaces import (
     QosReliability,
     QosTime,
 )
+from rosbags.rosbag2 import reader as rosbag2
 from rosbags.typesys.store import Typestore
 
 from objreg_ros.recording.bag_errors import (
@@ -33,7 +34,7 @@ from objreg_ros.recording.bag_errors import (
 from objreg_ros.recording.bag_files import open_bag
 from objreg_ros.recording.messages import READ, difference, misfit, serialise, standard_types
 from objreg_ros.recording.record import Record, Recording, Topic
-from objreg_ros.recording.unpacking import bound_unpacking
+from objreg_ros.recording.unpacking import ZSTD_MAGIC, bound_unpacking
 
 END_OF_TIME_NS = 2**63
 REINDEX = "make metadata.yaml anew with `ros2 bag reindex`, or move it away"
@@ -97,6 +98,10 @@ class BagRecording(Recording):
         self._reader.close()
         self._kept.close()
 
+    def _unpacked(self, raw: bytes) -> bytes:
+        """The bytes of a message that was packed by itself, of which only metadata.yaml tells; CDR begins with 0."""
+        return rosbag2.zstd.decompress(raw) if self._reader.is2 and raw[:4] == ZSTD_MAGIC else raw
+
     def _odd_message(self, got: str) -> ValueError:
         return odd_message(self.path, got) if self._is_whole else broken_bag(self.path, got, opened=True)
 
@@ -109,14 +114,17 @@ class BagRecording(Recording):
             if connection.msgtype in self._misfits:
                 raise self._odd_message(self._misfits[connection.msgtype])
             try:
-                return self._reader.deserialize(raw, connection.msgtype)
+                return self._reader.deserialize(self._unpacked(raw), connection.msgtype)
             except Exception as error:
                 if not says_broken(error):
                     raise
                 raise self._odd_message(f"{connection.topic}: {said(error)}") from error
 
         def encode() -> bytes:
-            return bytes(raw) if self._reader.is2 else serialise(decode())
+            if not self._reader.is2:
+                return serialise(decode())
+            with broken_means_value_error(self.path, opened=True):
+                return bytes(self._unpacked(raw))
 
         return Record(connection.topic, connection.msgtype, stamp_ns, decode, encode)
 

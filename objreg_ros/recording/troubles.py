@@ -28,7 +28,7 @@ REGISTER = "record registered depth (RealSense: align_depth.enable:=true, OpenNI
 RECORD_UNITS = "record depth in mm (16UC1) or in m (32FC1); a TUM folder names its steps as depth_scale in camera.yaml"
 
 OF_FILES = "the topics of a folder are made of its files, and each that it can have is there unless it was ruled out"
-FOLDER = "give the folder what is missing, and leave out --remap and segmenter.source"
+FOLDER = "give the folder what is missing, or leave out --remap"
 CAMERA_YAML = (
     "give camera.yaml the width, height, fx, fy, cx and cy of the depth pictures, or name --camera fx,fy,cx,cy"
 )

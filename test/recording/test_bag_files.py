@@ -8,9 +8,12 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
+from objreg_ros.bridge import from_msg
 from objreg_ros.recording import open_recording, write_rosbag2
 from objreg_ros.recording.bag_files import bag_files
+from objreg_ros.recording.messages import standard_types
 
 from .folders import noetic_bag, records, tum_folder
 
@@ -65,7 +68,9 @@ def test_numbers_in_names_are_put_in_order_as_numbers(tmp_path: Path) -> None:
     assert [file.name for file in bag_files(tmp_path)] == ["run_1.mcap", "run_9.mcap", "run_10.mcap"]
 
 
-@pytest.mark.parametrize("content", ["", "\0" * 4096, "rosbag2_bagfile_information:\n  version: 9\n  sto", "[" * 5000])
+@pytest.mark.parametrize(
+    "content", ["", "\0" * 4096, "rosbag2_bagfile_information:\n  version: 9\n  sto", "version: [1, 2"]
+)
 def test_a_file_is_read_where_its_metadata_are_no_use(content: str, tmp_path: Path) -> None:
     file = one(tmp_path / "bag")
     (tmp_path / "bag/metadata.yaml").write_text(content)
@@ -74,6 +79,29 @@ def test_a_file_is_read_where_its_metadata_are_no_use(content: str, tmp_path: Pa
     (note,) = recording.notes
     assert note.startswith("metadata.yaml is not used (") and note.endswith(f"): {file.name} read without it")
     assert ("it is empty" in note) == (not content.strip("\0")) and "\n" not in note
+
+
+def test_metadata_that_nest_without_end_are_refused_although_the_file_is_whole(tmp_path: Path) -> None:
+    one(tmp_path / "bag")
+    (tmp_path / "bag/metadata.yaml").write_text("rosbag2_bagfile_information: " + "[" * 5000)
+    with pytest.raises(ValueError, match=r"got: RecursionError.*; make metadata\.yaml anew with `ros2 bag reindex`"):
+        open_recording(tmp_path / "bag")
+
+
+@pytest.mark.parametrize("storage", ENDS)
+def test_messages_that_were_packed_one_by_one_are_read_without_metadata(storage: str, tmp_path: Path) -> None:
+    plugin = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}[storage]
+    writer = Writer(tmp_path / "bag", version=9, storage_plugin=plugin)
+    writer.set_compression(CompressionMode.MESSAGE, CompressionFormat.ZSTD)
+    with writer:
+        for record in records(1):
+            connection = writer.add_connection(record.topic, record.msgtype, typestore=standard_types())
+            writer.write(connection, record.stamp_ns, record.cdr)
+    (tmp_path / "bag/metadata.yaml").unlink()
+    with open_recording(tmp_path / "bag") as recording:
+        record = next(recording.records(["/depth/image"]))
+        assert from_msg.depth(record.message)[0, 0] == 1.0
+        assert from_msg.depth(standard_types().deserialize_cdr(record.cdr, record.msgtype))[0, 0] == 1.0
 
 
 def test_a_renamed_file_is_read_and_the_name_that_is_gone_is_said(tmp_path: Path) -> None:
