@@ -122,14 +122,14 @@ def _of_calibration(values: Mapping[str, Any]) -> CameraFile | None:
         return None
     lens = next((named[name] for name in ("distortion_coefficients", "dist_coeffs", "distortion") if name in named), ())
     size = named.get("image_size") or (0, 0)
-    told = {
+    known = {
         **named,
         "image_width": named.get("image_width", size[0] if isinstance(size, Sequence) else 0),
         "image_height": named.get("image_height", size[1] if isinstance(size, Sequence) and len(size) > 1 else 0),
         "distortion_coefficients": lens or None,
         "distortion_model": named.get("distortion_model") or _model_of(lens),
     }
-    return CameraFile(told, named.get("depth_scale"))
+    return CameraFile(known, named.get("depth_scale"))
 
 
 def _of_camera_info(values: Mapping[str, Any]) -> CameraFile | None:
@@ -146,8 +146,8 @@ def _of_camera_info(values: Mapping[str, Any]) -> CameraFile | None:
         )
     names = {"width": "image_width", "height": "image_height", "k": "camera_matrix", "r": "rectification_matrix",
              "p": "projection_matrix", "distortion_model": "distortion_model"}  # fmt: skip
-    told = {to: named[name] for name, to in names.items() if named.get(name) is not None}
-    return CameraFile({**told, "distortion_coefficients": named.get("d") or None})
+    known = {to: named[name] for name, to in names.items() if named.get(name) is not None}
+    return CameraFile({**known, "distortion_coefficients": named.get("d") or None})
 
 
 def _of_orb_slam(values: Mapping[str, Any]) -> CameraFile | None:
@@ -160,13 +160,13 @@ def _of_orb_slam(values: Mapping[str, Any]) -> CameraFile | None:
     numbers = {name: values.get(f"{prefix}.{name}") for name in PINHOLE}
     fy: Any = numbers["fy"]
     upwards = isinstance(fy, int | float) and fy < 0  # ICL-NUIM: rows of pictures count downwards nevertheless
-    told = _pinhole({**numbers, "fy": -fy if upwards else fy})
-    told |= {"image_width": values.get("Camera.width", 0), "image_height": values.get("Camera.height", 0)}
-    told["distortion_coefficients"] = [values.get(f"{prefix}.{name}", 0.0) for name in names]
-    told["distortion_model"] = "equidistant" if fisheye else "plumb_bob"
+    known = _pinhole({**numbers, "fy": -fy if upwards else fy})
+    known |= {"image_width": values.get("Camera.width", 0), "image_height": values.get("Camera.height", 0)}
+    known["distortion_coefficients"] = [values.get(f"{prefix}.{name}", 0.0) for name in names]
+    known["distortion_model"] = "equidistant" if fisheye else "plumb_bob"
     scale = values.get("RGBD.DepthMapFactor", values.get("DepthMapFactor"))
-    known = isinstance(scale, int | float) and scale > LEAST_DEPTH_SCALE
-    return CameraFile(told, scale if known else None, (f"fy {fy:g} is taken without its sign",) if upwards else ())
+    has_scale = isinstance(scale, int | float) and scale > LEAST_DEPTH_SCALE
+    return CameraFile(known, scale if has_scale else None, (f"fy {fy:g} is taken without its sign",) if upwards else ())
 
 
 def _of_kalibr(values: Mapping[str, Any]) -> CameraFile | None:
@@ -183,40 +183,40 @@ def _of_kalibr(values: Mapping[str, Any]) -> CameraFile | None:
     size = first.get("resolution") or (0, 0)
     if not isinstance(size, Sequence) or len(size) != 2:
         raise ValueError(f"expected resolution: [width, height] of {cameras[0]}, got {brief(size)}")
-    told = _pinhole(dict(zip(PINHOLE, numbers, strict=True)))
-    told |= {"image_width": size[0], "image_height": size[1], "distortion_model": KALIBR[lens]}
-    told["distortion_coefficients"] = [] if lens == "none" else first.get("distortion_coeffs") or []
+    known = _pinhole(dict(zip(PINHOLE, numbers, strict=True)))
+    known |= {"image_width": size[0], "image_height": size[1], "distortion_model": KALIBR[lens]}
+    known["distortion_coefficients"] = [] if lens == "none" else first.get("distortion_coeffs") or []
     rest = ", ".join(cameras[1:])
     note = f"the file has several cameras: {cameras[0]} is used, and not {rest}; leave only the right one in it if not"
-    return CameraFile(told, notes=(note,) if rest else ())
+    return CameraFile(known, notes=(note,) if rest else ())
 
 
 def _of_open3d(values: Mapping[str, Any]) -> CameraFile | None:
     """Open3D's pinhole camera, also within the parameters of a view; its matrix is written by columns."""
     inner = values.get("intrinsic")
-    told = inner if isinstance(inner, Mapping) else values
-    matrix = told.get("intrinsic_matrix")
+    known = inner if isinstance(inner, Mapping) else values
+    matrix = known.get("intrinsic_matrix")
     if matrix is None:
         return None
     rows = _flat(matrix)
     if len(rows) == 9 and not any((rows[2], rows[5])):
         rows = [rows[3 * column + row] for row in range(3) for column in range(3)]
-    values_of = {"camera_matrix": rows, "image_width": told.get("width", 0), "image_height": told.get("height", 0)}
-    return CameraFile(values_of, told.get("depth_scale"))
+    values_of = {"camera_matrix": rows, "image_width": known.get("width", 0), "image_height": known.get("height", 0)}
+    return CameraFile(values_of, known.get("depth_scale"))
 
 
 def _of_pinhole(values: Mapping[str, Any]) -> CameraFile | None:
     """``fx``, ``fy``, ``cx`` and ``cy`` by name, also one mapping deeper, as in the settings of neural SLAM."""
     nested = (inner for inner in values.values() if isinstance(inner, Mapping))
-    told = next((one for one in (values, *nested) if all(one.get(name) is not None for name in PINHOLE)), None)
-    if told is None:
+    known = next((one for one in (values, *nested) if all(one.get(name) is not None for name in PINHOLE)), None)
+    if known is None:
         return None
     width, height = (
-        next((told[n] for n in names if n in told), 0) for names in (("width", "w", "W"), ("height", "h", "H"))
+        next((known[n] for n in names if n in known), 0) for names in (("width", "w", "W"), ("height", "h", "H"))
     )
-    made = {**_pinhole(told), "image_width": width, "image_height": height}
-    scale = next((told[name] for name in ("depth_scale", "png_depth_scale", "scale") if name in told), None)
-    return CameraFile({**made, "distortion_coefficients": told.get("distortion") or None}, scale)
+    made = {**_pinhole(known), "image_width": width, "image_height": height}
+    scale = next((known[name] for name in ("depth_scale", "png_depth_scale", "scale") if name in known), None)
+    return CameraFile({**made, "distortion_coefficients": known.get("distortion") or None}, scale)
 
 
 READERS: tuple[Callable[[Mapping[str, Any]], CameraFile | None], ...] = (
@@ -231,12 +231,12 @@ READERS: tuple[Callable[[Mapping[str, Any]], CameraFile | None], ...] = (
 
 def _of_numbers(text: str) -> CameraFile | None:
     """A bare matrix of 3 × 3 or 4 × 4 by rows, or fx fy cx cy in one line; None for other text."""
-    lines = [[word for word in re.split(r"[\s,;\[\]]+", line) if word] for line in text.splitlines()]
+    lines = [[part for part in re.split(r"[\s,;\[\]]+", line) if part] for line in text.splitlines()]
     rows = [line for line in lines if line and not line[0].startswith("#")]
     if [len(row) for row in rows] not in ([3] * 3, [4] * 4, [4]):
         return None
     try:
-        numbers = [[float(word) for word in row] for row in rows]
+        numbers = [[float(part) for part in row] for row in rows]
     except ValueError:
         return None
     if len(numbers) == 1:
@@ -249,14 +249,14 @@ def _of_ost(text: str) -> CameraFile | None:
     lines = [line.strip() for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
     if "camera matrix" not in lines or "[image]" not in lines:
         return None
-    told: dict[str, Any] = {}
+    known: dict[str, Any] = {}
     for k, line in enumerate(lines):
         if line in ("width", "height") and k + 1 < len(lines):
-            told[f"image_{line}"] = int(lines[k + 1]) if lines[k + 1].isdecimal() else lines[k + 1]
+            known[f"image_{line}"] = int(lines[k + 1]) if lines[k + 1].isdecimal() else lines[k + 1]
         elif line in OST:
-            told[OST[line]] = _numbers_below(lines[k + 1 :])
-    told["distortion_model"] = _model_of(told.get("distortion_coefficients", ()))
-    return CameraFile(told)
+            known[OST[line]] = _numbers_below(lines[k + 1 :])
+    known["distortion_model"] = _model_of(known.get("distortion_coefficients", ()))
+    return CameraFile(known)
 
 
 def _numbers_below(lines: Sequence[str]) -> list[float]:
@@ -264,17 +264,17 @@ def _numbers_below(lines: Sequence[str]) -> list[float]:
     numbers: list[float] = []
     for line in lines:
         try:
-            numbers += [float(word) for word in line.split()]
+            numbers += [float(part) for part in line.split()]
         except ValueError:
             break
     return numbers
 
 
-def _pinhole(told: Mapping[str, Any]) -> dict[str, Any]:
+def _pinhole(known: Mapping[str, Any]) -> dict[str, Any]:
     """fx, fy, cx and cy as a camera matrix; ValueError where one is not said."""
-    if missing := [name for name in PINHOLE if told.get(name) is None]:
+    if missing := [name for name in PINHOLE if known.get(name) is None]:
         raise ValueError(f"expected fx, fy, cx and cy, got none for {', '.join(missing)}")
-    fx, fy, cx, cy = (told[name] for name in PINHOLE)
+    fx, fy, cx, cy = (known[name] for name in PINHOLE)
     return {"camera_matrix": [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]}
 
 

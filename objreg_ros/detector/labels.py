@@ -113,9 +113,8 @@ def _names_of_yaml(path: Path, text: str) -> list[str]:
     if len(text) > NAMES_TEXT:
         raise ValueError(f"{expected}, of at most {NAMES_TEXT} characters, got {len(text)}")
     try:
-        told = yaml.load(text, yaml.BaseLoader)  # nothing but text, lists and mappings
-        told = told.get("names", told) if isinstance(told, dict) else told
-        names = in_order(told)
+        values = yaml.load(text, yaml.BaseLoader)  # nothing but text, lists and mappings
+        names = in_order(values.get("names", values) if isinstance(values, dict) else values)
     except (yaml.YAMLError, ValueError, LookupError, TypeError, RecursionError) as error:
         raise ValueError(f"{expected}, got: {' '.join(str(error).split())[:200]}") from error
     return [name.strip() for name in names]

@@ -43,8 +43,8 @@ def require_pictures(folder: Path, names: Iterable[str]) -> None:
             place = real(file) if stat.S_ISLNK(kind) or file.name == ".." else real(file.parent) / file.name
             inside = place.is_relative_to(real(folder))
         except (FileNotFoundError, NotADirectoryError, RuntimeError) as error:  # a loop of links is a RuntimeError
-            told = f"expected the picture {name} that its list names, got no such file"
-            raise FileNotFoundError(f"{folder}: {told}") from error
+            known = f"expected the picture {name} that its list names, got no such file"
+            raise FileNotFoundError(f"{folder}: {known}") from error
         if not inside:
             raise ValueError(f"{folder}: expected pictures inside of this folder, got {name} at {place}; copy it there")
         if not stat.S_ISREG(kind):

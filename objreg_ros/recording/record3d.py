@@ -119,7 +119,7 @@ def is_record3d(folder: Path) -> bool:
 
 
 def _moments(source: Source) -> tuple[list[Moment], list[str]]:
-    told = _metadata(source)
+    known = _metadata(source)
     colours = {int(m[1]): name for name in source.names if (m := COLOUR_NAME.search(name))}
     depths = {
         int(m[1]): name for name in source.names if (m := DEPTH_NAME.search(name)) and name not in colours.values()
@@ -130,18 +130,18 @@ def _moments(source: Source) -> tuple[list[Moment], list[str]]:
         raise FileNotFoundError(
             f"{source.path}: expected pictures of one number in rgbd/, or in rgb/ and depth/, got {got}"
         )
-    stamps, notes = _stamps(told, both, source.path)
+    stamps, notes = _stamps(known, both, source.path)
     colour, depth = (
         _first_colour(source, [colours[n] for n in both]),
-        _first_depth(source, told, [depths[n] for n in both]),
+        _first_depth(source, known, [depths[n] for n in both]),
     )
-    camera, of_camera = scaled_camera(_camera(told, source.path), colour, depth, MILLIMETRES, "metadata")
+    camera, of_camera = scaled_camera(_camera(known, source.path), colour, depth, MILLIMETRES, "metadata")
     moments = []
     for number, stamp_ns in zip(both, stamps, strict=True):
         picture = partial(_colour_message, source, colours[number], stamp_ns, camera.size)
-        metres = partial(_depth_message, source, told, depths[number], stamp_ns)
+        metres = partial(_depth_message, source, known, depths[number], stamp_ns)
         moments += [info_moment(camera, stamp_ns), Moment(stamp_ns, IMAGE, picture), Moment(stamp_ns, DEPTH, metres)]
-    odometry, of_poses = _odometry(told, both, stamps, source.path)
+    odometry, of_poses = _odometry(known, both, stamps, source.path)
     return moments + odometry, [*notes, *of_camera, *larger_colour(colour, depth), *of_poses]
 
 
@@ -151,33 +151,35 @@ def _metadata(source: Source) -> Mapping[str, Any]:
         got = ", ".join(source.names[:5]) or "nothing"
         raise FileNotFoundError(f"{source.path}: expected the file metadata of Record3D, got {got}; export it as .r3d")
     try:
-        told = json.loads(source.read(name))
+        known = json.loads(source.read(name))
     except (ValueError, RecursionError) as error:
         raise ValueError(f"{source.path}: expected JSON in {name}, got: {str(error)[:200]}; export it again") from error
-    if not isinstance(told, dict) or "K" not in told:
+    if not isinstance(known, dict) or "K" not in known:
         raise ValueError(
-            f"{source.path}: expected K, w, h and poses in {name}, got {str(told)[:80]}; export it as .r3d"
+            f"{source.path}: expected K, w, h and poses in {name}, got {str(known)[:80]}; export it as .r3d"
         )
-    return told
+    return known
 
 
-def _camera(told: Mapping[str, Any], path: Path) -> Any:
+def _camera(known: Mapping[str, Any], path: Path) -> Any:
     """The camera of colour; K is written by columns."""
-    numbers = told["K"]
+    numbers = known["K"]
     by_rows = (
         [numbers[3 * c + r] for r in range(3) for c in range(3)]
         if isinstance(numbers, list) and len(numbers) == 9
         else []
     )
     try:
-        return of_mapping({"camera_matrix": by_rows, "image_width": told.get("w", 0), "image_height": told.get("h", 0)})
+        return of_mapping(
+            {"camera_matrix": by_rows, "image_width": known.get("w", 0), "image_height": known.get("h", 0)}
+        )
     except ValueError as error:
         raise ValueError(f"{path}: expected K, w and h of a camera in metadata, got: {error}") from error
 
 
-def _stamps(told: Mapping[str, Any], numbers: list[int], path: Path) -> tuple[list[int], list[str]]:
-    """The times of the frames in ns: as they are told, else by the frames in a second."""
-    times, fps = told.get("frameTimestamps"), told.get("fps")
+def _stamps(known: Mapping[str, Any], numbers: list[int], path: Path) -> tuple[list[int], list[str]]:
+    """The times of the frames in ns: as they are given, else by the frames in a second."""
+    times, fps = known.get("frameTimestamps"), known.get("fps")
     try:
         if isinstance(times, list) and len(times) > max(numbers):
             return [round(float(times[number]) * 1e9) for number in numbers], []
@@ -194,10 +196,10 @@ def _stamps(told: Mapping[str, Any], numbers: list[int], path: Path) -> tuple[li
 
 
 def _odometry(
-    told: Mapping[str, Any], numbers: list[int], stamps: list[int], path: Path
+    known: Mapping[str, Any], numbers: list[int], stamps: list[int], path: Path
 ) -> tuple[list[Moment], list[str]]:
-    """The poses of the camera in its optical frame, and a note on those that are none; no pose where none is told."""
-    poses = told.get("poses") or []
+    """The poses of the camera in its optical frame, and a note on those that are none; no pose where none is given."""
+    poses = known.get("poses") or []
     moments: list[Moment] = []
     for number, stamp_ns in zip(numbers, stamps, strict=True):
         if number >= len(poses):
@@ -219,13 +221,13 @@ def _first_colour(source: Source, names: list[str]) -> Size:
     return pixels.shape[1], pixels.shape[0]
 
 
-def _first_depth(source: Source, told: Mapping[str, Any], names: list[str]) -> Size:
-    metres = _metres(source, told, names[0])
+def _first_depth(source: Source, known: Mapping[str, Any], names: list[str]) -> Size:
+    metres = _metres(source, known, names[0])
     return metres.shape[1], metres.shape[0]
 
 
-def _metres(source: Source, told: Mapping[str, Any], name: str) -> Array:
-    return metres_of(source.read(name), name, f"{source.path}/{name}", told)
+def _metres(source: Source, known: Mapping[str, Any], name: str) -> Array:
+    return metres_of(source.read(name), name, f"{source.path}/{name}", known)
 
 
 def _colour_message(source: Source, name: str, stamp_ns: int, size: Size) -> Any:
@@ -234,5 +236,5 @@ def _colour_message(source: Source, name: str, stamp_ns: int, size: Size) -> Any
     return messages.image(np.asarray(rgb), "rgb8", stamp_ns, CAMERA_FRAME)
 
 
-def _depth_message(source: Source, told: Mapping[str, Any], name: str, stamp_ns: int) -> Any:
-    return messages.image(_metres(source, told, name), "32FC1", stamp_ns, CAMERA_FRAME)
+def _depth_message(source: Source, known: Mapping[str, Any], name: str, stamp_ns: int) -> Any:
+    return messages.image(_metres(source, known, name), "32FC1", stamp_ns, CAMERA_FRAME)

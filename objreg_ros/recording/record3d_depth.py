@@ -22,14 +22,14 @@ NO_LZFSE = (
 )
 
 
-def metres_of(data: bytes, name: str, where: str, told: Mapping[str, Any]) -> Array:
+def metres_of(data: bytes, name: str, where: str, known: Mapping[str, Any]) -> Array:
     """Depth (H, W) float32 m of a file's bytes, 0 where there is none; ``where`` names it in a refusal.
 
-    ``told`` are the metadata, which may say its size (``dw``, ``dh``). ValueError for what cannot be unpacked.
+    ``known`` are the metadata, which may say its size (``dw``, ``dh``). ValueError for what cannot be unpacked.
     """
     end = name.rpartition(".")[2].lower()
     if end == "depth":
-        pixels = _shaped(np.frombuffer(_unpacked(data, where), np.float32), told, where)
+        pixels = _shaped(np.frombuffer(_unpacked(data, where), np.float32), known, where)
     elif end == "npy":
         pixels = _of_npy(data, where)
     else:
@@ -63,11 +63,11 @@ def _lzfse() -> Callable[[bytes], bytes] | None:
     return None
 
 
-def _shaped(values: Array, told: Mapping[str, Any], where: str) -> Array:
+def _shaped(values: Array, known: Mapping[str, Any], where: str) -> Array:
     """Depth as rows, in the size that the metadata say, or in that of the shape of colour."""
-    width, height = told.get("dw"), told.get("dh")
+    width, height = known.get("dw"), known.get("dh")
     if not isinstance(width, int) or not isinstance(height, int):
-        w, h = float(told.get("w") or 3), float(told.get("h") or 4)
+        w, h = float(known.get("w") or 3), float(known.get("h") or 4)
         width = round((len(values) * w / h) ** 0.5)
         height = len(values) // max(width, 1)
     if width * height != len(values) or not 0 < len(values) <= limits.MOST_PIXELS_OF_PICTURE:

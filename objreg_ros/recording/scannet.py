@@ -74,10 +74,10 @@ def sizes_of(folder: Path, pairs: Iterable[Pair]) -> tuple[Size, Size]:
     return colour, first_depth_size(folder, [name for _, _, _, name in pairs]) or colour
 
 
-def scaled_camera(told: Calibration, of: Size, depth: Size, scale: float, what: str) -> tuple[TumCamera, list[str]]:
+def scaled_camera(known: Calibration, of: Size, depth: Size, scale: float, what: str) -> tuple[TumCamera, list[str]]:
     """The camera of a file, of pictures of a size, for those of depth; a note where it is brought to another size."""
-    width, height = (told.width, told.height) if told.width else of
-    pinhole = Intrinsics(fx=told.k[0], fy=told.k[4], cx=told.k[2], cy=told.k[5], width=width, height=height)
+    width, height = (known.width, known.height) if known.width else of
+    pinhole = Intrinsics(fx=known.k[0], fy=known.k[4], cx=known.k[2], cy=known.k[5], width=width, height=height)
     fitting = scaled(pinhole, *depth)
     said = f"{what} is of pictures of {width} × {height}: scaled to depth's {depth[0]} × {depth[1]}"
     return TumCamera(fitting, scale, (0.0,) * 5), [] if fitting is pinhole else [said]
@@ -98,8 +98,8 @@ def _camera(folder: Path, colour: Size, depth: Size) -> tuple[TumCamera, list[st
     for name, size in (("intrinsic_depth.txt", depth), ("intrinsic_color.txt", colour)):
         if (folder / name).exists():
             try:
-                told = of_file(parse_camera(read_text(folder / name, SETTINGS_BYTES)))
-                return scaled_camera(told, size, depth, MILLIMETRES, f"{CAMERA}/{name}")
+                known = of_file(parse_camera(read_text(folder / name, SETTINGS_BYTES)))
+                return scaled_camera(known, size, depth, MILLIMETRES, f"{CAMERA}/{name}")
             except ValueError as error:
                 raise ValueError(f"{folder / name}: expected a matrix of 4 × 4, got: {error}") from error
     got = ", ".join(sorted(file.name for file in folder.glob("*"))[:5]) or "nothing"
@@ -109,16 +109,16 @@ def _camera(folder: Path, colour: Size, depth: Size) -> tuple[TumCamera, list[st
 def _truth(folder: Path, stems: set[str]) -> tuple[list[Moment], list[str]]:
     """The poses of the frames, and a note on those that BundleFusion lost: it writes -inf."""
     files = sorted((file for file in folder.glob("*.txt") if file.stem in stems), key=lambda file: int(file.stem))
-    told = [(int(file.stem), _pose(file)) for file in files]
-    moments = [true_moment(T, _stamp(number)) for number, T in told if T is not None]
-    return moments, passed_over(len(told) - len(moments), len(told), f"{POSES}/")
+    known = [(int(file.stem), _pose(file)) for file in files]
+    moments = [true_moment(T, _stamp(number)) for number, T in known if T is not None]
+    return moments, passed_over(len(known) - len(moments), len(known), f"{POSES}/")
 
 
 def _pose(file: Path) -> Array | None:
     """``T_world_camera`` of a file; None where it is no pose. ValueError where it has no 16 numbers."""
     text = read_text(file, SETTINGS_BYTES)
     try:
-        T_world_camera = np.array([float(word) for word in text.replace(",", " ").split()]).reshape(4, 4)
+        T_world_camera = np.array([float(part) for part in text.replace(",", " ").split()]).reshape(4, 4)
     except ValueError as error:
         raise ValueError(f"{file}: expected 4 × 4 numbers, got {text[:80]!r}") from error
     return rigid(T_world_camera) if is_rigid(T_world_camera, ROUNDED) else None

@@ -65,8 +65,8 @@ class StrayRecording(FolderRecording):
             raise ValueError(f"{path}: expected rows of {POSES} with pictures of their frames in {DEPTHS}/, got {got}")
         self._video = Video(path / VIDEO)
         depth = first_depth_size(path, [depths[_frame(row, path)] for row in rows]) or self._video.size
-        told = of_file(parse_camera(read_text(path / CAMERA, SETTINGS_BYTES)))
-        camera, notes = scaled_camera(told, self._video.size, depth, MILLIMETRES, CAMERA)
+        known = of_file(parse_camera(read_text(path / CAMERA, SETTINGS_BYTES)))
+        camera, notes = scaled_camera(known, self._video.size, depth, MILLIMETRES, CAMERA)
         moments, of_poses = _odometry(rows, table, path)
         for row in rows:
             stamp_ns, frame = stamp_of(row[0], path / POSES), _frame(row, path)

@@ -52,8 +52,8 @@ def pose_columns(names: Sequence[str]) -> tuple[int, ...]:
     places: dict[str, int] = {}
     for k, name in enumerate(names):
         for kind, pattern in (("q", QUATERNION), ("t", POSITION)):
-            if (told := pattern.fullmatch(name)) is not None:
-                places.setdefault(kind + told.group(3), k)
+            if (known := pattern.fullmatch(name)) is not None:
+                places.setdefault(kind + known.group(3), k)
                 break
     wanted = ("tx", "ty", "tz", "qx", "qy", "qz", "qw")
     return tuple(places[name] for name in wanted) if all(name in places for name in wanted) else USUAL
@@ -77,12 +77,12 @@ def stamp_of(text: str, file: Path) -> int:
 
 
 def _names_columns(line: str) -> bool:
-    """Whether a line has nothing but words, as the first one of a CSV file."""
-    words = [text for text in BETWEEN.split(UNIT.sub("", line)) if text]
-    return len(words) > 1 and all(re.fullmatch(r"[A-Za-z_]\w*", word) for word in words)
+    """Whether a line has nothing but names, as the first one of a CSV file."""
+    parts = [text for text in BETWEEN.split(UNIT.sub("", line)) if text]
+    return len(parts) > 1 and all(re.fullmatch(r"[A-Za-z_]\w*", part) for part in parts)
 
 
 def _names(line: str) -> tuple[str, ...]:
     """The names of columns in a line that begins with that of the time; none in another comment."""
-    words = [text.lower() for text in BETWEEN.split(UNIT.sub("", line.lstrip("#"))) if text]
-    return tuple(words) if words and words[0].startswith(("time", "stamp", "t_", "frame")) else ()
+    parts = [text.lower() for text in BETWEEN.split(UNIT.sub("", line.lstrip("#"))) if text]
+    return tuple(parts) if parts and parts[0].startswith(("time", "stamp", "t_", "frame")) else ()

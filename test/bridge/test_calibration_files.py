@@ -74,13 +74,13 @@ def test_what_opencv_stores_is_the_camera(end: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "told",
+    "known",
     [OPEN3D, {"intrinsic": OPEN3D, "extrinsic": [1]}, {**OPEN3D, "intrinsic_matrix": K},
      {**OPEN3D, "intrinsic_matrix": np.reshape(K, (3, 3)).tolist()}],
     ids=["columns", "within a view", "rows", "rows of rows"],
 )  # fmt: skip
-def test_open3d_s_matrix_is_taken_by_columns_or_by_rows(told: dict) -> None:
-    read = camera(json.dumps(told))
+def test_open3d_s_matrix_is_taken_by_columns_or_by_rows(known: dict) -> None:
+    read = camera(json.dumps(known))
     assert (read.k, read.width, read.height, read.d) == (K, 640, 480, ())
 
 
@@ -107,7 +107,7 @@ def test_of_several_cameras_of_kalibr_the_first_is_taken_and_said(tmp_path: Path
     assert note.startswith("chain.yaml: the file has several cameras: cam0 is used, and not cam1")
 
 
-def test_the_steps_of_depth_are_told_beside_the_camera() -> None:
+def test_the_steps_of_depth_are_given_beside_the_camera() -> None:
     orb = ORB.format("Camera")
     assert parse_camera(orb + "RGBD.DepthMapFactor: 5208.0\n").depth_scale == 5208
     assert parse_camera(orb + "DepthMapFactor: 1000.0\n").depth_scale == 1000

@@ -21,9 +21,9 @@ def test_moments_come_in_order_of_time_and_as_they_are_asked_for(tmp_path: Path)
 def test_the_y_axis_of_arkit_s_world_is_the_z_axis_of_odometry() -> None:
     up = np.eye(4)
     up[1, 3] = 2.0
-    word = from_msg.odometry(odometry_moment(up, 5).make())
-    assert np.allclose(word.T_odom_body[:3, 3], (0, 0, 2)) and word.stamp_ns == 5
-    assert (word.frame_id, word.child_frame_id) == ("odom", "camera")
+    seen = from_msg.odometry(odometry_moment(up, 5).make())
+    assert np.allclose(seen.T_odom_body[:3, 3], (0, 0, 2)) and seen.stamp_ns == 5
+    assert (seen.frame_id, seen.child_frame_id) == ("odom", "camera")
 
 
 def test_numbers_that_are_no_pose_give_none() -> None:

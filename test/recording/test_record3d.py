@@ -50,10 +50,10 @@ def test_a_recording_is_colour_in_the_size_of_depth_with_its_camera(make: Any, t
         )
         assert [r.stamp_ns for r in recording.records(["/image"])] == [0, 10**8, 2 * 10**8]
         first = {r.topic: r.message for r in recording.records(end_ns=1)}
-        word = from_msg.depth_image(first["/depth/image"], first["/camera_info"], first["/image"])
-        assert word.rgb is not None and word.rgb.shape == (32, 24, 3)
-        assert (word.intrinsics.fx, word.intrinsics.cx, word.intrinsics.cy) == (25, 11.5, 15.5)
-        assert word.depth[5, 5] == 1 and word.depth[0, 0] == 0
+        seen = from_msg.depth_image(first["/depth/image"], first["/camera_info"], first["/image"])
+        assert seen.rgb is not None and seen.rgb.shape == (32, 24, 3)
+        assert (seen.intrinsics.fx, seen.intrinsics.cx, seen.intrinsics.cy) == (25, 11.5, 15.5)
+        assert seen.depth[5, 5] == 1 and seen.depth[0, 0] == 0
         assert "no times of frames: 10 a second by metadata" in recording.notes
 
 

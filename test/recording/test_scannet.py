@@ -40,9 +40,9 @@ def test_a_scene_is_colour_depth_and_truth_in_the_order_of_its_numbers(tmp_path:
 
 def test_colour_comes_in_the_size_of_depth(tmp_path: Path) -> None:
     first = {r.topic: r.message for r in open_recording(scene(tmp_path)).records(end_ns=1)}
-    word = from_msg.depth_image(first["/depth/image"], first["/camera_info"], first["/image"])
-    assert word.rgb is not None and word.rgb.shape == (30, 40, 3) and word.depth[0, 0] == 1
-    assert (word.intrinsics.fx, word.intrinsics.cx) == (35, 19.5)
+    seen = from_msg.depth_image(first["/depth/image"], first["/camera_info"], first["/image"])
+    assert seen.rgb is not None and seen.rgb.shape == (30, 40, 3) and seen.depth[0, 0] == 1
+    assert (seen.intrinsics.fx, seen.intrinsics.cx) == (35, 19.5)
 
 
 def test_a_camera_of_colour_is_scaled_to_depth(tmp_path: Path) -> None:

@@ -43,9 +43,9 @@ def test_a_scan_is_colour_in_the_size_of_depth_with_its_camera(tmp_path: Path) -
             ("/camera_info", "/odom", "/image", "/depth/image"), 5
         )
         first = {r.topic: r.message for r in recording.records(end_ns=100 * 10**9 + 1)}
-        word = from_msg.depth_image(first["/depth/image"], first["/camera_info"], first["/image"])
-        assert word.rgb is not None and word.rgb.shape == (48, 64, 3) and word.depth[0, 0] == 1
-        assert (word.intrinsics.fx, word.intrinsics.cx, word.intrinsics.cy) == (50, 31.5, 23.5)
+        seen = from_msg.depth_image(first["/depth/image"], first["/camera_info"], first["/image"])
+        assert seen.rgb is not None and seen.rgb.shape == (48, 64, 3) and seen.depth[0, 0] == 1
+        assert (seen.intrinsics.fx, seen.intrinsics.cx, seen.intrinsics.cy) == (50, 31.5, 23.5)
         greys = [int(from_msg.image(r.message).rgb[24, 32, 0]) for r in recording.records(["/image"])]
         assert greys == pytest.approx([0, 20, 40, 60, 80], abs=6)
     assert "camera_matrix.csv is of pictures of 128 × 96: scaled to depth's 64 × 48" in recording.notes
