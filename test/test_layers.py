@@ -31,6 +31,7 @@ FREE_BRIDGE = tuple(
     f"bridge.{name}"
     for name in (
         "calibration",
+        "calibration_files",
         "from_msg",
         "course",
         "sync",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A camera that somebody names, where no camera_info does: numbers, or a file as camera_calibration writes it.
+"""A camera that somebody names, where no camera_info does: numbers, or a file as calibration tools write it.
 
 A `Calibration` has the fields of a sensor_msgs/CameraInfo, so whatever reads one takes the other. It is of the whole
 picture of one size, or, if it names none, of whatever size comes.
@@ -17,15 +17,14 @@ from reprlib import repr as brief
 from types import SimpleNamespace
 from typing import Any
 
-import yaml
-
 from objreg_ros import limits
+from objreg_ros.bridge.calibration_files import FORMS, CameraFile, parse_camera
 from objreg_ros.bridge.pictures import size_of
 from objreg_ros.lens import UPRIGHT, require_model
 
 FILE_BYTES = 1 << 20  # a thousand times what is usual: YAML takes long
 PINHOLE = ("fx", "fy", "cx", "cy")
-FORM = "fx,fy,cx,cy or fx,fy,cx,cy,width,height in pixels, or a YAML file as camera_calibration writes it"
+FORM = f"fx,fy,cx,cy or fx,fy,cx,cy,width,height in pixels, or {FORMS}"
 SAME_SHAPE = 0.01  # of a side that a picture may have more or less than the scaled one: sizes are rounded
 MATRICES = {"camera_matrix": 9, "rectification_matrix": 9, "projection_matrix": 12}
 
@@ -59,7 +58,8 @@ class Calibration:
             if not all(map(math.isfinite, getattr(self, name))):
                 raise ValueError(f"expected finite numbers in {name.upper()}, got {getattr(self, name)}")
         if self.k[0] <= 0 or self.k[4] <= 0:
-            raise ValueError(f"expected focal lengths above 0, got {self.k[0]:g} and {self.k[4]:g}")
+            sign = "; of an fy below 0, as ICL-NUIM has it, leave out the sign" if self.k[4] < 0 < self.k[0] else ""
+            raise ValueError(f"expected focal lengths above 0, got {self.k[0]:g} and {self.k[4]:g}{sign}")
         sides = self.width, self.height
         if sides != (0, 0) and not all(0 < side <= limits.MOST_SIDE for side in sides):
             raise ValueError(f"expected a width and height of 1 to {limits.MOST_SIDE}, got {sides[0]} × {sides[1]}")
@@ -88,16 +88,27 @@ def read_calibration(told: str) -> Calibration:
 
     OSError for a file that is not there, ValueError for what is no camera: both say what was expected.
     """
+    return read_camera(told)[0]
+
+
+def read_camera(told: str) -> tuple[Calibration, tuple[str, ...]]:
+    """As `read_calibration`, with notes for the user on what was chosen of a file."""
     numbers = _numbers_of(told)
     if numbers is not None:
-        return of_numbers(numbers)
+        return of_numbers(numbers), ()
     file = Path(told).expanduser()
     if not file.exists():
         raise FileNotFoundError(f"camera: expected {FORM}, got {told!r}, which is no file")
     try:
-        return of_mapping(_mapping(_text(file)))
+        parsed = parse_camera(read_camera_text(file))
+        return of_file(parsed), tuple(f"{file.name}: {note}" for note in parsed.notes)
     except ValueError as error:
         raise ValueError(f"camera: {file}: {error}") from error
+
+
+def of_file(parsed: CameraFile) -> Calibration:
+    """The camera that was parsed of a file."""
+    return of_mapping(parsed.values)
 
 
 def absolute(told: str) -> str:
@@ -181,7 +192,8 @@ def _scaled(matrix: Numbers, columns: int, across: float, down: float) -> Number
     return (*scaled[0], *scaled[1], *matrix[2 * columns :])
 
 
-def _text(file: Path) -> str:
+def read_camera_text(file: Path) -> str:
+    """The text of a file of a camera; ValueError for what is no regular file, too long or no UTF-8."""
     told = file.stat()
     if not stat.S_ISREG(told.st_mode):
         raise ValueError("expected a regular file, got something else")
@@ -190,20 +202,12 @@ def _text(file: Path) -> str:
     return file.read_bytes().decode("utf-8-sig")  # what is no UTF-8 is a ValueError
 
 
-def _mapping(text: str) -> Mapping[str, Any]:
-    try:
-        values = yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise ValueError(f"expected YAML, got: {' '.join(str(error).split())}") from error
-    if not isinstance(values, dict):
-        raise ValueError(f"expected a mapping like image_width: 640, got {type(values).__name__}")
-    return values
-
-
 def _matrix_of(values: Mapping[str, Any], name: str, count: int | None = None) -> Numbers:
     """The numbers of a matrix, which are its ``data`` or the list itself."""
     told = values[name]
     data = told.get("data") if isinstance(told, Mapping) else told
+    if isinstance(data, list) and data and all(isinstance(row, list) for row in data):
+        data = [value for row in data for value in row]
     if not isinstance(data, list) or not all(isinstance(value, int | float) for value in data):
         raise ValueError(f"expected {name} with its numbers as data: [1.0, 0.0, …], got {brief(told)[:80]}")
     if count is not None and len(data) != count:

@@ -30,7 +30,7 @@ from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.mounts import TRANSFORMS, camera_on_body
 from objreg_ros.recording.told_camera import with_camera
-from objreg_ros.recording.troubles import troubles
+from objreg_ros.recording.troubles import FOLDER, troubles
 from objreg_ros.registration.params import RegistrarNodeParams
 from objreg_ros.report.about import about
 from objreg_ros.report.findings import as_json, find, setting
@@ -157,7 +157,8 @@ def _inputs(recording: Path, asked: Asked) -> Inputs:
             return inputs
         wanted = inputs.wanted(depth_source)
         other = "" if depth_source == "auto" else ", or leave out segmenter.source"
-        raise ValueError(f"{recording}: expected {wanted}, got {', '.join(source.topics)}; see --remap{other}")
+        choose = f"{FOLDER}{other}" if source.of_pictures else f"see --remap{other}"
+        raise ValueError(f"{recording}: expected {wanted}, got {', '.join(source.topics)}; {choose}")
 
 
 def _say(text: str) -> None:

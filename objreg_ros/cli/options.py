@@ -32,7 +32,7 @@ camera = click.option(
     "--camera",
     default="",
     metavar="FX,FY,CX,CY[,W,H]|FILE",
-    help="The camera in place of camera_info: pixels, or a YAML file as camera_calibration writes it.",
+    help="The camera in place of camera_info: pixels, or a file of ROS, OpenCV, RTAB-Map, ORB-SLAM, kalibr or Open3D.",
 )
 model = click.option("--model", help="ONNX model: a path or the name of an installed one.")
 json_out = click.option(
@@ -41,7 +41,7 @@ json_out = click.option(
     type=click.Path(dir_okay=False, allow_dash=True, path_type=Path),
     help="Write the outcome here; - is standard output, and all else then goes to standard error.",
 )
-labels = click.option("--labels", help="Text file of labels, one a line.")
+labels = click.option("--labels", help="Text file of labels, one a line, or YAML with names:.")
 
 max_frames = click.option("--max-frames", type=click.IntRange(min=1), help="Stop after this many frames.")
 odometry = click.option(

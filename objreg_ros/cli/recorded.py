@@ -20,6 +20,7 @@ from objreg_ros.recording.drift import ODOM, with_drifting_odometry
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.mounts import static_frames
 from objreg_ros.recording.told_camera import with_camera
+from objreg_ros.recording.troubles import FOLDER
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.report.about import about
 from objreg_ros.report.findings import setting
@@ -85,7 +86,8 @@ class Asked:
             there = ", ".join(f"{topic.name} ({topic.msgtype})" for topic in source.topics.values()) or "no topics"
             wanted = inputs.wanted(depth_source)
             other = "" if depth_source == "auto" else ", or leave out segmenter.source"
-            raise ValueError(f"{source.path}: expected {wanted}, got {there}; choose with --remap input:=/topic{other}")
+            choose = f"{FOLDER}{other}" if source.of_pictures else f"choose with --remap input:=/topic{other}"
+            raise ValueError(f"{source.path}: expected {wanted}, got {there}; {choose}")
         if self.drifts:
             if inputs.ground_truth is None:
                 raise ValueError(f"{source.path}: --odometry {self.odometry} needs a ground truth, and there is none")

@@ -11,7 +11,7 @@ import numpy as np
 
 from objreg_ros.data import Array, ColourImage, Detections
 from objreg_ros.detector.boxes import area, clip, suppress
-from objreg_ros.detector.contract import Candidates, Graph
+from objreg_ros.detector.contract import Candidates, Contract, Graph
 from objreg_ros.detector.labels import NO_CLASS, find_labels
 from objreg_ros.detector.masks import draw_masks
 from objreg_ros.detector.params import DetectorParams
@@ -31,13 +31,16 @@ class Detector:
     def __init__(self, params: DetectorParams, model_path: Path, labels_path: Path | None = None):
         self.params = params
         self._runtime = Runtime(Path(model_path), params.threads)
-        self.labels = find_labels(Path(model_path), labels_path, self._runtime.metadata)
         runtime = self._runtime
         self._picture = Picture.of(runtime.inputs, runtime.metadata)
         hw = self._picture.usual_hw(runtime.metadata)
-        graph = Graph(runtime.inputs, runtime.outputs, runtime.metadata, self._probe(hw), len(self.labels),
-                      params.label_offset, hw)  # fmt: skip
-        self._contract = recognise(graph, params.contract)
+        graph = Graph(runtime.inputs, runtime.outputs, runtime.metadata, self._probe(hw), 0, params.label_offset, hw)
+
+        def recognised(labels: tuple[str, ...]) -> Contract:
+            return recognise(replace(graph, labels=len(labels)), params.contract)
+
+        self.labels = find_labels(Path(model_path), labels_path, runtime.metadata, recognised)
+        self._contract = recognised(self.labels)
         if not isinstance(self._contract, TfDetection):  # others are for pictures of one size
             self._picture = self._picture.sized(*hw)
         self._picture = self._picture.asked(self._contract.look, runtime.metadata)

@@ -109,7 +109,8 @@ class NanoDet:
         strides = _require_grid(shape[1], graph.hw)
         if strides != (8, 16, 32, 64) or not cls.fits(graph, shape):
             raise ValueError(f"head of the model: expected NanoDet-Plus, [1, {cells(graph.hw, (8, 16, 32, 64))}, C + "
-                             f"4 (R + 1)] for {graph.labels} labels, got {list(shape)}")  # fmt: skip
+                             f"4 (R + 1)] for {graph.labels} labels, got {list(shape)}; name its own "
+                             "`contract`, and give its own `labels`")  # fmt: skip
         return cls((head,), graph.labels, shape, graph.hw, grid(graph.hw, strides))
 
     @staticmethod

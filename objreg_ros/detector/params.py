@@ -17,7 +17,10 @@ class DetectorParams(Params):
         "ONNX model: a path, or a file name in models/ or in the user's data folder; auto: a COCO model that `objreg "
         "fetch-model` brought, else objreg_ssd.onnx",
     )
-    labels: str = param("", "file of one label a line; empty: from the model's metadata, or a file beside the model")
+    labels: str = param(
+        "",
+        "file of one label a line, or YAML with names:; empty: from the model's metadata, or a file beside the model",
+    )
     label_offset: str = param(
         "auto", "number of the first class: 0 (converted TFLite), 1 (TF detection API)", choices=("auto", "0", "1")
     )

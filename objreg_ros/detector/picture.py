@@ -18,6 +18,7 @@ EXPECTED = (
     "expected one input, uint8 [1, H, W, 3], or float32 [1, H, W, 3] or [1, 3, H, W], and at most orig_target_sizes "
     "[1, 2] beside it"
 )
+AGAIN = "export the model again"
 FLOATS = {"float": np.float32, "float16": np.float16}
 SIZES = "orig_target_sizes"
 """The second input of RT-DETR and D-FINE: the width and height that the boxes are told in."""
@@ -94,11 +95,11 @@ class Picture:
         others = [port.name for port in inputs[1:]]
         dtypes = ("uint8", *FLOATS)
         if not inputs or others not in ([], [SIZES]) or len(inputs[0].shape) != 4 or inputs[0].dtype not in dtypes:
-            raise ValueError(f"input of the model: {EXPECTED}, got {got}")
+            raise ValueError(f"input of the model: {EXPECTED}, got {got}; export a detector of one picture")
         batch, *size, last = inputs[0].shape
         channels_first = inputs[0].dtype in FLOATS and size[0] == 3 and last != 3
         if batch not in (1, None) or not (channels_first or last in (3, None)):
-            raise ValueError(f"input of the model: {EXPECTED}, got {got}")
+            raise ValueError(f"input of the model: {EXPECTED}, got {got}; export it with a batch of 1 (batch=1)")
         height, width = (size[1], last) if channels_first else size
         _require_size(height, width, got)
         return cls(height, width, channels_first, inputs[0].dtype, _look(metadata, Look()), bool(others))
@@ -153,9 +154,9 @@ def read_imgsz(metadata: Mapping[str, str]) -> tuple[int, int] | None:
         height, width = np.broadcast_to(np.asarray(json.loads(text[:80].replace("(", "[").replace(")", "]"))), (2,))
         sides = int(height), int(width)
     except (ValueError, TypeError, RecursionError, OverflowError) as error:
-        raise ValueError(f"imgsz: expected [height, width], got {text[:80]!r}") from error
+        raise ValueError(f"imgsz: expected [height, width], got {text[:80]!r}; {AGAIN}") from error
     if min(sides) < 1:
-        raise ValueError(f"imgsz: expected [height, width] above 0, got {text[:80]!r}")
+        raise ValueError(f"imgsz: expected [height, width] above 0, got {text[:80]!r}; {AGAIN}")
     _require_size(*sides, f"imgsz {text[:80]}")
     return sides
 
@@ -184,7 +185,7 @@ def _numbers(metadata: Mapping[str, str], key: str) -> tuple[float, ...] | None:
     try:
         numbers = np.broadcast_to(np.asarray(json.loads(metadata[key]), np.float32), (3,))
     except (ValueError, TypeError, RecursionError, OverflowError) as error:
-        raise ValueError(f"{key}: expected a number or a list of three, got {metadata[key][:80]!r}") from error
+        raise ValueError(f"{key}: expected a number or a list of three, got {metadata[key][:80]!r}; {AGAIN}") from error
     if not np.isfinite(numbers).all():
-        raise ValueError(f"{key}: expected finite numbers, got {metadata[key][:80]!r}")
+        raise ValueError(f"{key}: expected finite numbers, got {metadata[key][:80]!r}; {AGAIN}")
     return tuple(float(number) for number in numbers)

@@ -15,7 +15,7 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.detector.boxes import decode
 from objreg_ros.detector.contract import Candidates, Graph, shapes
-from objreg_ros.detector.picture import Look
+from objreg_ros.detector.picture import AGAIN, Look
 
 RAW_CONTRACT = "ssd_raw/1"
 
@@ -78,7 +78,9 @@ def _priors(metadata: Mapping[str, str]) -> Array:
         raw = np.frombuffer(base64.b64decode(metadata["objreg.priors"], validate=True), "<f4")
         priors = raw.reshape(-1, 4).astype(np.float32)
     except (KeyError, ValueError) as error:
-        raise ValueError(f"objreg.priors: expected base64 of float32 [A,4], got {error!r}") from error
+        raise ValueError(
+            f"objreg.priors: expected base64 of float32 [A,4], got {error!r}; export the model again"
+        ) from error
     bad = ~(np.isfinite(priors).all(axis=1) & (priors[:, 2:] > 0).all(axis=1))
     if bad.any():
         first = int(bad.argmax())
@@ -95,7 +97,8 @@ def _variances(metadata: Mapping[str, str]) -> Array:
     try:
         variances = np.asarray(json.loads(text), np.float32).reshape(4)
     except (ValueError, TypeError, RecursionError, OverflowError) as error:
-        raise ValueError(f"objreg.variances: expected a list of 4 numbers, got {text[:80]!r}") from error
+        raise ValueError(f"objreg.variances: expected a list of 4 numbers, got {text[:80]!r}; {AGAIN}") from error
     if not (np.isfinite(variances) & (variances >= 0)).all():
-        raise ValueError(f"objreg.variances: expected 4 finite numbers that are not negative, got {text[:80]!r}")
+        expected = "4 finite numbers that are not negative"
+        raise ValueError(f"objreg.variances: expected {expected}, got {text[:80]!r}; {AGAIN}")
     return variances

@@ -12,6 +12,7 @@ import onnxruntime
 
 from objreg_ros.data import Array
 
+REMEDY = "check the download, or export the model again"
 SPIN_US = 10
 """So long a thread stays awake for the next operation on the same picture, since to wake it takes longer. On two cores
 a picture takes a tenth less time so, on a busy machine about the same, and not more of the processor."""
@@ -43,7 +44,9 @@ class Runtime:
                 str(path), make_options(threads), providers=["CPUExecutionProvider"]
             )
         except Exception as error:  # onnxruntime's errors share no base of their own
-            raise ValueError(f"model {path}: expected an ONNX file that onnxruntime loads, got: {error}") from error
+            raise ValueError(
+                f"model {path}: expected an ONNX file that onnxruntime loads, got: {error}; {REMEDY}"
+            ) from error
         self.inputs = tuple(_port(node) for node in self._session.get_inputs())
         self.outputs = tuple(_port(node) for node in self._session.get_outputs())
         self.metadata: dict[str, str] = dict(self._session.get_modelmeta().custom_metadata_map)
@@ -57,7 +60,7 @@ class Runtime:
         except Exception as error:  # onnxruntime's errors share no base of their own
             raise ValueError(
                 f"model: expected it to run on a picture {list(tensor.shape)}, as its input is {self.inputs[0]}, "
-                f"got: {error}"
+                f"got: {error}; export the model again for pictures of that size"
             ) from error
 
 

@@ -3,15 +3,12 @@
 
 from __future__ import annotations
 
-import errno
-import struct
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.interfaces import (
     Connection,
     ConnectionExtRosbag1,
@@ -23,61 +20,38 @@ from rosbags.interfaces import (
     QosReliability,
     QosTime,
 )
-from rosbags.rosbag1 import ReaderError as Rosbag1Error
-from rosbags.rosbag2 import ReaderError as Rosbag2Error
-from rosbags.serde import SerdeError
+from rosbags.rosbag2 import reader as rosbag2
 from rosbags.typesys.store import Typestore
 
+from objreg_ros.recording.bag_errors import (
+    broken_bag,
+    broken_means_value_error,
+    is_whole_mcap,
+    odd_message,
+    said,
+    says_broken,
+)
+from objreg_ros.recording.bag_files import open_bag
 from objreg_ros.recording.messages import READ, difference, misfit, serialise, standard_types
 from objreg_ros.recording.record import Record, Recording, Topic
-from objreg_ros.recording.text import SETTINGS_BYTES, require_regular
-from objreg_ros.recording.unpacking import UnpackingError, bound_unpacking, require_room
+from objreg_ros.recording.unpacking import ZSTD_MAGIC, bound_unpacking
 
-METADATA = "metadata.yaml"
-METADATA_BYTES = 16 * SETTINGS_BYTES  # it has a line for every file and every topic
 END_OF_TIME_NS = 2**63
-
-# What the library lets through when the bytes of a file are not what they should be.
-BROKEN = (
-    AnyReaderError,
-    Rosbag1Error,
-    Rosbag2Error,
-    SerdeError,
-    struct.error,
-    AssertionError,
-    EOFError,
-    KeyError,
-    IndexError,
-    TypeError,
-    ValueError,
-    AttributeError,
-    RuntimeError,  # lz4, and nested too deeply
-    MemoryError,  # sizes that lie
-    OverflowError,
-)
-# The packages whose own errors say the same, by name: which of them `rosbags` reads with hangs on its version.
-DECODERS = {"apsw", "sqlite3", "backports", "compression", "zstandard"}
-REPAIR = {
-    ".bag": "`rosbag reindex` repairs a bag that was not closed",
-    ".mcap": "`mcap recover` saves what is readable",
-    ".db3": "`sqlite3 old.db3 .recover | sqlite3 new.db3` saves what is readable, `ros2 bag reindex` its metadata",
-}
+REINDEX = "make metadata.yaml anew with `ros2 bag reindex`, or move it away"
 
 bound_unpacking()
 
 
 class BagRecording(Recording):
-    """A rosbag1 file, a rosbag2 folder or a single rosbag2 file."""
+    """A rosbag1 file, a rosbag2 folder, a single file of one, or the files of a folder without metadata.yaml."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        _require_readable(path)
-        with _broken_means_value_error(path):
-            require_room(path)
-            self._reader = AnyReader([path], default_typestore=standard_types())
-            self._reader.open()
-        self.kind = _kind(path)
-        self._connections, self.notes = _one_type_each(self._reader.connections)
+        bag = open_bag(path)
+        self._reader, self._kept, self._files = bag.reader, bag.kept, bag.files
+        self.kind = _kind(bag.files)
+        self._connections, notes = _one_type_each(self._reader.connections)
+        self.notes = [*bag.notes, *notes]
         self.topics = _topics(self._connections)
         told = {kind: misfit(kind, self._types()) for kind in READ if kind in self._types().fielddefs}
         self._misfits = {kind: why for kind, why in told.items() if why}
@@ -85,7 +59,8 @@ class BagRecording(Recording):
         self.start_ns, self.end_ns = (self._reader.start_time, self._reader.end_time) if spans else (0, 0)
         if not -END_OF_TIME_NS <= self.start_ns <= self.end_ns <= END_OF_TIME_NS:
             self.close()
-            raise _broken_bag(path, f"records from {self.start_ns} to {self.end_ns} ns")
+            got = f"records from {self.start_ns} to {self.end_ns} ns"
+            raise ValueError(f"{path}: expected a whole bag, got: {got}; {REINDEX}")
 
     def records(
         self, topics: Collection[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
@@ -94,7 +69,7 @@ class BagRecording(Recording):
         wanted = [c for c in self._connections if topics is None or c.topic in topics]
         if not wanted:
             return
-        with _broken_means_value_error(self.path):
+        with broken_means_value_error(self.path, opened=True):
             for connection, stamp_ns, raw in self._reader.messages(wanted, start_ns, end_ns):
                 yield self._record(connection, stamp_ns, raw)
 
@@ -119,18 +94,37 @@ class BagRecording(Recording):
         return self._reader.typestore
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the files."""
         self._reader.close()
+        self._kept.close()
+
+    def _unpacked(self, raw: bytes) -> bytes:
+        """The bytes of a message that was packed by itself, of which only metadata.yaml tells; CDR begins with 0."""
+        return rosbag2.zstd.decompress(raw) if self._reader.is2 and raw[:4] == ZSTD_MAGIC else raw
+
+    def _odd_message(self, got: str) -> ValueError:
+        return odd_message(self.path, got) if self._is_whole else broken_bag(self.path, got, opened=True)
+
+    @cached_property
+    def _is_whole(self) -> bool:
+        return all(map(is_whole_mcap, self._files))
 
     def _record(self, connection: Any, stamp_ns: int, raw: bytes) -> Record:
         def decode() -> Any:
             if connection.msgtype in self._misfits:
-                raise _broken_bag(self.path, self._misfits[connection.msgtype])
-            with _broken_means_value_error(self.path):
-                return self._reader.deserialize(raw, connection.msgtype)
+                raise self._odd_message(self._misfits[connection.msgtype])
+            try:
+                return self._reader.deserialize(self._unpacked(raw), connection.msgtype)
+            except Exception as error:
+                if not says_broken(error):
+                    raise
+                raise self._odd_message(f"{connection.topic}: {said(error)}") from error
 
         def encode() -> bytes:
-            return bytes(raw) if self._reader.is2 else serialise(decode())
+            if not self._reader.is2:
+                return serialise(decode())
+            with broken_means_value_error(self.path, opened=True):
+                return bytes(self._unpacked(raw))
 
         return Record(connection.topic, connection.msgtype, stamp_ns, decode, encode)
 
@@ -181,60 +175,7 @@ def _topics(connections: Iterable[Connection]) -> dict[str, Topic]:
     return dict(sorted(counts.items()))
 
 
-def _kind(path: Path) -> str:
-    if path.suffix == ".bag":
+def _kind(files: Sequence[Path]) -> str:
+    if any(file.suffix == ".bag" for file in files):
         return "rosbag1"
-    files = [path] if path.is_file() else sorted(path.iterdir())
     return "rosbag2 (mcap)" if any(".mcap" in file.suffixes for file in files) else "rosbag2 (sqlite3)"
-
-
-@contextmanager
-def _broken_means_value_error(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except Exception as error:
-        if not _says_broken(error):
-            raise
-        if (denied := _denial(error)) is not None:
-            raise PermissionError(f"{path}: expected permission to read it, got: {denied.strerror}") from error
-        if isinstance(error, UnpackingError):
-            raise ValueError(f"{path}: {error}") from error
-        raise _broken_bag(path, _said(error)) from error
-
-
-def _said(error: Exception) -> str:
-    """An error in one line; with its name where it is none of those that were made to be read."""
-    said, name = " ".join(str(error).split()).rstrip("."), type(error).__name__
-    if not said or isinstance(error, (LookupError, MemoryError, OverflowError, RecursionError, AttributeError)):
-        return f"{name}: {said}".rstrip(": ")
-    return said
-
-
-def _broken_bag(path: Path, got: str) -> ValueError:
-    suffix = path.suffix if path.is_file() else next((f.suffix for f in path.iterdir() if f.suffix in REPAIR), "")
-    repair = REPAIR.get(suffix, "record it again or check the copy")
-    return ValueError(f"{path}: expected a whole bag, got: {got}; truncated or corrupt? {repair}")
-
-
-def _require_readable(path: Path) -> None:
-    """ValueError for what the library would wait for, or read, without end."""
-    if not path.is_dir():
-        require_regular(path)
-        return
-    for file in sorted(file for file in path.iterdir() if not file.is_dir() and file.exists()):
-        size = require_regular(file)
-        if file.name == METADATA and size > METADATA_BYTES:
-            raise ValueError(f"{file}: expected at most {METADATA_BYTES} bytes of metadata, got {size}; reindex it")
-
-
-def _denial(error: BaseException | None) -> PermissionError | None:
-    """The refusal of the system that an error came of, if one did."""
-    while error is not None and not isinstance(error, PermissionError):
-        error = error.__cause__ or error.__context__
-    return error
-
-
-def _says_broken(error: Exception) -> bool:
-    of_bz2 = type(error) is OSError and error.errno is None  # those of the system have a number
-    beyond = isinstance(error, OSError) and error.errno == errno.EINVAL  # a place that no file has
-    return isinstance(error, BROKEN) or of_bz2 or beyond or type(error).__module__.partition(".")[0] in DECODERS

@@ -3,18 +3,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
+from objreg_ros.recording.bag_files import METADATA, bag_files, is_bag
 from objreg_ros.recording.bags import BagRecording
 from objreg_ros.recording.record import Recording
+from objreg_ros.recording.record3d import Record3dRecording, is_record3d
+from objreg_ros.recording.scannet import ScanNetRecording, is_scannet
+from objreg_ros.recording.stray_scanner import StrayRecording, is_stray
 from objreg_ros.recording.text import require_regular
 from objreg_ros.recording.tum import TumRecording
 
 EXPECTED = (
-    "expected a rosbag1 file (.bag), a rosbag2 folder (metadata.yaml) or file (.mcap, .db3), or a TUM RGB-D folder "
-    "(rgb/, depth/ and associations.txt or rgb.txt and depth.txt)"
+    "expected a rosbag1 file (.bag), a rosbag2 folder (metadata.yaml) or file (.mcap, .db3), a TUM RGB-D folder "
+    "(rgb/, depth/ and associations.txt or rgb.txt and depth.txt), a folder of ScanNet or Stray "
+    "Scanner, or a file (.r3d) or folder of Record3D"
 )
-BAG_FILES = (".bag", ".mcap", ".db3")
 
 
 def open_recording(path: Path | str) -> Recording:
@@ -25,18 +30,40 @@ def open_recording(path: Path | str) -> Recording:
     if place.is_dir():
         return _open_folder(place)
     require_regular(place)
-    if place.suffix not in BAG_FILES:
+    if place.suffix.lower() == ".r3d":
+        return Record3dRecording(place)
+    if not is_bag(place):
         raise ValueError(f"{place}: {EXPECTED}, got a file {place.suffix or 'without a suffix'}")
     return BagRecording(place)
 
 
 def _open_folder(folder: Path) -> Recording:
-    if (folder / "metadata.yaml").exists():
+    bags = bag_files(folder)
+    if bags and (folder / METADATA).exists():
         return BagRecording(folder)
-    if (folder / "rgb").is_dir() or (folder / "rgb.txt").exists():
-        return TumRecording(folder)
-    bags = sorted(file for file in folder.iterdir() if file.suffix in BAG_FILES)
-    if len(bags) == 1:
-        return BagRecording(bags[0])
+    for fits, kind in FOLDERS:
+        if fits(folder):
+            return _beside(kind(folder), bags)
+    if bags or (folder / METADATA).exists():
+        return BagRecording(folder)
     got = ", ".join(sorted(file.name for file in folder.iterdir())[:5]) or "nothing"
     raise ValueError(f"{folder}: {EXPECTED}, got a folder with {got}")
+
+
+def _is_tum(folder: Path) -> bool:
+    return (folder / "rgb").is_dir() or (folder / "rgb.txt").exists()
+
+
+FOLDERS: tuple[tuple[Callable[[Path], bool], Callable[[Path], Recording]], ...] = (
+    (is_stray, StrayRecording),
+    (is_record3d, Record3dRecording),
+    (_is_tum, TumRecording),
+    (is_scannet, ScanNetRecording),
+)
+
+
+def _beside(recording: Recording, bags: list[Path]) -> Recording:
+    """The recording of pictures with a note on the bags that lie in its folder too."""
+    if bags:
+        recording.notes.append(f"also there, and not read: {', '.join(bag.name for bag in bags)}; name one to read it")
+    return recording

@@ -76,8 +76,12 @@ def misnamed(topic: str) -> str:
 
 
 class Recording(ABC):
-    """A recording that is open; a context manager. ``notes`` say what was assumed or is odd, for the user."""
+    """A recording that is open; a context manager. ``notes`` say what was assumed or is odd, for the user.
 
+    ``of_pictures`` is whether it is a folder of pictures: its topics are made here, and no remap finds others.
+    """
+
+    of_pictures: bool = False
     path: Path
     kind: str
     topics: dict[str, Topic]

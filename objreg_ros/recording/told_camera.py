@@ -6,13 +6,13 @@ So the graph, a replay of it and the pages about it take the camera as they take
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import chain
 from typing import Any
 
 from rosbags.interfaces import Qos
 
-from objreg_ros.bridge.calibration import Calibration, fitted, read_calibration
+from objreg_ros.bridge.calibration import Calibration, fitted, read_camera
 from objreg_ros.recording import messages
 from objreg_ros.recording.inputs import CAMERA_INFO, choose_inputs
 from objreg_ros.recording.record import Record, Recording, Topic
@@ -23,11 +23,11 @@ TOLD = "/told/camera_info"  # the topic that it comes by
 class ToldCamera(Recording):
     """The recording ``of``, with one camera_info on `TOLD` before everything else, which late subscribers get too."""
 
-    def __init__(self, of: Recording, camera: Calibration, frame_id: str) -> None:
+    def __init__(self, of: Recording, camera: Calibration, frame_id: str, notes: Sequence[str] = ()) -> None:
         self._of, self._camera, self._frame_id = of, camera, frame_id
-        self.path, self.kind = of.path, of.kind
+        self.path, self.kind, self.of_pictures = of.path, of.kind, of.of_pictures
         others = sorted(of.topics.keys() - _without_cameras(of).keys())
-        self.notes = [*of.notes, *([f"not used, as a camera is told: {', '.join(others)}"] if others else [])]
+        self.notes = [*of.notes, *notes, *([f"not used, as a camera is told: {', '.join(others)}"] if others else [])]
         self.start_ns, self.end_ns = of.start_ns, of.end_ns
         self.topics = {**_without_cameras(of), TOLD: Topic(TOLD, CAMERA_INFO, 1)}
 
@@ -65,14 +65,14 @@ class ToldCamera(Recording):
 def with_camera(
     recording: Recording, told: str, remaps: Mapping[str, str] | None = None, source: str = "auto"
 ) -> Recording:
-    """The recording with the camera that ``told`` names, see `read_calibration`; as it is where that is empty.
+    """The recording with the camera that ``told`` names, see `read_camera`; as it is where that is empty.
 
     ``remaps`` and ``source`` say which pictures the camera is of, as to `choose_inputs`. ValueError for what is no
     camera, and for one of pictures of another shape.
     """
     if not told:
         return recording
-    camera = read_calibration(told)
+    camera, notes = read_camera(told)
     asked = {name: topic for name, topic in (remaps or {}).items() if name != "camera_info"}
     topics = {**_without_cameras(recording), TOLD: Topic(TOLD, CAMERA_INFO, 1)}
     inputs = choose_inputs(topics, asked, source)
@@ -80,9 +80,9 @@ def with_camera(
     read = (record.read() for record in recording.records([picture])) if picture else iter(())
     first = next((message for message in read if message is not None), None)
     if first is None:
-        return ToldCamera(recording, camera, "")
+        return ToldCamera(recording, camera, "", notes)
     try:
-        return ToldCamera(recording, fitted(camera, first), str(first.header.frame_id))
+        return ToldCamera(recording, fitted(camera, first), str(first.header.frame_id), notes)
     except ValueError as error:
         raise ValueError(f"{recording.path}: {picture}: {error}") from error
 

@@ -27,11 +27,21 @@ NEVER_ALL_WITHIN_M = 0.15  # nearer than any depth camera measures
 REGISTER = "record registered depth (RealSense: align_depth.enable:=true, OpenNI: depth_registered)"
 RECORD_UNITS = "record depth in mm (16UC1) or in m (32FC1); a TUM folder names its steps as depth_scale in camera.yaml"
 
+OF_FILES = "the topics of a folder are made of its files, and each that it can have is there unless it was ruled out"
+FOLDER = "give the folder what is missing, or leave out --remap"
+CAMERA_YAML = (
+    "give camera.yaml the width, height, fx, fy, cx and cy of the depth pictures, or name --camera fx,fy,cx,cy"
+)
+NAME_INFO = "name the right one with --remap camera_info:=/topic, or tell the camera with --camera fx,fy,cx,cy"
+REGISTER_FILES = "export depth and colour of one field of view: depth that is registered to colour"
 
-def missing(inputs: Inputs) -> Finding | None:
-    """What keeps the graph from running; None where nothing does."""
+
+def missing(inputs: Inputs, of_pictures: bool = False) -> Finding | None:
+    """What keeps the graph from running; None where nothing does. ``of_pictures`` is that of the recording."""
     if not inputs.missing:
         return None
+    if of_pictures:
+        return Finding(f"the graph cannot run: expected {inputs.missing}", OF_FILES, FOLDER, "waits-for-a-topic")
     lacks_camera = inputs.image and (inputs.points or inputs.depth)
     return Finding(
         f"the graph cannot run: expected {inputs.missing}",
@@ -43,7 +53,7 @@ def missing(inputs: Inputs) -> Finding | None:
 
 def warnings(recording: Recording, inputs: Inputs) -> list[Finding]:
     """What would go wrong or be missed, and what to do; empty if nothing."""
-    lacking = missing(inputs)
+    lacking = missing(inputs, recording.of_pictures)
     found = [Finding(note) for note in recording.notes] + ([lacking] if lacking else [])
     if inputs.odom is None:
         found.append(Finding("no odometry: the registrar follows the camera by itself, and the gate is less strict"))
@@ -73,7 +83,7 @@ def _first_messages(recording: Recording, inputs: Inputs) -> list[Finding]:
             Finding(
                 f"depth has {_size(depth)} pixels and its camera_info {camera.width} × {camera.height}",
                 "the camera_info is of another picture, so every frame would be dropped",
-                "name the right one with --remap camera_info:=/topic, or tell the camera with --camera fx,fy,cx,cy",
+                CAMERA_YAML if recording.of_pictures else NAME_INFO,
                 "no-camera-info",
             )
         )
@@ -82,7 +92,7 @@ def _first_messages(recording: Recording, inputs: Inputs) -> list[Finding]:
             Finding(
                 f"colour has {_size(colour)} pixels and depth {_size(depth)}",
                 "they must show the same field of view, and depth that is not registered to colour seldom does",
-                REGISTER,
+                REGISTER_FILES if recording.of_pictures else REGISTER,
                 "depth-is-not-registered",
             )
         )

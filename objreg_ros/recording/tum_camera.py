@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The camera of a TUM RGB-D folder: ``camera.yaml``, and what is assumed where that says nothing.
 
-The file has the keys below, or is one of ROS's camera_calibration, to which ``depth_scale`` may be added.
+The file has the keys below, or is one that a calibration tool wrote (`objreg_ros.bridge.calibration_files`), to which
+``depth_scale`` may be added. It may be of the colour pictures where those are larger than depth.
 
 The benchmark's own advice for sequences without calibration is ROS's default camera, 525 px for pictures that are 640
 wide, and depth in steps of 0.2 mm. See Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM Systems" (2012).
@@ -9,6 +10,7 @@ wide, and depth in steps of 0.2 mm. See Sturm et al., "A Benchmark for the Evalu
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +18,8 @@ from typing import Any
 
 import yaml
 
-from objreg_ros.bridge.calibration import of_mapping
+from objreg_ros.bridge.calibration import SAME_SHAPE, of_file
+from objreg_ros.bridge.calibration_files import parse_camera
 from objreg_ros.data import Intrinsics
 from objreg_ros.lens import require_model
 from objreg_ros.recording.text import SETTINGS_BYTES, read_text
@@ -25,6 +28,10 @@ FOCAL_PX, FOCAL_WIDTH = 525.0, 640  # the default camera's focal length, and of 
 DEPTH_SCALE = 5000.0  # steps of depth in a metre
 PINHOLE = ("fx", "fy", "cx", "cy")
 KEYS = (*PINHOLE, "width", "height", "depth_scale", "distortion")
+NAMES = ("camera.yaml", "camera.yml", "camera.json")
+UPWARDS = "{}: fy {:g} is taken as {:g}: rows of pictures count downwards, whatever its own y axis does"
+
+Size = tuple[int, int]  # width, height
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,25 +46,62 @@ class TumCamera:
     distortion: tuple[float, ...]
     notes: tuple[str, ...] = ()
 
+    @property
+    def size(self) -> Size:
+        """Width and height of the pictures that it is of, in pixels."""
+        return self.intrinsics.width, self.intrinsics.height
 
-def read_camera(file: Path, width: int, height: int) -> TumCamera:
-    """The camera in ``file``, whose pictures have so many pixels; the default one where there is no file.
 
-    ValueError for what is no camera, or if the file gives none of fx fy cx cy.
+def camera_file(folder: Path) -> Path:
+    """The file of the camera in a folder; the first of the names that it may have where there is none."""
+    return next((folder / name for name in NAMES if (folder / name).exists()), folder / NAMES[0])
+
+
+def read_camera(file: Path, width: int, height: int, colour: Size | None = None) -> TumCamera:
+    """The camera in ``file`` for depth pictures of so many pixels; the default one where there is no file.
+
+    ``colour`` is the size of the colour pictures: a file of those is scaled to depth, and that is said. ValueError for
+    what is no camera, or if the file gives none of fx fy cx cy.
     """
-    told = _told(file) if file.exists() else {}
-    assumed = _default(width, height)
-    values = {"width": width, "height": height, "distortion": (0.0,) * 5, **assumed, **told}
+    told, notes = _told(file) if file.exists() else ({}, [])
+    size = _size_of(told, (width, height), colour or (width, height))
+    assumed = _default(*size)
+    values = {"width": size[0], "height": size[1], "distortion": (0.0,) * 5, **assumed, **told}
     try:
-        numbers = {name: float(values[name]) for name in PINHOLE}
-        intrinsics = Intrinsics(**numbers, width=int(values["width"]), height=int(values["height"]))
+        intrinsics = Intrinsics(**{name: float(values[name]) for name in PINHOLE}, width=size[0], height=size[1])
         scale, distortion = _depth_scale(values["depth_scale"]), _distortion(values["distortion"])
     except (TypeError, ValueError, OverflowError) as error:
         raise ValueError(
             f"{file}: expected numbers fx fy cx cy width height depth_scale, and a list of them as distortion, "
             f"got: {error}"
         ) from error
-    return TumCamera(intrinsics, scale, distortion, tuple(_notes(file, told, assumed)))
+    fitting = scaled(intrinsics, width, height)
+    if told and fitting is not intrinsics:
+        notes = [*notes, f"{file.name} is of pictures of {size[0]} × {size[1]}: scaled to depth's {width} × {height}"]
+    return TumCamera(fitting, scale, distortion, (*_notes(file, told, assumed), *notes))
+
+
+def scaled(camera: Intrinsics, width: int, height: int) -> Intrinsics:
+    """The camera of the same pictures with another number of pixels; itself where these are of another shape.
+
+    The middle of a pixel is on an integer.
+    """
+    across, down = width / camera.width, height / camera.height
+    if (width, height) == (camera.width, camera.height) or abs(across / down - 1.0) > SAME_SHAPE:
+        return camera
+    cx, cy = across * camera.cx + (across - 1) / 2, down * camera.cy + (down - 1) / 2
+    return Intrinsics(fx=across * camera.fx, fy=down * camera.fy, cx=cx, cy=cy, width=width, height=height)
+
+
+def _size_of(told: Mapping[str, Any], depth: Size, colour: Size) -> Size:
+    """Width and height of the pictures that a file is of: as it says, else by which of the two its centre halves."""
+    try:
+        if told.get("width") or told.get("height"):
+            return int(told.get("width", depth[0])), int(told.get("height", depth[1]))
+        cx = float(told.get("cx", depth[0] / 2))
+    except (TypeError, ValueError, OverflowError):
+        return depth  # what is wrong with it is said where all is read
+    return colour if cx > math.sqrt(depth[0] * colour[0]) / 2 else depth
 
 
 def _default(width: int, height: int) -> dict[str, float]:
@@ -66,41 +110,47 @@ def _default(width: int, height: int) -> dict[str, float]:
     return {"fx": focal, "fy": focal, "cx": (width - 1) / 2, "cy": (height - 1) / 2, "depth_scale": DEPTH_SCALE}
 
 
-def _told(file: Path) -> dict[str, Any]:
-    """What the file says, by key. A key without a value says nothing."""
+def _told(file: Path) -> tuple[dict[str, Any], list[str]]:
+    """What the file says, by key, and notes on it. A key without a value says nothing."""
     text = read_text(file, SETTINGS_BYTES)
+    told = _own_keys(text)
+    if told is None:
+        return _of_calibration(file, text)
+    fy = told.get("fy")
+    if isinstance(fy, int | float) and fy < 0:  # ICL-NUIM
+        return {**told, "fy": -fy}, [UPWARDS.format(file.name, fy, -fy)]
+    return told, []
+
+
+def _own_keys(text: str) -> dict[str, Any] | None:
+    """The keys of a file in our own form; None for another text."""
     try:
         values = yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise ValueError(f"{file}: expected YAML, got: {' '.join(str(error).split())}") from error
-    if not isinstance(values, dict):
-        raise ValueError(f"{file}: expected a mapping like fx: 525.0, got {type(values).__name__}")
-    told = {str(key): value for key, value in values.items() if value is not None}
-    if "camera_matrix" in told:
-        return _of_calibration(file, told)
-    if not any(name in told for name in PINHOLE):
-        got = ", ".join(told) or "nothing"
-        raise ValueError(
-            f"{file}: expected fx, fy, cx, cy (pixels) and depth_scale (steps of depth in a metre), got {got}; "
-            "name them so, or remove the file for the benchmark's default camera"
-        )
-    return told
+    except (yaml.YAMLError, ValueError, RecursionError):
+        return None
+    told = {str(key): value for key, value in values.items() if value is not None} if isinstance(values, dict) else {}
+    return told if any(name in told for name in PINHOLE) else None
 
 
-def _of_calibration(file: Path, told: Mapping[str, Any]) -> dict[str, Any]:
-    """The keys of ours for a file of camera_calibration."""
+def _of_calibration(file: Path, text: str) -> tuple[dict[str, Any], list[str]]:
+    """The keys of ours for a file of a calibration tool."""
     try:
-        camera = of_mapping(told)
+        parsed = parse_camera(text)
+        camera = of_file(parsed)
     except ValueError as error:
-        raise ValueError(f"{file}: {error}") from error
+        raise ValueError(
+            f"{file}: {error}; name fx, fy, cx, cy (pixels) and depth_scale (steps of depth in a metre), or remove the "
+            "file for the benchmark's default camera"
+        ) from error
     if any(camera.d) and camera.distortion_model != "plumb_bob":
         raise ValueError(
             f"{file}: expected the model plumb_bob, got {camera.distortion_model}; name this file with --camera instead"
         )
     found = dict(zip(PINHOLE, (camera.k[0], camera.k[4], camera.k[2], camera.k[5]), strict=True))
     size = {"width": camera.width, "height": camera.height} if camera.width else {}
-    scale = {"depth_scale": told["depth_scale"]} if "depth_scale" in told else {}
-    return {**found, **size, **scale, **({"distortion": list(camera.d)} if camera.d else {})}
+    scale = {"depth_scale": parsed.depth_scale} if parsed.depth_scale is not None else {}
+    lens = {"distortion": list(camera.d)} if camera.d else {}
+    return {**found, **size, **scale, **lens}, [f"{file.name}: {note}" for note in parsed.notes]
 
 
 def _notes(file: Path, told: Mapping[str, Any], assumed: Mapping[str, float]) -> list[str]:

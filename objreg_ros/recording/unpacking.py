@@ -139,6 +139,11 @@ def require_room(bag: Path) -> None:
     for file in sorted(file for file in bag.iterdir() if file.is_file()) if bag.is_dir() else ():
         if size := zstd_bound(file):
             packed, unpacked = packed + file.stat().st_size, unpacked + size
+    require_disk(packed, unpacked)
+
+
+def require_disk(packed: int, unpacked: int) -> None:
+    """`UnpackingError` where so many bytes, of so many packed ones, are too much for the temporary folder."""
     if not unpacked:
         return
     place = tempfile.gettempdir()

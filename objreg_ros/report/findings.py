@@ -33,8 +33,10 @@ def setting(recording: Recording, inputs: Inputs, model: str) -> dict[str, Any]:
     """What a run's JSON tells of it for `find`: the file of the model, and whether the recording is simulated.
 
     That is None where it could be either: a recording with the topics of the simulator, but without its truth beside.
+    Of a folder of pictures it says that too, for there is no other topic to take.
     """
-    return {"model": share.model(model).name, "simulated": _is_simulated(recording, inputs)}
+    told = {"model": share.model(model).name, "simulated": _is_simulated(recording, inputs)}
+    return {**told, "pictures": True} if recording.of_pictures else told
 
 
 def _is_simulated(recording: Recording, inputs: Inputs) -> bool | None:
@@ -104,7 +106,8 @@ def _no_frame(counts: Counts, summary: Mapping[str, Any]) -> Finding | None:
     if malformed:
         said = summary.get("complaints", {}).get(max(malformed, key=lambda reason: malformed[reason]), "")
         cause = "the messages are not what their topics say" + (f" ({said})" if said else "")
-        return Finding(what, cause, f"see which with `{_look(summary)}`, and take others with --remap", anchor)
+        other = "repair or replace these files" if summary.get("pictures") else "take others with --remap"
+        return Finding(what, cause, f"see which with `{_look(summary)}`, and {other}", anchor)
     if counts.dropped:
         cause = "colour, depth and camera_info did not meet in time"
         return Finding(what, cause, f"compare their stamps with `{_look(summary)}`; segmenter.slop widens it", anchor)

@@ -85,8 +85,8 @@ class SegmenterNodeParams(MountedParams):
     )
     camera: str = param(
         "",
-        "the camera in place of camera_info: fx,fy,cx,cy[,width,height] in pixels, or a file as camera_calibration "
-        "writes it; of another size of the same shape it is scaled",
+        "the camera in place of camera_info: fx,fy,cx,cy[,width,height] in pixels, or a file of ROS, OpenCV, "
+        "RTAB-Map, ORB-SLAM, kalibr or Open3D; of another size of the same shape it is scaled",
     )
     colour: bool = param(True, "take the colour of the points from `image` when depth comes as an image")
     level_odom: bool = param(

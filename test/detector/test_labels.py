@@ -87,3 +87,54 @@ def test_names_of_another_kind_are_refused(text: str, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="expected a dict of class numbers from 0 and names") as refusal:
         find_labels(tmp_path / "m.onnx", None, {"names": text})
     assert len(str(refusal.value)) < 400
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["names:\n  0: cup\n  1: tea pot\n", "nc: 2\nnames: [cup, tea pot]\n", "# two\nnames:\n- cup\n- tea pot\n",
+     "names: {1: tea pot, 0: cup}", "- cup\n- tea pot\n", "0: cup\n1: tea pot\n", '["cup", "tea pot"]',
+     "path: ../coco\ntrain: images\n\nnames:\n  0: cup\n  1: tea pot\n\ndownload: |\n  import os\n"],
+)  # fmt: skip
+def test_a_file_of_labels_may_be_yaml(text: str, tmp_path: Path) -> None:
+    (tmp_path / "m.txt").write_text(text)
+    assert find_labels(tmp_path / "m.onnx", None, {}) == ("cup", "tea pot")
+
+
+def test_what_yaml_takes_for_truth_is_a_name_like_any_other(tmp_path: Path) -> None:
+    (tmp_path / "m.txt").write_text("names: [yes, 7, null]")
+    assert read_labels(tmp_path / "m.txt") == ("yes", "7", "null")
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["names: 3", "names: {1: cup}", "names: {a: cup}", "names: [[a]]", "names: [", "{nc: 2}", "[" * 5000, "names:"],
+)
+def test_yaml_without_names_is_refused_in_one_line(text: str, tmp_path: Path) -> None:
+    (tmp_path / "m.txt").write_text(text)
+    with pytest.raises(ValueError, match=r"m\.txt: expected one label a line, or names: ") as refusal:
+        read_labels(tmp_path / "m.txt")
+    assert "\n" not in str(refusal.value)
+
+
+def test_numbers_of_classes_may_be_text(tmp_path: Path) -> None:
+    assert find_labels(tmp_path / "m.onnx", None, {"names": '{"0": "cup", "1": "chair"}'}) == ("cup", "chair")
+
+
+@pytest.mark.parametrize("names", ["None", "{1: 'a', 2: 'b'}", "{0: 'a'}", "['a', 'b', 'c']"])
+def test_a_file_beside_stands_in_for_metadata_that_do_not_fit(names: str, tmp_path: Path) -> None:
+    (tmp_path / "m.txt").write_text("cup\nchair\n")
+
+    def two(labels: tuple[str, ...]) -> None:
+        if len(labels) != 2:
+            raise ValueError(f"expected 2 labels, got {len(labels)}")
+
+    assert find_labels(tmp_path / "m.onnx", None, {"names": names}, two) == ("cup", "chair")
+    (tmp_path / "m.txt").unlink()
+    with pytest.raises(ValueError, match=r"expected (2 labels, got|a dict .*`labels`, or put that file .* as m\.txt)"):
+        find_labels(tmp_path / "m.onnx", None, {"names": names}, two)
+
+
+@pytest.mark.parametrize("end", [".txt", ".names", ".yaml", ".yml"])
+def test_the_file_beside_a_model_may_end_as_tools_end_it(end: str, tmp_path: Path) -> None:
+    (tmp_path / f"m{end}").write_text("names: [cup]")
+    assert find_labels(tmp_path / "m.onnx", None, {}) == ("cup",)

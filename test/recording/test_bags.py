@@ -13,7 +13,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from objreg_ros.bridge import from_msg
-from objreg_ros.recording import Record, bags, messages, open_recording, write_rosbag2
+from objreg_ros.recording import Record, bag_files, messages, open_recording, write_rosbag2
 from objreg_ros.recording.messages import standard_types
 
 from .folders import CAMERA, humble_bag, records, robot_bag
@@ -239,13 +239,6 @@ def test_a_bug_is_not_called_a_broken_bag(bag: Path, monkeypatch: pytest.MonkeyP
             _ = record.message
 
 
-def test_metadata_that_are_no_metadata_are_refused_in_one_line(bag: Path) -> None:
-    (bag / "metadata.yaml").write_text("rosbag2_bagfile_information: [1, 2")
-    with pytest.raises(ValueError, match="expected a whole bag") as refusal:
-        open_recording(bag)
-    assert "\n" not in str(refusal.value)
-
-
 def test_a_bag_whose_file_was_moved_away_is_refused(bag: Path) -> None:
     next(f for f in bag.iterdir() if f.suffix in (".mcap", ".db3")).unlink()
     with pytest.raises(ValueError, match="missing"):
@@ -322,14 +315,8 @@ def test_a_size_that_no_memory_holds_is_a_broken_bag(at: int, value: int, tmp_pa
         open_recording(file)
 
 
-def test_metadata_that_nest_without_end_are_a_broken_bag(bag: Path) -> None:
-    (bag / "metadata.yaml").write_text("rosbag2_bagfile_information: " + "[" * 5000)
-    with pytest.raises(ValueError, match="expected a whole bag, got: RecursionError"):
-        open_recording(bag)
-
-
 def test_metadata_that_are_too_long_are_refused_unread(bag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bags, "METADATA_BYTES", 100)
+    monkeypatch.setattr(bag_files, "METADATA_BYTES", 100)
     with pytest.raises(ValueError, match=r"metadata\.yaml: expected at most 100 bytes of metadata, got \d+"):
         open_recording(bag)
 
@@ -338,7 +325,7 @@ def test_times_that_no_clock_has_are_a_broken_bag(tmp_path: Path) -> None:
     write_rosbag2(tmp_path / "bag", records())
     file, content = tmp_path / "bag/metadata.yaml", (tmp_path / "bag/metadata.yaml").read_text()
     file.write_text(content.replace("nanoseconds_since_epoch: 1000000000", f"nanoseconds_since_epoch: {10**30}"))
-    with pytest.raises(ValueError, match="expected a whole bag, got: records from 1000"):
+    with pytest.raises(ValueError, match=r"expected a whole bag, got: records from 1000.*; make metadata"):
         open_recording(tmp_path / "bag")
 
 
@@ -360,6 +347,6 @@ def test_messages_whose_definition_in_the_bag_lacks_what_is_read_are_broken(
         writer.write(writer.add_connection("/image", kind, typestore=types), 5, b"\0\1\0\0" + bytes(40))
     with (
         open_recording(tmp_path / "bag") as recording,
-        pytest.raises(ValueError, match=rf"{got}; truncated or corrupt"),
+        pytest.raises(ValueError, match=rf"as their type defines them, got: .* {got}; the file is whole"),
     ):
         _ = next(recording.records()).message

@@ -46,3 +46,9 @@ def test_a_pipe_in_a_bag_is_not_waited_for(name: str, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "bag" / name)
     with pytest.raises(ValueError, match=rf"{name}: expected a regular file, got a pipe"):
         open_recording(tmp_path / "bag")
+
+
+def test_text_with_the_name_of_a_record3d_file_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.r3d").write_text("hello")
+    with pytest.raises(ValueError, match=r"a\.r3d: expected a ZIP as Record3D exports it"):
+        open_recording(tmp_path / "a.r3d")

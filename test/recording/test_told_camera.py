@@ -60,3 +60,11 @@ def test_pictures_of_another_shape_are_refused_with_the_topic(tmp_path: Path) ->
         pytest.raises(ValueError, match=r"/depth/image: camera: expected a picture of 640 × 360 .*, got 64 × 48"),
     ):
         with_camera(opened, "525,525,320,180,640,360")
+
+
+def test_what_was_chosen_of_a_file_with_several_cameras_is_said(tmp_path: Path) -> None:
+    one = "  camera_model: pinhole\n  intrinsics: [50.0, 50.0, 31.5, 23.5]\n  resolution: [64, 48]\n"
+    (tmp_path / "chain.yaml").write_text(f"cam0:\n{one}cam1:\n{one}")
+    told = with_camera(open_recording(tum_folder(tmp_path / "tum")), str(tmp_path / "chain.yaml"))
+    assert any(note.startswith("chain.yaml: the file has several cameras: cam0 is used") for note in told.notes)
+    assert told.of_pictures

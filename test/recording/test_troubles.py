@@ -4,6 +4,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -179,3 +180,22 @@ def test_what_only_informs_is_no_trouble_of_a_run(tmp_path: Path) -> None:
 def test_stamps_of_two_clocks_are_not_to_be_bridged(tmp_path: Path) -> None:
     told = said(bag(tmp_path / "bag", depth_and_colour(METRE, "16UC1", later=10**9)))
     assert "record both with stamps of one clock" in told and "segmenter.slop=" not in told
+
+
+def test_a_folder_of_pictures_is_not_advised_to_take_other_topics(tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path)
+    (folder / "camera.yaml").write_text("fx: 50\nfy: 50\ncx: 31.5\ncy: 23.5\nwidth: 64\nheight: 64\ndepth_scale: 1000")
+    recording = open_recording(folder)
+    assert "depth has 64 × 48 pixels and its camera_info 64 × 64" in said(recording)
+    assert "give camera.yaml the width, height, fx, fy, cx and cy of the depth pictures" in said(recording)
+    lacking = choose_inputs(recording.topics, {"depth": ""})
+    texts = "\n".join(finding.text for finding in warnings(recording, lacking))
+    assert "the graph cannot run: expected points or a depth image" in texts and "leave out --remap" in texts
+    assert "--remap input:=/topic" not in texts + said(recording)
+
+
+def test_colour_of_another_shape_in_a_folder_is_to_be_exported_anew(tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path)
+    for file in (folder / "rgb").iterdir():
+        cv2.imwrite(str(file), np.zeros((72, 128, 3), np.uint8))
+    assert "export depth and colour of one field of view" in said(open_recording(folder))

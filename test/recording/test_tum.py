@@ -141,6 +141,7 @@ def test_a_text_of_another_encoding_is_refused_by_name(tmp_path: Path) -> None:
 def test_colour_is_not_turned_as_its_camera_was_held_since_depth_is_not(tmp_path: Path) -> None:
     folder = numbered_folder(tmp_path, {"1.0": 0})
     (folder / "rgb/1.0.png").unlink()
+    cv2.imwrite(str(folder / "depth/1.0.png"), np.full((4, 8), 5000, np.uint16))
     _, jpeg = cv2.imencode(".jpg", np.zeros((4, 8, 3), np.uint8))
     turned = b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0\0"  # TIFF: orientation 6
     exif = b"\xff\xe1" + (len(turned) + 8).to_bytes(2, "big") + b"Exif\0\0" + turned
@@ -210,7 +211,7 @@ def test_a_broken_first_picture_keeps_no_folder_from_being_read(tmp_path: Path) 
         ],
         ("groundtruth.txt", "0.0 0 0 0 0 0 0 one", "expected timestamp tx ty tz"),
         ("camera.yaml", "fx: [", "expected YAML"),
-        ("camera.yaml", "525", "expected a mapping"),
+        ("camera.yaml", "525", "expected a file of ROS .*, got int"),
         ("camera.yaml", "fx: 0", "expected numbers fx fy"),
         ("camera.yaml", "fx: wide", "expected numbers fx fy"),
         *[
@@ -333,3 +334,56 @@ def test_the_distortion_of_a_folder_s_camera_is_undone_in_depth_and_colour(tmp_p
     assert of is not None and of.D == (-0.3, 0.1, 0.001, 0.002, 0)
     assert np.array_equal(word.depth, of.rectify_depth(raw.depth)) and (word.depth > 0).any()
     assert raw.rgb is not None and np.array_equal(word.rgb, of.rectify_colour(raw.rgb))
+
+
+@pytest.mark.parametrize("sign", [",", ", ", "\t", ";"])
+@pytest.mark.parametrize("lists", [False, True])
+def test_columns_may_be_parted_by_commas(lists: bool, sign: str, tmp_path: Path) -> None:
+    plain, parted = tum_folder(tmp_path / "plain", lists=lists), tum_folder(tmp_path / "parted", lists=lists)
+    for file in parted.glob("*.txt"):
+        file.write_bytes(b"\xef\xbb\xbf" + file.read_text().replace("\n", "\r\n").replace(" ", sign).encode())
+    told = [[(r.stamp_ns, r.topic) for r in open_recording(folder).records()] for folder in (plain, parted)]
+    assert told[0] == told[1] and len(told[0]) == 12
+
+
+def test_depth_may_come_first_in_a_list_of_pairs(tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path, lag=0.004)
+    lines = [line.split() for line in (folder / "associations.txt").read_text().splitlines()]
+    (folder / "associations.txt").write_text("\n".join(" ".join([*line[2:], *line[:2]]) for line in lines))
+    recording = open_recording(folder)
+    assert "associations.txt has depth in its first columns" in recording.notes
+    assert [r.stamp_ns for r in recording.records(["/depth/image"])] == [4_000_000, 104_000_000, 204_000_000]
+    assert from_msg.image(next(recording.records(["/image"])).message).rgb[0, 0].tolist() == [200, 0, 0]
+
+
+def test_the_numbers_of_frames_are_said_to_be_no_times(tmp_path: Path) -> None:
+    folder = numbered_folder(tmp_path, {"0": 0, "1": 10, "2": 20})
+    (folder / "groundtruth.txt").write_text("0.0 0 0 0 0 0 0 1\n0.5 1 0 0 0 0 0 1\n")
+    notes = open_recording(folder).notes
+    assert "times are the numbers of frames: each is taken for a second" in notes
+    assert "groundtruth.txt has other times than the pictures, which are the numbers of frames" in notes
+    assert not any("numbers of frames" in n for n in open_recording(tum_folder(tmp_path / "timed")).notes)
+
+
+def test_the_truth_is_read_as_its_header_names_the_columns(tmp_path: Path) -> None:
+    folder = numbered_folder(tmp_path, {"1403636579763555584": 0})
+    header = "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []"
+    (folder / "groundtruth.txt").write_text(f"{header}\n1403636579763555584,1,2,3,0,0,0,1\n")
+    word = from_msg.odometry(next(open_recording(folder).records(["/ground_truth"])).message)
+    assert word.stamp_ns == 1403636579763555584 and word.T_odom_body[:3, 3].tolist() == [1, 2, 3]
+    assert np.allclose(word.T_odom_body[:3, :3], np.diag([-1, -1, 1]))
+
+
+@pytest.mark.parametrize("of_colour", [False, True])
+def test_larger_colour_is_brought_to_the_size_of_depth(of_colour: bool, tmp_path: Path) -> None:
+    folder = tum_folder(tmp_path)
+    for file in (folder / "rgb").iterdir():
+        cv2.imwrite(str(file), np.full((96, 128, 3), (0, 0, 200), np.uint8))
+    if of_colour:
+        (folder / "camera.yaml").write_text("fx: 100\nfy: 100\ncx: 63.5\ncy: 47.5\ndepth_scale: 1000\n")
+    recording = open_recording(folder)
+    first = {r.topic: r.message for r in recording.records(end_ns=1)}
+    word = from_msg.depth_image(first["/depth/image"], first["/camera_info"], first["/image"])
+    assert word.rgb is not None and word.rgb.shape == (48, 64, 3) and word.rgb[0, 0].tolist() == [200, 0, 0]
+    assert (word.intrinsics.fx, word.intrinsics.cx, word.intrinsics.cy) == (50, 31.5, 23.5)
+    assert "colour has 128 × 96 pixels and depth 64 × 48: colour is brought to the size of depth" in recording.notes

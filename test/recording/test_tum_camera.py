@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from objreg_ros.recording.tum_camera import TumCamera, read_camera
+from objreg_ros.recording.tum_camera import TumCamera, camera_file, read_camera
 
 WHOLE = "fx: 585\nfy: 580\ncx: 320\ncy: 240\ndepth_scale: 1000"
 
@@ -50,10 +50,55 @@ def test_what_nobody_knows_is_said(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize("text", ["Camera.fx: 585.0\nDepthMapFactor: 1000", "depth_scale: 1000"])
-def test_a_file_without_a_camera_is_refused_with_what_it_has(text: str, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=rf"expected fx, fy, cx, cy .*got {text.split(':')[0]}.*remove the file"):
+@pytest.mark.parametrize(
+    ("text", "got"), [("Camera.fx: 585.0\nDepthMapFactor: 1000", "none for fy, cx"), ("depth_scale: 1000", "the keys")]
+)
+def test_a_file_without_a_camera_is_refused_with_what_it_has(text: str, got: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=rf"expected .*fx, fy, cx and cy.*got {got}.*depth_scale.*remove the file"):
         camera(tmp_path, text)
+
+
+def test_a_focal_length_below_0_is_that_of_rows_that_count_downwards(tmp_path: Path) -> None:
+    read = camera(tmp_path, WHOLE.replace("fy: 580", "fy: -480"))
+    assert pinhole(read) == (585, 480, 320, 240)
+    assert "fy -480 is taken as 480" in read.notes[0]
+    with pytest.raises(ValueError, match="expected focal lengths"):
+        camera(tmp_path, WHOLE.replace("fx: 585", "fx: -585"))
+
+
+def test_the_settings_of_orb_slam_tell_the_depth_scale_too(tmp_path: Path) -> None:
+    names = "Camera.fx: 481.2\nCamera.fy: -480.0\nCamera.cx: 319.5\nCamera.cy: 239.5\nDepthMapFactor: 5208.0\n"
+    read = camera(tmp_path, f"%YAML:1.0\n---\n{names}")
+    assert pinhole(read) == (481.2, 480, 319.5, 239.5) and read.depth_scale == 5208
+    assert read.notes == ("camera.yaml: fy -480 is taken without its sign",)
+
+
+@pytest.mark.parametrize("said", ["", "width: 1280\nheight: 960\n"])
+def test_a_camera_of_larger_colour_is_scaled_to_depth_and_said(said: str, tmp_path: Path) -> None:
+    file = tmp_path / "camera.yaml"
+    file.write_text(f"fx: 1050\nfy: 1050\ncx: 640.5\ncy: 480.5\ndepth_scale: 1000\n{said}")
+    read = read_camera(file, 640, 480, (1280, 960))
+    assert pinhole(read) == (525, 525, 320, 240) and read.size == (640, 480)
+    assert read.notes == ("camera.yaml is of pictures of 1280 × 960: scaled to depth's 640 × 480",)
+
+
+def test_a_camera_of_depth_beside_larger_colour_stays_as_it_is(tmp_path: Path) -> None:
+    file = tmp_path / "camera.yaml"
+    file.write_text(WHOLE)
+    read = read_camera(file, 640, 480, (1280, 960))
+    assert pinhole(read) == (585, 580, 320, 240) and read.notes == ()
+    assert read_camera(tmp_path / "none.yaml", 640, 480, (1280, 960)).intrinsics.fx == 525
+
+
+def test_a_camera_of_another_shape_is_left_as_it_is(tmp_path: Path) -> None:
+    assert camera(tmp_path, f"{WHOLE}\nwidth: 1280\nheight: 720").size == (1280, 720)
+
+
+@pytest.mark.parametrize("name", ["camera.yml", "camera.json"])
+def test_the_file_may_be_json_or_end_otherwise(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text('{"width": 640, "height": 480, "fx": 585, "fy": 580, "cx": 320, "cy": 240}')
+    assert camera_file(tmp_path).name == name
+    assert pinhole(read_camera(camera_file(tmp_path), 640, 480)) == (585, 580, 320, 240)
 
 
 @pytest.mark.parametrize("value", ["0.1", "none", "{a: 1}", "[a, b]"])

@@ -84,7 +84,19 @@ def test_a_recording_is_known_as_simulated_by_the_truth_beside_it(tmp_path: Path
     for path, simulated in ((tum_folder(tmp_path / "tum"), False), (tmp_path / "bag", None)):
         with open_recording(path) as source:
             told = setting(source, choose_inputs(source.topics), "objreg_ssd.onnx")
-        assert told == {"model": "objreg_ssd.onnx", "simulated": simulated}
+        of_pictures = {"pictures": True} if simulated is False else {}
+        assert told == {"model": "objreg_ssd.onnx", "simulated": simulated, **of_pictures}
+
+
+def test_of_a_folder_of_pictures_no_other_topic_is_to_be_taken() -> None:
+    run = {**EMPTY, "frames": 0, "dropped": {"malformed_depth": 3}}
+    assert "--remap" in find(run)[0].todo
+    (finding,) = find({**run, "pictures": True})
+    assert "--remap" not in finding.todo and "replace these files" in finding.todo
+
+
+def test_a_recording_with_its_truth_beside_it_is_simulated(tmp_path: Path) -> None:
+    write_rosbag2(tmp_path / "bag", records())
     (tmp_path / "bag/truth").mkdir()
     (tmp_path / "bag/truth/frames.jsonl").touch()
     with open_recording(tmp_path / "bag") as source:
