@@ -36,9 +36,11 @@ FREE_BRIDGE = tuple(
         "sync",
         "pace",
         "layout",
+        "colour_frame",
         "lenses",
         "masks",
         "pictures",
+        "registered_depth",
         "static_frames",
     )
 )
