@@ -49,14 +49,8 @@ REMAPPED = {  # what the nodes listen to → the argument that says where it is,
     "masks": ("masks", ""),
     "label_info": ("label_info", ""),
 }
-OF_CAMERA = (
-    "image",
-    "points",
-    "depth",
-    "camera_info",
-    "colour_info",
-    "imu",
-)  # the arguments that camera_name goes before
+# The arguments that camera_name goes before.
+OF_CAMERA = ("image", "points", "depth", "camera_info", "colour_info", "imu")
 TF = [("/tf", "tf"), ("/tf_static", "tf_static")]  # robots in namespaces of their own have frames of the same names
 
 OPTIONS = {
@@ -66,8 +60,7 @@ OPTIONS = {
     "source": "where the segmenter takes depth from",
     "detections": "who says where objects are; with vision_msgs or masks our detector is not started",
     "camera_name": "namespace of the camera's topics, as its driver's: image, points, depth, camera_info, colour_info "
-    "and imu are "
-    "looked for in it, but for those that are given with a / in front",
+    "and imu are looked for in it, but for those that are given with a / in front",
     "camera": "the camera where nobody publishes camera_info: fx,fy,cx,cy or a calibration YAML",
     "T_base_camera": "where the camera sits on the body of odom, seven numbers with commas; else /tf_static is asked",
     "use_sim_time": "true to follow /clock",

@@ -20,9 +20,8 @@ from objreg_ros.bridge.static_frames import FindPose
 from objreg_ros.data import Array, ColourImage, DepthImage, Intrinsics, PointCloud
 from objreg_ros.geometry import transform
 
-REGISTERED = re.compile(
-    r"(?<!un)(align|regist)|depth_to_(rgb|colou?r)|rgb_to_depth", re.IGNORECASE
-)  # in the name of a topic
+# In the name of a topic.
+REGISTERED = re.compile(r"(?<!un)(align|regist)|depth_to_(rgb|colou?r)|rgb_to_depth", re.IGNORECASE)
 SAME_FOCAL, SAME_CENTRE_PX = 1e-3, 0.6  # of the focal length; half a pixel lies between two ways to scale a picture
 SAME_SIDE_PX = 1.0  # to which the sides of a scaled picture are rounded
 LEAST_ASIDE_M, LEAST_TURN_DEG = 0.005, 0.5  # by less two frames are one place

@@ -25,8 +25,8 @@ NEVER_ALL_BEYOND_M = 3.0  # a depth camera indoors always has something nearer: 
 NEVER_ALL_WITHIN_M = 0.15  # nearer than any depth camera measures
 
 REGISTER = (
-    "record registered depth (RealSense: align_depth.enable:=true, OpenNI: depth_registered), or the camera_info of both "
-    "and /tf_static between their frames: then it is registered here"
+    "record registered depth (RealSense: align_depth.enable:=true, OpenNI: depth_registered), or /tf_static between "
+    "the two frames and the camera_info of both: then it is registered here"
 )
 RECORD_UNITS = "record depth in mm (16UC1) or in m (32FC1); a TUM folder names its steps as depth_scale in camera.yaml"
 

@@ -2,8 +2,8 @@
 """The door of the segmenter: depth and detections in, objects and views out.
 
 In: ``points``, or ``depth/image`` with ``camera_info`` and ``image``, and ``colour/camera_info`` where depth is not
-registered to colour; ``detections_table`` with ``labels``, or ``detections_in``, or ``masks``; ``imu``, or ``odom`` where gravity comes from it. Out: ``objects``, ``detections_3d``,
-``view``, ``view/camera_info`` and ``gravity``.
+registered to colour; ``detections_table`` with ``labels``, or ``detections_in``, or ``masks``; ``imu``, or ``odom``
+where gravity comes from it. Out: ``objects``, ``detections_3d``, ``view``, ``view/camera_info`` and ``gravity``.
 """
 
 from __future__ import annotations
@@ -202,8 +202,9 @@ class SegmenterNode(MatchingDoor):
         self._segmenter.params = self.settings.of(SegmenterParams)
         raw = self._raw_pictures()
         camera_info = self.read("camera_info", fitted, self._camera_of(payload), payload["depth"])
-        (depth, *lens, _), cloud = self._depth(payload, camera_info, raw)
-        asked = self._detections.read(payload, depth, *lens, cloud)
+        seen, cloud = self._depth(payload, camera_info, raw)
+        depth = seen.depth
+        asked = self._detections.read(payload, depth, seen.camera_info, seen.raw, cloud)
         gravity, felt = self._level_gravity(payload, depth.frame_id), self._felt_gravity(payload, depth.frame_id)
         with self.ledger.timed("segment"):
             told = (gravity, None) if felt is None else (felt.gravity, felt.gravity_sigma_deg)
