@@ -80,7 +80,7 @@ def test_depth_that_is_registered_here_is_no_trouble_but_a_remark(tmp_path: Path
     tied = static("depth", "c", pose(np.eye(3), np.array([0.05, 0.0, 0.0])), 5)
     recording = bag(tmp_path / "tied", [*items, tied])
     inputs = choose_inputs(recording.topics)
-    remark = "depth of 'depth' is registered here to colour of 'c', with -5.0 0.0 0.0 cm between them, as 64 × 48 px"
+    remark = "depth of 'depth' is registered here to colour of 'c', with -5.0 0.0 0.0 cm between them, as 40 × 30 px"
     assert remark in said(recording) and not troubles(recording, inputs)
     loose = bag(tmp_path / "loose", items)
     (found,) = troubles(loose, inputs)
