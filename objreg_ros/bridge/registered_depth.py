@@ -75,6 +75,13 @@ def register(
     )
 
 
+def warm() -> None:
+    """Load the kernels, or compile them, as `register` calls them."""
+    camera = Intrinsics(fx=1.0, fy=1.0, cx=0.0, cy=0.0, width=2, height=2)
+    depth = DepthImage(depth=np.ones((2, 2), np.float32), rgb=None, intrinsics=camera, stamp_ns=0)
+    register(depth, np.eye(4), camera)
+
+
 def moved(depth: Array, of: Intrinsics, T_to_of: Array, to: Intrinsics) -> Array:
     """Depth (H, W) float32 m of camera ``of`` as camera ``to`` has it (h, w), 0 where there is none."""
     R, t = T_to_of[:3, :3], T_to_of[:3, 3].astype(np.float32)
@@ -82,8 +89,8 @@ def moved(depth: Array, of: Intrinsics, T_to_of: Array, to: Intrinsics) -> Array
     down = (R[:, 1:2] * ((np.arange(of.height) - of.cy) / of.fy) + R[:, 2:]).astype(np.float32)
     K = np.array([to.fx, to.fy, to.cx, to.cy], np.float32)
     steps = (R[:, :2] / [of.fx, of.fy]).astype(np.float32)
-    uvz = np.empty((*depth.shape, 3), np.float32)
-    _project(np.ascontiguousarray(depth), across, down, t, K, uvz)
+    depth, uvz = np.ascontiguousarray(depth), np.empty((*depth.shape, 3), np.float32)
+    _project(depth, across, down, t, K, uvz)
     found = np.full((to.height, to.width), np.inf, np.float32)
     _splat(depth, uvz, steps, K, found)
     found[np.isinf(found)] = 0.0

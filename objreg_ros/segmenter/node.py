@@ -23,7 +23,7 @@ from rclpy.qos import DurabilityPolicy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from sensor_msgs.msg import Imu as ImuMessage
 
-from objreg_ros.bridge import colour_frame, from_msg, lenses, qos, to_msg, vision_to_msg
+from objreg_ros.bridge import colour_frame, from_msg, lenses, qos, registered_depth, to_msg, vision_to_msg
 from objreg_ros.bridge.calibration import fitted, read_calibration
 from objreg_ros.bridge.detections_in import DetectionsIn
 from objreg_ros.bridge.indoors import Indoors, Surplus
@@ -63,7 +63,7 @@ class SegmenterNode(MatchingDoor):
         """Load the kernels, publish and listen."""
         self._inputs = self.settings.of(SegmenterNodeParams)
         self._segmenter = Segmenter(self.settings.of(SegmenterParams))
-        await_kernels(self._segmenter.warm, self.get_logger().info)
+        await_kernels(self._warm, self.get_logger().info)
         self._camera_info: Any = read_calibration(self._inputs.camera) if self._inputs.camera else None
         self._colour_info: Any = None
         self._find_pose = hear_static_frames(self).between
@@ -80,6 +80,10 @@ class SegmenterNode(MatchingDoor):
         solids = vision_to_msg.Detection3DArray
         self._solids = None if solids is None else self.create_publisher(solids, "detections_3d", qos.room())
         self._listen()
+
+    def _warm(self) -> None:
+        self._segmenter.warm()
+        registered_depth.warm()
 
     def _listen(self) -> None:
         self._listen_for_camera()

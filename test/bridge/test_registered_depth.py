@@ -4,7 +4,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.bridge.registered_depth import camera_for, moved, register
+from objreg_ros.bridge import registered_depth
+from objreg_ros.bridge.registered_depth import camera_for, moved, register, warm
 from objreg_ros.data import DepthImage, Intrinsics
 from objreg_ros.geometry import pose, rotation_from_vector
 
@@ -124,3 +125,14 @@ def test_where_the_picture_of_depth_ends_is_known() -> None:
 def test_depth_that_lies_beside_the_picture_is_refused_with_where_it_was_taken_to_be() -> None:
     with pytest.raises(ValueError, match=r"got none with depth at 9.000 0.000 0.000 m in 'colour'.*tf_static"):
         register(depth_image(plane(1.0)), shifted(9.0), DEPTH, None, "colour")
+
+
+def test_no_frame_after_warming_up_compiles_anything() -> None:
+    warm()
+    kernels = registered_depth._project, registered_depth._splat
+    before = [list(kernel.signatures) for kernel in kernels]
+    metres = np.asfortranarray(plane(2.0))
+    metres.flags.writeable = False
+    for depth in (depth_image(metres), depth_image(plane(1.0))):
+        register(depth, shifted(0.01), NARROW, np.zeros((60, 80, 3), np.uint8))
+    assert [list(kernel.signatures) for kernel in kernels] == before

@@ -14,8 +14,7 @@ from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.summary import describe_topics
 from objreg_ros.recording.troubles import troubles, warnings
 
-from .folders import CAMERA, records, tum_folder, uncalibrated
-from .test_mounts import static
+from .folders import CAMERA, records, static, tum_folder, uncalibrated
 
 
 def bag(path: Path, items: Iterator[Record] | list[Record]) -> Recording:
