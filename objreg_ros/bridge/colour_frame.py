@@ -22,7 +22,7 @@ from objreg_ros.geometry import transform
 
 # In the name of a topic.
 REGISTERED = re.compile(r"(?<!un)(align|regist)|depth_to_(rgb|colou?r)|rgb_to_depth", re.IGNORECASE)
-SAME_FOCAL, SAME_CENTRE_PX = 1e-3, 0.6  # of the focal length; half a pixel lies between two ways to scale a picture
+SAME_FOCAL, SAME_CENTRE_PX = 1e-3, 0.6  # of the focal length; half a pixel lies between two kinds of scaling
 SAME_SIDE_PX = 1.0  # to which the sides of a scaled picture are rounded
 LEAST_ASIDE_M, LEAST_TURN_DEG = 0.005, 0.5  # by less two frames are one place
 OPTICAL = 0.7  # cosine of the most between the axes of two cameras that see the same; a body's frame is 90 deg aside
@@ -193,7 +193,7 @@ def _frame(message: Any) -> str:
 
 
 def _aside(T: Array | None) -> bool:
-    """Whether a frame is known to be beside another, and both look the same way."""
+    """Whether a frame is known to be beside another, and both face the same side."""
     if T is None or T[2, 2] < OPTICAL:
         return False
     turn_deg = np.degrees(np.arccos(np.clip((np.trace(T[:3, :3]) - 1) / 2, -1, 1)))

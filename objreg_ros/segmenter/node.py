@@ -103,8 +103,8 @@ class SegmenterNode(MatchingDoor):
             self.feed("camera_info", 0, self._camera_info)
             return
         self.listen(CameraInfo, "camera_info", self._hear_camera, self.sensor(), watched="camera_info")
-        self.listen(CameraInfo, COLOUR_INFO, self._hear_colour_camera, self.sensor())
-        self._kept = {"camera_info": self._hear_camera, COLOUR_INFO: self._hear_colour_camera}
+        self.listen(CameraInfo, COLOUR_INFO, self._receive_colour_camera, self.sensor())
+        self._kept = {"camera_info": self._hear_camera, COLOUR_INFO: self._receive_colour_camera}
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._look = self.create_timer(LOOK_S, self._look_for_kept_camera, clock=steady)
 
@@ -138,7 +138,7 @@ class SegmenterNode(MatchingDoor):
         self.watch.forget("camera_info")  # once is enough
         self.feed("camera_info", from_msg.stamp_ns(message), message)
 
-    def _hear_colour_camera(self, message: Any) -> None:
+    def _receive_colour_camera(self, message: Any) -> None:
         self._colour_info = message
 
     def _hear_image(self, _: str, message: Any) -> None:

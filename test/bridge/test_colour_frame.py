@@ -79,7 +79,7 @@ def test_depth_that_counts_as_registered_stays_to_the_bit(
     assert (found.depth.rgb is None) == (colour_hw != (60, 80))
 
 
-def test_two_sensors_of_one_make_are_told_apart_by_their_frames() -> None:
+def test_two_sensors_of_one_make_differ_by_their_frames() -> None:
     found = seen(Cameras(OF_DEPTH, info(60.0, 80, 60)), "depth", (60, 80))
     assert found.registered and found.depth.frame_id == "colour"
     assert int(np.argmax(found.depth.depth[30] > 0)) == 17  # 3 px at 2 m

@@ -72,8 +72,8 @@ def test_depth_in_another_frame_than_colour_is_said_with_how_to_register_it(tmp_
 
 def test_depth_that_is_registered_here_is_no_trouble_but_a_remark(tmp_path: Path) -> None:
     of_colour = Intrinsics(fx=80.0, fy=80.0, cx=31.5, cy=23.5, width=64, height=48)
-    told = Record.of("/colour/camera_info", messages.camera_info(of_colour, 5, "c"), 5)
-    items = [*depth_and_colour(METRE, "16UC1", frame_id="depth"), told]
+    info = Record.of("/colour/camera_info", messages.camera_info(of_colour, 5, "c"), 5)
+    items = [*depth_and_colour(METRE, "16UC1", frame_id="depth"), info]
     names = {"/image": "/colour/image", "/camera_info": "/depth/camera_info"}
     items = [Record.of(names.get(r.topic, r.topic), r.message, 5) for r in items]
     tied = static("depth", "c", pose(np.eye(3), np.array([0.05, 0.0, 0.0])), 5)

@@ -149,14 +149,14 @@ def test_pictures_and_boxes_of_a_lens_are_shown_rectified_unless_they_are_so_alr
 def test_depth_of_another_sensor_is_shown_as_the_segmenter_gets_it(tmp_path: Path) -> None:
     of_depth = Intrinsics(fx=50.0, fy=50.0, cx=31.5, cy=23.5, width=64, height=48)
     of_colour = Intrinsics(fx=100.0, fy=100.0, cx=63.5, cy=47.5, width=128, height=96)
-    told = [
+    recorded = [
         Record.of("/rgb/image", messages.image(np.full((96, 128, 3), 7, np.uint8), "rgb8", 5, "rgb"), 5),
         Record.of("/rgb/camera_info", messages.camera_info(of_colour, 5, "rgb", (-0.1, 0.0, 0.0, 0.0, 0.0)), 5),
         Record.of("/depth/image", messages.image(np.full((48, 64), 1000, np.uint16), "16UC1", 5, "depth"), 5),
         Record.of("/depth/camera_info", messages.camera_info(of_depth, 5, "depth"), 5),
         static("depth", "rgb", pose(np.eye(3), np.array([0.1, 0.0, 0.0])), 5),
     ]
-    write_rosbag2(tmp_path / "bag", told)
+    write_rosbag2(tmp_path / "bag", recorded)
     with open_recording(tmp_path / "bag") as recording:
         album = Album(recording, choose_inputs(recording.topics))
         seen = album.at(5)
