@@ -28,6 +28,7 @@ TOPICS = {
     "points": "PointCloud2, organised or not",
     "depth": "depth image, instead of points; its compressed form is looked for at <depth>/compressedDepth",
     "camera_info": "camera of the depth image",
+    "colour_info": "camera of the colour image, for depth that is not registered to it",
     "odom": "odometry of the camera's body",
     "imu": "IMU of the camera",
     "detections_in": "boxes of another detector, vision_msgs/Detection2DArray",
@@ -41,13 +42,15 @@ REMAPPED = {  # what the nodes listen to → the argument that says where it is,
     "depth/image": ("depth", ""),
     "depth/image/compressedDepth": ("depth", "/compressedDepth"),
     "camera_info": ("camera_info", ""),
+    "colour/camera_info": ("colour_info", ""),
     "odom": ("odom", ""),
     "imu": ("imu", ""),
     "detections_in": ("detections_in", ""),
     "masks": ("masks", ""),
     "label_info": ("label_info", ""),
 }
-OF_CAMERA = ("image", "points", "depth", "camera_info", "imu")  # the arguments that camera_name goes before
+# The arguments that camera_name goes before.
+OF_CAMERA = ("image", "points", "depth", "camera_info", "colour_info", "imu")
 TF = [("/tf", "tf"), ("/tf_static", "tf_static")]  # robots in namespaces of their own have frames of the same names
 
 OPTIONS = {
@@ -56,8 +59,8 @@ OPTIONS = {
     "model": "ONNX model of the detector",
     "source": "where the segmenter takes depth from",
     "detections": "who says where objects are; with vision_msgs or masks our detector is not started",
-    "camera_name": "namespace of the camera's topics, as its driver's: image, points, depth, camera_info and imu are "
-    "looked for in it, but for those that are given with a / in front",
+    "camera_name": "namespace of the camera's topics, as its driver's: image, points, depth, camera_info, colour_info "
+    "and imu are looked for in it, but for those that are given with a / in front",
     "camera": "the camera where nobody publishes camera_info: fx,fy,cx,cy or a calibration YAML",
     "T_base_camera": "where the camera sits on the body of odom, seven numbers with commas; else /tf_static is asked",
     "use_sim_time": "true to follow /clock",

@@ -17,7 +17,7 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from objreg_ros.bridge import from_msg, lenses
+from objreg_ros.bridge import colour_frame, from_msg, lenses
 from objreg_ros.bridge.pace import Pace
 from objreg_ros.bridge.static_frames import FindPose, Mount
 from objreg_ros.bridge.sync import Drop, Match, Need, Stream, Synchroniser
@@ -161,6 +161,7 @@ class Run:
     detections: int = 0
     objects: int = 0
     lens: str = ""  # what was assumed of it; empty where no camera_info came
+    registered: str = ""  # how depth was brought into the picture of colour; empty where it came so
     mount: str = ""  # what was assumed of how the camera sits on the body of the odometry; empty where it is told
     closures: list[LoopClosure] = field(default_factory=list)
     rejected: Counter[str] = field(default_factory=Counter)
@@ -183,6 +184,7 @@ class Run:
             "detections": self.detections,
             "objects": self.objects,
             "lens": self.lens,
+            "registered": self.registered,
             "depth_to_colour": self.depth_to_colour,
             "depth_noise": None if self.depth_noise is None else round(self.depth_noise, 3),
             "depth_lag": None if self.depth_lag is None else self.depth_lag._asdict(),
@@ -263,6 +265,9 @@ class Line:
         self._from_points = inputs.points is not None
         self._raw = lenses.raw_pictures(timing.rectified, inputs.depth or inputs.points, inputs.image)
         self._camera_info: Any = None
+        self._colour_info: Any = None
+        self._has_colour_info = inputs.colour_info is not None
+        self._named = colour_frame.named_registered(inputs.depth, inputs.image)
         self._pace = Pace(timing.max_rate)
         self._imu = Imu(timing.T_camera_imu, timing.find_pose)
         self._mount = Mount(timing.T_base_camera, timing.find_pose, self._hear_of_mount)
@@ -304,6 +309,8 @@ class Line:
         elif name == "camera_info":
             self._camera_info = message
             self._feed(name, stamp_ns, message)
+        elif name == "colour_info":
+            self._colour_info = message
         elif name in ("depth", "points"):
             self._feed("depth", stamp_ns, message)
         elif name == "odom":
@@ -385,15 +392,19 @@ class Line:
 
     def _depth(self, match: Match) -> tuple[DepthImage, Detections]:
         """Depth and boxes of one picture without a lens."""
-        seen, raw = match["detections"], self._raw
+        found, find_pose = match["detections"], self._timing.find_pose
         if not self._from_points:
-            camera_info = match["camera_info"]
-            depth = lenses.depth_image(match["depth"], camera_info, match.payloads.get("image"), raw=raw)
-            self.run.lens = self.run.lens or lenses.describe(camera_info, raw)
-            return depth, lenses.detections(seen, camera_info, raw)
-        cloud = from_msg.point_cloud(match["depth"])
+            cameras = colour_frame.Cameras(match["camera_info"], self._colour_info, self._named, self._has_colour_info)
+            colour = match.payloads.get("image")
+            seen = colour_frame.depth_image(
+                match["depth"], cameras, colour, find_pose, self._raw, colour_frame=found.frame_id
+            )
+            self.run.lens = self.run.lens or lenses.describe(seen.camera_info, seen.raw)
+            self.run.registered = self.run.registered or seen.registered
+            return seen.depth, lenses.detections(found, seen.camera_info, seen.raw)
+        cloud = colour_frame.in_optical_frame(from_msg.point_cloud(match["depth"]), found.frame_id, find_pose)
         depth = self._rooms.organise(cloud, from_msg.camera_of_cloud(self._camera_info, cloud))
-        return depth, lenses.detections(seen, self._camera_info, raw, cloud)
+        return depth, lenses.detections(found, self._camera_info, self._raw, cloud)
 
     def _track(self, matches: Iterable[Match]) -> None:
         for match in matches:

@@ -37,9 +37,11 @@ FREE_BRIDGE = tuple(
         "sync",
         "pace",
         "layout",
+        "colour_frame",
         "lenses",
         "masks",
         "pictures",
+        "registered_depth",
         "static_frames",
     )
 )

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 from recording.folders import CAMERA, records, uncalibrated
-from simple_rooms import simple_rooms
+from simple_rooms import OneBox, simple_rooms
 
 from objreg_ros.bridge import from_msg
-from objreg_ros.data import DepthImage, Detections, Frame
+from objreg_ros.data import ColourImage, DepthImage, Detections, Frame, Intrinsics
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import back_project, pose, rotation_from_vector
@@ -489,3 +489,78 @@ def test_what_the_masks_of_a_model_cover_is_the_objects(tmp_path: Path) -> None:
     run_offline(records(2), replace(rooms, detector=detector, segmenter=Segmenter()), INPUTS)
     for frame in chain.frames:
         require_objects(CAMERA, frame.objects)
+
+
+OF_COLOUR = Intrinsics(fx=100.0, fy=100.0, cx=63.5, cy=35.5, width=128, height=72)
+ASIDE = pose(np.eye(3), np.array([-0.06, 0.0, 0.0]))
+WITH_COLOUR = replace(INPUTS, colour_info="/colour/camera_info")
+
+
+def of_two_sensors() -> Iterator[Record]:
+    """Colour of twice the pixels beside depth, whose left third is nearer; the camera_info of colour comes last."""
+    for record in records(3):
+        message, stamp_ns = record.message, record.stamp_ns
+        if record.topic == "/image":
+            yield Record.of(
+                "/image", messages.image(np.zeros((72, 128, 3), np.uint8), "rgb8", stamp_ns, "rgb"), stamp_ns
+            )
+            info = messages.camera_info(OF_COLOUR, stamp_ns, "rgb")
+            yield Record.of("/colour/camera_info", info, stamp_ns)
+        elif record.topic == "/depth/image":
+            depth = np.full((48, 64), 2000, np.uint16)
+            depth[:, :20] = 1000
+            yield Record.of(record.topic, messages.image(depth, "16UC1", stamp_ns, "depth"), stamp_ns)
+        else:
+            message.header.frame_id = "depth" if record.topic == "/camera_info" else message.header.frame_id
+            yield Record.of(record.topic, message, stamp_ns)
+
+
+class InFrame:
+    """`OneBox`, whose detections are in the frame of their picture."""
+
+    def detect(self, image: ColourImage) -> Detections:
+        return replace(OneBox().detect(image), frame_id=image.frame_id)
+
+
+def test_depth_of_another_sensor_goes_to_the_segmenter_in_the_picture_of_colour() -> None:
+    rooms, chain = simple_rooms()
+    timing = Timing(find_pose=lambda a, b: {("rgb", "depth"): ASIDE}.get((a, b)))
+    run = run_offline(of_two_sensors(), replace(rooms, detector=InFrame()), WITH_COLOUR, timing)
+    assert run.frames == 3 and not run.dropped
+    assert run.summary(Truth([]))["registered"].startswith("depth of 'depth' is registered here to colour of 'rgb'")
+    for frame in chain.frames:
+        assert (frame.view.intrinsics.width, frame.view.intrinsics.fx) == (64, 50.0)
+        row = frame.view.xyz[18, :, 2]
+        assert (row[:17] == 1.0).all() and (row[19:61] == 2.0).all()  # 3 px at 1 m, 1.5 at 2 m
+
+
+@pytest.mark.parametrize(
+    ("inputs", "lacks"),
+    [(WITH_COLOUR, "/tf_static between the two frames, got"), (INPUTS, "and the camera_info of colour, got")],
+)
+def test_depth_that_cannot_be_registered_is_dropped_with_what_is_missing(inputs: Inputs, lacks: str) -> None:
+    rooms, _ = simple_rooms()
+    run = run_offline(of_two_sensors(), replace(rooms, detector=InFrame()), inputs)
+    assert run.frames == 0 and run.dropped == {"malformed_depth": 3}
+    assert lacks in run.complaints["malformed_depth"] and "'rgb'" in run.complaints["malformed_depth"]
+
+
+def test_a_cloud_of_a_body_is_turned_into_the_frame_of_the_picture() -> None:
+    rooms, chain = simple_rooms()
+    xyz = back_project(np.full((48, 64), 2.0, np.float32), CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy)
+    R_body_optical = np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]])
+    rows = np.zeros((48, 64), [("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
+    rows["x"], rows["y"], rows["z"] = np.moveaxis(xyz @ R_body_optical.T, -1, 0)
+    said = [
+        Record.of("/points", messages.point_cloud(rows, r.stamp_ns, "zed"), r.stamp_ns)
+        if r.topic == "/depth/image"
+        else r
+        for r in records(2)
+    ]
+    inputs = Inputs(image="/image", points="/points", odom="/odom")
+    timing = Timing(find_pose=lambda a, b: pose(R_body_optical.T, np.zeros(3)) if (a, b) == ("camera", "zed") else None)
+    run = run_offline(said, replace(rooms, organise=organise), inputs, timing)
+    assert run.frames == 2 and not run.dropped
+    np.testing.assert_allclose(chain.frames[0].view.xyz, xyz, atol=1e-5)
+    run = run_offline(said, replace(rooms, organise=organise), inputs)
+    assert run.frames == 0 and "publish /tf_static between its frame" in run.complaints["malformed_depth"]

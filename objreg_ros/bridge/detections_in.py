@@ -93,7 +93,8 @@ class DetectionsIn:
             names = match["labels"]
             seen = self._door.read("detections", from_msg.detections, message, names, depth.depth.shape)
             return Asked(self._door.read("camera_info", lenses.detections, seen, *lens), names)
-        seen = self._door.read("detections", self._foreign, message, match.payloads.get("image"), depth)
+        size = depth.depth.shape if cloud is not None or camera_info is None else _size_of(camera_info)
+        seen = self._door.read("detections", self._foreign, message, match.payloads.get("image"), size)
         seen = self._door.read("camera_info", lenses.detections, seen, *lens)
         self._labels.include(seen.label)
         names = self._labels.names
@@ -101,9 +102,9 @@ class DetectionsIn:
             self._tell(names)
         return Asked(seen, names)
 
-    def _foreign(self, message: Any, image: Any, depth: DepthImage) -> Detections:
+    def _foreign(self, message: Any, image: Any, image_hw: tuple[int, int]) -> Detections:
         if not isinstance(message, Image):
-            return self._boxes(message, _size(image) or depth.depth.shape)
+            return self._boxes(message, _size(image) or image_hw)
         where = from_msg.when_and_where(message)
         return vision_from_msg.instances(self._numbers(message), self._names, **where)
 
@@ -124,6 +125,12 @@ class DetectionsIn:
 
 def _is_surplus(message: Any) -> bool:
     return isinstance(message, PointCloud2) and from_msg.is_surplus(message)
+
+
+def _size_of(camera_info: Any) -> tuple[int, int]:
+    """Height and width of the picture of a camera_info."""
+    camera = from_msg.intrinsics(camera_info)
+    return camera.height, camera.width
 
 
 def _size(image: Any) -> tuple[int, int] | None:

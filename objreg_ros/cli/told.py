@@ -47,6 +47,8 @@ def tell_run(run: Run, summary: Mapping[str, Any]) -> None:
     )
     if run.lens:
         click.echo(f"  lens: {run.lens}")
+    if run.registered:
+        click.echo(f"  {run.registered}")
     if run.mount:
         click.echo(f"  camera: {run.mount}")
     if run.depth_to_colour:

@@ -113,6 +113,7 @@ class Inputs:
     points: str | None = None
     depth: str | None = None
     camera_info: str | None = None
+    colour_info: str | None = None  # the camera_info of `image`, where that is another than depth's
     odom: str | None = None
     imu: str | None = None
     ground_truth: str | None = None
@@ -151,6 +152,7 @@ GRAPH_TOPICS = {  # the names that the nodes subscribe to
     "points": "points",
     "depth": "depth/image",
     "camera_info": "camera_info",
+    "colour_info": "colour/camera_info",
     "odom": "odom",
     "imu": "imu",
     "ground_truth": "ground_truth",
@@ -179,6 +181,7 @@ def choose_inputs(topics: Mapping[str, Topic], remaps: Mapping[str, str] | None 
     else:
         found["depth"] = None
         found["camera_info"] = asked.get("camera_info", _camera_info_of((found["image"], found["points"]), topics))
+    found["colour_info"] = asked.get("colour_info", _colour_info_of(found, topics))
     return Inputs(**{field.name: found[field.name] or None for field in fields(Inputs)})
 
 
@@ -241,7 +244,7 @@ def _require_known(asked: Mapping[str, str], topics: Mapping[str, Topic]) -> Non
 
 def _require_types(asked: Mapping[str, str], topics: Mapping[str, Topic]) -> None:
     for name, topic in asked.items():
-        types = (CAMERA_INFO,) if name == "camera_info" else RULES[name].types
+        types = (CAMERA_INFO,) if name in ("camera_info", "colour_info") else RULES[name].types
         if topic and topics[topic].msgtype not in types:
             raise ValueError(f"expected {name} of type {' or '.join(types)}, got {topic} ({topics[topic].msgtype})")
 
@@ -285,6 +288,12 @@ def _camera_info_of(pictures: Iterable[str | None], topics: Mapping[str, Topic])
         if nearest and -unshared >= _folders(picture):
             return nearest
     return infos[0] if len(infos) == 1 else None
+
+
+def _colour_info_of(found: Mapping[str, str | None], topics: Mapping[str, Topic]) -> str | None:
+    """The camera_info of colour where depth is a picture with another one; None where one is of both."""
+    own = _camera_info_of((found["image"],), topics) if found["depth"] else None
+    return None if own == found["camera_info"] else own
 
 
 def _folders(picture: str) -> int:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from objreg_ros.bridge import from_msg
+from objreg_ros.bridge import colour_frame, from_msg, lenses
 from objreg_ros.data import Array, Intrinsics
 from objreg_ros.plausibility.finding import Finding
 from objreg_ros.recording.inputs import Inputs
@@ -24,7 +24,10 @@ MOMENTS = 5  # of a recording at which its depth is looked at
 NEVER_ALL_BEYOND_M = 3.0  # a depth camera indoors always has something nearer: its floor, a table, a wall
 NEVER_ALL_WITHIN_M = 0.15  # nearer than any depth camera measures
 
-REGISTER = "record registered depth (RealSense: align_depth.enable:=true, OpenNI: depth_registered)"
+REGISTER = (
+    "record registered depth (RealSense: align_depth.enable:=true, OpenNI: depth_registered), or /tf_static between "
+    "the two frames and the camera_info of both: then it is registered here"
+)
 RECORD_UNITS = "record depth in mm (16UC1) or in m (32FC1); a TUM folder names its steps as depth_scale in camera.yaml"
 
 OF_FILES = "the topics of a folder are made of its files, and each that it can have is there unless it was ruled out"
@@ -60,7 +63,7 @@ def warnings(recording: Recording, inputs: Inputs) -> list[Finding]:
     if inputs.ground_truth is None:
         found.append(Finding("no ground truth: the true error of constraints cannot be told"))
     found += map(Finding, [*_mount_of_camera(recording, inputs), *_mount_of_imu(recording, inputs)])
-    for look in (_first_messages, _frames, _stamps, _scale):
+    for look in (_first_messages, _registration, _stamps, _scale):
         found += look(recording, inputs)
     return found
 
@@ -73,7 +76,7 @@ def troubles(recording: Recording, inputs: Inputs) -> list[Finding]:
 def _first_messages(recording: Recording, inputs: Inputs) -> list[Finding]:
     """What the nodes would say of the first messages."""
     found: list[Finding] = []
-    colour = _try(found, "image", recording, inputs.image, lambda m: from_msg.image(m).rgb.shape[:2])
+    _try(found, "image", recording, inputs.image, from_msg.image)
     depth = _try(found, "depth", recording, inputs.depth, lambda m: from_msg.depth(m).shape)
     cloud = _try(found, "points", recording, inputs.points, from_msg.point_cloud)
     read = from_msg.intrinsics if cloud is None else partial(from_msg.camera_of_cloud, cloud=cloud)
@@ -85,15 +88,6 @@ def _first_messages(recording: Recording, inputs: Inputs) -> list[Finding]:
                 "the camera_info is of another picture, so every frame would be dropped",
                 CAMERA_YAML if recording.of_pictures else NAME_INFO,
                 "no-camera-info",
-            )
-        )
-    if colour and depth and colour != depth:
-        found.append(
-            Finding(
-                f"colour has {_size(colour)} pixels and depth {_size(depth)}",
-                "they must show the same field of view, and depth that is not registered to colour seldom does",
-                REGISTER_FILES if recording.of_pictures else REGISTER,
-                "depth-is-not-registered",
             )
         )
     if cloud is not None and not cloud.organised and camera is None:
@@ -123,19 +117,49 @@ def _size(hw: tuple[int, int]) -> str:
     return f"{hw[1]} × {hw[0]}"
 
 
-def _frames(recording: Recording, inputs: Inputs) -> list[Finding]:
-    """Whether a depth image is in the frame of colour, as one that is registered to it is."""
-    colour, depth = (_frame_id(recording, topic) for topic in (inputs.image, inputs.depth))
-    if not colour or not depth or colour == depth:
+def _registration(recording: Recording, inputs: Inputs) -> list[Finding]:
+    """Whether depth is registered to colour: by the driver, by us, or by nobody."""
+    topics = inputs.image, inputs.depth, inputs.camera_info, inputs.colour_info
+    colour, depth, info, colour_info = (first_readable(recording, topic) for topic in topics)
+    if colour is None or depth is None or info is None:
         return []
-    return [
-        Finding(
-            f"colour is in the frame {colour} and depth in {depth}",
-            "depth that is not registered to colour gives wrong objects",
-            REGISTER,
-            "depth-is-not-registered",
-        )
-    ]
+    try:
+        picture, size = from_msg.image(colour), from_msg.depth(depth).shape
+        from_msg.depth_image(depth, info)
+    except ValueError:
+        return []  # said where the first messages are looked at
+    raw = lenses.raw_pictures("auto", inputs.depth, inputs.image)
+    cameras = colour_frame.Cameras(info, colour_info, colour_frame.named_registered(inputs.depth, inputs.image))
+    try:
+        seen = colour_frame.depth_image(depth, cameras, picture, static_frames(recording).between, raw)
+    except ValueError as error:
+        what = f"colour has {_size(picture.rgb.shape[:2])} pixels and depth {_size(size)}: {error}"
+        return [Finding(what, "every frame would be dropped", _register(recording), "depth-is-not-registered")]
+    if seen.registered:
+        return [Finding(seen.registered)]
+    todo = _register(recording)
+    return [*_sizes(picture.rgb.shape[:2], size, todo), *_frames(frame_of(colour), frame_of(depth), todo)]
+
+
+def _register(recording: Recording) -> str:
+    """What to do about depth that is not registered."""
+    return REGISTER_FILES if recording.of_pictures else REGISTER
+
+
+def _sizes(colour: tuple[int, int], depth: tuple[int, int], todo: str) -> Iterator[Finding]:
+    """Whether the two pictures have as many pixels."""
+    if colour != depth:
+        what = f"colour has {_size(colour)} pixels and depth {_size(depth)}"
+        cause = "they must show the same field of view, and depth that is not registered to colour seldom does"
+        yield Finding(what, cause, todo, "depth-is-not-registered")
+
+
+def _frames(colour: str, depth: str, todo: str) -> Iterator[Finding]:
+    """Whether a depth image is in the frame of colour, as one that is registered to it is."""
+    if colour and depth and colour != depth:
+        what = f"colour is in the frame {colour} and depth in {depth}"
+        cause = "depth that is not registered to colour gives wrong objects"
+        yield Finding(what, cause, todo, "depth-is-not-registered")
 
 
 def _mount_of_camera(recording: Recording, inputs: Inputs) -> list[str]:

@@ -10,10 +10,11 @@ from typing import Any
 import cv2
 import numpy as np
 
-from objreg_ros.bridge import from_msg, lenses
+from objreg_ros.bridge import colour_frame, from_msg, lenses
 from objreg_ros.data import UNTRIED, Array, DepthImage, Detections, LoopClosure, Rejected
 from objreg_ros.geometry import back_project, transform
 from objreg_ros.recording.inputs import Inputs
+from objreg_ros.recording.mounts import first_readable, frame_of, static_frames
 from objreg_ros.recording.record import Recording
 from objreg_ros.report.shelf import SLOP_NS, Cameras, Shelf
 from objreg_ros.report.story import Story
@@ -35,8 +36,12 @@ class Album:
         self._is_cloud = inputs.depth is None
         image = None if self._is_cloud else inputs.image  # a cloud has its colour in it
         self._source, self._image = (Shelf(recording, topic) if topic else None for topic in (source, image))
-        self._cameras = Cameras(recording, inputs.camera_info)
+        self._cameras, self._of_colour = (Cameras(recording, t) for t in (inputs.camera_info, inputs.colour_info))
         self._raw = lenses.raw_pictures(rectified, source, inputs.image)
+        self._named = colour_frame.named_registered(inputs.depth, inputs.image)
+        self._find_pose = static_frames(recording).between
+        self._picture_frame = frame_of(first_readable(recording, inputs.image))
+        self._of_picture: tuple[Any, lenses.Raw] | None = None  # camera_info of what depth was registered to here
         self._known: dict[int, DepthImage | str] = {}
 
     def at(self, stamp_ns: int) -> DepthImage | None:
@@ -51,7 +56,9 @@ class Album:
 
     def rectified(self, detections: Detections) -> Detections:
         """Boxes of the recorded picture of a moment, in the picture that `at` gives."""
-        return lenses.detections(detections, self._cameras.at(detections.stamp_ns), self._raw)
+        self._seen(detections.stamp_ns)
+        own = self._cameras.at(detections.stamp_ns), self._raw
+        return lenses.detections(detections, *(self._of_picture or own))
 
     def _seen(self, stamp_ns: int) -> DepthImage | str:
         if stamp_ns not in self._known:
@@ -79,13 +86,19 @@ class Album:
         return _nothing_near(self._image, "the depth") if colour is None else "the colour is not of the depth's size"
 
     def _depth_image(self, depth: Any, colour: Any) -> DepthImage:
-        camera_info = self._cameras.at(from_msg.stamp_ns(depth))
+        stamp_ns = from_msg.stamp_ns(depth)
+        camera_info = self._cameras.at(stamp_ns)
         if self._is_cloud:
-            cloud = from_msg.point_cloud(depth)
+            cloud = colour_frame.in_optical_frame(from_msg.point_cloud(depth), self._picture_frame, self._find_pose)
             return organise(cloud, from_msg.camera_of_cloud(camera_info, cloud))
         if camera_info is None:
             raise ValueError("expected a calibrated camera_info, got none")
-        return lenses.depth_image(depth, camera_info, colour, raw=self._raw)
+        cameras = colour_frame.Cameras(camera_info, self._of_colour.at(stamp_ns), self._named)
+        seen = colour_frame.depth_image(
+            depth, cameras, colour, self._find_pose, self._raw, colour_frame=self._picture_frame
+        )
+        self._of_picture = (seen.camera_info, seen.raw) if seen.registered else None
+        return seen.depth
 
 
 def overlay(target: DepthImage, source: DepthImage, T_target_source: Array) -> Array:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The door of the segmenter: depth and detections in, objects and views out.
 
-In: ``points``, or ``depth/image`` with ``camera_info`` and ``image``; ``detections_table`` with ``labels``, or
-``detections_in``, or ``masks``; ``imu``, or ``odom`` where gravity comes from it. Out: ``objects``, ``detections_3d``,
-``view``, ``view/camera_info`` and ``gravity``.
+In: ``points``, or ``depth/image`` with ``camera_info`` and ``image``, and ``colour/camera_info`` where depth is not
+registered to colour; ``detections_table`` with ``labels``, or ``detections_in``, or ``masks``; ``imu``, or ``odom``
+where gravity comes from it. Out: ``objects``, ``detections_3d``, ``view``, ``view/camera_info`` and ``gravity``.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from rclpy.qos import DurabilityPolicy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from sensor_msgs.msg import Imu as ImuMessage
 
-from objreg_ros.bridge import from_msg, lenses, qos, to_msg, vision_to_msg
+from objreg_ros.bridge import colour_frame, from_msg, lenses, qos, registered_depth, to_msg, vision_to_msg
 from objreg_ros.bridge.calibration import fitted, read_calibration
 from objreg_ros.bridge.detections_in import DetectionsIn
 from objreg_ros.bridge.indoors import Indoors, Surplus
@@ -45,6 +45,7 @@ from objreg_ros.segmenter.segment import Segmenter
 POINTS = {"points": PointCloud2}
 DEPTH = {"depth/image": Image, "depth/image/compressedDepth": CompressedImage}
 SOURCES = {"auto": {**POINTS, **DEPTH}, "points": POINTS, "depth": DEPTH}
+COLOUR_INFO = "colour/camera_info"
 LOOK_S = 0.5  # between two looks for who keeps a camera_info
 ODOM_DEPTH = 1000  # odometry is small and many times as frequent as frames; what an IMU feels is too
 COMPARED = 100  # of the last frames is told by how much IMU and picture disagree
@@ -62,16 +63,16 @@ class SegmenterNode(MatchingDoor):
         """Load the kernels, publish and listen."""
         self._inputs = self.settings.of(SegmenterNodeParams)
         self._segmenter = Segmenter(self.settings.of(SegmenterParams))
-        await_kernels(self._segmenter.warm, self.get_logger().info)
+        await_kernels(self._warm, self.get_logger().info)
         self._camera_info: Any = read_calibration(self._inputs.camera) if self._inputs.camera else None
-        mounting = self._inputs.mounting if self._inputs.level_odom else self._inputs.imu_mounting
-        frames = hear_static_frames(self, mounting is None)
-        self._imu = Imu(self._inputs.imu_mounting, frames.between)
-        self._mount = Mount(self._inputs.mounting, frames.between, self.get_logger().info)
+        self._colour_info: Any = None
+        self._find_pose = hear_static_frames(self).between
+        self._imu = Imu(self._inputs.imu_mounting, self._find_pose)
+        self._mount = Mount(self._inputs.mounting, self._find_pose, self.get_logger().info)
         self._told: Counter[str] = Counter()  # frames by who told their gravity
         self._apart_deg: deque[float] = deque(maxlen=COMPARED)
         self._source: str | None = None  # the topic that depth comes by
-        self._lens = ""  # what was said of it
+        self._lens = self._registered = ""  # what was said of the lens, and of how depth was registered
         self._objects = self.offer(PointCloud2, "objects", qos.room())
         self._view = self.create_publisher(PointCloud2, "view", qos.room())
         self._view_info = self.create_publisher(CameraInfo, "view/camera_info", qos.room())
@@ -79,6 +80,10 @@ class SegmenterNode(MatchingDoor):
         solids = vision_to_msg.Detection3DArray
         self._solids = None if solids is None else self.create_publisher(solids, "detections_3d", qos.room())
         self._listen()
+
+    def _warm(self) -> None:
+        self._segmenter.warm()
+        registered_depth.warm()
 
     def _listen(self) -> None:
         self._listen_for_camera()
@@ -98,6 +103,8 @@ class SegmenterNode(MatchingDoor):
             self.feed("camera_info", 0, self._camera_info)
             return
         self.listen(CameraInfo, "camera_info", self._hear_camera, self.sensor(), watched="camera_info")
+        self.listen(CameraInfo, COLOUR_INFO, self._receive_colour_camera, self.sensor())
+        self._kept = {"camera_info": self._hear_camera, COLOUR_INFO: self._receive_colour_camera}
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._look = self.create_timer(LOOK_S, self._look_for_kept_camera, clock=steady)
 
@@ -106,19 +113,23 @@ class SegmenterNode(MatchingDoor):
             self.listen_to_first("image", IMAGES, self._decode_image, self._hear_image, self.sensor())
 
     def _look_for_kept_camera(self) -> None:
-        """Get what a driver that publishes its camera once keeps for who comes late, unless it came in time.
+        """Get what a driver that publishes its cameras once keeps for who comes late, unless they came in time.
 
         Only where there is such a driver: the others would warn of a QoS that they do not have.
         """
-        if self._camera_info is not None:
-            self._look.cancel()
-            return
-        publishers = self.get_publishers_info_by_topic(self.resolve_topic_name("camera_info"))
-        if any(publisher.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for publisher in publishers):
-            self._look.cancel()
+        for topic in [topic for topic in self._kept if self._is_kept(topic)]:
             quiet = SubscriptionEventCallbacks(use_default_callbacks=False)
             options = {"event_callbacks": quiet, "qos_overriding_options": FIXED}  # overrides are of the one above
-            self.create_subscription(CameraInfo, "camera_info", self._hear_camera, qos.latched(), **options)
+            self.create_subscription(CameraInfo, topic, self._kept.pop(topic), qos.latched(), **options)
+        if self._camera_info is not None or "camera_info" not in self._kept:
+            self._look.cancel()
+
+    def _is_kept(self, topic: str) -> bool:
+        """Whether a camera that has not come yet is kept by who published it."""
+        if (self._camera_info if topic == "camera_info" else self._colour_info) is not None:
+            return False
+        publishers = self.get_publishers_info_by_topic(self.resolve_topic_name(topic))
+        return any(publisher.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for publisher in publishers)
 
     # Hear
 
@@ -126,6 +137,9 @@ class SegmenterNode(MatchingDoor):
         self._camera_info = message
         self.watch.forget("camera_info")  # once is enough
         self.feed("camera_info", from_msg.stamp_ns(message), message)
+
+    def _receive_colour_camera(self, message: Any) -> None:
+        self._colour_info = message
 
     def _hear_image(self, _: str, message: Any) -> None:
         surplus = isinstance(message, Surplus)
@@ -192,9 +206,10 @@ class SegmenterNode(MatchingDoor):
         self._segmenter.params = self.settings.of(SegmenterParams)
         raw = self._raw_pictures()
         camera_info = self.read("camera_info", fitted, self._camera_of(payload), payload["depth"])
-        depth, cloud = self._depth(payload, camera_info, raw)
-        asked = self._detections.read(payload, depth, camera_info, raw, cloud)
-        gravity, felt = self._level_gravity(payload), self._felt_gravity(payload, depth.frame_id)
+        seen, cloud = self._depth(payload, camera_info, raw)
+        depth = seen.depth
+        asked = self._detections.read(payload, depth, seen.camera_info, seen.raw, cloud)
+        gravity, felt = self._level_gravity(payload, depth.frame_id), self._felt_gravity(payload, depth.frame_id)
         with self.ledger.timed("segment"):
             told = (gravity, None) if felt is None else (felt.gravity, felt.gravity_sigma_deg)
             frame = self._segmenter.segment(asked.detections, depth, told[0], gravity_sigma_deg=told[1])
@@ -203,9 +218,9 @@ class SegmenterNode(MatchingDoor):
         self._publish(frame, asked.names)
         return True
 
-    def _level_gravity(self, match: Match) -> Array | None:
+    def _level_gravity(self, match: Match, camera_frame: str) -> Array | None:
         odom = match.payloads.get("odom")
-        T_body_camera = self._mount.T_body_camera(odom, match["depth"].header.frame_id)
+        T_body_camera = self._mount.T_body_camera(odom, camera_frame)
         gravity = from_msg.level_gravity(match.stamp_ns, odom, T_body_camera)
         if gravity is None and self._inputs.level_odom:
             self.throttled.remind(
@@ -259,30 +274,44 @@ class SegmenterNode(MatchingDoor):
     def _camera_of(self, match: Match) -> Any:
         return match.payloads.get("camera_info", self._camera_info)
 
-    def _raw_pictures(self) -> lenses.Raw:
-        """Which pictures are to be rectified, by what their topics are called behind all remaps."""
+    def _topics(self) -> tuple[str, str]:
+        """What the topics of depth and of colour are called behind all remaps."""
         image = (self.taken("image") if self._inputs.colour and self._source in DEPTH else None) or "image"
-        topics = self._source or "depth/image", image
-        return lenses.raw_pictures(self._inputs.rectified, *map(self.resolve_topic_name, topics))
+        return self.resolve_topic_name(self._source or "depth/image"), self.resolve_topic_name(image)
 
-    def _tell_lens(self, camera_info: Any, raw: lenses.Raw) -> None:
-        """Say once, and again where it changes, what is assumed of the lens."""
-        lens = self.read("camera_info", lenses.describe, camera_info, raw)
+    def _raw_pictures(self) -> lenses.Raw:
+        """Which pictures are to be rectified, by the names of their topics."""
+        return lenses.raw_pictures(self._inputs.rectified, *self._topics())
+
+    def _cameras(self, camera_info: Any) -> colour_frame.Cameras:
+        named = colour_frame.named_registered(*self._topics())
+        awaited = not self._inputs.camera and self._colour_info is None and self.count_publishers(COLOUR_INFO) > 0
+        return colour_frame.Cameras(camera_info, self._colour_info, named, awaited)
+
+    def _tell_lens(self, seen: colour_frame.Seen) -> None:
+        """Say once, and again where it changes, what is assumed of the lens and how depth is registered."""
+        lens = self.read("camera_info", lenses.describe, seen.camera_info, seen.raw)
         if lens != self._lens:
             self._lens = lens
             self.get_logger().info(f"lens: {lens}")
+        if seen.registered != self._registered:
+            self._registered = seen.registered
+            self.get_logger().info(seen.registered or "depth is registered to colour as it comes")
 
-    def _depth(self, match: Match, camera_info: Any, raw: lenses.Raw) -> tuple[DepthImage, PointCloud | None]:
-        """The depth image, and the cloud where it comes of one."""
+    def _depth(self, match: Match, camera_info: Any, raw: lenses.Raw) -> tuple[colour_frame.Seen, PointCloud | None]:
+        """The depth image in the picture of colour, and the cloud where it comes of one."""
+        picture_frame = from_msg.frame_id(match["detections"])
         if "camera_info" in match.payloads:
-            messages = match["depth"], camera_info, match["image"]
-            depth = self.read("depth", lenses.depth_image, *messages, self.most_pixels, raw)
-            self._tell_lens(camera_info, raw)
-            return depth, None
+            messages = match["depth"], self._cameras(camera_info), match["image"]
+            settings = self._find_pose, raw, self.most_pixels, picture_frame
+            seen = self.read("depth", colour_frame.depth_image, *messages, *settings)
+            self._tell_lens(seen)
+            return seen, None
         cloud = self.read("points", from_msg.point_cloud, match["depth"])
+        cloud = colour_frame.in_optical_frame(cloud, picture_frame, self._find_pose)
         camera = self.read("camera_info", from_msg.camera_of_cloud, camera_info, cloud, self.most_pixels)
         with self.ledger.timed("organise"):
-            return organise(cloud, camera), cloud
+            return colour_frame.Seen(organise(cloud, camera), camera_info, raw), cloud
 
     def _publish(self, frame: Frame, names: to_msg.Labels) -> None:
         self._objects.tell(frame, partial(to_msg.objects, frame, names))

@@ -16,6 +16,8 @@ FILLED = 0.75  # share of these that have a point right of them, and below
 BEGUN = 0.9  # share of the points in every step-th column, and row, of a cloud that was thinned to these
 FIT_ERROR_PX = 1.5  # the median distance that a pixel may have from where the fitted camera sees its point
 
+TURN = "publish /tf_static between its frame and that of the picture, or the cloud in the optical frame of its camera"
+
 
 def organise(cloud: PointCloud, intrinsics: Intrinsics | None = None) -> DepthImage:
     """The depth image of a cloud.
@@ -63,7 +65,7 @@ def _require_in_front(z: Array, measured: Array) -> None:
     if in_front < count / 2:
         raise ValueError(
             f"expected a cloud in the optical frame (x right, y down, z forward) with points in front of the camera, "
-            f"got {count - in_front} of {count} points with negative z; transform it to the camera's optical frame"
+            f"got {count - in_front} of {count} points with negative z; {TURN}"
         )
 
 
@@ -88,7 +90,8 @@ def fit_intrinsics(xyz: Array, valid: Array) -> Intrinsics:
     if not error <= FIT_ERROR_PX or fx <= 0 or fy <= 0:
         raise ValueError(
             f"expected pixels that fit a pinhole camera to {FIT_ERROR_PX} px, got {error:.3g} px with "
-            f"fx {fx:.4g}, fy {fy:.4g}; publish camera_info, or the cloud as unorganised (height 1)"
+            f"fx {fx:.4g}, fy {fy:.4g}: its rows and columns are no picture along z, as in a frame with x forward; "
+            f"{TURN}, or publish camera_info and the cloud as unorganised (height 1)"
         )
     height, width = valid.shape
     return Intrinsics(fx=fx, fy=fy, cx=cx, cy=cy, width=width, height=height)
@@ -114,7 +117,7 @@ def _fitted_instead(xyz: Array, valid: Array, camera: Intrinsics) -> Intrinsics:
         off = _error_px(xyz, valid, camera)
         raise ValueError(
             "expected an organised cloud in the optical frame (x right, y down, z forward) of its camera_info, got one "
-            f"whose points lie {off:.3g} px beside their pixels; transform it to the camera's optical frame"
+            f"whose points lie {off:.3g} px beside their pixels; {TURN}"
         ) from error
 
 
@@ -153,7 +156,7 @@ def _require_in_image(points: Array, camera: Intrinsics) -> None:
     if seen < max(1.0, IN_IMAGE * len(points)):
         raise ValueError(
             f"expected points within the {camera.width}x{camera.height} image, got {seen} of {len(points)} there; "
-            "transform the cloud to the optical frame of this camera (x right, y down, z forward)"
+            f"is it in the optical frame of this camera (x right, y down, z forward)? If not, {TURN}"
         )
 
 

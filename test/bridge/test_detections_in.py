@@ -134,6 +134,15 @@ def test_boxes_are_of_the_size_of_the_raw_picture_where_there_is_one(monkeypatch
     assert met == [(60, 80), (120, 160), (90, 120)]
 
 
+def test_boxes_of_a_compressed_picture_are_of_the_size_of_its_camera(monkeypatch: pytest.MonkeyPatch) -> None:
+    met: list[tuple[int, int]] = []
+    monkeypatch.setattr(vision_from_msg, "boxes", lambda _message, _names, image_hw: met.append(image_hw) or boxes(1))
+    inputs = DetectionsIn(Door(), "auto")  # type: ignore[arg-type]
+    of_colour = to_msg.camera_info(replace(CAMERA, width=160, height=120), 5, "colour")
+    inputs.read(match(SimpleNamespace()), DEPTH, of_colour, lenses.Raw(), None)
+    assert met == [(120, 160)]
+
+
 def test_a_table_that_another_tells_meanwhile_is_told_again_with_the_names_that_were_met() -> None:
     door = Door()
     inputs = DetectionsIn(door, "auto")  # type: ignore[arg-type]

@@ -71,6 +71,16 @@ def records(frames: int = 3) -> Iterator[Record]:
         yield Record.of("/depth/image", messages.image(depth, "16UC1", stamp_ns, "camera"), stamp_ns)
 
 
+def static(parent: str, child: str, T_parent_child: np.ndarray, stamp_ns: int, topic: str = "/tf_static") -> Record:
+    """A /tf_static of one edge."""
+    moved = messages.pose(T_parent_child)
+    place = messages.message("geometry_msgs/Vector3", x=moved.position.x, y=moved.position.y, z=moved.position.z)
+    transform = messages.message("geometry_msgs/Transform", translation=place, rotation=moved.orientation)
+    head = messages.header(stamp_ns, parent)
+    one = messages.message("geometry_msgs/TransformStamped", header=head, child_frame_id=child, transform=transform)
+    return Record.of(topic, messages.message("tf2_msgs/TFMessage", transforms=[one]), stamp_ns)
+
+
 def uncalibrated(stamp_ns: int) -> Record:
     """A camera_info as drivers send it until somebody has calibrated the camera."""
     info = messages.camera_info(CAMERA, stamp_ns, "camera")

@@ -147,7 +147,26 @@ DRIVERS = {
 @pytest.mark.parametrize("driver", DRIVERS)
 def test_the_topics_of_a_driver_are_recognised(driver: str) -> None:
     there, expected = DRIVERS[driver]
-    assert choose_inputs(topics(there)).chosen() == dict(pair.split("=") for pair in expected.split())
+    chosen = {name: topic for name, topic in choose_inputs(topics(there)).chosen().items() if name != "colour_info"}
+    assert chosen == dict(pair.split("=") for pair in expected.split())
+
+
+@pytest.mark.parametrize(
+    ("driver", "colour_info"),
+    [
+        ("OAK-D", "/oak/rgb/camera_info"),
+        ("Azure Kinect, native geometry", "/rgb_to_depth/camera_info"),
+        ("realsense-viewer", "/device_0/sensor_1/Color_0/info/camera_info"),
+        ("ours", None),
+        ("kinect2_bridge", None),
+        ("OAK-D with a cloud", None),
+        ("a camera called depth", None),
+    ],
+)
+def test_colour_has_a_camera_info_of_its_own_only_beside_a_depth_image_with_another(
+    driver: str, colour_info: str | None
+) -> None:
+    assert choose_inputs(topics(DRIVERS[driver][0])).colour_info == colour_info
 
 
 OWN = (

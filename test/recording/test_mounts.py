@@ -12,18 +12,9 @@ from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.mounts import TRANSFORMS, camera_on_body, static_frames, static_topics
 from objreg_ros.recording.troubles import warnings
 
-from .folders import CAMERA
+from .folders import CAMERA, static
 
 T_BODY_CAMERA = pose(rotation_from_vector(np.array([0.1, -1.2, 0.3])), np.array([0.2, 0.0, 0.5]))
-
-
-def static(parent: str, child: str, T_parent_child: np.ndarray, stamp_ns: int, topic: str = "/tf_static") -> Record:
-    moved = messages.pose(T_parent_child)
-    place = messages.message("geometry_msgs/Vector3", x=moved.position.x, y=moved.position.y, z=moved.position.z)
-    transform = messages.message("geometry_msgs/Transform", translation=place, rotation=moved.orientation)
-    head = messages.header(stamp_ns, parent)
-    one = messages.message("geometry_msgs/TransformStamped", header=head, child_frame_id=child, transform=transform)
-    return Record.of(topic, messages.message("tf2_msgs/TFMessage", transforms=[one]), stamp_ns)
 
 
 def bag(place: Path, *more: Record, child: str = "base", camera: str = "eye") -> Path:

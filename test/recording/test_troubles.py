@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import Intrinsics
+from objreg_ros.geometry import pose
 from objreg_ros.recording import Record, Recording, messages, open_recording, write_rosbag2
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.summary import describe_topics
 from objreg_ros.recording.troubles import troubles, warnings
 
-from .folders import CAMERA, records, tum_folder, uncalibrated
+from .folders import CAMERA, records, static, tum_folder, uncalibrated
 
 
 def bag(path: Path, items: Iterator[Record] | list[Record]) -> Recording:
@@ -68,6 +69,22 @@ def test_depth_in_another_frame_than_colour_is_said_with_how_to_register_it(tmp_
     told = said(recording)
     assert "colour is in the frame c and depth in camera_depth_optical_frame" in told
     assert "align_depth.enable:=true" in told and "depth_registered" in told
+
+
+def test_depth_that_is_registered_here_is_no_trouble_but_a_remark(tmp_path: Path) -> None:
+    of_colour = Intrinsics(fx=80.0, fy=80.0, cx=31.5, cy=23.5, width=64, height=48)
+    info = Record.of("/colour/camera_info", messages.camera_info(of_colour, 5, "c"), 5)
+    items = [*depth_and_colour(METRE, "16UC1", frame_id="depth"), info]
+    names = {"/image": "/colour/image", "/camera_info": "/depth/camera_info"}
+    items = [Record.of(names.get(r.topic, r.topic), r.message, 5) for r in items]
+    tied = static("depth", "c", pose(np.eye(3), np.array([0.05, 0.0, 0.0])), 5)
+    recording = bag(tmp_path / "tied", [*items, tied])
+    inputs = choose_inputs(recording.topics)
+    remark = "depth of 'depth' is registered here to colour of 'c', with -5.0 0.0 0.0 cm between them, as 40 × 30 px"
+    assert remark in said(recording) and not troubles(recording, inputs)
+    loose = bag(tmp_path / "loose", items)
+    (found,) = troubles(loose, inputs)
+    assert found.anchor == "depth-is-not-registered" and "/tf_static between the two frames" in found.text
 
 
 @pytest.mark.parametrize("frame_id", ["c", "/c", ""])

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recording.folders import STEP_NS, records, tum_folder, uncalibrated
+from recording.folders import STEP_NS, records, static, tum_folder, uncalibrated
 
 from objreg_ros.bridge.layout import VIEW
 from objreg_ros.data import DepthImage, Detections, Intrinsics
@@ -144,3 +144,26 @@ def test_pictures_and_boxes_of_a_lens_are_shown_rectified_unless_they_are_so_alr
     seen, raw = bent.at(0), straight.at(0)
     assert seen is not None and raw is not None and seen.shown is not None and raw.shown is None
     assert not np.array_equal(bent.rectified(box).xyxy, box.xyxy) and straight.rectified(box) is box
+
+
+def test_depth_of_another_sensor_is_shown_as_the_segmenter_gets_it(tmp_path: Path) -> None:
+    of_depth = Intrinsics(fx=50.0, fy=50.0, cx=31.5, cy=23.5, width=64, height=48)
+    of_colour = Intrinsics(fx=100.0, fy=100.0, cx=63.5, cy=47.5, width=128, height=96)
+    recorded = [
+        Record.of("/rgb/image", messages.image(np.full((96, 128, 3), 7, np.uint8), "rgb8", 5, "rgb"), 5),
+        Record.of("/rgb/camera_info", messages.camera_info(of_colour, 5, "rgb", (-0.1, 0.0, 0.0, 0.0, 0.0)), 5),
+        Record.of("/depth/image", messages.image(np.full((48, 64), 1000, np.uint16), "16UC1", 5, "depth"), 5),
+        Record.of("/depth/camera_info", messages.camera_info(of_depth, 5, "depth"), 5),
+        static("depth", "rgb", pose(np.eye(3), np.array([0.1, 0.0, 0.0])), 5),
+    ]
+    write_rosbag2(tmp_path / "bag", recorded)
+    with open_recording(tmp_path / "bag") as recording:
+        album = Album(recording, choose_inputs(recording.topics))
+        seen = album.at(5)
+        assert seen is not None and seen.frame_id == "rgb" and seen.rgb is not None and (seen.rgb == 7).all()
+        assert (seen.depth[24, :59] == 1.0).all() and not seen.depth[24, 59:].any()  # 5 px at 1 m
+        box = Detections(
+            xyxy=np.array([[5, 5, 60, 60]], np.float32), score=np.ones(1, np.float32), label=("cup",),
+            image_hw=(96, 128), stamp_ns=5,
+        )  # fmt: skip
+        assert not np.array_equal(album.rectified(box).xyxy, box.xyxy)

@@ -122,6 +122,7 @@ def test_the_name_of_the_camera_goes_before_its_topics_but_not_before_others(
         ("depth/image", "front/depth/image"),
         ("depth/image/compressedDepth", "front/depth/image/compressedDepth"),
         ("camera_info", "front/camera_info"),
+        ("colour/camera_info", "front/colour/camera_info"),
         ("odom", "wheels"),
         ("imu", "front/imu"),
     ]

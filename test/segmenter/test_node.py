@@ -119,6 +119,26 @@ def test_depth_of_another_frame_than_the_picture_is_told_with_what_to_do(made: C
     assert "got colour in 'colour_eye' and depth in 'depth_eye'" in line and "align_depth.enable:=true" in line
 
 
+def test_depth_of_another_sensor_is_brought_into_the_picture_of_colour(
+    made: Callable[..., Camera], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    camera = made()
+    met = spied(camera, monkeypatch)
+    T_colour_depth = np.eye(4)
+    T_colour_depth[0, 3] = -0.12
+    camera.door._find_pose = lambda a, b: T_colour_depth if (a, b) == ("colour_eye", "depth_eye") else None
+    of_colour = replace(CAMERA, fx=600.0, fy=600.0, cx=319.5, cy=239.5, width=640, height=480)
+    info = camera.node.create_publisher(CameraInfo, "colour/camera_info", qos.room())
+    camera.wait(lambda: info.get_subscription_count() > 0)
+    info.publish(to_msg.camera_info(of_colour, 1, "colour_eye"))
+    camera.wait(lambda: camera.door._colour_info is not None)
+    camera.see(1.2, "depth_eye", "colour_eye")
+    ((_, depth),) = met
+    assert depth.frame_id == "colour_eye" and (depth.intrinsics.width, depth.intrinsics.fx) == (320, 300.0)
+    assert (depth.depth[120, :289] > 0).all() and not depth.depth[120, 291:].any()  # 30 px at 1.2 m
+    assert "is registered here" in camera.door._registered
+
+
 def test_frames_without_a_level_odometry_that_is_asked_for_are_told(made: Callable[..., Camera]) -> None:
     camera = made()
     camera.door._inputs = replace(camera.door._inputs, level_odom=True)

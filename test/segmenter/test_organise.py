@@ -161,3 +161,16 @@ def test_intrinsics_fit_in_spite_of_noise_and_holes() -> None:
     valid = rng.random(xyz.shape[:2]) < 0.3
     got = fit_intrinsics(xyz, valid)
     assert (got.fx, got.cy) == pytest.approx((300.0, 22.9), rel=0.01)
+
+
+@pytest.mark.parametrize("camera", [None, CAMERA])
+@pytest.mark.parametrize("lower", [0.0, 0.4])
+@pytest.mark.parametrize("organised", [True, False])
+def test_a_cloud_with_x_forward_is_refused_with_what_to_publish(
+    camera: Intrinsics | None, lower: float, organised: bool
+) -> None:
+    optical = np.array(cloud_of(hilly_depth()).xyz) - np.array([0.0, lower, 0.0], np.float32)
+    body = optical @ np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]], np.float32).T
+    body = body if organised else body.reshape(1, -1, 3)
+    with pytest.raises(ValueError, match=r"publish /tf_static between its frame|expected camera_info"):
+        organise(PointCloud(xyz=body, rgb=None, stamp_ns=0, frame_id="body"), camera)

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Depth of one camera as another camera would have measured it: each pixel is moved, and the nearest of a place wins.
+
+A depth pixel covers the part of the other picture that its square covers there, and reaches on to its neighbours on
+the same surface. So no holes open where the other picture is finer or sees a surface from another side, and nothing
+behind shines through. What only the other camera sees stays without depth.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import cv2
+import numba
+import numpy as np
+
+from objreg_ros.data import Array, DepthImage, Intrinsics
+from objreg_ros.geometry import inverse
+
+SAME_SURFACE = 0.03  # of depth, between two pixels side by side; a grazing wall has less
+NEAREST_M = 0.05  # before the other camera; nothing is measured nearer
+MOST_REACH = 8.0  # px from the middle of what one pixel covers: bounds the work for cameras that cannot be
+HARDLY_FINER = 1.25  # times the resolution of depth: such a picture is left as it is
+SHOWN_AT_M = (0.5, 5.0)  # a place is in the depth camera's picture where it is so at both distances
+
+Key = tuple[float, ...]
+
+
+def camera_for(picture: Intrinsics, depth: Intrinsics) -> Intrinsics:
+    """The camera of a colour picture, scaled down to about the angle that a pixel of depth has.
+
+    A finer one would hold no more depth, and every later step costs by the pixel. A coarser one is left as it is.
+    """
+    finer = min(picture.fx / depth.fx, picture.fy / depth.fy)
+    if finer <= HARDLY_FINER:
+        return picture
+    width, height = (max(1, round(side / finer)) for side in (picture.width, picture.height))
+    across, down = width / picture.width, height / picture.height
+    return Intrinsics(
+        fx=picture.fx * across,
+        fy=picture.fy * down,
+        cx=(picture.cx + 0.5) * across - 0.5,
+        cy=(picture.cy + 0.5) * down - 0.5,
+        width=width,
+        height=height,
+    )
+
+
+def register(
+    depth: DepthImage, T_colour_depth: Array, picture: Intrinsics, rgb: Array | None = None, frame_id: str = ""
+) -> DepthImage:
+    """The depth image in the camera of a colour picture, or in that camera scaled down by `camera_for`.
+
+    ``T_colour_depth (4, 4)`` maps points of depth's optical frame into colour's; ``rgb (H, W, 3)`` is the picture of
+    ``picture``, ``frame_id`` its frame. Depth is along the optical axis of colour, m, and 0 where the depth camera
+    measured nothing or does not see. ValueError where depth was measured and none of it is in the picture.
+    """
+    camera = camera_for(picture, depth.intrinsics)
+    metres = moved(depth.depth, depth.intrinsics, T_colour_depth, camera)
+    if not metres.any() and depth.depth.any():
+        where = " ".join(f"{value:.3f}" for value in T_colour_depth[:3, 3])
+        raise ValueError(
+            f"depth: expected some of it in the picture of colour, got none with depth at {where} m in {frame_id!r}; "
+            "is /tf_static between the two frames, and the camera_info of both, right?"
+        )
+    if rgb is not None and rgb.shape[:2] != metres.shape:
+        rgb = np.asarray(cv2.resize(rgb, (camera.width, camera.height), interpolation=cv2.INTER_AREA))
+    return DepthImage(
+        depth=metres,
+        rgb=rgb,
+        intrinsics=camera,
+        stamp_ns=depth.stamp_ns,
+        frame_id=frame_id or depth.frame_id,
+        shown=_shown(depth, T_colour_depth, camera),
+    )
+
+
+def warm() -> None:
+    """Load the kernels, or compile them, as `register` calls them."""
+    camera = Intrinsics(fx=1.0, fy=1.0, cx=0.0, cy=0.0, width=2, height=2)
+    depth = DepthImage(depth=np.ones((2, 2), np.float32), rgb=None, intrinsics=camera, stamp_ns=0)
+    register(depth, np.eye(4), camera)
+
+
+def moved(depth: Array, of: Intrinsics, T_to_of: Array, to: Intrinsics) -> Array:
+    """Depth (H, W) float32 m of camera ``of`` as camera ``to`` has it (h, w), 0 where there is none."""
+    R, t = T_to_of[:3, :3], T_to_of[:3, 3].astype(np.float32)
+    across = (R[:, :1] * ((np.arange(of.width) - of.cx) / of.fx)).astype(np.float32)
+    down = (R[:, 1:2] * ((np.arange(of.height) - of.cy) / of.fy) + R[:, 2:]).astype(np.float32)
+    K = np.array([to.fx, to.fy, to.cx, to.cy], np.float32)
+    steps = (R[:, :2] / [of.fx, of.fy]).astype(np.float32)
+    depth, uvz = np.ascontiguousarray(depth), np.empty((*depth.shape, 3), np.float32)
+    _project(depth, across, down, t, K, uvz)
+    found = np.full((to.height, to.width), np.inf, np.float32)
+    _splat(depth, uvz, steps, K, found)
+    found[np.isinf(found)] = 0.0
+    return found
+
+
+@numba.njit(cache=True, nogil=True)
+def _project(depth, across, down, t, K, uvz):  # type: ignore[no-untyped-def]
+    """Where each pixel is in the other picture, and its depth there; 0 where there is none."""
+    fx, fy, cx, cy = K
+    for row in range(depth.shape[0]):
+        for column in range(depth.shape[1]):
+            z = depth[row, column]
+            ahead = z * (across[2, column] + down[2, row]) + t[2]
+            if not (z > 0 and ahead > NEAREST_M):
+                uvz[row, column, 2] = 0
+                continue
+            uvz[row, column, 0] = fx * (z * (across[0, column] + down[0, row]) + t[0]) / ahead + cx
+            uvz[row, column, 1] = fy * (z * (across[1, column] + down[1, row]) + t[1]) / ahead + cy
+            uvz[row, column, 2] = ahead
+
+
+@numba.njit(cache=True, nogil=True)
+def _splat(depth, uvz, steps, K, found):  # type: ignore[no-untyped-def]
+    """Lay each pixel over what it covers, from its own square on to the squares of the pixels right and below."""
+    height, width = depth.shape
+    tall, wide = found.shape
+    fx, fy, cx, cy = K
+    for row in range(height):
+        for column in range(width):
+            u, v, ahead = uvz[row, column]
+            if not (ahead > 0 and -MOST_REACH < u < wide + MOST_REACH and -MOST_REACH < v < tall + MOST_REACH):
+                continue
+            near = np.float32(0.5) * depth[row, column] / ahead
+            x, y = (u - cx) / fx, (v - cy) / fy
+            half_u = fx * near * (abs(steps[0, 0] - x * steps[2, 0]) + abs(steps[0, 1] - x * steps[2, 1]))
+            half_v = fy * near * (abs(steps[1, 0] - y * steps[2, 0]) + abs(steps[1, 1] - y * steps[2, 1]))
+            left, right, top, bottom = u - half_u, u + half_u, v - half_v, v + half_v
+            for k in range(2):
+                r, c = row + k, column + 1 - k
+                if r == height or c == width or uvz[r, c, 2] == 0:
+                    continue
+                if abs(depth[r, c] - depth[row, column]) > SAME_SURFACE * depth[row, column]:
+                    continue
+                left, right = min(left, uvz[r, c, 0] + half_u), max(right, uvz[r, c, 0] - half_u)
+                top, bottom = min(top, uvz[r, c, 1] + half_v), max(bottom, uvz[r, c, 1] - half_v)
+            first, last = max(0.0, np.ceil(max(left, u - MOST_REACH))), min(wide, np.ceil(min(right, u + MOST_REACH)))
+            begin, end = max(0.0, np.ceil(max(top, v - MOST_REACH))), min(tall, np.ceil(min(bottom, v + MOST_REACH)))
+            for i in range(int(begin), int(end)):
+                for j in range(int(first), int(last)):
+                    if ahead < found[i, j]:
+                        found[i, j] = ahead
+
+
+def _shown(depth: DepthImage, T_colour_depth: Array, camera: Intrinsics) -> Array | None:
+    """(h, w) bool: which pixels the depth camera's picture reaches; None where that is all of them."""
+    rows, columns, inside = _seen_from(_key(depth.intrinsics), _key(camera), tuple(T_colour_depth.ravel().tolist()))
+    if depth.shown is not None:
+        inside = inside & depth.shown[rows, columns]
+    return None if inside.all() else inside
+
+
+@lru_cache(maxsize=2)
+def _seen_from(depth: Key, camera: Key, T: Key) -> tuple[Array, Array, Array]:
+    """The rows and columns (h, w) of depth that show the far pixels of colour, and which pixels it shows at all."""
+    T_depth_colour = inverse(np.array(T).reshape(4, 4))
+    fx, fy, cx, cy, width, height = camera
+    u, v = np.meshgrid(np.arange(int(width)), np.arange(int(height)))
+    rays = np.stack([(u - cx) / fx, (v - cy) / fy, np.ones(u.shape)], axis=-1) @ T_depth_colour[:3, :3].T
+    fx, fy, cx, cy, width, height = depth
+    inside = np.ones(u.shape, np.bool_)
+    for distance in SHOWN_AT_M:
+        x, y, z = np.moveaxis(rays * distance + T_depth_colour[:3, 3], -1, 0)
+        ahead = np.maximum(z, 1e-6)
+        columns, rows = np.rint(fx * x / ahead + cx), np.rint(fy * y / ahead + cy)
+        inside &= (z > 0) & (columns >= 0) & (rows >= 0) & (columns < width) & (rows < height)
+    bounded = (np.clip(values, 0, most - 1).astype(np.int32) for values, most in ((rows, height), (columns, width)))
+    return *bounded, inside
+
+
+def _key(camera: Intrinsics) -> Key:
+    return camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height
