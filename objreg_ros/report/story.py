@@ -13,8 +13,10 @@ import numpy as np
 
 from objreg_ros.data import Array, LoopClosure, Odometry, Reason, Rejected
 from objreg_ros.geometry import rigid_fit, transform
+from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.pose_graph import PoseGraph
-from objreg_ros.report.trajectory_error import absolute_errors
+from objreg_ros.report.camera_map import TRACKED, CameraMap, TrackedFrame, with_sessions
+from objreg_ros.report.trajectory_error import absolute_errors, root_mean_square
 from objreg_ros.truth import FALSE, Error, Truth, within
 
 Row = TypeVar("Row")
@@ -36,6 +38,12 @@ class Glimpse:
     tracked: tuple[int, Array] | None = None  # without odometry: session and T_session_camera by our own tracking
     objects: tuple[tuple[str, Array], ...] = ()
 
+    def pose(self, by_tracking: bool) -> tuple[int, Array] | None:
+        """The session and ``T_session_camera`` of our own tracking, or of odometry; None where that knows none."""
+        if by_tracking:
+            return self.tracked
+        return None if self.T_odom_camera is None else (0, self.T_odom_camera)
+
 
 @dataclass(frozen=True, slots=True)
 class Tracks:
@@ -52,11 +60,12 @@ class Tracks:
     odometry_error: Array | None = None
     corrected_error: Array | None = None
     T_drawn_map: Array = field(default_factory=lambda: np.eye(4))
+    source: str = "odometry"  # or "tracked", by our own tracking
 
     @property
     def lines(self) -> dict[str, Array]:
         """The ways that there are, by name, in the order in which they are drawn."""
-        told = {"odometry": self.odometry, "corrected": self.corrected}
+        told = {self.source: self.odometry, "corrected": self.corrected}
         return told if self.true is None else {"true": self.true, **told}
 
 
@@ -70,9 +79,8 @@ class Story:
     glimpses: tuple[Glimpse, ...] = ()
     closures: tuple[LoopClosure, ...] = ()
     refusals: tuple[Rejected, ...] = ()
-    graph: PoseGraph = field(default_factory=PoseGraph)
+    map: CameraMap = field(default_factory=CameraMap)
     pruned: tuple[LoopClosure, ...] = ()
-    unsolved: str = ""  # why the corrected way is that of odometry
 
     @classmethod
     def of(cls, name: str, summary: Mapping[str, Any], truth: Truth) -> Story:
@@ -82,12 +90,27 @@ class Story:
         """
         glimpses = _read(name, summary, "glimpses", _glimpse)
         closures = _read(name, summary, "constraints", _closure)
-        graph, refusals = mapped(glimpses, closures), _read(name, summary, "refusals", _refusal)
-        try:
-            pruned, unsolved = graph.optimise().pruned, ""
-        except ImportError as error:
-            pruned, unsolved = (), str(error)
-        return cls(name, summary, truth, glimpses, closures, refusals, graph, pruned, unsolved)
+        refusals, by_tracking = _read(name, summary, "refusals", _refusal), summary.get("odometry") == TRACKED
+        frames = [frame for _, frame in advancing(glimpses, by_tracking)]
+        if by_tracking:
+            closures = with_sessions(closures, frames)
+        made = CameraMap.of(frames, closures, MapperParams.of_tracking() if by_tracking else None)
+        return cls(name, summary, truth, glimpses, closures, refusals, made, made.pruned)
+
+    @property
+    def by_tracking(self) -> bool:
+        """Whether the way is that of our own tracking, and not of odometry."""
+        return bool(self.summary.get("odometry") == TRACKED)
+
+    @property
+    def graph(self) -> PoseGraph:
+        """What solved the map."""
+        return self.map.graph
+
+    @property
+    def source(self) -> str:
+        """What the way is of, as its line is named."""
+        return TRACKED if self.by_tracking else "odometry"
 
     @cached_property
     def stretch_ns(self) -> tuple[int, int]:
@@ -149,15 +172,19 @@ class Story:
 
     @property
     def left_out(self) -> int:
-        """How many frames with odometry are not on the map because time does not advance at them."""
-        told = sum(glimpse.T_odom_camera is not None for glimpse in self.glimpses)
-        return told - len(advancing(self.glimpses))
+        """How many frames with a pose are not on the map because time does not advance at them."""
+        told = sum(glimpse.pose(self.by_tracking) is not None for glimpse in self.glimpses)
+        return told - len(self.map.frames) - self.map.frames_apart
 
     def poses_before_and_after(self) -> tuple[list[int], list[Array], list[Array]]:
-        """The stamps of the frames on the map, and ``T_odom_camera`` and ``T_map_camera`` (4, 4) at each."""
-        frames = posed(self.glimpses)
-        stamps = [stamp for stamp, _ in frames]
-        return stamps, [T for _, T in frames], self.graph.corrected(stamps)
+        """The stamps of the frames on the map, and the pose of the camera (4, 4) at each, before and ``T_map_camera``.
+
+        Before it is corrected it is ``T_odom_camera``; of our own tracking, each session where the map has its first
+        frame.
+        """
+        frames = self.map.frames
+        stamps = [frame.stamp_ns for frame in frames]
+        return stamps, [frame.T_map_camera_before for frame in frames], [frame.T_map_camera for frame in frames]
 
     def tracks(self) -> Tracks | None:
         """Odometry, corrected and true way, over each other; None without odometry."""
@@ -167,7 +194,8 @@ class Story:
         true = [self.truth.at(stamp) for stamp in stamps]
         known = [k for k, T in enumerate(true) if T is not None]
         if len(known) < 3:
-            return Tracks(np.array(stamps), positions(odometry), positions(corrected), None)
+            line = np.array(stamps), positions(odometry), positions(corrected)
+            return Tracks(*line, None, source=self.source)
         stamps = [stamps[k] for k in known]
         odometry, corrected = [odometry[k] for k in known], [corrected[k] for k in known]
         targets = [T for T in true if T is not None]
@@ -179,6 +207,7 @@ class Story:
             absolute_errors(odometry, targets),
             absolute_errors(corrected, targets),
             rigid_fit(positions(corrected), positions(targets)),
+            self.source,
         )
 
     def true_way(self) -> tuple[Array, Array] | None:
@@ -207,44 +236,49 @@ class Story:
         return np.array([stamp for stamp, _ in longest]), np.array([T for _, T in longest])
 
     def objects(self) -> list[tuple[str, Array, Array]]:
-        """(label, position by odometry, position in the map) of every object seen with odometry."""
-        seen = [glimpse for glimpse in advancing(self.glimpses) if glimpse.objects]
-        corrected = self.graph.corrected(glimpse.stamp_ns for glimpse in seen)
+        """(label, position before, position in the map) of every object seen on the map."""
+        mapped = {frame.stamp_ns: frame for frame in self.map.frames}
         return [
-            (label, transform(glimpse.T_odom_camera, xyz), transform(T_map_camera, xyz))
-            for glimpse, T_map_camera in zip(seen, corrected, strict=True)
+            (label, transform(mapped[at].T_map_camera_before, xyz), transform(mapped[at].T_map_camera, xyz))
+            for glimpse, (at, *_) in advancing(self.glimpses, self.by_tracking)
+            if at in mapped
             for label, xyz in glimpse.objects
-            if glimpse.T_odom_camera is not None
         ]
 
+    def trajectory(self) -> dict[str, Any] | None:
+        """The way as JSON: what it is of, how much is in one piece, its errors; None without a way.
 
-def advancing(glimpses: Sequence[Glimpse]) -> list[Glimpse]:
-    """The frames with odometry that are later than all before them: stamps repeat and go back where a bag is looped."""
-    later: list[Glimpse] = []
+        ``error_cm`` is the root mean square of the absolute trajectory error, before and after closures correct it;
+        None without truth.
+        """
+        tracks = self.tracks()
+        if tracks is None:
+            return None
+        of, errors = self.map, (tracks.odometry_error, tracks.corrected_error)
+        rms = [None if error is None else round(100.0 * root_mean_square(error), 3) for error in errors]
+        return {
+            "of": self.source,
+            "frames": len(of.frames),
+            "sessions": of.sessions,
+            "frames_apart": of.frames_apart,
+            "sessions_apart": of.sessions_apart,
+            "pruned": len(self.pruned),
+            "unsolved": of.unsolved,
+            "error_cm": None if None in rms else dict(zip(("before", "after"), rms, strict=True)),
+        }
+
+
+def advancing(glimpses: Sequence[Glimpse], by_tracking: bool = False) -> list[tuple[Glimpse, TrackedFrame]]:
+    """The frames with a pose that are later than all before them: stamps repeat and go back where a bag is looped.
+
+    ``by_tracking``: the pose is that of our own tracking, else that of odometry, whose one session is 0.
+    """
+    later: list[tuple[Glimpse, TrackedFrame]] = []
     for glimpse in glimpses:
-        if glimpse.T_odom_camera is not None and (not later or glimpse.stamp_ns > later[-1].stamp_ns):
-            later.append(glimpse)
+        known = glimpse.pose(by_tracking)
+        if known is not None and (not later or glimpse.stamp_ns > later[-1][0].stamp_ns):
+            later.append((glimpse, TrackedFrame(glimpse.stamp_ns, *known)))
     return later
-
-
-def posed(glimpses: Sequence[Glimpse]) -> list[tuple[int, Array]]:
-    """Stamp and ``T_odom_camera`` of the `advancing` frames."""
-    return [(glimpse.stamp_ns, T) for glimpse in advancing(glimpses) if (T := glimpse.T_odom_camera) is not None]
-
-
-def of_one_clock(closures: Sequence[LoopClosure]) -> list[LoopClosure]:
-    """The closures from an earlier to a later moment: the others tie two runs of the clock; a map is of one."""
-    return [closure for closure in closures if closure.from_ns < closure.to_ns]
-
-
-def mapped(glimpses: Sequence[Glimpse], closures: Sequence[LoopClosure]) -> PoseGraph:
-    """The pose graph of the frames with odometry at which time advances, with every closure of one clock."""
-    graph = PoseGraph()
-    for stamp_ns, T_odom_camera in posed(glimpses):
-        graph.add_odometry(Odometry(T_odom_body=T_odom_camera, stamp_ns=stamp_ns))
-    for closure in of_one_clock(closures):
-        graph.add_closure(closure)
-    return graph
 
 
 def positions(poses: Sequence[Array]) -> Array:

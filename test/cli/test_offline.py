@@ -47,7 +47,7 @@ def test_a_folder_goes_through_the_real_rooms_and_gives_its_json(model: Path, tm
     output = offline(folder, "--model", model, "--json", file, "--set", "registrar.seed=7")
     assert "4 frames, 4 detections" in output and "the first time compiles for a minute" in output
     summary = json.loads(file.read_text())
-    assert set(summary) >= KEYS and summary["frames"] == 4 and summary["odometry"] is None
+    assert set(summary) >= KEYS and summary["frames"] == 4 and summary["odometry"] == "tracked"
     about = summary["about"]
     assert about["params"] == {"detector.model": str(model), "registrar.seed": 7}
     assert about["model"]["name"] == model.name and about["recording"] == str(folder)
@@ -123,7 +123,7 @@ def test_a_drift_without_a_seed_is_refused_before_anything_is_prepared(odometry:
 
 
 def test_an_odometry_that_is_not_there_is_refused_with_what_it_may_be(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"--odometry: expected a topic of /.*, or none, or drift:SEED, got '/oddom'"):
+    with pytest.raises(ValueError, match=r"expected a topic of /.*, or tracked, or none, or drift:SEED, got '/oddom'"):
         offline(tum_folder(tmp_path), "--odometry", "/oddom")
 
 

@@ -131,7 +131,7 @@ def test_keyframes_of_another_run_in_the_same_store_are_left_out(tmp_path: Path)
         straight(3), store_of(tmp_path / "b.db", taken(1, 1.0), *others), told.append
     )
     assert (tmp_path / "map.ply").read_bytes() == (tmp_path / "both.ply").read_bytes()
-    assert told[1] == "3 keyframes of the store are not on the map: they are of another run, or without odometry"
+    assert told[1] == "3 keyframes of the store are not on the map: they are of another run, or not of the trajectory"
 
 
 def test_a_damaged_keyframe_is_left_out_and_told(tmp_path: Path) -> None:

@@ -138,7 +138,7 @@ def test_the_pose_that_was_refused_is_told_where_there_was_one() -> None:
 def test_without_the_solver_the_way_is_that_of_odometry_and_the_story_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "gtsam", None)
     story = Story.of("walk", summary(), TRUTH)
-    assert "expected gtsam" in story.unsolved and not story.pruned
+    assert "expected gtsam" in story.map.unsolved and not story.pruned
     tracks = story.tracks()
     np.testing.assert_allclose(tracks.corrected, tracks.odometry, atol=1e-3)
 
