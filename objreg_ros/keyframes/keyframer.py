@@ -19,6 +19,7 @@ from objreg_ros.keyframes.frame_window import Clock, FrameWindow, SessionNumbers
 from objreg_ros.keyframes.gravity_filter import GravityFilter
 from objreg_ros.keyframes.odometry import TravelledPath
 from objreg_ros.keyframes.tracking import TrackedSurface, tracked_surface, view_motion
+from objreg_ros.keyframes.turn import LastPicture
 from objreg_ros.registration.params import KeyframeParams
 
 MOST_FRAMES = 4  # that are fused into one keyframe
@@ -112,6 +113,7 @@ class Keyframer:
         self._last_ns: int | None = None  # of the last frame
         self._open: _Open | None = None
         self._session: _Session | None = None
+        self._last_picture = LastPicture()
         self._last: tuple[int, Array, Counter[str]] | None = None  # session, pose and labels of the last frame window
 
     @property
@@ -176,6 +178,8 @@ class Keyframer:
             T_odom_first=T_session_frame,
         )
         self._session.follow(frame)
+        if not self._session.in_odometry:
+            self._last_picture.begin(frame.view)
         self._begin(self._session, _with_session_gravity(self._session, frame), T_session_frame)
         return ended
 
@@ -213,8 +217,17 @@ class Keyframer:
         """The pose of a frame in its session, in a gap of the odometry by the views; None if the track is lost."""
         if frame.T_odom_camera is not None or self._open is None:
             return frame.T_odom_camera
-        T_first_frame = view_motion(frame.view, self._open.surface, self._open.T_first_last)
+        T_first_frame = self._by_views(self._open, frame)
         return None if T_first_frame is None else rigid(self._open.T_session_first @ T_first_frame)
+
+    def _by_views(self, window: _Open, frame: Frame) -> Array | None:
+        """``T_first_frame`` by the views, where the camera turned fast from what their small pictures say of that."""
+        T_last_frame = None if window.session.in_odometry else self._last_picture.fast_turn(frame.view)
+        if T_last_frame is not None:
+            T_first_frame = view_motion(frame.view, window.surface, window.T_first_last @ T_last_frame)
+            if T_first_frame is not None:
+                return T_first_frame
+        return view_motion(frame.view, window.surface, window.T_first_last)
 
     def _may_come_back(self, session: _Session, frame: Frame) -> bool:
         """Whether odometry is only a moment late: such a frame is passed over."""

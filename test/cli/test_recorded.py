@@ -12,7 +12,6 @@ from objreg_ros.cli.settings import read_settings
 from objreg_ros.recording import Record, open_recording, write_rosbag2
 from objreg_ros.recording.drift import with_drifting_odometry
 
-
 NOTHING = {"model": None, "labels": None, "camera": "", "params_file": None, "changes": (), "remaps": ()}
 
 
