@@ -8,6 +8,7 @@ and Murray, "Improving the agility of keyframe-based SLAM", 2008). No depth is u
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -21,7 +22,18 @@ BLUR = 1.2  # px, one sigma
 ITERATIONS = 8
 LEAST_OVERLAP = 0.3  # of the picture; what overlaps less is not compared
 SETTLED = 1e-3  # rad
+MOST_DIFFERENT, NOISE = 0.3, 1.0  # share of a picture's contrast, and grey levels, that a turn leaves unexplained
 FEW_PX = 6.0  # of a view, by which a turn may move it and be found from rest
+
+
+class Turn(NamedTuple):
+    """``T_last_frame (4, 4)``, a turn alone; None where none makes one picture the other.
+
+    ``is_slow``: it moved the view by `FEW_PX` at most, or there is no grey to see that.
+    """
+
+    T_last_frame: Array | None
+    is_slow: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,17 +91,16 @@ class LastPicture:
         """Take the first frame."""
         self._pictures = small_pictures(view)
 
-    def fast_turn(self, view: View) -> Array | None:
-        """``T_last_view (4, 4)``, a turn alone, and take the view as the last; None where it is no more than `FEW_PX`.
-
-        None, too, where the pictures do not say: they have no grey, or do not overlap.
-        """
+    def next(self, view: View) -> Turn:
+        """How the camera turned since the last frame, which this one is from now on."""
         last, self._pictures = self._pictures, small_pictures(view)
-        if len(last) != len(self._pictures) or not last:
-            return None
+        if not last or not self._pictures:
+            return Turn(None, is_slow=True)
         R, difference = turn_between(self._pictures, last)
-        is_fast = rotation_angle(R) * max(view.intrinsics.fx, view.intrinsics.fy) > FEW_PX
-        return pose(R, np.zeros(3)) if is_fast and np.isfinite(difference) else None
+        if not difference <= MOST_DIFFERENT * np.std(self._pictures[-1].grey) + NOISE:
+            return Turn(None, is_slow=False)
+        is_slow = rotation_angle(R) * max(view.intrinsics.fx, view.intrinsics.fy) <= FEW_PX
+        return Turn(pose(R, np.zeros(3)), is_slow)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
