@@ -27,13 +27,13 @@ FEW_PX = 6.0  # of a view, by which a turn may move it and be found from rest
 
 
 class Turn(NamedTuple):
-    """``T_last_frame (4, 4)``, a turn alone; None where none makes one picture the other.
+    """``T_last_frame (4, 4)``, a turn alone; None where none makes one picture the other, or there is no grey.
 
-    ``is_slow``: it moved the view by `FEW_PX` at most, or there is no grey to see that.
+    ``is_fast``: it moved the view by more than `FEW_PX`.
     """
 
-    T_last_frame: Array | None
-    is_slow: bool
+    T_last_frame: Array | None = None
+    is_fast: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,12 +95,12 @@ class LastPicture:
         """How the camera turned since the last frame, which this one is from now on."""
         last, self._pictures = self._pictures, small_pictures(view)
         if not last or not self._pictures:
-            return Turn(None, is_slow=True)
+            return Turn()
         R, difference = turn_between(self._pictures, last)
         if not difference <= MOST_DIFFERENT * np.std(self._pictures[-1].grey) + NOISE:
-            return Turn(None, is_slow=False)
-        is_slow = rotation_angle(R) * max(view.intrinsics.fx, view.intrinsics.fy) <= FEW_PX
-        return Turn(pose(R, np.zeros(3)), is_slow)
+            return Turn()
+        pixels = rotation_angle(R) * max(view.intrinsics.fx, view.intrinsics.fy)
+        return Turn(pose(R, np.zeros(3)), pixels > FEW_PX)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

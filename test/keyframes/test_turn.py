@@ -45,9 +45,9 @@ def test_a_guess_is_gone_on_from_and_pictures_that_do_not_overlap_tell_nothing()
 
 def test_a_fast_turn_is_told_from_a_slow_one() -> None:
     last = LastPicture()
-    assert last.next(scene_view()) == (None, True)  # nothing came before
+    assert last.next(scene_view()) == (None, False)  # nothing came before
     slow, fast = last.next(scene_view(turned(0, 1, 0))), last.next(scene_view(turned(0, 7, 0)))
-    assert slow.is_slow and not fast.is_slow
+    assert fast.is_fast and not slow.is_fast
     assert error_deg(fast.T_last_frame, turned(0, 6, 0)) < 1.0 and not fast.T_last_frame[:3, 3].any()
 
 
@@ -63,7 +63,7 @@ def test_without_grey_and_without_texture_nothing_is_fast() -> None:
     view = scene_view()
     last = LastPicture()
     last.begin(replace(view, grey=None))
-    assert last.next(scene_view(turned(0, 8, 0))) == (None, True)
+    assert last.next(scene_view(turned(0, 8, 0))) == (None, False)
     flat: View = replace(view, grey=np.full_like(view.grey, 90))
     last.begin(flat)
-    assert last.next(flat).is_slow
+    assert not last.next(flat).is_fast
