@@ -23,7 +23,6 @@ GREY_SIGMA = 10.0  # grey levels: noise, vignetting and the residue of exposure
 HUBER = 1.3  # standard deviations beyond which an error counts linearly
 LEAST_SHARE = 0.5  # of the pixels that land in the other view; less is another scene or a lost track
 LEAST_PAIRS = 200
-SAME_PICTURE = 0.8  # correlation of grey: right poses have more (370 looked at), of slipped ones 19 of 20 have less
 SETTLED = 1e-4  # length of a last step, metres and radians
 
 
@@ -80,17 +79,18 @@ def view_motion(source: View, target: TrackedSurface, T_target_source: Array | N
     return T if share >= LEAST_SHARE else None
 
 
-def show_the_same(source: View, target: TrackedSurface, T_target_source: Array) -> bool:
-    """Whether both views show one picture where they overlap, or nothing tells: one has no grey, or little contrast.
+def same_picture(source: View, target: TrackedSurface, T_target_source: Array) -> float:
+    """The correlation of the views' grey where one lies upon the other, -1 to 1; 0 where too little does.
 
-    Surfaces agree at other places too: a wall slides along itself. No where they do not overlap.
+    1, too, where what is left is noise, or nothing tells: one has no grey. Surfaces alone agree at other places too: a
+    wall slides along itself.
     """
     if source.grey is None or not target.has_grey:
-        return True
+        return 1.0
     xyz, grey = _thin(source, 2)
     correlation, contrast = _correlation(xyz, grey, T_target_source, target.xyz, target.grey, target.camera)
     unexplained = contrast * np.sqrt(max(1.0 - correlation * correlation, 0.0))
-    return bool(correlation >= SAME_PICTURE or unexplained <= GREY_SIGMA)
+    return 1.0 if unexplained <= GREY_SIGMA else float(correlation)
 
 
 def _thin(view: View, stride: int) -> tuple[Array, Array]:

@@ -23,7 +23,7 @@ ITERATIONS = 8
 LEAST_OVERLAP = 0.3  # of the picture; what overlaps less is not compared
 SETTLED = 1e-3  # rad
 MOST_DIFFERENT, NOISE = 0.3, 1.0  # share of a picture's contrast, and grey levels, that a turn leaves unexplained
-FEW_PX = 3.0  # of a view, by which a turn may move it and surely be found from rest; from 4 on some are not
+FEW_PX = 6.0  # of a view, by which a turn may move it and mostly be found from rest
 
 
 class Turn(NamedTuple):

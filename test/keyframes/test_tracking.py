@@ -11,7 +11,7 @@ from registration.samples import CAMERA, moved, scene_view
 
 from objreg_ros.data import View
 from objreg_ros.geometry import pose, pose_error, rotation_from_vector
-from objreg_ros.keyframes.tracking import show_the_same, tracked_surface, view_motion
+from objreg_ros.keyframes.tracking import same_picture, tracked_surface, view_motion
 
 MOTIONS = [
     pose(rotation_from_vector(np.array([0.0, 0.02, 0.0])), np.array([0.02, 0.0, 0.01])),
@@ -91,14 +91,14 @@ def test_two_views_of_different_scenes_have_no_motion() -> None:
 
 def test_views_show_the_same_where_they_lie_and_not_aside() -> None:
     view, surface = scene_view(MOTIONS[0]), tracked_surface(scene_view())
-    assert show_the_same(view, surface, MOTIONS[0])
-    assert show_the_same(replace(view, grey=view.grey // 2 + np.uint8(40)), surface, MOTIONS[0])
-    assert not show_the_same(view, surface, moved(0.2) @ MOTIONS[0])
-    assert not show_the_same(view, surface, moved(9.0))
+    assert same_picture(view, surface, MOTIONS[0]) > 0.98
+    assert same_picture(replace(view, grey=view.grey // 2 + np.uint8(40)), surface, MOTIONS[0]) > 0.98
+    assert same_picture(view, surface, moved(0.2) @ MOTIONS[0]) < 0.7
+    assert same_picture(view, surface, moved(9.0)) == 0.0
 
 
 def test_a_view_without_grey_or_contrast_contradicts_nothing() -> None:
     view = scene_view()
     dull = replace(view, grey=np.random.default_rng(1).integers(90, 99, view.grey.shape).astype(np.uint8))
     for one, other in ((replace(view, grey=None), view), (view, replace(view, grey=None)), (dull, dull)):
-        assert show_the_same(one, tracked_surface(other), moved(0.2))
+        assert same_picture(one, tracked_surface(other), moved(0.2)) == 1.0
