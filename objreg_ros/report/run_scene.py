@@ -99,7 +99,7 @@ def scene_of(story: Story, album: Album) -> RunScene:
 
 def _ways(story: Story) -> dict[str, Way]:
     stamps, odometry, corrected = story.poses_before_and_after()
-    if not stamps:
+    if not story.has_way:
         return _true_way(story, [glimpse.stamp_ns for glimpse in story.glimpses] or story.truth.stamps_ns)
     ways = {name: Way(tuple(stamps), np.array(poses)) for name, poses in
             ((story.source, odometry), ("corrected", corrected))}  # fmt: skip

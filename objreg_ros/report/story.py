@@ -186,10 +186,15 @@ class Story:
         stamps = [frame.stamp_ns for frame in frames]
         return stamps, [frame.T_map_camera_before for frame in frames], [frame.T_map_camera for frame in frames]
 
+    @property
+    def has_way(self) -> bool:
+        """Whether there is a way to draw. Of our own tracking one frame is none."""
+        return len(self.map.frames) > self.by_tracking
+
     def tracks(self) -> Tracks | None:
-        """Odometry, corrected and true way, over each other; None without odometry."""
+        """Odometry, or our own tracking, corrected and true way, over each other; None without any to draw."""
         stamps, odometry, corrected = self.poses_before_and_after()
-        if not stamps:
+        if not self.has_way:
             return None
         true = [self.truth.at(stamp) for stamp in stamps]
         known = [k for k, T in enumerate(true) if T is not None]
@@ -251,10 +256,10 @@ class Story:
         ``error_cm`` is the root mean square of the absolute trajectory error, before and after closures correct it;
         None without truth.
         """
-        tracks = self.tracks()
-        if tracks is None:
+        of, tracks = self.map, self.tracks()
+        if not of.frames:
             return None
-        of, errors = self.map, (tracks.odometry_error, tracks.corrected_error)
+        errors = (None, None) if tracks is None else (tracks.odometry_error, tracks.corrected_error)
         rms = [None if error is None else round(100.0 * root_mean_square(error), 3) for error in errors]
         return {
             "of": self.source,
