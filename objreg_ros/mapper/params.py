@@ -15,8 +15,8 @@ GONE = dict.fromkeys(
     "it is LEAST_SIGMAS in mapper/pose_graph.py; what constraints share is picture_*_error",
 )
 
-# How our own tracking errs after one metre or one radian, in m and degrees: on two recordings of a Kinect with truth,
-# one slow and one that turns fast, it errs by ... (docs/figures.md).
+# How our own tracking errs after one metre or one radian, one sigma, in m and degrees: by 0.033 to 0.044 m and 1.5 to
+# 3.6 degrees over 1 to 20 frames of two recordings of a Kinect, one slow, one turning fast; by less in simulation.
 TRACKING_ERRORS = 0.05, 3.0
 
 
