@@ -16,7 +16,7 @@ GONE = dict.fromkeys(
 )
 
 # How our own tracking errs after one metre or one radian, one sigma, in m and degrees: over 1 to 20 frames by 0.033 to
-# 0.044 m and 1.5 to 3.6 degrees on two recordings of a Kinect, one slow, one turning fast; by 0.06 to 0.07 m and 1 to 1.3
+# 0.044 m and 1.5 to 3.6 degrees on two recordings of a Kinect, slow and fast; 0.06 to 0.07 m and 1 to 1.3
 # degrees with a simulated RealSense D435, and by less with other simulated sensors.
 TRACKING_ERRORS = 0.07, 3.0
 
