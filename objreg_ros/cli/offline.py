@@ -16,7 +16,16 @@ from objreg_ros.cli.options import require_writable
 from objreg_ros.cli.outputs import Outputs
 from objreg_ros.cli.recorded import Asked, Opened
 from objreg_ros.cli.settings import tell_ignored
-from objreg_ros.cli.told import STANDARD_OUTPUT, exit_code, json_to, tell, tell_next, tell_reasons, tell_run
+from objreg_ros.cli.told import (
+    STANDARD_OUTPUT,
+    exit_code,
+    json_to,
+    tell,
+    tell_next,
+    tell_reasons,
+    tell_run,
+    tell_trajectory,
+)
 from objreg_ros.offline import Run
 from objreg_ros.recording.troubles import troubles
 from objreg_ros.registration.params import RegistrarParams
@@ -52,8 +61,9 @@ def command(recording: Path, json_file: Path | None, **given: Any) -> int:
     Deterministic, and as fast as the CPU goes. Prints what came out and, where the recording has ground truth, the
     true error of every constraint.
 
-    With odometry the constraints correct it: --tum, --kitti, --g2o and --map write what comes out, in the frame in
-    which odometry began. Poses are of the camera's optical frame, at every frame of the recording.
+    The constraints correct the odometry, or without one the registrar's own tracking: --tum, --kitti, --g2o and --map
+    write what comes out, in the frame in which it began. Poses are of the camera's optical frame, at every frame. Where
+    the track is lost, they are those of the largest part that constraints tie together.
 
     Says where the run stopped if no loop was closed, and ends with 3 if no frame got through.
     """
@@ -63,7 +73,7 @@ def command(recording: Path, json_file: Path | None, **given: Any) -> int:
         require_writable("--json", json_file)
     tell_ignored(asked.settings)
     with asked.opened(recording) as opened, TemporaryDirectory() as folder, json_to(json_file) as write_json:
-        outputs.require_way(opened.source, opened.inputs, bool(opened.truth.poses))
+        outputs.require_way(opened.source, opened.odometry is not None, bool(opened.truth.poses))
         for note in opened.notes:
             click.echo(f"! {note}", err=True)
         registrar = outputs.remembering(asked.settings.of("registrar", RegistrarParams), folder)
@@ -74,9 +84,11 @@ def command(recording: Path, json_file: Path | None, **given: Any) -> int:
         findings = find(summary, troubles(opened.source, opened.inputs))
         click.echo(verdict(summary, findings))
         tell(findings)
-        write_json({**summary, "findings": as_json(findings)})
+        story = Story.of(recording.name, summary, opened.truth)
+        trajectory = story.trajectory()
+        tell_trajectory(trajectory)
+        write_json({**summary, "trajectory": trajectory, "findings": as_json(findings)})
         if outputs.wanted:
-            story = Story.of(recording.name, summary, opened.truth)
             outputs.write(story, Album(opened.source, opened.inputs, summary["rectified"]), Path(registrar.store))
         if run.closures:
             _say_what_follows(recording, json_file)

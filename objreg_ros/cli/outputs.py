@@ -11,7 +11,6 @@ import click
 from objreg_ros.cli.loudness import aside
 from objreg_ros.cli.options import require_writable
 from objreg_ros.recording import Recording
-from objreg_ros.recording.inputs import Inputs
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.report.map_files import MapFiles
 from objreg_ros.report.pictures import Album
@@ -53,16 +52,18 @@ class Outputs:
         """Whether any file is asked for."""
         return bool(self.files.wanted or self.scenes.wanted)
 
-    def require_way(self, source: Recording, inputs: Inputs, has_truth: bool) -> None:
-        """ValueError where nothing will tell the way that is asked for: a map corrects odometry, a scene shows any."""
-        if self.files.wanted and inputs.odom is None:
+    def require_way(self, source: Recording, has_way: bool, has_truth: bool) -> None:
+        """ValueError where nothing will tell the way that is asked for: a map corrects one, a scene shows any.
+
+        ``has_way`` is whether there is odometry, or the registrar's own tracking in its place.
+        """
+        if self.files.wanted and not has_way:
             there = ", ".join(source.topics)
             raise ValueError(
-                f"{source.path}: {', '.join(self.files.wanted)}: expected odometry, which a map corrects, got none of "
-                f"{there}; choose its topic with --odometry TOPIC, or make one that drifts from the truth with "
-                "--odometry drift:1"
+                f"{source.path}: {', '.join(self.files.wanted)}: expected a trajectory, which a map corrects, got "
+                f"--odometry none; leave it out or take --odometry tracked, or one of {there} with --odometry TOPIC"
             )
-        self.scenes.require_way(source.path, inputs.odom is not None or has_truth)
+        self.scenes.require_way(source.path, has_way or has_truth)
 
     def remembering(self, registrar: RegistrarParams, folder: str) -> RegistrarParams:
         """With a store in a file, in ``folder`` unless it has one, where the map is made of what it remembers."""
@@ -78,9 +79,10 @@ class Outputs:
         if self.scenes.wanted:
             self.scenes.write(scene_of(story, album), click.echo)
         if self.files.wanted:
-            click.echo(f"  map: {len(story.graph.keyframes)} keyframes, {len(story.pruned)} constraints pruned")
-            if story.unsolved:
-                click.echo(f"  map: as odometry says: {story.unsolved}")
+            known, source = story.map, "our own tracking" if story.by_tracking else "odometry"
+            click.echo(f"  map: {known.keyframes()} keyframes, {len(story.pruned)} constraints pruned")
+            if known.unsolved:
+                click.echo(f"  map: as {source} says: {known.unsolved}")
             if story.left_out:
                 click.echo(f"  map: {story.left_out} frames at which time does not advance are left out")
             self.files.write(story, store, lambda line: click.echo(f"  map: {line}"))

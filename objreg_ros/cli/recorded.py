@@ -23,11 +23,16 @@ from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.recording.troubles import FOLDER
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.report.about import about
+from objreg_ros.report.camera_map import TRACKED
 from objreg_ros.report.findings import setting
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_ros.truth import Truth
 
 DRIFT = "drift:"
+NONE = "none"
+BY_TRACKING = (
+    "there is no odometry: the trajectory is that of the registrar's own tracking (--odometry none: no trajectory)"
+)
 CAMERAS_OWN = (
     "--odometry {} is the camera's own and not level: T_base_camera and segmenter.level_odom are left out of this run"
 )
@@ -77,9 +82,9 @@ class Asked:
     def _inputs(self, source: Recording, depth_source: str) -> Inputs:
         asked = parse_remaps(self.remaps)
         if self.odometry is not None:
-            asked["odom"] = "" if self.odometry == "none" or self.drifts else self.odometry
+            asked["odom"] = "" if self.odometry in (NONE, TRACKED) or self.drifts else self.odometry
             if asked["odom"] and asked["odom"] not in source.topics:
-                expected = f"a topic of {', '.join(source.topics)}, or none, or drift:SEED"
+                expected = f"a topic of {', '.join(source.topics)}, or tracked, or none, or drift:SEED"
                 raise ValueError(f"--odometry: expected {expected}, got {self.odometry!r}")
         inputs = choose_inputs(source.topics, asked, depth_source)
         if not inputs.complete:
@@ -112,7 +117,13 @@ class Opened:
         segmenter = self.asked.settings.of("segmenter", SegmenterNodeParams)
         is_told = registrar.mounting is not None or segmenter.level_odom
         left_out = [CAMERAS_OWN.format(self.asked.odometry)] if self.asked.drifts and is_told else []
-        return (*self.source.notes, *self.truth.notes, *left_out)
+        by_itself = [BY_TRACKING] if self.odometry == TRACKED and self.asked.odometry is None else []
+        return (*self.source.notes, *self.truth.notes, *left_out, *by_itself)
+
+    @property
+    def odometry(self) -> str | None:
+        """The topic of the odometry; `TRACKED` where there is none, None where no trajectory is asked for."""
+        return TRACKED if self.inputs.odom is None and self.asked.odometry != NONE else self.inputs.odom
 
     @property
     def frames(self) -> int:
@@ -144,7 +155,7 @@ class Opened:
             "about": about(self.path, model, settings.changed(), arguments),
             "recording": str(self.path.resolve()),
             "inputs": self.inputs.outright,
-            "odometry": self.inputs.odom,
+            "odometry": self.odometry,
             "rectified": told.rectified,
             "camera": absolute(told.camera),
             **setting(self.source, self.inputs, model),

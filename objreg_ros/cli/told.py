@@ -84,6 +84,24 @@ def tell_run(run: Run, summary: Mapping[str, Any]) -> None:
         click.echo(f"  of {truth['count']} constraints: {shares}")
 
 
+@aside()
+def tell_trajectory(trajectory: Mapping[str, Any] | None) -> None:
+    """How much of the trajectory is in one piece, and its error before and after closures correct it."""
+    if trajectory is None:
+        return
+    sessions, apart = trajectory["sessions"], trajectory["sessions_apart"]
+    tied = f" in {sessions} sessions that closures tie together" if sessions > 1 else ""
+    click.echo(f"  trajectory ({trajectory['of']}): {trajectory['frames']} frames{tied}")
+    if apart:
+        click.echo(
+            f"  trajectory: {trajectory['frames_apart']} frames in {apart} more sessions are left out: the track was "
+            "lost between, and no closures tie them to it"
+        )
+    error = trajectory["error_cm"]
+    if error is not None:
+        click.echo(f"  trajectory error: {error['before']:.1f} cm, corrected {error['after']:.1f} cm (RMS)")
+
+
 def tell_reasons(refusals: Iterable[Rejected]) -> None:
     """With -v a line for each refusal: both moments, the reason and the numbers behind it."""
     for refused in refusals if is_verbose() else ():

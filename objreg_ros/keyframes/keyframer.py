@@ -18,13 +18,16 @@ from objreg_ros.geometry import inverse, leaps, rigid, rotation_angle
 from objreg_ros.keyframes.frame_window import Clock, FrameWindow, SessionNumbers, alone, with_gravity_of
 from objreg_ros.keyframes.gravity_filter import GravityFilter
 from objreg_ros.keyframes.odometry import TravelledPath
-from objreg_ros.keyframes.tracking import TrackedSurface, tracked_surface, view_motion
+from objreg_ros.keyframes.tracking import TrackedSurface, same_picture, tracked_surface, view_motion
+from objreg_ros.keyframes.turn import LastPicture
 from objreg_ros.registration.params import KeyframeParams
 
 MOST_FRAMES = 4  # that are fused into one keyframe
 LEAST_OBJECTS = 1  # of a keyframe: one without objects proposes nothing
 GRAVITY_PATH_M = 2.0  # path after which gravity carried by odometry counts half
 GRAVITY_TURN_DEG = 120.0  # turn after which gravity carried by odometry counts half
+SAME_PICTURE = 0.8  # correlation of grey: right poses have more (370 looked at), of slipped ones 19 of 20 have less
+SURELY_SAME = 0.95  # correlation from which no other guess is tried
 SILENCE_S = 5.0  # odometry may have begun anew in it without a leap
 UNSET_NS = 0  # the stamp of a camera that starts before the simulated clock does: no clock began then
 
@@ -112,6 +115,7 @@ class Keyframer:
         self._last_ns: int | None = None  # of the last frame
         self._open: _Open | None = None
         self._session: _Session | None = None
+        self._last_picture = LastPicture()
         self._last: tuple[int, Array, Counter[str]] | None = None  # session, pose and labels of the last frame window
 
     @property
@@ -176,6 +180,8 @@ class Keyframer:
             T_odom_first=T_session_frame,
         )
         self._session.follow(frame)
+        if not self._session.in_odometry:
+            self._last_picture.begin(frame.view)
         self._begin(self._session, _with_session_gravity(self._session, frame), T_session_frame)
         return ended
 
@@ -213,8 +219,29 @@ class Keyframer:
         """The pose of a frame in its session, in a gap of the odometry by the views; None if the track is lost."""
         if frame.T_odom_camera is not None or self._open is None:
             return frame.T_odom_camera
-        T_first_frame = view_motion(frame.view, self._open.surface, self._open.T_first_last)
+        T_first_frame = self._by_views(self._open, frame)
         return None if T_first_frame is None else rigid(self._open.T_session_first @ T_first_frame)
+
+    def _by_views(self, window: _Open, frame: Frame) -> Array | None:
+        """``T_first_frame`` by the views; None if the track is lost.
+
+        They are aligned from where the last one was and from how the camera turned since, the latter first where it
+        turned fast. A pose counts only where both views show the same picture.
+        """
+        view, surface = frame.view, window.surface
+        if window.session.in_odometry:
+            return view_motion(view, surface, window.T_first_last)
+        turn, guesses = self._last_picture.next(view), [window.T_first_last]
+        if turn.T_last_frame is not None:
+            guesses.insert(0 if turn.is_fast else 1, window.T_first_last @ turn.T_last_frame)
+        found, best = None, SAME_PICTURE
+        for guess in guesses:
+            T_first_frame = view_motion(view, surface, guess)
+            if T_first_frame is not None and (same := same_picture(view, surface, T_first_frame)) >= best:
+                found, best = T_first_frame, same
+            if best >= SURELY_SAME:
+                break
+        return found
 
     def _may_come_back(self, session: _Session, frame: Frame) -> bool:
         """Whether odometry is only a moment late: such a frame is passed over."""

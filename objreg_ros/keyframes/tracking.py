@@ -79,6 +79,20 @@ def view_motion(source: View, target: TrackedSurface, T_target_source: Array | N
     return T if share >= LEAST_SHARE else None
 
 
+def same_picture(source: View, target: TrackedSurface, T_target_source: Array) -> float:
+    """The correlation of the views' grey where one lies upon the other, -1 to 1; 0 where too little does.
+
+    1, too, where what is left is noise, or nothing tells: one has no grey. Surfaces alone agree at other places too: a
+    wall slides along itself.
+    """
+    if source.grey is None or not target.has_grey:
+        return 1.0
+    xyz, grey = _thin(source, 2)
+    correlation, contrast = _correlation(xyz, grey, T_target_source, target.xyz, target.grey, target.camera)
+    unexplained = contrast * np.sqrt(max(1.0 - correlation * correlation, 0.0))
+    return 1.0 if unexplained <= GREY_SIGMA else float(correlation)
+
+
 def _thin(view: View, stride: int) -> tuple[Array, Array]:
     xyz = view.xyz[::stride, ::stride].reshape(-1, 3)
     known = np.isfinite(xyz[:, 2])
@@ -140,3 +154,33 @@ def _normal_equations(xyz, grey, T, target_xyz, normals, target_grey, slope, cam
             brightness += weight * error
             weights += weight
     return H, g, pairs, max(seen, 1), brightness / max(weights, 1e-12)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _correlation(xyz, grey, T, target_xyz, target_grey, camera):  # type: ignore[no-untyped-def]
+    """The correlation of grey over the pixels that land on known depth, and the deviation of what they land on.
+
+    0 and inf for fewer than `LEAST_PAIRS`.
+    """
+    height, width = target_grey.shape
+    n, a, b, aa, bb, ab = 0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(len(xyz)):
+        z = T[2, 0] * xyz[k, 0] + T[2, 1] * xyz[k, 1] + T[2, 2] * xyz[k, 2] + T[2, 3]
+        if z < 0.1:
+            continue
+        x = T[0, 0] * xyz[k, 0] + T[0, 1] * xyz[k, 1] + T[0, 2] * xyz[k, 2] + T[0, 3]
+        y = T[1, 0] * xyz[k, 0] + T[1, 1] * xyz[k, 1] + T[1, 2] * xyz[k, 2] + T[1, 3]
+        u, v = camera[0] * x / z + camera[2], camera[1] * y / z + camera[3]
+        if u < 0.0 or v < 0.0 or u > width - 1.0 or v > height - 1.0:
+            continue
+        i, j = int(v + 0.5), int(u + 0.5)
+        if not target_xyz[i, j, 2] > 0.0:
+            continue
+        here, there = float64(grey[k]), float64(target_grey[i, j])
+        n, a, b = n + 1, a + here, b + there
+        aa, bb, ab = aa + here * here, bb + there * there, ab + here * there
+    if n < LEAST_PAIRS:
+        return 0.0, np.inf
+    here, there = aa - a * a / n, bb - b * b / n
+    correlation = (ab - a * b / n) / np.sqrt(here * there) if here * there > 0.0 else 0.0
+    return correlation, np.sqrt(max(there / n, 0.0))

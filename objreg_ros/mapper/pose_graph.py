@@ -298,8 +298,11 @@ class PoseGraph:
 
     def paths(self) -> list[list[tuple[int, Array]]]:
         """Those of every session; none for one that is not placed."""
-        placed = [s == 0 or self._course(s) is not None for s in range(len(self.sessions))]
-        return [self._path_of(s) if is_placed else [] for s, is_placed in enumerate(placed)]
+        return [self._path_of(s) if self.is_in_map(s) else [] for s in range(len(self.sessions))]
+
+    def is_in_map(self, session: int) -> bool:
+        """Whether it is known where a session, by number, is in the map: it is the first, or closures tie it there."""
+        return session == 0 or self._course(session) is not None
 
     def _path_of(self, session: int) -> list[tuple[int, Array]]:
         return list(zip(list(self.sessions[session].keyframes.stamps_ns), self._mapped_of(session), strict=True))
@@ -315,11 +318,15 @@ class PoseGraph:
         ]
         return [T for path in paths for _, T in path], edges
 
-    def corrected(self, stamps_ns: Iterable[int], robot: str = "") -> list[Array]:
-        """``T_map_body`` at any moments that a robot's newest odometry covers; ValueError for one that it does not."""
-        number, session = self.sessions.newest(robot), self._going_on(robot)
+    def corrected(self, stamps_ns: Iterable[int], robot: str = "", session: int | None = None) -> list[Array]:
+        """``T_map_body`` at any moments that a robot's newest odometry covers; ValueError for one that it does not.
+
+        With ``session``, a number, of that one.
+        """
+        number = self.sessions.newest(robot) if session is None else session
+        known = Session(robot) if number is None else self.sessions[number]
         mapped = np.zeros((0, 4, 4)) if number is None else self._mapped_of(number)
-        return [_corrected_at(stamp, session, mapped) for stamp in stamps_ns]
+        return [_corrected_at(stamp, known, mapped) for stamp in stamps_ns]
 
     def _course(self, session: int) -> Course | None:
         """The course of a session as far as it is solved."""

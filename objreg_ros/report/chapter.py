@@ -8,17 +8,17 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-import numpy as np
-
-from objreg_ros.data import UNTRIED, Array
+from objreg_ros.data import UNTRIED
 from objreg_ros.report import clouds, figures, thumbnails
+from objreg_ros.report.camera_map import of_one_clock
 from objreg_ros.report.clouds import Clouds
 from objreg_ros.report.pairs import ACCEPTED, Pair, pairs_of
 from objreg_ros.report.pictures import Album, chosen_closures, chosen_refusals, data_uri, overlay
 from objreg_ros.report.reasons import MEANINGS
-from objreg_ros.report.scene import scene
-from objreg_ros.report.story import Story, Tracks, of_one_clock
+from objreg_ros.report.scene import NAMES, scene
+from objreg_ros.report.story import Story, Tracks
 from objreg_ros.report.thumbnails import Thumbnails
+from objreg_ros.report.trajectory_error import root_mean_square
 
 View = dict[str, Any]
 
@@ -49,11 +49,6 @@ def chapter(story: Story, album: Album | None, runs: int = 1, spatial: bool = Tr
         "objects": _objects(story),
         "stages": _stages(story),
     }
-
-
-def root_mean_square(values: Array) -> float:
-    """The root of the mean square."""
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def spaced(name: str) -> str:
@@ -110,7 +105,7 @@ def _tiles(story: Story, tracks: Tracks | None) -> list[View]:
         )
     if tracks is not None and tracks.odometry_error is not None and tracks.corrected_error is not None:
         before, after = (100 * root_mean_square(e) for e in (tracks.odometry_error, tracks.corrected_error))
-        tiles.append(_tile(f"{before:.1f} → {after:.1f} cm", "trajectory error", _change(before, after)))
+        tiles.append(_tile(f"{before:.1f} → {after:.1f} cm", "trajectory error", _change(before, after, tracks.source)))
     return tiles
 
 
@@ -132,9 +127,9 @@ def _count_note(story: Story) -> str:
     return f"{story.summary['detections']:,} detections, {story.summary.get('objects', 0):,} objects"
 
 
-def _change(before: float, after: float) -> str:
+def _change(before: float, after: float, source: str) -> str:
     share = 100 * (1 - after / before) if before > 0 else 0.0
-    return f"RMS, {abs(share):.0f} % {'less' if share >= 0 else 'more'} than odometry"
+    return f"RMS, {abs(share):.0f} % {'less' if share >= 0 else 'more'} than {NAMES.get(source, source)}"
 
 
 def _way(story: Story, tracks: Tracks | None) -> View:
@@ -155,7 +150,7 @@ def _way(story: Story, tracks: Tracks | None) -> View:
     else:
         words = "There is neither odometry nor ground truth in this run, and no track of the camera, so no way to draw."
         return {"words": words, "legend": [], "drawing": None, "error": None, "scene": None}
-    names = {"true": "truth", "tracked": "our own tracking", "accepted": "closure"}
+    names = {**NAMES, "accepted": "closure"}
     marks = [*lines, *sorted({figures.verdict(story, closure) for closure in story.closures})]
     return {
         "words": words,
@@ -173,17 +168,30 @@ def _in_both_widths(draw: Callable[[int], str], wide: int = figures.WIDE) -> Vie
 
 
 def _way_words(story: Story) -> str:
-    words = "From above. Closures tie places that were seen twice; the pose graph takes the drift out of odometry."
+    source = NAMES.get(story.source, story.source)
+    words = f"From above. Closures tie places that were seen twice; the pose graph takes the drift out of {source}."
+    if story.by_tracking:
+        words += f" {_pieces(story)}"
     if story.pruned:
         words += f" The mapper pruned {len(story.pruned)} of {len(story.closures)} closures."
-    if story.unsolved:
-        words += f" The corrected way is that of odometry here: {story.unsolved}."
+    if story.map.unsolved:
+        words += f" The corrected way is that of {source} here: {story.map.unsolved}."
     if story.left_out:
         words += f" {story.left_out} frames are left out: their time is not later than that of the frames before them."
     across = len(story.closures) - len(of_one_clock(story.closures))
     if across:
         words += f" {across} closures are left out: they tie two runs of the clock, and the map is of one."
     return words
+
+
+def _pieces(story: Story) -> str:
+    """What of our own tracking is drawn."""
+    known = story.map
+    words = f"There is no odometry in this run: {len(known.frames)} of {len(story.glimpses)} frames are drawn, which "
+    words += f"closures tie out of {known.sessions} sessions." if known.sessions > 1 else "are of one session."
+    if not known.sessions_apart:
+        return words
+    return f"{words} {known.frames_apart} frames in {known.sessions_apart} more sessions are not: nothing ties them."
 
 
 def _timeline(story: Story) -> View | None:
@@ -305,7 +313,7 @@ def _card(pair: Pair, album: Album) -> View | None:
 
 def _objects(story: Story) -> list[View]:
     views = []
-    for caption, corrected in {"By odometry": False, "Corrected": True}.items():
+    for caption, corrected in {f"By {NAMES.get(story.source, story.source)}": False, "Corrected": True}.items():
         drawing = _in_both_widths(partial(figures.object_map, story, corrected), figures.HALF)
         if drawing is None:
             return []

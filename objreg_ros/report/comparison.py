@@ -9,9 +9,10 @@ from typing import Any
 
 from objreg_ros.data import LoopClosure, Rejected
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.report.chapter import View, judged, root_mean_square, spaced
+from objreg_ros.report.chapter import View, judged, spaced
 from objreg_ros.report.pairs import Pair, pairs_of
 from objreg_ros.report.story import Story
+from objreg_ros.report.trajectory_error import root_mean_square
 
 DEFAULT = "default"
 KEYFRAME_NS = round(RegistrarParams().keyframe_seconds * 1e9)  # moments so near are of one keyframe
@@ -63,7 +64,7 @@ def _table(stories: Sequence[Story]) -> list[tuple[str, list[str]]]:
         ("objects", [_count(story, "objects") for story in stories]),
         ("constraints", [f"{len(story.closures)}" for story in stories]),
         ("false constraints", [_false(story) for story in stories]),
-        ("error of odometry", [_trajectory_error(story, "odometry_error") for story in stories]),
+        ("error before correction", [_trajectory_error(story, "odometry_error") for story in stories]),
         ("error corrected", [_trajectory_error(story, "corrected_error") for story in stories]),
     ]
     reasons = dict.fromkeys(reason for story in stories for reason in story.summary.get("rejected", {}))

@@ -63,7 +63,7 @@ def error_over_time(story: Story, tracks: Tracks, width: int = WIDE) -> str:
     if not shown.any():
         return ""
     times = (tracks.stamps_ns[shown] - story.start_ns) * 1e-9
-    errors = {"odometry": 100 * tracks.odometry_error[shown], "corrected": 100 * tracks.corrected_error[shown]}
+    errors = {tracks.source: 100 * tracks.odometry_error[shown], "corrected": 100 * tracks.corrected_error[shown]}
     top = max(float(error.max()) for error in errors.values())
     plot = Plot((float(times[0]), float(times[-1]) + 1e-9), (0.0, 1.08 * max(top, 1.0)), width, height=220)
     plot.x_axis("s")
@@ -99,7 +99,7 @@ def timeline(story: Story, width: int = WIDE) -> str:
 
 
 def object_map(story: Story, corrected: bool, width: int = HALF) -> str:
-    """Every sighting of an object from above, by odometry or in the corrected map, and the camera's way."""
+    """Every sighting of an object from above, before or in the corrected map, and the camera's way."""
     seen = story.objects()
     places = [row[2] for row in seen]
     tracks = story.tracks()
@@ -120,7 +120,7 @@ def object_map(story: Story, corrected: bool, width: int = HALF) -> str:
     names = heaps([row[0] for row in seen], xy)
     for label, (x_px, y_px) in apart([(label, (plot.x(x), plot.y(y) - 8)) for label, (x, y) in names]):
         plot.text(x_px, y_px, label, "middle", "name")
-    return plot.svg("objects from above" + (", corrected" if corrected else ", by odometry"))
+    return plot.svg("objects from above" + (", corrected" if corrected else ", before it is corrected"))
 
 
 def heaps(labels: Sequence[str], xy: Array) -> list[tuple[str, Array]]:

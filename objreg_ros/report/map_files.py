@@ -51,15 +51,12 @@ class MapFiles:
     def write(self, story: Story, store: Path, tell: Callable[[str], None] = lambda line: None) -> None:
         """Write what is asked for; ``store`` is the registrar's, which is read for the cloud alone.
 
-        ``tell`` hears what was written and what was left out. ValueError for a run without odometry: it has no map.
+        ``tell`` hears what was written and what was left out. ValueError for a run without a trajectory: it has no map.
         OSError where a file cannot be written, StoreError (one of them) where the store cannot be read.
         """
-        stamps, odometry, corrected = story.poses_before_and_after()
+        stamps, _, corrected = story.poses_before_and_after()
         if not stamps:
-            raise ValueError(
-                f"{', '.join(self.wanted)}: expected frames with odometry, got none of {len(story.glimpses)}: there is "
-                "no map; is the topic of the odometry the right one, and its stamps of the same clock (odom_slop)?"
-            )
+            raise ValueError(f"{', '.join(self.wanted)}: {_why_no_map(story)}")
         if self.tum is not None:
             write_whole(self.tum, tum.trajectory_text(zip(stamps, corrected, strict=True)))
             tell(f"{self.tum}: {len(stamps)} poses")
@@ -71,8 +68,8 @@ class MapFiles:
             write_whole(self.g2o, g2o.graph_text(keyframes, edges))
             tell(f"{self.g2o}: {len(keyframes)} keyframes, {len(edges)} edges")
         if self.cloud is not None:
-            poses = dict(zip(stamps, zip(odometry, corrected, strict=True), strict=True))
-            cloud = cloud_of(_keyframes(store, tell), poses, self.voxel, tell)
+            poses = {frame.stamp_ns: (frame.T_session_camera, frame.T_map_camera) for frame in story.map.frames}
+            cloud = cloud_of(_keyframes(store, tell), poses, self.voxel, tell, by_odometry=not story.by_tracking)
             xyz, rgb = cloud.points()
             write_ply(self.cloud, xyz, rgb=rgb)
             tell(f"{self.cloud}: {len(xyz)} points, one for each voxel of {100.0 * cloud.voxel:g} cm")
@@ -83,15 +80,16 @@ def cloud_of(
     poses: dict[int, tuple[Array, Array]],
     voxel: float,
     tell: Callable[[str], None] = lambda line: None,
+    by_odometry: bool = True,
 ) -> VoxelCloud:
     """The views of keyframes, and their objects where these have colours, in the corrected frame.
 
-    ``poses`` are ``T_odom_camera`` and ``T_map_camera`` by stamps. A keyframe that is not of one of them, as one of
-    another run in the same store, is left out.
+    ``poses`` are ``T_session_camera`` and ``T_map_camera`` by stamps, by odometry or by our own tracking. A keyframe
+    that is not of one of them, as one of another run in the same store, is left out.
     """
     cloud, left_out = VoxelCloud(voxel), 0
     for keyframe in keyframes:
-        T_map_camera = _corrected(keyframe, poses)
+        T_map_camera = _corrected(keyframe, poses) if keyframe.by_odometry == by_odometry else None
         if T_map_camera is None:
             left_out += 1
             continue
@@ -101,7 +99,7 @@ def cloud_of(
             if item.cloud.rgb is not None:
                 cloud.add(T_map_camera, item.cloud.xyz, item.cloud.rgb, OF_AN_OBJECT)
     if left_out:
-        tell(f"{left_out} keyframes of the store are not on the map: they are of another run, or without odometry")
+        tell(f"{left_out} keyframes of the store are not on the map: they are of another run, or not of the trajectory")
     if cloud.voxel > voxel:
         tell(f"voxels of {voxel:g} m are more than fit into memory")
     return cloud
@@ -109,10 +107,19 @@ def cloud_of(
 
 def _corrected(keyframe: Keyframe, poses: dict[int, tuple[Array, Array]]) -> Array | None:
     """``T_map_camera``; None for a keyframe that is not of this run."""
-    T_odom_camera, T_map_camera = poses.get(keyframe.stamp_ns, (None, None))
-    if T_odom_camera is None or keyframe.T_odom_camera is None or not keyframe.by_odometry:
+    T_session_camera, T_map_camera = poses.get(keyframe.stamp_ns, (None, None))
+    if T_session_camera is None or keyframe.T_odom_camera is None:
         return None
-    return T_map_camera if np.allclose(keyframe.T_odom_camera, T_odom_camera, rtol=0.0, atol=SAME_POSE) else None
+    return T_map_camera if np.allclose(keyframe.T_odom_camera, T_session_camera, rtol=0.0, atol=SAME_POSE) else None
+
+
+def _why_no_map(story: Story) -> str:
+    if story.by_tracking:
+        return f"expected frames that were tracked, got none of {len(story.glimpses)}: there is no map"
+    return (
+        f"expected frames with odometry, got none of {len(story.glimpses)}: there is no map; is the topic of the "
+        "odometry the right one, and its stamps of the same clock (odom_slop)? --odometry tracked does without"
+    )
 
 
 def _keyframes(path: Path, tell: Callable[[str], None]) -> Iterator[Keyframe]:

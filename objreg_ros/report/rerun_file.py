@@ -15,6 +15,7 @@ from objreg_ros.whole_file import folder_for, put_whole
 
 COLOURS = {
     "odometry": (217, 89, 38),
+    "tracked": (217, 89, 38),
     "corrected": (42, 120, 214),
     "true": (139, 138, 131),
     "accepted": (26, 138, 60),

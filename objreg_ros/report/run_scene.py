@@ -63,8 +63,8 @@ class Moment:
 class RunScene:
     """A run in the frame in which odometry began; ``ways`` are ``odometry``, ``corrected`` and, if known, ``true``.
 
-    Without odometry the one way is the true one, in the frame of the truth. ``objects`` are labels with positions (3,)
-    m, one for each frame that saw one.
+    ``tracked`` stands for ``odometry`` where the way is that of our own tracking. Without either the one way is the
+    true one, in the frame of the truth. ``objects`` are labels with positions (3,) m, one for each frame that saw one.
     """
 
     name: str
@@ -99,10 +99,10 @@ def scene_of(story: Story, album: Album) -> RunScene:
 
 def _ways(story: Story) -> dict[str, Way]:
     stamps, odometry, corrected = story.poses_before_and_after()
-    if not stamps:
+    if not story.has_way:
         return _true_way(story, [glimpse.stamp_ns for glimpse in story.glimpses] or story.truth.stamps_ns)
     ways = {name: Way(tuple(stamps), np.array(poses)) for name, poses in
-            (("odometry", odometry), ("corrected", corrected))}  # fmt: skip
+            ((story.source, odometry), ("corrected", corrected))}  # fmt: skip
     true = _true_way(story, stamps).get("true")
     if true is not None and len(true.stamps_ns) >= LEAST_COMMON:
         of = dict(zip(stamps, corrected, strict=True))

@@ -48,7 +48,8 @@ def _levelling(story: Story, stamps_ns: Array, tracks: Tracks | None) -> Array:
         if not poses and (tracked := story.tracked_way()) is not None:
             poses = list(tracked[1])
     else:
-        poses = [tracks.T_drawn_map @ T for T in story.graph.corrected(stamps_ns.tolist())]
+        mapped = {frame.stamp_ns: frame.T_map_camera for frame in story.map.frames}
+        poses = [tracks.T_drawn_map @ mapped[stamp] for stamp in stamps_ns.tolist()]
     return levelling(np.array(poses).reshape(-1, 4, 4))
 
 

@@ -3,38 +3,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
-from objreg_ros.data import Array, LoopClosure, Odometry, Reason, Rejected
+from objreg_ros.data import Array, LoopClosure, Rejected
 from objreg_ros.geometry import rigid_fit, transform
+from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.pose_graph import PoseGraph
-from objreg_ros.report.trajectory_error import absolute_errors
+from objreg_ros.report.camera_map import TRACKED, CameraMap, with_sessions
+from objreg_ros.report.rows import Glimpse, advancing, closure_of, glimpse_of, read_rows, refusal_of
+from objreg_ros.report.trajectory_error import absolute_errors, root_mean_square
 from objreg_ros.truth import FALSE, Error, Truth, within
 
-Row = TypeVar("Row")
-
-MOST_NS = 1 << 63
 PAUSE_NS = 3_600_000_000_000  # what is further from a run is not of it: one stamp of 0 would make it last for decades
-
-
-@dataclass(frozen=True, slots=True)
-class Glimpse:
-    """One frame: when, from where (None without odometry), the labels detected, and objects by label and position.
-
-    Positions (3,) are the middles of the objects in the camera, m.
-    """
-
-    stamp_ns: int
-    T_odom_camera: Array | None = None
-    labels: tuple[str, ...] = ()
-    tracked: tuple[int, Array] | None = None  # without odometry: session and T_session_camera by our own tracking
-    objects: tuple[tuple[str, Array], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,11 +38,12 @@ class Tracks:
     odometry_error: Array | None = None
     corrected_error: Array | None = None
     T_drawn_map: Array = field(default_factory=lambda: np.eye(4))
+    source: str = "odometry"  # or "tracked", by our own tracking
 
     @property
     def lines(self) -> dict[str, Array]:
         """The ways that there are, by name, in the order in which they are drawn."""
-        told = {"odometry": self.odometry, "corrected": self.corrected}
+        told = {self.source: self.odometry, "corrected": self.corrected}
         return told if self.true is None else {"true": self.true, **told}
 
 
@@ -70,9 +57,8 @@ class Story:
     glimpses: tuple[Glimpse, ...] = ()
     closures: tuple[LoopClosure, ...] = ()
     refusals: tuple[Rejected, ...] = ()
-    graph: PoseGraph = field(default_factory=PoseGraph)
+    map: CameraMap = field(default_factory=CameraMap)
     pruned: tuple[LoopClosure, ...] = ()
-    unsolved: str = ""  # why the corrected way is that of odometry
 
     @classmethod
     def of(cls, name: str, summary: Mapping[str, Any], truth: Truth) -> Story:
@@ -80,14 +66,29 @@ class Story:
 
         ValueError for what `objreg offline --json` would not write.
         """
-        glimpses = _read(name, summary, "glimpses", _glimpse)
-        closures = _read(name, summary, "constraints", _closure)
-        graph, refusals = mapped(glimpses, closures), _read(name, summary, "refusals", _refusal)
-        try:
-            pruned, unsolved = graph.optimise().pruned, ""
-        except ImportError as error:
-            pruned, unsolved = (), str(error)
-        return cls(name, summary, truth, glimpses, closures, refusals, graph, pruned, unsolved)
+        glimpses = read_rows(name, summary, "glimpses", glimpse_of)
+        closures = read_rows(name, summary, "constraints", closure_of)
+        refusals, by_tracking = read_rows(name, summary, "refusals", refusal_of), summary.get("odometry") == TRACKED
+        frames = [frame for _, frame in advancing(glimpses, by_tracking)]
+        if by_tracking:
+            closures = with_sessions(closures, frames)
+        made = CameraMap.of(frames, closures, MapperParams.of_tracking() if by_tracking else None)
+        return cls(name, summary, truth, glimpses, closures, refusals, made, made.pruned)
+
+    @property
+    def by_tracking(self) -> bool:
+        """Whether the way is that of our own tracking, and not of odometry."""
+        return bool(self.summary.get("odometry") == TRACKED)
+
+    @property
+    def graph(self) -> PoseGraph:
+        """What solved the map."""
+        return self.map.graph
+
+    @property
+    def source(self) -> str:
+        """What the way is of, as its line is named."""
+        return TRACKED if self.by_tracking else "odometry"
 
     @cached_property
     def stretch_ns(self) -> tuple[int, int]:
@@ -149,25 +150,35 @@ class Story:
 
     @property
     def left_out(self) -> int:
-        """How many frames with odometry are not on the map because time does not advance at them."""
-        told = sum(glimpse.T_odom_camera is not None for glimpse in self.glimpses)
-        return told - len(advancing(self.glimpses))
+        """How many frames with a pose are not on the map because time does not advance at them."""
+        told = sum(glimpse.pose(self.by_tracking) is not None for glimpse in self.glimpses)
+        return told - len(self.map.frames) - self.map.frames_apart
 
     def poses_before_and_after(self) -> tuple[list[int], list[Array], list[Array]]:
-        """The stamps of the frames on the map, and ``T_odom_camera`` and ``T_map_camera`` (4, 4) at each."""
-        frames = posed(self.glimpses)
-        stamps = [stamp for stamp, _ in frames]
-        return stamps, [T for _, T in frames], self.graph.corrected(stamps)
+        """The stamps of the frames on the map, and the pose of the camera (4, 4) at each, before and ``T_map_camera``.
+
+        Before it is corrected it is ``T_odom_camera``; of our own tracking, each session where the map has its first
+        frame.
+        """
+        frames = self.map.frames
+        stamps = [frame.stamp_ns for frame in frames]
+        return stamps, [frame.T_map_camera_before for frame in frames], [frame.T_map_camera for frame in frames]
+
+    @property
+    def has_way(self) -> bool:
+        """Whether there is a way to draw. Of our own tracking one frame is none."""
+        return len(self.map.frames) > self.by_tracking
 
     def tracks(self) -> Tracks | None:
-        """Odometry, corrected and true way, over each other; None without odometry."""
+        """Odometry, or our own tracking, corrected and true way, over each other; None without any to draw."""
         stamps, odometry, corrected = self.poses_before_and_after()
-        if not stamps:
+        if not self.has_way:
             return None
         true = [self.truth.at(stamp) for stamp in stamps]
         known = [k for k, T in enumerate(true) if T is not None]
         if len(known) < 3:
-            return Tracks(np.array(stamps), positions(odometry), positions(corrected), None)
+            line = np.array(stamps), positions(odometry), positions(corrected)
+            return Tracks(*line, None, source=self.source)
         stamps = [stamps[k] for k in known]
         odometry, corrected = [odometry[k] for k in known], [corrected[k] for k in known]
         targets = [T for T in true if T is not None]
@@ -179,6 +190,7 @@ class Story:
             absolute_errors(odometry, targets),
             absolute_errors(corrected, targets),
             rigid_fit(positions(corrected), positions(targets)),
+            self.source,
         )
 
     def true_way(self) -> tuple[Array, Array] | None:
@@ -207,44 +219,36 @@ class Story:
         return np.array([stamp for stamp, _ in longest]), np.array([T for _, T in longest])
 
     def objects(self) -> list[tuple[str, Array, Array]]:
-        """(label, position by odometry, position in the map) of every object seen with odometry."""
-        seen = [glimpse for glimpse in advancing(self.glimpses) if glimpse.objects]
-        corrected = self.graph.corrected(glimpse.stamp_ns for glimpse in seen)
+        """(label, position before, position in the map) of every object seen on the map."""
+        mapped = {frame.stamp_ns: frame for frame in self.map.frames}
         return [
-            (label, transform(glimpse.T_odom_camera, xyz), transform(T_map_camera, xyz))
-            for glimpse, T_map_camera in zip(seen, corrected, strict=True)
+            (label, transform(mapped[at].T_map_camera_before, xyz), transform(mapped[at].T_map_camera, xyz))
+            for glimpse, (at, *_) in advancing(self.glimpses, self.by_tracking)
+            if at in mapped
             for label, xyz in glimpse.objects
-            if glimpse.T_odom_camera is not None
         ]
 
+    def trajectory(self) -> dict[str, Any] | None:
+        """The way as JSON: what it is of, how much is in one piece, its errors; None without a way.
 
-def advancing(glimpses: Sequence[Glimpse]) -> list[Glimpse]:
-    """The frames with odometry that are later than all before them: stamps repeat and go back where a bag is looped."""
-    later: list[Glimpse] = []
-    for glimpse in glimpses:
-        if glimpse.T_odom_camera is not None and (not later or glimpse.stamp_ns > later[-1].stamp_ns):
-            later.append(glimpse)
-    return later
-
-
-def posed(glimpses: Sequence[Glimpse]) -> list[tuple[int, Array]]:
-    """Stamp and ``T_odom_camera`` of the `advancing` frames."""
-    return [(glimpse.stamp_ns, T) for glimpse in advancing(glimpses) if (T := glimpse.T_odom_camera) is not None]
-
-
-def of_one_clock(closures: Sequence[LoopClosure]) -> list[LoopClosure]:
-    """The closures from an earlier to a later moment: the others tie two runs of the clock; a map is of one."""
-    return [closure for closure in closures if closure.from_ns < closure.to_ns]
-
-
-def mapped(glimpses: Sequence[Glimpse], closures: Sequence[LoopClosure]) -> PoseGraph:
-    """The pose graph of the frames with odometry at which time advances, with every closure of one clock."""
-    graph = PoseGraph()
-    for stamp_ns, T_odom_camera in posed(glimpses):
-        graph.add_odometry(Odometry(T_odom_body=T_odom_camera, stamp_ns=stamp_ns))
-    for closure in of_one_clock(closures):
-        graph.add_closure(closure)
-    return graph
+        ``error_cm`` is the root mean square of the absolute trajectory error, before and after closures correct it;
+        None without truth.
+        """
+        of, tracks = self.map, self.tracks()
+        if not of.frames:
+            return None
+        errors = (None, None) if tracks is None else (tracks.odometry_error, tracks.corrected_error)
+        rms = [None if error is None else round(100.0 * root_mean_square(error), 3) for error in errors]
+        return {
+            "of": self.source,
+            "frames": len(of.frames),
+            "sessions": of.sessions,
+            "frames_apart": of.frames_apart,
+            "sessions_apart": of.sessions_apart,
+            "pruned": len(self.pruned),
+            "unsolved": of.unsolved,
+            "error_cm": None if None in rms else dict(zip(("before", "after"), rms, strict=True)),
+        }
 
 
 def positions(poses: Sequence[Array]) -> Array:
@@ -254,92 +258,3 @@ def positions(poses: Sequence[Array]) -> Array:
 
 def _laid_over(poses: Sequence[Array], true: Sequence[Array]) -> Array:
     return transform(rigid_fit(positions(poses), positions(true)), positions(poses))
-
-
-def _read(name: str, summary: Mapping[str, Any], key: str, read: Callable[[Any], Row]) -> tuple[Row, ...]:
-    try:
-        return tuple(read(row) for row in summary.get(key, ()))
-    except (TypeError, KeyError, AttributeError, ValueError, OverflowError) as error:
-        got = " ".join(str(summary[key]).split())[:80]
-        raise ValueError(
-            f"{name}: expected {key} as `objreg offline --json` writes them, got {got} ({error!r}); run it again"
-        ) from error
-
-
-def _glimpse(row: Mapping[str, Any]) -> Glimpse:
-    pose, stamp_ns, tracked = row.get("T_odom_camera"), _stamp(row["stamp_ns"]), row.get("tracked")
-    return Glimpse(
-        stamp_ns=stamp_ns,
-        T_odom_camera=None if pose is None else _rigid(pose, stamp_ns),
-        labels=tuple(map(_spaced, row.get("labels", ()))),
-        tracked=None if tracked is None else (int(tracked["session"]), _rigid(tracked["T_session_camera"], stamp_ns)),
-        objects=tuple((_spaced(label), _place(xyz)) for label, xyz in row.get("objects", ())),
-    )
-
-
-def _stamp(value: Any) -> int:
-    """A stamp in ns; ValueError for what a message cannot have."""
-    stamp_ns = int(value)
-    if abs(stamp_ns) >= MOST_NS:
-        raise ValueError(f"expected a stamp in ns, got {value}")
-    return stamp_ns
-
-
-def _place(xyz: Any) -> Array:
-    """A position (3,) m; ValueError if it is none."""
-    place = np.array(xyz, float)
-    if place.shape != (3,) or not np.isfinite(place).all():
-        raise ValueError(f"expected three finite numbers, got {xyz}")
-    return place
-
-
-def _tried_pose(pose: Any) -> Array | None:
-    """A pose that was turned down (4, 4), which may not be rigid; None where there is none to look at."""
-    if pose is None:
-        return None
-    T = np.array(pose, float)
-    if T.shape != (4, 4):
-        raise ValueError(f"expected a pose of 4 x 4 numbers, got {T.shape}")
-    return T if np.isfinite(T).all() else None
-
-
-def _text(value: Any) -> str:
-    if not isinstance(value, str):
-        raise ValueError(f"expected text, got {value!r}")
-    return value
-
-
-def _rigid(pose: Any, stamp_ns: int) -> Array:
-    """The pose (4, 4); ValueError if it is none."""
-    return Odometry(T_odom_body=np.array(pose, float), stamp_ns=stamp_ns).T_odom_body
-
-
-def _closure(row: Mapping[str, Any]) -> LoopClosure:
-    return LoopClosure(
-        from_ns=_stamp(row["from_ns"]),
-        to_ns=_stamp(row["to_ns"]),
-        T_from_to=np.array(row["T_from_to"], float),
-        covariance=np.array(row["covariance"], float),
-        labels=tuple(map(_spaced, row["labels"])),
-        evidence=_evidence(row),
-    )
-
-
-def _evidence(row: Mapping[str, Any]) -> dict[str, float]:
-    return {_spaced(name): float(number) for name, number in row.get("evidence", {}).items()}
-
-
-def _spaced(label: str) -> str:
-    """A label as it reads on a page."""
-    return label.replace("_", " ")
-
-
-def _refusal(row: Mapping[str, Any]) -> Rejected:
-    return Rejected(
-        reason=Reason(row["reason"]),
-        from_ns=_stamp(row["from_ns"]),
-        to_ns=_stamp(row["to_ns"]),
-        detail=_text(row["detail"]),
-        T_from_to=_tried_pose(row.get("T_from_to")),
-        evidence=_evidence(row),
-    )

@@ -23,4 +23,9 @@ def absolute_errors(estimated: Sequence[Array], true: Sequence[Array]) -> Array:
 
 def absolute_trajectory_error(estimated: Sequence[Array], true: Sequence[Array]) -> float:
     """The root of the mean square of `absolute_errors`, m."""
-    return float(np.sqrt(np.mean(absolute_errors(estimated, true) ** 2)))
+    return root_mean_square(absolute_errors(estimated, true))
+
+
+def root_mean_square(values: Array) -> float:
+    """The root of the mean square."""
+    return float(np.sqrt(np.mean(values**2)))

@@ -47,7 +47,7 @@ def test_a_folder_goes_through_the_real_rooms_and_gives_its_json(model: Path, tm
     output = offline(folder, "--model", model, "--json", file, "--set", "registrar.seed=7")
     assert "4 frames, 4 detections" in output and "the first time compiles for a minute" in output
     summary = json.loads(file.read_text())
-    assert set(summary) >= KEYS and summary["frames"] == 4 and summary["odometry"] is None
+    assert set(summary) >= KEYS and summary["frames"] == 4 and summary["odometry"] == "tracked"
     about = summary["about"]
     assert about["params"] == {"detector.model": str(model), "registrar.seed": 7}
     assert about["model"]["name"] == model.name and about["recording"] == str(folder)
@@ -123,7 +123,7 @@ def test_a_drift_without_a_seed_is_refused_before_anything_is_prepared(odometry:
 
 
 def test_an_odometry_that_is_not_there_is_refused_with_what_it_may_be(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"--odometry: expected a topic of /.*, or none, or drift:SEED, got '/oddom'"):
+    with pytest.raises(ValueError, match=r"expected a topic of /.*, or tracked, or none, or drift:SEED, got '/oddom'"):
         offline(tum_folder(tmp_path), "--odometry", "/oddom")
 
 
@@ -206,9 +206,38 @@ def test_the_map_is_made_of_the_store_that_was_asked_for(model: Path, tmp_path: 
 
 
 @pytest.mark.parametrize("option", ["--tum", "--kitti", "--g2o", "--map"])
-def test_a_map_without_odometry_is_refused_before_the_run(option: str, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=rf"{option}: expected odometry, .* got none of /.*--odometry TOPIC, or"):
-        offline(tum_folder(tmp_path / "tum"), "--model", "no_model.onnx", option, tmp_path / "out")
+def test_a_map_of_no_trajectory_is_refused_before_the_run(option: str, tmp_path: Path) -> None:
+    words = (option, tmp_path / "out", "--odometry", "none")
+    with pytest.raises(ValueError, match=rf"{option}: expected a trajectory, .* or one of /.* with --odometry TOPIC"):
+        offline(tum_folder(tmp_path / "tum"), "--model", "no_model.onnx", *words)
+
+
+def test_a_recording_without_odometry_has_the_trajectory_of_our_own_tracking(model: Path, tmp_path: Path) -> None:
+    folder, file = tum_folder(tmp_path / "tum", frames=4), tmp_path / "out.json"
+    files = {name: tmp_path / name for name in ("tum", "kitti", "g2o", "map")}
+    words = [word for name, path in files.items() for word in (f"--{name}", path.with_suffix(".out"))]
+    output = offline(folder, "--model", model, "--json", file, *words)
+    assert output.count("! there is no odometry: the trajectory is that of the registrar's own tracking") == 1
+    trajectory = json.loads(file.read_text())["trajectory"]
+    assert trajectory["of"] == "tracked" and trajectory["frames"] + trajectory["frames_apart"] == 4
+    assert f"trajectory (tracked): {trajectory['frames']} frames" in output
+    assert len((tmp_path / "tum.out").read_text().splitlines()) == trajectory["frames"]
+    assert all((tmp_path / f"{name}.out").stat().st_size for name in ("kitti", "g2o", "map"))
+
+
+def test_the_error_of_a_trajectory_is_told_before_and_after_it_is_corrected(model: Path, tmp_path: Path) -> None:
+    folder, file = tum_folder(tmp_path / "tum", frames=4), tmp_path / "out.json"
+    output = offline(folder, "--model", model, "--json", file, "--odometry", "drift:1")
+    error = json.loads(file.read_text())["trajectory"]["error_cm"]
+    assert 0.0 < error["before"] < 20.0 and error["after"] == pytest.approx(error["before"], abs=0.2)
+    assert f"trajectory error: {error['before']:.1f} cm, corrected {error['after']:.1f} cm (RMS)" in output
+
+
+def test_no_trajectory_is_asked_for_and_none_is_told(model: Path, tmp_path: Path) -> None:
+    folder, file = tum_folder(tmp_path / "tum", frames=2), tmp_path / "out.json"
+    assert "trajectory" not in offline(folder, "--model", model, "--json", file, "--odometry", "none")
+    summary = json.loads(file.read_text())
+    assert summary["odometry"] is None and summary["trajectory"] is None
 
 
 @pytest.mark.parametrize("option", ["--tum", "--kitti", "--g2o", "--map"])
@@ -224,7 +253,7 @@ def test_a_voxel_of_no_size_is_refused_before_the_run(tmp_path: Path) -> None:
 
 def test_a_run_is_written_for_foxglove(model: Path, tmp_path: Path) -> None:
     folder, file = tum_folder(tmp_path / "tum", frames=4), tmp_path / "run.mcap"
-    output = offline(folder, "--model", model, "--mcap", file)
+    output = offline(folder, "--model", model, "--mcap", file, "--odometry", "none")
     assert f"{file}: the way (true), 0 closures, 4 moments with picture and cloud" in output
     assert {record.topic for record in read(file)} >= {"/way/true", "/tf", "/camera/points"}
 

@@ -19,8 +19,7 @@ def asked(folder: Path, *options: str, voxel: float = 0.02) -> Outputs:
     return Outputs.of(*(files.get(name) for name in names), voxel, None, files.get("mcap"))
 
 
-def without_odometry() -> tuple[Any, Any]:
-    return SimpleNamespace(path=Path("bag"), topics={"/image": None}), SimpleNamespace(odom=None)
+BAG: Any = SimpleNamespace(path=Path("bag"), topics={"/image": None})
 
 
 def test_nothing_is_wanted_of_no_options(tmp_path: Path) -> None:
@@ -38,16 +37,17 @@ def test_a_file_that_cannot_be_written_is_refused_before_the_run(tmp_path: Path)
         asked(tmp_path / "nowhere", "g2o")
 
 
-def test_a_map_wants_odometry_and_says_how_to_get_one(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"--tum: expected odometry.*--odometry drift:1"):
-        asked(tmp_path, "tum").require_way(*without_odometry(), has_truth=True)
+def test_a_map_wants_a_trajectory_and_says_how_to_get_one(tmp_path: Path) -> None:
+    asked(tmp_path, "tum").require_way(BAG, has_way=True, has_truth=False)
+    with pytest.raises(ValueError, match=r"--tum: expected a trajectory.*--odometry none.*--odometry tracked"):
+        asked(tmp_path, "tum").require_way(BAG, has_way=False, has_truth=True)
 
 
 def test_a_scene_is_content_with_truth(tmp_path: Path) -> None:
     outputs = asked(tmp_path, "mcap")
-    outputs.require_way(*without_odometry(), has_truth=True)
+    outputs.require_way(BAG, has_way=False, has_truth=True)
     with pytest.raises(ValueError, match="--mcap: expected odometry or a ground truth"):
-        outputs.require_way(*without_odometry(), has_truth=False)
+        outputs.require_way(BAG, has_way=False, has_truth=False)
 
 
 def test_a_cloud_is_made_of_a_store_in_a_file(tmp_path: Path) -> None:

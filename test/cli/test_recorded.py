@@ -9,8 +9,15 @@ from recording.folders import tum_folder
 
 from objreg_ros.cli.recorded import Asked
 from objreg_ros.cli.settings import read_settings
+from objreg_ros.recording import Record, open_recording, write_rosbag2
+from objreg_ros.recording.drift import with_drifting_odometry
 
 NOTHING = {"model": None, "labels": None, "camera": "", "params_file": None, "changes": (), "remaps": ()}
+
+
+def with_odometry(folder: Path) -> list[Record]:
+    with open_recording(folder) as source:
+        return list(with_drifting_odometry(source.records(), "/ground_truth", 1))
 
 
 def test_named_options_are_settings_of_the_nodes() -> None:
@@ -28,4 +35,22 @@ def test_no_more_frames_are_expected_than_are_asked_for(tmp_path: Path) -> None:
     folder = tum_folder(tmp_path, frames=4)
     with asked.opened(folder) as whole, replace(asked, max_frames=3).opened(folder) as part:
         assert (whole.frames, part.frames) == (4, 3) and whole.inputs.depth == "/depth/image"
-        assert whole.notes == ()
+        assert len(whole.notes) == 1 and "registrar's own tracking" in whole.notes[0]
+
+
+def test_a_recording_without_odometry_is_tracked_unless_it_is_asked_for_none(tmp_path: Path) -> None:
+    asked = Asked(read_settings(None, ()))
+    folder = tum_folder(tmp_path, frames=2)
+    known = []
+    for odometry in (None, "tracked", "none", "drift:1"):
+        with replace(asked, odometry=odometry).opened(folder) as opened:
+            known.append((opened.odometry, len(opened.notes)))
+    assert known == [("tracked", 1), ("tracked", 0), (None, 0), ("/drifting_odom", 0)]
+
+
+def test_odometry_that_is_there_is_left_out_where_tracking_is_asked_for(tmp_path: Path) -> None:
+    write_rosbag2(tmp_path / "bag", with_odometry(tum_folder(tmp_path / "tum", frames=2)))
+    asked = Asked(read_settings(None, ()))
+    with asked.opened(tmp_path / "bag") as opened, replace(asked, odometry="tracked").opened(tmp_path / "bag") as other:
+        assert (opened.odometry, opened.inputs.odom) == ("/drifting_odom", "/drifting_odom")
+        assert (other.odometry, other.inputs.odom) == ("tracked", None)

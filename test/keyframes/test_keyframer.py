@@ -56,6 +56,19 @@ def test_objects_without_points_make_no_keyframe() -> None:
     assert _run(Keyframer(PARAMS), [frame(0.1 * i, (nowhere,), moved(0.1 * i)) for i in range(10)]) == []
 
 
+def swung(degrees: float) -> np.ndarray:
+    return pose(rotation_from_vector(np.array([0.0, np.radians(degrees), 0.0])), np.zeros(3))
+
+
+def test_a_camera_that_turns_fast_is_followed_in_one_session() -> None:
+    poses = [swung(angle) for angle in (0, 7, 14, 21, 14, 6)]
+    keyframer = Keyframer(PARAMS)
+    for i, T in enumerate(poses):
+        keyframer.add(frame(0.1 * i, CUP, None, scene_view(T)))
+        assert keyframer.tracked is not None and keyframer.tracked[0] == 0
+        np.testing.assert_allclose(keyframer.tracked[1], T, atol=0.02)
+
+
 def test_without_odometry_the_views_give_the_motion() -> None:
     frames = [frame(0.1 * i, CUP, None, scene_view(moved(0.03 * i))) for i in range(6)]
     windows = _run(Keyframer(PARAMS), frames)

@@ -11,7 +11,7 @@ from registration.samples import CAMERA, moved, scene_view
 
 from objreg_ros.data import View
 from objreg_ros.geometry import pose, pose_error, rotation_from_vector
-from objreg_ros.keyframes.tracking import tracked_surface, view_motion
+from objreg_ros.keyframes.tracking import same_picture, tracked_surface, view_motion
 
 MOTIONS = [
     pose(rotation_from_vector(np.array([0.0, 0.02, 0.0])), np.array([0.02, 0.0, 0.01])),
@@ -87,3 +87,18 @@ def test_two_views_of_different_scenes_have_no_motion() -> None:
     nothing = View(xyz=np.full((120, 160, 3), np.nan, np.float32), grey=None, intrinsics=CAMERA)
     assert view_motion(scene_view(), tracked_surface(nothing)) is None
     assert view_motion(nothing, tracked_surface(scene_view())) is None
+
+
+def test_views_show_the_same_where_they_lie_and_not_aside() -> None:
+    view, surface = scene_view(MOTIONS[0]), tracked_surface(scene_view())
+    assert same_picture(view, surface, MOTIONS[0]) > 0.98
+    assert same_picture(replace(view, grey=view.grey // 2 + np.uint8(40)), surface, MOTIONS[0]) > 0.98
+    assert same_picture(view, surface, moved(0.2) @ MOTIONS[0]) < 0.7
+    assert same_picture(view, surface, moved(9.0)) == 0.0
+
+
+def test_a_view_without_grey_or_contrast_contradicts_nothing() -> None:
+    view = scene_view()
+    dull = replace(view, grey=np.random.default_rng(1).integers(90, 99, view.grey.shape).astype(np.uint8))
+    for one, other in ((replace(view, grey=None), view), (view, replace(view, grey=None)), (dull, dull)):
+        assert same_picture(one, tracked_surface(other), moved(0.2)) == 1.0

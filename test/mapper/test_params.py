@@ -46,3 +46,9 @@ def test_robots_are_distinct_namespaces(robots: tuple[str, ...]) -> None:
 def test_a_floor_that_a_user_could_set_before_is_refused_with_what_took_its_place() -> None:
     with pytest.raises(ValueError, match="min_sigma_rotation: no parameter any more; it is LEAST_SIGMAS"):
         MapperParams.from_mapping({"min_sigma_rotation": 0.1})
+
+
+def test_our_own_tracking_is_believed_less_than_odometry_and_errs_by_nothing_steady() -> None:
+    usual, tracked = MapperParams(), MapperParams.of_tracking()
+    assert all(a > b for a, b in zip(tracked.odometry_sigmas, usual.odometry_sigmas, strict=True))
+    assert not any(tracked.steady) and tracked.keyframe_translation == usual.keyframe_translation

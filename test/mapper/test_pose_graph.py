@@ -438,6 +438,18 @@ def test_sessions_by_different_clocks_need_no_names() -> None:
     assert len(graph.optimise().kept) == 2 and graph.is_placed
 
 
+def test_any_session_is_asked_by_its_number_for_its_moments() -> None:
+    graph = two_sessions()
+    assert graph.is_in_map(0) and not graph.is_in_map(1)
+    for a, b in ((20, 21), (60, 61)):
+        assert graph.add_closure(across(a, b))
+    graph.optimise()
+    assert graph.is_in_map(1)
+    stamps = [k * SECOND // 10 for k in range(3)]
+    np.testing.assert_array_equal(graph.corrected(stamps, session=1), graph.corrected(stamps))
+    np.testing.assert_allclose(graph.corrected(stamps, session=0)[0], LAPS[0][0], atol=0.01)
+
+
 def test_a_session_of_no_odometry_is_none() -> None:
     graph = PoseGraph()
     graph.begin_session(3)

@@ -75,6 +75,17 @@ def summary(false: bool = False) -> dict[str, Any]:
     }
 
 
+def tracked(begins: int = 0) -> dict[str, Any]:
+    """The walk without odometry: our own tracking has it, lost at frame ``begins`` and begun anew there, if not 0."""
+    told = summary()
+    poses = odometry()
+    for k, row in enumerate(told["glimpses"]):
+        first = begins if k >= begins else 0
+        T = inverse(poses[first]) @ poses[k]
+        row |= {"T_odom_camera": None, "tracked": {"session": int(k >= begins > 0), "T_session_camera": T.tolist()}}
+    return {**told, "odometry": "tracked"}
+
+
 def with_a_stray(stamp_ns: int) -> dict[str, Any]:
     """The walk with a frame of another time before it, whose label nothing else has, and with a refusal of then."""
     told = summary()

@@ -10,7 +10,7 @@ from objreg_ros.report.page import page
 from objreg_ros.report.story import Story
 from objreg_ros.truth import Truth
 
-from .runs import TRUTH, summary
+from .runs import TRUTH, summary, tracked
 
 FINDING = {"what": "No image was read.", "cause": "All <malformed>.", "todo": "objreg inspect x", "anchor": "no-images"}
 
@@ -71,3 +71,15 @@ def test_without_odometry_and_truth_our_own_tracking_is_drawn_in_its_longest_str
     assert f"{len(rows) - lost} of {len(rows)} frames" in way["words"]
     assert way["legend"][0] == ("tracked", "our own tracking") and "line tracked" in way["drawing"]["wide"]
     assert way["scene"]["ways"][0]["name"] == "our own tracking"
+
+
+def test_our_own_tracking_is_drawn_corrected_with_what_of_it_is_left_out() -> None:
+    lost = tracked(begins=45)
+    lost["constraints"] = []
+    for told, words in ((tracked(), "120 of 120 frames"), (lost, "45 frames in 1 more sessions are not: nothing ties")):
+        way = view(told)["way"]
+        assert words in way["words"] and "There is no odometry" in way["words"]
+        assert ("tracked", "our own tracking") in way["legend"] and ("corrected", "corrected") in way["legend"]
+        assert 'class="line tracked"' in way["drawing"]["wide"]
+    assert "than our own tracking" in next(tile for tile in view(tracked())["tiles"] if "error" in tile["name"])["note"]
+    assert page([(Story.of("walk", tracked(), TRUTH), None)])

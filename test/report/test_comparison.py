@@ -61,4 +61,4 @@ def test_the_table_tells_errors_reasons_and_times_of_each() -> None:
     table = dict(comparison([told({}), told({}, stage_ms=slow, rejected={"gravity_not_kept": 3})])["table"])
     assert table["detect, median"] == ["8.0 ms", "16.0 ms"] and table["register, median"] == ["0.2 ms", "–"]
     assert table["gravity not kept"] == ["0", "3"] and table["false constraints"] == ["0 of 4", "0 of 4"]
-    assert table["error of odometry"][0].endswith(" cm")
+    assert table["error before correction"][0].endswith(" cm")

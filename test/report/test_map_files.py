@@ -31,7 +31,7 @@ def walk() -> Story:
     return Story.of("walk", summary(false=True), TRUTH)
 
 
-def rows(file: Path) -> np.ndarray:
+def rows_of(file: Path) -> np.ndarray:
     return np.array([line.split() for line in file.read_text().splitlines()], float)
 
 
@@ -57,7 +57,7 @@ def taken(number: int, seconds: float, *objects: object, x: float | None = None)
 def test_the_trajectories_are_the_corrected_way_at_every_frame(walk: Story, tmp_path: Path) -> None:
     told: list[str] = []
     MapFiles(tum=tmp_path / "way.tum", kitti=tmp_path / "way.kitti").write(walk, NOWHERE, told.append)
-    tum, kitti = rows(tmp_path / "way.tum"), rows(tmp_path / "way.kitti").reshape(-1, 3, 4)
+    tum, kitti = rows_of(tmp_path / "way.tum"), rows_of(tmp_path / "way.kitti").reshape(-1, 3, 4)
     assert tum[:, 0].tolist() == [k / 10 for k in range(COUNT)]
     np.testing.assert_allclose(kitti[:, :, 3], tum[:, 1:4], atol=1e-8)
     _, odometry, corrected = walk.poses_before_and_after()
@@ -131,7 +131,19 @@ def test_keyframes_of_another_run_in_the_same_store_are_left_out(tmp_path: Path)
         straight(3), store_of(tmp_path / "b.db", taken(1, 1.0), *others), told.append
     )
     assert (tmp_path / "map.ply").read_bytes() == (tmp_path / "both.ply").read_bytes()
-    assert told[1] == "3 keyframes of the store are not on the map: they are of another run, or without odometry"
+    assert told[1] == "3 keyframes of the store are not on the map: they are of another run, or not of the trajectory"
+
+
+def test_keyframes_of_our_own_tracking_are_on_its_map_and_those_of_odometry_are_not(tmp_path: Path) -> None:
+    rows = [
+        {"stamp_ns": k * SECOND, "tracked": {"session": 4, "T_session_camera": moved(k).tolist()}} for k in range(3)
+    ]
+    story = Story.of("straight", {"glimpses": rows, "constraints": [], "odometry": "tracked"}, Truth([]))
+    store = store_of(tmp_path / "a.db", replace(taken(1, 1.0), by_odometry=False), taken(2, 2.0))
+    told: list[str] = []
+    MapFiles(tum=tmp_path / "way.tum", cloud=tmp_path / "map.ply").write(story, store, told.append)
+    assert told[1] == "1 keyframes of the store are not on the map: they are of another run, or not of the trajectory"
+    assert len(read_ply(tmp_path / "map.ply")) > 1000 and len(rows_of(tmp_path / "way.tum")) == 3
 
 
 def test_a_damaged_keyframe_is_left_out_and_told(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 from objreg_ros.report.story import Story
 from objreg_ros.truth import Truth
 
-from .runs import COUNT, TRUE, TRUTH, summary, with_a_stray
+from .runs import COUNT, TRUE, TRUTH, summary, tracked, with_a_stray
 
 
 def test_closures_bend_the_way_back_to_the_truth() -> None:
@@ -138,7 +138,7 @@ def test_the_pose_that_was_refused_is_told_where_there_was_one() -> None:
 def test_without_the_solver_the_way_is_that_of_odometry_and_the_story_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "gtsam", None)
     story = Story.of("walk", summary(), TRUTH)
-    assert "expected gtsam" in story.unsolved and not story.pruned
+    assert "expected gtsam" in story.map.unsolved and not story.pruned
     tracks = story.tracks()
     np.testing.assert_allclose(tracks.corrected, tracks.odometry, atol=1e-3)
 
@@ -157,3 +157,29 @@ def test_a_run_with_a_short_rest_is_one_stretch() -> None:
         row["stamp_ns"] += 3000 * 10**9
     story = Story.of("walk", told, TRUTH)
     assert story.out_of_time == {} and story.stretch_ns[1] > 3000 * 10**9
+
+
+def test_our_own_tracking_is_corrected_as_odometry_is_and_named_as_what_it_is() -> None:
+    story, usual = Story.of("walk", tracked(), TRUTH), Story.of("walk", summary(), TRUTH)
+    tracks, trajectory = story.tracks(), story.trajectory()
+    assert list(tracks.lines) == ["true", "tracked", "corrected"]
+    assert trajectory["of"] == "tracked" and (trajectory["frames"], trajectory["sessions"]) == (COUNT, 1)
+    assert trajectory["error_cm"]["after"] < 0.5 * trajectory["error_cm"]["before"]
+    assert usual.trajectory()["error_cm"]["before"] == pytest.approx(trajectory["error_cm"]["before"])
+    assert len(story.objects()) == len(usual.objects()) > 0
+
+
+def test_of_a_track_that_was_lost_the_largest_part_is_on_the_map() -> None:
+    told = tracked(begins=45)  # closures tie 40 to 100, but one alone ties no session
+    told["constraints"] = [row for row in told["constraints"] if row["from_ns"] == 40 * 100_000_000]
+    story = Story.of("walk", told, TRUTH)
+    trajectory = story.trajectory()
+    assert (trajectory["frames"], trajectory["frames_apart"], trajectory["sessions_apart"]) == (75, 45, 1)
+    assert story.left_out == 0 and len(story.tracks().corrected) == 75
+    whole = Story.of("walk", tracked(begins=45), TRUTH).trajectory()
+    assert (whole["frames"], whole["sessions"], whole["frames_apart"]) == (COUNT, 2, 0)
+
+
+def test_without_an_order_to_track_the_track_is_no_map() -> None:
+    story = Story.of("walk", {**tracked(), "odometry": None}, TRUTH)
+    assert story.tracks() is None and story.trajectory() is None and len(story.tracked_way()[0]) == COUNT
