@@ -114,9 +114,12 @@ class Rooms:
 
 
 def build_rooms(
-    detector: DetectorParams, segmenter: SegmenterParams, registrar: RegistrarParams
+    detector: DetectorParams, segmenter: SegmenterParams, registrar: RegistrarParams, detects: Detects | None = None
 ) -> tuple[Rooms, Callable[[], None]]:
-    """The rooms by their parameters, and what closes them. OSError and ValueError as the rooms raise them."""
+    """The rooms by their parameters, and what closes them. OSError and ValueError as the rooms raise them.
+
+    ``detects`` takes the place of the detector: what remembers pictures that it has seen before, say.
+    """
     from objreg_ros import share
     from objreg_ros.detector.detector import Detector
     from objreg_ros.registrar.registrar import Registrar
@@ -124,7 +127,7 @@ def build_rooms(
     from objreg_ros.segmenter.organise import organise
     from objreg_ros.segmenter.segment import Segmenter
 
-    detects = Detector.of(detector, share.model)
+    detects = detects or Detector.of(detector, share.model)
     segments = Segmenter(segmenter)
     segments.warm()
     warm(registrar)

@@ -14,7 +14,7 @@ import numpy as np
 from objreg_ros.bridge.calibration import absolute
 from objreg_ros.cli.settings import Settings, read_settings
 from objreg_ros.detector.params import DetectorParams
-from objreg_ros.offline import Run, Timing, build_rooms, run_offline
+from objreg_ros.offline import Detects, Run, Timing, build_rooms, run_offline
 from objreg_ros.recording import Record, Recording, open_recording
 from objreg_ros.recording.drift import ODOM, with_drifting_odometry
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
@@ -73,11 +73,15 @@ class Asked:
     @contextmanager
     def opened(self, path: Path) -> Iterator[Opened]:
         """A recording with the inputs that it is run on; OSError and ValueError where it has not got them."""
-        told = self.settings.of("segmenter", SegmenterNodeParams)
         with open_recording(path) as recording:
-            source = with_camera(recording, told.camera, parse_remaps(self.remaps), told.source)
-            inputs = self._inputs(source, told.source)
-            yield Opened(self, path, source, inputs, Truth.of(source, inputs.ground_truth))
+            yield replace(self.of_recording(recording), path=path)
+
+    def of_recording(self, recording: Recording) -> Opened:
+        """As `opened`, of a recording that is open already, be it one without a file. ValueError as that."""
+        told = self.settings.of("segmenter", SegmenterNodeParams)
+        source = with_camera(recording, told.camera, parse_remaps(self.remaps), told.source)
+        inputs = self._inputs(source, told.source)
+        return Opened(self, recording.path, source, inputs, Truth.of(source, inputs.ground_truth))
 
     def _inputs(self, source: Recording, depth_source: str) -> Inputs:
         asked = parse_remaps(self.remaps)
@@ -131,8 +135,16 @@ class Opened:
         count = self.source.topics[self.inputs.depth or self.inputs.points or ""].count
         return min(count, self.asked.max_frames or count)
 
-    def run(self, registrar: RegistrarParams | None = None, on_frame: Callable[[int], None] = lambda n: None) -> Run:
-        """What comes out of the rooms; ``registrar`` in place of the settings' own. ``on_frame`` as `run_offline`."""
+    def run(
+        self,
+        registrar: RegistrarParams | None = None,
+        on_frame: Callable[[int], None] = lambda n: None,
+        detects: Detects | None = None,
+    ) -> Run:
+        """What comes out of the rooms; ``registrar`` and ``detects`` in place of what the settings say.
+
+        ``on_frame`` as in `run_offline`.
+        """
         settings = self.asked.settings
         detector = settings.of("detector", DetectorParams)
         find_pose = static_frames(self.source).between
@@ -141,6 +153,7 @@ class Opened:
             detector,
             settings.of("segmenter", SegmenterParams),
             registrar or settings.of("registrar", RegistrarParams),
+            detects,
         )
         try:
             return run_offline(self._records(), rooms, self.inputs, timing, self.asked.max_frames, on_frame)
