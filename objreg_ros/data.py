@@ -331,7 +331,7 @@ class Frame:
     ``objects`` with instance >= 1; ``support`` the points of the surfaces they stand on (instance 0) or None;
     ``gravity (3,) float64`` of length 1, the way things fall in the camera frame, or None; ``gravity_confidence`` 0..1;
     ``T_odom_camera`` the odometry's pose of the camera or None; ``robot`` who carries the camera, empty where there is
-    but one.
+    but one; ``doubt`` why the camera is not what it says, empty where nothing speaks against it.
     """
 
     objects: tuple[ObjectCloud, ...]
@@ -343,6 +343,7 @@ class Frame:
     stamp_ns: int
     frame_id: str = "camera"
     robot: str = ""
+    doubt: str = ""
 
     def __post_init__(self) -> None:
         few = len(self.objects) <= limits.MOST_OBJECTS
@@ -583,9 +584,12 @@ class Reason(Enum):
     UNREADABLE = "unreadable"
     CLOCK = "clock_began_anew"
     NEIGHBOURS = "neighbours_disagree"
+    CAMERA = "camera_implausible"
 
 
-UNTRIED = frozenset({Reason.NO_CANDIDATE, Reason.REDUNDANT, Reason.OVER_BUDGET, Reason.UNREADABLE, Reason.CLOCK})
+UNTRIED = frozenset(
+    {Reason.NO_CANDIDATE, Reason.REDUNDANT, Reason.OVER_BUDGET, Reason.UNREADABLE, Reason.CLOCK, Reason.CAMERA}
+)
 """Reasons for which nothing was registered."""
 
 

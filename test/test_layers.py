@@ -31,6 +31,7 @@ FREE_BRIDGE = tuple(
     f"bridge.{name}"
     for name in (
         "calibration",
+        "camera_checks",
         "calibration_files",
         "from_msg",
         "course",

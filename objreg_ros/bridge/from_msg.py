@@ -38,6 +38,7 @@ from objreg_ros.data import (
     View,
 )
 from objreg_ros.geometry import interpolate, pose, rotation_from_quaternion
+from objreg_ros.plausibility.pinhole import differ, likelier
 
 Array = NDArray[Any]
 
@@ -119,10 +120,33 @@ def intrinsics(message: Any) -> Intrinsics:
     """The pinhole camera of a CameraInfo, with its binning and region of interest applied.
 
     It is the projection matrix P, by which rectified and registered pictures are made (image_geometry's
-    PinholeCameraModel), and K where P is left at zeros. ValueError for a camera that is not calibrated (ROS drivers
-    say so with zeros in both).
+    PinholeCameraModel), and K where P is left at zeros. Where nothing is to be rectified both are one camera: if they
+    differ, and P cannot be that of the picture as K can, it is K. ValueError for a camera that is not calibrated (ROS
+    drivers say so with zeros in both).
     """
-    return _windowed(_calibrated(message), message)
+    camera = _windowed(_calibrated(message), message)
+    other = unrectified_twin(message)
+    return camera if other is None else likelier(camera, other)
+
+
+def unrectified_twin(message: Any) -> Intrinsics | None:
+    """The camera of K where a CameraInfo says that nothing is to be rectified (D zero, R the identity), and P another
+    one; None where the two agree, or may differ."""
+    K, P, R = _camera_matrix(message, "k"), _camera_matrix(message, "p"), _numbers(message, "r")
+    if K[0, 0] == 0 or P[0, 0] == 0 or np.array_equal(K, P[:, :3]) or np.any(_numbers(message, "d")):
+        return None
+    if R.any() and not np.allclose(R, np.eye(3).ravel(), atol=1e-6):
+        return None
+    try:
+        k, p = pinhole(message, "k"), pinhole(message, "p")
+    except ValueError:
+        return None
+    return k if differ(p, k) else None
+
+
+def _numbers(message: Any, name: str) -> Array:
+    values = getattr(message, name) if hasattr(message, name) else getattr(message, name.upper(), ())  # as in ROS 1
+    return np.asarray(values, np.float64).ravel()
 
 
 def pinhole(message: Any, name: str) -> Intrinsics:

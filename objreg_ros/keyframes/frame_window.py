@@ -66,6 +66,16 @@ class FrameWindow:
         """Whose camera it is of."""
         return self.frames[0].robot
 
+    @property
+    def camera(self) -> tuple[str, str]:
+        """Whose camera it is of, and its frame."""
+        return self.robot, self.frames[0].frame_id
+
+    @property
+    def doubt(self) -> str:
+        """Why its camera is not what it says; empty where nothing speaks against it."""
+        return next((frame.doubt for frame in self.frames if frame.doubt), "")
+
     @classmethod
     def of(cls, frame: Frame) -> FrameWindow:
         """One frame by itself."""

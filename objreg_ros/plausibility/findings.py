@@ -45,12 +45,12 @@ def no_camera(why: str) -> Finding:
     return Finding(f"camera_info: {why}", cause, NAME_CAMERA, anchor)
 
 
-def matrices_disagree(p: Intrinsics, k: Intrinsics, used: Intrinsics) -> Finding:
+def matrices_disagree(p: Intrinsics, k: Intrinsics, is_p_used: bool) -> Finding:
     """K and P of one camera_info differ where nothing is to be rectified."""
     stated = " and ".join(
         f"{name} has a focal length of {c.fx:.0f} px about {c.cx:.0f}, {c.cy:.0f}" for name, c in (("K", k), ("P", p))
     )
-    name = "K" if used is k else "P"
+    name = "P" if is_p_used else "K"
     return Finding(
         f"the two matrices of camera_info disagree: {stated}; {name} is used",
         "the driver scaled one of them and left the other, or left its default; there is no distortion to rectify",

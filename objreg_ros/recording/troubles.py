@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from objreg_ros.bridge import colour_frame, from_msg, lenses
+from objreg_ros.bridge.camera_checks import check_camera
 from objreg_ros.data import Array, Intrinsics
 from objreg_ros.plausibility.finding import Finding
 from objreg_ros.recording.inputs import Inputs
@@ -63,7 +64,7 @@ def warnings(recording: Recording, inputs: Inputs) -> list[Finding]:
     if inputs.ground_truth is None:
         found.append(Finding("no ground truth: the true error of constraints cannot be told"))
     found += map(Finding, [*_mount_of_camera(recording, inputs), *_mount_of_imu(recording, inputs)])
-    for look in (_first_messages, _registration, _stamps, _scale):
+    for look in (_first_messages, _camera, _registration, _stamps, _scale):
         found += look(recording, inputs)
     return found
 
@@ -111,6 +112,16 @@ def _try(
     except ValueError as error:
         found.append(Finding(f"{name}: {error}"))
         return None
+
+
+def _camera(recording: Recording, inputs: Inputs) -> list[Finding]:
+    """Whether the camera can be that of its pictures."""
+    info, colour_info = (first_readable(recording, topic) for topic in (inputs.camera_info, inputs.colour_info))
+    one_frame = _frame_id(recording, inputs.image) == _frame_id(recording, inputs.depth)
+    try:
+        return [] if info is None else check_camera(info, colour_info, one_frame)
+    except ValueError:
+        return []  # said where the first messages are looked at
 
 
 def _size(hw: tuple[int, int]) -> str:

@@ -13,6 +13,7 @@ from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.recollection import Recollection
 from objreg_ros.registrar.relocalisation import Relocalisation
 from objreg_ros.registrar.thinning import Thinning
+from objreg_ros.registration.gate.refusal import Refusal
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
 
@@ -56,6 +57,11 @@ class CameraTrack:
     def is_abreast(self, stamp_ns: int, keyframe_id: int) -> bool:
         """Whether it has come to about this time, by a keyframe that came after the one of this id."""
         return self.newest_id > keyframe_id and abs(self.newest_ns - stamp_ns) < GOES_ON_NS
+
+    def give_up(self, window: FrameWindow) -> Outcome:
+        """Refuse a frame window whose camera is in doubt, and all that waits."""
+        refusal = Reason.CAMERA, window.doubt
+        return Outcome(rejected=(*self.confirmation.give_up(refusal), refused_window(window, refusal)))
 
     def settle(self, now_ns: int | None, recollection: Recollection) -> Outcome:
         """What waits no more: late constraints, which are written down, and refusals; all where there is no now."""
@@ -137,6 +143,24 @@ class CameraTracks(dict[Camera, CameraTrack]):
         beside = (track for of, track in tuple(self.items()) if of[0] == robot and of != camera)
         together = set().union(*(track.sessions for track in beside if track.goes_on_beside(clock)))
         return store.sessions_beyond(robot, clock.session, clock.began_ns) - together
+
+
+def refused_window(window: FrameWindow, refusal: Refusal) -> Rejected:
+    """A frame window that was not compared with any other."""
+    reason, detail = refusal
+    first = window.frames[0]
+    return Rejected(
+        reason=reason,
+        from_ns=first.stamp_ns,
+        to_ns=first.stamp_ns,
+        detail=detail,
+        from_frame_id=first.frame_id,
+        to_frame_id=first.frame_id,
+        from_session=window.session,
+        to_session=window.session,
+        from_robot=first.robot,
+        to_robot=first.robot,
+    )
 
 
 def clock_refusals(clock: Clock, hidden: frozenset[int], keyframe: Keyframe) -> tuple[Rejected, ...]:

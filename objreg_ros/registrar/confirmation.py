@@ -105,6 +105,12 @@ class Confirmation:
             del self._waiting[number]
         return confirmed, refused
 
+    def give_up(self, refusal: Refusal) -> list[Rejected]:
+        """Refuse all that waits."""
+        refused = [waiting.refused(refusal) for waiting in self._waiting.values()]
+        self._waiting.clear()
+        return refused
+
     def _possible(self, candidate: Candidate, prior: Prior | None) -> bool:
         margin = candidate.perturbation_margin
         held = margin is None or margin >= LEAST_MARGIN

@@ -140,13 +140,16 @@ class Registrar:
         as over budget: with no time the keyframe is only stored. Without a limit the outcome depends on the frames
         alone. Keyframes are numbered as they come here: in the order of their frames. StoreError where one cannot be
         stored; then it closes nothing. Of a frame window that a `reset` overtook nothing comes, nor of
-        one whose objects have no name and were seen but once.
+        one whose objects have no name and were seen but once. One whose camera is in doubt is refused and not stored:
+        it would be wrong for whoever comes there later.
         """
         budget = Budget(time.monotonic() + seconds, hurried)
         with self._lock:
             if window.session < self._first_session:  # `reset` came first
                 return Outcome()
             self.params = self._recollection.params = self._adopted
+            if window.doubt:
+                return self._tracks.of(window.camera).give_up(window)
             keyframe = fuse(window, self.params)
             return self._search(keyframe, window.clock, budget) if keyframe.objects else Outcome()
 
