@@ -39,7 +39,9 @@ FREE_BRIDGE = tuple(
         "lenses",
         "masks",
         "pictures",
-        "static_frames",
+        "frames",
+        "mount",
+        "chains",
     )
 )
 CORE = ("limits", "sensor", "whole_file", "data", "lens", "geometry", "params", "share")

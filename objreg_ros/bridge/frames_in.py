@@ -13,7 +13,7 @@ from std_msgs.msg import String
 
 from objreg_ros.bridge import from_msg, qos
 from objreg_ros.bridge.matching import MatchingDoor
-from objreg_ros.bridge.static_frames import Mount
+from objreg_ros.bridge.mount import Mount
 from objreg_ros.bridge.sync import Match, Need, Stream
 from objreg_ros.data import Array, Frame
 

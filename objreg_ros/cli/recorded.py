@@ -18,7 +18,7 @@ from objreg_ros.offline import Run, Timing, build_rooms, run_offline
 from objreg_ros.recording import Record, Recording, open_recording
 from objreg_ros.recording.drift import ODOM, with_drifting_odometry
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
-from objreg_ros.recording.mounts import static_frames
+from objreg_ros.recording.mounts import camera_frame, frame_tree, moving_topics
 from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.report.about import about
@@ -122,8 +122,8 @@ class Opened:
         """What comes out of the rooms; ``registrar`` in place of the settings' own. ``on_frame`` as `run_offline`."""
         settings = self.asked.settings
         detector = settings.of("detector", DetectorParams)
-        find_pose = static_frames(self.source).between
-        timing = replace(self._timing(), find_pose=find_pose, max_rate=detector.max_rate)
+        frames = frame_tree(self.source, camera_frame(self.source, self.inputs))
+        timing = replace(self._timing(), frames=frames, max_rate=detector.max_rate)
         rooms, close = build_rooms(
             detector,
             settings.of("segmenter", SegmenterParams),
@@ -168,7 +168,8 @@ class Opened:
         return timing
 
     def _records(self) -> Iterator[Record]:
-        records = self.source.records(set(self.inputs.chosen().values()))
+        topics = {*self.inputs.chosen().values(), *moving_topics(self.source)}
+        records = self.source.records(topics)
         if not self.asked.drifts or self.inputs.ground_truth is None:
             return records
         seed = int(str(self.asked.odometry).removeprefix(DRIFT))

@@ -32,9 +32,9 @@ from objreg_ros.bridge.matching import MatchingDoor
 from objreg_ros.bridge.overridable import FIXED
 from objreg_ros.bridge.params import ManagedParams
 from objreg_ros.bridge.spin import run
-from objreg_ros.bridge.static_frames import Mount
+from objreg_ros.bridge.mount import Mount
 from objreg_ros.bridge.sync import Drop, Match, Need, Stream
-from objreg_ros.bridge.transforms import hear_static_frames
+from objreg_ros.bridge.transforms import hear_frames
 from objreg_ros.data import Array, ColourImage, DepthImage, Detections, FeltGravity, Frame, PointCloud
 from objreg_ros.segmenter.doubts import range_doubt, registration_doubt
 from objreg_ros.segmenter.imu import Imu
@@ -65,9 +65,9 @@ class SegmenterNode(MatchingDoor):
         await_kernels(self._segmenter.warm, self.get_logger().info)
         self._camera_info: Any = read_calibration(self._inputs.camera) if self._inputs.camera else None
         mounting = self._inputs.mounting if self._inputs.level_odom else self._inputs.imu_mounting
-        frames = hear_static_frames(self, mounting is None)
+        frames = hear_frames(self, mounting is None)
         self._imu = Imu(self._inputs.imu_mounting, frames.between)
-        self._mount = Mount(self._inputs.mounting, frames.between, self.get_logger().info)
+        self._mount = Mount(self._inputs.mounting, frames, self.get_logger().info)
         self._told: Counter[str] = Counter()  # frames by who told their gravity
         self._apart_deg: deque[float] = deque(maxlen=COMPARED)
         self._source: str | None = None  # the topic that depth comes by

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from objreg_ros.bridge.static_frames import Mount, StaticFrames
-from objreg_ros.data import Odometry
+from objreg_ros.bridge.frames import FrameTree
 from objreg_ros.geometry import pose, quaternion_from_rotation, rotation_from_vector
 
 
@@ -33,7 +32,7 @@ def said(*transforms: Any) -> Any:
 
 
 def test_two_frames_of_one_tree_are_tied_up_and_down() -> None:
-    frames = StaticFrames()
+    frames = FrameTree()
     frames.hear(said(transform("base", "camera", moved(1)), transform("camera", "camera_optical", moved(2))))
     frames.hear(said(transform("/base", "/imu", moved(3))))
     expected = np.linalg.inv(moved(1) @ moved(2)) @ moved(3)
@@ -44,16 +43,16 @@ def test_two_frames_of_one_tree_are_tied_up_and_down() -> None:
 
 
 def test_frames_that_nothing_ties_are_not_guessed() -> None:
-    frames = StaticFrames()
+    frames = FrameTree()
     frames.hear(said(transform("base", "camera", moved(1)), transform("map", "imu", moved(2))))
     assert frames.between("camera", "imu") is None and frames.between("nowhere", "camera") is None
 
 
 def test_the_last_word_on_a_frame_counts_and_a_ring_is_no_end() -> None:
-    ring = StaticFrames()
+    ring = FrameTree()
     ring.hear(said(transform("a", "b", moved(1)), transform("b", "a", moved(2))))
     assert ring.between("c", "a") is None and ring.between("a", "b") is not None
-    frames = StaticFrames()
+    frames = FrameTree()
     frames.hear(said(transform("a", "b", moved(1)), transform("a", "b", moved(3))))
     assert frames.between("a", "b") == pytest.approx(moved(3), abs=1e-9)
 
@@ -65,7 +64,7 @@ def test_a_transform_that_is_none_is_refused(wrong: str) -> None:
         one.transform.rotation = SimpleNamespace(x=0.0, y=0.0, z=0.0, w=0.0)
     else:
         one.transform.translation.x = float("nan")
-    frames = StaticFrames()
+    frames = FrameTree()
     with pytest.raises(ValueError, match="expected"):
         frames.hear(said(one))
     assert frames.between("a", "b") is None
@@ -73,51 +72,7 @@ def test_a_transform_that_is_none_is_refused(wrong: str) -> None:
 
 @pytest.mark.parametrize("names", [("a", "b" * 1001), ("a" * 1001, "b")])
 def test_a_name_that_is_too_long_is_refused(names: tuple[str, str]) -> None:
-    frames = StaticFrames()
-    with pytest.raises(ValueError, match="tf_static: expected at most 1000 characters, got 1001"):
+    frames = FrameTree()
+    with pytest.raises(ValueError, match="tf: expected at most 1000 characters, got 1001"):
         frames.hear(said(transform(*names, moved(1))))
     assert frames.between(*names) is None
-
-
-def words(child: str) -> list[Odometry]:
-    return [Odometry(T_odom_body=np.eye(4), child_frame_id=child, stamp_ns=1, frame_id="odom")]
-
-
-def test_the_camera_sits_on_the_body_as_the_parameter_says_else_as_the_tree_does() -> None:
-    frames, said_of_it = StaticFrames(), list[str]()
-    frames.hear(said(transform("base", "eye", moved(1))))
-    mount = Mount(None, frames.between, said_of_it.append)
-    for _ in range(3):
-        assert mount.T_body_camera(words("/base"), "eye") == pytest.approx(moved(1), abs=1e-9)
-    (text,) = said_of_it
-    assert text.startswith("/tf_static has the camera's 'eye' on the odometry's 'base' at ")
-    assert Mount(moved(2), frames.between, said_of_it.append).T_body_camera(words("base"), "eye") is not None
-    assert np.array_equal(Mount(moved(2), frames.between).T_body_camera(words("base"), "eye"), moved(2))
-    assert len(said_of_it) == 1
-
-
-def test_what_nothing_ties_is_one_place_and_said_once_and_again_where_that_changes() -> None:
-    frames, said_of_it = StaticFrames(), list[str]()
-    mount = Mount(None, frames.between, said_of_it.append)
-    assert [mount.T_body_camera(words("base"), "eye") for _ in range(3)] == [None] * 3
-    (text,) = said_of_it
-    assert "ties the odometry's 'base' to the camera's 'eye': taken to be one place; set T_base_camera" in text
-    frames.hear(said(transform("base", "eye", moved(1))))
-    assert mount.T_body_camera(words("base"), "eye") is not None and len(said_of_it) == 2
-
-
-@pytest.mark.parametrize("told", [None, [], "eye", "/eye"])
-def test_odometry_of_the_camera_itself_and_none_need_no_word(told: object) -> None:
-    said_of_it = list[str]()
-    mount = Mount(None, StaticFrames().between, said_of_it.append)
-    assert mount.T_body_camera(words(told) if isinstance(told, str) else told, "eye") is None  # type: ignore[arg-type]
-    assert said_of_it == []
-
-
-def test_what_is_assumed_of_two_robots_in_turn_is_said_once_of_each() -> None:
-    texts: list[str] = []
-    mount = Mount(None, StaticFrames().between, texts.append)
-    for robot in ("a", "b") * 3:
-        word = Odometry(T_odom_body=np.eye(4), stamp_ns=0, child_frame_id=f"{robot}/base")
-        mount.T_body_camera([word], f"{robot}/camera")
-    assert len(texts) == 2 and "a/base" in texts[0] and "b/base" in texts[1]
