@@ -46,8 +46,9 @@ labels = click.option("--labels", help="Text file of labels, one a line.")
 max_frames = click.option("--max-frames", type=click.IntRange(min=1), help="Stop after this many frames.")
 odometry = click.option(
     "--odometry",
-    metavar="TOPIC|none|drift:SEED",
-    help="Another topic, no odometry, or a synthetic one that drifts away from the recording's ground truth.",
+    metavar="TOPIC|tf|none|drift:SEED",
+    help="Another topic (of Odometry or poses), the moving frame on /tf, no odometry, or a synthetic one that drifts "
+    "away from the recording's ground truth.",
 )
 OF_RUN = ("model", "labels", "camera", "max_frames", "odometry", "params_file", "changes", "remaps")
 

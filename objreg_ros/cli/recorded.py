@@ -17,8 +17,9 @@ from objreg_ros.detector.params import DetectorParams
 from objreg_ros.offline import Run, Timing, build_rooms, run_offline
 from objreg_ros.recording import Record, Recording, open_recording
 from objreg_ros.recording.drift import ODOM, with_drifting_odometry
-from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
+from objreg_ros.recording.inputs import TF_ODOM, Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.mounts import camera_frame, frame_tree, moving_topics
+from objreg_ros.recording.tf_odometry import by_transforms, with_transforms
 from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.report.about import about
@@ -26,7 +27,10 @@ from objreg_ros.report.findings import setting
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_ros.truth import Truth
 
-DRIFT = "drift:"
+DRIFT, TF = "drift:", "tf"
+NOT_ON_TF = (
+    "expected a moving frame above the camera on /tf, as odom → base_link, got none; is the camera's frame tied to it?"
+)
 CAMERAS_OWN = (
     "--odometry {} is the camera's own and not level: T_base_camera and segmenter.level_odom are left out of this run"
 )
@@ -69,16 +73,20 @@ class Asked:
         """A recording with the inputs that it is run on; OSError and ValueError where it has not got them."""
         told = self.settings.of("segmenter", SegmenterNodeParams)
         with open_recording(path) as recording:
-            source = with_camera(recording, told.camera, parse_remaps(self.remaps), told.source)
+            camera = with_camera(recording, told.camera, parse_remaps(self.remaps), told.source)
+            source = with_transforms(camera, self.odometry == TF)
             inputs = self._inputs(source, told.source)
             yield Opened(self, path, source, inputs, Truth.of(source, inputs.ground_truth))
 
     def _inputs(self, source: Recording, depth_source: str) -> Inputs:
         asked = parse_remaps(self.remaps)
         if self.odometry is not None:
-            asked["odom"] = "" if self.odometry == "none" or self.drifts else self.odometry
+            named = {TF: TF_ODOM, "none": ""}.get(self.odometry, self.odometry)
+            asked["odom"] = "" if self.drifts else named
+            if asked["odom"] == TF_ODOM and TF_ODOM not in source.topics:
+                raise ValueError(f"{source.path}: --odometry tf: {NOT_ON_TF}")
             if asked["odom"] and asked["odom"] not in source.topics:
-                expected = f"a topic of {', '.join(source.topics)}, or none, or drift:SEED"
+                expected = f"a topic of {', '.join(source.topics)}, or tf, none or drift:SEED"
                 raise ValueError(f"--odometry: expected {expected}, got {self.odometry!r}")
         inputs = choose_inputs(source.topics, asked, depth_source)
         if not inputs.complete:
@@ -110,7 +118,7 @@ class Opened:
         segmenter = self.asked.settings.of("segmenter", SegmenterNodeParams)
         is_told = registrar.mounting is not None or segmenter.level_odom
         left_out = [CAMERAS_OWN.format(self.asked.odometry)] if self.asked.drifts and is_told else []
-        return (*self.source.notes, *self.truth.notes, *left_out)
+        return (*self.source.notes, *by_transforms(self.source, self.inputs), *self.truth.notes, *left_out)
 
     @property
     def frames(self) -> int:
