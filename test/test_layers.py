@@ -42,6 +42,7 @@ FREE_BRIDGE = tuple(
         "frames",
         "mount",
         "chains",
+        "travel",
     )
 )
 CORE = ("limits", "sensor", "whole_file", "data", "lens", "geometry", "params", "share")

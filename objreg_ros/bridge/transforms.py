@@ -21,6 +21,11 @@ KEPT = 100  # messages of all that say how the parts of a robot sit on each othe
 MOVING = 100  # messages of /tf: a second of a robot
 
 
+def is_installed() -> bool:
+    """Whether /tf can be heard at all."""
+    return TFMessage is not None
+
+
 def hear_frames(door: Door, wanted: bool = True, then: Callable[[Any], None] = lambda message: None) -> FrameTree:
     """What /tf_static and /tf say, from now on; nothing ever where it is not ``wanted``, or of no installed type.
 

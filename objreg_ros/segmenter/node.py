@@ -29,10 +29,10 @@ from objreg_ros.bridge.detections_in import DetectionsIn
 from objreg_ros.bridge.indoors import Indoors, Surplus
 from objreg_ros.bridge.lifetime import await_kernels
 from objreg_ros.bridge.matching import MatchingDoor
+from objreg_ros.bridge.mount import Mount
 from objreg_ros.bridge.overridable import FIXED
 from objreg_ros.bridge.params import ManagedParams
 from objreg_ros.bridge.spin import run
-from objreg_ros.bridge.mount import Mount
 from objreg_ros.bridge.sync import Drop, Match, Need, Stream
 from objreg_ros.bridge.transforms import hear_frames
 from objreg_ros.data import Array, ColourImage, DepthImage, Detections, FeltGravity, Frame, PointCloud

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.bridge import transforms
-from objreg_ros.bridge.transforms import hear_mount, hear_frames
+from objreg_ros.bridge.transforms import hear_frames, hear_mount
 from objreg_ros.data import Odometry
 
 
