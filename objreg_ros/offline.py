@@ -18,8 +18,9 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from objreg_ros.bridge import colour_frame, from_msg, lenses
+from objreg_ros.bridge.frames import FrameTree
+from objreg_ros.bridge.mount import Mount, Seat, nameless_body
 from objreg_ros.bridge.pace import Pace
-from objreg_ros.bridge.static_frames import FindPose, Mount
 from objreg_ros.bridge.sync import Drop, Match, Need, Stream, Synchroniser
 from objreg_ros.data import (
     Array,
@@ -36,6 +37,7 @@ from objreg_ros.data import (
 )
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.recording.inputs import Inputs
+from objreg_ros.recording.mounts import is_moving
 from objreg_ros.recording.record import Record
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.report.export import constraint
@@ -141,7 +143,7 @@ class Timing:
 
     With ``level_odom`` the segmenter takes gravity from the odometry, and ``T_level_camera`` is its T_base_camera.
     ``max_rate`` is the detector's; 0, as it is here, is every picture. ``T_camera_imu`` is the segmenter's.
-    ``find_pose`` is asked for each of these that is None: (one frame, another) → how the other sits on the one.
+    ``frames`` is asked for each of these that is None, and takes in what /tf says on the way.
     """
 
     slop_ns: int = 20_000_000
@@ -152,7 +154,7 @@ class Timing:
     T_level_camera: Array | None = None
     rectified: str = "auto"  # whether pictures come without the distortion of their lens, as the segmenter's parameter
     T_camera_imu: Array | None = None
-    find_pose: FindPose = lambda a, b: None
+    frames: FrameTree = field(default_factory=FrameTree)
     max_rate: float = 0.0
 
 
@@ -272,15 +274,17 @@ class Line:
         self._has_colour_info = inputs.colour_info is not None
         self._named = colour_frame.named_registered(inputs.depth, inputs.image)
         self._pace = Pace(timing.max_rate)
-        self._imu = Imu(timing.T_camera_imu, timing.find_pose)
-        self._mount = Mount(timing.T_base_camera, timing.find_pose, self._hear_of_mount)
-        self._level_mount = Mount(timing.T_level_camera, timing.find_pose)
+        self._imu = Imu(timing.T_camera_imu, timing.frames.between)
+        self._mount = Mount(timing.T_base_camera, timing.frames, self._hear_of_mount)
+        self._level_mount = Mount(timing.T_level_camera, timing.frames)
+        self._odom_topic = inputs.odom or ""
         self.run.imu_passed_over = self._imu.counts
         self._labels: dict[int, tuple[str, ...]] = {}  # what was detected in the frames that are under way
         self._views = Synchroniser(self._streams(), self._unmatched)
         expected = inputs.odom is not None
         odom = Stream("odom", Need.OPTIONAL, timing.odom_slop_ns, ODOM_DEPTH, enclosing=True, expected=expected)
-        self._frames = Synchroniser([Stream("frame"), odom], self._unmatched)
+        joints = Stream("joints", Need.OPTIONAL, timing.odom_slop_ns, ODOM_DEPTH, enclosing=True)
+        self._frames = Synchroniser([Stream("frame"), odom, joints], self._unmatched)
 
     def _streams(self) -> list[Stream]:
         streams = [Stream("depth"), Stream("detections", slop_ns=self._timing.slop_ns)]
@@ -305,7 +309,10 @@ class Line:
             self.take(name, message)
 
     def take(self, name: str, message: Any) -> None:
-        """One message of an input of the graph. One that breaks its contract is counted as dropped."""
+        """One message of an input of the graph, or of "tf". One that breaks its contract is counted as dropped."""
+        if name == "tf":
+            self._take_tf(message)
+            return
         stamp_ns = from_msg.stamp_ns(message)
         if name == "image":
             self._take_image(stamp_ns, message)
@@ -319,6 +326,8 @@ class Line:
         elif name == "odom":
             odometry = self._kept(name, partial(from_msg.odometry, message))
             if odometry is not None:
+                body = nameless_body(self._odom_topic, hasattr(message, "child_frame_id"))
+                self._mount.nameless = self._level_mount.nameless = body
                 self._feed(name, stamp_ns, odometry)
                 self._track(self._frames.add(name, stamp_ns, odometry))
         elif name == "imu":
@@ -326,6 +335,13 @@ class Line:
             felt = None if sample is None else self._imu.hear(sample)
             if felt is not None:
                 self._feed(name, stamp_ns, felt)
+
+    def _take_tf(self, message: Any) -> None:
+        """What /tf says; frames wait until the joints that carry the camera are known."""
+        self._kept("tf", partial(self._timing.frames.hear_moving, message))
+        reached_ns = self._mount.reached_ns
+        if reached_ns is not None:
+            self._track(self._frames.add("joints", reached_ns, None))
 
     def finish(self) -> Run:
         """Let out what waits."""
@@ -373,7 +389,7 @@ class Line:
         with self._timed("decode"):
             depth, detections = self._depth(match)
             odom = match.payloads.get("odom")
-            T_body_camera = self._level_mount.T_body_camera(odom, depth.frame_id)
+            T_body_camera = self._level_mount.T_body_camera(odom, depth.frame_id, match.stamp_ns)
             gravity = from_msg.level_gravity(match.stamp_ns, odom, T_body_camera)
             felt = self._felt_gravity(match, depth.frame_id)
         with self._timed("segment"):
@@ -395,7 +411,7 @@ class Line:
 
     def _depth(self, match: Match) -> tuple[DepthImage, Detections]:
         """Depth and boxes of one picture without a lens."""
-        found, find_pose = match["detections"], self._timing.find_pose
+        found, find_pose = match["detections"], self._timing.frames.between
         if not self._from_points:
             cameras = colour_frame.Cameras(match["camera_info"], self._colour_info, self._named, self._has_colour_info)
             colour = match.payloads.get("image")
@@ -414,8 +430,9 @@ class Line:
             if self.full:
                 return
             labels = self._labels.pop(match.stamp_ns, ())
-            T_body_camera = self._mount.T_body_camera(match["odom"], match["frame"].frame_id)
-            frame = with_odometry(match["frame"], match["odom"], T_body_camera)
+            seated = self._mount.seated(match["odom"], match["frame"].frame_id, match.stamp_ns)
+            odom = None if seated.seat is Seat.BEYOND else match["odom"]
+            frame = with_odometry(match["frame"], odom, seated.T_body_camera)
             self.run.frames += 1
             self.run.glimpses.append(glimpse(frame, labels))
             with self._timed("register"):
@@ -467,8 +484,9 @@ def run_offline(
     line = Line(rooms, inputs, timing or Timing(), max_frames)
     name_of = {topic: name for name, topic in inputs.chosen().items()}
     for record in records:
-        if record.topic in name_of:
-            line.take_record(name_of[record.topic], record)
+        name = "tf" if is_moving(record.topic, record.msgtype) else name_of.get(record.topic)
+        if name is not None:
+            line.take_record(name, record)
             on_frame(line.run.frames + line.run.dropped[LEFT_OUT])
         if line.full:
             break

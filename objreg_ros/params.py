@@ -140,7 +140,7 @@ class MountedParams(Params):
 
     T_base_camera: tuple[float, ...] = param(
         (),
-        "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: as /tf_static says, or the "
+        "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: as /tf_static or /tf say, or the "
         "odometry is the camera's",
     )
 

@@ -43,7 +43,10 @@ FREE_BRIDGE = tuple(
         "masks",
         "pictures",
         "registered_depth",
-        "static_frames",
+        "frames",
+        "mount",
+        "chains",
+        "travel",
     )
 )
 CORE = ("limits", "sensor", "whole_file", "data", "lens", "geometry", "params", "share")

@@ -10,17 +10,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bridge.trees import said, transform
 from recording.folders import CAMERA, records, uncalibrated
 from simple_rooms import OneBox, simple_rooms
 
 from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.frames import FrameTree
 from objreg_ros.data import ColourImage, DepthImage, Detections, Frame, Intrinsics
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
-from objreg_ros.geometry import back_project, pose, rotation_from_vector
+from objreg_ros.geometry import back_project, pose, rotation_angle, rotation_from_vector
 from objreg_ros.offline import Timing, as_sent, run_offline
 from objreg_ros.recording import Record, messages
 from objreg_ros.recording.inputs import Inputs
+from objreg_ros.recording.mounts import TRANSFORMS
 from objreg_ros.segmenter.organise import organise
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.segmenter.sensor_estimate import Lag, SensorEstimate
@@ -440,31 +443,51 @@ def test_a_run_whose_frames_tell_nothing_of_their_sensor_says_none() -> None:
     assert summary["depth_noise"] is None and summary["depth_lag"] is None
 
 
+def tied(place: np.ndarray) -> Timing:
+    """The camera at a place on the base, by a tree of frames."""
+    tree = FrameTree()
+    tree.hear(said(transform("base", "camera", place)))
+    return Timing(frames=tree)
+
+
 def test_the_cameras_place_on_the_body_is_asked_for_by_the_names_of_their_frames_unless_it_is_told() -> None:
-    place, asked = turned_about_x(0.3), list[tuple[str, str]]()
-
-    def found(body: str, camera: str) -> np.ndarray:
-        asked.append((body, camera))
-        return place
-
+    place = turned_about_x(0.3)
     (rooms, chain), (told_rooms, told_chain) = simple_rooms(), simple_rooms()
-    run = run_offline(map(other_body, records(2)), rooms, INPUTS, Timing(find_pose=found))
-    run_offline(
-        map(other_body, records(2)), told_rooms, INPUTS, Timing(find_pose=lambda *_: np.eye(4), T_base_camera=place)
-    )
-    assert set(asked) == {("base", "camera")} and "/tf_static has the camera's 'camera'" in run.mount
-    for frame, told in zip(chain.frames, told_chain.frames, strict=True):
-        np.testing.assert_array_equal(frame.T_odom_camera, told.T_odom_camera)
-        np.testing.assert_allclose(frame.T_odom_camera[:3, :3], place[:3, :3])
+    run = run_offline(map(other_body, records(2)), rooms, INPUTS, tied(place))
+    told = replace(tied(np.eye(4)), T_base_camera=place)
+    run_offline(map(other_body, records(2)), told_rooms, INPUTS, told)
+    assert "/tf_static has the camera's 'camera' on the odometry's 'base'" in run.mount
+    for frame, other in zip(chain.frames, told_chain.frames, strict=True):
+        np.testing.assert_allclose(frame.T_odom_camera, other.T_odom_camera, atol=1e-9)
+        np.testing.assert_allclose(frame.T_odom_camera[:3, :3], place[:3, :3], atol=1e-9)
 
 
 def test_gravity_of_a_level_odometry_is_turned_by_the_same_place() -> None:
     place = pose(np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]]), np.zeros(3))
 
     rooms, chain = simple_rooms()
-    run_offline(map(other_body, records(2)), rooms, INPUTS, Timing(level_odom=True, find_pose=lambda *_: place))
+    run_offline(map(other_body, records(2)), rooms, INPUTS, replace(tied(place), level_odom=True))
     for frame in chain.frames:
         np.testing.assert_allclose(frame.gravity, [0, 1, 0], atol=1e-6)
+
+
+def with_joint(recorded: list[Record], reaches: int) -> Iterator[Record]:
+    """The records, behind each odometry a joint that turned since the last, up to one of them."""
+    count = 0
+    for record in recorded:
+        yield other_body(record)
+        if record.topic == "/odom" and count < reaches:
+            stamp_ns = from_msg.stamp_ns(record.message)
+            message = said(transform("base", "camera", turned_about_x(0.1 * count), stamp_ns))
+            yield Record("/tf", TRANSFORMS, record.stamp_ns, lambda message=message: message, bytes)
+            count += 1
+
+
+def test_frames_wait_for_the_joint_that_carries_their_camera() -> None:
+    rooms, chain = simple_rooms()
+    run = run_offline(with_joint(list(records(4)), 4), rooms, INPUTS)
+    angles = [rotation_angle(frame.T_odom_camera[:3, :3]) for frame in chain.frames]
+    assert angles[1:] == pytest.approx([0.1, 0.2, 0.3], abs=1e-9) and "by a joint, which is followed" in run.mount
 
 
 def test_odometry_of_a_body_that_nothing_ties_to_the_camera_is_taken_as_the_cameras_and_said() -> None:
@@ -524,7 +547,7 @@ class InFrame:
 
 def test_depth_of_another_sensor_goes_to_the_segmenter_in_the_picture_of_colour() -> None:
     rooms, chain = simple_rooms()
-    timing = Timing(find_pose=lambda a, b: {("rgb", "depth"): ASIDE}.get((a, b)))
+    timing = Timing(frames=tied("rgb", "depth", ASIDE))
     run = run_offline(of_two_sensors(), replace(rooms, detector=InFrame()), WITH_COLOUR, timing)
     assert run.frames == 3 and not run.dropped
     assert run.summary(Truth([]))["registered"].startswith("depth of 'depth' is registered here to colour of 'rgb'")
@@ -558,7 +581,7 @@ def test_a_cloud_of_a_body_is_turned_into_the_frame_of_the_picture() -> None:
         for r in records(2)
     ]
     inputs = Inputs(image="/image", points="/points", odom="/odom")
-    timing = Timing(find_pose=lambda a, b: pose(R_body_optical.T, np.zeros(3)) if (a, b) == ("camera", "zed") else None)
+    timing = Timing(frames=tied("camera", "zed", pose(R_body_optical.T, np.zeros(3))))
     run = run_offline(said, replace(rooms, organise=organise), inputs, timing)
     assert run.frames == 2 and not run.dropped
     np.testing.assert_allclose(chain.frames[0].view.xyz, xyz, atol=1e-5)

@@ -21,8 +21,8 @@ class Body:
         params = door.settings.of(BodyParams)
         self._told = params.mounting
         self._frame = params.base_frame
-        self._frames = transforms.hear_static_frames(door, self._told is None)
-        self._mount = transforms.Mount(self._told, self._frames.between, door.get_logger().info)
+        self._frames = transforms.hear_frames(door, self._told is None)
+        self._mount = transforms.Mount(self._told, self._frames, door.get_logger().info)
         self._remind = door.throttled.remind
 
     def T_body_camera(self, from_or_to: str, newest: Odometry | None = None) -> Array | None:

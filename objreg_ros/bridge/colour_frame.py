@@ -8,6 +8,7 @@ cameras of the two are the same, and often the name of the topic says so.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -16,9 +17,11 @@ import numpy as np
 from objreg_ros import limits
 from objreg_ros.bridge import from_msg, lenses
 from objreg_ros.bridge.registered_depth import register
-from objreg_ros.bridge.static_frames import FindPose
 from objreg_ros.data import Array, ColourImage, DepthImage, Intrinsics, PointCloud
 from objreg_ros.geometry import transform
+
+FindPose = Callable[[str, str], Array | None]
+"""(a, b) → ``T_a_b (4, 4)``, None where nothing ties the two frames."""
 
 # In the name of a topic.
 REGISTERED = re.compile(r"(?<!un)(align|regist)|depth_to_(rgb|colou?r)|rgb_to_depth", re.IGNORECASE)

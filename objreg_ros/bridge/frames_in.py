@@ -4,18 +4,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
-from geometry_msgs.msg import Vector3Stamped
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Vector3Stamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, PointCloud2
 from std_msgs.msg import String
 
 from objreg_ros.bridge import from_msg, qos
 from objreg_ros.bridge.matching import MatchingDoor
-from objreg_ros.bridge.static_frames import Mount
+from objreg_ros.bridge.mount import Body, Mount, Seat, nameless_body
 from objreg_ros.bridge.sync import Match, Need, Stream
+from objreg_ros.bridge.transforms import hear_frames, is_installed
+from objreg_ros.bridge.travel import Travel
 from objreg_ros.data import Array, Frame
+
+# By which odometry may come. Whose pose one without a child_frame_id is, the name behind all remaps says.
+ODOMETRY = {"odom": Odometry, "odom/pose": PoseStamped, "odom/pose_with_covariance": PoseWithCovarianceStamped}
 
 
 class FramesDoor(MatchingDoor):
@@ -29,20 +35,35 @@ class FramesDoor(MatchingDoor):
         self.odom_frame = "odom"
         self._camera: str | None = None  # the frame_id of the last frame
 
-    def listen_to_frames(self, mount: Mount, odom_slop_ns: int) -> None:
-        """Subscribe; ``mount`` says where the camera sits on the body of odometry."""
-        self._mount = mount
+    def listen_to_frames(self, told: Array | None, odom_slop_ns: int, odometry: str = "topic") -> None:
+        """Subscribe. ``told`` says where the camera sits on the body of odometry, else /tf_static and /tf do.
+
+        ``odometry`` is where that comes from: ``topic``, ``tf``, or ``auto``: /tf while no topic has a publisher.
+        """
+        wanted = told is None or odometry != "topic"
+        tree = hear_frames(self, wanted, self._hear_tf)
+        self._mount = Mount(told, tree, self.get_logger().info)
+        self._travel = Travel(tree, outright=odometry == "tf")
+        self._by_topic = odometry == "topic"
         room: dict[str, type] = {"objects": PointCloud2}
         if not self.hears_words:  # which hold these too
             room |= {"view": PointCloud2, "view/camera_info": CameraInfo, "gravity": Vector3Stamped}
         self.listen(String, "labels", self.hear_labels, qos.latched())
-        self.listen(Odometry, "odom", self._hear_odom, self.sensor(qos.ODOMETRY))
+        if odometry != "tf":
+            self._listen_to_odometry()
         for topic, kind in room.items():
             self.listen(kind, topic, self._hear(topic), qos.room(), watched=topic)
         self.expect("objects", "objects")
         exact = [Stream(topic) for topic in room]
-        odom = Stream("odom", Need.OPTIONAL, odom_slop_ns, depth=1000, enclosing=True)
-        self.begin([*exact, Stream("labels", Need.LATCHED), odom])
+        names = "odom", *(["joints"] if wanted and is_installed() else [])
+        beside = [Stream(name, Need.OPTIONAL, odom_slop_ns, depth=1000, enclosing=True) for name in names]
+        self.begin([*exact, Stream("labels", Need.LATCHED), *beside])
+
+    def _listen_to_odometry(self) -> None:
+        for topic, kind in ODOMETRY.items():
+            has_child = kind is Odometry
+            body = nameless_body(self.resolve_topic_name(topic), has_child)
+            self.listen(kind, topic, partial(self._hear_odom, body=body), self.sensor(qos.ODOMETRY))
 
     @property
     def hears_words(self) -> bool:
@@ -60,25 +81,44 @@ class FramesDoor(MatchingDoor):
         """What numbers are called by a robot, or by the only one there is."""
         return self._names.get(robot) or self._names.get("", {})
 
-    def _hear_odom(self, message: Any) -> None:
+    def _hear_odom(self, message: Any, body: Body = Body.BASE) -> None:
         odometry = self.read_aside("odom", from_msg.odometry, message)
         if odometry is not None:
+            self._by_topic, self._mount.nameless = True, body
             self.feed("odom", odometry.stamp_ns, odometry)
 
+    def _hear_tf(self, message: Any) -> None:
+        """Odometry of /tf, unless it comes by a topic; frames wait for the joints that carry the camera."""
+        if not self._by_topic and not any(map(self._is_published, ODOMETRY)):
+            for odometry in self._travel.of(message):
+                self.feed("odom", odometry.stamp_ns, odometry)
+        reached_ns = self._mount.reached_ns
+        if reached_ns is not None:
+            self.feed("joints", reached_ns, True)
+
+    def _is_published(self, topic: str) -> bool:
+        return not self._travel.outright and self.count_publishers(self.resolve_topic_name(topic)) > 0
+
     def _hear(self, topic: str) -> Callable[[Any], None]:
-        return lambda message: self.feed(topic, from_msg.stamp_ns(message), message)
+        def hear(message: Any) -> None:
+            self._travel.camera = from_msg.frame_id(message).lstrip("/")
+            self.feed(topic, from_msg.stamp_ns(message), message)
+
+        return hear if topic == "objects" else lambda message: self.feed(topic, from_msg.stamp_ns(message), message)
 
     def frame_of(self, match: Match) -> tuple[Frame, Array | None]:
         """A frame, and where the camera sits on the body of its odometry; `DroppedError` if it breaks its contract."""
         odom, camera = match["odom"], from_msg.frame_id(match["objects"])
         self._watch_camera(camera)
+        seat, T_body_camera = self._mount.seated(odom, camera, match.stamp_ns)
+        odom = None if seat is Seat.BEYOND else odom
         self.without_odometry += odom is None
         self.odom_frame = odom[0].frame_id if odom else self.odom_frame
-        T_body_camera = self._mount.T_body_camera(odom, camera)
         if isinstance(match["objects"], Frame):
             return self.read("frame", from_msg.followed, match["objects"], odom, T_body_camera), T_body_camera
-        topics = ("objects", "view", "view/camera_info", "gravity", "labels", "odom")
-        return self.read("frame", from_msg.frame, *(match[topic] for topic in topics), T_body_camera), T_body_camera
+        topics = ("objects", "view", "view/camera_info", "gravity", "labels")
+        parts = [*(match[topic] for topic in topics), odom]
+        return self.read("frame", from_msg.frame, *parts, T_body_camera), T_body_camera
 
     def _watch_camera(self, frame_id: str) -> None:
         """Say so where the frames of two cameras come in turn."""

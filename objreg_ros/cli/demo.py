@@ -29,6 +29,7 @@ from objreg_ros.offline import constraint_with_error, refusal_with_evidence
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.mounts import TRANSFORMS, camera_on_body
+from objreg_ros.recording.tf_odometry import with_transforms
 from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.recording.troubles import FOLDER, troubles
 from objreg_ros.registration.params import RegistrarNodeParams
@@ -97,7 +98,7 @@ def run(asked: Asked) -> int:
     inputs, camera = _inputs(recording, asked), camera_asked(asked)
     bag = as_rosbag2(recording, inputs, asked.out, asked.seconds)
     with open_recording(bag) as opened:
-        source = with_camera(opened, camera, inputs.outright)
+        source = with_transforms(with_camera(opened, camera, inputs.outright))
         logs, told = asked.out / "logs", told_of(asked, recording, source, inputs)
         live = run_live(bag, setup_of(asked, inputs, camera), logs, _say)
         truth = Truth.of(source, inputs.ground_truth)
@@ -149,7 +150,7 @@ def _inputs(recording: Path, asked: Asked) -> Inputs:
     depth_source = settings.of("segmenter", SegmenterNodeParams).source
     remaps = parse_remaps(asked.remaps)
     with open_recording(recording) as opened:
-        source = with_camera(opened, camera_asked(asked), remaps, depth_source)
+        source = with_transforms(with_camera(opened, camera_asked(asked), remaps, depth_source))
         for note in source.notes:
             _say(f"! {note}")
         inputs = choose_inputs(source.topics, remaps, depth_source)

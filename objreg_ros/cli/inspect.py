@@ -15,6 +15,7 @@ from objreg_ros.memory.store_file import is_store
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import GRAPH_TOPICS, Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.summary import describe_lens, describe_topics
+from objreg_ros.recording.tf_odometry import by_transforms, with_transforms
 from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.recording.troubles import warnings
 from objreg_ros.report.live_pictures import write_picture
@@ -48,13 +49,15 @@ def command(recording: Path, remaps: tuple[str, ...], camera: str, picture: Path
             raise ValueError(f"{option}: expected a store of the registrar, whose objects it draws, got {recording}")
     asked = parse_remaps(remaps)
     with open_recording(recording) as opened:
-        source = with_camera(opened, camera, asked)
+        source = with_transforms(with_camera(opened, camera, asked))
         inputs = choose_inputs(source.topics, asked)
         _say_what_it_is(source)
         _say_topics(source)
         _say_inputs(inputs)
         _say_lens(source, inputs)
         _say_truth(source, inputs)
+        for note in by_transforms(source, inputs):
+            click.echo(note)
         tell(warnings(source, inputs))
     if not inputs.complete:
         return NOTHING

@@ -46,9 +46,9 @@ labels = click.option("--labels", help="Text file of labels, one a line, or YAML
 max_frames = click.option("--max-frames", type=click.IntRange(min=1), help="Stop after this many frames.")
 odometry = click.option(
     "--odometry",
-    metavar="TOPIC|tracked|none|drift:SEED",
-    help="Another topic; the registrar's own tracking (as where there is no odometry); no trajectory; or a synthetic "
-    "one that drifts away from the recording's ground truth.",
+    metavar="TOPIC|tf|tracked|none|drift:SEED",
+    help="Another topic (of Odometry or poses); the moving frame on /tf; the registrar's own tracking (as where there "
+    "is no odometry); no trajectory; or a synthetic one that drifts away from the recording's ground truth.",
 )
 OF_RUN = ("model", "labels", "camera", "max_frames", "odometry", "params_file", "changes", "remaps")
 

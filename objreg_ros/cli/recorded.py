@@ -17,8 +17,9 @@ from objreg_ros.detector.params import DetectorParams
 from objreg_ros.offline import Detects, Run, Timing, build_rooms, run_offline
 from objreg_ros.recording import Record, Recording, open_recording
 from objreg_ros.recording.drift import ODOM, with_drifting_odometry
-from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
-from objreg_ros.recording.mounts import static_frames
+from objreg_ros.recording.inputs import TF_ODOM, Inputs, choose_inputs, parse_remaps
+from objreg_ros.recording.mounts import camera_frame, frame_tree, moving_topics
+from objreg_ros.recording.tf_odometry import by_transforms, with_transforms
 from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.recording.troubles import FOLDER
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
@@ -28,10 +29,12 @@ from objreg_ros.report.findings import setting
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_ros.truth import Truth
 
-DRIFT = "drift:"
-NONE = "none"
+DRIFT, TF, NONE = "drift:", "tf", "none"
 BY_TRACKING = (
     "there is no odometry: the trajectory is that of the registrar's own tracking (--odometry none: no trajectory)"
+)
+NOT_ON_TF = (
+    "expected a moving frame above the camera on /tf, as odom → base_link, got none; is the camera's frame tied to it?"
 )
 CAMERAS_OWN = (
     "--odometry {} is the camera's own and not level: T_base_camera and segmenter.level_odom are left out of this run"
@@ -79,16 +82,20 @@ class Asked:
     def of_recording(self, recording: Recording) -> Opened:
         """As `opened`, of a recording that is open already, be it one without a file. ValueError as that."""
         told = self.settings.of("segmenter", SegmenterNodeParams)
-        source = with_camera(recording, told.camera, parse_remaps(self.remaps), told.source)
+        camera = with_camera(recording, told.camera, parse_remaps(self.remaps), told.source)
+        source = with_transforms(camera, self.odometry == TF)
         inputs = self._inputs(source, told.source)
         return Opened(self, recording.path, source, inputs, Truth.of(source, inputs.ground_truth))
 
     def _inputs(self, source: Recording, depth_source: str) -> Inputs:
         asked = parse_remaps(self.remaps)
         if self.odometry is not None:
-            asked["odom"] = "" if self.odometry in (NONE, TRACKED) or self.drifts else self.odometry
+            named = {TF: TF_ODOM, NONE: "", TRACKED: ""}.get(self.odometry, self.odometry)
+            asked["odom"] = "" if self.drifts else named
+            if asked["odom"] == TF_ODOM and TF_ODOM not in source.topics:
+                raise ValueError(f"{source.path}: --odometry tf: {NOT_ON_TF}")
             if asked["odom"] and asked["odom"] not in source.topics:
-                expected = f"a topic of {', '.join(source.topics)}, or tracked, or none, or drift:SEED"
+                expected = f"a topic of {', '.join(source.topics)}, or tf, tracked, none or drift:SEED"
                 raise ValueError(f"--odometry: expected {expected}, got {self.odometry!r}")
         inputs = choose_inputs(source.topics, asked, depth_source)
         if not inputs.complete:
@@ -122,7 +129,7 @@ class Opened:
         is_told = registrar.mounting is not None or segmenter.level_odom
         left_out = [CAMERAS_OWN.format(self.asked.odometry)] if self.asked.drifts and is_told else []
         by_itself = [BY_TRACKING] if self.odometry == TRACKED and self.asked.odometry is None else []
-        return (*self.source.notes, *self.truth.notes, *left_out, *by_itself)
+        return (*self.source.notes, *by_transforms(self.source, self.inputs), *self.truth.notes, *left_out, *by_itself)
 
     @property
     def odometry(self) -> str | None:
@@ -147,8 +154,8 @@ class Opened:
         """
         settings = self.asked.settings
         detector = settings.of("detector", DetectorParams)
-        find_pose = static_frames(self.source).between
-        timing = replace(self._timing(), find_pose=find_pose, max_rate=detector.max_rate)
+        frames = frame_tree(self.source, camera_frame(self.source, self.inputs))
+        timing = replace(self._timing(), frames=frames, max_rate=detector.max_rate)
         rooms, close = build_rooms(
             detector,
             settings.of("segmenter", SegmenterParams),
@@ -194,7 +201,8 @@ class Opened:
         return timing
 
     def _records(self) -> Iterator[Record]:
-        records = self.source.records(set(self.inputs.chosen().values()))
+        topics = {*self.inputs.chosen().values(), *moving_topics(self.source)}
+        records = self.source.records(topics)
         if not self.asked.drifts or self.inputs.ground_truth is None:
             return records
         seed = int(str(self.asked.odometry).removeprefix(DRIFT))

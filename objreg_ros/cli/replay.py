@@ -19,6 +19,7 @@ from objreg_ros.recording.inputs import SOURCES, Inputs, choose_inputs, parse_re
 from objreg_ros.recording.messages import header_stamp_ns
 from objreg_ros.recording.mounts import TRANSFORMS, static_topics
 from objreg_ros.recording.replay import Selection, graph_names, read_ahead, recorded_names
+from objreg_ros.recording.tf_odometry import with_transforms
 from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.recording.troubles import troubles
 
@@ -82,7 +83,7 @@ def command(
 
     asked = parse_remaps(remaps)
     with open_recording(recording) as opened:
-        source = with_camera(opened, camera, asked, depth_source)
+        source = with_transforms(with_camera(opened, camera, asked, depth_source))
         for note in source.notes:
             click.echo(f"! {note}", err=True)
         inputs = choose_inputs(source.topics, asked, depth_source)

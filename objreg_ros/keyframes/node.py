@@ -21,7 +21,6 @@ from objreg_ros.bridge.lifetime import await_kernels
 from objreg_ros.bridge.params import ManagedParams
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.sync import Match
-from objreg_ros.bridge.transforms import hear_mount
 from objreg_ros.bridge.worker import Backlog, Limit
 from objreg_ros.keyframes.frame_window import FrameWindow
 from objreg_ros.keyframes.fusion import fuse
@@ -46,7 +45,6 @@ class KeyframerNode(FramesDoor):
     def open(self) -> None:
         """Load the kernels, publish and listen."""
         inputs = self.settings.of(KeyframerNodeParams)
-        mount = hear_mount(self, inputs.mounting)
         await_kernels(lambda: warm(self.settings.of(KeyframeParams)), self.get_logger().info)
         self._run = uuid.uuid4().hex
         self._keyframer = Keyframer(self.settings.of(KeyframeParams))
@@ -58,7 +56,7 @@ class KeyframerNode(FramesDoor):
             self._send, self._send, self.fail, WAITING, lambda job: job[1].nbytes
         )
         self.create_timer(LOOK_S, self._end_what_rests, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self.listen_to_frames(mount, round(inputs.odom_slop * 1e9))
+        self.listen_to_frames(inputs.mounting, round(inputs.odom_slop * 1e9), inputs.odometry)
 
     def adopt(self) -> None:
         """Live parameters hold from the next frame on."""

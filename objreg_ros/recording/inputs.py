@@ -97,6 +97,14 @@ RULES = {
     ),
     "ground_truth": Rule(POSES, r"(?!.*(" + TRUTH + r"))^", (TRUTH,)),
 }
+# Without an Odometry: what /tf tells (`tf_odometry`), else poses whose names say so.
+POSE_ODOM = Rule(
+    ("geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped"),
+    rf"{TRUTH}|initial_?pose|goal|target|amcl|waypoint|set_?point|tag|marker|object",
+    (r"odom", r"(^|[/_])(vio|vo|slam|orb\w*)([/_]|$)", r"camera_?pose", r"(^|[/_])(robot_|tracked_|local_)?pose$"),
+)
+TF_ODOM, TF_TRUTH = "/tf/odom", "/tf/ground_truth"  # made of the /tf of a recording, which has no topics of these names
+DERIVED = {"odom": TF_ODOM, "ground_truth": TF_TRUTH}
 NATIVE = "rgb_to_depth"  # colour in the geometry of the native depth
 NATIVE_DEPTH = Rule(PICTURES, RULES["depth"].never + "|depth_to_rgb", (r"depth/image",), DEPTH_ENCODING)
 REGISTERED = RULES["depth"].prefer.index(r"depth/image_rect")  # the names before it say that they are registered
@@ -175,6 +183,7 @@ def choose_inputs(topics: Mapping[str, Topic], remaps: Mapping[str, str] | None 
     _require_types(asked, topics)
     _require_different(asked)
     found = _find(topics, asked)
+    _fall_back(found, topics, asked)
     found["camera_info"] = asked.get("camera_info", _camera_info_of((found["depth"], found["image"]), topics))
     if _depth_wins(found, asked):
         found["points"] = None
@@ -187,13 +196,28 @@ def choose_inputs(topics: Mapping[str, Topic], remaps: Mapping[str, str] | None 
 
 def _find(topics: Mapping[str, Topic], asked: Mapping[str, str]) -> dict[str, str | None]:
     """What is asked for, and the best topic for each other input, in the order of the rules; no topic serves two."""
-    free = [topic for topic in topics.values() if topic.name not in asked.values() and not OWN.search(topic.name)]
+    free = _free(topics, asked)
     found: dict[str, str | None] = {}
     for name, rule in RULES.items():
         native = name == "depth" and NATIVE in (found["image"] or "")
         found[name] = asked[name] if name in asked else _best(NATIVE_DEPTH if native else rule, free)
         free = [topic for topic in free if topic.name != found[name]]
     return found
+
+
+def _free(topics: Mapping[str, Topic], asked: Mapping[str, str]) -> list[Topic]:
+    """The topics that no remap names, and that were recorded of others than our own nodes."""
+    taken = {*asked.values(), *DERIVED.values()}
+    return [topic for topic in topics.values() if topic.name not in taken and not OWN.search(topic.name)]
+
+
+def _fall_back(found: dict[str, str | None], topics: Mapping[str, Topic], asked: Mapping[str, str]) -> None:
+    """Take what /tf tells, and poses as odometry, where no topic was found for an input that is not asked for."""
+    for name, topic in DERIVED.items():
+        if name not in asked and not found[name] and topic in topics:
+            found[name] = topic
+    if "odom" not in asked and not found["odom"]:
+        found["odom"] = _best(POSE_ODOM, [t for t in _free(topics, asked) if t.name != found["ground_truth"]])
 
 
 def _only(source: str, asked: Mapping[str, str]) -> dict[str, str]:
@@ -244,7 +268,8 @@ def _require_known(asked: Mapping[str, str], topics: Mapping[str, Topic]) -> Non
 
 def _require_types(asked: Mapping[str, str], topics: Mapping[str, Topic]) -> None:
     for name, topic in asked.items():
-        types = (CAMERA_INFO,) if name in ("camera_info", "colour_info") else RULES[name].types
+        infos = dict.fromkeys(("camera_info", "colour_info"), (CAMERA_INFO,))
+        types = {**infos, "odom": POSES}.get(name) or RULES[name].types
         if topic and topics[topic].msgtype not in types:
             raise ValueError(f"expected {name} of type {' or '.join(types)}, got {topic} ({topics[topic].msgtype})")
 

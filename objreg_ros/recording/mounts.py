@@ -1,41 +1,98 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the parts of a recorded robot sit on each other: all of the recording's /tf_static, whenever it was said."""
+"""How the parts of a recorded robot sit on each other: all of the recording's /tf_static, and what its /tf repeats."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import suppress
-from typing import Any
+from itertools import islice
+from typing import Any, NamedTuple
 
-from objreg_ros.bridge.static_frames import StaticFrames
+from objreg_ros.bridge.chains import body_of
+from objreg_ros.bridge.frames import FrameTree, Tie
+from objreg_ros.bridge.mount import Body, nameless_body
 from objreg_ros.data import Array
 from objreg_ros.recording.inputs import Inputs
-from objreg_ros.recording.record import Recording
+from objreg_ros.recording.record import Record, Recording
 
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
+TYPES = (TRANSFORMS, "tf/msg/tfMessage")  # the latter of early ROS 1
+MOMENTS, LOOKED_AT = 12, 100  # at which /tf is looked at ahead, and messages of each
 
 
 def static_topics(recording: Recording) -> list[str]:
     """The topics of a recording that are its /tf_static, in any namespace."""
-    return [t.name for t in recording.topics.values() if t.msgtype == TRANSFORMS and t.name.endswith("tf_static")]
+    return [t.name for t in recording.topics.values() if t.msgtype in TYPES and t.name.endswith("tf_static")]
 
 
-def static_frames(recording: Recording) -> StaticFrames:
-    """What they say; what does not decode is left out."""
-    frames, topics = StaticFrames(), static_topics(recording)
-    for record in recording.records(topics) if topics else ():
+def moving_topics(recording: Recording) -> list[str]:
+    """The topics of a recording that are its /tf, in any namespace."""
+    return [t.name for t in recording.topics.values() if is_moving(t.name, t.msgtype)]
+
+
+def is_moving(topic: str, msgtype: str) -> bool:
+    """Whether a topic is a /tf, in any namespace."""
+    return msgtype in TYPES and topic.split("/")[-1] == "tf"
+
+
+def frame_tree(recording: Recording, *followed: str) -> FrameTree:
+    """What all of /tf_static says, and /tf at some moments of the recording; what does not decode is left out.
+
+    Of what is above the frames ``followed`` it is then known what moves.
+    """
+    tree, static = FrameTree(), static_topics(recording)
+    tree.follow(*followed)
+    for record in recording.records(static) if static else ():
         with suppress(ValueError):
-            frames.hear(record.message)
-    return frames
+            tree.hear(record.message)
+    for record in _glances(recording, moving_topics(recording)):
+        with suppress(ValueError):
+            tree.hear_moving(record.message)
+    return tree
 
 
-def camera_on_body(recording: Recording, inputs: Inputs) -> tuple[str, str, Array | None]:
-    """The frames of odometry's body and of depth, and ``T_body_camera (4, 4)`` by /tf_static; None where nothing ties
-    them. Both names are empty where one is not told."""
-    odom, depth = (first_readable(recording, topic) for topic in (inputs.odom, inputs.depth or inputs.points))
-    body, camera = getattr(odom, "child_frame_id", "").lstrip("/"), frame_of(depth)
-    if not body or not camera:
-        return "", "", None
-    return body, camera, static_frames(recording).between(body, camera)
+def _glances(recording: Recording, topics: list[str]) -> Iterator[Record]:
+    """Records of some moments in order of time: all there are where these are few."""
+    count = sum(recording.topics[topic].count for topic in topics)
+    if count <= MOMENTS * LOOKED_AT:
+        yield from recording.records(topics) if topics else ()
+        return
+    span_ns = recording.end_ns - recording.start_ns
+    for k in range(MOMENTS):
+        yield from islice(recording.records(topics, recording.start_ns + k * span_ns // MOMENTS), LOOKED_AT)
+
+
+class Mounted(NamedTuple):
+    """How the camera sits on the body of a recording's odometry.
+
+    ``T_body_camera (4, 4)`` is None where a joint moves between them, or ``tie`` is None: nothing ties them. Both names
+    are empty where one is not told, and where the odometry is of the camera itself.
+    """
+
+    body: str
+    camera: str
+    T_body_camera: Array | None
+    tie: Tie | None
+
+
+def camera_on_body(recording: Recording, inputs: Inputs) -> Mounted:
+    """How the camera sits on the body of the odometry, by /tf_static and /tf."""
+    odom, camera = first_readable(recording, inputs.odom), camera_frame(recording, inputs)
+    if odom is None or not camera:
+        return Mounted("", "", None, None)
+    tree = frame_tree(recording, camera)
+    body = getattr(odom, "child_frame_id", "").lstrip("/")
+    if not body and nameless_body(inputs.odom or "", hasattr(odom, "child_frame_id")) is Body.BASE:
+        body = body_of(tree, frame_of(odom), camera)
+    if not body:
+        return Mounted("", "", None, None)
+    without = frame_of(odom)
+    return Mounted(body, camera, tree.between(body, camera, None, without), tree.tie(body, camera, without))
+
+
+def camera_frame(recording: Recording, inputs: Inputs) -> str:
+    """The frame of depth; empty if it tells none."""
+    return frame_of(first_readable(recording, inputs.depth or inputs.points))
 
 
 def first_readable(recording: Recording, topic: str | None) -> Any | None:

@@ -16,6 +16,10 @@ from objreg_ros.recording.record import Record, Recording
 Item = TypeVar("Item")
 
 COMPRESSED = {"image": "image/compressed", "depth": "depth/image/compressedDepth"}
+POSES = {
+    "geometry_msgs/msg/PoseStamped": "odom/pose",
+    "geometry_msgs/msg/PoseWithCovarianceStamped": "odom/pose_with_covariance",
+}
 AHEAD = 30  # records that are read before they are due
 
 
@@ -67,8 +71,10 @@ def graph_names(recording: Recording, inputs: Inputs) -> dict[str, str]:
 
 
 def _graph_name(recording: Recording, name: str, topic: str) -> str:
-    compressed = recording.topics[topic].msgtype.endswith("CompressedImage")
-    return COMPRESSED[name] if compressed else GRAPH_TOPICS[name]
+    kind = recording.topics[topic].msgtype
+    if name == "odom":
+        return POSES.get(kind, GRAPH_TOPICS[name])
+    return COMPRESSED[name] if kind.endswith("CompressedImage") else GRAPH_TOPICS[name]
 
 
 def recorded_names(recording: Recording) -> dict[str, str]:

@@ -12,10 +12,11 @@ import numpy as np
 
 from objreg_ros.bridge import colour_frame, from_msg, lenses
 from objreg_ros.bridge.camera_checks import check_camera
+from objreg_ros.bridge.frames import Tie
 from objreg_ros.data import Array, Intrinsics
 from objreg_ros.plausibility.finding import Finding
 from objreg_ros.recording.inputs import Inputs
-from objreg_ros.recording.mounts import camera_on_body, first_readable, frame_of, static_frames
+from objreg_ros.recording.mounts import camera_on_body, first_readable, frame_of, frame_tree
 from objreg_ros.recording.record import Record, Recording
 
 SAMPLE = 60  # messages of colour and depth whose stamps are compared
@@ -142,7 +143,7 @@ def _registration(recording: Recording, inputs: Inputs) -> list[Finding]:
     raw = lenses.raw_pictures("auto", inputs.depth, inputs.image)
     cameras = colour_frame.Cameras(info, colour_info, colour_frame.named_registered(inputs.depth, inputs.image))
     try:
-        seen = colour_frame.depth_image(depth, cameras, picture, static_frames(recording).between, raw)
+        seen = colour_frame.depth_image(depth, cameras, picture, frame_tree(recording).between, raw)
     except ValueError as error:
         what = f"colour has {_size(picture.rgb.shape[:2])} pixels and depth {_size(size)}: {error}"
         return [Finding(what, "every frame would be dropped", _register(recording), "depth-is-not-registered")]
@@ -175,23 +176,28 @@ def _frames(colour: str, depth: str, todo: str) -> Iterator[Finding]:
 
 def _mount_of_camera(recording: Recording, inputs: Inputs) -> list[str]:
     """Whether it is known how the camera sits on the body of the odometry."""
-    body, camera, T_body_camera = camera_on_body(recording, inputs)
-    if body == camera or T_body_camera is not None:
+    mounted = camera_on_body(recording, inputs)
+    body, camera = mounted.body, mounted.camera
+    if mounted.tie is Tie.MOVING:
+        return [f"the camera's {camera} moves on the odometry's {body} by a joint on /tf, which is followed"]
+    if mounted.tie is Tie.CONSTANT and body != camera:
+        return [f"the camera's {camera} is mounted on the odometry's {body} by /tf, which repeats the same"]
+    if mounted.tie is not None or body == camera:
         return []
     return [
-        f"odometry is of {body} and depth in {camera}, and no /tf_static ties them: they are taken to be one place; "
-        "set T_base_camera of registrar and mapper where they are not"
+        f"odometry is of {body} and depth in {camera}, and neither /tf_static nor /tf ties them: they are taken to be "
+        "one place; set T_base_camera of registrar and mapper where they are not"
     ]
 
 
 def _mount_of_imu(recording: Recording, inputs: Inputs) -> list[str]:
     """Whether it is known how the IMU sits on the camera."""
     camera, imu = (_frame_id(recording, topic) for topic in (inputs.depth or inputs.points, inputs.imu))
-    if not camera or not imu or camera == imu or static_frames(recording).between(camera, imu) is not None:
+    if not camera or not imu or camera == imu or frame_tree(recording, camera, imu).tie(camera, imu) is not None:
         return []
     return [
-        f"the IMU is in the frame {imu} and depth in {camera}, and no /tf_static ties them: it tells gravity only with "
-        "segmenter.T_camera_imu, its pose in the camera's optical frame"
+        f"the IMU is in the frame {imu} and depth in {camera}, and neither /tf_static nor /tf ties them: it tells "
+        "gravity only with segmenter.T_camera_imu, its pose in the camera's optical frame"
     ]
 
 

@@ -30,7 +30,6 @@ from objreg_ros.bridge.relocalised import Whereabouts
 from objreg_ros.bridge.robots import prefixes_of
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.sync import Match
-from objreg_ros.bridge.transforms import hear_mount
 from objreg_ros.bridge.worker import Backlog, Limit
 from objreg_ros.data import framed
 from objreg_ros.keyframes.frame_window import FrameWindow
@@ -107,7 +106,7 @@ class RegistrarNode(FramesDoor):
         if self._robots:
             self._keyframes = KeyframesIn(self, self._robots, list(inputs.cameras.values()), self._take)
         else:
-            self.listen_to_frames(hear_mount(self, inputs.mounting), round(inputs.odom_slop * 1e9))
+            self.listen_to_frames(inputs.mounting, round(inputs.odom_slop * 1e9), inputs.odometry)
 
     def _asked_to_exchange(self) -> str:
         """Our own robot's name if keyframes are exchanged; empty if not. ValueError where it has none."""

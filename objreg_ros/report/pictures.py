@@ -14,7 +14,7 @@ from objreg_ros.bridge import colour_frame, from_msg, lenses
 from objreg_ros.data import UNTRIED, Array, DepthImage, Detections, LoopClosure, Rejected
 from objreg_ros.geometry import back_project, transform
 from objreg_ros.recording.inputs import Inputs
-from objreg_ros.recording.mounts import first_readable, frame_of, static_frames
+from objreg_ros.recording.mounts import first_readable, frame_of, frame_tree
 from objreg_ros.recording.record import Recording
 from objreg_ros.report.shelf import SLOP_NS, Cameras, Shelf
 from objreg_ros.report.story import Story
@@ -39,7 +39,7 @@ class Album:
         self._cameras, self._of_colour = (Cameras(recording, t) for t in (inputs.camera_info, inputs.colour_info))
         self._raw = lenses.raw_pictures(rectified, source, inputs.image)
         self._named = colour_frame.named_registered(inputs.depth, inputs.image)
-        self._find_pose = static_frames(recording).between
+        self._find_pose = frame_tree(recording).between
         self._picture_frame = frame_of(first_readable(recording, inputs.image))
         self._of_picture: tuple[Any, lenses.Raw] | None = None  # camera_info of what depth was registered to here
         self._known: dict[int, DepthImage | str] = {}

@@ -18,6 +18,7 @@ from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.opening import open_recording
 from objreg_ros.recording.poses import pose_of
 from objreg_ros.recording.text import read_text
+from objreg_ros.recording.tf_odometry import with_transforms
 from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.report.form import require_form
 from objreg_ros.report.page import page
@@ -50,7 +51,7 @@ def _chapter(file: Path, stack: ExitStack) -> tuple[Story, Album | None]:
     place = Path(summary.get("recording", ""))
     if not summary.get("recording") or not place.exists():
         return Story.of(file.stem, summary, Truth([])), None
-    opened = stack.enter_context(open_recording(place))
+    opened = with_transforms(stack.enter_context(open_recording(place)))
     recording = with_camera(opened, summary.get("camera", ""), _inputs_of(summary, opened))
     inputs = choose_inputs(recording.topics, _inputs_of(summary, recording))
     T_base_camera = mounting(summary.get("T_base_camera", ()))

@@ -29,12 +29,12 @@ from objreg_ros.bridge.detections_in import DetectionsIn
 from objreg_ros.bridge.indoors import Indoors, Surplus
 from objreg_ros.bridge.lifetime import await_kernels
 from objreg_ros.bridge.matching import MatchingDoor
+from objreg_ros.bridge.mount import Mount
 from objreg_ros.bridge.overridable import FIXED
 from objreg_ros.bridge.params import ManagedParams
 from objreg_ros.bridge.spin import run
-from objreg_ros.bridge.static_frames import Mount
 from objreg_ros.bridge.sync import Drop, Match, Need, Stream
-from objreg_ros.bridge.transforms import hear_static_frames
+from objreg_ros.bridge.transforms import hear_frames
 from objreg_ros.data import Array, ColourImage, DepthImage, Detections, FeltGravity, Frame, PointCloud
 from objreg_ros.segmenter.doubts import range_doubt, registration_doubt
 from objreg_ros.segmenter.imu import Imu
@@ -66,9 +66,10 @@ class SegmenterNode(MatchingDoor):
         await_kernels(self._warm, self.get_logger().info)
         self._camera_info: Any = read_calibration(self._inputs.camera) if self._inputs.camera else None
         self._colour_info: Any = None
-        self._find_pose = hear_static_frames(self).between
+        frames = hear_frames(self)
+        self._find_pose = frames.between
         self._imu = Imu(self._inputs.imu_mounting, self._find_pose)
-        self._mount = Mount(self._inputs.mounting, self._find_pose, self.get_logger().info)
+        self._mount = Mount(self._inputs.mounting, frames, self.get_logger().info)
         self._told: Counter[str] = Counter()  # frames by who told their gravity
         self._apart_deg: deque[float] = deque(maxlen=COMPARED)
         self._source: str | None = None  # the topic that depth comes by

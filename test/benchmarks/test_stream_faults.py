@@ -14,7 +14,7 @@ from objreg_ros.data import Intrinsics
 from objreg_ros.geometry import inverse, pose, rotation_angle, rotation_from_vector
 from objreg_ros.recording import messages
 from objreg_ros.recording.inputs import choose_inputs
-from objreg_ros.recording.mounts import static_frames
+from objreg_ros.recording.mounts import frame_tree
 
 CAMERA = Intrinsics(fx=30.0, fy=31.0, cx=16.0, cy=12.0, width=32, height=24)
 STEP_NS, COUNT = 100_000_000, 12
@@ -275,7 +275,7 @@ def test_a_wrong_mount_is_turned_by_20_to_180_degrees_at_the_same_place() -> Non
 
     for seed in SEEDS:
         fault = made("mount_wrong", seed)
-        T = static_frames(fault.recording).between(BODY, CAMERA)
+        T = frame_tree(fault.recording).between(BODY, CAMERA)
         assert T is not None and changed(fault.recording) == {TF_STATIC}
         turned = np.degrees(rotation_angle(T_BODY_CAMERA[:3, :3].T @ T[:3, :3]))
         assert turned == pytest.approx(fault.magnitude["degrees"], abs=1e-6) and 20 <= turned <= 180

@@ -14,7 +14,6 @@ from registration.samples import SECOND, box, frame
 
 from objreg_ros.bridge import to_msg
 from objreg_ros.bridge.frames_in import FramesDoor
-from objreg_ros.bridge.static_frames import Mount
 from objreg_ros.bridge.sync import Match
 from objreg_ros.data import Array, Frame, Odometry
 from objreg_ros.geometry import pose
@@ -34,7 +33,7 @@ class Frames(FramesDoor):
         self.throttled._write = self.said.append
         self.taken = list[tuple[Frame, Array | None]]()
         self.done = threading.Semaphore(0)
-        self.listen_to_frames(Mount(T_BODY_CAMERA, lambda a, b: None), 20_000_000)
+        self.listen_to_frames(T_BODY_CAMERA, 20_000_000)
 
     def compute(self, stamp_ns: int, payload: Match) -> bool:
         try:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.bridge import transforms
-from objreg_ros.bridge.transforms import hear_mount, hear_static_frames
+from objreg_ros.bridge.transforms import hear_frames, hear_mount
 from objreg_ros.data import Odometry
 
 
@@ -53,7 +53,7 @@ def test_where_the_type_is_missing_or_a_parameter_tells_nothing_is_heard(monkeyp
     told = np.eye(4)
     assert hear_mount(node, told).T_body_camera(ODOMETRY, "eye") is told
     monkeypatch.setattr(transforms, "TFMessage", None)
-    assert hear_static_frames(node).between("base", "eye") is None
+    assert hear_frames(node).between("base", "eye") is None
     assert node.heard == {} and node.said == []
 
 
@@ -63,7 +63,7 @@ def test_the_real_message_fits(monkeypatch: pytest.MonkeyPatch) -> None:
     one = stamped(child_frame_id="eye")
     one.header.frame_id, one.transform.translation.x = "base", 0.5
     node: Any = Listener()
-    frames = hear_static_frames(node)
+    frames = hear_frames(node)
     node.heard["/tf_static"](kinds.TFMessage(transforms=[one]))
     T = frames.between("base", "eye")
     assert T is not None and T[0, 3] == 0.5

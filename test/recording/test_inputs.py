@@ -315,7 +315,7 @@ def test_a_remap_to_nowhere_is_refused() -> None:
 @pytest.mark.parametrize(
     ("name", "topic", "expected"),
     [
-        ("odom", "/image", r"odom of type nav_msgs/msg/Odometry, got /image \(sensor_msgs/msg/Image\)"),
+        ("odom", "/image", r"odom of type geometry_msgs/msg/PoseStamped or nav_msgs/msg/Odometry or .*, got /image \("),
         ("camera_info", "/odom", r"camera_info of type sensor_msgs/msg/CameraInfo, got /odom \(nav_msgs"),
         ("image", "/points", r"image of type sensor_msgs/msg/Image or sensor_msgs/msg/CompressedImage, got /points"),
         ("points", "/image", r"points of type sensor_msgs/msg/PointCloud2, got /image"),

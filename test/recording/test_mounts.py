@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from objreg_ros.bridge.frames import Tie
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.recording import Record, messages, open_recording, write_rosbag2
 from objreg_ros.recording.inputs import choose_inputs
-from objreg_ros.recording.mounts import TRANSFORMS, camera_on_body, static_frames, static_topics
+from objreg_ros.recording.mounts import TRANSFORMS, camera_on_body, frame_tree, static_topics
 from objreg_ros.recording.troubles import warnings
 
 from .folders import CAMERA, static
@@ -31,15 +32,16 @@ def test_the_camera_on_the_body_of_the_odometry_is_what_tf_static_says_whenever(
     late = static("/base", "/eye", T_BODY_CAMERA, 99, "/robot/tf_static")
     with open_recording(bag(tmp_path / "bag", late)) as source:
         assert static_topics(source) == ["/robot/tf_static"] and source.topics["/robot/tf_static"].msgtype == TRANSFORMS
-        body, camera, T = camera_on_body(source, choose_inputs(source.topics))
+        body, camera, T, tie = camera_on_body(source, choose_inputs(source.topics))
+        assert tie is Tie.STATIC
         assert (body, camera) == ("base", "eye") and pytest.approx(T_BODY_CAMERA, abs=1e-9) == T
         assert not [w for w in warnings(source, choose_inputs(source.topics)) if "tf_static" in w.text]
 
 
 def test_a_body_that_nothing_ties_to_the_camera_is_told_with_what_to_do(tmp_path: Path) -> None:
     with open_recording(bag(tmp_path / "bag")) as source:
-        assert camera_on_body(source, choose_inputs(source.topics)) == ("base", "eye", None)
-        assert static_frames(source).between("base", "eye") is None
+        assert camera_on_body(source, choose_inputs(source.topics)) == ("base", "eye", None, None)
+        assert frame_tree(source).between("base", "eye") is None
         (told,) = [w for w in warnings(source, choose_inputs(source.topics)) if "tf_static" in w.text]
         assert told.text.startswith("odometry is of base and depth in eye") and "set T_base_camera" in told.text
 
