@@ -331,7 +331,8 @@ class Frame:
     ``objects`` with instance >= 1; ``support`` the points of the surfaces they stand on (instance 0) or None;
     ``gravity (3,) float64`` of length 1, the way things fall in the camera frame, or None; ``gravity_confidence`` 0..1;
     ``T_odom_camera`` the odometry's pose of the camera or None; ``robot`` who carries the camera, empty where there is
-    but one; ``doubt`` why the camera is not what it says, empty where nothing speaks against it.
+    but one; ``doubt`` why the camera is not what it says, empty where nothing speaks against it; ``proven`` whether
+    enough of the stream was seen for that.
     """
 
     objects: tuple[ObjectCloud, ...]
@@ -344,6 +345,7 @@ class Frame:
     frame_id: str = "camera"
     robot: str = ""
     doubt: str = ""
+    proven: bool = True
 
     def __post_init__(self) -> None:
         few = len(self.objects) <= limits.MOST_OBJECTS

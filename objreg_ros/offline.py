@@ -9,17 +9,18 @@ from __future__ import annotations
 
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
 from objreg_ros.bridge import colour_frame, from_msg, lenses
+from objreg_ros.bridge.camera_stream import CameraStream
 from objreg_ros.bridge.frames import FrameTree
-from objreg_ros.bridge.mount import Mount, Seat, nameless_body
+from objreg_ros.bridge.mount import Mount, nameless_body
 from objreg_ros.bridge.pace import Pace
 from objreg_ros.bridge.sync import Drop, Match, Need, Stream, Synchroniser
 from objreg_ros.data import (
@@ -31,11 +32,11 @@ from objreg_ros.data import (
     Frame,
     LoopClosure,
     ObjectCloud,
-    Odometry,
     PointCloud,
     Rejected,
 )
 from objreg_ros.detector.params import DetectorParams
+from objreg_ros.plausibility.finding import Finding
 from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.mounts import is_moving
 from objreg_ros.recording.record import Record
@@ -167,6 +168,8 @@ class Run:
     objects: int = 0
     lens: str = ""  # what was assumed of it; empty where no camera_info came
     registered: str = ""  # how depth was brought into the picture of colour; empty where it came so
+    findings: tuple[Finding, ...] = ()  # what of the stream is not as it says
+    measured_mount: Array | None = None  # T_body_camera, where nothing says it and it was measured
     mount: str = ""  # what was assumed of how the camera sits on the body of the odometry; empty where it is told
     closures: list[LoopClosure] = field(default_factory=list)
     rejected: Counter[str] = field(default_factory=Counter)
@@ -188,7 +191,9 @@ class Run:
             "frames": self.frames,
             "detections": self.detections,
             "objects": self.objects,
+            "stream": [asdict(finding) for finding in self.findings],
             "lens": self.lens,
+            "mount_estimate": None if self.measured_mount is None else {"T_body_camera": self.measured_mount.tolist()},
             "registered": self.registered,
             "depth_to_colour": self.depth_to_colour,
             "depth_noise": None if self.depth_noise is None else round(self.depth_noise, 3),
@@ -276,6 +281,7 @@ class Line:
         self._pace = Pace(timing.max_rate)
         self._imu = Imu(timing.T_camera_imu, timing.frames.between)
         self._mount = Mount(timing.T_base_camera, timing.frames, self._hear_of_mount)
+        self._stream = CameraStream(self._mount, self._hear_of_mount)
         self._level_mount = Mount(timing.T_level_camera, timing.frames)
         self._odom_topic = inputs.odom or ""
         self.run.imu_passed_over = self._imu.counts
@@ -328,6 +334,7 @@ class Line:
             if odometry is not None:
                 body = nameless_body(self._odom_topic, hasattr(message, "child_frame_id"))
                 self._mount.nameless = self._level_mount.nameless = body
+                self._stream.take_odometry(odometry)
                 self._feed(name, stamp_ns, odometry)
                 self._track(self._frames.add(name, stamp_ns, odometry))
         elif name == "imu":
@@ -348,6 +355,8 @@ class Line:
         self._segment(self._views.flush())
         self._track(self._frames.flush())
         self._note(self._rooms.registrar.finish())
+        self._stream.finish()
+        self.run.findings, self.run.measured_mount = self._stream.findings, self._stream.mount
         sensor = self._rooms.segmenter.sensor
         self.run.depth_to_colour = sensor.depth_to_colour.text()
         self.run.depth_noise, self.run.depth_lag = sensor.noise, sensor.lag
@@ -430,9 +439,8 @@ class Line:
             if self.full:
                 return
             labels = self._labels.pop(match.stamp_ns, ())
-            seated = self._mount.seated(match["odom"], match["frame"].frame_id, match.stamp_ns)
-            odom = None if seated.seat is Seat.BEYOND else match["odom"]
-            frame = with_odometry(match["frame"], odom, seated.T_body_camera)
+            with self._timed("check"):
+                frame = self._stream.place(match["frame"], match["odom"])
             self.run.frames += 1
             self.run.glimpses.append(glimpse(frame, labels))
             with self._timed("register"):
@@ -491,14 +499,6 @@ def run_offline(
         if line.full:
             break
     return line.finish()
-
-
-def with_odometry(frame: Frame, odom: Sequence[Odometry] | None, T_base_camera: Array | None) -> Frame:
-    """The frame with the pose that the odometry around it gives its camera."""
-    if not odom:
-        return frame
-    T_odom_body = from_msg.pose_at(frame.stamp_ns, odom)
-    return replace(frame, T_odom_camera=T_odom_body if T_base_camera is None else T_odom_body @ T_base_camera)
 
 
 def as_sent(frame: Frame) -> Frame:

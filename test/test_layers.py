@@ -32,6 +32,7 @@ FREE_BRIDGE = tuple(
     for name in (
         "calibration",
         "camera_checks",
+        "camera_stream",
         "calibration_files",
         "from_msg",
         "course",

@@ -443,10 +443,10 @@ def test_a_run_whose_frames_tell_nothing_of_their_sensor_says_none() -> None:
     assert summary["depth_noise"] is None and summary["depth_lag"] is None
 
 
-def tied(place: np.ndarray) -> Timing:
-    """The camera at a place on the base, by a tree of frames."""
+def tied(place: np.ndarray, parent: str = "base", child: str = "camera") -> Timing:
+    """One frame at a place on another, by a tree of frames."""
     tree = FrameTree()
-    tree.hear(said(transform("base", "camera", place)))
+    tree.hear(said(transform(parent, child, place)))
     return Timing(frames=tree)
 
 
@@ -547,7 +547,7 @@ class InFrame:
 
 def test_depth_of_another_sensor_goes_to_the_segmenter_in_the_picture_of_colour() -> None:
     rooms, chain = simple_rooms()
-    timing = Timing(frames=tied("rgb", "depth", ASIDE))
+    timing = tied(ASIDE, "rgb", "depth")
     run = run_offline(of_two_sensors(), replace(rooms, detector=InFrame()), WITH_COLOUR, timing)
     assert run.frames == 3 and not run.dropped
     assert run.summary(Truth([]))["registered"].startswith("depth of 'depth' is registered here to colour of 'rgb'")
@@ -581,7 +581,7 @@ def test_a_cloud_of_a_body_is_turned_into_the_frame_of_the_picture() -> None:
         for r in records(2)
     ]
     inputs = Inputs(image="/image", points="/points", odom="/odom")
-    timing = Timing(frames=tied("camera", "zed", pose(R_body_optical.T, np.zeros(3))))
+    timing = tied(pose(R_body_optical.T, np.zeros(3)), "camera", "zed")
     run = run_offline(said, replace(rooms, organise=organise), inputs, timing)
     assert run.frames == 2 and not run.dropped
     np.testing.assert_allclose(chain.frames[0].view.xyz, xyz, atol=1e-5)

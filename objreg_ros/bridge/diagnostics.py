@@ -19,6 +19,7 @@ LOST = "lost in transport: "
 LATENCY = "latency "
 REJECTED = "rejected: "
 CONNECTED = "connected: "
+FOUND = "found: "
 
 
 def diagnostic(

@@ -26,7 +26,7 @@ from std_srvs.srv import Trigger
 
 from objreg_ros.bridge import qos, to_msg
 from objreg_ros.bridge.choice import Choice
-from objreg_ros.bridge.diagnostics import CONNECTED, diagnostic
+from objreg_ros.bridge.diagnostics import CONNECTED, FOUND, diagnostic
 from objreg_ros.bridge.drops import Drops
 from objreg_ros.bridge.indoors import Ear, Indoors, Inlet, Outlet
 from objreg_ros.bridge.ledger import Ledger
@@ -38,6 +38,7 @@ from objreg_ros.bridge.params import DoorParams, ManagedParams
 from objreg_ros.bridge.watch import Watch
 from objreg_ros.bridge.worker import Worker
 from objreg_ros.params import Params
+from objreg_ros.plausibility.finding import Finding
 
 INACTIVE = "inactive"  # why a frame ends that came to a managed node that is not active
 
@@ -108,6 +109,10 @@ class Door(ManagedNode):
     def extra_diagnostics(self) -> Mapping[str, object]:
         """What this node adds to its diagnostics."""
         return {}
+
+    def found(self) -> Sequence[Finding]:
+        """What this node finds its stream to have; a warning in its diagnostics."""
+        return ()
 
     # Inputs
 
@@ -358,7 +363,9 @@ class Door(ManagedNode):
         connected = {f"{CONNECTED}{topic}": count for topic, count in sorted(self.connected.items())}
         state = {"state": self.state} if self.is_managed else {}
         extra = {**state, **connected, **self._ignored, **(self.extra_diagnostics() if self.is_open else {})}
-        troubles = (*silent.values(), *self._drops.lasting().values())
+        found = self.found() if self.is_open else ()
+        extra |= {f"{FOUND}{finding.anchor}": finding.text for finding in found}
+        troubles = (*silent.values(), *self._drops.lasting().values(), *(finding.what for finding in found))
         self._diagnostics.publish(diagnostic(name, stamp, balance, rate, troubles, extra))
 
     def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> SetParametersResult:

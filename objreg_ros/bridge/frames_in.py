@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -13,12 +13,14 @@ from sensor_msgs.msg import CameraInfo, PointCloud2
 from std_msgs.msg import String
 
 from objreg_ros.bridge import from_msg, qos
+from objreg_ros.bridge.camera_stream import CameraStream
 from objreg_ros.bridge.matching import MatchingDoor
-from objreg_ros.bridge.mount import Body, Mount, Seat, nameless_body
+from objreg_ros.bridge.mount import Body, Mount, nameless_body
 from objreg_ros.bridge.sync import Match, Need, Stream
 from objreg_ros.bridge.transforms import hear_frames, is_installed
 from objreg_ros.bridge.travel import Travel
 from objreg_ros.data import Array, Frame
+from objreg_ros.plausibility.finding import Finding
 
 # By which odometry may come. Whose pose one without a child_frame_id is, the name behind all remaps says.
 ODOMETRY = {"odom": Odometry, "odom/pose": PoseStamped, "odom/pose_with_covariance": PoseWithCovarianceStamped}
@@ -30,7 +32,7 @@ class FramesDoor(MatchingDoor):
     def prepare(self) -> None:
         """As any door; nothing is known of labels and odometry."""
         super().prepare()
-        self.without_odometry = 0  # frames
+        self._stream = CameraStream(Mount(None))
         self._names = dict[str, dict[int, str]]()  # by robot
         self.odom_frame = "odom"
         self._camera: str | None = None  # the frame_id of the last frame
@@ -43,6 +45,7 @@ class FramesDoor(MatchingDoor):
         wanted = told is None or odometry != "topic"
         tree = hear_frames(self, wanted, self._hear_tf)
         self._mount = Mount(told, tree, self.get_logger().info)
+        self._stream = CameraStream(self._mount, self.get_logger().info)
         self._travel = Travel(tree, outright=odometry == "tf")
         self._by_topic = odometry == "topic"
         room: dict[str, type] = {"objects": PointCloud2}
@@ -85,12 +88,14 @@ class FramesDoor(MatchingDoor):
         odometry = self.read_aside("odom", from_msg.odometry, message)
         if odometry is not None:
             self._by_topic, self._mount.nameless = True, body
+            self._stream.take_odometry(odometry)
             self.feed("odom", odometry.stamp_ns, odometry)
 
     def _hear_tf(self, message: Any) -> None:
         """Odometry of /tf, unless it comes by a topic; frames wait for the joints that carry the camera."""
         if not self._by_topic and not any(map(self._is_published, ODOMETRY)):
             for odometry in self._travel.of(message):
+                self._stream.take_odometry(odometry)
                 self.feed("odom", odometry.stamp_ns, odometry)
         reached_ns = self._mount.reached_ns
         if reached_ns is not None:
@@ -110,15 +115,25 @@ class FramesDoor(MatchingDoor):
         """A frame, and where the camera sits on the body of its odometry; `DroppedError` if it breaks its contract."""
         odom, camera = match["odom"], from_msg.frame_id(match["objects"])
         self._watch_camera(camera)
-        seat, T_body_camera = self._mount.seated(odom, camera, match.stamp_ns)
-        odom = None if seat is Seat.BEYOND else odom
-        self.without_odometry += odom is None
         self.odom_frame = odom[0].frame_id if odom else self.odom_frame
-        if isinstance(match["objects"], Frame):
-            return self.read("frame", from_msg.followed, match["objects"], odom, T_body_camera), T_body_camera
-        topics = ("objects", "view", "view/camera_info", "gravity", "labels")
-        parts = [*(match[topic] for topic in topics), odom]
-        return self.read("frame", from_msg.frame, *parts, T_body_camera), T_body_camera
+        frame = match["objects"]
+        if not isinstance(frame, Frame):
+            topics = ("objects", "view", "view/camera_info", "gravity", "labels")
+            frame = self.read("frame", from_msg.frame, *(match[topic] for topic in topics))
+        with self.ledger.timed("check"):
+            frame = self.read("frame", self._stream.place, frame, odom)
+        for finding in self._stream.findings:
+            self.throttled.remind(finding.anchor, finding.text)
+        return frame, self._stream.T_body_camera
+
+    @property
+    def without_odometry(self) -> int:
+        """Frames that came, or are used, without odometry."""
+        return self._stream.without_odometry
+
+    def found(self) -> Sequence[Finding]:
+        """What of the stream is not as it says."""
+        return self._stream.findings
 
     def _watch_camera(self, frame_id: str) -> None:
         """Say so where the frames of two cameras come in turn."""

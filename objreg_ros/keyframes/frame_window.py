@@ -76,6 +76,11 @@ class FrameWindow:
         """Why its camera is not what it says; empty where nothing speaks against it."""
         return next((frame.doubt for frame in self.frames if frame.doubt), "")
 
+    @property
+    def proven(self) -> bool:
+        """Whether enough of the stream was seen to believe its camera."""
+        return self.frames[-1].proven
+
     @classmethod
     def of(cls, frame: Frame) -> FrameWindow:
         """One frame by itself."""

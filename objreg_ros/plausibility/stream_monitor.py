@@ -30,6 +30,8 @@ LEAST_SPANS, LEAST_STRANGE = 4, 6
 MOST_SPANS = 48  # the newest
 OFTEN, SELDOM = 12, 6  # up to so many spans each is followed by a look at all; then every so many are
 STRANGE_SHARE = 0.7  # of spans that do not fit, where colour is not that of depth
+PROOF_SIGMA = 0.1  # deviation of the logarithm of a focal length that is believed
+PATIENCE_S = 30.0  # a camera that has not moved enough for so long is believed
 MOST_REST = 0.8  # of the motions of one body, in the deviations of `hand_eye`; those of two come to 1 and more
 WRONG_DEG = 10.0  # a mount that is off by more is wrong
 ENOUGH_DEG, ENOUGH_M = 3.0, 0.12  # deviations of a mount that is measured well enough to be used
@@ -71,6 +73,13 @@ class StreamMonitor:
     def T_body_camera(self) -> Array | None:
         """The measured mount (4, 4), for a camera whose mount nothing else says; None where it is not known well."""
         return self.mount.T_body_camera if self.mount is not None and _is_enough(self.mount) else None
+
+    @property
+    def proven(self) -> bool:
+        """Whether enough was seen to believe the camera, or whether its motion does not tell in a long time."""
+        if self.fit is not None and self.fit.count >= LEAST_SPANS and self.fit.focal_sigma < PROOF_SIGMA:
+            return True
+        return self._last_ns is not None and 1e-9 * (self._last_ns - self._first_ns) > PATIENCE_S
 
     def take_odometry(self, sample: Odometry) -> None:
         """A sample of odometry, whether or not a frame comes by it."""

@@ -3,11 +3,11 @@
 
 from __future__ import annotations
 
-from objreg_ros.data import Frame, Reason, Rejected
+from objreg_ros.data import Frame, LoopClosure, Reason, Rejected
 from objreg_ros.keyframes.frame_window import Clock, FrameWindow, SessionNumbers
 from objreg_ros.keyframes.keyframer import Keyframer
 from objreg_ros.memory.store import Store
-from objreg_ros.registrar.closure import redundant, rejected
+from objreg_ros.registrar.closure import Waiting, redundant, rejected
 from objreg_ros.registrar.confirmation import Confirmation
 from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.recollection import Recollection
@@ -35,6 +35,7 @@ class CameraTrack:
         self.relocalisation = Relocalisation()
         self.confirmation = Confirmation(params)
         self.thinning = Thinning(params.thin_seconds)
+        self.unproven: list[Waiting] = []  # accepted while too little was seen of the camera to believe it
         self.hidden: frozenset[int] = frozenset()
         self.clock: Clock | None = None
         self.sessions: set[int] = set()  # of the run of the clock
@@ -61,7 +62,13 @@ class CameraTrack:
     def give_up(self, window: FrameWindow) -> Outcome:
         """Refuse a frame window whose camera is in doubt, and all that waits."""
         refusal = Reason.CAMERA, window.doubt
-        return Outcome(rejected=(*self.confirmation.give_up(refusal), refused_window(window, refusal)))
+        unproven, self.unproven = [waiting.refused(refusal) for waiting in self.unproven], []
+        return Outcome(rejected=(*unproven, *self.confirmation.give_up(refusal), refused_window(window, refusal)))
+
+    def release(self, recollection: Recollection) -> tuple[LoopClosure, ...]:
+        """The constraints that waited until the camera was believed, written down."""
+        unproven, self.unproven = self.unproven, []
+        return tuple(self._late(waiting, recollection) for waiting in unproven)
 
     def settle(self, now_ns: int | None, recollection: Recollection) -> Outcome:
         """What waits no more: late constraints, which are written down, and refusals; all where there is no now."""
@@ -73,11 +80,15 @@ class CameraTrack:
                 refused.append(waiting.refused(redundant(recollection.params.thin_seconds)))
                 continue
             self.thinning.accept(*moments)
-            settled, ends = recollection.remember_late(waiting)
-            if ends is not None:
-                self.relocalisation.hear(settled.closure, *ends)
-            closures.append(settled.closure)
+            closures.append(self._late(waiting, recollection))
         return Outcome(closures=tuple(closures), rejected=tuple(refused))
+
+    def _late(self, waiting: Waiting, recollection: Recollection) -> LoopClosure:
+        """A constraint that waited, written down."""
+        settled, ends = recollection.remember_late(waiting)
+        if ends is not None:
+            self.relocalisation.hear(settled.closure, *ends)
+        return settled.closure
 
 
 class CameraTracks(dict[Camera, CameraTrack]):

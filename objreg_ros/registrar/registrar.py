@@ -38,6 +38,7 @@ from objreg_ros.registration.api import Gate, Method
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
 
+UNPROVEN = Reason.CAMERA, "too little of the stream was seen to believe its camera"
 RECENT = 500  # landmarks that are told of after every keyframe
 
 
@@ -151,7 +152,7 @@ class Registrar:
             if window.doubt:
                 return self._tracks.of(window.camera).give_up(window)
             keyframe = fuse(window, self.params)
-            return self._search(keyframe, window.clock, budget) if keyframe.objects else Outcome()
+            return self._search(keyframe, window.clock, budget, window.proven) if keyframe.objects else Outcome()
 
     def receive(
         self, arrival: Arrival, seconds: float = np.inf, hurried: Callable[[], bool] = lambda: False
@@ -165,20 +166,23 @@ class Registrar:
             received = self._origins.received(arrival)
             return None if received is None else self._search(*received, budget)
 
-    def _search(self, made: Keyframe, clock: Clock, budget: Budget) -> Outcome:
+    def _search(self, made: Keyframe, clock: Clock, budget: Budget, proven: bool = True) -> Outcome:
         keyframe, track = made.numbered(self._store.next_keyframe()), self._tracks.of(made.camera)
         self._session = keyframe.session
         before = self._tracks.go_on(keyframe, clock, self._recollection)
         sightings = sightings_of(keyframe)
         found = self._find_closures(keyframe, sightings, track, budget)
+        believed = found.accepted if proven else []
         try:
-            closures, named = self._recollection.remember(keyframe, sightings, found.accepted)
+            closures, named = self._recollection.remember(keyframe, sightings, believed)
         except StoreError:
             for item in found.accepted:
                 track.thinning.withdraw(item.target.session, item.target.stamp_ns, keyframe.stamp_ns)
             raise
-        for item, closure in zip(found.accepted, closures, strict=True):
+        for item, closure in zip(believed, closures, strict=True):
             track.relocalisation.hear(closure, keyframe, item.target)
+        if not proven:
+            track.unproven += [waiting_of(keyframe, named, item, UNPROVEN, self.params) for item in found.accepted]
         for held in found.held:
             self._hold(held, keyframe, named, track)
         outcome = Outcome(
@@ -191,7 +195,8 @@ class Registrar:
             session=keyframe.session,
             robot=keyframe.robot,
         )
-        return outcome.with_late(track.settle(keyframe.stamp_ns, self._recollection))
+        released = Outcome(closures=track.release(self._recollection) if proven else ())
+        return outcome.with_late(released).with_late(track.settle(keyframe.stamp_ns, self._recollection))
 
     def moment(self, keyframe_id: int) -> tuple[Keyframe, Clock]:
         """A stored keyframe, and the run of its camera's clock that goes on. KeyError where it is not stored, or no
@@ -256,7 +261,9 @@ class Registrar:
     def settle(self) -> Outcome:
         """Publish or refuse what still waits for other keyframes to confirm it: the end of a recording, or a save."""
         with self._lock:
-            return in_turn([track.settle(None, self._recollection) for track in tuple(self._tracks.values())])
+            released = [Outcome(closures=track.release(self._recollection)) for track in tuple(self._tracks.values())]
+            settled = [track.settle(None, self._recollection) for track in tuple(self._tracks.values())]
+            return in_turn([*released, *settled])
 
     def reset(self) -> None:
         """Forget everything, in the store too; StoreError, and nothing is forgotten, where that cannot be."""

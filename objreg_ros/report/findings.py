@@ -77,11 +77,22 @@ class Counts:
 
 
 def find(summary: Mapping[str, Any], of_recording: Iterable[Finding] = ()) -> tuple[Finding, ...]:
-    """Where the run stopped first, if no loop was closed; then what else it and its recording were found to have."""
-    counts = Counts.of(summary)
-    steps = (_no_frame, _no_detections, _no_objects, _none_tried, _no_revisit, _all_refused)
-    stopped = () if counts.constraints else (_first(steps, counts, summary),)
-    found = (*stopped, *of_recording, _simulated_model(counts, summary), _overtaken(summary), _over_budget(summary))
+    """Where the run stopped first, if no loop was closed; then what else it and its recording were found to have.
+
+    What was measured of its stream to be other than it says is the cause before all others.
+    """
+    counts, causes = Counts.of(summary), tuple(Finding(**row) for row in summary.get("stream", ()))
+    steps = (_no_frame, _no_detections, _no_objects)
+    later = () if causes else (_none_tried, _no_revisit, _all_refused)
+    stopped = () if counts.constraints else (_first((*steps, *later), counts, summary),)
+    found = (
+        *stopped,
+        *causes,
+        *of_recording,
+        _simulated_model(counts, summary),
+        _overtaken(summary),
+        _over_budget(summary),
+    )
     return tuple(dict.fromkeys(finding for finding in found if finding is not None))
 
 
