@@ -169,6 +169,11 @@ SCHEMES = {
         line([(100, 110), (220, 110)], NEW, 6), line([(160, 60), (160, 110)], WRONG, 1, True),
         words(200, 140, "one stamp, two moments"),
     ),
+    "camera_implausible": picture(
+        line([(60, 110), (200, 30), (340, 110)], EARLIER), line([(60, 110), (200, 70), (340, 110)], WRONG),
+        words(200, 24, "how the picture moves", EARLIER), words(200, 90, "what camera_info says", WRONG),
+        words(200, 140, "no closure is made with a camera that is not what it says"),
+    ),
     "neighbours_disagree": picture(
         line([(60, 40), (160, 35), (260, 40), (340, 35)], EARLIER),
         line([(60, 110), (160, 105), (260, 110), (340, 105)], NEW),

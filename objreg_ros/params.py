@@ -21,6 +21,7 @@ from typing import Any, Self
 
 from objreg_ros.geometry import Array, mounting
 
+AUTO = "auto"
 NAMESPACE = re.compile("/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 
 
@@ -39,10 +40,12 @@ class Declaration:
     choices: tuple[str, ...] = ()
     live: bool = False
     counts: tuple[int, ...] = ()  # how long a list may be; empty: as long as it likes
+    or_auto: bool = False  # whether "auto" stands for an empty list
 
     def check(self, value: Any) -> Any:
         """The value in its declared type; ValueError with expected and got if it is not that or out of range."""
         if self.many:
+            value = () if self.or_auto and value == AUTO else value
             items = value.tolist() if hasattr(value, "tolist") else value
             if not isinstance(items, list | tuple):
                 raise ValueError(f"{self.name}: expected a list of {self.kind.__name__}, got {value!r}")
@@ -86,9 +89,11 @@ def param(
     choices: tuple[str, ...] = (),
     live: bool = False,
     counts: tuple[int, ...] = (),
+    or_auto: bool = False,
 ) -> Any:
     """Declare one parameter. ``live`` ones may be changed while a node runs; the others are read-only there."""
     metadata = {"doc": doc, "unit": unit, "ge": ge, "le": le, "choices": choices, "live": live, "counts": counts}
+    metadata["or_auto"] = or_auto
     return dataclasses.field(default=default, metadata=metadata)
 
 
@@ -140,8 +145,9 @@ class MountedParams(Params):
 
     T_base_camera: tuple[float, ...] = param(
         (),
-        "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty: as /tf_static or /tf say, or the "
-        "odometry is the camera's",
+        "the camera's optical frame on the odometry's body: x y z qx qy qz qw; empty or auto: as /tf_static or /tf "
+        "say, else measured from the motion of both",
+        or_auto=True,
     )
 
     def __post_init__(self) -> None:

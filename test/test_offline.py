@@ -126,7 +126,9 @@ def test_a_frame_between_two_odometry_messages_has_a_pose_between_theirs() -> No
     for record in records(4):
         if record.topic == "/odom":
             early = wanted[record.stamp_ns] * MS
-            message = messages.odometry(from_msg.odometry(record.message).T_odom_body, np.eye(6), early, "odom", "base")
+            message = messages.odometry(
+                from_msg.odometry(record.message).T_odom_body, np.eye(6), early, "odom", "camera"
+            )
             record = Record.of("/odom", message, early)
         shifted.append(record)
     run_offline(sorted(shifted, key=lambda record: record.stamp_ns), rooms, INPUTS)
@@ -285,7 +287,7 @@ def test_the_same_recording_gives_the_same_json() -> None:
     for _ in range(2):
         rooms, _ = simple_rooms()
         summary = run_offline(records(4), rooms, INPUTS).summary(truth)
-        assert set(summary.pop("stage_ms")) == {"decode", "detect", "segment", "register"}
+        assert set(summary.pop("stage_ms")) == {"decode", "detect", "segment", "check", "register"}
         texts.append(json.dumps(summary))
     assert texts[0] == texts[1]
 

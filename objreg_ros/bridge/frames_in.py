@@ -37,28 +37,26 @@ class FramesDoor(MatchingDoor):
         self.odom_frame = "odom"
         self._camera: str | None = None  # the frame_id of the last frame
 
-    def listen_to_frames(self, told: Array | None, odom_slop_ns: int, odometry: str = "topic") -> None:
+    def listen_to_frames(self, told: Array | None, odom_slop_ns: int) -> None:
         """Subscribe. ``told`` says where the camera sits on the body of odometry, else /tf_static and /tf do.
 
-        ``odometry`` is where that comes from: ``topic``, ``tf``, or ``auto``: /tf while no topic has a publisher.
+        Odometry is that of a topic, and that of /tf while no topic of it has a publisher.
         """
-        wanted = told is None or odometry != "topic"
-        tree = hear_frames(self, wanted, self._hear_tf)
+        tree = hear_frames(self, then=self._hear_tf)
         self._mount = Mount(told, tree, self.get_logger().info)
         self._stream = CameraStream(self._mount, self.get_logger().info)
-        self._travel = Travel(tree, outright=odometry == "tf")
-        self._by_topic = odometry == "topic"
+        self._travel = Travel(tree)
+        self._by_topic = False
         room: dict[str, type] = {"objects": PointCloud2}
         if not self.hears_words:  # which hold these too
             room |= {"view": PointCloud2, "view/camera_info": CameraInfo, "gravity": Vector3Stamped}
         self.listen(String, "labels", self.hear_labels, qos.latched())
-        if odometry != "tf":
-            self._listen_to_odometry()
+        self._listen_to_odometry()
         for topic, kind in room.items():
             self.listen(kind, topic, self._hear(topic), qos.room(), watched=topic)
         self.expect("objects", "objects")
         exact = [Stream(topic) for topic in room]
-        names = "odom", *(["joints"] if wanted and is_installed() else [])
+        names = "odom", *(["joints"] if is_installed() else [])
         beside = [Stream(name, Need.OPTIONAL, odom_slop_ns, depth=1000, enclosing=True) for name in names]
         self.begin([*exact, Stream("labels", Need.LATCHED), *beside])
 
@@ -102,7 +100,7 @@ class FramesDoor(MatchingDoor):
             self.feed("joints", reached_ns, True)
 
     def _is_published(self, topic: str) -> bool:
-        return not self._travel.outright and self.count_publishers(self.resolve_topic_name(topic)) > 0
+        return self.count_publishers(self.resolve_topic_name(topic)) > 0
 
     def _hear(self, topic: str) -> Callable[[Any], None]:
         def hear(message: Any) -> None:

@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from objreg_ros.data import Frame, LoopClosure, Reason, Rejected
 from objreg_ros.keyframes.frame_window import Clock, FrameWindow, SessionNumbers
 from objreg_ros.keyframes.keyframer import Keyframer
+from objreg_ros.memory.sighting import Sighting
 from objreg_ros.memory.store import Store
-from objreg_ros.registrar.closure import Waiting, redundant, rejected
+from objreg_ros.registrar.closure import Accepted, Waiting, redundant, rejected, waiting_of
 from objreg_ros.registrar.confirmation import Confirmation
 from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.recollection import Recollection
@@ -17,6 +20,7 @@ from objreg_ros.registration.gate.refusal import Refusal
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
 
+UNPROVEN = Reason.CAMERA, "too little of the stream was seen to believe its camera"
 MOST_CAMERAS = 64  # of all robots that are followed
 GOES_ON_NS = 1_000_000_000  # a clock that is not so far ahead of one that begins goes on beside it
 
@@ -31,6 +35,7 @@ class CameraTrack:
     """
 
     def __init__(self, params: RegistrarParams, numbers: SessionNumbers) -> None:
+        self._params = params
         self.keyframer = Keyframer(params, numbers)
         self.relocalisation = Relocalisation()
         self.confirmation = Confirmation(params)
@@ -65,15 +70,19 @@ class CameraTrack:
         unproven, self.unproven = [waiting.refused(refusal) for waiting in self.unproven], []
         return Outcome(rejected=(*unproven, *self.confirmation.give_up(refusal), refused_window(window, refusal)))
 
-    def release(self, recollection: Recollection) -> tuple[LoopClosure, ...]:
-        """The constraints that waited until the camera was believed, written down."""
-        unproven, self.unproven = self.unproven, []
-        return tuple(self._late(waiting, recollection) for waiting in unproven)
+    def wait_for_proof(self, accepted: Sequence[Accepted], keyframe: Keyframe, named: Sequence[Sighting]) -> None:
+        """Keep what was accepted until the camera is believed; ``named`` are the keyframe's sightings."""
+        params = self._params
+        self.unproven += [waiting_of(keyframe, named, item, UNPROVEN, params) for item in accepted]
 
-    def settle(self, now_ns: int | None, recollection: Recollection) -> Outcome:
-        """What waits no more: late constraints, which are written down, and refusals; all where there is no now."""
+    def settle(self, now_ns: int | None, recollection: Recollection, proven: bool = True) -> Outcome:
+        """What waits no more: late constraints, which are written down, and refusals; all where there is no now.
+
+        Those among them that waited for their camera to be believed, if it is ``proven`` now.
+        """
         confirmed, refused = self.confirmation.settle(now_ns)
-        closures = []
+        waited, self.unproven = (self.unproven, []) if proven else ([], self.unproven)
+        closures = [self._late(waiting, recollection) for waiting in waited]
         for waiting in confirmed:
             moments = waiting.from_session, waiting.closure.from_ns, waiting.closure.to_ns
             if self.thinning.redundant(*moments):

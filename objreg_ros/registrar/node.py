@@ -106,7 +106,7 @@ class RegistrarNode(FramesDoor):
         if self._robots:
             self._keyframes = KeyframesIn(self, self._robots, list(inputs.cameras.values()), self._take)
         else:
-            self.listen_to_frames(inputs.mounting, round(inputs.odom_slop * 1e9), inputs.odometry)
+            self.listen_to_frames(inputs.mounting, round(inputs.odom_slop * 1e9))
 
     def _asked_to_exchange(self) -> str:
         """Our own robot's name if keyframes are exchanged; empty if not. ValueError where it has none."""

@@ -24,11 +24,7 @@ from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.registrar.camera_track import CameraTrack, CameraTracks
 from objreg_ros.registrar.candidate_search import Budget, Found, Means, Pools, Search
-from objreg_ros.registrar.closure import (
-    observations,
-    rejected,
-    waiting_of,
-)
+from objreg_ros.registrar.closure import observations, rejected, waiting_of
 from objreg_ros.registrar.confirmation import Held
 from objreg_ros.registrar.origins import Origins
 from objreg_ros.registrar.outcome import Outcome, in_turn
@@ -38,7 +34,6 @@ from objreg_ros.registration.api import Gate, Method
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
 
-UNPROVEN = Reason.CAMERA, "too little of the stream was seen to believe its camera"
 RECENT = 500  # landmarks that are told of after every keyframe
 
 
@@ -141,8 +136,7 @@ class Registrar:
         as over budget: with no time the keyframe is only stored. Without a limit the outcome depends on the frames
         alone. Keyframes are numbered as they come here: in the order of their frames. StoreError where one cannot be
         stored; then it closes nothing. Of a frame window that a `reset` overtook nothing comes, nor of
-        one whose objects have no name and were seen but once. One whose camera is in doubt is refused and not stored:
-        it would be wrong for whoever comes there later.
+        one whose objects have no name and were seen but once. One whose camera is in doubt is refused, and not stored.
         """
         budget = Budget(time.monotonic() + seconds, hurried)
         with self._lock:
@@ -182,7 +176,7 @@ class Registrar:
         for item, closure in zip(believed, closures, strict=True):
             track.relocalisation.hear(closure, keyframe, item.target)
         if not proven:
-            track.unproven += [waiting_of(keyframe, named, item, UNPROVEN, self.params) for item in found.accepted]
+            track.wait_for_proof(found.accepted, keyframe, named)
         for held in found.held:
             self._hold(held, keyframe, named, track)
         outcome = Outcome(
@@ -195,8 +189,7 @@ class Registrar:
             session=keyframe.session,
             robot=keyframe.robot,
         )
-        released = Outcome(closures=track.release(self._recollection) if proven else ())
-        return outcome.with_late(released).with_late(track.settle(keyframe.stamp_ns, self._recollection))
+        return outcome.with_late(track.settle(keyframe.stamp_ns, self._recollection, proven))
 
     def moment(self, keyframe_id: int) -> tuple[Keyframe, Clock]:
         """A stored keyframe, and the run of its camera's clock that goes on. KeyError where it is not stored, or no
@@ -261,9 +254,7 @@ class Registrar:
     def settle(self) -> Outcome:
         """Publish or refuse what still waits for other keyframes to confirm it: the end of a recording, or a save."""
         with self._lock:
-            released = [Outcome(closures=track.release(self._recollection)) for track in tuple(self._tracks.values())]
-            settled = [track.settle(None, self._recollection) for track in tuple(self._tracks.values())]
-            return in_turn([*released, *settled])
+            return in_turn([track.settle(None, self._recollection) for track in tuple(self._tracks.values())])
 
     def reset(self) -> None:
         """Forget everything, in the store too; StoreError, and nothing is forgotten, where that cannot be."""

@@ -100,12 +100,6 @@ class FramesParams(MountedParams):
         "s",
         ge=0.0,
     )
-    odometry: str = param(
-        "auto",
-        "where odometry comes from: a topic (odom, odom/pose or odom/pose_with_covariance), or the moving frame above "
-        "the camera on /tf; auto takes /tf while none of the topics has a publisher",
-        choices=("auto", "topic", "tf"),
-    )
 
 
 @dataclass(frozen=True)

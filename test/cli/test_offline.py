@@ -55,7 +55,7 @@ def test_a_folder_goes_through_the_real_rooms_and_gives_its_json(model: Path, tm
         **Inputs(image="/image", depth="/depth/image", camera_info="/camera_info").outright,
         "ground_truth": "/ground_truth",
     }
-    assert summary["stage_ms"].keys() == {"decode", "detect", "segment", "register"}
+    assert summary["stage_ms"].keys() == {"decode", "detect", "segment", "check", "register"}
 
 
 def test_what_is_odd_about_the_recording_and_its_truth_is_said(model: Path, tmp_path: Path) -> None:
@@ -123,7 +123,7 @@ def test_a_drift_without_a_seed_is_refused_before_anything_is_prepared(odometry:
 
 
 def test_an_odometry_that_is_not_there_is_refused_with_what_it_may_be(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"expected a topic of /.*, or tracked, or none, or drift:SEED, got '/oddom'"):
+    with pytest.raises(ValueError, match=r"expected a topic of /.*, or tf, tracked, none or drift:SEED, got '/oddom'"):
         offline(tum_folder(tmp_path), "--odometry", "/oddom")
 
 
