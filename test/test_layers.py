@@ -51,7 +51,7 @@ FREE_BRIDGE = tuple(
     )
 )
 CORE = ("limits", "sensor", "whole_file", "data", "lens", "geometry", "params", "share")
-HOUSE = ("offline", "truth", "report")
+HOUSE = ("offline", "rehearsal", "truth", "report")
 
 
 def module_name(path: Path) -> str:

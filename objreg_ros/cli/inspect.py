@@ -8,16 +8,20 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import click
+from tqdm import tqdm
 
 from objreg_ros.cli import NOTHING, options
 from objreg_ros.cli.told import tell, tell_next
 from objreg_ros.memory.store_file import is_store
+from objreg_ros.plausibility.finding import Finding
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import GRAPH_TOPICS, Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.summary import describe_lens, describe_topics
 from objreg_ros.recording.tf_odometry import by_transforms, with_transforms
 from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.recording.troubles import warnings
+from objreg_ros.rehearsal import FRAMES, rehearse
+from objreg_ros.report.findings import found_in
 from objreg_ros.report.live_pictures import write_picture
 from objreg_ros.report.portraits import portraits
 from objreg_ros.report.store_drawing import draw
@@ -38,8 +42,10 @@ FILE = click.Path(dir_okay=False, path_type=Path)
 def command(recording: Path, remaps: tuple[str, ...], camera: str, picture: Path | None, page: Path | None) -> int:
     """Say what is in RECORDING, which topics the graph would use, and what would go wrong.
 
-    Ends with 3 where the graph cannot run on it. RECORDING may also be a store of the registrar: then its sessions,
-    labels and objects are told, and what moved.
+    Takes its first frames as a run would, without a detector, and says what of the stream is not as it claims. Ends
+    with 3 where the graph cannot run on it, or would drop every frame.
+
+    RECORDING may also be a store of the registrar: then its sessions, labels and objects are told, and what moved.
     """
     if is_store(recording):
         _say_store(recording, picture, page)
@@ -58,12 +64,27 @@ def command(recording: Path, remaps: tuple[str, ...], camera: str, picture: Path
         _say_truth(source, inputs)
         for note in by_transforms(source, inputs):
             click.echo(note)
-        tell(warnings(source, inputs))
-    if not inputs.complete:
+        runs, found = _rehearsed(source, inputs) if inputs.complete else (False, ())
+        tell([*warnings(source, inputs), *found])
+    if not runs:
         return NOTHING
     told = [f"--remap={remap}" for remap in remaps] + ([f"--camera={camera}"] if camera else [])
     tell_next("objreg", "offline", str(recording), *told, "--json", "run.json")
     return 0
+
+
+def _rehearsed(source: Recording, inputs: Inputs) -> tuple[bool, tuple[Finding, ...]]:
+    """Whether the graph would run on the first frames, and what is found in them; a bar shows how far it is."""
+    with tqdm(total=FRAMES, unit="frame", desc="looking at frames", disable=None, leave=False) as bar:
+
+        def show(frames: int) -> None:
+            bar.update(frames - bar.n)
+
+        try:
+            run = rehearse(source, inputs, on_frame=show)
+        except ValueError as error:  # a file that is broken in its middle: a run has what comes before
+            return bar.n > 0, (Finding(str(error)),)
+    return run.frames > 0, found_in(run)
 
 
 def _say_store(store: Path, picture: Path | None, page: Path | None) -> None:

@@ -14,24 +14,24 @@ from objreg_ros.plausibility.hand_eye import HandEye
 NAME_CAMERA = "name the camera of the picture with --camera fx,fy,cx,cy (segmenter.camera), or mend its driver"
 
 
-def focal_length(fit: CameraFit, camera: Intrinsics) -> Finding:
+def focal_length(fit: CameraFit) -> Finding:
     """The camera turned, and what it saw moved as under another focal length."""
-    measured = f"{fit.focal * camera.fx:.0f} ± {fit.focal * camera.fx * fit.focal_sigma:.0f} px"
     return Finding(
-        f"camera_info has a focal length of {camera.fx:.0f} px, and the stream moves as with {measured}",
+        f"by its motion the camera has {fit.focal:.2f} ± {fit.focal * fit.focal_sigma:.2f} times the focal length that "
+        "camera_info says",
         "camera_info is of another camera, of another size of picture, or was never calibrated",
         NAME_CAMERA,
         "camera-focal-length",
     )
 
 
-def principal_point(fit: CameraFit, camera: Intrinsics) -> Finding:
+def principal_point(fit: CameraFit) -> Finding:
     """The camera moved, and what it saw moved as about another principal point."""
-    cx, cy = fit.centre * camera.width + (camera.cx, camera.cy)
-    sigma = fit.centre_sigma * camera.width
-    stated, measured = f"{camera.cx:.0f}, {camera.cy:.0f}", f"{cx:.0f} ± {sigma[0]:.0f}, {cy:.0f} ± {sigma[1]:.0f} px"
+    right, down = 100.0 * fit.centre
+    sigma = 100.0 * fit.centre_sigma
     return Finding(
-        f"camera_info has its principal point at {stated}, and the stream moves as with {measured}",
+        f"by its motion the camera has its principal point {right:.0f} ± {sigma[0]:.0f} % of the width to the right and "
+        f"{down:.0f} ± {sigma[1]:.0f} % down of where camera_info says",
         "camera_info is of another camera, or of a picture that was cut out elsewhere",
         NAME_CAMERA,
         "camera-principal-point",

@@ -141,13 +141,13 @@ class StreamMonitor:
         if implausible(self.camera):
             return
         self.fit = fit_camera([leg.span for leg in self._legs], self.camera, self.fit)
-        of_camera = self._of_camera(self.fit, self.camera)
+        of_camera = self._of_camera(self.fit)
         of_odometry, of_scale = self._of_odometry(self.fit) if len(self._odometry) > 1 else ((), ())
         doubted = (*of_camera, *of_scale)
         self.doubt = doubted[0].what if doubted else ""
         self.findings = (*doubted, *of_odometry, *self._of_gaps())
 
-    def _of_camera(self, fit: CameraFit, camera: Intrinsics) -> tuple[Finding, ...]:
+    def _of_camera(self, fit: CameraFit) -> tuple[Finding, ...]:
         strange = float(np.mean(fit.misfit > MOST_MISFIT))
         if len(fit.misfit) >= LEAST_STRANGE and strange >= STRANGE_SHARE:
             return (findings.other_colour(strange),)
@@ -155,9 +155,9 @@ class StreamMonitor:
             return ()
         found = []
         if _is_off(abs(np.log(fit.focal)), fit.focal_sigma):
-            found.append(findings.focal_length(fit, camera))
+            found.append(findings.focal_length(fit))
         if any(_is_off(abs(off), sigma) for off, sigma in zip(fit.centre, fit.centre_sigma, strict=True)):
-            found.append(findings.principal_point(fit, camera))
+            found.append(findings.principal_point(fit))
         return tuple(found)
 
     def _of_odometry(self, fit: CameraFit) -> tuple[tuple[Finding, ...], tuple[Finding, ...]]:

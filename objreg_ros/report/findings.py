@@ -14,6 +14,7 @@ from typing import Any
 
 from objreg_ros import share
 from objreg_ros.data import UNTRIED, Reason
+from objreg_ros.offline import Run
 from objreg_ros.plausibility.finding import Finding
 from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.record import Recording
@@ -94,6 +95,13 @@ def find(summary: Mapping[str, Any], of_recording: Iterable[Finding] = ()) -> tu
         _over_budget(summary),
     )
     return tuple(dict.fromkeys(finding for finding in found if finding is not None))
+
+
+def found_in(run: Run) -> tuple[Finding, ...]:
+    """What a run found of its stream; where it came to no frame, why."""
+    summary = {"frames": run.frames, "dropped": run.dropped, "complaints": run.complaints}
+    stopped = _no_frame(Counts.of(summary), summary)
+    return run.findings if stopped is None else (stopped,)
 
 
 def as_json(findings: Iterable[Finding]) -> list[dict[str, str]]:
