@@ -30,8 +30,8 @@ def principal_point(fit: CameraFit) -> Finding:
     right, down = 100.0 * fit.centre
     sigma = 100.0 * fit.centre_sigma
     return Finding(
-        f"by its motion the camera has its principal point {right:.0f} ± {sigma[0]:.0f} % of the width to the right and "
-        f"{down:.0f} ± {sigma[1]:.0f} % down of where camera_info says",
+        f"by its motion the camera has its principal point {right:.0f} ± {sigma[0]:.0f} % of the width to the right "
+        f"and {down:.0f} ± {sigma[1]:.0f} % down of where camera_info says",
         "camera_info is of another camera, or of a picture that was cut out elsewhere",
         NAME_CAMERA,
         "camera-principal-point",
@@ -115,7 +115,7 @@ def other_clock(seconds: float, share: float) -> Finding:
     )
 
 
-def mount_wrong(stated: Array, fit: HandEye, degrees: float) -> Finding:
+def mount_wrong(fit: HandEye, degrees: float) -> Finding:
     """The camera sits otherwise on the body than it is said to."""
     return Finding(
         f"the camera is turned by {degrees:.0f}° on the robot beside what /tf or T_base_camera says",

@@ -9,7 +9,7 @@ camera is not what it says, `doubt` says why: no closure is to be made then. Odo
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -162,26 +162,24 @@ class StreamMonitor:
 
     def _of_odometry(self, fit: CameraFit) -> tuple[tuple[Finding, ...], tuple[Finding, ...]]:
         """What is found of the odometry and its mount, and of the scale of depth."""
-        fits = fit.misfit < MOST_MISFIT
-        if not fits.any():
+        fits = [k for k in range(len(self._legs)) if fit.misfit[k] < MOST_MISFIT]
+        mounted = [k for k in fits if self._legs[k].mounts is not None]
+        chosen = mounted if len(mounted) >= LEAST_TURNS else fits
+        if not chosen:
             return (), ()
-        legs = [leg for leg, kept in zip(self._legs, fits, strict=True) if kept]
-        T_camera = inverses(fit.T_last_first[fits])
-        T_body, known = self._motions(legs, 0.0)
-        alike = likeness(T_body[known], T_camera[known])
-        mount = hand_eye(T_body[known], T_camera[known]) if alike.is_alike else None
+        legs, T_camera = [self._legs[k] for k in chosen], inverses(fit.T_last_first[chosen])
+        T_odom, known = self._motions(legs, 0.0)
+        alike = likeness(T_odom[known], T_camera[known])
+        mount = hand_eye(T_odom[known], T_camera[known]) if alike.is_alike else None
         two_bodies = alike.is_unlike or (mount is not None and mount.rest > MOST_REST)
         if known.mean() < 0.5 or two_bodies:
             return self._of_others(legs, T_camera, alike.share, two_bodies), ()
         if mount is None:
             return (), ()
         self.disowned = ""
-        mounted = known & np.array([leg.mounts is not None for leg in legs])
-        if np.count_nonzero(mounted) >= LEAST_TURNS:
-            return self._of_known_mount(
-                [leg for leg, kept in zip(legs, mounted, strict=True) if kept], T_camera[mounted]
-            )
-        return self._of_unknown_mount(mount, T_body[known])
+        if chosen is mounted:
+            return self._of_known_mount(mount, legs[-1], T_odom[known], T_camera[known])
+        return self._of_unknown_mount(mount, T_odom[known])
 
     def _of_others(self, legs: list[_Leg], T_camera: Array, share: float, unlike: bool) -> tuple[Finding, ...]:
         """Odometry that does not turn as the camera does now: at another time, or never."""
@@ -200,17 +198,18 @@ class StreamMonitor:
         self.disowned = found.what
         return (found,)
 
-    def _of_known_mount(self, legs: list[_Leg], T_camera: Array) -> tuple[tuple[Finding, ...], tuple[Finding, ...]]:
-        """A mount that is known is right where the camera by way of odometry moves as it was seen to."""
-        mounts = [leg.mounts for leg in legs if leg.mounts is not None]
-        T_odom = [self._odometry.at(np.array([leg.span[end] for leg in legs]))[0] for end in (0, 1)]
-        first, last = (T @ np.array([pair[end] for pair in mounts]) for end, T in enumerate(T_odom))
-        T_by_odometry = inverses(first) @ last
-        beside = hand_eye(T_by_odometry, T_camera)
+    def _of_known_mount(
+        self, beside: HandEye, last: _Leg, T_by_odometry: Array, T_camera: Array
+    ) -> tuple[tuple[Finding, ...], tuple[Finding, ...]]:
+        """A mount that is known is right where the camera by way of odometry moves as it was seen to.
+
+        ``beside`` is how the camera sits on where the mount has it: the identity, if that is right.
+        """
         degrees = float(np.degrees(rotation_angle(beside.T_body_camera[:3, :3])))
         if degrees > max(WRONG_DEG, SIGMAS * beside.rotation_sigma_deg):
-            self.mount = HandEye(mounts[-1][1] @ beside.T_body_camera, *_rest_of(beside))
-            found = findings.mount_wrong(mounts[-1][1], self.mount, degrees)
+            assert last.mounts is not None
+            self.mount = replace(beside, T_body_camera=last.mounts[1] @ beside.T_body_camera)
+            found = findings.mount_wrong(self.mount, degrees)
             self.disowned = found.what
             return (found,), ()
         return (), self._of_scale(hand_eye(T_by_odometry, T_camera, np.eye(4)), T_by_odometry)
@@ -240,13 +239,15 @@ class StreamMonitor:
         return (findings.odometry_gaps(share, 1e-9 * covered, 1e-9 * (self._last_ns - self._first_ns)),)
 
     def _motions(self, legs: list[_Leg], later_s: float) -> tuple[Array, Array]:
-        """The motions (n, 4, 4) of the body from the first to the last moment of spans by stamps that are so much
-        later, and which of them are known."""
-        first, last = (
-            self._odometry.at(np.array([leg.span[end] for leg in legs], np.int64) + round(1e9 * later_s))
-            for end in (0, 1)
-        )
-        return inverses(first[0]) @ last[0], first[1] & last[1]
+        """The motions (n, 4, 4) by odometry from the first to the last moment of spans, by stamps that are so much
+        later, and which of them are known: of the camera where its mount is known, else of the body."""
+        ends, known = [], np.ones(len(legs), bool)
+        for end in (0, 1):
+            stamps_ns = np.array([leg.span[end] for leg in legs], np.int64) + round(1e9 * later_s)
+            T_odom_body, there = self._odometry.at(stamps_ns)
+            ends.append(T_odom_body @ np.array([np.eye(4) if leg.mounts is None else leg.mounts[end] for leg in legs]))
+            known &= there
+        return inverses(ends[0]) @ ends[1], known
 
 
 def _is_off(size: float, sigma: float) -> bool:
@@ -262,7 +263,3 @@ def _left_open(mount: HandEye) -> str:
     """What the motion does not say of a mount, in words."""
     axes = [axis for axis, sigma in zip("xyz", mount.lever_sigma_m, strict=True) if sigma > ENOUGH_M]
     return f"; its {' and '.join(axes)} cannot be seen from such motion and is near 0" if axes else ""
-
-
-def _rest_of(fit: HandEye) -> tuple[float, float, Array, float, float]:
-    return fit.scale, fit.rotation_sigma_deg, fit.lever_sigma_m, fit.scale_sigma, fit.rest
