@@ -153,7 +153,7 @@ def _inputs(recording: Path, asked: Asked) -> Inputs:
         source = with_transforms(with_camera(opened, camera_asked(asked), remaps, depth_source))
         for note in source.notes:
             _say(f"! {note}")
-        inputs = choose_inputs(source.topics, remaps, depth_source)
+        inputs = choose_inputs(source.topics, remaps, depth_source, first_frames(source))
         if inputs.complete:
             return inputs
         wanted = inputs.wanted(depth_source)

@@ -15,7 +15,8 @@ from objreg_ros.cli.told import tell, tell_next
 from objreg_ros.memory.store_file import is_store
 from objreg_ros.plausibility.finding import Finding
 from objreg_ros.recording import Recording, open_recording
-from objreg_ros.recording.inputs import GRAPH_TOPICS, Inputs, choose_inputs, parse_remaps
+from objreg_ros.recording.inputs import GRAPH_TOPICS, Inputs, alternatives, choose_inputs, parse_remaps
+from objreg_ros.recording.mounts import first_frames
 from objreg_ros.recording.summary import describe_lens, describe_topics
 from objreg_ros.recording.tf_odometry import by_transforms, with_transforms
 from objreg_ros.recording.told_camera import with_camera
@@ -56,10 +57,11 @@ def command(recording: Path, remaps: tuple[str, ...], camera: str, picture: Path
     asked = parse_remaps(remaps)
     with open_recording(recording) as opened:
         source = with_transforms(with_camera(opened, camera, asked))
-        inputs = choose_inputs(source.topics, asked)
+        inputs = choose_inputs(source.topics, asked, frames=first_frames(source))
         _say_what_it_is(source)
         _say_topics(source)
         _say_inputs(inputs)
+        _say_other_cameras(alternatives(source.topics, first_frames(source), asked))
         _say_lens(source, inputs)
         _say_truth(source, inputs)
         for note in by_transforms(source, inputs):
@@ -128,6 +130,14 @@ def _say_inputs(inputs: Inputs) -> None:
     chosen = inputs.chosen()
     rows = [(GRAPH_TOPICS[name], chosen.get(name, "-")) for name in GRAPH_TOPICS]
     click.echo(columns(("input of the graph", "topic that it would use"), rows) + "\n")
+
+
+def _say_other_cameras(others: Sequence[Inputs]) -> None:
+    for other in others:
+        remaps = " ".join(f"--remap {name}:={topic}" for name, topic in other.outright_camera.items())
+        click.echo(f"another camera that could be meant: {remaps}")
+    if others:
+        click.echo()
 
 
 def _say_lens(source: Recording, inputs: Inputs) -> None:

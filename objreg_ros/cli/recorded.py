@@ -17,8 +17,8 @@ from objreg_ros.detector.params import DetectorParams
 from objreg_ros.offline import Detects, Run, Timing, build_rooms, run_offline
 from objreg_ros.recording import Record, Recording, open_recording
 from objreg_ros.recording.drift import ODOM, with_drifting_odometry
-from objreg_ros.recording.inputs import TF_ODOM, Inputs, choose_inputs, parse_remaps
-from objreg_ros.recording.mounts import camera_frame, frame_tree, moving_topics
+from objreg_ros.recording.inputs import TF_ODOM, Inputs, alternatives, choose_inputs, parse_remaps
+from objreg_ros.recording.mounts import camera_frame, first_frames, frame_tree, moving_topics
 from objreg_ros.recording.tf_odometry import by_transforms, with_transforms
 from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.recording.troubles import FOLDER
@@ -36,6 +36,7 @@ BY_TRACKING = (
 NOT_ON_TF = (
     "expected a moving frame above the camera on /tf, as odom → base_link, got none; is the camera's frame tied to it?"
 )
+TAKEN = "of several cameras that of {} is taken; there is also {}: objreg inspect has the --remap of each"
 CAMERAS_OWN = (
     "--odometry {} is the camera's own and not level: T_base_camera and segmenter.level_odom are left out of this run"
 )
@@ -97,7 +98,7 @@ class Asked:
             if asked["odom"] and asked["odom"] not in source.topics:
                 expected = f"a topic of {', '.join(source.topics)}, or tf, tracked, none or drift:SEED"
                 raise ValueError(f"--odometry: expected {expected}, got {self.odometry!r}")
-        inputs = choose_inputs(source.topics, asked, depth_source)
+        inputs = choose_inputs(source.topics, asked, depth_source, first_frames(source))
         if not inputs.complete:
             there = ", ".join(f"{topic.name} ({topic.msgtype})" for topic in source.topics.values()) or "no topics"
             wanted = inputs.wanted(depth_source)
@@ -129,7 +130,14 @@ class Opened:
         is_told = registrar.mounting is not None or segmenter.level_odom
         left_out = [CAMERAS_OWN.format(self.asked.odometry)] if self.asked.drifts and is_told else []
         by_itself = [BY_TRACKING] if self.odometry == TRACKED and self.asked.odometry is None else []
-        return (*self.source.notes, *by_transforms(self.source, self.inputs), *self.truth.notes, *left_out, *by_itself)
+        of_recording = (*self.source.notes, *self._choice(segmenter.source), *by_transforms(self.source, self.inputs))
+        return (*of_recording, *self.truth.notes, *left_out, *by_itself)
+
+    def _choice(self, source: str) -> list[str]:
+        """Which camera was taken, where the recording has others that could be meant."""
+        remaps = parse_remaps(self.asked.remaps)
+        others = alternatives(self.source.topics, first_frames(self.source), remaps, source)
+        return [TAKEN.format(self.inputs.image, ", ".join(str(other.image) for other in others))] if others else []
 
     @property
     def odometry(self) -> str | None:

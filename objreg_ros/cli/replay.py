@@ -86,7 +86,7 @@ def command(
         source = with_transforms(with_camera(opened, camera, asked, depth_source))
         for note in source.notes:
             click.echo(f"! {note}", err=True)
-        inputs = choose_inputs(source.topics, asked, depth_source)
+        inputs = choose_inputs(source.topics, asked, depth_source, first_frames(source))
         tell(troubles(source, inputs), err=True)
         names = playable_names(source, inputs) if everything else {**graph_names(source, inputs), **_mounts(source)}
         if not names:

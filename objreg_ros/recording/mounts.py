@@ -14,8 +14,10 @@ from objreg_ros.bridge.mount import Body, nameless_body
 from objreg_ros.data import Array
 from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.record import Record, Recording
+from objreg_ros.recording.topic_rules import CAMERA_INFO, PICTURES
 
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
+OF_CAMERAS = (*PICTURES, "sensor_msgs/msg/PointCloud2", CAMERA_INFO)
 TYPES = (TRANSFORMS, "tf/msg/tfMessage")  # the latter of early ROS 1
 MOMENTS, LOOKED_AT = 12, 100  # at which /tf is looked at ahead, and messages of each
 
@@ -99,6 +101,13 @@ def first_readable(recording: Recording, topic: str | None) -> Any | None:
     """The first message of a topic; None where there is none, or where it does not decode."""
     record = next(recording.records([topic]), None) if topic in recording.topics else None
     return None if record is None else record.read()
+
+
+def first_frames(recording: Recording) -> dict[str, str]:
+    """The frame of the first message of every picture, cloud and camera_info: topic → frame, where it says one."""
+    topics = [topic.name for topic in recording.topics.values() if topic.msgtype in OF_CAMERAS and topic.count]
+    found = {topic: frame_of(first_readable(recording, topic)) for topic in topics}
+    return {topic: frame for topic, frame in found.items() if frame}
 
 
 def frame_of(message: Any | None) -> str:

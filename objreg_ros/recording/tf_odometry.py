@@ -96,7 +96,7 @@ def with_transforms(recording: Recording, outright: bool = False) -> Recording:
     """
     if not moving_topics(recording):
         return recording
-    camera = _camera_of(recording, choose_inputs(recording.topics))
+    camera = _camera_of(recording, choose_inputs(recording.topics, frames=first_frames(recording)))
     if not camera:
         return recording
     tree = frame_tree(recording, camera)

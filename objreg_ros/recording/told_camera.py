@@ -75,7 +75,7 @@ def with_camera(
     camera, notes = read_camera(told)
     asked = {name: topic for name, topic in (remaps or {}).items() if name != "camera_info"}
     topics = {**_without_cameras(recording), TOLD: Topic(TOLD, CAMERA_INFO, 1)}
-    inputs = choose_inputs(topics, asked, source)
+    inputs = choose_inputs(topics, asked, source, first_frames(recording))
     picture = inputs.depth or inputs.points or inputs.image
     read = (record.read() for record in recording.records([picture])) if picture else iter(())
     first = next((message for message in read if message is not None), None)
