@@ -22,7 +22,7 @@ def check_camera(camera_info: Any, colour_info: Any = None, one_frame: bool = Fa
 
 
 def _matrices(camera_info: Any) -> Iterator[Finding]:
-    used, k = from_msg.intrinsics(camera_info), from_msg.unrectified_twin(camera_info)
+    used, k = from_msg.intrinsics(camera_info), from_msg.disagreeing_k(camera_info)
     if k is not None:
         yield findings.matrices_disagree(from_msg.pinhole(camera_info, "p"), k, differ(used, k))
     if why := implausible(used):

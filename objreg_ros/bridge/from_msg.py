@@ -120,27 +120,29 @@ def intrinsics(message: Any) -> Intrinsics:
     """The pinhole camera of a CameraInfo, with its binning and region of interest applied.
 
     It is the projection matrix P, by which rectified and registered pictures are made (image_geometry's
-    PinholeCameraModel), and K where P is left at zeros. Where nothing is to be rectified both are one camera: if they
-    differ, and P cannot be that of the picture as K can, it is K. ValueError for a camera that is not calibrated (ROS
-    drivers say so with zeros in both).
+    PinholeCameraModel), and K where P is left at zeros, or cannot be that of the picture as K can. ValueError
+    for a camera that is not calibrated (ROS drivers say so with zeros in both).
     """
     camera = _windowed(_calibrated(message), message)
-    other = unrectified_twin(message)
+    other = disagreeing_k(message)
     return camera if other is None else likelier(camera, other)
 
 
-def unrectified_twin(message: Any) -> Intrinsics | None:
-    """The camera of K where a CameraInfo says that nothing is to be rectified (D zero, R the identity), and P another
-    one; None where the two agree, or may differ."""
+def disagreeing_k(message: Any) -> Intrinsics | None:
+    """The camera of K where P is another one that it cannot be; None where the two agree, or may differ.
+
+    They may where there is something to rectify (D, R), as far as P can be the camera of the picture too.
+    """
     K, P, R = _camera_matrix(message, "k"), _camera_matrix(message, "p"), _numbers(message, "r")
-    if K[0, 0] == 0 or P[0, 0] == 0 or np.array_equal(K, P[:, :3]) or np.any(_numbers(message, "d")):
-        return None
-    if R.any() and not np.allclose(R, np.eye(3).ravel(), atol=1e-6):
+    if K[0, 0] == 0 or P[0, 0] == 0 or np.array_equal(K, P[:, :3]):
         return None
     try:
         k, p = pinhole(message, "k"), pinhole(message, "p")
     except ValueError:
         return None
+    is_turned = R.any() and not np.allclose(R, np.eye(3).ravel(), atol=1e-6)
+    if np.any(_numbers(message, "d")) or is_turned:
+        return k if likelier(p, k) is k else None
     return k if differ(p, k) else None
 
 

@@ -28,7 +28,7 @@ from objreg_ros.geometry import quaternion_from_rotation
 from objreg_ros.offline import constraint_with_error, refusal_with_evidence
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
-from objreg_ros.recording.mounts import TRANSFORMS, camera_on_body
+from objreg_ros.recording.mounts import TRANSFORMS, camera_on_body, first_frames
 from objreg_ros.recording.tf_odometry import with_transforms
 from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.recording.troubles import FOLDER, troubles

@@ -17,7 +17,7 @@ from objreg_ros.cli.told import tell
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import SOURCES, Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.messages import header_stamp_ns
-from objreg_ros.recording.mounts import TRANSFORMS, static_topics
+from objreg_ros.recording.mounts import TRANSFORMS, first_frames, static_topics
 from objreg_ros.recording.replay import Selection, graph_names, read_ahead, recorded_names
 from objreg_ros.recording.tf_odometry import with_transforms
 from objreg_ros.recording.told_camera import with_camera

@@ -14,8 +14,8 @@ import numpy as np
 
 from objreg_ros.data import Array, View
 
-MOST_CORNERS = 100
-LEAST_CORNERS = 20  # with depth at both ends of a span
+MOST_CORNERS = 120
+LEAST_CORNERS = 12  # with depth at both ends of a span
 LEAST_SHARE = 0.4  # of the corners that are still followed; with fewer a span ends
 QUALITY, SEPARATION_PX, BLOCK_PX = 0.01, 5, 5  # of corners, as `cv2.goodFeaturesToTrack` has them
 FLOW = {

@@ -30,7 +30,7 @@ LEAST_SPANS, LEAST_STRANGE = 4, 6
 MOST_SPANS = 48  # the newest
 OFTEN, SELDOM = 12, 6  # up to so many spans each is followed by a look at all; then every so many are
 STRANGE_SHARE = 0.7  # of spans that do not fit, where colour is not that of depth
-PROOF_SIGMA = 0.1  # deviation of the logarithm of a focal length that is believed
+PROOF_SIGMA = 0.1  # deviation of the logarithm of a focal length, and of a scale, that is believed
 PATIENCE_S = 30.0  # a camera that has not moved enough for so long is believed
 MOST_REST = 0.8  # of the motions of one body, in the deviations of `hand_eye`; those of two come to 1 and more
 WRONG_DEG = 10.0  # a mount that is off by more is wrong
@@ -63,6 +63,7 @@ class StreamMonitor:
     _odometry: OdometryTrack = field(default_factory=OdometryTrack)
     _legs: deque[_Leg] = field(default_factory=lambda: deque(maxlen=MOST_SPANS))
     _mounts: dict[int, Array | None] = field(default_factory=dict)
+    _scale_sigma: float = np.inf  # of its logarithm
     _spans: int = 0
     _first_ns: int = 0
     _last_ns: int | None = None
@@ -76,8 +77,11 @@ class StreamMonitor:
 
     @property
     def proven(self) -> bool:
-        """Whether enough was seen to believe the camera, or whether its motion does not tell in a long time."""
-        if self.fit is not None and self.fit.count >= LEAST_SPANS and self.fit.focal_sigma < PROOF_SIGMA:
+        """Whether enough was seen to believe the camera, and the scale of its depth where odometry tells that, or
+        whether its motion does not tell in a long time."""
+        by_odometry = len(self._odometry) > 1 and not self.disowned
+        has_scale = not by_odometry or self._scale_sigma < PROOF_SIGMA
+        if self.fit is not None and self.fit.count >= LEAST_SPANS and self.fit.focal_sigma < PROOF_SIGMA and has_scale:
             return True
         return self._last_ns is not None and 1e-9 * (self._last_ns - self._first_ns) > PATIENCE_S
 
@@ -223,6 +227,7 @@ class StreamMonitor:
         return (finding,), self._of_scale(fit, T_body)
 
     def _of_scale(self, fit: HandEye, T_body: Array) -> tuple[Finding, ...]:
+        self._scale_sigma = fit.scale_sigma
         metres = float(np.linalg.norm(T_body[:, :3, 3], axis=1).sum())
         off = metres > LEAST_METRES and fit.rest < MOST_REST and _is_off(abs(np.log(fit.scale)), fit.scale_sigma)
         return (findings.depth_scale(fit),) if off else ()

@@ -14,15 +14,51 @@ TRANSPORT = re.compile(r"/(compressed|compressedDepth)$")
 PART = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 SENSOR = re.compile(r"sensor_\d+")  # realsense-viewer has a folder for each kind of picture
 KINDS = frozenset(
-    "rgb color colour depth registered aligned align to image img raw rect rectified mono points point pointcloud"
-    " cloud xyz xyzrgb data info frame stereo ir infra hw sw hd qhd sd preview video stream".split()
+    [
+        "rgb",
+        "color",
+        "colour",
+        "depth",
+        "registered",
+        "aligned",
+        "align",
+        "to",
+        "image",
+        "img",
+        "raw",
+        "rect",
+        "rectified",
+        "mono",
+        "points",
+        "point",
+        "pointcloud",
+        "cloud",
+        "xyz",
+        "xyzrgb",
+        "data",
+        "info",
+        "frame",
+        "stereo",
+        "ir",
+        "infra",
+        "hw",
+        "sw",
+        "hd",
+        "qhd",
+        "sd",
+        "preview",
+        "video",
+        "stream",
+    ]
 )
 OF_FRAMES = KINDS | {"optical", "link"}
 GENERIC = frozenset(("camera", "cam", "node", "sensor", "ros", "driver"))
 HALVES = frozenset(("left", "right"))  # of a camera with two lenses
 SIDE = frozenset(("arm", "wrist", "hand", "gripper", "rear", "back", "down", "bottom"))  # less probably meant
 FRONT = re.compile(r"front|head|main|cent(er|re)")
-CAMERA = re.compile(r"cam|sensor|kinect|realsense|^rs|^[dltr]\d{3}|zed|oak|k4a|azure|orbbec|astra|xtion|device|front|rear")
+CAMERA = re.compile(
+    r"cam|sensor|kinect|realsense|^rs|^[dltr]\d{3}|zed|oak|k4a|azure|orbbec|astra|xtion|device|front|rear"
+)
 SAME, GENERICALLY_SAME, HALF, BY_FRAME = range(4)
 
 
@@ -90,5 +126,7 @@ def _relation_of(words: tuple[str, ...], others: tuple[str, ...]) -> int | None:
 
 def _contradict(frame: str, other: str) -> bool:
     """Whether two frames name two cameras: each has a part that the other lacks."""
-    words, others = (set(_specific([p for f in name.split("/") for p in _parts(f, OF_FRAMES)])) for name in (frame, other))
+    words, others = (
+        set(_specific([p for f in name.split("/") for p in _parts(f, OF_FRAMES)])) for name in (frame, other)
+    )
     return bool(words - others - HALVES and others - words - HALVES)

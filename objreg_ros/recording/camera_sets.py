@@ -57,7 +57,9 @@ class CameraSets:
         frames: Mapping[str, str] | None = None,
     ) -> None:
         self._asked, self._frames, free = asked, frames, list(free)
-        self._infos = [t.name for t in topics.values() if t.msgtype == CAMERA_INFO and t.count and not OWN.search(t.name)]
+        self._infos = [
+            t.name for t in topics.values() if t.msgtype == CAMERA_INFO and t.count and not OWN.search(t.name)
+        ]
         self._images = self._of("image", free)
         self._clouds = self._of("points", free)
         rivals = {*self._clouds, *(name for name in self._images if name in asked.values())}
@@ -132,7 +134,9 @@ class CameraSets:
 
     def _half(self) -> CameraSet:
         """Colour alone, or what there is without colour."""
-        image = next((name for name in self._images if name in self._asked.values() or not fits(HALF_OF_STEREO, name)), None)
+        image = next(
+            (name for name in self._images if name in self._asked.values() or not fits(HALF_OF_STEREO, name)), None
+        )
         depth = points = None
         if image is None or self._asked.get("depth") or self._asked.get("points"):
             depth, points = next(iter(self._depths), None), next(iter(self._clouds), None)
@@ -141,9 +145,7 @@ class CameraSets:
         points = None if depth else points
         of = next(filter(None, (depth, image, points)), None)
         info = self._info_of(of) if of else self._infos[0] if len(self._infos) == 1 else None
-        return CameraSet(
-            image, depth, points, self._asked_or("camera_info", info), self._asked_or("colour_info", None)
-        )
+        return CameraSet(image, depth, points, self._asked_or("camera_info", info), self._asked_or("colour_info", None))
 
     def _asked_or(self, name: str, found: str | None) -> str | None:
         return self._asked.get(name, found) or None
@@ -158,7 +160,9 @@ class CameraSets:
         own = [info for info in fitting if _folder(info) == _folder(picture)]
         if not own and registered and other:
             common = _shared(other, picture)
-            own = [info for info in fitting if _folder(info) == _folder(other) and common >= _most_shared(fitting, picture)]
+            own = [
+                info for info in fitting if _folder(info) == _folder(other) and common >= _most_shared(fitting, picture)
+            ]
         if own:
             return own[0]
         for place in places:

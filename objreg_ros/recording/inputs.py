@@ -17,6 +17,8 @@ from objreg_ros.recording.topic_rules import CAMERA_INFO, OWN, POSE_ODOM, POSES,
 TF_ODOM, TF_TRUTH = "/tf/odom", "/tf/ground_truth"  # made of the /tf of a recording, which has no topics of these names
 DERIVED = {"odom": TF_ODOM, "ground_truth": TF_TRUTH}
 SOURCES = ("auto", "points", "depth")  # as the segmenter's parameter of this name
+
+
 @dataclass(frozen=True, slots=True)
 class Inputs:
     """The topic of a recording for each input of the graph; None where it has none."""
@@ -165,9 +167,7 @@ def _free(topics: Mapping[str, Topic], asked: Mapping[str, str]) -> list[Topic]:
     return [topic for topic in topics.values() if topic.name not in taken and not OWN.search(topic.name)]
 
 
-def _fall_back(
-    found: dict[str, str | None], topics: Mapping[str, Topic], asked: Mapping[str, str], robot: str
-) -> None:
+def _fall_back(found: dict[str, str | None], topics: Mapping[str, Topic], asked: Mapping[str, str], robot: str) -> None:
     """Take what /tf tells, and poses as odometry, where no topic was found for an input that is not asked for."""
     for name, topic in DERIVED.items():
         if name not in asked and not found[name] and topic in topics:

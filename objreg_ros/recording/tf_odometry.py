@@ -18,7 +18,7 @@ from objreg_ros.bridge.chains import moved, names_of, odometry_edge, truth_edge
 from objreg_ros.bridge.frames import Edge, FrameTree
 from objreg_ros.recording import messages
 from objreg_ros.recording.inputs import TF_ODOM, TF_TRUTH, Inputs, choose_inputs
-from objreg_ros.recording.mounts import first_readable, frame_of, frame_tree, moving_topics
+from objreg_ros.recording.mounts import first_frames, first_readable, frame_of, frame_tree, moving_topics
 from objreg_ros.recording.record import Record, Recording, Topic
 
 UNCERTAIN = np.eye(6)  # /tf tells no covariance

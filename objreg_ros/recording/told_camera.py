@@ -15,6 +15,7 @@ from rosbags.interfaces import Qos
 from objreg_ros.bridge.calibration import Calibration, fitted, read_camera
 from objreg_ros.recording import messages
 from objreg_ros.recording.inputs import CAMERA_INFO, choose_inputs
+from objreg_ros.recording.mounts import first_frames
 from objreg_ros.recording.record import Record, Recording, Topic
 
 TOLD = "/told/camera_info"  # the topic that it comes by

@@ -110,8 +110,8 @@ DRIVERS = {
         "depth=/camera/aligned_depth_to_color/image_raw/compressedDepth",
     ),
     "depth that only its transport gives away": (
-        "/cam0/image_raw /cam1/image_raw /cam2/frame/compressedDepth:jpeg /camera_info:info",
-        "image=/cam0/image_raw depth=/cam2/frame/compressedDepth camera_info=/camera_info",
+        "/cam0/image_raw /cam1/image_raw /cam2/image_raw /cam2/frame/compressedDepth:jpeg /camera_info:info",
+        "image=/cam2/image_raw depth=/cam2/frame/compressedDepth camera_info=/camera_info",
     ),
     "a camera called depth": (
         "/depth_cam/rgb/image_raw /depth_cam/rgb/image_raw/compressed:jpeg /depth_cam/rgb/camera_info:info "

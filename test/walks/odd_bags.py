@@ -56,7 +56,7 @@ def garbage_in_place_of_depth(folder: Path, room: Path) -> None:
     empty = someone.type("offline", "bag", *FEW, ends=3)
     assert "no frame got through" in empty.text and "no-frame-got-through" in empty.leads_to()
     assert empty.advises("objreg inspect") and empty.advises("--remap")
-    seen = someone.type("inspect", "bag")
+    seen = someone.type("inspect", "bag", ends=3)
     assert "! depth: " in seen.text and SPARE_DEPTH in seen.text
     told = someone.type("inspect", "bag", f"--remap=depth:={SPARE_DEPTH}")
     assert "! depth: " not in told.text
