@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Vector3Stamped
 from nav_msgs.msg import Odometry
+from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import CameraInfo, PointCloud2
 from std_msgs.msg import String
 
@@ -25,6 +28,8 @@ from objreg_ros.plausibility.finding import Finding
 # By which odometry may come. Whose pose one without a child_frame_id is, the name behind all remaps says.
 ODOMETRY = {"odom": Odometry, "odom/pose": PoseStamped, "odom/pose_with_covariance": PoseWithCovarianceStamped}
 
+LOOK_S, SILENT_S = 1.0, 5.0  # between two looks at whether frames still come, and without any
+
 
 class FramesDoor(MatchingDoor):
     """Its books count the messages of ``objects``; `frame_of` is for `compute`."""
@@ -34,6 +39,7 @@ class FramesDoor(MatchingDoor):
         super().prepare()
         self._stream = CameraStream(Mount(None))
         self._names = dict[str, dict[int, str]]()  # by robot
+        self._seen_s = math.inf  # when the last frame came, by `time.monotonic`
         self.odom_frame = "odom"
         self._camera: str | None = None  # the frame_id of the last frame
 
@@ -118,11 +124,22 @@ class FramesDoor(MatchingDoor):
         if not isinstance(frame, Frame):
             topics = ("objects", "view", "view/camera_info", "gravity", "labels")
             frame = self.read("frame", from_msg.frame, *(match[topic] for topic in topics))
+        self._seen_s = time.monotonic()
         with self.ledger.timed("check"):
             frame = self.read("frame", self._stream.place, frame, odom)
         for finding in self._stream.findings:
             self.throttled.remind(finding.anchor, finding.text)
         return frame, self._stream.T_body_camera
+
+    def when_silent(self, work: Callable[[], object]) -> None:
+        """Do ``work`` aside, once, when no frame came for `SILENT_S`, and again after each next silence."""
+
+        def look() -> None:
+            if time.monotonic() - self._seen_s > SILENT_S:
+                self._seen_s = math.inf
+                self.aside(work)
+
+        self.create_timer(LOOK_S, look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     @property
     def without_odometry(self) -> int:

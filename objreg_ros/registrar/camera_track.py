@@ -11,7 +11,7 @@ from objreg_ros.keyframes.keyframer import Keyframer
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.memory.store import Store
 from objreg_ros.registrar.closure import Accepted, Waiting, redundant, rejected, waiting_of
-from objreg_ros.registrar.confirmation import Confirmation
+from objreg_ros.registrar.confirmation import Confirmation, Held
 from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.recollection import Recollection
 from objreg_ros.registrar.relocalisation import Relocalisation
@@ -70,10 +70,20 @@ class CameraTrack:
         unproven, self.unproven = [waiting.refused(refusal) for waiting in self.unproven], []
         return Outcome(rejected=(*unproven, *self.confirmation.give_up(refusal), refused_window(window, refusal)))
 
+    def hold(self, held: Held, keyframe: Keyframe, named: Sequence[Sighting]) -> None:
+        """Keep a pose that waits for other keyframes; ``named`` are the keyframe's sightings."""
+        number, item, refusal = held
+        self.confirmation.hold(number, waiting_of(keyframe, named, item, refusal, self._params))
+
     def wait_for_proof(self, accepted: Sequence[Accepted], keyframe: Keyframe, named: Sequence[Sighting]) -> None:
         """Keep what was accepted until the camera is believed; ``named`` are the keyframe's sightings."""
         params = self._params
         self.unproven += [waiting_of(keyframe, named, item, UNPROVEN, params) for item in accepted]
+
+    def release(self, recollection: Recollection) -> Outcome:
+        """The constraints that waited for their camera to be believed."""
+        waited, self.unproven = self.unproven, []
+        return Outcome(closures=tuple(self._late(waiting, recollection) for waiting in waited))
 
     def settle(self, now_ns: int | None, recollection: Recollection, proven: bool = True) -> Outcome:
         """What waits no more: late constraints, which are written down, and refusals; all where there is no now.
@@ -81,8 +91,7 @@ class CameraTrack:
         Those among them that waited for their camera to be believed, if it is ``proven`` now.
         """
         confirmed, refused = self.confirmation.settle(now_ns)
-        waited, self.unproven = (self.unproven, []) if proven else ([], self.unproven)
-        closures = [self._late(waiting, recollection) for waiting in waited]
+        closures = list(self.release(recollection).closures) if proven else []
         for waiting in confirmed:
             moments = waiting.from_session, waiting.closure.from_ns, waiting.closure.to_ns
             if self.thinning.redundant(*moments):
@@ -111,6 +120,10 @@ class CameraTracks(dict[Camera, CameraTrack]):
         self._params, self._numbers = params, numbers
         self.followed = CameraTrack(params, numbers)
 
+    def all(self) -> tuple[CameraTrack, ...]:
+        """Each of them, as they are now: a tracking thread may add one meanwhile."""
+        return tuple(self.values())
+
     def of(self, camera: Camera) -> CameraTrack:
         """That of a camera, a new one where it has none."""
         if camera not in self:
@@ -126,7 +139,7 @@ class CameraTracks(dict[Camera, CameraTrack]):
 
     def end(self) -> list[FrameWindow]:
         """The frame windows that were being collected, without those that show nothing new."""
-        ended = [track.keyframer.finish() for track in tuple(self.values())]
+        ended = [track.keyframer.finish() for track in self.all()]
         return [window for window in ended if window is not None]
 
     def go_on(self, keyframe: Keyframe, clock: Clock, recollection: Recollection) -> tuple[Rejected, ...]:

@@ -24,8 +24,7 @@ from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.registrar.camera_track import CameraTrack, CameraTracks
 from objreg_ros.registrar.candidate_search import Budget, Found, Means, Pools, Search
-from objreg_ros.registrar.closure import observations, rejected, waiting_of
-from objreg_ros.registrar.confirmation import Held
+from objreg_ros.registrar.closure import observations, rejected
 from objreg_ros.registrar.origins import Origins
 from objreg_ros.registrar.outcome import Outcome, in_turn
 from objreg_ros.registrar.recollection import Recollection
@@ -85,7 +84,7 @@ class Registrar:
     @property
     def waiting(self) -> int:
         """How many poses wait for other keyframes to confirm them."""
-        return sum(len(track.confirmation) for track in tuple(self._tracks.values()))
+        return sum(len(track.confirmation) for track in self._tracks.all())
 
     @property
     def relocalised(self) -> Relocalised | None:
@@ -98,7 +97,7 @@ class Registrar:
         return self._tracks.followed.relocalisation.reason
 
     def counts(self) -> dict[str, int]:
-        """How many keyframes, objects, landmarks, sessions and closures are stored; how many ``forgotten`` by now."""
+        """How many keyframes, objects, landmarks, sessions and closures are stored, and how many are forgotten."""
         with self._lock:
             return self._store.counts()
 
@@ -178,7 +177,7 @@ class Registrar:
         if not proven:
             track.wait_for_proof(found.accepted, keyframe, named)
         for held in found.held:
-            self._hold(held, keyframe, named, track)
+            track.hold(held, keyframe, named)
         outcome = Outcome(
             closures=closures,
             rejected=(*before, *found.refused),
@@ -247,14 +246,19 @@ class Registrar:
             found = self._try([one for one in candidates if one.keyframe_id in stored], keyframe, track, budget)
             closures = self._recollection.remember_closures(keyframe, found.accepted)
             for held in found.held:
-                self._hold(held, keyframe, self._recollection.as_known(keyframe, held.item), track)
+                track.hold(held, keyframe, self._recollection.as_known(keyframe, held.item))
             outcome = Outcome(closures=closures, rejected=(*before, *found.refused), robot=keyframe.robot)
             return outcome.with_late(track.settle(keyframe.stamp_ns, self._recollection))
 
     def settle(self) -> Outcome:
         """Publish or refuse what still waits for other keyframes to confirm it: the end of a recording, or a save."""
         with self._lock:
-            return in_turn([track.settle(None, self._recollection) for track in tuple(self._tracks.values())])
+            return in_turn([track.settle(None, self._recollection) for track in self._tracks.all()])
+
+    def release(self) -> Outcome:
+        """Publish what waits for proof of a camera that is silent: none will come."""
+        with self._lock:
+            return in_turn([track.release(self._recollection) for track in self._tracks.all()])
 
     def reset(self) -> None:
         """Forget everything, in the store too; StoreError, and nothing is forgotten, where that cannot be."""
@@ -294,7 +298,3 @@ class Registrar:
         gate, pool = self._gate or gate_of(self.params), self._pools.fitting()
         means = Means(self._store, self._method, gate, track.confirmation, pool)
         return Search(keyframe, track.thinning, budget, means, self.params).run(candidates)
-
-    def _hold(self, held: Held, keyframe: Keyframe, named: Sequence[Sighting], track: CameraTrack) -> None:
-        number, item, refusal = held
-        track.confirmation.hold(number, waiting_of(keyframe, named, item, refusal, self.params))

@@ -12,7 +12,7 @@ import cv2
 from objreg_ros.bridge import from_msg
 from objreg_ros.recording import Record, open_recording, write_rosbag2
 
-ODD_COLOUR = "/stereo/left/mono"
+ODD_COLOUR = "/people/mask_preview"
 SPARE_DEPTH = "/spare/depth"
 TOPICS = ("/image", "/depth/image", "/camera_info", "/odom")
 
