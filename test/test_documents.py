@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -57,6 +58,17 @@ def names_in_table(heading: str) -> set[str]:
     return set(re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE))
 
 
+def anchors_of_findings() -> set[str]:
+    """The sections that the findings of all sources name outright."""
+    found = set()
+    for path in (REPOSITORY / "objreg_ros").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and ast.unparse(node.func) == "Finding":
+                given = [*node.args[3:4], *(word.value for word in node.keywords if word.arg == "anchor")]
+                found |= {str(value.value) for value in given if isinstance(value, ast.Constant)}
+    return found
+
+
 def rows_of_changes() -> list[tuple[str, list[Path], list[str]]]:
     """The rows of ARCHITECTURE.md's last table: what is changed, in which files, by which names."""
     table = text("ARCHITECTURE.md").partition("## 8. Where to change what")[2]
@@ -83,6 +95,12 @@ def test_every_file_and_folder_that_a_document_names_exists(document: str) -> No
     names = NAMED_FILE.findall(text(document)) + NAMED_FOLDER.findall(text(document))
     missing = sorted({name for name in names if not name.startswith(MADE) and found(name) is None})
     assert not missing, f"{document} names {missing}"
+
+
+def test_every_finding_leads_to_a_section_of_troubleshooting() -> None:
+    named, sections = anchors_of_findings(), anchors(REPOSITORY / "docs/troubleshooting.md")
+    assert {"mount-wrong", "depth-scale", "no-objects"} <= named
+    assert named <= sections, f"docs/troubleshooting.md lacks {sorted(named - sections)}"
 
 
 def test_one_finds_where_to_change_what_by_names_that_are_there() -> None:
