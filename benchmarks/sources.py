@@ -55,7 +55,7 @@ class Collector:
         self.frames.append(frame)
         return Outcome()
 
-    def finish(self) -> Outcome:
+    def finish(self, doubt: str = "") -> Outcome:
         """Nothing is left."""
         return Outcome()
 

@@ -103,7 +103,7 @@ class Registers(Protocol):
 
     def process(self, frame: Frame) -> Outcome: ...
 
-    def finish(self) -> Outcome: ...
+    def finish(self, doubt: str = "") -> Outcome: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -354,8 +354,7 @@ class Line:
         """Let out what waits."""
         self._segment(self._views.flush())
         self._track(self._frames.flush())
-        self._note(self._rooms.registrar.finish())
-        self._stream.finish()
+        self._note(self._rooms.registrar.finish(self._stream.finish()))
         self.run.findings, self.run.measured_mount = self._stream.findings, self._stream.mount
         sensor = self._rooms.segmenter.sensor
         self.run.depth_to_colour = sensor.depth_to_colour.text()

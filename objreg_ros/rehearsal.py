@@ -74,7 +74,7 @@ class _ClosesNothing:
     def process(self, frame: Frame) -> Outcome:
         return Outcome()
 
-    def finish(self) -> Outcome:
+    def finish(self, doubt: str = "") -> Outcome:
         return Outcome()
 
 

@@ -114,7 +114,7 @@ class Chain:
         )
         return Outcome(closures=(closure,))
 
-    def finish(self) -> Outcome:
+    def finish(self, doubt: str = "") -> Outcome:
         self.finished = True
         return Outcome()
 

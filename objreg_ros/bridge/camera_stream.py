@@ -60,9 +60,10 @@ class CameraStream:
         placed = from_msg.followed(frame, used, T_body_camera)
         return replace(placed, doubt=self._monitor.doubt, proven=self._monitor.proven)
 
-    def finish(self) -> None:
-        """Look at what has come by the end of a recording."""
+    def finish(self) -> str:
+        """Look at what has come by the end of a recording; the doubt there is of the camera, "" for none."""
         self._monitor.finish()
+        return self._monitor.doubt
 
     def _known_mount(self, frame: Frame, odometry: Sequence[Odometry] | None) -> tuple[Seat, Array | None]:
         """What is said of the mount; of frames without odometry by the newest sample."""

@@ -131,13 +131,16 @@ class FramesDoor(MatchingDoor):
             self.throttled.remind(finding.anchor, finding.text)
         return frame, self._stream.T_body_camera
 
-    def when_silent(self, work: Callable[[], object]) -> None:
-        """Do ``work`` aside, once, when no frame came for `SILENT_S`, and again after each next silence."""
+    def when_silent(self, work: Callable[[str], object]) -> None:
+        """Do ``work`` aside, once, when no frame came for `SILENT_S`, and again after each next silence.
+
+        It is given the doubt there is of the camera by then, "" for none.
+        """
 
         def look() -> None:
             if time.monotonic() - self._seen_s > SILENT_S:
                 self._seen_s = math.inf
-                self.aside(work)
+                self.aside(lambda: work(self._stream.finish()))
 
         self.create_timer(LOOK_S, look, clock=Clock(clock_type=ClockType.STEADY_TIME))
 

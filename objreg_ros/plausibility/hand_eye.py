@@ -10,6 +10,7 @@ its deviation says so.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -61,16 +62,45 @@ def hand_eye(T_body: Array, T_camera: Array, T_body_camera: Array | None = None)
 
 
 def _known(motions: _Motions, T_body_camera: Array) -> HandEye:
-    R, lever = T_body_camera[:3, :3], T_body_camera[:3, 3]
+    scale = scale_of(*motions.shifts_of_camera(T_body_camera))
+    return HandEye(T_body_camera, scale.factor, 0.0, np.zeros(3), scale.sigma, scale.rest)
+
+
+class Scale(NamedTuple):
+    """By what ``factor`` shifts are longer than others, the deviation of its logarithm, and what is left, in
+    deviations."""
+
+    factor: float
+    sigma: float
+    rest: float
+
+
+def scale_of(shifts: Array, others: Array) -> Scale:
+    """How much longer ``shifts (n, 3)`` are than ``others``. Both err: by the others they come out too short, the
+    others by them too long (regression dilution; Fuller, "Measurement error models", 1987). The scale is between."""
+    forward, backward = _ratio(others, shifts), _ratio(shifts, others)
+    middle, between = 0.5 * (forward.log - backward.log), 0.5 * abs(forward.log + backward.log)
+    sigma = float(np.linalg.norm([0.5 * (forward.sigma + backward.sigma), between, SCALE_FLOOR]))
+    return Scale(float(np.exp(middle)), sigma, min(forward.rest, backward.rest))
+
+
+class _Ratio(NamedTuple):
+    log: float
+    sigma: float
+    rest: float
+
+
+def _ratio(sources: Array, targets: Array) -> _Ratio:
+    """How many times as long targets are as sources, by robust least squares of what the targets are off."""
+    sigma = SHIFT_SIGMA_M + SHIFT_GROWTH * np.linalg.norm(targets, axis=1, keepdims=True)
 
     def errors(log_scale: Array) -> Array:
-        return motions.errors(np.concatenate([np.zeros(3), lever, log_scale]), R)[:, 3:].ravel()
+        return np.asarray((targets - sources * np.exp(log_scale)) / sigma).ravel()
 
     fit = least_squares(errors, [0.0], loss="soft_l1", bounds=(-4.0, 4.0))
-    variance = _covariance(fit.jac, errors(fit.x), motions.count, np.array([SCALE_PRIOR]))[0, 0]
-    rest = float(np.median(np.abs(errors(fit.x))))
-    scale_sigma = float(np.hypot(np.sqrt(variance), SCALE_FLOOR))
-    return HandEye(T_body_camera, float(np.exp(fit.x[0])), 0.0, np.zeros(3), scale_sigma, rest)
+    left = errors(fit.x)
+    variance = _covariance(fit.jac, left, len(targets), np.array([SCALE_PRIOR]))[0, 0]
+    return _Ratio(float(fit.x[0]), float(np.sqrt(variance)), float(np.median(np.abs(left))))
 
 
 def _solve(motions: _Motions, R: Array) -> tuple[float, HandEye]:
@@ -86,9 +116,10 @@ def _solve(motions: _Motions, R: Array) -> tuple[float, HandEye]:
     found = pose(rotation_from_vector(fit.x[:3]) @ R, fit.x[3:6])
     rest = float(np.median(np.abs(errors(fit.x)[:own])))
     rotation_sigma = float(np.degrees(np.sqrt(np.linalg.eigvalsh(covariance[:3, :3])[-1])))
-    scale_sigma = float(np.hypot(np.sqrt(covariance[6, 6]), SCALE_FLOOR))
+    scale = scale_of(*motions.shifts_of_camera(found))
+    scale_sigma = max(scale.sigma, float(np.sqrt(covariance[6, 6])))
     levers = np.sqrt(np.diag(covariance)[3:6])
-    return float(fit.cost), HandEye(found, float(np.exp(fit.x[6])), rotation_sigma, levers, scale_sigma, rest)
+    return float(fit.cost), HandEye(found, scale.factor, rotation_sigma, levers, scale_sigma, rest)
 
 
 class _Motions:
@@ -102,6 +133,11 @@ class _Motions:
         turn, shift = (np.linalg.norm(vectors, axis=1, keepdims=True) for vectors in (self.turns[0], self.shifts[0]))
         self._turn_sigma = TURN_SIGMA + TURN_GROWTH * turn
         self._shift_sigma = SHIFT_SIGMA_M + SHIFT_GROWTH * shift
+
+    def shifts_of_camera(self, T_body_camera: Array) -> tuple[Array, Array]:
+        """The shifts (n, 3) of the camera as it was seen to move, and by way of the body."""
+        R, lever = T_body_camera[:3, :3], T_body_camera[:3, 3]
+        return self.shifts[1], (self._levers @ lever + self.shifts[0]) @ R
 
     def errors(self, x: Array, R: Array) -> Array:
         """Errors (n, 6) in deviations, of turns and of shifts, for a change of the rotation ``R`` (3), a lever (3) and

@@ -21,17 +21,18 @@ from objreg_ros.plausibility.camera_fit import MOST_MISFIT, CameraFit, fit_camer
 from objreg_ros.plausibility.corner_tracks import CornerTracks, Span
 from objreg_ros.plausibility.finding import Finding
 from objreg_ros.plausibility.hand_eye import HandEye, hand_eye
-from objreg_ros.plausibility.odometry_fit import LEAST_TURNS, find_shift, likeness
+from objreg_ros.plausibility.odometry_fit import ALIKE, LEAST_TURNS, find_shift, likeness
 from objreg_ros.plausibility.odometry_track import OdometryTrack
+from objreg_ros.plausibility.offset import Offset, offsets
 from objreg_ros.plausibility.pinhole import implausible
 
-SHARE, SIGMAS = 0.05, 4.0  # a number that is off by more than both is wrong
+# Deviations by which a number must be off: while looks are many; after `PATIENCE_S`; at the end, if never believed.
+SIGMAS, LATER_SIGMAS, LAST_SIGMAS = 4.0, 3.0, 2.5
 LEAST_SPANS, LEAST_STRANGE = 4, 6
 MOST_SPANS = 48  # the newest
 OFTEN, SELDOM = 12, 6  # up to so many spans each is followed by a look at all; then every so many are
 STRANGE_SHARE = 0.7  # of spans that do not fit, where colour is not that of depth
-PROOF_SIGMA = 0.1  # deviation of the logarithm of a focal length, and of a scale, that is believed
-PATIENCE_S = 20.0  # a camera that has not moved enough for so long is believed
+PATIENCE_S, LONG_S = 20.0, 60.0  # a camera that has not moved for so long is believed; one that has not moved enough
 MOST_REST = 0.8  # of the motions of one body, in the deviations of `hand_eye`; those of two come to 1 and more
 WRONG_DEG = 10.0  # a mount that is off by more is wrong
 ENOUGH_DEG, ENOUGH_M = 3.0, 0.12  # deviations of a mount that is measured well enough to be used
@@ -63,7 +64,9 @@ class StreamMonitor:
     _odometry: OdometryTrack = field(default_factory=OdometryTrack)
     _legs: deque[_Leg] = field(default_factory=lambda: deque(maxlen=MOST_SPANS))
     _mounts: dict[int, Array | None] = field(default_factory=dict)
-    _scale_sigma: float = np.inf  # of its logarithm
+    _scale: Offset | None = None  # of depth beside odometry; None where it is not measured
+    _believed: bool = False
+    _sigmas: float = SIGMAS  # of the look in hand
     _spans: int = 0
     _first_ns: int = 0
     _last_ns: int | None = None
@@ -79,11 +82,9 @@ class StreamMonitor:
     def proven(self) -> bool:
         """Whether enough was seen to believe the camera, and the scale of its depth where odometry tells that, or
         whether its motion does not tell in a long time."""
-        by_odometry = len(self._odometry) > 1 and not self.disowned
-        has_scale = not by_odometry or self._scale_sigma < PROOF_SIGMA
-        if self.fit is not None and self.fit.count >= LEAST_SPANS and self.fit.focal_sigma < PROOF_SIGMA and has_scale:
-            return True
-        return self._last_ns is not None and 1e-9 * (self._last_ns - self._first_ns) > PATIENCE_S
+        return self._believed or (
+            not self.doubt and self._age_s > (LONG_S if self._spans >= LEAST_SPANS else PATIENCE_S)
+        )
 
     def take_odometry(self, sample: Odometry) -> None:
         """A sample of odometry, whether or not a frame comes by it."""
@@ -114,7 +115,7 @@ class StreamMonitor:
     def finish(self) -> None:
         """Judge what has come by the end of a recording."""
         if self.camera is not None and self._legs:
-            self._judge()
+            self._judge(is_last=True)
 
     def _is_another(self, stamp_ns: int, camera: Intrinsics) -> bool:
         """Whether a view is of another camera than the one before, or of another run of the clock."""
@@ -125,6 +126,7 @@ class StreamMonitor:
         """Another camera, or another run of the clock."""
         self._corners, self.camera, self.fit = CornerTracks(), None, None
         self.doubt, self.findings = "", ()
+        self._scale, self._believed = None, False
         self._legs.clear()
         self._mounts.clear()
         self._spans = 0
@@ -139,17 +141,29 @@ class StreamMonitor:
         if why:
             self.findings, self.doubt = (findings.no_camera(why),), f"camera_info: {why}"
 
-    def _judge(self) -> None:
+    @property
+    def _age_s(self) -> float:
+        return 0.0 if self._last_ns is None else 1e-9 * (self._last_ns - self._first_ns)
+
+    def _judge(self, is_last: bool = False) -> None:
         """Look at all spans again."""
         assert self.camera is not None
         if implausible(self.camera):
             return
+        later = LAST_SIGMAS if is_last and not self._believed else LATER_SIGMAS
+        self._sigmas = later if is_last or self._age_s > PATIENCE_S else SIGMAS
         self.fit = fit_camera([leg.span for leg in self._legs], self.camera, self.fit)
-        of_camera = self._of_camera(self.fit)
         of_odometry, of_scale = self._of_odometry(self.fit) if len(self._odometry) > 1 else ((), ())
-        doubted = (*of_camera, *of_scale)
+        doubted = (*self._of_camera(self.fit), *of_scale)
         self.doubt = doubted[0].what if doubted else ""
         self.findings = (*doubted, *of_odometry, *self._of_gaps())
+        self._believed = not doubted and (self._believed or self._is_close(self.fit))
+
+    def _is_close(self, fit: CameraFit) -> bool:
+        """Whether all that is measured of the camera is surely near to what it says."""
+        by_odometry = len(self._odometry) > 1 and not self.disowned
+        scale = (self._scale,) if by_odometry else ()
+        return fit.count >= LEAST_SPANS and all(off is not None and off.is_close for off in (*offsets(fit), *scale))
 
     def _of_camera(self, fit: CameraFit) -> tuple[Finding, ...]:
         strange = float(np.mean(fit.misfit > MOST_MISFIT))
@@ -157,11 +171,9 @@ class StreamMonitor:
             return (findings.other_colour(strange),)
         if fit.count < LEAST_SPANS:
             return ()
-        found = []
-        if _is_off(abs(np.log(fit.focal)), fit.focal_sigma):
-            found.append(findings.focal_length(fit))
-        if any(_is_off(abs(off), sigma) for off, sigma in zip(fit.centre, fit.centre_sigma, strict=True)):
-            found.append(findings.principal_point(fit))
+        focal, *centre = offsets(fit)
+        found = [findings.focal_length(fit)] if focal.is_wrong(self._sigmas) else []
+        found += [findings.principal_point(fit)] if any(off.is_wrong(self._sigmas) for off in centre) else []
         return tuple(found)
 
     def _of_odometry(self, fit: CameraFit) -> tuple[tuple[Finding, ...], tuple[Finding, ...]]:
@@ -174,6 +186,8 @@ class StreamMonitor:
         legs, T_camera = [self._legs[k] for k in chosen], inverses(fit.T_last_first[chosen])
         T_odom, known = self._motions(legs, 0.0)
         alike = likeness(T_odom[known], T_camera[known])
+        if chosen is mounted and alike.turns < LEAST_TURNS:
+            return (), self._of_few(T_odom[known], T_camera[known])
         mount = hand_eye(T_odom[known], T_camera[known]) if alike.is_alike else None
         two_bodies = alike.is_unlike or (mount is not None and mount.rest > MOST_REST)
         if known.mean() < 0.5 or two_bodies:
@@ -184,6 +198,13 @@ class StreamMonitor:
         if chosen is mounted:
             return self._of_known_mount(mount, legs[-1], T_odom[known], T_camera[known])
         return self._of_unknown_mount(mount, T_odom[known])
+
+    def _of_few(self, T_by_odometry: Array, T_camera: Array) -> tuple[Finding, ...]:
+        """The scale by few turns, where they are those of the mount that is known."""
+        alike = likeness(T_by_odometry, T_camera, np.eye(3))
+        if alike.turns < LEAST_SPANS or alike.share < ALIKE:
+            return ()
+        return self._of_scale(hand_eye(T_by_odometry, T_camera, np.eye(4)), T_by_odometry)
 
     def _of_others(self, legs: list[_Leg], T_camera: Array, share: float, unlike: bool) -> tuple[Finding, ...]:
         """Odometry that does not turn as the camera does now: at another time, or never."""
@@ -227,9 +248,12 @@ class StreamMonitor:
         return (finding,), self._of_scale(fit, T_body)
 
     def _of_scale(self, fit: HandEye, T_body: Array) -> tuple[Finding, ...]:
-        self._scale_sigma = fit.scale_sigma
+        assert self.fit is not None
+        if any(offset.is_vague for offset in offsets(self.fit)):
+            return ()
+        self._scale = Offset(abs(float(np.log(fit.scale))), fit.scale_sigma)
         metres = float(np.linalg.norm(T_body[:, :3, 3], axis=1).sum())
-        off = metres > LEAST_METRES and fit.rest < MOST_REST and _is_off(abs(np.log(fit.scale)), fit.scale_sigma)
+        off = metres > LEAST_METRES and fit.rest < MOST_REST and self._scale.is_wrong(self._sigmas)
         return (findings.depth_scale(fit),) if off else ()
 
     def _of_gaps(self) -> tuple[Finding, ...]:
@@ -253,10 +277,6 @@ class StreamMonitor:
             ends.append(T_odom_body @ np.array([np.eye(4) if leg.mounts is None else leg.mounts[end] for leg in legs]))
             known &= there
         return inverses(ends[0]) @ ends[1], known
-
-
-def _is_off(size: float, sigma: float) -> bool:
-    return bool(size > SHARE and size > SIGMAS * sigma)
 
 
 def _is_enough(mount: HandEye) -> bool:

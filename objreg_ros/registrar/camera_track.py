@@ -40,7 +40,8 @@ class CameraTrack:
         self.relocalisation = Relocalisation()
         self.confirmation = Confirmation(params)
         self.thinning = Thinning(params.thin_seconds)
-        self.unproven: list[Waiting] = []  # accepted while too little was seen of the camera to believe it
+        self.proven = True  # whether enough of the camera was seen to believe it
+        self.unproven: list[Waiting] = []  # accepted while it was not
         self.hidden: frozenset[int] = frozenset()
         self.clock: Clock | None = None
         self.sessions: set[int] = set()  # of the run of the clock
@@ -64,11 +65,10 @@ class CameraTrack:
         """Whether it has come to about this time, by a keyframe that came after the one of this id."""
         return self.newest_id > keyframe_id and abs(self.newest_ns - stamp_ns) < GOES_ON_NS
 
-    def give_up(self, window: FrameWindow) -> Outcome:
-        """Refuse a frame window whose camera is in doubt, and all that waits."""
-        refusal = Reason.CAMERA, window.doubt
-        unproven, self.unproven = [waiting.refused(refusal) for waiting in self.unproven], []
-        return Outcome(rejected=(*unproven, *self.confirmation.give_up(refusal), refused_window(window, refusal)))
+    def give_up(self, refusal: Refusal | None = None) -> tuple[Rejected, ...]:
+        """Refuse all that waits; for what it waits for where no other refusal is given."""
+        unproven, self.unproven = [waiting.refused(refusal or waiting.refusal) for waiting in self.unproven], []
+        return (*unproven, *self.confirmation.give_up(refusal))
 
     def hold(self, held: Held, keyframe: Keyframe, named: Sequence[Sighting]) -> None:
         """Keep a pose that waits for other keyframes; ``named`` are the keyframe's sightings."""
@@ -80,25 +80,32 @@ class CameraTrack:
         params = self._params
         self.unproven += [waiting_of(keyframe, named, item, UNPROVEN, params) for item in accepted]
 
-    def release(self, recollection: Recollection) -> Outcome:
-        """The constraints that waited for their camera to be believed."""
+    def release(self, recollection: Recollection, doubt: str) -> Outcome:
+        """Believe the camera, or refuse all that waits where it is in ``doubt``."""
+        self.proven = not doubt
+        return Outcome(rejected=self.give_up((Reason.CAMERA, doubt))) if doubt else self._released(recollection)
+
+    def _released(self, recollection: Recollection) -> Outcome:
         waited, self.unproven = self.unproven, []
         return Outcome(closures=tuple(self._late(waiting, recollection) for waiting in waited))
 
-    def settle(self, now_ns: int | None, recollection: Recollection, proven: bool = True) -> Outcome:
+    def settle(self, now_ns: int | None, recollection: Recollection) -> Outcome:
         """What waits no more: late constraints, which are written down, and refusals; all where there is no now.
 
-        Those among them that waited for their camera to be believed, if it is ``proven`` now.
+        Nothing is published, and what is confirmed waits on, while the camera is not proven.
         """
         confirmed, refused = self.confirmation.settle(now_ns)
-        closures = list(self.release(recollection).closures) if proven else []
+        closures = list(self._released(recollection).closures) if self.proven else []
         for waiting in confirmed:
             moments = waiting.from_session, waiting.closure.from_ns, waiting.closure.to_ns
             if self.thinning.redundant(*moments):
                 refused.append(waiting.refused(redundant(recollection.params.thin_seconds)))
                 continue
             self.thinning.accept(*moments)
-            closures.append(self._late(waiting, recollection))
+            if self.proven:
+                closures.append(self._late(waiting, recollection))
+            else:
+                self.unproven.append(waiting)
         return Outcome(closures=tuple(closures), rejected=tuple(refused))
 
     def _late(self, waiting: Waiting, recollection: Recollection) -> LoopClosure:
@@ -137,6 +144,11 @@ class CameraTracks(dict[Camera, CameraTrack]):
         self.followed = self.of((frame.robot, frame.frame_id))
         return self.followed
 
+    def refuse(self, window: FrameWindow, doubt: str) -> Outcome:
+        """Give up a frame window whose camera is in ``doubt``, and all that waits for that camera."""
+        refusal = Reason.CAMERA, doubt
+        return Outcome(rejected=(*self.of(window.camera).give_up(refusal), refused_window(window, refusal)))
+
     def end(self) -> list[FrameWindow]:
         """The frame windows that were being collected, without those that show nothing new."""
         ended = [track.keyframer.finish() for track in self.all()]
@@ -152,7 +164,7 @@ class CameraTracks(dict[Camera, CameraTrack]):
         given_up: tuple[Rejected, ...] = ()
         if clock != track.clock:
             hidden = self.hidden_from(clock, keyframe.camera, recollection.store)
-            given_up = track.settle(None, recollection).rejected + clock_refusals(clock, hidden, keyframe)
+            given_up = track.give_up() + clock_refusals(clock, hidden, keyframe)
             track.begin(clock, hidden, recollection.params)
         self._show_beside(track, keyframe)
         track.see(keyframe)

@@ -105,9 +105,9 @@ class Confirmation:
             del self._waiting[number]
         return confirmed, refused
 
-    def give_up(self, refusal: Refusal) -> list[Rejected]:
-        """Refuse all that waits."""
-        refused = [waiting.refused(refusal) for waiting in self._waiting.values()]
+    def give_up(self, refusal: Refusal | None) -> list[Rejected]:
+        """Refuse all that waits; for what it waits for where no other refusal is given."""
+        refused = [waiting.refused(refusal or waiting.refusal) for waiting in self._waiting.values()]
         self._waiting.clear()
         return refused
 

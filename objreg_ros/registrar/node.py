@@ -85,7 +85,7 @@ class RegistrarNode(FramesDoor):
     def _open_to(self, inputs: RegistrarNodeParams, refused: ExitStack) -> None:
         self._tracking, self._telling = threading.Lock(), threading.Lock()
         self._enabled, self._unsearched = True, 0
-        self.when_silent(lambda: self._publish(self._registrar.release()))
+        self.when_silent(lambda doubt: self._publish(self._registrar.release(doubt)))
         self._counts = dict(self._registrar.counts())
         self._scene = Scene()
         self._robots = prefixes_of(self, list(inputs.cameras)) if inputs.robots else {}

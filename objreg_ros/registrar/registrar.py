@@ -103,12 +103,12 @@ class Registrar:
 
     def process(self, frame: Frame) -> Outcome:
         """Take in one frame: `track`, and `search` when it completed a keyframe."""
-        window = self.track(frame)
-        return Outcome() if window is None else self.search(window)
+        return Outcome() if (window := self.track(frame)) is None else self.search(window)
 
-    def finish(self, seconds: float = np.inf, hurried: Callable[[], bool] = lambda: False) -> Outcome:
-        """`search` for the keyframes that were still being collected, and settle what waits: the end of a recording."""
-        return in_turn([self.search(window, seconds, hurried) for window in self.end()]).with_late(self.settle())
+    def finish(self, doubt: str = "") -> Outcome:
+        """`search` for the keyframes that were being collected, `release` and `settle`: the end of a recording."""
+        outcomes = [self._tracks.refuse(window, doubt) if doubt else self.search(window) for window in self.end()]
+        return in_turn(outcomes).with_late(self.release(doubt)).with_late(self.settle())
 
     def end(self) -> list[FrameWindow]:
         """The frame windows that were still being collected, one a camera, without those that show nothing new."""
@@ -143,7 +143,7 @@ class Registrar:
                 return Outcome()
             self.params = self._recollection.params = self._adopted
             if window.doubt:
-                return self._tracks.of(window.camera).give_up(window)
+                return self._tracks.refuse(window, window.doubt)
             keyframe = fuse(window, self.params)
             return self._search(keyframe, window.clock, budget, window.proven) if keyframe.objects else Outcome()
 
@@ -156,11 +156,11 @@ class Registrar:
         budget = Budget(time.monotonic() + seconds, hurried)
         with self._lock:
             self.params = self._recollection.params = self._adopted
-            received = self._origins.received(arrival)
-            return None if received is None else self._search(*received, budget)
+            return None if (received := self._origins.received(arrival)) is None else self._search(*received, budget)
 
     def _search(self, made: Keyframe, clock: Clock, budget: Budget, proven: bool = True) -> Outcome:
         keyframe, track = made.numbered(self._store.next_keyframe()), self._tracks.of(made.camera)
+        track.proven = proven
         self._session = keyframe.session
         before = self._tracks.go_on(keyframe, clock, self._recollection)
         sightings = sightings_of(keyframe)
@@ -188,7 +188,7 @@ class Registrar:
             session=keyframe.session,
             robot=keyframe.robot,
         )
-        return outcome.with_late(track.settle(keyframe.stamp_ns, self._recollection, proven))
+        return outcome.with_late(track.settle(keyframe.stamp_ns, self._recollection))
 
     def moment(self, keyframe_id: int) -> tuple[Keyframe, Clock]:
         """A stored keyframe, and the run of its camera's clock that goes on. KeyError where it is not stored, or no
@@ -255,10 +255,10 @@ class Registrar:
         with self._lock:
             return in_turn([track.settle(None, self._recollection) for track in self._tracks.all()])
 
-    def release(self) -> Outcome:
-        """Publish what waits for proof of a camera that is silent: none will come."""
+    def release(self, doubt: str = "") -> Outcome:
+        """Publish what waits for proof of a camera that is silent; refuse it if that is in ``doubt``."""
         with self._lock:
-            return in_turn([track.release(self._recollection) for track in self._tracks.all()])
+            return in_turn([track.release(self._recollection, doubt) for track in self._tracks.all()])
 
     def reset(self) -> None:
         """Forget everything, in the store too; StoreError, and nothing is forgotten, where that cannot be."""
