@@ -44,6 +44,7 @@ FREE_BRIDGE = tuple(
         "masks",
         "pictures",
         "registered_depth",
+        "rvl",
         "frames",
         "mount",
         "chains",

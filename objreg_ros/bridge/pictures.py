@@ -7,6 +7,7 @@ How many there are is read off the message or off the header of its file, before
 from __future__ import annotations
 
 import io
+import re
 from typing import Any
 
 import cv2
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from objreg_ros import limits
+from objreg_ros.bridge import rvl
 
 Array = NDArray[Any]
 
@@ -66,7 +68,8 @@ DEPTH = {"16UC1": "u2", "mono16": "u2", "32FC1": "f4"}
 INSTANCES = {"mono8": "u1", "8UC1": "u1", "mono16": "u2", "16UC1": "u2"}
 AS_STORED = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION  # depth knows nothing of how a jpeg is to be held
 PNG, CHUNK = b"\x89PNG\r\n\x1a\n", 12  # how a png begins, and the bytes of a chunk beside its data
-COMPRESSED_DEPTH_HEADER = 12  # compressed_depth_image_transport: an enum and two floats before the PNG
+COMPRESSED_DEPTH_HEADER = 12  # compressed_depth_image_transport: an enum and two floats before the PNG or the RVL
+RVL = re.compile(r"compressedDepth\s+rvl", re.IGNORECASE)  # in the format; PNG is not always named
 
 
 def colour_pixels(message: Any, most_pixels: int = limits.MOST_PIXELS_OF_PICTURE) -> Array:
@@ -129,8 +132,17 @@ def size_of(message: Any) -> tuple[int, int]:
         if min(width, height) <= 0:
             raise ValueError(f"image: expected pixels, got {width} × {height}")
         return width, height
+    if RVL.search(message.format):
+        return _size_of_rvl(np.frombuffer(message.data, np.uint8)[COMPRESSED_DEPTH_HEADER:])
     data = bytes(message.data)
     return _size_in_file(data[COMPRESSED_DEPTH_HEADER:] if "compressedDepth" in message.format else data)
+
+
+def _size_of_rvl(packed: Array) -> tuple[int, int]:
+    width, height = rvl.size(packed)
+    if min(width, height) <= 0:
+        raise ValueError(f"compressed depth: expected pixels, got {width} × {height}")
+    return width, height
 
 
 def _size_in_file(
@@ -246,11 +258,15 @@ def _decoded(data: Any, flags: int, conversion: int | None, expected: str) -> Ar
 
 
 def _compressed_depth(message: Any, most_pixels: int) -> Array:
-    """PNG of 16-bit millimetres, or of quantised inverse depth with its two constants (compressedDepth of 32FC1)."""
+    """16-bit millimetres, or quantised inverse depth with its two constants (compressedDepth of 32FC1)."""
     data = np.frombuffer(message.data, np.uint8)
     if "compressedDepth" not in message.format:
         return _metres(_depth_png(data, "a 16-bit png", most_pixels))
-    pixels = _depth_png(data[COMPRESSED_DEPTH_HEADER:], "compressedDepth png", most_pixels)
+    packed = data[COMPRESSED_DEPTH_HEADER:]
+    if RVL.search(message.format):
+        pixels = _depth_rvl(packed, most_pixels)
+    else:
+        pixels = _depth_png(packed, "compressedDepth png", most_pixels)
     if not message.format.startswith("32FC1"):
         return _metres(pixels)
     a, b = data[4:COMPRESSED_DEPTH_HEADER].view("<f4")
@@ -262,6 +278,11 @@ def _compressed_depth(message: Any, most_pixels: int) -> Array:
 def _depth_png(data: Array, expected: str, most_pixels: int) -> Array:
     require_picture(data.tobytes(), ("PNG",), most_pixels)
     return _one_channel(_decoded(data, cv2.IMREAD_UNCHANGED, None, expected))
+
+
+def _depth_rvl(packed: Array, most_pixels: int) -> Array:
+    _require_size(*rvl.size(packed), most_pixels)
+    return rvl.unpack(packed)
 
 
 def _one_channel(pixels: Array) -> Array:

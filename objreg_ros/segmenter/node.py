@@ -23,7 +23,7 @@ from rclpy.qos import DurabilityPolicy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from sensor_msgs.msg import Imu as ImuMessage
 
-from objreg_ros.bridge import colour_frame, from_msg, lenses, qos, registered_depth, to_msg, vision_to_msg
+from objreg_ros.bridge import colour_frame, from_msg, lenses, qos, registered_depth, rvl, to_msg, vision_to_msg
 from objreg_ros.bridge.calibration import fitted, read_calibration
 from objreg_ros.bridge.detections_in import DetectionsIn
 from objreg_ros.bridge.indoors import Indoors, Surplus
@@ -85,6 +85,7 @@ class SegmenterNode(MatchingDoor):
     def _warm(self) -> None:
         self._segmenter.warm()
         registered_depth.warm()
+        rvl.warm()
 
     def _listen(self) -> None:
         self._listen_for_camera()

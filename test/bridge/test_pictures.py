@@ -14,6 +14,7 @@ import pytest
 from objreg_ros.bridge.pictures import colour_pixels, depth_metres, size_of, unpack_rgb
 
 from . import messages
+from .test_rvl import claiming, packed
 
 RED = (200, 30, 10)
 
@@ -347,6 +348,45 @@ def test_compressed_depth_of_floats_is_inverse_depth() -> None:
     quantised = np.array([[0, round(a / 2.0 + b)]], np.uint16)
     depth = depth_metres(compressed_depth(quantised, "32FC1", a, b))
     assert depth == pytest.approx(np.array([[0, 2.0]]), rel=1e-3)
+
+
+def rvl_depth(behind: np.ndarray, kind: str = "16UC1; compressedDepth rvl", a: float = 0, b: float = 0) -> Any:
+    return messages.compressed(struct.pack("<iff", 0, a, b) + behind.tobytes(), kind)
+
+
+@pytest.mark.parametrize("kind", ["16UC1; compressedDepth rvl", "16UC1;compressedDepth RVL"])
+def test_rvl_of_16_bits_is_millimetres_and_of_floats_inverse_depth(kind: str) -> None:
+    pixels = np.array([[0, 1500, 65535], [1, 0, 480]], np.uint16)
+    depth = depth_metres(rvl_depth(packed(pixels), kind))
+    assert depth.dtype == np.float32 and depth == pytest.approx(np.array([[0, 1.5, 0], [0.001, 0, 0.48]]))
+    a, b = 1000.0, -20.0
+    depth = depth_metres(rvl_depth(packed(pixels), kind.replace("16UC1", "32FC1"), a, b))
+    assert depth == pytest.approx(np.array([[0, 1000 / 1520, 1000 / 65555], [1000 / 21, 0, 2.0]]))
+
+
+def test_the_size_of_rvl_is_told_before_any_pixel_is_decoded() -> None:
+    assert size_of(rvl_depth(claiming(640, 480, []))) == (640, 480)
+    for width, height in ((0, 480), (640, -1)):
+        with pytest.raises(ValueError, match=f"expected pixels, got {width} × {height}"):
+            size_of(rvl_depth(claiming(width, height, [])))
+
+
+@pytest.mark.parametrize(("width", "height"), [(0, 5), (-3, -3), (70_000, 2), (30_000, 30_000), (2**31 - 1, 2**31 - 1)])
+def test_rvl_that_claims_an_impossible_size_is_refused_before_memory_is_taken(width: int, height: int) -> None:
+    message = rvl_depth(claiming(width, height, [width * height, 0] if width > 0 else []))
+    tracemalloc.start()
+    with pytest.raises(ValueError, match=r"expected (pixels|at most)"):
+        depth_metres(message)
+    assert tracemalloc.get_traced_memory()[1] < 1_000_000
+    tracemalloc.stop()
+
+
+@pytest.mark.parametrize("length", [0, 5, 12, 19])
+def test_rvl_without_its_headers_is_refused(length: int) -> None:
+    message = messages.compressed(bytes(length), "32FC1; compressedDepth rvl")
+    for read in (depth_metres, size_of):
+        with pytest.raises(ValueError, match="expected an rvl header"):
+            read(message)
 
 
 def test_a_plain_png_of_depth_is_millimetres() -> None:
