@@ -19,7 +19,7 @@ from objreg_ros.data import Array, DepthImage, Detections, Intrinsics
 
 # model: how many coefficients it may have
 MODELS = {
-    "plumb_bob": (4, 5),
+    "plumb_bob": (4, 5, 8, 12, 14),  # beyond 5 it is a rational_polynomial, which many drivers do not call so
     "rational_polynomial": (8, 12, 14),  # 12 and 14: with a thin prism and a tilted sensor, as OAK-D's driver says
     "equidistant": (4,),
 }
@@ -157,7 +157,7 @@ class Lens:
     def _seen_at(self, at: Array) -> Array:
         """The raw pixels (N, 2) that show the rectified rays ``x/z, y/z`` (N, 2)."""
         ray = np.column_stack([at, np.ones(len(at))]) @ self._turn
-        K, D = _matrix(self.raw), np.array(self.D)
+        K, D = _matrix(self.raw), self._coefficients
         if self.model == "equidistant":
             flat = (ray[:, :2] / ray[:, 2:]).reshape(-1, 1, 2)
             return cv2.fisheye.distortPoints(flat, K, D).reshape(-1, 2)
@@ -192,13 +192,17 @@ class Lens:
         return np.asarray(inside)
 
     @cached_property
+    def _coefficients(self) -> Array:
+        return np.array(_without_filling(self.model, self.D), np.float64)
+
+    @cached_property
     def _turn(self) -> Array:
         return np.array(self.R, np.float64).reshape(3, 3)
 
     @cached_property
     def _maps(self) -> tuple[Array, Array]:
         """The raw column and row (H, W) float32 that every rectified pixel shows; `NOWHERE` behind a fold."""
-        K, D, P = _matrix(self.raw), np.array(self.D), _matrix(self.camera)
+        K, D, P = _matrix(self.raw), self._coefficients, _matrix(self.camera)
         make = cv2.fisheye.initUndistortRectifyMap if self.model == "equidistant" else cv2.initUndistortRectifyMap
         u, v = make(K, D, self._turn, P, (self.raw.width, self.raw.height), cv2.CV_32FC1)
         step = math.ceil(math.sqrt(u.size / FOLD_PIXELS))
@@ -210,14 +214,22 @@ class Lens:
 
 
 def require_model(model: str, D: tuple[float, ...]) -> None:
-    """ValueError unless ``D`` are finite coefficients of a known model, as many as it has."""
+    """ValueError unless ``D`` are finite coefficients of a known model, as many as it has but for zeros behind them."""
     if model not in MODELS:
         raise ValueError(f"lens: expected a distortion model of {', '.join(MODELS)}, got {model[:40]!r}")
-    if len(D) not in MODELS[model]:
-        wanted = " or ".join(map(str, MODELS[model]))
+    if len(_without_filling(model, D)) not in MODELS[model]:
+        *fewer, most = map(str, MODELS[model])
+        wanted = f"{', '.join(fewer)} or {most}" if fewer else most
         raise ValueError(f"lens: expected {wanted} coefficients of {model}, got {len(D)}")
     if not np.isfinite(D).all():
         raise ValueError(f"lens: expected finite coefficients of {model}, got {list(D)}")
+
+
+def _without_filling(model: str, D: tuple[float, ...]) -> tuple[float, ...]:
+    """The coefficients without the zeros that fill an array behind as many as the model has."""
+    if len(D) in MODELS[model]:
+        return D
+    return next((D[:count] for count in MODELS[model] if len(D) > count and not any(D[count:])), D)
 
 
 def _matrix(camera: Intrinsics) -> Array:

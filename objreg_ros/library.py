@@ -45,9 +45,10 @@ Detects = Callable[[Array], Found]
 class Camera:
     """A camera in pixels: ``u = fx x/z + cx``, pixel centres on integers.
 
-    ``distortion`` are the coefficients of its lens in OpenCV's order and ``model`` says of which: ``plumb_bob`` 4 or 5,
-    ``rational_polynomial`` 8, 12 or 14, ``equidistant`` 4. Pictures are rectified by them, and what was detected in
-    these. None or zeros: the pictures are taken as rectified. Clouds are metres already: nothing of them is rectified.
+    ``distortion`` are the coefficients of its lens in OpenCV's order and ``model`` says of which: ``plumb_bob`` 4, 5,
+    8, 12 or 14, ``rational_polynomial`` 8, 12 or 14, ``equidistant`` 4. Pictures are rectified by them, and what was
+    detected in these. None or zeros: the pictures are taken as rectified. Clouds are metres already: nothing of them is
+    rectified.
 
     ``width`` and ``height`` are those of the picture where they are 0; only clouds that are no pictures need them.
     """

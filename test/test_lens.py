@@ -17,6 +17,8 @@ WIDER = replace(CAMERA, fx=200.0, fy=210.0, cx=158.0)
 COEFFICIENTS = {
     "plumb_bob": (-0.25, 0.08, 0.001, -0.002, 0.01),
     "plumb_bob, four": (0.2, -0.3, 0.001, 0.002),
+    "plumb_bob, eight": (0.4, -2.5, 0.0005, -0.0003, 1.4, 0.3, -2.3, 1.3),
+    "plumb_bob, fourteen": (0.2, -0.3, 0.001, 0.002, 0.1, 0.1, -0.2, 0.05, 0.002, 0.0, -0.001, 0.0, 0.01, -0.005),
     "rational_polynomial": (0.4, -2.5, 0.0005, -0.0003, 1.4, 0.3, -2.3, 1.3),
     "equidistant": (-0.03, 0.01, -0.005, 0.001),
 }
@@ -186,11 +188,35 @@ def test_a_turned_camera_sees_rays_where_the_turn_puts_them() -> None:
     assert np.hypot(*(np.array([u[120, 160], v[120, 160]]) - of._seen_at(np.array([[-1 / 260, 2 / 250]]))[0])) < 1e-3
 
 
+@pytest.mark.parametrize("count", [8, 12, 14])
+def test_a_plumb_bob_of_more_than_five_numbers_is_a_rational_polynomial(count: int) -> None:
+    D = COEFFICIENTS["plumb_bob, fourteen"][:count]
+    one, other = Lens("plumb_bob", D, CAMERA, CAMERA), Lens("rational_polynomial", D, CAMERA, CAMERA)
+    assert np.array_equal(one._maps, other._maps)
+    assert np.abs(one._maps[0] - lens("plumb_bob")._maps[0]).max() > 1.0
+
+
+@pytest.mark.parametrize("count", [6, 8, 11, 12, 14])
+def test_zeros_behind_the_five_of_a_plumb_bob_change_nothing(count: int) -> None:
+    five = COEFFICIENTS["plumb_bob"]
+    filled = Lens("plumb_bob", (*five, *(0.0,) * (count - 5)), CAMERA, CAMERA)
+    assert np.array_equal(filled._maps, lens("plumb_bob")._maps)
+    box = np.array([[40.0, 30.0, 200.0, 190.0]])
+    assert np.array_equal(filled.rectify_xyxy(box), lens("plumb_bob").rectify_xyxy(box))
+
+
+def test_zeros_behind_the_numbers_of_a_fisheye_change_nothing() -> None:
+    four = lens("equidistant")
+    filled = Lens("equidistant", (*four.D, 0.0), CAMERA, CAMERA)
+    assert np.array_equal(filled._maps, four._maps)
+
+
 @pytest.mark.parametrize(
     ("model", "D", "said"),
     [
-        ("plumb_bob", (0.1, 0.2), "expected 4 or 5 coefficients of plumb_bob, got 2"),
-        ("rational_polynomial", (0.1,) * 5, "expected 8 or 12 or 14 coefficients of rational_polynomial, got 5"),
+        ("plumb_bob", (0.1,) * 6, "expected 4, 5, 8, 12 or 14 coefficients of plumb_bob, got 6"),
+        ("plumb_bob", (0.1, 0.2), "expected 4, 5, 8, 12 or 14 coefficients of plumb_bob, got 2"),
+        ("rational_polynomial", (0.1,) * 5, "expected 8, 12 or 14 coefficients of rational_polynomial, got 5"),
         ("equidistant", (0.1,) * 5, "expected 4 coefficients of equidistant, got 5"),
         ("omnidirectional", (0.1,) * 5, "expected a distortion model of plumb_bob, .*, got 'omnidirectional'"),
         ("plumb_bob", (float("nan"), 0, 0, 0, 0), "expected finite coefficients of plumb_bob, got .nan"),

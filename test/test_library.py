@@ -271,7 +271,9 @@ def test_pictures_of_a_lens_are_rectified_with_their_masks_and_boxes(what: str) 
 
 
 def test_a_lens_that_cannot_be_is_refused() -> None:
-    with pytest.raises(ValueError, match="picture 1: lens: expected 4 or 5 coefficients of plumb_bob, got 2"):
+    with pytest.raises(
+        ValueError, match="picture 1: lens: expected 4, 5, 8, 12 or 14 coefficients of plumb_bob, got 2"
+    ):
         register(*PICTURES, replace(CAMERA, distortion=(0.1, 0.2)), detections=MASKS)
     with pytest.raises(ValueError, match=r"expected a distortion model of .*, got 'round'"):
         register(*PICTURES, replace(LENS, model="round"), detections=MASKS)

@@ -279,8 +279,8 @@ def _pinhole(known: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _model_of(lens: Any) -> str:
-    """The model of ROS for coefficients of OpenCV, which does not name it: five, or up to eight."""
-    return "rational_polynomial" if len(_flat(lens)) == 8 else "plumb_bob"
+    """The model of ROS for coefficients of OpenCV, which does not name it: up to five, or more."""
+    return "rational_polynomial" if len(_flat(lens)) > 5 else "plumb_bob"
 
 
 def _flat(matrix: Any) -> list[Any]:

@@ -74,7 +74,7 @@ def _unpack(words, pixels):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True, nogil=True)
 def _number(words, at):  # type: ignore[no-untyped-def]
     """The number at a nibble, and the nibble behind it; 0 and what is wrong where there is none."""
-    value = 0
+    value = np.int64(0)
     for k in range(MOST_NIBBLES):
         if at >> 3 >= words.size:
             return 0, TRUNCATED

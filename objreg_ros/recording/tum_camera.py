@@ -142,7 +142,7 @@ def _of_calibration(file: Path, text: str) -> tuple[dict[str, Any], list[str]]:
             f"{file}: {error}; name fx, fy, cx, cy (pixels) and depth_scale (steps of depth in a metre), or remove the "
             "file for the benchmark's default camera"
         ) from error
-    if any(camera.d) and camera.distortion_model != "plumb_bob":
+    if any(camera.d) and camera.distortion_model not in ("plumb_bob", "rational_polynomial"):
         raise ValueError(
             f"{file}: expected the model plumb_bob, got {camera.distortion_model}; name this file with --camera instead"
         )

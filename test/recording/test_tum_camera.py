@@ -119,9 +119,11 @@ def test_yaml_that_nests_or_says_what_no_reader_takes_is_refused_in_one_line(tex
     assert "\n" not in str(refusal.value)
 
 
-@pytest.mark.parametrize("value", ["[0.1, 0.2]", "[.nan, 0, 0, 0, 0]", "[0.1, 0, 0, 0, 0, 0]"])
+@pytest.mark.parametrize("value", ["[0.1, 0.2]", "[.nan, 0, 0, 0, 0]", "[0.1, 0, 0, 0, 0, 0.1]"])
 def test_distortion_that_is_no_lens_of_a_plumb_bob_is_refused(value: str, tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"camera\.yaml: .*expected (4 or 5|finite) coefficients of plumb_bob, got"):
+    with pytest.raises(
+        ValueError, match=r"camera\.yaml: .*expected (4, 5, 8, 12 or 14|finite) coefficients of plumb_bob, got"
+    ):
         camera(tmp_path, f"{WHOLE}\ndistortion: {value}")
 
 
@@ -138,6 +140,13 @@ def test_a_file_of_camera_calibration_will_do_and_depth_scale_may_be_added(tmp_p
     assert (read.depth_scale, read.distortion, read.notes) == (1000, (0.1, 0, 0, 0, 0.2), ())
     (note,) = camera(tmp_path, CALIBRATED).notes
     assert note.endswith("assumed: depth_scale 5000")
+
+
+@pytest.mark.parametrize("model", ["plumb_bob", "rational_polynomial"])
+def test_a_calibration_of_eight_numbers_is_taken_by_either_name(model: str, tmp_path: Path) -> None:
+    eight = (0.4, -2.5, 0.0005, -0.0003, 1.4, 0.3, -2.3, 1.3)
+    told = CALIBRATED.replace("plumb_bob", model).replace("cols: 5, data: [0.1, 0, 0, 0, 0.2]", f"data: {list(eight)}")
+    assert camera(tmp_path, told).distortion == eight
 
 
 def test_a_calibration_that_is_none_or_of_a_lens_that_the_folder_cannot_have_is_refused(tmp_path: Path) -> None:
