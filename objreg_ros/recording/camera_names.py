@@ -47,6 +47,11 @@ KINDS = frozenset(
         "qhd",
         "sd",
         "preview",
+        "resize",
+        "resized",
+        "pcl",
+        "ground",
+        "truth",
         "video",
         "stream",
     ]
@@ -120,7 +125,8 @@ def _relation_of(words: tuple[str, ...], others: tuple[str, ...]) -> int | None:
     if words and others and specific == others_specific:
         return GENERICALLY_SAME
     apart = set(specific) ^ set(others_specific)
-    is_half = apart <= HALVES and len(apart) == 1 and bool(set(specific) & set(others_specific))
+    is_shared = bool(set(words) & set(others)) or () in (words, others)  # /left/image_rect and /depth
+    is_half = apart <= HALVES and len(apart) == 1 and is_shared
     return HALF if is_half else None
 
 

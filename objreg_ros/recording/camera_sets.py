@@ -19,6 +19,7 @@ from objreg_ros.recording.topic_rules import (
     OWN,
     REGISTERED,
     RULES,
+    STEREO,
     candidates,
     fits,
     may_be,
@@ -107,13 +108,23 @@ class CameraSets:
             return False
         if share_frame(image, view, self._frames):
             return False
-        is_left_of_zed = sure == HALF and "left" in camera_words(image) and rank(RULES["depth"], view) < REGISTERED
-        return not is_left_of_zed and (sure >= HALF or not {"left", "right"} & set(camera_words(view)))
+        is_left = sure == HALF and "left" in camera_words(image) and not self._is_elsewhere(image, view)
+        return not is_left and (sure >= HALF or not {"left", "right"} & set(camera_words(view)))
+
+    def _is_elsewhere(self, image: str, view: str) -> bool:
+        """Whether depth that names no lens is of another than the left, whose it is by the convention of stereo.
+
+        OAK-D's is of its colour camera or of the right lens. Depth of another frame needs a camera_info of its own.
+        """
+        is_apart = share_frame(image, view, self._frames) is False
+        is_known = view in self._depths and any(_folder(info) == _folder(view) for info in self._infos)
+        return fits(STEREO, view) or (is_apart and not is_known)
 
     def _with_depth(self, image: str, depth: str, sure: int) -> CameraSet:
         registered = NATIVE in image or rank(RULES["depth"], depth) < REGISTERED
         registered = registered or share_frame(image, depth, self._frames) is True
         info = self._asked_or("camera_info", self._info_of(depth, image, registered))
+        registered = registered or self._has_one_info(image, depth, info)
         own = self._info_of(image)
         colour_info = self._asked_or("colour_info", None if own == info else own)
         kind = BY_DEPTH if registered else BY_TWO_CAMERAS if info and colour_info else BY_ONE_CAMERA
@@ -171,6 +182,11 @@ class CameraSets:
                 return near[2]
         is_free = len(self._infos) == 1 and (fitting or not self._has_pictures(self._infos[0]))
         return self._infos[0] if is_free else None
+
+    def _has_one_info(self, image: str, depth: str, info: str | None) -> bool:
+        """Whether colour, depth and one camera_info lie in one folder, as of a camera that makes both: Isaac Sim's."""
+        is_apart = share_frame(image, depth, self._frames) is False
+        return info is not None and not is_apart and _folder(image) == _folder(depth) == _folder(info)
 
     def _has_pictures(self, info: str) -> bool:
         return any(_folder(info) == _folder(picture) for picture in self._pictures)

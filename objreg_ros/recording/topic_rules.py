@@ -49,7 +49,7 @@ RULES = {
     "image": Rule(
         PICTURES,
         rf"(?<!rgb_to_)depth{IS_KIND}|(^|/)ir(/|_|$)|infra|disparity|mask|label|confidence|body_index|(^|/)theora"
-        rf"|objects|(^|/)view(/|$)|{STEREO}|{DEPTH_ENCODING}",
+        rf"|objects|(^|/)view(/|$)|segment|(^|/)(semantic|instance|panoptic|normals?)[^/]*$|{STEREO}|{DEPTH_ENCODING}",
         (
             r"rgb_to_depth/image",  # Azure Kinect: colour in the geometry of its native depth
             r"^/?image$",

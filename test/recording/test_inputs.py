@@ -25,6 +25,21 @@ def topics(text: str) -> dict[str, Topic]:
     return {name: Topic(name, KINDS.get(kind, IMAGE), 3) for name, _, kind in named}
 
 
+NOVA = (
+    "/front_stereo_camera/left/image_rect_color /front_stereo_camera/left/camera_info:info "
+    "/front_stereo_camera/right/image_rect_color /front_stereo_camera/right/camera_info:info "
+    "/back_stereo_camera/left/image_rect_color /back_stereo_camera/left/camera_info:info "
+    "/chassis/odom:odom /chassis/imu:imu /front_stereo_imu/imu:imu /front_3d_lidar/lidar_points:points"
+)
+
+
+def spot(robot: str) -> str:
+    """The cameras of a Spot with an arm, each with depth as it was measured and as it was registered."""
+    cameras = ("back", "frontleft", "frontright", "hand", "left", "right")
+    folders = [f"{robot}/{kind}/{name}" for name in cameras for kind in ("camera", "depth", "depth_registered")]
+    return " ".join(f"{folder}/image {folder}/camera_info:info" for folder in folders)
+
+
 DRIVERS = {
     "a RealSense with its IMU on a robot with another": (
         "/camera/color/image_raw /camera/color/camera_info:info /camera/aligned_depth_to_color/image_raw "
@@ -136,6 +151,60 @@ DRIVERS = {
         "image=/zed/zed_node/rgb/color/rect/image depth=/zed/zed_node/depth/depth_registered "
         "camera_info=/zed/zed_node/depth/camera_info",
     ),
+    "a MultiSense, whose depth is that of its left lens": (
+        "/multisense/left/image_rect_color /multisense/left/camera_info:info /multisense/right/image_rect "
+        "/multisense/right/camera_info:info /multisense/depth",
+        "image=/multisense/left/image_rect_color depth=/multisense/depth camera_info=/multisense/left/camera_info",
+    ),
+    "stereo_image_proc": (
+        "/stereo/left/image_rect_color /stereo/left/camera_info:info /stereo/right/image_rect_color "
+        "/stereo/right/camera_info:info /stereo/disparity /stereo/points2:points",
+        "image=/stereo/left/image_rect_color points=/stereo/points2 camera_info=/stereo/left/camera_info",
+    ),
+    "stereo matched by Isaac ROS without a namespace": (
+        "/left/image_rect /left/camera_info_rect:info /right/image_rect /right/camera_info_rect:info /depth",
+        "image=/left/image_rect depth=/depth camera_info=/left/camera_info_rect",
+    ),
+    "Nova with the depth of a lens": (
+        f"{NOVA} /front_stereo_camera/left/depth",
+        "image=/front_stereo_camera/left/image_rect_color depth=/front_stereo_camera/left/depth "
+        "camera_info=/front_stereo_camera/left/camera_info odom=/chassis/odom imu=/chassis/imu",
+    ),
+    "Nova with the depth of a camera": (
+        f"{NOVA} /front_stereo_camera/depth",
+        "image=/front_stereo_camera/left/image_rect_color depth=/front_stereo_camera/depth "
+        "camera_info=/front_stereo_camera/left/camera_info odom=/chassis/odom imu=/chassis/imu",
+    ),
+    "Nova in Isaac Sim": (
+        f"{NOVA} /front_stereo_camera/depth/ground_truth /front_stereo_camera/depth/camera_info:info",
+        "image=/front_stereo_camera/left/image_rect_color depth=/front_stereo_camera/depth/ground_truth "
+        "camera_info=/front_stereo_camera/depth/camera_info odom=/chassis/odom imu=/chassis/imu",
+    ),
+    "Isaac Sim": (
+        "/rgb /depth /camera_info:info /depth_pcl:points /instance_segmentation /semantic_segmentation /normals "
+        "/odom:odom",
+        "image=/rgb depth=/depth camera_info=/camera_info odom=/odom",
+    ),
+    "Isaac Sim with two robots": (
+        "/robot1/front_cam/rgb /robot1/front_cam/depth /robot1/front_cam/camera_info:info /robot1/odom:odom "
+        "/robot2/front_cam/rgb /robot2/front_cam/depth /robot2/front_cam/camera_info:info /robot2/odom:odom",
+        "image=/robot1/front_cam/rgb depth=/robot1/front_cam/depth camera_info=/robot1/front_cam/camera_info "
+        "odom=/robot1/odom",
+    ),
+    "Spot": (
+        f"{spot('/spot')} /spot/odometry:odom /spot/odometry/corrected:odom",
+        "image=/spot/camera/frontleft/image depth=/spot/depth_registered/frontleft/image "
+        "camera_info=/spot/depth_registered/frontleft/camera_info odom=/spot/odometry",
+    ),
+    "Spot without a name": (
+        f"{spot('')} /odometry:odom /camera/frontmiddle_virtual/image",
+        "image=/camera/frontleft/image depth=/depth_registered/frontleft/image "
+        "camera_info=/depth_registered/frontleft/camera_info odom=/odometry",
+    ),
+    "the hand of Spot": (
+        "/camera/hand/image /camera/hand/camera_info:info /depth_registered/hand/image",
+        "image=/camera/hand/image depth=/depth_registered/hand/image camera_info=/camera/hand/camera_info",
+    ),
     "truth as odometry": (
         "/odometry/filtered:odom /vicon/camera:odom",
         "odom=/odometry/filtered ground_truth=/vicon/camera",
@@ -206,6 +275,27 @@ def test_a_remap_wins_over_everything() -> None:
     assert choose_inputs(there, {"image": "/other"}).image == "/other"
     inputs = choose_inputs(there, {"points": "/points"})
     assert (inputs.points, inputs.depth) == ("/points", None)
+
+
+def test_the_left_lens_is_not_taken_for_depth_that_is_measured_elsewhere() -> None:
+    there = topics("/cam/left/image_rect /cam/left/camera_info:info /cam/right/image_rect /cam/depth")
+    left, tof = "cam_left_optical_frame", "cam_tof_optical_frame"
+    assert choose_inputs(there, frames={"/cam/left/image_rect": left, "/cam/depth": left}).complete
+    assert choose_inputs(there, frames={"/cam/left/image_rect": left, "/cam/depth": tof}).image is None
+    oak = topics("/oak/left/image_raw /oak/left/camera_info:info /oak/stereo/image_raw /oak/stereo/camera_info:info")
+    assert choose_inputs(oak).image is None
+
+
+def test_depth_beside_colour_and_their_only_camera_info_goes_before_points() -> None:
+    there = topics("/cam/rgb /cam/depth /cam/camera_info:info /cam/points:points")
+    assert choose_inputs(there).depth == "/cam/depth"
+    apart = {"/cam/rgb": "cam_rgb_optical_frame", "/cam/depth": "cam_depth_optical_frame"}
+    assert choose_inputs(there, frames=apart).points == "/cam/points"
+
+
+@pytest.mark.parametrize("name", ["/semantic_segmentation", "/cam/instance_segmentation", "/cam/normals", "/segments"])
+def test_what_was_made_of_a_picture_is_no_colour(name: str) -> None:
+    assert choose_inputs(topics(f"{name} /depth /camera_info:info")).image is None
 
 
 @pytest.mark.parametrize("driver", DRIVERS)
