@@ -17,7 +17,7 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from objreg_ros.bridge import colour_frame, from_msg, lenses
+from objreg_ros.bridge import colour_frame, from_msg, lenses, vision_from_msg
 from objreg_ros.bridge.camera_stream import CameraStream
 from objreg_ros.bridge.frames import FrameTree
 from objreg_ros.bridge.mount import Mount, nameless_body
@@ -40,6 +40,7 @@ from objreg_ros.plausibility.finding import Finding
 from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.mounts import is_moving
 from objreg_ros.recording.record import Record
+from objreg_ros.recording.recorded_detections import RecordedDetections
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.report.export import constraint
 from objreg_ros.segmenter.gravity_choice import GravityChoice
@@ -267,10 +268,18 @@ def percentiles_ms(seconds: list[float]) -> dict[str, float]:
 
 
 class Line:
-    """The three rooms in a row. Give it messages in order of time, then `finish`."""
+    """The three rooms in a row. Give it messages in order of time, then `finish`.
 
-    def __init__(self, rooms: Rooms, inputs: Inputs, timing: Timing, max_frames: int | None = None) -> None:
+    With ``recorded`` the detector is not asked: what another one found comes as "detections", and as "label_info" the
+    names of its numbers.
+    """
+
+    def __init__(
+        self, rooms: Rooms, inputs: Inputs, timing: Timing, max_frames: int | None = None, recorded: bool = False
+    ) -> None:
         self.run = Run()
+        self._recorded = recorded
+        self._names: dict[int, str] = {}  # of the numbers that another detector says
         self._rooms, self._timing, self._max_frames = rooms, timing, max_frames
         self._from_points = inputs.points is not None
         self._raw = lenses.raw_pictures(timing.rectified, inputs.depth or inputs.points, inputs.image)
@@ -319,9 +328,17 @@ class Line:
         if name == "tf":
             self._take_tf(message)
             return
+        if name == "label_info":
+            told = self._kept(name, partial(vision_from_msg.label_info, message))
+            self._names = self._names if told is None else told
+            return
         stamp_ns = from_msg.stamp_ns(message)
-        if name == "image":
+        if name == "image" and not self._recorded:
             self._take_image(stamp_ns, message)
+        elif name == "image":
+            self._feed(name, stamp_ns, message)
+        elif name == "detections":
+            self._take_detections(stamp_ns, message)
         elif name == "camera_info":
             self._camera_info = message
             self._feed(name, stamp_ns, message)
@@ -371,6 +388,10 @@ class Line:
             self._feed("image", stamp_ns, message)
             self._feed("detections", stamp_ns, detections)
 
+    def _take_detections(self, stamp_ns: int, message: Any) -> None:
+        if self._kept("detections", partial(vision_from_msg.detections, message, self._names, (1, 1))) is not None:
+            self._feed("detections", stamp_ns, message)
+
     def _detect(self, message: Any) -> Detections:
         with self._timed("decode"):
             image = from_msg.image(message)
@@ -386,14 +407,15 @@ class Line:
             if match.is_surplus:
                 self.run.dropped[LEFT_OUT] += 1
                 continue
-            frame = self._kept("depth", partial(self._frame, match))
-            if frame is not None:
-                self.run.detections += len(match["detections"])
+            made = self._kept("depth", partial(self._frame, match))
+            if made is not None:
+                frame, detections = made
+                self.run.detections += len(detections)
                 self.run.objects += len(frame.objects)
-                self._labels[frame.stamp_ns] = match["detections"].label
+                self._labels[frame.stamp_ns] = detections.label
                 self._track(self._frames.add("frame", frame.stamp_ns, frame))
 
-    def _frame(self, match: Match) -> Frame:
+    def _frame(self, match: Match) -> tuple[Frame, Detections]:
         with self._timed("decode"):
             depth, detections = self._depth(match)
             odom = match.payloads.get("odom")
@@ -406,7 +428,7 @@ class Line:
             segmenter = self._rooms.segmenter
             frame = as_sent(segmenter.segment(detections, depth, gravity, gravity_sigma_deg=sigma_deg))
         self._note_gravity(segmenter.choice)
-        return frame
+        return frame, detections
 
     def _felt_gravity(self, match: Match, camera_frame: str) -> FeltGravity | None:
         words = match.payloads.get("imu")
@@ -419,19 +441,28 @@ class Line:
 
     def _depth(self, match: Match) -> tuple[DepthImage, Detections]:
         """Depth and boxes of one picture without a lens."""
-        found, find_pose = match["detections"], self._timing.frames.between
+        picture_frame, find_pose = _frame_of(match["detections"]), self._timing.frames.between
         if not self._from_points:
             cameras = colour_frame.Cameras(match["camera_info"], self._colour_info, self._named, self._has_colour_info)
             colour = match.payloads.get("image")
             seen = colour_frame.depth_image(
-                match["depth"], cameras, colour, find_pose, self._raw, colour_frame=found.frame_id
+                match["depth"], cameras, colour, find_pose, self._raw, colour_frame=picture_frame
             )
             self.run.lens = self.run.lens or lenses.describe(seen.camera_info, seen.raw)
             self.run.registered = self.run.registered or seen.registered
+            found = self._found(match, seen.depth, seen.camera_info)
             return seen.depth, lenses.detections(found, seen.camera_info, seen.raw)
-        cloud = colour_frame.in_optical_frame(from_msg.point_cloud(match["depth"]), found.frame_id, find_pose)
+        cloud = colour_frame.in_optical_frame(from_msg.point_cloud(match["depth"]), picture_frame, find_pose)
         depth = self._rooms.organise(cloud, from_msg.camera_of_cloud(self._camera_info, cloud))
-        return depth, lenses.detections(found, self._camera_info, self._raw, cloud)
+        return depth, lenses.detections(self._found(match, depth, None), self._camera_info, self._raw, cloud)
+
+    def _found(self, match: Match, depth: DepthImage, camera_info: Any) -> Detections:
+        """The boxes or masks of a match, read now where another detector recorded them."""
+        found = match["detections"]
+        if isinstance(found, Detections):
+            return found
+        hw = vision_from_msg.picture_hw(match.payloads.get("image"), camera_info) or depth.depth.shape
+        return vision_from_msg.detections(found, self._names, hw)
 
     def _track(self, matches: Iterable[Match]) -> None:
         for match in matches:
@@ -483,13 +514,15 @@ def run_offline(
     timing: Timing | None = None,
     max_frames: int | None = None,
     on_frame: Callable[[int], None] = lambda frames: None,
+    recorded: RecordedDetections | None = None,
 ) -> Run:
     """Drive the rooms with a recording's records, to their end or to ``max_frames``; what came out.
 
-    ``on_frame`` hears how many frames are through, those that were left out among them.
+    ``on_frame`` hears how many frames are through, those that were left out among them. ``recorded`` are detections
+    that take the place of the detector's.
     """
-    line = Line(rooms, inputs, timing or Timing(), max_frames)
-    name_of = {topic: name for name, topic in inputs.chosen().items()}
+    line = Line(rooms, inputs, timing or Timing(), max_frames, recorded is not None)
+    name_of = {topic: name for name, topic in inputs.chosen().items()} | (recorded.topics if recorded else {})
     for record in records:
         name = "tf" if is_moving(record.topic, record.msgtype) else name_of.get(record.topic)
         if name is not None:
@@ -498,6 +531,11 @@ def run_offline(
         if line.full:
             break
     return line.finish()
+
+
+def _frame_of(found: Any) -> str:
+    """The frame of detections, which is that of their picture, read or not."""
+    return found.frame_id if isinstance(found, Detections) else from_msg.frame_id(found)
 
 
 def as_sent(frame: Frame) -> Frame:

@@ -23,7 +23,7 @@ from objreg_ros.segmenter.view import reduced_view, step_for
 FRAMES = 400  # that are looked at: most cameras have turned enough by then
 
 
-class _SeesNothing:
+class SeesNothing:
     """In place of a detector."""
 
     def detect(self, image: ColourImage) -> Detections:
@@ -82,7 +82,7 @@ def rehearse(
     source: Recording, inputs: Inputs, frames: int = FRAMES, on_frame: Callable[[int], None] = lambda frames: None
 ) -> Run:
     """What comes of the first ``frames`` of a recording. ``on_frame`` as in `run_offline`."""
-    rooms = Rooms(_SeesNothing(), _CutsNothing(), _ClosesNothing(), organise)
+    rooms = Rooms(SeesNothing(), _CutsNothing(), _ClosesNothing(), organise)
     timing = Timing(frames=frame_tree(source, camera_frame(source, inputs)))
     return run_offline(_beginning(source, inputs, frames), rooms, inputs, timing, on_frame=on_frame)
 

@@ -49,6 +49,7 @@ FREE_BRIDGE = tuple(
         "mount",
         "chains",
         "travel",
+        "vision_from_msg",
     )
 )
 CORE = ("limits", "sensor", "whole_file", "data", "lens", "geometry", "params", "share")

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from bridge.trees import said, transform
 from recording.folders import CAMERA, records, uncalibrated
+from recording.vision import detected
 from simple_rooms import OneBox, simple_rooms
 
 from objreg_ros.bridge import from_msg
@@ -24,6 +25,7 @@ from objreg_ros.offline import Timing, as_sent, run_offline
 from objreg_ros.recording import Record, messages
 from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.mounts import TRANSFORMS
+from objreg_ros.recording.recorded_detections import RecordedDetections
 from objreg_ros.segmenter.organise import organise
 from objreg_ros.segmenter.segment import Segmenter
 from objreg_ros.segmenter.sensor_estimate import Lag, SensorEstimate
@@ -46,6 +48,47 @@ def test_colour_reaches_the_segmenter_registered_to_depth() -> None:
     run_offline(records(3), rooms, INPUTS)
     assert [frame.objects[0].rgb.tolist() for frame in chain.frames] == [[[i, 20, 30]] for i in range(3)]
     assert [round(float(frame.objects[0].xyz[0, 2]), 3) for frame in chain.frames] == [1.0, 1.001, 1.002]
+
+
+@pytest.mark.parametrize("topic", ["/yolo/detections", "/yolo/instance_masks"])
+def test_recorded_detections_take_the_place_of_the_detector(topic: str) -> None:
+    rooms, chain = simple_rooms()
+    recorded = RecordedDetections(topic, "/yolo/label_info")
+    run = run_offline(detected(4), rooms, INPUTS, recorded=recorded)
+    assert (run.frames, run.detections, run.objects) == (4, 4, 4) and not run.dropped
+    assert [row["labels"] for row in run.glimpses] == [["mug"]] * 4
+    assert "detect" not in run.stage_s and chain.frames[1].T_odom_camera is not None
+    without = run_offline(detected(4), simple_rooms()[0], INPUTS, recorded=RecordedDetections(topic))
+    assert without.frames == 4 and without.glimpses[0]["labels"] != ["mug"]
+
+
+def test_recorded_boxes_and_masks_are_those_of_their_picture() -> None:
+    for topic in ("/yolo/detections", "/yolo/instance_masks"):
+        rooms, _ = simple_rooms()
+        segmented: list[Detections] = []
+        segment = rooms.segmenter.segment
+
+        def seen(found: Detections, *rest: Any, into: list = segmented, then: Any = segment, **more: Any) -> Frame:
+            into.append(found)
+            return then(found, *rest, **more)
+
+        rooms.segmenter.segment = seen  # type: ignore[method-assign]
+        run_offline(detected(3), rooms, INPUTS, recorded=RecordedDetections(topic))
+        assert [found.xyxy.tolist() for found in segmented] == [[[20, 12, 40, 24]]] * 3
+        assert {found.image_hw for found in segmented} == {(48, 64)}
+        assert [found.instances is not None for found in segmented] == [topic.endswith("masks")] * 3
+
+
+def test_a_picture_whose_recorded_detections_are_missing_or_broken_is_dropped_with_a_reason() -> None:
+    there = [r for r in detected(4) if (r.topic, r.stamp_ns) != ("/yolo/detections", 1350 * MS)]
+    broken = next(r for r in there if r.topic == "/yolo/detections").message
+    broken.detections[0].bbox.size_x = -1.0
+    there = [
+        Record.of(r.topic, broken, r.stamp_ns) if r.stamp_ns == 1250 * MS and "detec" in r.topic else r for r in there
+    ]
+    run = run_offline(there, simple_rooms()[0], INPUTS, recorded=RecordedDetections("/yolo/detections"))
+    assert run.frames == 2 and run.dropped == {"malformed_detections": 1, "depth_unmatched": 2}
+    assert "expected a finite box" in run.complaints["malformed_detections"]
 
 
 def test_colour_can_be_left_out() -> None:

@@ -16,10 +16,9 @@ from objreg_ros.bridge.indoors import Surplus
 from objreg_ros.bridge.label_table import LabelTable
 from objreg_ros.bridge.layout import table
 from objreg_ros.bridge.matching import MatchingDoor
-from objreg_ros.bridge.pictures import instance_numbers
 from objreg_ros.bridge.sync import Drop, Match
 from objreg_ros.bridge.vision_to_msg import Detection2DArray, LabelInfo
-from objreg_ros.data import Array, ColourImage, DepthImage, Detections, PointCloud
+from objreg_ros.data import DepthImage, Detections, PointCloud
 
 TABLE, BOXES, MASKS = {"detections_table": PointCloud2}, {"detections_in": Detection2DArray}, {"masks": Image}
 SOURCES = {"auto": {**TABLE, **BOXES, **MASKS}, "table": TABLE, "vision_msgs": BOXES, "masks": MASKS}
@@ -74,7 +73,7 @@ class DetectionsIn:
     def _decode(self, topic: str, message: Any) -> object:
         if topic in TABLE:
             return isinstance(message, Detections | Surplus) or table(message)
-        return self._boxes(message, (1, 1)) if topic in BOXES else self._numbers(message)
+        return self._foreign(message, (1, 1))
 
     def _hear(self, topic: str, message: Any) -> None:
         if topic not in TABLE:
@@ -93,8 +92,9 @@ class DetectionsIn:
             names = match["labels"]
             seen = self._door.read("detections", from_msg.detections, message, names, depth.depth.shape)
             return Asked(self._door.read("camera_info", lenses.detections, seen, *lens), names)
-        size = depth.depth.shape if cloud is not None or camera_info is None else _size_of(camera_info)
-        seen = self._door.read("detections", self._foreign, message, match.payloads.get("image"), size)
+        of_picture = match.payloads.get("image"), None if cloud is not None else camera_info
+        size = vision_from_msg.picture_hw(*of_picture) or depth.depth.shape
+        seen = self._door.read("detections", self._foreign, message, size)
         seen = self._door.read("camera_info", lenses.detections, seen, *lens)
         self._labels.include(seen.label)
         names = self._labels.names
@@ -102,17 +102,8 @@ class DetectionsIn:
             self._tell(names)
         return Asked(seen, names)
 
-    def _foreign(self, message: Any, image: Any, image_hw: tuple[int, int]) -> Detections:
-        if not isinstance(message, Image):
-            return self._boxes(message, _size(image) or image_hw)
-        where = from_msg.when_and_where(message)
-        return vision_from_msg.instances(self._numbers(message), self._names, **where)
-
-    def _boxes(self, message: Any, image_hw: tuple[int, int]) -> Detections:
-        return vision_from_msg.boxes(message, self._names, image_hw)
-
-    def _numbers(self, message: Any) -> Array:
-        return instance_numbers(message, self._door.most_pixels)
+    def _foreign(self, message: Any, image_hw: tuple[int, int]) -> Detections:
+        return vision_from_msg.detections(message, self._names, image_hw, self._door.most_pixels)
 
     def _tell(self, names: to_msg.Labels) -> None:
         """Publish the table of names, and wait until it is there: what is sent next needs it."""
@@ -125,16 +116,3 @@ class DetectionsIn:
 
 def _is_surplus(message: Any) -> bool:
     return isinstance(message, PointCloud2) and from_msg.is_surplus(message)
-
-
-def _size_of(camera_info: Any) -> tuple[int, int]:
-    """Height and width of the picture of a camera_info."""
-    camera = from_msg.intrinsics(camera_info)
-    return camera.height, camera.width
-
-
-def _size(image: Any) -> tuple[int, int] | None:
-    """Height and width of a picture that is raw or decoded; None where there is none, or a compressed one."""
-    if isinstance(image, ColourImage):
-        return image.rgb.shape[:2]
-    return (int(image.height), int(image.width)) if isinstance(image, Image) else None

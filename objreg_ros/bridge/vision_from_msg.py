@@ -17,6 +17,7 @@ from scipy.ndimage import find_objects
 
 from objreg_ros import limits
 from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.pictures import instance_numbers
 from objreg_ros.data import UNNAMED, Detections
 
 Array = NDArray[Any]
@@ -27,6 +28,33 @@ def label_info(message: Any) -> dict[int, str]:
     if len(message.class_map) > limits.MOST_CLASS_ID:
         raise ValueError(f"label_info: expected at most {limits.MOST_CLASS_ID} classes, got {len(message.class_map)}")
     return {int(one.class_id): from_msg.checked_label(one.class_name) for one in message.class_map}
+
+
+def detections(
+    message: Any,
+    names: Mapping[int, str],
+    image_hw: tuple[int, int],
+    most_pixels: int = limits.MOST_PIXELS_OF_PICTURE,
+) -> Detections:
+    """What another detector found in a picture: its boxes, or an Image of masks, which has a size of its own."""
+    if not hasattr(message, "encoding"):
+        return boxes(message, names, image_hw)
+    return instances(instance_numbers(message, most_pixels), names, **from_msg.when_and_where(message))
+
+
+def picture_hw(image: Any, camera_info: Any) -> tuple[int, int] | None:
+    """Height and width of the picture that boxes are in, raw or decoded, else of its camera; None where neither is.
+
+    A compressed picture counts as none.
+    """
+    if hasattr(image, "rgb"):
+        return image.rgb.shape[:2]
+    if hasattr(image, "encoding"):
+        return int(image.height), int(image.width)
+    if camera_info is None:
+        return None
+    camera = from_msg.intrinsics(camera_info)
+    return camera.height, camera.width
 
 
 def boxes(message: Any, names: Mapping[int, str], image_hw: tuple[int, int]) -> Detections:
@@ -55,18 +83,20 @@ Box = tuple[tuple[float, float, float, float], float, str, str]  # xyxy px, scor
 
 def _box(detection: Any, names: Mapping[int, str]) -> Box:
     score, label = _best(detection.results, names)
-    return _xyxy(detection.bbox), score, label, from_msg.checked_label(detection.id)
+    return _xyxy(detection.bbox), score, label, from_msg.checked_label(getattr(detection, "id", ""))
 
 
 def _best(results: Any, names: Mapping[int, str]) -> tuple[float, str]:
     """The score and the label of the hypothesis with the best score; nothing is known of a box without any."""
     if not results:
         return 0.0, UNNAMED
-    best = max((result.hypothesis for result in results), key=lambda hypothesis: hypothesis.score)
+    told = (getattr(result, "hypothesis", result) for result in results)  # vision_msgs before 3 had it in one
+    best = max(told, key=lambda hypothesis: hypothesis.score)
     score = float(best.score)
     if not 0.0 <= score <= 1.0:
         raise ValueError(f"detections: expected scores of 0 to 1, got {score}")
-    return score, _named(from_msg.checked_label(best.class_id), names)
+    class_id = best.class_id if hasattr(best, "class_id") else str(best.id)
+    return score, _named(from_msg.checked_label(class_id), names)
 
 
 def _named(class_id: str, names: Mapping[int, str]) -> str:

@@ -17,6 +17,7 @@ from objreg_ros.plausibility.finding import Finding
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import GRAPH_TOPICS, Inputs, alternatives, choose_inputs, parse_remaps
 from objreg_ros.recording.mounts import first_frames
+from objreg_ros.recording.recorded_detections import recorded_detections
 from objreg_ros.recording.summary import describe_lens, describe_topics
 from objreg_ros.recording.tf_odometry import by_transforms, with_transforms
 from objreg_ros.recording.told_camera import with_camera
@@ -62,6 +63,7 @@ def command(recording: Path, remaps: tuple[str, ...], camera: str, picture: Path
         _say_topics(source)
         _say_inputs(inputs)
         _say_other_cameras(alternatives(source.topics, first_frames(source), asked))
+        _say_detections(source)
         _say_lens(source, inputs)
         _say_truth(source, inputs)
         for note in by_transforms(source, inputs):
@@ -137,6 +139,15 @@ def _say_other_cameras(others: Sequence[Inputs]) -> None:
         remaps = " ".join(f"--remap {name}:={topic}" for name, topic in other.outright_camera.items())
         click.echo(f"another camera that could be meant: {remaps}")
     if others:
+        click.echo()
+
+
+def _say_detections(source: Recording) -> None:
+    found = recorded_detections(source.topics)
+    for one in found:
+        names = f", with the names of {one.names}" if one.names else ""
+        click.echo(f"detections that were recorded: --detections {one.topic} runs with them{names}")
+    if found:
         click.echo()
 
 

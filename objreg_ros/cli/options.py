@@ -50,12 +50,17 @@ odometry = click.option(
     help="Another topic (of Odometry or poses); the moving frame on /tf; the registrar's own tracking (as where there "
     "is no odometry); no trajectory; or a synthetic one that drifts away from the recording's ground truth.",
 )
-OF_RUN = ("model", "labels", "camera", "max_frames", "odometry", "params_file", "changes", "remaps")
+detections = click.option(
+    "--detections",
+    metavar="TOPIC",
+    help="Boxes (vision_msgs/Detection2DArray) or masks that the recording holds, in place of the detector.",
+)
+OF_RUN = ("model", "labels", "camera", "max_frames", "odometry", "params_file", "changes", "remaps", "detections")
 
 
 def of_run(command: Callable) -> Callable:
     """How a recording is run, in `OF_RUN`."""
-    for option in (remap, change, params, odometry, max_frames, camera, labels, model):
+    for option in (remap, change, params, odometry, max_frames, camera, labels, detections, model):
         command = option(command)
     return command
 

@@ -19,10 +19,12 @@ from objreg_ros.recording import Record, Recording, open_recording
 from objreg_ros.recording.drift import ODOM, with_drifting_odometry
 from objreg_ros.recording.inputs import TF_ODOM, Inputs, alternatives, choose_inputs, parse_remaps
 from objreg_ros.recording.mounts import camera_frame, first_frames, frame_tree, moving_topics
+from objreg_ros.recording.recorded_detections import RecordedDetections, choose_detections
 from objreg_ros.recording.tf_odometry import by_transforms, with_transforms
 from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.recording.troubles import FOLDER
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
+from objreg_ros.rehearsal import SeesNothing
 from objreg_ros.report.about import about
 from objreg_ros.report.camera_map import TRACKED
 from objreg_ros.report.findings import setting
@@ -50,6 +52,7 @@ class Asked:
     remaps: tuple[str, ...] = ()
     odometry: str | None = None
     max_frames: int | None = None
+    detections: str | None = None  # a topic in place of the detector
 
     @classmethod
     def of(
@@ -62,12 +65,13 @@ class Asked:
         remaps: tuple[str, ...],
         odometry: str | None,
         max_frames: int | None,
+        detections: str | None = None,
     ) -> Asked:
         """What the options of `options.of_run` say; ValueError for what is refused before any recording is read."""
         _require_seed(odometry)
         named = {"detector.model": model, "detector.labels": labels, "segmenter.camera": camera}
         words = [f"{name}={value}" for name, value in named.items() if value]
-        return cls(read_settings(params_file, [*changes, *words]), remaps, odometry, max_frames)
+        return cls(read_settings(params_file, [*changes, *words]), remaps, odometry, max_frames, detections)
 
     @property
     def drifts(self) -> bool:
@@ -86,7 +90,8 @@ class Asked:
         camera = with_camera(recording, told.camera, parse_remaps(self.remaps), told.source)
         source = with_transforms(camera, self.odometry == TF)
         inputs = self._inputs(source, told.source)
-        return Opened(self, recording.path, source, inputs, Truth.of(source, inputs.ground_truth))
+        recorded = choose_detections(source, self.detections) if self.detections else None
+        return Opened(self, recording.path, source, inputs, Truth.of(source, inputs.ground_truth), recorded)
 
     def _inputs(self, source: Recording, depth_source: str) -> Inputs:
         asked = parse_remaps(self.remaps)
@@ -121,6 +126,7 @@ class Opened:
     source: Recording
     inputs: Inputs
     truth: Truth
+    recorded: RecordedDetections | None = None  # in place of the detector
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -168,10 +174,11 @@ class Opened:
             detector,
             settings.of("segmenter", SegmenterParams),
             registrar or settings.of("registrar", RegistrarParams),
-            detects,
+            SeesNothing() if self.recorded else detects,
         )
+        of_run = self.inputs, timing, self.asked.max_frames, on_frame, self.recorded
         try:
-            return run_offline(self._records(), rooms, self.inputs, timing, self.asked.max_frames, on_frame)
+            return run_offline(self._records(), rooms, *of_run)
         finally:
             close()
 
@@ -184,6 +191,7 @@ class Opened:
             "recording": str(self.path.resolve()),
             "inputs": self.inputs.outright,
             "odometry": self.odometry,
+            "detections_from": self.recorded.topic if self.recorded else None,
             "rectified": told.rectified,
             "camera": absolute(told.camera),
             **setting(self.source, self.inputs, model),
@@ -209,7 +217,8 @@ class Opened:
         return timing
 
     def _records(self) -> Iterator[Record]:
-        topics = {*self.inputs.chosen().values(), *moving_topics(self.source)}
+        recorded = self.recorded.topics if self.recorded else {}
+        topics = {*self.inputs.chosen().values(), *moving_topics(self.source), *recorded}
         records = self.source.records(topics)
         if not self.asked.drifts or self.inputs.ground_truth is None:
             return records

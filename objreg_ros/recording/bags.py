@@ -37,6 +37,10 @@ from objreg_ros.recording.record import Record, Recording, Topic
 from objreg_ros.recording.unpacking import ZSTD_MAGIC, bound_unpacking
 
 END_OF_TIME_NS = 2**63
+UNDEFINED = (
+    "{}: {}: expected the definition of {} in the bag, got none; `ros2 bag convert` it to mcap where its package is "
+    "installed"
+)
 REINDEX = "make metadata.yaml anew with `ros2 bag reindex`, or move it away"
 
 bound_unpacking()
@@ -113,6 +117,8 @@ class BagRecording(Recording):
         def decode() -> Any:
             if connection.msgtype in self._misfits:
                 raise self._odd_message(self._misfits[connection.msgtype])
+            if connection.msgtype not in self._types().fielddefs:
+                raise ValueError(UNDEFINED.format(self.path, connection.topic, connection.msgtype))
             try:
                 return self._reader.deserialize(self._unpacked(raw), connection.msgtype)
             except Exception as error:

@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from objreg_ros.bridge import from_msg, lenses
+from objreg_ros.bridge import from_msg, lenses, vision_from_msg
 from objreg_ros.bridge.layout import table
 from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.mounts import first_readable
@@ -92,6 +93,11 @@ def _imu(message: Any) -> str:
     return f"{told}, {message.header.frame_id}"
 
 
+def _boxes(message: Any) -> str:
+    labels = Counter(vision_from_msg.boxes(message, {}, (1, 1)).label)
+    return f"{len(message.detections)} boxes: {', '.join(sorted(labels))[:80]}" if labels else "no boxes"
+
+
 DESCRIBE: dict[str, Callable[[Any], str]] = {
     "sensor_msgs/msg/Image": _image,
     "sensor_msgs/msg/CompressedImage": _compressed,
@@ -99,6 +105,7 @@ DESCRIBE: dict[str, Callable[[Any], str]] = {
     "sensor_msgs/msg/CameraInfo": _camera,
     "sensor_msgs/msg/Imu": _imu,
     "nav_msgs/msg/Odometry": _pose,
+    "vision_msgs/msg/Detection2DArray": _boxes,
     "geometry_msgs/msg/PoseStamped": _pose,
     "geometry_msgs/msg/PoseWithCovarianceStamped": _pose,
     "geometry_msgs/msg/TransformStamped": _pose,

@@ -13,7 +13,7 @@ import pytest
 from objreg_ros.bridge import vision_from_msg
 from objreg_ros.data import UNNAMED
 
-from .messages import header
+from .messages import camera_info, header, image
 
 HW = (100, 200)
 
@@ -39,6 +39,33 @@ def test_boxes_come_best_first_with_their_names_and_what_the_detector_calls_them
         found.score.tolist() == pytest.approx([0.9, 0.4]) and found.label == ("tv", "cup") and found.ids == ("b", "a")
     )
     assert (found.image_hw, found.stamp_ns, found.frame_id) == (HW, 7, "eye")
+
+
+def test_the_messages_of_ros_1_are_understood() -> None:
+    old = box(50, 40, 20, 10, ("cup", 0.4))
+    old.results = [SimpleNamespace(id=4, score=0.4), SimpleNamespace(id=5, score=0.2)]
+    old.bbox.center = SimpleNamespace(x=50.0, y=40.0, theta=0.0)
+    del old.id
+    found = vision_from_msg.boxes(array(old), {4: "mug"}, HW)
+    assert (found.label, found.ids, found.xyxy.tolist()) == (("mug",), ("",), [[40, 35, 60, 45]])
+
+
+def test_boxes_and_pictures_of_masks_are_told_apart() -> None:
+    assert vision_from_msg.detections(array(box(50, 40, 20, 10, ("cup", 1.0))), {}, HW).image_hw == HW
+    numbers = np.zeros((6, 8), np.uint8)
+    numbers[2:4, 1:5] = 4
+    found = vision_from_msg.detections(image(numbers, "mono8"), {4: "mug"}, HW)
+    assert (found.image_hw, found.label, found.xyxy.tolist()) == ((6, 8), ("mug",), [[1, 2, 5, 4]])
+    with pytest.raises(ValueError, match="expected at most 40 pixels"):
+        vision_from_msg.detections(image(numbers, "mono8"), {}, HW, most_pixels=40)
+
+
+def test_boxes_are_in_the_picture_or_else_in_that_of_its_camera() -> None:
+    camera = camera_info([50.0, 0, 31.5, 0, 50.0, 23.5, 0, 0, 1], 64, 48)
+    raw, packed = image(np.zeros((6, 8), np.uint8), "mono8"), SimpleNamespace(format="jpeg", data=b"")
+    assert vision_from_msg.picture_hw(raw, camera) == vision_from_msg.picture_hw(raw, None) == (6, 8)
+    assert vision_from_msg.picture_hw(packed, camera) == vision_from_msg.picture_hw(None, camera) == (48, 64)
+    assert vision_from_msg.picture_hw(None, None) is None
 
 
 def test_a_picture_without_objects_has_no_boxes() -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from recording.folders import CAMERA, lost, tum_folder
+from recording.vision import detected_bag
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from objreg_ros.cli.inspect import columns, command
@@ -21,6 +22,14 @@ def test_a_recording_is_told_with_its_inputs_and_its_truth(tmp_path: Path) -> No
     for text in ("TUM RGB-D folder, 0.20 s", "sensor_msgs/Image", "64 × 48 16UC1, camera", "3 poses, 1.00 m"):
         assert text in result.output
     assert "! no odometry" in result.output
+
+
+def test_detections_that_were_recorded_are_named(tmp_path: Path) -> None:
+    result = CliRunner().invoke(command, [str(detected_bag(tmp_path / "bag"))], catch_exceptions=False)
+    assert "1 boxes: 4" in result.output
+    for topic in ("/yolo/detections", "/yolo/instance_masks"):
+        assert f"--detections {topic} runs with them, with the names of /yolo/label_info" in result.output
+    assert "--detections" not in CliRunner().invoke(command, [str(tum_folder(tmp_path / "tum"))]).output
 
 
 def test_poses_of_the_truth_that_are_none_are_counted(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from recording.folders import tum_folder
+from recording.vision import detected_bag
 
 from objreg_ros.cli.recorded import Asked
 from objreg_ros.cli.settings import read_settings
@@ -46,6 +47,15 @@ def test_a_recording_without_odometry_is_tracked_unless_it_is_asked_for_none(tmp
         with replace(asked, odometry=odometry).opened(folder) as opened:
             known.append((opened.odometry, len(opened.notes)))
     assert known == [("tracked", 1), ("tracked", 0), (None, 0), ("/drifting_odom", 0)]
+
+
+def test_recorded_detections_are_run_without_the_detector(tmp_path: Path) -> None:
+    asked = Asked(read_settings(None, ()), detections="/yolo/detections")
+    with asked.opened(detected_bag(tmp_path / "bag", frames=2)) as opened:
+        run = opened.run()
+        summary = opened.summary(run, ())
+    assert run.detections == 2 and "detect" not in run.stage_s and summary["detections_from"] == "/yolo/detections"
+    assert [row["labels"] for row in summary["glimpses"]] == [["mug"]] * 2
 
 
 def test_odometry_that_is_there_is_left_out_where_tracking_is_asked_for(tmp_path: Path) -> None:
