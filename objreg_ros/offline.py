@@ -329,8 +329,8 @@ class Line:
             self._take_tf(message)
             return
         if name == "label_info":
-            told = self._kept(name, partial(vision_from_msg.label_info, message))
-            self._names = self._names if told is None else told
+            names = self._kept(name, partial(vision_from_msg.label_info, message))
+            self._names = self._names if names is None else names
             return
         stamp_ns = from_msg.stamp_ns(message)
         if name == "image" and not self._recorded:

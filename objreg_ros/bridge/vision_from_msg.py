@@ -90,8 +90,8 @@ def _best(results: Any, names: Mapping[int, str]) -> tuple[float, str]:
     """The score and the label of the hypothesis with the best score; nothing is known of a box without any."""
     if not results:
         return 0.0, UNNAMED
-    told = (getattr(result, "hypothesis", result) for result in results)  # vision_msgs before 3 had it in one
-    best = max(told, key=lambda hypothesis: hypothesis.score)
+    hypotheses = (getattr(result, "hypothesis", result) for result in results)  # vision_msgs before 3 had it in one
+    best = max(hypotheses, key=lambda hypothesis: hypothesis.score)
     score = float(best.score)
     if not 0.0 <= score <= 1.0:
         raise ValueError(f"detections: expected scores of 0 to 1, got {score}")

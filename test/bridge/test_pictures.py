@@ -364,7 +364,7 @@ def test_rvl_of_16_bits_is_millimetres_and_of_floats_inverse_depth(kind: str) ->
     assert depth == pytest.approx(np.array([[0, 1000 / 1520, 1000 / 65555], [1000 / 21, 0, 2.0]]))
 
 
-def test_the_size_of_rvl_is_told_before_any_pixel_is_decoded() -> None:
+def test_the_size_of_rvl_is_known_before_any_pixel_is_decoded() -> None:
     assert size_of(rvl_depth(claiming(640, 480, []))) == (640, 480)
     for width, height in ((0, 480), (640, -1)):
         with pytest.raises(ValueError, match=f"expected pixels, got {width} × {height}"):

@@ -50,7 +50,7 @@ def test_the_messages_of_ros_1_are_understood() -> None:
     assert (found.label, found.ids, found.xyxy.tolist()) == (("mug",), ("",), [[40, 35, 60, 45]])
 
 
-def test_boxes_and_pictures_of_masks_are_told_apart() -> None:
+def test_boxes_and_pictures_of_masks_are_kept_apart() -> None:
     assert vision_from_msg.detections(array(box(50, 40, 20, 10, ("cup", 1.0))), {}, HW).image_hw == HW
     numbers = np.zeros((6, 8), np.uint8)
     numbers[2:4, 1:5] = 4

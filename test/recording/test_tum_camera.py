@@ -145,8 +145,8 @@ def test_a_file_of_camera_calibration_will_do_and_depth_scale_may_be_added(tmp_p
 @pytest.mark.parametrize("model", ["plumb_bob", "rational_polynomial"])
 def test_a_calibration_of_eight_numbers_is_taken_by_either_name(model: str, tmp_path: Path) -> None:
     eight = (0.4, -2.5, 0.0005, -0.0003, 1.4, 0.3, -2.3, 1.3)
-    told = CALIBRATED.replace("plumb_bob", model).replace("cols: 5, data: [0.1, 0, 0, 0, 0.2]", f"data: {list(eight)}")
-    assert camera(tmp_path, told).distortion == eight
+    text = CALIBRATED.replace("plumb_bob", model).replace("cols: 5, data: [0.1, 0, 0, 0, 0.2]", f"data: {list(eight)}")
+    assert camera(tmp_path, text).distortion == eight
 
 
 def test_a_calibration_that_is_none_or_of_a_lens_that_the_folder_cannot_have_is_refused(tmp_path: Path) -> None:
