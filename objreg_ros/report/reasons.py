@@ -154,7 +154,7 @@ REFUSALS = {
         "the camera, or the scale of its depth, is not what the stream says",
         "The detail says what was measured and what was said. Mend camera_info, or name the camera.",
         ("segmenter.camera",),
-        (("plausibility/stream_monitor.py", "SHARE"), ("plausibility/stream_monitor.py", "SIGMAS")),
+        (("plausibility/offset.py", "SHARE"), ("plausibility/stream_monitor.py", "SIGMAS")),
     ),
     "clock_began_anew": Words(
         "what was seen before then has stamps of now, and is left out",
