@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from stream_faults import KINDS, RIGHT, Faulty
 from stream_grounds import Ground, load
+from stream_recording import MemoryRecording
 
 from objreg_ros import share
 from objreg_ros.cli.recorded import Asked, Opened
@@ -23,6 +24,9 @@ from objreg_ros.data import Array, ColourImage, Detections
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import pose_error
+from objreg_ros.plausibility.finding import Finding
+from objreg_ros.recording.inputs import choose_inputs
+from objreg_ros.recording.mounts import first_frames
 from objreg_ros.recording.troubles import troubles
 from objreg_ros.report.findings import find
 
@@ -98,7 +102,9 @@ def run_case(case: Case) -> Row:
         opened = asked.of_recording(faulty.recording)
         row |= examined(opened, detector_of(case.ground.model, case.ground.threshold), faulty.T_body_camera)
     except (ValueError, OSError) as error:
-        row |= {"refused": str(error), "constraints": 0, "false": 0, "judged": 0, "findings": [], "mount_error": None}
+        named = [finding.anchor for finding in inspected(faulty.recording) if finding.anchor]
+        row |= {"refused": str(error), "constraints": 0, "false": 0, "judged": 0, "mount_error": None}
+        row["findings"] = named
     return {**row, "seconds": round(time.perf_counter() - start, 2)}
 
 
@@ -117,6 +123,11 @@ def examined(opened: Opened, detector: Remembering, T_body_camera: Array | None 
         "dropped": summary["dropped"],
         "mount_error": mount_error(summary.get("mount_estimate"), T_body_camera),
     }
+
+
+def inspected(recording: MemoryRecording) -> list[Finding]:
+    """What `objreg inspect` says of a recording that is not run."""
+    return troubles(recording, choose_inputs(recording.topics, frames=first_frames(recording)))
 
 
 def mount_error(estimate: Any, T_body_camera: Array | None) -> tuple[float, float] | None:

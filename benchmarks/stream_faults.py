@@ -268,15 +268,13 @@ def _odometry(message: Any, T_odom_body: Array) -> Any:
 
 
 def other_robot(recording: MemoryRecording, rng: Random, aside: Aside) -> Faulty:
-    """Odometry is of a robot that goes elsewhere: another one's, or this one's played backwards or from its middle."""
-    own, how = odometry_poses(recording), str(rng.choice(["other", "backwards", "from the middle"]))
-    rows = np.arange(len(own))
+    """Odometry is of a robot that goes elsewhere: another one's, or this one's played backwards."""
+    own, how = odometry_poses(recording), str(rng.choice(["other", "backwards"]))
     if how == "other":
         at = np.linspace(0, len(aside.other_poses) - 1, len(own)).round().astype(int)
         poses = aside.other_poses[at] @ inverse(aside.T_body_camera)
     else:
-        folded = np.abs((rows + len(own) // 2) % (2 * len(own) - 2) - (len(own) - 1))
-        poses = own[::-1] if how == "backwards" else own[folded]
+        poses = own[::-1]
     return Faulty(with_poses(recording, poses), {"how": how})
 
 

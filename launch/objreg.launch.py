@@ -62,7 +62,8 @@ OPTIONS = {
     "camera_name": "namespace of the camera's topics, as its driver's: image, points, depth, camera_info, colour_info "
     "and imu are looked for in it, but for those that are given with a / in front",
     "camera": "the camera where nobody publishes camera_info: fx,fy,cx,cy or a calibration YAML",
-    "T_base_camera": "where the camera sits on the body of odom, seven numbers with commas; else /tf_static is asked",
+    "T_base_camera": "where the camera sits on the body of odom, seven numbers with commas; else /tf_static "
+    "and /tf are asked",
     "use_sim_time": "true to follow /clock",
     "reliable": "true to ask cameras for reliable delivery",
     "keyframer": "true to start a keyframer in the registrar's place, which sends keyframes to a registrar elsewhere",

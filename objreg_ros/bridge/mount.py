@@ -41,7 +41,7 @@ class Seat(Enum):
 
     KNOWN = "known"  # a parameter or the tree of frames says where
     ONE_PLACE = "one place"  # the odometry is the camera's own
-    UNKNOWN = "unknown"  # nothing ties the two: they are taken to be in one place, which may be wrong
+    UNKNOWN = "unknown"  # nothing ties the two
     BEYOND = "beyond"  # a joint moves between them, and where it was at the moment is not known
 
 
@@ -106,7 +106,9 @@ class Mount:
         tie = self._tree.tie(body, camera, odom) if body and camera else None
         if tie is None:
             what = f"nothing on /tf_static or /tf ties {_the('odometry', body)} to {_the('camera', camera)}"
-            self._tell(body, camera, f"{what}: taken to be one place; set T_base_camera where they are not")
+            self._tell(
+                body, camera, f"{what}: the registrar measures it, others take it to be one place; set T_base_camera"
+            )
             return Seated(Seat.UNKNOWN)
         return self._tied(tie, odom, body, camera, words[-1].stamp_ns if stamp_ns is None else stamp_ns)
 

@@ -22,7 +22,7 @@ from objreg_ros.recording.mounts import camera_frame, first_frames, frame_tree, 
 from objreg_ros.recording.recorded_detections import RecordedDetections, choose_detections
 from objreg_ros.recording.tf_odometry import by_transforms, with_transforms
 from objreg_ros.recording.told_camera import with_camera
-from objreg_ros.recording.troubles import FOLDER
+from objreg_ros.recording.troubles import FOLDER, unpaired
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.rehearsal import SeesNothing
 from objreg_ros.report.about import about
@@ -104,6 +104,8 @@ class Asked:
                 expected = f"a topic of {', '.join(source.topics)}, or tf, tracked, none or drift:SEED"
                 raise ValueError(f"--odometry: expected {expected}, got {self.odometry!r}")
         inputs = choose_inputs(source.topics, asked, depth_source, first_frames(source))
+        if (two := unpaired(source, inputs)) is not None:
+            raise ValueError(f"{source.path}: {two.text}")
         if not inputs.complete:
             there = ", ".join(f"{topic.name} ({topic.msgtype})" for topic in source.topics.values()) or "no topics"
             wanted = inputs.wanted(depth_source)

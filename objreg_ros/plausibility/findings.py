@@ -38,6 +38,18 @@ def principal_point(fit: CameraFit) -> Finding:
     )
 
 
+def two_cameras(colour: str, depth: str) -> Finding:
+    """Colour and depth that were recorded are of two cameras by their names and frames."""
+    kind = "points" if depth.rpartition("/")[2].startswith("points") else "depth/image"
+    return Finding(
+        f"colour {colour} and depth {depth} are of two cameras",
+        "their names or frames say so, and depth of another camera gives wrong objects",
+        "record colour and depth of one camera; if these are of one, name both: "
+        f"--remap image:={colour} --remap {kind}:={depth}",
+        "colour-of-another-camera",
+    )
+
+
 def no_camera(why: str) -> Finding:
     """A camera that cannot be."""
     cause = "camera_info is of another size of picture, or was never calibrated"

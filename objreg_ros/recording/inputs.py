@@ -122,6 +122,15 @@ def alternatives(
     return [_whole(camera, topics, asked) for camera in kept[1:]]
 
 
+def depth_of_others(topics: Mapping[str, Topic], inputs: Inputs, frames: Mapping[str, str] | None = None) -> list[str]:
+    """What was recorded of depth, best first, where none of it is of the camera of colour; empty where some is."""
+    if inputs.image is None or inputs.depth is not None or inputs.points is not None:
+        return []
+    free = _free(topics, inputs.chosen())
+    found = [*candidates(RULES["depth"], free), *candidates(RULES["points"], free)]
+    return [] if any(relation(inputs.image, name, frames) is not None for name in found) else found
+
+
 def _asked(topics: Mapping[str, Topic], remaps: Mapping[str, str] | None, source: str) -> dict[str, str]:
     """What is asked for by input; ValueError as `choose_inputs`."""
     asked = _only(source, {_input_name(name): topic for name, topic in (remaps or {}).items()})

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import partial
-from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -15,13 +14,12 @@ from objreg_ros.bridge.camera_checks import check_camera
 from objreg_ros.bridge.frames import Tie
 from objreg_ros.data import Array, Intrinsics
 from objreg_ros.plausibility.finding import Finding
-from objreg_ros.recording.inputs import Inputs
-from objreg_ros.recording.mounts import camera_on_body, first_readable, frame_of, frame_tree
+from objreg_ros.plausibility.findings import two_cameras
+from objreg_ros.recording.inputs import Inputs, depth_of_others
+from objreg_ros.recording.mounts import camera_on_body, first_frames, first_readable, frame_of, frame_tree
 from objreg_ros.recording.record import Record, Recording
+from objreg_ros.recording.stamps import stamps
 
-SAMPLE = 60  # messages of colour and depth whose stamps are compared
-NEAR_NS = 20_000_000  # how far apart colour and depth may be for the nodes' default slop
-FAR_NS = 200_000_000  # in so long a camera moves on: to let such frames meet makes wrong objects
 MOMENTS = 5  # of a recording at which its depth is looked at
 NEVER_ALL_BEYOND_M = 3.0  # a depth camera indoors always has something nearer: its floor, a table, a wall
 NEVER_ALL_WITHIN_M = 0.15  # nearer than any depth camera measures
@@ -56,16 +54,22 @@ def missing(inputs: Inputs, of_pictures: bool = False) -> Finding | None:
     )
 
 
+def unpaired(recording: Recording, inputs: Inputs) -> Finding | None:
+    """Colour and depth of two cameras, of which none was chosen; None where that is not so."""
+    others = depth_of_others(recording.topics, inputs, first_frames(recording))
+    return two_cameras(str(inputs.image), others[0]) if others else None
+
+
 def warnings(recording: Recording, inputs: Inputs) -> list[Finding]:
     """What would go wrong or be missed, and what to do; empty if nothing."""
-    lacking = missing(inputs, recording.of_pictures)
+    lacking = unpaired(recording, inputs) or missing(inputs, recording.of_pictures)
     found = [Finding(note) for note in recording.notes] + ([lacking] if lacking else [])
     if inputs.odom is None:
         found.append(Finding("no odometry: the registrar follows the camera by itself, and the gate is less strict"))
     if inputs.ground_truth is None:
         found.append(Finding("no ground truth: the true error of constraints cannot be told"))
     found += map(Finding, [*_mount_of_camera(recording, inputs), *_mount_of_imu(recording, inputs)])
-    for look in (_first_messages, _camera, _registration, _stamps, _scale):
+    for look in (_first_messages, _camera, _registration, stamps, _scale):
         found += look(recording, inputs)
     return found
 
@@ -185,8 +189,8 @@ def _mount_of_camera(recording: Recording, inputs: Inputs) -> list[str]:
     if mounted.tie is not None or body == camera:
         return []
     return [
-        f"odometry is of {body} and depth in {camera}, and neither /tf_static nor /tf ties them: they are taken to be "
-        "one place; set T_base_camera of registrar and mapper where they are not"
+        f"odometry is of {body} and depth in {camera}, and neither /tf_static nor /tf ties them: the mount is measured "
+        "from the motion, if that tells it; set T_base_camera of registrar and mapper if you know it"
     ]
 
 
@@ -204,47 +208,6 @@ def _mount_of_imu(recording: Recording, inputs: Inputs) -> list[str]:
 def _frame_id(recording: Recording, topic: str | None) -> str:
     """The frame of a topic's first message; empty if it tells none."""
     return frame_of(first_readable(recording, topic))
-
-
-def _stamps(recording: Recording, inputs: Inputs) -> list[Finding]:
-    """Whether the stamps in the headers let colour and depth be brought together."""
-    topics = inputs.image, inputs.depth or inputs.points
-    begins = [record.stamp_ns for topic in topics if (record := _first(recording, topic)) is not None]
-    colour, depth = (_header_stamps(recording, topic, max(begins, default=0)) for topic in topics)
-    found = [*_course("colour", colour), *_course("depth", depth)]
-    readable = all(first_readable(recording, topic) is not None for topic in topics)
-    if readable and not (len(colour) and len(depth)):
-        what = "colour and depth were recorded at different times: none goes with the other"
-        found.append(Finding(what, "", "record both together", "streams-apart"))
-    if len(colour) and len(depth):
-        found += _distance(_apart_ns(colour, depth))
-    return found
-
-
-def _course(name: str, stamps: Array) -> Iterator[Finding]:
-    """Whether the stamps of a stream advance."""
-    if (np.diff(stamps) < 0).any():
-        yield Finding(f"the stamps of {name} go back in time: what waits is dropped there")
-    if len(stamps) > 1 and (stamps == stamps[0]).all():
-        yield Finding(
-            f"the first {len(stamps)} stamps of {name} are all {stamps[0]} ns",
-            "frames are told apart by them, and none closes a loop",
-            "record it again with the time in its headers",
-            "streams-apart",
-        )
-
-
-def _distance(apart_ns: float) -> Iterator[Finding]:
-    """Whether colour and depth are too far apart in time for the nodes' defaults."""
-    if apart_ns <= NEAR_NS:
-        return
-    what = f"colour and depth are {apart_ns * 1e-6:.0f} ms apart"
-    if apart_ns > FAR_NS:
-        cause, todo = "their stamps are of two clocks", "record both with stamps of one clock"
-    else:
-        cause = "the two streams of the camera are not synchronised, and frames meet within segmenter.slop"
-        todo = f"raise segmenter.slop above that: --set segmenter.slop={np.ceil(apart_ns * 1e-7 + 1) / 100:.2f}"
-    yield Finding(what, cause, todo, "streams-apart")
 
 
 def _scale(recording: Recording, inputs: Inputs) -> Iterator[Finding]:
@@ -278,30 +241,6 @@ def _reach_m(metres: Array) -> tuple[float, float] | None:
     """Where depth begins and ends, a twentieth of its pixels aside; None where there is none."""
     told = metres[np.isfinite(metres) & (metres > 0)]
     return None if not len(told) else (float(np.quantile(told, 0.05)), float(np.quantile(told, 0.95)))
-
-
-def _apart_ns(colour: np.ndarray, depth: np.ndarray) -> float:
-    """How far the stamps of the slower stream are from the nearest of the faster one; the median.
-
-    Only those within the time of both count, unless there are none.
-    """
-    slow, fast = sorted((colour, depth), key=_pace)
-    within = slow[(slow >= fast.min()) & (slow <= fast.max())]
-    slow = within if len(within) else slow
-    return float(np.median(np.abs(slow[:, None] - fast[None, :]).min(axis=1)))
-
-
-def _pace(stamps: np.ndarray) -> float:
-    """Stamps in a second; 0 for fewer than two."""
-    step_ns = float(np.median(np.abs(np.diff(stamps)))) if len(stamps) > 1 else 0.0
-    return 1e9 / step_ns if step_ns else 0.0
-
-
-def _header_stamps(recording: Recording, topic: str | None, start_ns: int) -> np.ndarray:
-    """The first `SAMPLE` stamps of what was recorded from a time on and decodes."""
-    messages = (record.read() for record in recording.records([topic], start_ns)) if topic else iter(())
-    readable = islice((message for message in messages if message is not None), SAMPLE)
-    return np.array([from_msg.stamp_ns(message) for message in readable], np.int64)
 
 
 def _first(recording: Recording, topic: str | None) -> Record | None:

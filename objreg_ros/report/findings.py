@@ -22,6 +22,7 @@ from objreg_ros.report.reasons import REFUSALS
 
 MANY = 0.05  # of the frames of a node; fewer that are overtaken are usual
 SELDOM = 0.2  # of the frames; a model that knows what it sees finds more
+LATE_MS, LATE_SIGMAS = 45.0, 4.0  # cameras whose two pictures are taken in turn are up to a picture apart
 OVERTAKEN = "overtaken"
 PASSED_OVER = tuple(reason.value for reason in (Reason.OVER_BUDGET, Reason.CLOCK, Reason.UNREADABLE))
 LOOK = "objreg inspect {recording}"
@@ -89,12 +90,27 @@ def find(summary: Mapping[str, Any], of_recording: Iterable[Finding] = ()) -> tu
     found = (
         *stopped,
         *causes,
+        _late_depth(summary),
         *of_recording,
         _simulated_model(counts, summary),
         _overtaken(summary),
         _over_budget(summary),
     )
     return tuple(dict.fromkeys(finding for finding in found if finding is not None))
+
+
+def _late_depth(summary: Mapping[str, Any]) -> Finding | None:
+    """Depth that goes by its stamp with colour, and shows another moment."""
+    lag = summary.get("depth_lag")
+    if lag is None or abs(lag["ms"]) < max(LATE_MS, LATE_SIGMAS * lag["sigma_ms"]):
+        return None
+    by, side = f"{abs(lag['ms']):.0f} ± {lag['sigma_ms']:.0f} ms", "before" if lag["ms"] > 0 else "after"
+    return Finding(
+        f"depth shows what was {by} {side} the picture of its stamp",
+        "the stamps of colour and of depth are of two moments; as the camera turns, depth lies beside its picture",
+        "mend the stamps in the driver (its time offset), or let the camera take both at once",
+        "streams-apart",
+    )
 
 
 def found_in(run: Run) -> tuple[Finding, ...]:

@@ -33,7 +33,7 @@ def test_what_nothing_ties_is_one_place_and_said_once_and_again_where_that_chang
     mount = Mount(None, frames, said_of_it.append)
     assert [mount.T_body_camera(words("base"), "eye") for _ in range(3)] == [None] * 3
     (text,) = said_of_it
-    assert "ties the odometry's 'base' to the camera's 'eye': taken to be one place; set T_base_camera" in text
+    assert "ties the odometry's 'base' to the camera's 'eye': the registrar measures it" in text
     frames.hear(said(transform("base", "eye", moved(1))))
     assert mount.T_body_camera(words("base"), "eye") is not None and len(said_of_it) == 2
 

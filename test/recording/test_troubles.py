@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -145,6 +146,12 @@ def test_how_far_the_slower_stream_is_from_the_faster_one_is_said(tmp_path: Path
     assert "colour and depth are 40 ms apart" in streams(tmp_path / "bag", 10, 5, later_s=0.04)
 
 
+def test_a_steady_lag_is_no_reason_for_a_wider_slop(tmp_path: Path) -> None:
+    steady = streams(tmp_path / "steady", 10, 10, later_s=0.04)
+    assert "colour and depth are 40 ms apart all the time" in steady and "segmenter.slop" not in steady
+    assert "segmenter.slop" in streams(tmp_path / "free", 5.3, 6, later_s=0.04)
+
+
 def test_streams_one_after_the_other_are_said(tmp_path: Path) -> None:
     assert "colour and depth were recorded at different times" in streams(tmp_path / "bag", 5, 5, colour_from_s=60)
 
@@ -216,3 +223,13 @@ def test_colour_of_another_shape_in_a_folder_is_to_be_exported_anew(tmp_path: Pa
     for file in (folder / "rgb").iterdir():
         cv2.imwrite(str(file), np.zeros((72, 128, 3), np.uint8))
     assert "export depth and colour of one field of view" in said(open_recording(folder))
+
+
+def test_colour_and_depth_of_two_cameras_are_named_with_the_remaps_that_join_them(tmp_path: Path) -> None:
+    renamed = {"/image": "/front/rgb/image_raw", "/depth/image": "/back/depth_registered/image_raw"}
+    items = [
+        replace(r, topic=renamed[r.topic]) for r in depth_and_colour(METRE, "16UC1", frame_id="d") if r.topic in renamed
+    ]
+    text = said(bag(tmp_path / "bag", items))
+    assert "colour /front/rgb/image_raw and depth /back/depth_registered/image_raw are of two cameras" in text
+    assert "--remap image:=/front/rgb/image_raw --remap depth/image:=/back/depth_registered/image_raw" in text

@@ -117,3 +117,18 @@ def test_one_line_says_whether_it_worked() -> None:
     off = {"count": 1, "rotation_deg": {"median": 9.0}, "translation_cm": {"median": 4.0}}
     assert "none of 1 false, 9.00° and 4.0 cm" in verdict({**CLOSED, "truth": {**off, "false": 0}})
     assert verdict({**CLOSED, "truth": {**off, "false": 1}}).startswith("Not quite")
+
+
+@pytest.mark.parametrize(
+    ("ms", "sigma_ms", "found"), [(63.0, 4.0, True), (-63.0, 4.0, True), (26.0, 4.0, False), (63.0, 20.0, False)]
+)
+def test_depth_that_shows_another_moment_than_its_picture_is_found(ms: float, sigma_ms: float, found: bool) -> None:
+    findings = find({"frames": 9, "constraints": [{}], "depth_lag": {"ms": ms, "sigma_ms": sigma_ms}})
+    assert [finding.anchor for finding in findings] == (["streams-apart"] if found else [])
+    assert not found or ("before" if ms > 0 else "after") in findings[0].text
+
+
+def test_what_was_found_of_the_stream_is_the_cause_before_all_others() -> None:
+    row = {"what": "depth is of another scale", "cause": "steps", "todo": "record mm", "anchor": "depth-scale"}
+    findings = find({"frames": 9, "constraints": [], "detections": 9, "objects": 9, "stream": [row]})
+    assert [finding.anchor for finding in findings] == ["depth-scale"] and "record mm" in findings[0].text
