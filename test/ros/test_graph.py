@@ -17,7 +17,7 @@ from sensor_msgs.msg import PointCloud2
 from objreg_ros.bridge import from_msg, qos
 
 from .graph import START_S, Graph
-from .test_replay import end_keyframe, objreg, start
+from .test_replay import await_release, end_keyframe, objreg, start
 
 pytestmark = pytest.mark.ros
 ROOMS = ("detector", "segmenter", "registrar")
@@ -106,6 +106,7 @@ def test_one_process_gives_the_constraints_of_three(fresh: Graph, shared: Path) 
             start(fresh, model, "-p threshold:=0.4")
         objreg(fresh, *words)
         end_keyframe(fresh)
+        await_release(fresh)
         found.append(list(map(from_msg.loop_closure, fresh.heard["constraints"])))
         fresh.heard["constraints"].clear()
         for name in list(fresh.processes):

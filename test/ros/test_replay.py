@@ -7,6 +7,7 @@ import json
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -26,6 +27,7 @@ from .graph import START_S, Graph
 
 pytestmark = pytest.mark.ros
 ROOMS = ("detector", "segmenter", "registrar")
+QUIET_S = 1.0  # without another message
 
 
 def objreg(graph: Graph, *words: str, seconds: float = 600) -> str:
@@ -133,6 +135,16 @@ def end_keyframe(graph: Graph) -> None:
     graph.wait_for(client.service_is_ready, what="the registrar's service")
     answer = client.call_async(Trigger.Request())
     graph.wait_for(answer.done, START_S, "the registrar to save")
+
+
+def await_release(graph: Graph, constraints: int = 1) -> None:
+    """Let the registrar publish what waited for its camera to be believed, as it does once no frame comes."""
+    heard = graph.heard["constraints"]
+    graph.wait_for(lambda: len(heard) >= constraints, START_S, "constraints of a camera that is silent")
+    ends, count = time.monotonic() + QUIET_S, len(heard)
+    graph.wait_for(lambda: len(heard) != count or time.monotonic() > ends)
+    if len(heard) != count:
+        await_release(graph, len(heard))
 
 
 @pytest.mark.slow
