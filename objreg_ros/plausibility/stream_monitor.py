@@ -125,7 +125,8 @@ class StreamMonitor:
     def _begin_anew(self) -> None:
         """Another camera, or another run of the clock."""
         self._corners, self.camera, self.fit = CornerTracks(), None, None
-        self.doubt, self.findings = "", ()
+        self.doubt, self.disowned, self.findings = "", "", ()
+        self.frames = self.with_odometry = 0
         self._scale, self._believed = None, False
         self._legs.clear()
         self._mounts.clear()
@@ -163,7 +164,8 @@ class StreamMonitor:
         """Whether all that is measured of the camera is surely near to what it says."""
         by_odometry = len(self._odometry) > 1 and not self.disowned
         scale = (self._scale,) if by_odometry else ()
-        return fit.count >= LEAST_SPANS and all(off is not None and off.is_close for off in (*offsets(fit), *scale))
+        most_fit = fit.count >= max(LEAST_SPANS, 0.5 * len(fit.misfit))
+        return most_fit and all(off is not None and off.is_close for off in (*offsets(fit), *scale))
 
     def _of_camera(self, fit: CameraFit) -> tuple[Finding, ...]:
         strange = float(np.mean(fit.misfit > MOST_MISFIT))

@@ -1,14 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from plausibility.spans import CAMERA
-from plausibility.test_hand_eye import MOUNT
-from plausibility.test_stream_monitor import BODY_PATH, OTHER_PATH, PATH, STEP_NS
-from plausibility.views import view
+from plausibility.box_room import depth_and_grey, longer, seen_as, swinging
+from plausibility.moving import CAMERA, MOUNT
 
 from objreg_ros.bridge.camera_stream import CameraStream
 from objreg_ros.bridge.frames import FrameTree
@@ -16,34 +12,49 @@ from objreg_ros.bridge.mount import Mount
 from objreg_ros.data import Array, Frame, Intrinsics, Odometry
 from objreg_ros.geometry import inverse, pose_error
 
+SECONDS = np.arange(0.0, 12.0, 0.1)
+PATH = swinging(SECONDS)
+BODY_PATH, OTHER_PATH = PATH @ inverse(MOUNT), swinging(SECONDS[::-1], pace=1.7) @ inverse(MOUNT)
 
-def frame(k: int, stated: Intrinsics = CAMERA) -> Frame:
+
+@pytest.fixture(scope="module")
+def pictures() -> list[tuple[Array, Array]]:
+    return [depth_and_grey(T) for T in PATH]
+
+
+def frame(k: int, picture: tuple[Array, Array], stated: Intrinsics) -> Frame:
     return Frame(
         objects=(),
         support=None,
-        view=view(PATH[k], stated),
+        view=seen_as(*picture, stated),
         gravity=None,
         gravity_confidence=0.0,
         T_odom_camera=None,
-        stamp_ns=k * STEP_NS,
+        stamp_ns=round(1e9 * SECONDS[k]),
         frame_id="camera",
     )
 
 
-def run(stream: CameraStream, T_odom_body: Array | None, stated: Intrinsics = CAMERA) -> list[Frame]:
-    """The frames of `PATH` with this odometry, as they are placed."""
+Pictures = list[tuple[Array, Array]]
+
+
+def run(
+    stream: CameraStream, pictures: Pictures, T_odom_body: Array | None, stated: Intrinsics = CAMERA
+) -> list[Frame]:
+    """The frames with this odometry, as they are placed."""
     placed = []
-    for k in range(len(PATH)):
-        beside = None if T_odom_body is None else [Odometry(T_odom_body=T_odom_body[k], stamp_ns=k * STEP_NS)]
+    for k, picture in enumerate(pictures):
+        taken = frame(k, picture, stated)
+        beside = None if T_odom_body is None else [Odometry(T_odom_body=T_odom_body[k], stamp_ns=taken.stamp_ns)]
         if beside:
             stream.take_odometry(beside[0])
-        placed.append(stream.place(frame(k, stated), beside))
+        placed.append(stream.place(taken, beside))
     return placed
 
 
-def test_a_frame_has_the_pose_of_its_camera_and_is_proven_in_time() -> None:
+def test_a_frame_has_the_pose_of_its_camera_and_is_proven_in_time(pictures: Pictures) -> None:
     stream = CameraStream(Mount(MOUNT))
-    first, *_, last = run(stream, BODY_PATH)
+    first, *_, last = run(stream, pictures, BODY_PATH)
     for placed, true in ((first, PATH[0]), (last, PATH[-1])):
         assert placed.T_odom_camera is not None
         degrees, centimetres = pose_error(placed.T_odom_camera, true)
@@ -52,31 +63,31 @@ def test_a_frame_has_the_pose_of_its_camera_and_is_proven_in_time() -> None:
     assert stream.without_odometry == 0 and stream.findings == ()
 
 
-def test_frames_of_a_camera_that_is_not_what_it_says_are_in_doubt() -> None:
+def test_frames_of_a_camera_that_is_not_what_it_says_are_in_doubt(pictures: Pictures) -> None:
     stream = CameraStream(Mount(None))
-    last = run(stream, None, replace(CAMERA, fx=1.3 * CAMERA.fx, fy=1.3 * CAMERA.fy))[-1]
+    last = run(stream, pictures, None, longer(CAMERA, 1.3))[-1]
     assert "focal length" in last.doubt and not last.proven and stream.finish() == last.doubt
 
 
-def test_odometry_of_another_robot_is_left_out_once_it_is_known_to_be() -> None:
+def test_odometry_of_another_robot_is_left_out_once_it_is_known_to_be(pictures: Pictures) -> None:
     stream = CameraStream(Mount(MOUNT))
-    placed = run(stream, OTHER_PATH @ inverse(MOUNT))
+    placed = run(stream, pictures, OTHER_PATH @ inverse(MOUNT))
     assert placed[0].T_odom_camera is not None and placed[-1].T_odom_camera is None
     assert 0 < stream.without_odometry < len(PATH)
 
 
-def test_a_mount_that_nothing_says_is_measured_and_used_and_said_once() -> None:
+def test_a_mount_that_nothing_says_is_measured_and_used_and_said_once(pictures: Pictures) -> None:
     said: list[str] = []
     stream = CameraStream(Mount(None, FrameTree()), said.append)
-    placed = run(stream, BODY_PATH)
+    placed = run(stream, pictures, BODY_PATH)
     assert placed[0].T_odom_camera is None and placed[-1].T_odom_camera is not None
     assert stream.mount is not None and pose_error(stream.mount, MOUNT)[0] < 3.0
     assert len(said) == 1 and "T_base_camera:" in said[0]
 
 
 @pytest.mark.parametrize("odometry", [None, BODY_PATH])
-def test_a_mount_that_is_known_is_not_reported_as_measured(odometry: Array | None) -> None:
+def test_a_mount_that_is_known_is_not_reported_as_measured(odometry: Array | None, pictures: Pictures) -> None:
     stream = CameraStream(Mount(MOUNT))
-    run(stream, odometry)
+    run(stream, pictures, odometry)
     assert stream.mount is None
     assert stream.T_body_camera is None if odometry is None else np.array_equal(stream.T_body_camera, MOUNT)

@@ -1,65 +1,100 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Where a camera sits on a body, by the motions of both."""
+
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from objreg_ros.data import Array
-from objreg_ros.geometry import inverse, inverses, pose, pose_error, rotation_from_vector
-from objreg_ros.plausibility.hand_eye import best_rotation, hand_eye, scale_of
-from plausibility.spans import path
+from objreg_ros.geometry import pose, pose_error, rotation_from_vector
+from objreg_ros.plausibility.hand_eye import best_rotation, hand_eye, scale_of, turns_of
+from plausibility.moving import MOUNT, carried, level_motions, random_motions
 
-MOUNT = pose(rotation_from_vector(np.array([1.2, -1.1, 1.3])), np.array([0.2, -0.1, 0.3]))
-
-
-def motions(T_world_camera: Array, T_body_camera: Array, scale: float = 1.0) -> tuple[Array, Array]:
-    """The motions of the body and of its camera, whose metres are ``scale`` times too long."""
-    T_body = T_world_camera @ inverse(T_body_camera)
-    of_body, of_camera = (inverses(T[:-1]) @ T[1:] for T in (T_body, T_world_camera))
-    of_camera[:, :3, 3] *= scale
-    return of_body, of_camera
+FREE = random_motions(24, turn=0.25, shift_m=0.15)
 
 
-def level_path(count: int) -> Array:
-    """``T_world_body`` of a robot that turns about the vertical and drives ahead."""
-    T, rng = [np.eye(4)], np.random.default_rng(5)
-    for _ in range(count - 1):
-        turn = np.array([0.0, 0.0, rng.uniform(-0.4, 0.4)])
-        T.append(T[-1] @ pose(rotation_from_vector(turn), np.array([rng.uniform(0.1, 0.3), 0.0, 0.0])))
-    return np.array(T)
+def noisy(vectors: Array, sigma: float, seed: int = 3) -> Array:
+    return vectors + np.random.default_rng(seed).normal(0, sigma, vectors.shape)
 
 
-def test_the_mount_of_a_camera_is_found_by_its_motions() -> None:
-    found = hand_eye(*motions(path(25), MOUNT))
-    degrees, centimetres = pose_error(found.T_body_camera, MOUNT)
-    assert degrees < 1.0 and centimetres < 3.0 and abs(np.log(found.scale)) < 0.02 and found.rest < 0.5
+def jolted(T: Array, seed: int = 4) -> Array:
+    """Motions that err by half a degree and 5 mm."""
+    rng = np.random.default_rng(seed)
+    return T @ pose(rotation_from_vector(rng.normal(0, 0.005, (len(T), 3))), rng.normal(0, 0.005, (len(T), 3)))
 
 
-def test_a_level_robot_leaves_the_height_of_its_camera_open_and_says_so() -> None:
-    found = hand_eye(*motions(level_path(25) @ MOUNT, MOUNT))
-    degrees, _ = pose_error(found.T_body_camera, MOUNT)
-    assert degrees < 2.0 and found.lever_sigma_m[2] > 0.3 and (found.lever_sigma_m[:2] < 0.1).all()
+def test_turns_are_rotation_vectors() -> None:
+    vectors = np.array([[0.1, -0.2, 0.3], [0.0, 0.0, 0.0]])
+    np.testing.assert_allclose(turns_of(pose(rotation_from_vector(vectors), np.zeros((2, 3)))), vectors, atol=1e-12)
 
 
-def test_depth_that_is_too_long_shows_in_the_scale_under_a_known_mount_and_under_none() -> None:
-    moved = motions(path(25), MOUNT, scale=1.3)
-    for found in (hand_eye(*moved, MOUNT), hand_eye(*moved)):
-        assert abs(np.log(found.scale / 1.3)) < 2 * found.scale_sigma < 0.2
-    assert (hand_eye(*moved, MOUNT).T_body_camera == MOUNT).all()
-
-
-def test_noise_of_either_shift_does_not_make_a_scale_but_its_deviation() -> None:
-    rng = np.random.default_rng(7)
-    true = 0.02 * rng.standard_normal((60, 3))
-    noisy = true + 0.02 * rng.standard_normal((60, 3))
-    for shifts, others in ((noisy, true), (true, noisy)):
-        found = scale_of(shifts, others)
-        assert abs(np.log(found.factor)) < 2 * found.sigma and found.sigma > 0.2
-    exact = scale_of(2.0 * true, true)
-    assert abs(exact.factor - 2.0) < 0.05 and exact.sigma < 0.05 and exact.rest < 0.1
-
-
-def test_the_rotation_between_directions_leaves_out_what_is_far_off() -> None:
-    sources = np.random.default_rng(8).standard_normal((30, 3))
+def test_the_rotation_between_directions_is_found_beside_a_few_that_are_wrong() -> None:
+    sources = np.random.default_rng(1).normal(size=(30, 3))
     targets = sources @ MOUNT[:3, :3].T
-    targets[:3] *= -1.0
+    targets[:5] = np.random.default_rng(2).normal(size=(5, 3))
     np.testing.assert_allclose(best_rotation(targets, sources), MOUNT[:3, :3], atol=1e-9)
+
+
+@pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (0.0, 2.5, 0.0), (1.5, 1.5, -1.5)])
+def test_a_known_mount_is_recovered_wherever_it_looks(turn: tuple[float, float, float]) -> None:
+    mount = MOUNT @ pose(rotation_from_vector(np.array(turn)), np.zeros(3))
+    found = hand_eye(FREE, carried(FREE, mount))
+    degrees, centimetres = pose_error(found.T_body_camera, mount)
+    assert degrees < 0.1 and centimetres < 0.5 and found.rest < 0.05
+    assert found.scale == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_mount_is_recovered_within_its_deviation_under_noise() -> None:
+    found = hand_eye(jolted(FREE), jolted(carried(FREE), seed=5))
+    degrees, _ = pose_error(found.T_body_camera, MOUNT)
+    off = np.abs(found.T_body_camera[:3, 3] - MOUNT[:3, 3])
+    assert degrees < 3.0 * found.rotation_sigma_deg < 6.0
+    assert (off < 3.0 * found.lever_sigma_m).all() and found.lever_sigma_m.max() < 0.1
+
+
+def test_a_level_robot_leaves_the_height_of_its_camera_open() -> None:
+    level = level_motions(24)
+    found = hand_eye(level, carried(level))
+    x, y, height = found.lever_sigma_m
+    assert height > 0.4 and max(x, y) < 0.1
+    assert abs(found.T_body_camera[2, 3]) < 0.01, "what is open stays near zero"
+    np.testing.assert_allclose(found.T_body_camera[:2, 3], MOUNT[:2, 3], atol=0.01)
+    assert pose_error(found.T_body_camera, MOUNT)[0] < 0.5
+
+
+@pytest.mark.parametrize("scale", [0.5, 1.0, 1.3])
+def test_the_scale_is_measured_with_the_mount_and_by_a_mount_that_is_known(scale: float) -> None:
+    T_camera = carried(FREE, scale=scale)
+    assert hand_eye(FREE, T_camera).scale == pytest.approx(scale, rel=0.01)
+    known = hand_eye(FREE, T_camera, MOUNT)
+    assert known.scale == pytest.approx(scale, rel=1e-3) and known.scale_sigma < 0.025
+    assert known.T_body_camera is MOUNT and known.rotation_sigma_deg == 0.0 and not known.lever_sigma_m.any()
+
+
+def test_motions_of_two_bodies_leave_more_than_those_of_one() -> None:
+    of_another = carried(random_motions(24, seed=9, turn=0.25, shift_m=0.15))
+    assert hand_eye(FREE, of_another).rest > 1.0 > hand_eye(jolted(FREE), carried(FREE)).rest
+
+
+def test_a_scale_under_noise_lies_between_both_regressions() -> None:
+    true = np.random.default_rng(2).normal(0, 0.1, (60, 3))
+    shifts, others = noisy(1.2 * true, 0.05), noisy(true, 0.05, seed=4)
+    diluted = np.sum(shifts * others) / np.sum(others**2)
+    lengthened = np.sum(shifts**2) / np.sum(shifts * others)
+    found = scale_of(shifts, others)
+    assert diluted < found.factor < lengthened
+    assert abs(np.log(found.factor / 1.2)) < found.sigma
+    assert found.sigma > 0.4 * np.log(lengthened / diluted), "no surer than they agree"
+
+
+def test_a_scale_turned_about_is_its_inverse() -> None:
+    true = np.random.default_rng(2).normal(0, 0.1, (60, 3))
+    shifts, others = noisy(1.2 * true, 0.02), noisy(true, 0.02, seed=4)
+    assert scale_of(shifts, others).factor * scale_of(others, shifts).factor == pytest.approx(1.0, abs=1e-6)
+
+
+def test_the_deviation_of_a_scale_grows_with_the_noise() -> None:
+    true = np.random.default_rng(2).normal(0, 0.1, (60, 3))
+    sigmas = [scale_of(noisy(true, noise), noisy(true, noise, seed=4)).sigma for noise in (0.0, 0.02, 0.05, 0.1)]
+    assert sigmas == sorted(sigmas) and sigmas[0] < 0.03 and sigmas[-1] > 3.0 * sigmas[0]

@@ -1,62 +1,106 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Turns tell whether odometry is of the robot that carries the camera, and of the same time."""
+
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
+import pytest
 
-from objreg_ros.data import Array, Odometry
-from objreg_ros.geometry import inverse, inverses
-from objreg_ros.plausibility.odometry_fit import find_shift, likeness
+from objreg_ros.data import Array
+from objreg_ros.geometry import inverses, pose, rotation_from_vector
+from objreg_ros.plausibility.odometry_fit import LEAST_SHIFT_S, LEAST_TURNS, find_shift, likeness
 from objreg_ros.plausibility.odometry_track import OdometryTrack
-from plausibility.spans import STEP_NS, path
-from plausibility.test_hand_eye import MOUNT, motions
+from plausibility.box_room import odometry, swinging
+from plausibility.moving import MOUNT, carried, random_motions
 
-CAMERA_PATH = path(120, seed=9)
+BODY = random_motions(20, turn=0.2)
+FIRST_S = np.arange(20.0, 40.0, 0.5)
+STAMPS_NS = np.rint(1e9 * np.array([FIRST_S, FIRST_S + 0.45])).astype(np.int64)
+T_CAMERA = inverses(swinging(FIRST_S)) @ swinging(FIRST_S + 0.45)
 
 
-def asked(T_odom_body: Array, later_s: float) -> OdometryTrack:
-    """An odometry whose stamps are so much later than the camera's."""
+def test_turns_of_one_body_are_alike_under_any_mount() -> None:
+    found = likeness(BODY, carried(BODY))
+    assert found.is_alike and not found.is_unlike
+    assert found.share == 1.0 and found.turns == len(BODY) and found.off < 1e-6
+
+
+def test_turns_are_alike_under_the_mount_that_is_named_and_no_other() -> None:
+    assert likeness(BODY, carried(BODY), MOUNT[:3, :3]).share == 1.0
+    assert likeness(BODY, carried(BODY), np.eye(3)).is_unlike
+
+
+def test_turns_of_two_bodies_are_unlike() -> None:
+    found = likeness(BODY, carried(random_motions(20, seed=8, turn=0.2)))
+    assert found.is_unlike and not found.is_alike and found.off > 0.5
+
+
+def test_small_turns_tell_nothing() -> None:
+    small = random_motions(20, turn=0.005)
+    found = likeness(small, carried(small))
+    assert found.turns == 0 and not found.is_alike and not found.is_unlike
+    assert not likeness(BODY[:0], BODY[:0]).is_alike
+
+
+def test_few_turns_are_of_neither_one_body_nor_two() -> None:
+    few, other = BODY[: LEAST_TURNS - 1], carried(random_motions(LEAST_TURNS - 1, seed=8, turn=0.2))
+    assert likeness(few, carried(few)).share == 1.0 and not likeness(few, carried(few)).is_alike
+    assert not likeness(few, other, MOUNT[:3, :3]).is_unlike
+
+
+def of_body(late_s: float, pace: float = 1.0, until_s: float = 60.0) -> Callable[[float], tuple[Array, Array]]:
+    """The motions of the body that carries the camera, by odometry that is stamped so much later."""
+    seconds = np.arange(0.0, until_s, 0.05)
     track = OdometryTrack()
-    for k, T in enumerate(T_odom_body):
-        track.add(Odometry(T_odom_body=T, stamp_ns=k * STEP_NS + round(1e9 * later_s)))
-    return track
+    for sample in odometry(seconds, swinging(seconds, pace), late_s):
+        track.add(sample)
+
+    def motions(later_s: float) -> tuple[Array, Array]:
+        (first, known), (last, also) = (track.at(stamps_ns + round(1e9 * later_s)) for stamps_ns in STAMPS_NS)
+        return inverses(first) @ last, known & also
+
+    return motions
 
 
-def shift_of(track: OdometryTrack, first: int = 40, count: int = 20) -> float | None:
-    """The shift that is found of the spans that begin with the one of a number."""
-    T_camera = inverses(CAMERA_PATH[:-1]) @ CAMERA_PATH[1:]
-    begins = STEP_NS * np.arange(first, first + count)
-
-    def at(seconds: float) -> tuple[Array, Array]:
-        ends = [track.at(begins + step + round(1e9 * seconds)) for step in (0, STEP_NS)]
-        return inverses(ends[0][0]) @ ends[1][0], ends[0][1] & ends[1][1]
-
-    found = find_shift(at, T_camera[first : first + count])
-    return None if found is None else found.seconds
+@pytest.mark.parametrize("late_s", [7.3, -4.1])
+def test_odometry_of_another_clock_is_found_with_its_shift(late_s: float) -> None:
+    found = find_shift(of_body(late_s), T_CAMERA)
+    assert found is not None and found.seconds == pytest.approx(late_s, abs=0.03)
+    assert found.likeness.share == 1.0 and found.likeness.is_alike
 
 
-def test_turns_of_one_body_are_alike_under_any_mount_and_those_of_two_are_not() -> None:
-    of_body, of_camera = motions(path(25), MOUNT)
-    assert likeness(of_body, of_camera).is_alike
-    assert likeness(of_body, of_camera, MOUNT[:3, :3]).share == 1.0
-    _, of_other = motions(path(25, seed=4), MOUNT)
-    assert likeness(of_body, of_other).is_unlike
+def test_a_shift_of_more_than_a_minute_is_found_where_it_is_known_about() -> None:
+    assert find_shift(of_body(107.3), T_CAMERA) is None
+    found = find_shift(of_body(107.3), T_CAMERA, about_s=100.0)
+    assert found is not None and found.seconds == pytest.approx(107.3, abs=0.03)
 
 
-def test_few_turns_and_none_say_nothing() -> None:
-    of_body, of_camera = motions(path(4), MOUNT)
-    assert not likeness(of_body, of_camera).is_alike and not likeness(of_body, of_camera).is_unlike
-    assert likeness(of_body[:0], of_camera[:0]).turns == 0
-    resting = np.broadcast_to(np.eye(4), (9, 4, 4))
-    assert likeness(resting, resting).turns == 0
+def test_turns_of_another_robot_have_no_shift() -> None:
+    assert find_shift(of_body(0.0, pace=1.7), T_CAMERA) is None
 
 
-def test_the_shift_of_a_clock_is_found_within_a_frame() -> None:
-    T_body = CAMERA_PATH @ inverse(MOUNT)
-    for seconds in (7.3, -4.1):
-        found = shift_of(asked(T_body, seconds))
-        assert found is not None and abs(found - seconds) < 0.1
+@pytest.mark.parametrize("late_s", [0.0, LEAST_SHIFT_S / 2])
+def test_odometry_of_the_same_clock_has_no_shift(late_s: float) -> None:
+    assert find_shift(of_body(late_s), T_CAMERA) is None
 
 
-def test_no_shift_is_found_of_another_robot_or_of_a_clock_that_is_right() -> None:
-    assert shift_of(asked(path(120, seed=10), 0.0)) is None
-    assert shift_of(asked(CAMERA_PATH @ inverse(MOUNT), 0.0)) is None
+def turned(about_z: Array) -> Array:
+    turns = np.zeros((len(about_z), 3))
+    turns[:, 2] = about_z
+    return pose(rotation_from_vector(turns), np.zeros(3))
+
+
+def test_turns_that_come_again_tell_no_shift() -> None:
+    noise = np.random.default_rng(6).normal(0, 0.005, len(FIRST_S))
+    all_known = np.ones(len(FIRST_S), bool)
+
+    def swung(later_s: float) -> Array:
+        return 0.3 * np.sin(2.0 * np.pi * (FIRST_S + later_s) / 4.0)
+
+    assert find_shift(lambda later_s: (turned(swung(later_s)), all_known), turned(swung(1.0) + noise)) is None
+
+
+def test_odometry_that_is_never_there_has_no_shift() -> None:
+    assert find_shift(lambda _: (np.zeros((len(T_CAMERA), 4, 4)), np.zeros(len(T_CAMERA), bool)), T_CAMERA) is None
