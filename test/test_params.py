@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.params import Params, param
+from objreg_ros.registration.params import RegistrarNodeParams
 
 
 @dataclass(frozen=True)
@@ -100,3 +101,9 @@ def test_a_type_that_ros_has_not_cannot_be_a_parameter(kind: object) -> None:
     wrong = dataclass(frozen=True)(type("Wrong", (Params,), {"__annotations__": {"x": kind}, "x": param(None, "?")}))
     with pytest.raises(TypeError, match="a parameter is bool, int, float, str or a tuple of one"):
         wrong.declarations()
+
+
+def test_auto_stands_for_a_mount_that_nothing_says() -> None:
+    assert RegistrarNodeParams(T_base_camera="auto").mounting is None  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="expected a list of float, got 'somewhere'"):
+        RegistrarNodeParams(T_base_camera="somewhere")  # type: ignore[arg-type]
