@@ -46,7 +46,7 @@ def _course(name: str, stamps: Array) -> Iterator[Finding]:
     if len(stamps) > 1 and (stamps == stamps[0]).all():
         yield Finding(
             f"the first {len(stamps)} stamps of {name} are all {stamps[0]} ns",
-            "frames are told apart by them, and none closes a loop",
+            "a stamp is what identifies a frame: none of these closes a loop",
             "record it again with the time in its headers",
             "streams-apart",
         )

@@ -139,12 +139,12 @@ def end_keyframe(graph: Graph) -> None:
 
 def await_release(graph: Graph, constraints: int = 1) -> None:
     """Let the registrar publish what waited for its camera to be believed, as it does once no frame comes."""
-    heard = graph.heard["constraints"]
-    graph.wait_for(lambda: len(heard) >= constraints, START_S, "constraints of a camera that is silent")
-    ends, count = time.monotonic() + QUIET_S, len(heard)
-    graph.wait_for(lambda: len(heard) != count or time.monotonic() > ends)
-    if len(heard) != count:
-        await_release(graph, len(heard))
+    published = graph.heard["constraints"]
+    graph.wait_for(lambda: len(published) >= constraints, START_S, "constraints of a camera that is silent")
+    ends, count = time.monotonic() + QUIET_S, len(published)
+    graph.wait_for(lambda: len(published) != count or time.monotonic() > ends)
+    if len(published) != count:
+        await_release(graph, len(published))
 
 
 @pytest.mark.slow
