@@ -58,7 +58,9 @@ class LazyGroup(click.Group):
         if cmd_name not in self.list_commands(ctx):
             return None
         command: click.Command = import_module(f"objreg_ros.cli.{_module(cmd_name)}").command
-        return loudness.heard_by(command)
+        from objreg_ros.cli import paths
+
+        return paths.guarded(loudness.heard_by(command))
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """What a tab brings: the commands without their import, and the options."""

@@ -15,6 +15,7 @@ from tqdm import tqdm
 from objreg_ros.cli import FIRST_TIME, NOTHING, options
 from objreg_ros.cli.batch_work import BatchWork
 from objreg_ros.cli.loudness import aside
+from objreg_ros.cli.paths import OutputPath, RecordingPath
 from objreg_ros.cli.recorded import Asked
 from objreg_ros.cli.settings import tell_ignored
 from objreg_ros.registration.params import RegistrarParams
@@ -31,12 +32,12 @@ HEAD = f"{'recording':32} {'frames':>7} {'constraints':>12} {'false':>6} {'s':>7
 
 @click.command()
 @click.argument(
-    "recordings", nargs=-1, required=True, type=click.Path(path_type=Path, resolve_path=True), metavar="RECORDINGS…"
+    "recordings", nargs=-1, required=True, type=RecordingPath(path_type=Path, resolve_path=True), metavar="RECORDINGS…"
 )
 @click.option(
     "--out",
     required=True,
-    type=click.Path(file_okay=False, path_type=Path, resolve_path=True),
+    type=OutputPath(file_okay=False, path_type=Path, resolve_path=True),
     help="The folder of the results; all workers have to see it, and the recordings, at the same path.",
 )
 @click.option("--workers", type=click.IntRange(min=1), help="Processes of this machine; one for each core by default.")

@@ -10,13 +10,14 @@ import click
 from tqdm import tqdm
 
 from objreg_ros.cli import options
+from objreg_ros.cli.paths import OutputPath
 from objreg_ros.recording import Record, Recording, open_recording, write_rosbag2
 from objreg_ros.recording.writer import STORAGES
 
 
 @click.command()
 @options.recording
-@click.argument("out", type=click.Path(path_type=Path))
+@click.argument("out", type=OutputPath(path_type=Path))
 @click.option(
     "--storage", type=click.Choice(list(STORAGES)), default="mcap", show_default=True, help="The kind of files in OUT."
 )

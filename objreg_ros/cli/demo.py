@@ -19,6 +19,7 @@ from objreg_ros.bridge.calibration import absolute
 from objreg_ros.cli import live_table, options
 from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
 from objreg_ros.cli.loudness import aside
+from objreg_ros.cli.paths import OutputPath, RecordingPath
 from objreg_ros.cli.played import as_rosbag2, simulated_room
 from objreg_ros.cli.settings import parse_change, read_settings, ros_argument, tell_ignored
 from objreg_ros.cli.told import closing_lines, exit_code, tell, tell_reasons
@@ -63,7 +64,7 @@ class Asked:
 
 
 @click.command()
-@click.argument("recording", type=click.Path(path_type=Path), required=False)
+@click.argument("recording", type=RecordingPath(path_type=Path), required=False)
 @options.model
 @options.labels
 @options.camera
@@ -75,7 +76,7 @@ class Asked:
 @click.option("--lossless", is_flag=True, help="Wait for every frame instead of keeping the pace.")
 @click.option(
     "--out",
-    type=click.Path(file_okay=False, path_type=Path),
+    type=OutputPath(file_okay=False, path_type=Path),
     default=Path("out/demo"),
     show_default=True,
     help="Where everything is written.",

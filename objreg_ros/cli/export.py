@@ -8,12 +8,13 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
+from objreg_ros.cli.paths import InputPath, OutputPath
 from objreg_ros.report.export import export
 
 
 @click.command()
-@click.argument("store", type=click.Path(path_type=Path))
-@click.argument("folder", type=click.Path(file_okay=False, path_type=Path))
+@click.argument("store", type=InputPath(path_type=Path))
+@click.argument("folder", type=OutputPath(file_okay=False, path_type=Path))
 def command(store: Path, folder: Path) -> None:
     """Write the objects, contexts and closures of STORE into FOLDER, new or empty, as PLY clouds and one map.json.
 

@@ -18,6 +18,7 @@ import click
 from tqdm import tqdm
 
 from objreg_ros import share
+from objreg_ros.cli.paths import OutputPath
 from objreg_ros.detector.runtime import Runtime
 from objreg_ros.whole_file import unwritten
 
@@ -60,7 +61,7 @@ MODELS = {
 @click.command()
 @click.argument("what", default="ssd-mobilenet-v1", metavar="[NAME|URL]")
 @click.option("--sha256", default="", help="The checksum that the file of a URL must have.")
-@click.option("--folder", type=click.Path(path_type=Path, file_okay=False), help="Where to; default: the user's data.")
+@click.option("--folder", type=OutputPath(path_type=Path, file_okay=False), help="Where to; default: the user's data.")
 def command(what: str, sha256: str, folder: Path | None) -> None:
     """Get a detector model, by NAME or from a URL.
 

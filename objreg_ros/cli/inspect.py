@@ -11,6 +11,7 @@ import click
 from tqdm import tqdm
 
 from objreg_ros.cli import NOTHING, options
+from objreg_ros.cli.paths import OutputPath
 from objreg_ros.cli.told import tell, tell_next
 from objreg_ros.memory.store_file import is_store
 from objreg_ros.plausibility.finding import Finding
@@ -32,7 +33,7 @@ from objreg_ros.report.store_survey import describe, survey
 from objreg_ros.truth import Truth
 from objreg_ros.whole_file import write_whole
 
-FILE = click.Path(dir_okay=False, path_type=Path)
+FILE = OutputPath(dir_okay=False, path_type=Path)
 
 
 @click.command()
@@ -92,9 +93,6 @@ def _rehearsed(source: Recording, inputs: Inputs) -> tuple[bool, tuple[Finding, 
 
 
 def _say_store(store: Path, picture: Path | None, page: Path | None) -> None:
-    for option, file in {"--picture": picture, "--page": page}.items():
-        if file is not None:
-            options.require_writable(option, file)
     found = survey(store)
     click.echo(describe(found))
     pictures = portraits(store, found.sightings) if picture or page else {}

@@ -12,12 +12,11 @@ import click
 from tqdm import tqdm
 
 from objreg_ros.cli import FIRST_TIME, options
-from objreg_ros.cli.options import require_writable
 from objreg_ros.cli.outputs import Outputs
+from objreg_ros.cli.paths import STANDARD_OUTPUT, OutputPath
 from objreg_ros.cli.recorded import Asked, Opened
 from objreg_ros.cli.settings import tell_ignored
 from objreg_ros.cli.told import (
-    STANDARD_OUTPUT,
     exit_code,
     json_to,
     tell,
@@ -34,7 +33,7 @@ from objreg_ros.report.map_files import VOXEL_M
 from objreg_ros.report.pictures import Album
 from objreg_ros.report.story import Story
 
-FILE = click.Path(dir_okay=False, path_type=Path)
+FILE = OutputPath(dir_okay=False, path_type=Path)
 
 
 @click.command()
@@ -69,8 +68,6 @@ def command(recording: Path, json_file: Path | None, **given: Any) -> int:
     """
     asked = Asked.of(**{name: given.pop(name) for name in options.OF_RUN})
     outputs = Outputs.of(**given)
-    if json_file is not None:
-        require_writable("--json", json_file)
     tell_ignored(asked.settings)
     with asked.opened(recording) as opened, TemporaryDirectory() as folder, json_to(json_file) as write_json:
         outputs.require_way(opened.source, opened.odometry is not None, bool(opened.truth.poses))

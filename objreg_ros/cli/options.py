@@ -3,17 +3,15 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
 import click
 
+from objreg_ros.cli.paths import InputText, ModelText, OutputPath, RecordingPath, SettingsPath
 from objreg_ros.recording.inputs import GRAPH_TOPICS
-from objreg_ros.whole_file import resolved
 
-recording = click.argument("recording", type=click.Path(path_type=Path))
+recording = click.argument("recording", type=RecordingPath(path_type=Path))
 remap = click.option(
     "--remap",
     "remaps",
@@ -24,24 +22,27 @@ remap = click.option(
 params = click.option(
     "--params",
     "params_file",
-    type=click.Path(path_type=Path),
+    type=SettingsPath(path_type=Path),
     help="ROS 2 parameter file, like config/objreg.yaml.",
 )
-change = click.option("--set", "changes", multiple=True, metavar="NODE.NAME=VALUE", help="Change one parameter.")
+change = click.option(
+    "--set", "changes", type=InputText(), multiple=True, metavar="NODE.NAME=VALUE", help="Change one parameter."
+)
 camera = click.option(
     "--camera",
+    type=InputText(),
     default="",
     metavar="FX,FY,CX,CY[,W,H]|FILE",
     help="The camera in place of camera_info: pixels, or a file of ROS, OpenCV, RTAB-Map, ORB-SLAM, kalibr or Open3D.",
 )
-model = click.option("--model", help="ONNX model: a path or the name of an installed one.")
+model = click.option("--model", type=ModelText(), help="ONNX model: a path or the name of an installed one.")
 json_out = click.option(
     "--json",
     "json_file",
-    type=click.Path(dir_okay=False, allow_dash=True, path_type=Path),
+    type=OutputPath(dir_okay=False, allow_dash=True, path_type=Path),
     help="Write the outcome here; - is standard output, and all else then goes to standard error.",
 )
-labels = click.option("--labels", help="Text file of labels, one a line, or YAML with names:.")
+labels = click.option("--labels", type=InputText(), help="Text file of labels, one a line, or YAML with names:.")
 
 max_frames = click.option("--max-frames", type=click.IntRange(min=1), help="Stop after this many frames.")
 odometry = click.option(
@@ -67,43 +68,7 @@ def of_run(command: Callable) -> Callable:
 
 def scene_files(command: Callable) -> Callable:
     """The files of a run for viewers, ``rerun`` and ``mcap``."""
-    file = click.Path(dir_okay=False, path_type=Path)
+    file = OutputPath(dir_okay=False, path_type=Path)
     mcap = click.option("--mcap", type=file, metavar="FILE.mcap", help="Write the run here for Foxglove.")
     rerun = click.option("--rerun", type=file, metavar="FILE.rrd", help="Write the run here for the Rerun viewer.")
     return rerun(mcap(command))
-
-
-def require_writable(option: str, file: Path) -> None:
-    """OSError before the work rather than after it, where the ``file`` of an option could not be written."""
-    if str(file) == "-":  # standard output
-        return
-    if not file.parent.is_dir():
-        raise OSError(f"{option}: expected an existing folder {file.parent}, got none; create it or choose another")
-    if not all(os.access(place, os.W_OK) for place in _places(file)):
-        raise OSError(f"{option}: expected permission to write {file}, got none; choose another place")
-    try:
-        _try_to_write(file)
-    except OSError as error:
-        why = error.strerror or error
-        raise OSError(f"{option}: expected a place that takes a file, got at {file}: {why}; choose another") from error
-
-
-def _places(file: Path) -> list[Path]:
-    """What has to be writable: a new file lies in the folder before it takes the place of an old one."""
-    if not file.exists():
-        return [file.parent]
-    return [file, resolved(file).parent] if file.is_file() else [file]
-
-
-def _try_to_write(file: Path) -> None:
-    """OSError where a file can be neither made nor opened for writing, whatever its permissions say; leaves no trace.
-
-    What is no plain file, as a pipe, is not opened: that would wait for its reader.
-    """
-    if file.exists() and not file.is_file():
-        return
-    with tempfile.TemporaryFile(dir=resolved(file).parent):
-        pass
-    if file.exists():
-        with file.open("ab"):
-            pass

@@ -9,7 +9,6 @@ from pathlib import Path
 import click
 
 from objreg_ros.cli.loudness import aside
-from objreg_ros.cli.options import require_writable
 from objreg_ros.recording import Recording
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.report.map_files import MapFiles
@@ -37,15 +36,12 @@ class Outputs:
         rerun: Path | None,
         mcap: Path | None,
     ) -> Outputs:
-        """Those of the options. ValueError for a voxel that is none, OSError where a file cannot be written."""
+        """Those of the options. ValueError for a voxel that is none."""
         try:
             files = MapFiles(tum, kitti, g2o, cloud, voxel)
         except ValueError as error:
             raise ValueError(f"--voxel: {error}") from error
-        made = cls(files, SceneFiles(rerun, mcap))
-        for option, file in (made.files.wanted | made.scenes.wanted).items():
-            require_writable(option, file)
-        return made
+        return cls(files, SceneFiles(rerun, mcap))
 
     @property
     def wanted(self) -> bool:

@@ -9,14 +9,14 @@ from pathlib import Path
 import click
 
 from objreg_ros.cli import offline
-from objreg_ros.cli.options import require_writable
+from objreg_ros.cli.paths import ModelText, OutputPath, RecordingPath
 from objreg_ros.report.write import write_report
 
 
 @click.command()
-@click.argument("runs", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RUN.json|REC…")
-@click.option("--out", default="report.html", type=click.Path(dir_okay=False, path_type=Path), help="The page.")
-@click.option("--model", help="ONNX model for recordings: a path or the name of an installed one.")
+@click.argument("runs", nargs=-1, required=True, type=RecordingPath(path_type=Path), metavar="RUN.json|REC…")
+@click.option("--out", default="report.html", type=OutputPath(dir_okay=False, path_type=Path), help="The page.")
+@click.option("--model", type=ModelText(), help="ONNX model for recordings: a path or the name of an installed one.")
 @click.option("--odometry", metavar="TOPIC|none|drift:SEED", help="For recordings: as in `objreg offline`.")
 @click.pass_context
 def command(context: click.Context, runs: tuple[Path, ...], out: Path, model: str | None, odometry: str | None) -> int:
@@ -25,7 +25,6 @@ def command(context: click.Context, runs: tuple[Path, ...], out: Path, model: st
     It opens offline and holds the trajectory against the truth, a timeline of closures and refusals, pictures of
     registrations, the object map and the times.
     """
-    require_writable("--out", out)
     for missing in [run for run in runs if not run.expanduser().exists()]:
         raise FileNotFoundError(
             f"expected the JSON of `objreg offline --json` or a recording, got nothing at {missing}"

@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
+from objreg_ros.cli.paths import OutputPath
 from objreg_ros.cli.told import tell_next
 from objreg_ros.data import Intrinsics
 from objreg_ros.params import Params
@@ -35,7 +36,7 @@ def _list(context: click.Context, _: click.Parameter, wanted: bool) -> None:
 
 
 @click.command()
-@click.argument("out", type=click.Path(path_type=Path))
+@click.argument("out", type=OutputPath(path_type=Path))
 @click.option(
     "--scenario",
     type=click.Choice([*SCENARIOS, *FLEETS]),

@@ -74,6 +74,7 @@ def test_a_latched_topic_stays_latched(storage: str, tmp_path: Path) -> None:
 
 
 def test_what_is_there_is_not_overwritten(tmp_path: Path) -> None:
-    folder = tum_folder(tmp_path)
+    folder, out = tum_folder(tmp_path / "tum"), tmp_path / "out"
+    out.mkdir()
     with pytest.raises(FileExistsError, match="expected a new folder"):
-        CliRunner().invoke(command, [str(folder), str(folder)], catch_exceptions=False)
+        CliRunner().invoke(command, [str(folder), str(out)], catch_exceptions=False)

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from recording.folders import tum_folder
 from report.places import cup_and_book
 
-from objreg_ros.cli import export, inspect
+from objreg_ros.cli import export, group, inspect
 from objreg_ros.memory.store import Store
 
 
@@ -26,11 +27,12 @@ def test_a_store_is_described_drawn_and_written_as_a_page(tmp_path: Path) -> Non
 def test_what_draws_a_store_asks_for_one_and_for_a_place_that_takes_a_file(option: str, tmp_path: Path) -> None:
     Store(tmp_path / "place.db").close()
     with pytest.raises(OSError, match=f"{option}: expected an existing folder"):
-        CliRunner().invoke(
-            inspect.command, [str(tmp_path / "place.db"), option, str(tmp_path / "no" / "x")], catch_exceptions=False
-        )
+        words = ["inspect", str(tmp_path / "place.db"), option, str(tmp_path / "no" / "x")]
+        CliRunner().invoke(group, words, catch_exceptions=False)
     with pytest.raises(ValueError, match=f"{option}: expected a store"):
-        CliRunner().invoke(inspect.command, [str(tmp_path), option, str(tmp_path / "x")], catch_exceptions=False)
+        CliRunner().invoke(
+            inspect.command, [str(tum_folder(tmp_path / "tum")), option, str(tmp_path / "x")], catch_exceptions=False
+        )
 
 
 def test_a_store_is_exported(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from recording.folders import CAMERA, lost, tum_folder
 from recording.vision import detected_bag
 from rosbags.rosbag2 import StoragePlugin, Writer
 
+from objreg_ros.cli import group
 from objreg_ros.cli.inspect import columns, command
 from objreg_ros.memory.store import Store
 from objreg_ros.recording import Record, messages, write_rosbag2
@@ -81,7 +82,7 @@ def test_a_real_bag_is_told(shared: Path) -> None:
 @pytest.mark.parametrize("name", ["nowhere/map.png", "map.xyz"])
 def test_a_picture_that_cannot_be_drawn_is_not_said_to_be(name: str, tmp_path: Path) -> None:
     Store(tmp_path / "place.db").close()
-    result = CliRunner().invoke(command, [str(tmp_path / "place.db"), "--picture", str(tmp_path / name)])
+    result = CliRunner().invoke(group, ["inspect", str(tmp_path / "place.db"), "--picture", str(tmp_path / name)])
     assert isinstance(result.exception, OSError) and "drawn into" not in result.output
 
 

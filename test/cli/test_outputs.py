@@ -32,11 +32,6 @@ def test_a_voxel_that_is_none_is_refused_by_the_name_of_its_option(tmp_path: Pat
         asked(tmp_path, "cloud", voxel=-1.0)
 
 
-def test_a_file_that_cannot_be_written_is_refused_before_the_run(tmp_path: Path) -> None:
-    with pytest.raises(OSError, match="--g2o"):
-        asked(tmp_path / "nowhere", "g2o")
-
-
 def test_a_map_wants_a_trajectory_and_says_how_to_get_one(tmp_path: Path) -> None:
     asked(tmp_path, "tum").require_way(BAG, has_way=True, has_truth=False)
     with pytest.raises(ValueError, match=r"--tum: expected a trajectory.*--odometry none.*--odometry tracked"):

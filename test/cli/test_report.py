@@ -7,15 +7,17 @@ import pytest
 from click.testing import CliRunner
 from recording.folders import tum_folder
 
+from objreg_ros.cli import group
 from objreg_ros.cli.report import command
 
 
 @pytest.mark.parametrize("name", ["nothere.json", "nothere"])
 def test_what_is_not_there_is_refused_before_anything_runs(tmp_path: Path, name: str) -> None:
-    runs = [str(tmp_path), str(tmp_path / name)]
+    recording = tum_folder(tmp_path / "tum")
+    runs = [str(recording), str(tmp_path / name)]
     with pytest.raises(FileNotFoundError, match=r"expected the JSON of .* or a recording, got nothing at .*nothere"):
         CliRunner().invoke(command, [*runs, "--out", str(tmp_path / "out.html")], catch_exceptions=False)
-    assert not list(tmp_path.iterdir())
+    assert list(tmp_path.iterdir()) == [recording]
 
 
 def test_a_page_that_cannot_be_written_is_refused_before_anything_runs(
@@ -24,5 +26,6 @@ def test_a_page_that_cannot_be_written_is_refused_before_anything_runs(
     recording = tum_folder(tmp_path / "tum")
     monkeypatch.setattr("objreg_ros.cli.recorded.run_offline", lambda *_: pytest.fail("a recording was run"))
     with pytest.raises(OSError, match=r"--out: expected an existing folder .*nowhere, got none; create it"):
-        CliRunner().invoke(command, [str(recording), "--out", str(tmp_path / "nowhere/x.html")], catch_exceptions=False)
+        words = ["report", str(recording), "--out", str(tmp_path / "nowhere/x.html")]
+        CliRunner().invoke(group, words, catch_exceptions=False, standalone_mode=False)
     assert not (tmp_path / "nowhere").exists()
