@@ -72,7 +72,7 @@ def _require_own_memory(asked: Asked) -> None:
 
 def _waiting(work: BatchWork, recordings: Sequence[Path]) -> list[Path]:
     """The recordings that are to be done; says what is done already, and what is done anew and why."""
-    differing = {recording: work.differing(recording) for recording in recordings}
+    differing = {recording: _differing(work, recording) for recording in recordings}
     done = sum(names == [] for names in differing.values())
     changed = Counter(name for names in differing.values() for name in names or ())
     if done:
@@ -81,6 +81,15 @@ def _waiting(work: BatchWork, recordings: Sequence[Path]) -> list[Path]:
         anew = sum(bool(names) for names in differing.values())
         click.echo(f"! {anew} were made otherwise and are done anew: {', '.join(sorted(changed))} changed", err=True)
     return [recording for recording, names in differing.items() if names != []]
+
+
+def _differing(work: BatchWork, recording: Path) -> list[str] | None:
+    """As `BatchWork.differing`; what is there and is no result is named, and counts as none."""
+    try:
+        return work.differing(recording)
+    except ValueError as error:
+        click.echo(f"! {error}; it is made anew", err=True)
+        return None
 
 
 def _failures(work: BatchWork, waiting: Sequence[Path], workers: int | None, scheduler: str) -> dict[Path, Exception]:
@@ -114,12 +123,22 @@ def _told(
     work: BatchWork, recordings: Sequence[Path], failures: dict[Path, Exception]
 ) -> Iterator[tuple[Row, dict[str, Any] | None]]:
     for recording in recordings:
-        summary = None if recording in failures else work.read(recording)
-        if summary is not None:
+        try:
+            summary = _result(work, recording, failures)
+        except Exception as error:
+            yield Row.failed(recording, error), None
+        else:
             yield Row.of(recording, work.file(recording).name, summary), summary
-            continue
-        unseen = OSError(f"expected its result at {work.file(recording)}, got none; the workers must share that folder")
-        yield Row.failed(recording, failures.get(recording, unseen)), None
+
+
+def _result(work: BatchWork, recording: Path, failures: dict[Path, Exception]) -> dict[str, Any]:
+    """The JSON of a recording; raises what kept it from being made."""
+    if recording in failures:
+        raise failures[recording]
+    summary = work.read(recording)
+    if summary is None:
+        raise OSError(f"expected its result at {work.file(recording)}, got none; the workers must share that folder")
+    return summary
 
 
 def _tell(rows: Sequence[Row], out: Path) -> None:

@@ -15,9 +15,11 @@ from objreg_ros.cli.recorded import Asked
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.recording.troubles import troubles
 from objreg_ros.report.about import about
+from objreg_ros.report.batch_schema import require_result
 from objreg_ros.report.findings import as_json, find
 from objreg_ros.whole_file import write_whole
 
+MOST_BYTES = 1 << 28  # of a result: eight hours at 30 Hz
 DIGITS = 8  # of the digest of a recording's path: recordings of one name have files of their own
 
 
@@ -41,8 +43,9 @@ class BatchWork:
 
     def __call__(self, recording: Path) -> None:
         """Run one recording and write its JSON whole, unless that is there already. OSError, ValueError as the run."""
-        if self.differing(recording) == []:
+        if self._is_done(recording):
             return
+        _require_plain(self.file(recording))
         start = time.perf_counter()
         with self.asked.opened(recording) as opened:
             summary = opened.summary(opened.run(), self.arguments)
@@ -58,20 +61,34 @@ class BatchWork:
         return self.folder / f"{recording.name}-{digest}.json"
 
     def read(self, recording: Path) -> dict[str, Any] | None:
-        """The JSON of a recording; None where none is there whole."""
+        """The JSON of a recording; None where none is there, ValueError where it is not what a batch writes."""
+        file = self.file(recording)
         try:
-            summary = json.loads(self.file(recording).read_bytes())
-        except (OSError, ValueError):
-            return None
-        return summary if isinstance(summary, dict) and "batch" in summary else None
+            _require_plain(file)
+            if not file.exists():
+                return None
+            summary: dict[str, Any] = json.loads(_read_bounded(file))
+            require_result(summary)
+        except (OSError, ValueError, RecursionError) as error:
+            raise ValueError(f"{file}: expected a result of a batch, got one that cannot be used: {error}") from error
+        return summary
 
     def differing(self, recording: Path) -> list[str] | None:
-        """By what a result of before was made otherwise: nothing where it holds, None where there is none."""
+        """By what a result of before was made otherwise: nothing where it holds, None where there is none.
+
+        ValueError where what is there is no result of a batch.
+        """
         summary = self.read(recording)
         if summary is None:
             return None
         before, now = summary["batch"]["made"], json.loads(json.dumps(self._made_of(recording)))
         return sorted(name for name in before.keys() | now.keys() if before.get(name) != now.get(name))
+
+    def _is_done(self, recording: Path) -> bool:
+        try:
+            return self.differing(recording) == []
+        except ValueError:
+            return False
 
     def _made_of(self, recording: Path) -> dict[str, Any]:
         return {**self.made, "recording": asdict(_Extent.of(recording))}
@@ -92,3 +109,16 @@ class _Extent:
 
 def _files(recording: Path) -> Iterator[Path]:
     return (file for file in (recording, *recording.rglob("*")) if file.is_file())
+
+
+def _require_plain(file: Path) -> None:
+    """OSError for what would be waited for, as a pipe, or cannot be replaced, as a folder."""
+    if file.exists() and not file.is_file():
+        raise OSError(f"{file}: expected a plain file or none, got something else; remove it")
+
+
+def _read_bounded(file: Path) -> bytes:
+    size = file.stat().st_size
+    if size > MOST_BYTES:
+        raise ValueError(f"expected at most {MOST_BYTES} bytes, got {size}")
+    return file.read_bytes()

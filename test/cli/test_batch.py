@@ -83,6 +83,38 @@ def test_half_a_result_is_none(words: list[object], tmp_path: Path, alone: list[
     assert batch(*words[1:], "--out", tmp_path / "out").return_value == 0 and len(alone) == 2
 
 
+EDITS: tuple[tuple[str, Any], ...] = (
+    ("frames", None), ("frames", -1), ("frames", 1e300), ("frames", 10**400), ("objects", True),
+    ("truth", []), ("truth", {}), ("truth", {"count": 1, "strict": "a", "loose": 0, "false": None}),
+    ("constraints", None), ("constraints", [{}]), ("constraints", 5), ("refusals", ["a"]),
+    ("refusals", [{"from_ns": 2**70, "to_ns": 1, "T_from_to": None, "reason": "a", "detail": "b", "evidence": {}}]),
+    ("refusals", [{"from_ns": 2, "to_ns": 1, "T_from_to": [[1]], "reason": "a", "detail": "b", "evidence": {}}]),
+    ("refusals", [{"from_ns": 2, "to_ns": 1, "T_from_to": None, "reason": "\ud800", "detail": "", "evidence": {}}]),
+    ("rejected", {"a": "b"}), ("rejected", 7), ("stage_ms", {"total": {}}), ("stage_ms", {"total": {"p50": "x"}}),
+    ("batch", None), ("batch", {}), ("batch", {"made": None}), ("batch", {"made": {}, "seconds": "s", "notes": []}),
+    ("batch", {"made": {}, "seconds": float("nan"), "notes": []}),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("missing", [False, True])
+def test_a_result_that_was_edited_is_made_anew_and_the_user_learns_of_it(
+    missing: bool, words: list[object], tmp_path: Path, alone: list[Path]
+) -> None:
+    batch(*words[1:], "--out", tmp_path / "out")
+    (file,) = (tmp_path / "out").glob("*.json")
+    good, anew = json.loads(file.read_text()), 1
+    for name, value in EDITS:
+        edited = {key: one for key, one in good.items() if key != name} if missing else {**good, name: value}
+        file.write_text(json.dumps(edited))
+        result = batch(*words[1:], "--out", tmp_path / "out")
+        anew += 1
+        assert result.return_value == 0 and "1 recordings, 0 failed, 2 frames" in result.output
+        assert f"{file.name}: expected a result of a batch" in result.output and "it is made anew" in result.output
+        assert len(alone) == anew and told(tmp_path / "out") == {
+            file.name: {k: good[k] for k in good if k not in TIMES}
+        }
+
+
 def test_a_recording_that_fails_stops_no_other(words: list[object], tmp_path: Path, alone: list[Path]) -> None:
     result = batch(tmp_path / "gone", *words[1:], "--out", tmp_path / "out")
     assert result.return_value == 3 and "2 recordings, 1 failed, 2 frames" in result.output
