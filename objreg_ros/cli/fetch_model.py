@@ -6,25 +6,17 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-import urllib.error
-import urllib.request
 from dataclasses import dataclass
-from http.client import HTTPException, HTTPResponse
+from http.client import HTTPException
 from pathlib import Path, PurePosixPath
-from typing import BinaryIO
 from urllib.parse import urlsplit
 
 import click
-from tqdm import tqdm
 
 from objreg_ros import share
+from objreg_ros.cli.download import download
 from objreg_ros.cli.paths import OutputPath
 from objreg_ros.detector.runtime import Runtime
-from objreg_ros.whole_file import unwritten
-
-TIMEOUT_S = 30.0
-CHUNK = 1 << 16
-MOST_BYTES = 1 << 32  # twice what a file of ONNX can be
 
 ZOO = "validated/vision/object_detection_segmentation/ssd-mobilenetv1/model"
 MIRRORS = (
@@ -116,61 +108,6 @@ def fetch(source: Source, path: Path) -> None:
         )
     _accept(part, source)
     os.replace(part, path)
-
-
-def download(url: str, part: Path, checked: bool) -> None:
-    """Append to ``part`` what is missing of ``url``; OSError or HTTPException when the connection fails.
-
-    ValueError where it leads to plain http and will not be ``checked``, and where it does not end.
-    """
-    have = part.stat().st_size if part.is_file() else 0
-    request = urllib.request.Request(url, headers={"Range": f"bytes={have}-"} if have else {})
-    try:
-        response = urllib.request.urlopen(request, timeout=TIMEOUT_S)
-    except urllib.error.HTTPError as error:
-        if error.code != 416:
-            raise
-        part.unlink()  # more than there is: the file has changed, or it was complete and somebody else's
-        return download(url, part, checked)
-    with response:
-        if not checked:
-            require_https(response.url)
-        _receive(response, part, have if response.status == 206 else 0)
-
-
-def require_https(url: str) -> None:
-    """ValueError for the address of an answer that anybody on its way could have changed."""
-    if urlsplit(url).scheme != "https":
-        raise ValueError(
-            f"model: expected https all the way, or --sha256 with the checksum of the file, got {url} without one"
-        )
-
-
-def _receive(response: HTTPResponse, part: Path, have: int) -> None:
-    """Write the answer behind the first ``have`` bytes of ``part``, with a progress bar."""
-    missing = int(response.headers.get("Content-Length") or 0)
-    bar = tqdm(
-        total=have + missing or None, initial=have, unit="B", unit_scale=True, desc=part.stem, leave=False, disable=None
-    )
-    with bar, part.open("ab" if have else "wb") as file:
-        while chunk := response.read(CHUNK):
-            if file.tell() + len(chunk) > MOST_BYTES:
-                part.unlink()
-                raise ValueError(f"{part.stem}: expected a model of at most {MOST_BYTES} bytes, got more; is it one?")
-            _keep(file, chunk, part)
-            bar.update(len(chunk))
-        arrived = file.tell() - have
-    if missing and arrived < missing:
-        raise OSError(f"the connection ended after {arrived} of {missing} bytes")
-
-
-def _keep(file: BinaryIO, chunk: bytes, part: Path) -> None:
-    """ValueError, which no other place would mend, where the disk does not take what has come."""
-    try:
-        file.write(chunk)
-        file.flush()
-    except OSError as error:
-        raise ValueError(str(unwritten(part, error))) from error
 
 
 def checksum(path: Path) -> str:

@@ -15,7 +15,7 @@ import pytest
 from click.testing import CliRunner
 
 from objreg_ros import share
-from objreg_ros.cli import fetch_model
+from objreg_ros.cli import download, fetch_model
 from objreg_ros.cli.fetch_model import Source, checksum, command, fetch, find_source
 
 
@@ -148,11 +148,11 @@ def test_the_next_mirror_is_tried_when_one_fails(server: Server, content: bytes,
 def test_offline_the_error_says_what_was_tried_and_what_to_do(tmp_path: Path) -> None:
     path = tmp_path / "some.onnx"
     with pytest.raises(ValueError, match=r"127\.0\.0\.1:9.*refused.*Are you online\?.*HTTPS_PROXY.*put it at"):
-        fetch(Source("some.onnx", ("http://127.0.0.1:9/some.onnx",)), path)
+        fetch(Source("some.onnx", ("https://127.0.0.1:9/some.onnx",)), path)
     with pytest.raises(
         ValueError, match=r"put it at .*some\.onnx and run this again, which adds its labels\. Try again"
     ):
-        fetch(Source("some.onnx", ("http://127.0.0.1:9/some.onnx",), labels="models/coco.txt"), path)
+        fetch(Source("some.onnx", ("https://127.0.0.1:9/some.onnx",), labels="models/coco.txt"), path)
 
 
 def test_a_missing_page_is_named_with_its_status(server: Server, tmp_path: Path) -> None:
@@ -211,7 +211,7 @@ def test_an_address_that_leads_on_to_plain_http_is_refused_without_a_checksum(
 def test_the_checksum_that_was_found_is_said_where_none_was_asked_for(
     server: Server, content: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(fetch_model, "require_https", lambda *_: None)
+    monkeypatch.setattr(download, "require_safe", lambda *_: None)
     fetch(Source("some.onnx", (server.url,)), tmp_path / "some.onnx")
     assert f"SHA-256 {checksum(tmp_path / 'some.onnx')}" in capsys.readouterr().out
 
@@ -219,7 +219,7 @@ def test_the_checksum_that_was_found_is_said_where_none_was_asked_for(
 def test_a_download_without_end_is_ended(
     server: Server, content: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fetch_model, "MOST_BYTES", 70_000)
+    monkeypatch.setattr(download, "MOST_BYTES", 70_000)
     with pytest.raises(ValueError, match=r"some\.onnx: expected a model of at most 70000 bytes, got more"):
         fetch(source(server, content, tmp_path), tmp_path / "some.onnx")
     assert [file.name for file in tmp_path.iterdir()] == ["reference"]

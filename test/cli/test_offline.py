@@ -10,6 +10,7 @@ from click.testing import CliRunner
 from detector.tiny_model import save_constant_model, tf_outputs
 from recording.folders import lost, tum_folder
 
+from objreg_ros.cli import group
 from objreg_ros.cli.offline import command
 from objreg_ros.offline import Run
 from objreg_ros.recording import Record, open_recording, write_rosbag2
@@ -37,7 +38,7 @@ def unstamped(message: Any) -> Any:
 
 
 def offline(*words: object) -> str:
-    result = CliRunner().invoke(command, [str(word) for word in words], catch_exceptions=False)
+    result = CliRunner().invoke(group, ["offline", *map(str, words)], catch_exceptions=False)
     assert result.exit_code == 0, result.output
     return result.output
 
