@@ -19,6 +19,9 @@ def main() -> None:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     from objreg_ros.cli import INTERRUPTED
     from objreg_ros.cli import main as run
+    from objreg_ros.terminal import protect_terminal
+
+    protect_terminal()
 
     try:
         run()

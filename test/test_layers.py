@@ -52,7 +52,7 @@ FREE_BRIDGE = tuple(
         "vision_from_msg",
     )
 )
-CORE = ("limits", "sensor", "whole_file", "data", "lens", "geometry", "params", "share")
+CORE = ("limits", "sensor", "whole_file", "terminal", "data", "lens", "geometry", "params", "share")
 HOUSE = ("offline", "rehearsal", "truth", "report")
 
 
@@ -102,7 +102,7 @@ def floor(module: str) -> int | None:
 def allowed(importer: str, imported: str) -> bool:
     """The table of the import law."""
     room = importer.split(".")[0]
-    if imported in ("limits", "sensor", "whole_file") and importer != "":
+    if imported in ("limits", "sensor", "whole_file", "terminal") and importer != "":
         return True
     if importer == "":  # what `import objreg_ros` offers, loaded when it is asked for
         return imported == "library"

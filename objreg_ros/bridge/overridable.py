@@ -18,12 +18,22 @@ from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import InvalidQosOverridesError, QosCallbackResult, QoSOverridingOptions
 from rclpy.subscription import Subscription
 
+from objreg_ros.bridge.plain_log import PlainLog
+
 MADE_FIRST = "/parameter_events"  # rclpy publishes it before a node can have parameters
 FIXED = QoSOverridingOptions(())  # of a topic whose QoS is what it is opened for
 
 
 class OverridableNode(Node):
-    """ValueError where a topic is opened with an override that is no QoS."""
+    """ValueError where a topic is opened with an override that is no QoS. Its log is plain text."""
+
+    _plain_log: PlainLog | None = None
+
+    def get_logger(self) -> PlainLog:
+        """As rclpy's, of printable text."""
+        if self._plain_log is None:
+            self._plain_log = PlainLog(super().get_logger().name)
+        return self._plain_log
 
     def create_publisher(self, msg_type: Any, topic: str, qos_profile: QoSProfile | int, **options: Any) -> Publisher:
         """As rclpy's, with overrides."""

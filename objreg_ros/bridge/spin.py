@@ -22,6 +22,7 @@ from objreg_ros.bridge.lifetime import (
     share_arenas,
     shutdown_as_interrupt,
 )
+from objreg_ros.terminal import protect_terminal
 
 
 def run(make: Callable[[], Door], args: Sequence[str] | None = None) -> int:
@@ -36,6 +37,7 @@ def run(make: Callable[[], Door], args: Sequence[str] | None = None) -> int:
 
 def run_together(makes: Sequence[Callable[[], Door]], args: Sequence[str] | None = None) -> int:
     """Run nodes in one executor, as `run` does one; made and closed in this order, and ended together."""
+    protect_terminal()
     first_signal = hear_first_signal()
     share_arenas()
     transport = profile.apply()
