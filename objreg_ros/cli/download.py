@@ -58,7 +58,7 @@ class Redirects(urllib.request.HTTPRedirectHandler):
 
 
 def require_safe(url: str, checked: bool) -> None:
-    """ValueError for an address that is not http(s), or that anybody on the way could answer for, unless ``checked``.
+    """ValueError for an address that is not http(s), or for which anybody between could answer, unless ``checked``.
 
     ``checked`` is whether the checksum of the file is known.
     """
@@ -75,7 +75,7 @@ def require_safe(url: str, checked: bool) -> None:
 def download(url: str, part: Path, checked: bool) -> None:
     """Append to ``part`` what is missing of ``url``; OSError or HTTPException when the connection fails or is slow.
 
-    ValueError where an address on the way is not safe, see `require_safe`, and where the file is too large.
+    ValueError where the address or a redirect is not safe, see `require_safe`, and where the file is too large.
     """
     require_safe(url, checked)
     have = part.stat().st_size if part.is_file() else 0
