@@ -22,9 +22,10 @@ from sensor_msgs.msg import CompressedImage
 from objreg_ros import limits
 from objreg_ros.bridge import from_msg, qos, to_msg
 from objreg_ros.bridge.door import Door
+from objreg_ros.bridge.fair_queue import FairQueue
 
 FORMAT = "objreg_exchange"
-MOST_UNREAD = 2 * qos.KEPT_SUMMARIES  # summaries that wait to be compared; what is told beyond is not heard
+MOST_UNREAD = 2 * qos.KEPT_SUMMARIES  # summaries that wait to be compared; those beyond are left out
 LOOK_S = 0.1  # between two looks at what may be answered
 
 
@@ -35,7 +36,9 @@ class Exchanges(Protocol):
 
     @property
     def waiting(self) -> int: ...
-    def hear(self, packed: bytes) -> bytes | None: ...
+    def sender(self, packed: bytes) -> str: ...
+    def awaits(self, packed: bytes) -> bool: ...
+    def hear(self, packed: bytes, now: float) -> bytes | None: ...
     def note(self, packed: bytes, now: float) -> None: ...
     def answer(self, now: float) -> bytes | None: ...
 
@@ -61,7 +64,8 @@ class Exchanging:
 
     def __init__(self, door: Door, namespace: str, exchange: Exchanges, take: Callable[[Delivered], None]) -> None:
         self._door, self._exchange, self._take = door, exchange, take
-        self._reader, self._unread, self._answering = ThreadPoolExecutor(1, "exchange"), 0, False
+        self._reader, self._answering = ThreadPoolExecutor(1, "exchange"), False
+        self._unread = FairQueue[tuple[int, bytes]](MOST_UNREAD)
         self._summaries = self._both(f"{namespace}/summaries", self._read_later, qos.latched(qos.KEPT_SUMMARIES))
         self._requests = self._both(f"{namespace}/requests", self._note, qos.room(depth=100))
         self._keyframes = self._both(f"{namespace}/keyframes", self._deliver, qos.room(depth=qos.KEPT_KEYFRAMES))
@@ -81,22 +85,23 @@ class Exchanging:
         self._publish(self._summaries, stamp_ns, summary)
 
     def _read_later(self, stamp_ns: int, packed: bytes) -> None:
-        if self._unread < MOST_UNREAD:
-            self._unread += 1
-            self._reader.submit(self._door.read_aside, "summaries", self._read, (stamp_ns, packed))
+        sender = self._door.read_aside("summaries", self._exchange.sender, packed)
+        if sender is not None and self._unread.put(sender, (stamp_ns, packed)):
+            self._reader.submit(self._door.read_aside, "summaries", self._read, self._unread)
 
-    def _read(self, told: tuple[int, bytes]) -> None:
-        self._unread -= 1
-        stamp_ns, packed = told
-        self._publish(self._requests, stamp_ns, self._exchange.hear(packed))
+    def _read(self, unread: FairQueue[tuple[int, bytes]]) -> None:
+        stamp_ns, packed = unread.take()
+        self._publish(self._requests, stamp_ns, self._exchange.hear(packed, time.monotonic()))
 
     def _note(self, _: int, packed: bytes) -> None:
         self._exchange.note(packed, time.monotonic())
 
     def _deliver(self, stamp_ns: int, packed: bytes) -> None:
-        self._door.accept(stamp_ns)
-        if self._door.let_in(stamp_ns):
-            self._take(Delivered(stamp_ns, packed))
+        """What others asked for goes no further, and keeps nothing waiting that was asked for here."""
+        if self._door.read_aside("keyframes", self._exchange.awaits, packed):
+            self._door.accept(stamp_ns)
+            if self._door.let_in(stamp_ns):
+                self._take(Delivered(stamp_ns, packed))
 
     def _answer_later(self) -> None:
         if self._exchange.waiting and not self._answering:

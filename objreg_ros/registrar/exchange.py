@@ -5,7 +5,8 @@ A registrar tells the others a summary of each keyframe. Who finds places of its
 compares it with those. Every pair of keyframes is looked at once: by the registrar that had its own when it heard of
 the other; where both were told before either was heard, by that of the older one.
 
-What is answered stays within bytes per second, the most promising first. Times are in s, of any clock that goes on.
+What is answered stays within bytes per second: askers take turns, each with the most promising. Names are believed of
+nobody: `peers/` says what a false one cannot do. Times are in s, of any clock that goes on.
 All calls may come from any thread; those that need the registrar wait for a search that is under way.
 """
 
@@ -14,23 +15,26 @@ from __future__ import annotations
 import threading
 import uuid
 from collections import Counter, OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, NamedTuple
 
 import numpy as np
 
+from objreg_ros.data import framed
 from objreg_ros.keyframes.frame_window import Clock
 from objreg_ros.memory.retrieval import CandidateKeyframe
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import StoreError
 from objreg_ros.registrar.outcome import Outcome
+from objreg_ros.registrar.peers.known import Peers
+from objreg_ros.registrar.peers.pending import Asked, Pending
+from objreg_ros.registrar.peers.wishes import Wishes
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.summary import (
-    MOST_HEARD,
     Name,
     Request,
     Summary,
+    name_of,
     pack_delivery,
     pack_request,
     pack_summary,
@@ -38,11 +42,9 @@ from objreg_ros.registrar.summary import (
     unpack_request,
     unpack_summary,
 )
+from objreg_ros.registration.keyframe import Keyframe
 
 BURST_S = 2.0  # of bytes that may be saved up
-PATIENCE_S = 60.0  # that a request waits
-MOST_WAITING = 1000  # requests
-MOST_ASKED = 1000  # keyframes that are asked for, and did not come yet
 MOST_SESSIONS = 4096  # of other registrars that have a number here
 
 
@@ -65,18 +67,6 @@ class Allowance:
         self._left -= sent
 
 
-class _Asked(NamedTuple):
-    """A keyframe that was asked for, and what it is to be compared with."""
-
-    summary: Summary
-    candidates: Sequence[CandidateKeyframe]
-
-
-class _Wish(NamedTuple):
-    votes: float
-    since: float
-
-
 class Exchange:
     """What ``registrar`` says to those of other robots and hears of them; ``robot`` is the name of frames without one.
 
@@ -87,15 +77,13 @@ class Exchange:
         self._registrar, self._robot, self.run = registrar, robot, run or uuid.uuid4().hex
         self._allowance, self._lock = Allowance(bytes_per_second), threading.Lock()
         self._from_before = self._told = registrar.newest_keyframe  # ids up to these
-        self._heard = OrderedDict[str, int]()  # by run, the newest keyframe
-        self._asked = OrderedDict[Name, _Asked]()
-        self._wishes: dict[int, _Wish] = {}  # by keyframe
         self._sessions = OrderedDict[tuple[str, int], int]()  # by run and session there, the number here
         self.books: Counter[str] = Counter()
+        self._peers, self._pending, self._wishes = Peers(robot), Pending(self.books), Wishes(self.books)
 
     @property
     def waiting(self) -> int:
-        """How many requests are not answered yet."""
+        """How many keyframes others wait for."""
         return len(self._wishes)
 
     def announce(self, outcome: Outcome) -> bytes | None:
@@ -109,12 +97,13 @@ class Exchange:
             keyframe, clock = self._registrar.moment(outcome.keyframe_id)
         except (KeyError, StoreError):
             return None
-        sightings = sightings_of(replace(keyframe, robot=keyframe.robot or self._robot))
+        named = self._ours(keyframe)
+        sightings = sightings_of(named)
         name = Name(self.run, keyframe.keyframe_id)
         with self._lock:
             self._told = name.keyframe_id
             summary = Summary(
-                name=name, frame_id=keyframe.frame_id, clock=clock, sightings=sightings, heard=dict(self._heard)
+                name=name, frame_id=named.frame_id, clock=clock, sightings=sightings, heard=self._peers.newest
             )
             try:
                 return self._sent("summaries", pack_summary(summary))
@@ -122,7 +111,12 @@ class Exchange:
                 self.books["dropped: too large to be told"] += 1
                 return None
 
-    def hear(self, packed: bytes) -> bytes | None:
+    def sender(self, packed: bytes) -> str:
+        """The run of the registrar that a summary names, empty for one that is not known yet; ValueError for none."""
+        run = name_of(packed).run
+        return run if run in self._peers else ""
+
+    def hear(self, packed: bytes, now: float = 0.0) -> bytes | None:
         """A request for the keyframe of a summary, where it may show a place that is stored here; else None.
 
         ValueError where the bytes are no summary.
@@ -130,7 +124,7 @@ class Exchange:
         summary = unpack_summary(packed)
         with self._lock:
             told = self._told
-            if not self._is_news(summary, len(packed)):
+            if not self._is_news(summary, packed, now):
                 return None
             session = self._session_here(summary.name.run, summary.sightings[0].session)
         sightings = [replace(sighting, session=session) for sighting in summary.sightings]
@@ -140,31 +134,31 @@ class Exchange:
             if not ours:
                 self.books["dropped: unlike"] += 1
                 return None
-            self._asked[summary.name] = _Asked(summary, ours)
-            self._bound(self._asked, MOST_ASKED, "dropped: not answered")
-            return self._sent("requests", pack_request(Request(summary.name, ours[0].votes)))
+            if not self._pending.add(Asked(summary, ours, now)):
+                return None
+            return self._sent("requests", pack_request(Request(summary.name, ours[0].votes, self.run)))
 
     def note(self, packed: bytes, now: float) -> None:
-        """Let a request wait for `answer`: what several wish for promises more. ValueError where the bytes are none."""
+        """Let a request wait for `answer`: what several wish for promises more. ValueError where the bytes are none.
+
+        Those who sent no summary yet are one asker together.
+        """
         request = unpack_request(packed)
         if request.name.run != self.run:
             return
-        number = request.name.keyframe_id
         with self._lock:
             self.books["requests heard"] += 1
-            before = self._wishes.get(number, _Wish(0.0, now))
-            self._wishes[number] = _Wish(before.votes + request.votes, before.since)
-            if len(self._wishes) > MOST_WAITING:
-                self._give_up(min(self._wishes, key=lambda n: self._wishes[n].votes), "crowded")
+            asker = request.asker if request.asker in self._peers else ""
+            self._wishes.add(asker, request.name.keyframe_id, request.votes, now)
 
     def answer(self, now: float) -> bytes | None:
-        """The keyframe that promises most of those that others wait for; None if none does, or it has to wait.
+        """The keyframe that promises most of those that one asker waits for; None if none does, or it has to wait.
 
-        Whoever asked for it takes it, so one answer is for all of them.
+        Askers take turns. Whoever asked for it takes it, so one answer is for all of them.
         """
         while (number := self._next(now)) is not None:
             try:
-                packed = pack_delivery(self.run, self._registrar.moment(number)[0])
+                packed = pack_delivery(self.run, self._ours(self._registrar.moment(number)[0]))
             except (KeyError, StoreError, ValueError):
                 self.books["dropped: not to be had"] += 1
                 continue
@@ -172,46 +166,55 @@ class Exchange:
                 return self._sent("keyframes", packed)
         return None
 
+    def awaits(self, packed: bytes) -> bool:
+        """Whether a keyframe was asked for, by the name that it has; ValueError where it has none."""
+        name = name_of(packed)
+        with self._lock:
+            return name in self._pending
+
     def take(
         self, packed: bytes, seconds: float = np.inf, hurried: Callable[[], bool] = lambda: False
     ) -> Outcome | None:
         """What a keyframe that was asked for comes to, as `Registrar.search` has it; None for one that was not.
 
-        ValueError where the bytes are no keyframe, or not the one of the summary.
+        ValueError where the bytes are no keyframe, or not the one of the summary: that one is still waited for.
         """
         name, came = unpack_delivery(packed)
         with self._lock:
             self.books["keyframes heard"] += 1
             self.books["bytes heard"] += len(packed)
-            asked = self._asked.pop(name, None)
-            if asked is None:
+            if name not in self._pending:
                 self.books["dropped: not asked for"] += 1
                 return None
-            first, began = asked.summary.sightings[0], asked.summary.clock
+        asked = self._answered(name, came)
+        first, began = asked.summary.sightings[0], asked.summary.clock
+        with self._lock:
+            self._pending.forget(asked)
+            self._peers.prove(name.run)
             clock = Clock(began.began_ns, self._session_here(name.run, began.session))
             session = self._session_here(name.run, first.session)
-        got, expected = (came.stamp_ns, came.session, came.frame_id), (first.stamp_ns, first.session)
-        if got != (*expected, asked.summary.frame_id):
-            raise ValueError(f"expected the keyframe at {expected[0]} ns of its summary, got one at {got[0]} ns")
-        keyframe = replace(came, robot=first.robot, session=session)
+        keyframe = replace(came, robot=first.robot, session=session, frame_id=asked.summary.frame_id)
         return self._named(self._registrar.compare(keyframe, clock, asked.candidates, seconds, hurried))
 
-    def _is_news(self, summary: Summary, size: int) -> bool:
-        run, number = summary.name
-        if run == self.run:
+    def _answered(self, name: Name, came: Keyframe) -> Asked:
+        """What a keyframe is the answer to; ValueError where it is not that of the summary."""
+        with self._lock:
+            asked = self._pending.find(name, came.stamp_ns, came.session, came.frame_id)
+        if asked is None:
+            raise ValueError(
+                f"expected the keyframe of its summary, got one at {came.stamp_ns} ns of {came.frame_id!r}"
+            )
+        asked.require(sightings_of(came))
+        return asked
+
+    def _is_news(self, summary: Summary, packed: bytes, now: float) -> bool:
+        if summary.name.run == self.run:
             return False
         self.books["summaries heard"] += 1
-        self.books["bytes heard"] += size
-        if summary.robot == self._robot:
-            self.books["dropped: a robot of our name"] += 1
-        elif number <= self._heard.get(run, 0):
-            self.books["dropped: heard before"] += 1
-        else:
-            self._heard[run] = number
-            self._heard.move_to_end(run)
-            self._bound(self._heard, MOST_HEARD)
-            return True
-        return False
+        self.books["bytes heard"] += len(packed)
+        if why := self._peers.refuse(summary, packed, now):
+            self.books[f"dropped: {why}"] += 1
+        return not why
 
     def _falls_to_us(self, stored: CandidateKeyframe, summary: Summary) -> bool:
         """Whether it is for us to look at a pair: the other had heard of ours, or ours is older."""
@@ -222,29 +225,21 @@ class Exchange:
     def _session_here(self, run: str, session: int) -> int:
         if (run, session) not in self._sessions:
             self._sessions[run, session] = self._registrar.take_session()
-            self._bound(self._sessions, MOST_SESSIONS)
+            if len(self._sessions) > MOST_SESSIONS:  # the oldest of the run that has most goes
+                fullest = Counter(of for of, _ in self._sessions).most_common(1)[0][0]
+                del self._sessions[next(one for one in self._sessions if one[0] == fullest)]
         return self._sessions[run, session]
 
     def _next(self, now: float) -> int | None:
-        """Take the most promising of those that wait, the older first; none while nothing may be sent."""
+        """Take the next of those that wait; none while nothing may be sent."""
         with self._lock:
-            for number in [n for n, wish in self._wishes.items() if now - wish.since > PATIENCE_S]:
-                self._give_up(number, "waited too long")
-            if not self._wishes or not self._allowance.some_left(now):
-                return None
-            number = max(self._wishes, key=lambda n: (self._wishes[n].votes, -n))
-            del self._wishes[number]
-            return number
+            self._wishes.expire(now)
+            return self._wishes.take(now) if self._allowance.some_left(now) else None
 
-    def _give_up(self, number: int, why: str) -> None:
-        del self._wishes[number]
-        self.books[f"dropped: {why}"] += 1
-
-    def _bound(self, table: OrderedDict[Any, Any], most: int, why: str = "") -> None:
-        while len(table) > most:
-            table.popitem(last=False)
-            if why:
-                self.books[why] += 1
+    def _ours(self, keyframe: Keyframe) -> Keyframe:
+        """A stored keyframe as others get it, under the name of our robot."""
+        robot = keyframe.robot or self._robot
+        return replace(keyframe, robot=robot, frame_id=framed(robot, keyframe.frame_id))
 
     def _sent(self, what: str, packed: bytes) -> bytes:
         self.books[f"{what} sent"] += 1

@@ -8,6 +8,7 @@ the objects' positions in float32 and descriptors in float16, or a packed keyfra
 from __future__ import annotations
 
 import json
+import re
 import struct
 import zlib
 from collections.abc import Callable, Mapping
@@ -36,7 +37,9 @@ MOST = {
 
 MOST_DESCRIPTOR = 100.0  # of a part of one
 MOST_VOTES = 1e9
-MOST_HEARD = 64  # runs of other registrars that a summary tells of
+MOST_RUNS = 64  # of other registrars, that are known and that a summary names
+MOST_HEAD = 1024  # bytes in which the name of a message is
+NAMED = re.compile(r'\{"run":"(?:[^"\\]|\\.)*","keyframe":\d+')
 Head = Mapping[str, Any]
 T = TypeVar("T")
 
@@ -70,10 +73,11 @@ class Summary:
 
 
 class Request(NamedTuple):
-    """A wish for a keyframe; the more ``votes``, the more it promises."""
+    """A wish for a keyframe; the more ``votes``, the more it promises. ``asker`` is the run of who asks, if it says."""
 
     name: Name
     votes: float
+    asker: str = ""
 
 
 def pack_summary(summary: Summary) -> bytes:
@@ -104,12 +108,13 @@ def unpack_summary(packed: bytes) -> Summary:
 
 def pack_request(request: Request) -> bytes:
     """A request as bytes."""
-    return _sealed(REQUEST, {"run": request.name.run, "keyframe": request.name.keyframe_id, "votes": request.votes})
+    run, number = request.name
+    return _sealed(REQUEST, {"run": run, "keyframe": number, "votes": request.votes, "asker": request.asker})
 
 
 def unpack_request(packed: bytes) -> Request:
     """The request of `pack_request`; ValueError as in `unpack_summary`."""
-    return _read(REQUEST, packed, lambda head, _: Request(_name(head), real(head, "votes", MOST_VOTES)))
+    return _read(REQUEST, packed, lambda head, _: _request(head))
 
 
 def pack_delivery(run: str, keyframe: Keyframe) -> bytes:
@@ -120,6 +125,26 @@ def pack_delivery(run: str, keyframe: Keyframe) -> bytes:
 def unpack_delivery(packed: bytes) -> tuple[Name, Keyframe]:
     """The keyframe of `pack_delivery`, with id 0 and without a robot; ValueError as in `unpack_summary`."""
     return _read(DELIVERY, packed, lambda head, rest: (_name(head), unpack_keyframe(rest)))
+
+
+def name_of(packed: bytes) -> Name:
+    """The name at the head of a summary or a delivery, of which no more is unpacked; ValueError where there is none.
+
+    Nothing else of the bytes is checked.
+    """
+    try:
+        start = zlib.decompressobj().decompress(packed[PREFIX.size :], MOST_HEAD).decode(errors="ignore")
+        named = NAMED.match(start)
+        if named is None:
+            raise ValueError(f"got {start[:40]!r}")
+        return _name(json.loads(f"{named[0]}}}"))
+    except (zlib.error, ValueError, RecursionError) as error:
+        raise ValueError(f"expected a name, got {len(packed)} bytes without ({str(error)[:MOST_SAID]})") from error
+
+
+def _request(head: Head) -> Request:
+    """An older version names no asker."""
+    return Request(_name(head), real(head, "votes", MOST_VOTES), text({"asker": "", **head}, "asker"))
 
 
 def _name(head: Head) -> Name:
@@ -173,7 +198,7 @@ def _clock(head: Head) -> Clock:
 
 
 def _heard(head: Head) -> dict[str, int]:
-    within("runs that were heard", len(head["heard"]), MOST_HEARD)
+    within("runs that were heard", len(head["heard"]), MOST_RUNS)
     return {text({"run": run}, "run"): within("heard", number, MOST_WHOLE) for run, number in head["heard"].items()}
 
 

@@ -30,7 +30,13 @@ class Spoken:
     def waiting(self) -> int:
         return len(self.notes)
 
-    def hear(self, packed: bytes) -> bytes | None:
+    def sender(self, packed: bytes) -> str:
+        return packed.decode()
+
+    def awaits(self, packed: bytes) -> bool:
+        return packed != b"of others"
+
+    def hear(self, packed: bytes, now: float) -> bytes | None:
         if packed == b"bad":
             raise ValueError("expected a summary, got none")
         return b"ask " + packed if packed != b"unlike" else None
@@ -74,7 +80,7 @@ def test_a_summary_that_looks_alike_is_answered_by_a_request_and_one_that_does_n
     for packed in (b"alike", b"unlike", b"bad"):
         made._read_later(7, packed)
     made._reader.shutdown()
-    assert out == [("/fleet/requests", b"ask alike")] and made._unread == 0
+    assert out == [("/fleet/requests", b"ask alike")] and len(made._unread) == 0
     assert door._ignored == {"malformed summaries": 1}
 
 
@@ -119,6 +125,7 @@ def test_an_answer_that_waits_for_a_search_keeps_no_subscription_waiting_and_one
 def test_a_keyframe_that_comes_is_in_the_books_and_handed_on(door: Door) -> None:
     taken = list[Delivered]()
     made = Exchanging(door, "/fleet", Spoken(), taken.append)
+    made._deliver(7, b"of others")
     made._deliver(7, b"keyframe")
     assert taken == [Delivered(7, b"keyframe")] and taken[0].nbytes == 8 and door.ledger.balance().waiting == 1
     made.close()
@@ -132,3 +139,28 @@ def test_pictures_and_what_is_too_large_are_counted_and_left_out(door: Door, pac
     subscription.callback(message(packed, form), {"publication_sequence_number": 1})
     assert taken == [] and door._ignored == {"malformed /fleet/keyframes": 1}
     made.close()
+
+
+def test_a_flood_of_summaries_of_one_keeps_none_of_another_unread(door: Door, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun, ended, compared = threading.Event(), threading.Event(), list[bytes]()
+
+    class Searching(Spoken):
+        def sender(self, packed: bytes) -> str:
+            return packed.decode()[0]
+
+        def hear(self, packed: bytes, now: float) -> bytes | None:
+            begun.set()
+            assert ended.wait(10.0)
+            compared.append(packed)
+            return None
+
+    monkeypatch.setattr("objreg_ros.bridge.exchanging.MOST_UNREAD", 10)
+    made = Exchanging(door, "/fleet", Searching(), lambda seen: None)
+    made._read_later(7, b"e")
+    assert begun.wait(10.0)
+    for k in range(100):
+        made._read_later(7, b"e%d" % k)
+    made._read_later(7, b"honest")
+    ended.set()
+    made._reader.shutdown()
+    assert compared.index(b"honest") <= 2 and len(compared) == 11 and not door._ignored

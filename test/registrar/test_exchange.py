@@ -15,11 +15,22 @@ from registration.samples import SECOND, candidate
 
 from objreg_ros.data import Array, Frame, LoopClosure, Reason
 from objreg_ros.geometry import inverse, pose_error
-from objreg_ros.registrar import exchange as module
 from objreg_ros.registrar.exchange import Allowance, Exchange
 from objreg_ros.registrar.outcome import Outcome
+from objreg_ros.registrar.peers import known, pending, wishes
 from objreg_ros.registrar.registrar import Registrar
-from objreg_ros.registrar.summary import Name, Request, pack_delivery, pack_request, unpack_request
+from objreg_ros.registrar.summary import (
+    Name,
+    Request,
+    Summary,
+    name_of,
+    pack_delivery,
+    pack_request,
+    pack_summary,
+    unpack_delivery,
+    unpack_request,
+    unpack_summary,
+)
 from objreg_ros.registration import method_of
 from objreg_ros.registration.candidate import ObjectPair
 from objreg_ros.registration.params import RegistrarParams
@@ -168,7 +179,7 @@ def test_a_summary_that_is_heard_twice_asks_nothing_twice() -> None:
     a.sees(10, HERE)
     summary = b.sees(30, BESIDE)
     assert a.exchange.hear(summary) is not None
-    assert a.exchange.hear(summary) is None and a.exchange.books["dropped: heard before"] == 1
+    assert a.exchange.hear(summary) is None and a.exchange.books["dropped: received before"] == 1
 
 
 def test_ones_own_summary_and_that_of_a_robot_of_ones_name_ask_nothing() -> None:
@@ -225,10 +236,12 @@ def test_every_pair_of_three_robots_is_looked_at_once() -> None:
 def test_the_most_promising_is_answered_first_and_one_answer_serves_all() -> None:
     b = Robot("b")
     b.sees(1, HERE), b.sees(2, AWAY), b.sees(3, BESIDE)
-    for number, votes in ((1, 2.0), (2, 1.5), (3, 2.5), (2, 1.5)):
-        b.exchange.note(pack_request(Request(Name("b", number), votes)), NOW)
+    for name in "ac":
+        b.exchange.hear(Robot(name).sees(1, AWAY))
+    for asker, number, votes in (("a", 1, 2.0), ("a", 2, 1.5), ("a", 3, 2.5), ("c", 2, 1.5), ("c", 2, 1.5)):
+        b.exchange.note(pack_request(Request(Name("b", number), votes, asker)), NOW)
     assert b.exchange.waiting == 3
-    order = [module.unpack_delivery(packed)[0].keyframe_id for packed in iter(lambda: b.exchange.answer(NOW), None)]
+    order = [unpack_delivery(packed)[0].keyframe_id for packed in iter(lambda: b.exchange.answer(NOW), None)]
     assert order == [2, 3, 1] and b.exchange.books["keyframes sent"] == 3
 
 
@@ -242,7 +255,7 @@ def test_what_is_sent_stays_within_bytes_per_second_and_what_waits_too_long_is_d
     paid = NOW + (sent + len(first) - 2000) / 1000.0
     assert b.exchange.answer(paid - 1.0) is None
     assert b.exchange.books["bytes sent"] == sent + len(first)
-    assert b.exchange.answer(NOW + module.PATIENCE_S + 1.0) is None
+    assert b.exchange.answer(NOW + wishes.PATIENCE_S + 1.0) is None
     assert b.exchange.books["dropped: waited too long"] == 1 and b.exchange.waiting == 0
 
 
@@ -268,12 +281,14 @@ def test_a_request_for_what_is_not_ours_or_not_there_any_more_is_not_answered() 
 
 
 def test_of_too_many_requests_the_least_promising_goes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MOST_WAITING", 2)
+    monkeypatch.setattr(wishes, "MOST_WAITING", 2)
     b = Robot("b")
+    b.sees(1, HERE), b.sees(2, AWAY), b.sees(3, BESIDE)
     for number, votes in ((1, 3.0), (2, 1.0), (3, 2.0)):
         b.exchange.note(pack_request(Request(Name("b", number), votes)), NOW)
     assert b.exchange.waiting == 2 and b.exchange.books["dropped: crowded"] == 1
-    assert 2 not in b.exchange._wishes
+    order = [unpack_delivery(packed)[0].keyframe_id for packed in iter(lambda: b.exchange.answer(NOW), None)]
+    assert order == [1, 3]
 
 
 def test_a_keyframe_that_was_not_asked_for_comes_to_nothing_and_another_one_is_refused() -> None:
@@ -283,9 +298,10 @@ def test_a_keyframe_that_was_not_asked_for_comes_to_nothing_and_another_one_is_r
     request = a.exchange.hear(summary)
     assert request is not None and unpack_request(request).name == Name("b", 1)
     keyframe, _ = b.registrar.moment(1)
-    with pytest.raises(ValueError, match="expected the keyframe at 30000000000 ns of its summary, got one at 31"):
+    keyframe = replace(keyframe, frame_id=f"b/{keyframe.frame_id}")
+    with pytest.raises(ValueError, match="expected the keyframe of its summary, got one at 31000000000 ns"):
         a.exchange.take(pack_delivery("b", replace(keyframe, stamp_ns=31 * SECOND)))
-    assert a.exchange.take(pack_delivery("b", keyframe)) is None
+    assert a.exchange.take(pack_delivery("c", keyframe)) is None
     assert a.exchange.books["dropped: not asked for"] == 1
 
 
@@ -357,3 +373,155 @@ def test_frames_without_a_robot_go_by_the_name_of_the_exchange() -> None:
     a.exchange.announce(a.registrar.search(window))
     (closure,) = a.fetches(b.sees(30, BESIDE), b).closures  # type: ignore[union-attr]
     assert closure.robots == ("a", "b")
+
+
+def _as(summary: bytes, run: str, number: int, robot: str = "", frame_id: str = "") -> bytes:
+    """A summary that was forged out of another one."""
+    true = unpack_summary(summary)
+    robot = robot or true.robot
+    sightings = tuple(replace(one, robot=robot) for one in true.sightings)
+    forged = {"name": Name(run, number), "sightings": sightings, "frame_id": frame_id or f"{robot}/camera"}
+    return pack_summary(replace(true, **forged))
+
+
+@pytest.mark.parametrize("comes_first", [True, False])
+def test_a_forged_summary_with_the_run_of_another_and_the_largest_number_silences_nobody(comes_first: bool) -> None:
+    a, b = Robot("a"), Robot("b")
+    a.sees(10, HERE)
+    if not comes_first:
+        a.exchange.hear(b.sees(20, AWAY))
+    true = b.sees(30, BESIDE)
+    a.exchange.hear(_as(true, "b", 2**63 - 1))
+    assert a.exchange.books["dropped: a far jump"] == (not comes_first)
+    outcome = a.fetches(true, b)
+    assert outcome is not None and _moments(outcome.closures) == [(("a", "b"), 10, 30)]
+
+
+def test_a_summary_under_the_name_of_the_true_one_keeps_that_out_of_nothing() -> None:
+    a, b = Robot("a"), Robot("b")
+    a.sees(10, HERE)
+    true = b.sees(30, BESIDE)
+    summary = unpack_summary(true)
+    moved = tuple(replace(one, stamp_ns=one.stamp_ns + 5) for one in summary.sightings)
+    a.exchange.hear(pack_summary(replace(summary, sightings=moved)))
+    outcome = a.fetches(true, b)
+    assert outcome is not None and outcome.closures
+
+
+def test_a_forged_keyframe_does_not_use_up_the_request_for_the_true_one() -> None:
+    a, b = Robot("a"), Robot("b")
+    a.sees(10, HERE)
+    request = a.exchange.hear(b.sees(30, BESIDE))
+    b.exchange.note(request, NOW)  # type: ignore[arg-type]
+    true = b.exchange.answer(NOW)
+    assert true is not None
+    keyframe = replace(unpack_delivery(true)[1], keyframe_id=1)
+    elsewhere = replace(keyframe, T_odom_camera=AWAY)
+    for forged in (replace(keyframe, stamp_ns=7), replace(keyframe, frame_id="e/camera"), elsewhere):
+        with pytest.raises(ValueError, match="of its summary"):
+            a.exchange.take(pack_delivery("b", forged))
+    outcome = a.exchange.take(true)
+    assert outcome is not None and outcome.closures
+    assert a.exchange.take(true) is None and not a.exchange.awaits(true)
+
+
+def test_summaries_of_one_push_no_request_for_those_of_others_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pending, "MOST_ASKED", 20)
+    a, b = Robot("a"), Robot("b")
+    a.sees(10, HERE)
+    true = b.sees(30, BESIDE)
+    first = a.exchange.hear(true)
+    assert first is not None
+    forged = [_as(true, "e", number, "e") for number in range(1, 60)]
+    assert sum(a.exchange.hear(one) is not None for one in forged) == 19
+    later = a.exchange.hear(b.sees(31, HERE))
+    assert later is not None and a.exchange.books["dropped: too many asked for"] == 40
+    for request in (first, later):
+        b.exchange.note(request, NOW)
+    packed = list(iter(lambda: b.exchange.answer(NOW), None))
+    assert len(packed) == 2 and all(a.exchange.take(one) is not None for one in packed)
+
+
+def test_a_request_that_is_never_answered_keeps_its_place_for_a_while_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pending, "MOST_ASKED", 1)
+    a, b = Robot("a"), Robot("b")
+    a.sees(10, HERE)
+    first, second, third = b.sees(30, BESIDE), b.sees(31, HERE), b.sees(32, BESIDE)
+    assert a.exchange.hear(first, NOW) is not None and a.exchange.hear(second, NOW) is None
+    assert a.exchange.hear(third, NOW + pending.ASKED_S + 1.0) is not None
+    assert a.exchange.books["dropped: not answered"] == 1
+
+
+def test_a_flood_of_requests_starves_no_other_asker() -> None:
+    b = Robot("b")
+    for k in range(6):
+        b.sees(1 + k, (HERE, BESIDE, AWAY)[k % 3])
+    for name in "ae":
+        b.exchange.hear(Robot(name).sees(50, AWAY))
+    for number in range(1, 6):
+        for asker in ("e", "", "nobody that is known"):
+            b.exchange.note(pack_request(Request(Name("b", number), 1e9, asker)), NOW)
+    b.exchange.note(pack_request(Request(Name("b", 6), 1.0, "a")), NOW)
+    order = [unpack_delivery(packed)[0].keyframe_id for packed in iter(lambda: b.exchange.answer(NOW), None)]
+    assert sorted(order) == [1, 2, 3, 4, 5, 6] and order.index(6) < 3
+
+
+def test_the_same_asker_gets_the_same_keyframe_again_after_a_while_only() -> None:
+    a, b = Robot("a"), Robot("b")
+    b.sees(1, HERE)
+    b.exchange.hear(a.sees(50, AWAY))
+    request = pack_request(Request(Name("b", 1), 1.0, "a"))
+    answered = []
+    for now in (NOW, NOW + 1.0, NOW + wishes.AGAIN_S):
+        b.exchange.note(request, now)
+        answered.append(b.exchange.answer(now) is not None)
+    assert answered == [True, False, True] and b.exchange.books["dropped: answered before"] == 1
+
+
+def test_requests_of_a_version_that_names_no_asker_are_answered() -> None:
+    assert unpack_request(pack_request(Request(Name("b", 1), 1.0))).asker == ""
+
+
+def test_a_frame_has_the_prefix_of_its_robot_and_a_run_one_robot() -> None:
+    a, b = Robot("a"), Robot("b")
+    a.sees(10, HERE)
+    true = b.sees(30, BESIDE)
+    assert unpack_summary(true).frame_id.startswith("b/")
+    for robot, frame_id in (("e", "b/camera"), ("e", "camera"), ("e", "a/camera")):
+        assert a.exchange.hear(_as(true, "e", 1, robot, frame_id)) is None
+    assert a.exchange.books["dropped: a frame of another robot"] == 3
+    assert a.exchange.hear(true) is not None
+    assert a.exchange.hear(_as(true, "b", 2, "e")) is None
+    assert a.exchange.books["dropped: a run of another robot"] == 1
+
+
+def test_names_of_registrars_that_there_are_not_take_no_place_of_one_that_gave_a_keyframe() -> None:
+    a, b, c = Robot("a"), Robot("b"), Robot("c")
+    a.sees(10, HERE)
+    assert a.fetches(b.sees(30, BESIDE), b) is not None
+    true = c.sees(40, BESIDE)
+    forged = [_as(true, f"e{k}", 1, f"e{k}") for k in range(200)]
+    for one in forged:
+        a.exchange.hear(one, 1.0)
+    assert a.exchange.books["dropped: too many registrars"] == 200 - (known.MOST_RUNS - 1)
+    assert a.exchange.hear(b.sees(33, AWAY), 2.0) is not None
+    assert a.exchange.hear(true, 2.0) is None
+    assert a.exchange.hear(true, 2.0 + known.TRIAL_S) is not None
+
+
+def test_a_session_of_one_keeps_its_number_though_another_names_thousands(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("objreg_ros.registrar.exchange.MOST_SESSIONS", 4)
+    a = Robot("a")
+    number = a.exchange._session_here("b", 0)
+    for session in range(9):
+        a.exchange._session_here("e", session)
+    assert a.exchange._session_here("b", 0) == number and len(a.exchange._sessions) == 4
+
+
+def test_the_name_is_read_off_the_head_of_a_message_and_anything_else_has_none() -> None:
+    b = Robot("b", run='quoted " run')
+    summary = b.sees(1, HERE)
+    assert name_of(summary) == Name('quoted " run', 1) and isinstance(unpack_summary(summary), Summary)
+    for packed in (b"", b"short", summary[:14] + b"\0" * 90, bytes(500)):
+        with pytest.raises(ValueError, match="expected a name"):
+            name_of(packed)
