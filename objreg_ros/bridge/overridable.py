@@ -12,6 +12,7 @@ from copy import copy
 from typing import Any
 
 from rclpy.exceptions import ParameterException
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -22,6 +23,32 @@ from objreg_ros.bridge.plain_log import PlainLog
 
 MADE_FIRST = "/parameter_events"  # rclpy publishes it before a node can have parameters
 FIXED = QoSOverridingOptions(())  # of a topic whose QoS is what it is opened for
+
+
+class QuietPublisher(Publisher):
+    """A publisher that has no reader and publishes nothing once ROS is shut down: a signal comes between any two steps.
+
+    ``is_up`` says whether ROS still runs.
+    """
+
+    is_up: Callable[[], bool]
+
+    def publish(self, msg: Any) -> None:
+        """As rclpy's."""
+        try:
+            super().publish(msg)
+        except rclpy_implementation.RCLError:
+            if self.is_up():
+                raise
+
+    def get_subscription_count(self) -> int:
+        """As rclpy's."""
+        try:
+            return super().get_subscription_count()
+        except rclpy_implementation.RCLError:
+            if self.is_up():
+                raise
+            return 0
 
 
 class OverridableNode(Node):
@@ -36,10 +63,13 @@ class OverridableNode(Node):
         return self._plain_log
 
     def create_publisher(self, msg_type: Any, topic: str, qos_profile: QoSProfile | int, **options: Any) -> Publisher:
-        """As rclpy's, with overrides."""
+        """As rclpy's, with overrides; quiet once ROS is shut down."""
         if topic == MADE_FIRST:
             return super().create_publisher(msg_type, topic, qos_profile, **options)
-        return _overridden(super().create_publisher, msg_type, topic, qos_profile, options)
+        options.setdefault("publisher_class", QuietPublisher)
+        made = _overridden(super().create_publisher, msg_type, topic, qos_profile, options)
+        made.is_up = self.context.ok
+        return made
 
     def create_subscription(
         self, msg_type: Any, topic: str, callback: Callable[[Any], None], qos_profile: QoSProfile | int, **options: Any

@@ -120,3 +120,17 @@ def test_an_override_that_is_no_qos_is_refused_in_one_line(made: Made, override:
     with pytest.raises(ValueError, match="qos_overrides of image") as refused:
         door.listen(String, "image", print, qos.sensor(False))
     assert got in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_once_ros_is_shut_down_a_publisher_has_no_reader_and_publishes_nothing(made: Made) -> None:
+    door = made()
+    sent = door.create_publisher(String, "words", qos.room())
+    sent.publish(String(data="before"))
+    rclpy.shutdown()
+    sent.publish(String(data="after"))
+    assert sent.get_subscription_count() == 0
+
+
+def test_what_is_no_message_is_refused_as_ever(made: Made) -> None:
+    with pytest.raises(TypeError):
+        made().create_publisher(String, "words", qos.room()).publish("no message")  # type: ignore[arg-type]

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A registrar that is ended in the middle of a search: live, in a process of its own."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from std_msgs.msg import Header
+
+from objreg_ros.memory.store import Store
+
+from .graph import Graph
+from .test_relocalised import BESIDE, HERE, MOUNT, frame, tell
+
+pytestmark = pytest.mark.ros
+
+LONG = """
+import sys, time
+import rclpy
+from objreg_ros.registrar import node
+class Long(node.Registrar):
+    def search(self, *how):
+        outcome = super().search(*how)
+        if outcome.keyframe_id == 2:
+            print("searching", flush=True)
+            while rclpy.ok():
+                time.sleep(0.01)
+        return outcome
+node.Registrar = Long
+sys.exit(node.main())
+"""
+
+
+@pytest.fixture
+def fresh(domain: int, tmp_path: Path) -> Iterator[Graph]:
+    made = Graph(domain, tmp_path)
+    yield made
+    made.close()
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_during_a_search_ends_with_status_0_says_nothing_and_loses_nothing(
+    fresh: Graph, tmp_path: Path, how: signal.Signals
+) -> None:
+    store = tmp_path / "place.db"
+    words = fresh.command("registrar", f"-p store:={store}", "-p reliable:=true", MOUNT)
+    fresh.hear(Header, "finished")
+    fresh._start("registrar", [sys.executable, "-c", LONG, *words[words.index("--ros-args") :]])
+    frames = [frame(10 + 3 * k, T, T) for k, T in enumerate((HERE, BESIDE, HERE))]
+    names = dict(enumerate(sorted({cloud.label for one in frames for cloud in one.objects})))
+    for one in frames:
+        tell(fresh, one, names)
+        if one is not frames[-1]:  # which completes the keyframe whose search does not end
+            fresh.answer("registrar", one.stamp_ns)
+    fresh.wait_for(lambda: "searching" in fresh.log("registrar"), what="the search")
+    before = len(fresh.log("registrar").splitlines())
+    assert fresh.stop("registrar", how) == 0
+    assert fresh.log("registrar").splitlines()[before:] == []
+    stored = Store(store, read_only=True)
+    assert len(stored.keyframe_ids()) == 3  # that in hand, and the one that no frame followed, too
+    stored.close()
