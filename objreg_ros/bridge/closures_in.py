@@ -2,7 +2,7 @@
 """How a node hears closures: on `loop_closures` of objreg_msgs, on `constraints`, or on both and each once.
 
 Those of one robot come on topics of its own too, whose name tells the robot where the message does not. On
-`constraints` the prefixes of frames tell it.
+`constraints` the prefixes of frames tell it. On a robot's topic closures of others alone are refused.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class ClosuresIn:
         self._known.clear()
 
     def _hear_constraint(self, message: Any, robot: str = "") -> None:
-        self._hear("constraints", message, lambda told: _of(robot, self._by_frames(from_msg.loop_closure(told))))
+        self._hear("constraints", message, lambda told: self._of(robot, self._by_frames(from_msg.loop_closure(told))))
 
     def _by_frames(self, closure: LoopClosure) -> LoopClosure:
         """The closure of the robots whose prefixes its frames have."""
@@ -76,13 +76,26 @@ class ClosuresIn:
         one, other = (robot_of(frame_id, self._robots) for frame_id in frames)
         return replace(closure, from_robot=one, to_robot=other)
 
+    def _of(self, robot: str, closure: LoopClosure) -> LoopClosure:
+        """The closure, of the robot of its topic where it names none itself. ValueError where it is of others only, or
+        a frame has the prefix of another robot: nobody speaks for others.
+        """
+        one, other = closure.robots
+        named = replace(closure, from_robot=one or robot, to_robot=other or robot)
+        if robot and robot not in named.robots:
+            raise ValueError(f"closure: expected one of {robot!r}, whose topic it is, got one of {named.robots}")
+        for name, frame_id in zip(named.robots, (closure.from_frame_id, closure.to_frame_id), strict=True):
+            if (owner := robot_of(frame_id, self._robots)) not in ("", name) and name:
+                raise ValueError(f"closure: expected a frame of {name!r}, got {frame_id!r}, which is of {owner!r}")
+        return named
+
     def _hear_whole(self, message: Any, robot: str = "") -> None:
         if message.retracted:
             told = self._told.get(message.id)
-            if told is not None:
+            if told is not None and (not robot or robot in told[1] or "" in told[1]):
                 self._withdraw(*told)
             return
-        closure = self._hear("loop_closures", message, lambda told: _of(robot, _whole(told)))
+        closure = self._hear("loop_closures", message, lambda told: self._of(robot, _whole(told)))
         if closure is not None:
             self._told[message.id] = closure.moments, closure.robots
             while len(self._told) > MOST_KNOWN:
@@ -106,12 +119,6 @@ class ClosuresIn:
             self._door.accept(closure.to_ns)
             self._take(closure)
         return closure
-
-
-def _of(robot: str, closure: LoopClosure) -> LoopClosure:
-    """The closure, of this robot where it tells none itself."""
-    one, other = closure.robots
-    return replace(closure, from_robot=one or robot, to_robot=other or robot) if robot else closure
 
 
 def _whole(message: Any) -> LoopClosure:

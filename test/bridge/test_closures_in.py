@@ -120,3 +120,44 @@ def test_a_frame_without_a_prefix_is_of_the_robot_whose_topic_tells_it() -> None
     hearer = Hearer(robots=("r1", "r2"))
     hearer.heard["r2/constraints"](to_msg.constraint(CLOSURE))
     assert hearer.taken[0].robots == ("r2", "r2")
+
+
+@pytest.mark.parametrize("topic", ["e/constraints", "e/loop_closures"])
+def test_nobody_speaks_for_others_on_a_topic_of_its_own(topic: str) -> None:
+    hearer = Hearer(robots=("a", "b", "e"))
+    forged = replace(CLOSURE, from_robot="a", to_robot="b", from_frame_id="a/camera", to_frame_id="b/camera")
+    message = to_msg.constraint(forged)
+    if topic.endswith("loop_closures"):
+        message = whole(forged, "")
+        message.from_moment.robot, message.to_moment.robot = "a", "b"
+    hearer.heard[topic](message)
+    assert hearer.dropped == [f"malformed_{topic[2:]}"] and not hearer.taken
+
+
+def test_a_closure_whose_frame_has_the_prefix_of_another_robot_is_refused() -> None:
+    hearer = Hearer(robots=("a", "b", "e"))
+    message = whole(CLOSURE, "e")
+    for end in (message.from_moment, message.to_moment):
+        end.frame_id = "b/camera"
+    for topic in ("loop_closures", "e/loop_closures"):
+        hearer.heard[topic](message)
+    assert hearer.dropped == ["malformed_loop_closures"] * 2 and not hearer.taken
+
+
+def test_a_closure_of_a_robot_and_another_is_taken_on_the_topic_of_either() -> None:
+    hearer = Hearer("constraints", ("a", "b"))
+    for to_ns, topic in ((9, "a/constraints"), (10, "b/constraints"), (11, "constraints")):
+        between = replace(CLOSURE, to_ns=to_ns, from_frame_id="a/camera", to_frame_id="b/camera")
+        hearer.heard[topic](to_msg.constraint(between))
+    assert [told.robots for told in hearer.taken] == [("a", "b")] * 3
+
+
+def test_a_robot_takes_back_on_its_topic_no_closure_of_others() -> None:
+    hearer = Hearer(robots=("a", "e"))
+    message = whole(CLOSURE, "a")
+    hearer.heard["loop_closures"](message)
+    message.retracted = True
+    hearer.heard["e/loop_closures"](message)
+    assert hearer.withdrawn == []
+    hearer.heard["a/loop_closures"](message)
+    assert hearer.withdrawn == [(CLOSURE.moments, ("a", "a"))]
