@@ -23,6 +23,7 @@ from objreg_ros import limits
 from objreg_ros.bridge import from_msg, qos, to_msg
 from objreg_ros.bridge.door import Door
 from objreg_ros.bridge.fair_queue import FairQueue
+from objreg_ros.bridge.key import Key
 
 FORMAT = "objreg_exchange"
 MOST_UNREAD = 2 * qos.KEPT_SUMMARIES  # summaries that wait to be compared; those beyond are left out
@@ -62,8 +63,10 @@ class Exchanging:
     Summaries are compared, and requests answered, in a thread of their own: that waits for a search that is under way.
     """
 
-    def __init__(self, door: Door, namespace: str, exchange: Exchanges, take: Callable[[Delivered], None]) -> None:
-        self._door, self._exchange, self._take = door, exchange, take
+    def __init__(
+        self, door: Door, namespace: str, exchange: Exchanges, take: Callable[[Delivered], None], key: Key | None = None
+    ) -> None:
+        self._door, self._exchange, self._take, self._key = door, exchange, take, key or Key()
         self._reader, self._answering = ThreadPoolExecutor(1, "exchange"), False
         self._unread = FairQueue[tuple[int, bytes]](MOST_UNREAD)
         self._summaries = self._both(f"{namespace}/summaries", self._read_later, qos.latched(qos.KEPT_SUMMARIES))
@@ -72,8 +75,10 @@ class Exchanging:
         door.create_timer(LOOK_S, self._answer_later, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _both(self, topic: str, hear: Callable[[int, bytes], None], profile: QoSProfile) -> Publisher:
+        full = self._door.resolve_topic_name(topic)
+
         def heard(message: Any) -> None:
-            packed = self._door.read_aside(topic, _bytes_of, message)
+            packed = self._door.read_aside(topic, lambda sent: _bytes_of(self._key.check(full, sent)), message)
             if packed is not None:
                 hear(from_msg.stamp_ns(message), packed)
 
@@ -117,7 +122,8 @@ class Exchanging:
             return
         data = array("B")
         data.frombytes(packed)
-        publisher.publish(CompressedImage(header=to_msg.header(stamp_ns, ""), format=FORMAT, data=data))
+        message = CompressedImage(header=to_msg.header(stamp_ns, ""), format=FORMAT, data=data)
+        publisher.publish(self._key.sign(publisher.topic_name, message))
 
     def told(self) -> dict[str, object]:
         """For diagnostics: what was said and heard."""

@@ -13,6 +13,7 @@ from std_msgs.msg import String
 
 from objreg_ros.bridge import from_msg, qos
 from objreg_ros.bridge.frames_in import FramesDoor
+from objreg_ros.bridge.key import Key
 from objreg_ros.bridge.keyframes_msg import SentKeyframe, read_keyframe
 from objreg_ros.data import framed
 
@@ -39,7 +40,7 @@ class KeyframesIn:
 
     ``prefixes`` has what stands before the topics of each robot, ``cameras`` the namespaces of each one's keyframers
     behind that; none where it has one, in its own. Two cameras of a robot are told apart by their frames: of two that
-    have one, the first to come is taken.
+    have one, the first to come is taken. The topic's namespace names the robot, and with a ``key`` it signed that.
     """
 
     def __init__(
@@ -48,8 +49,9 @@ class KeyframesIn:
         prefixes: Mapping[str, str],
         cameras: Sequence[Sequence[str]],
         take: Callable[[FromRobot], None],
+        key: Key | None = None,
     ) -> None:
-        self._door, self._take = door, take
+        self._door, self._take, self._key = door, take, key or Key()
         self._counts = Counter[tuple[str, str]]()  # by robot, and what became of its keyframes
         self._frames = dict[tuple[str, str], str]()  # of the camera of each robot and topic
         for (robot, prefix), names in zip(prefixes.items(), cameras, strict=True):
@@ -64,7 +66,8 @@ class KeyframesIn:
         self._door.expect(topic, topic)
 
     def _hear(self, robot: str, topic: str, message: Any) -> None:
-        sent, stamp_ns = self._door.read_aside("keyframes", read_keyframe, message), from_msg.stamp_ns(message)
+        full, stamp_ns = self._door.resolve_topic_name(topic), from_msg.stamp_ns(message)
+        sent = self._door.read_aside("keyframes", lambda one: read_keyframe(self._key.check(full, one)), message)
         self._door.accept(stamp_ns)
         if sent is None:
             self._door.drop(stamp_ns, "malformed_keyframes")

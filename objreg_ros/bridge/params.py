@@ -56,6 +56,17 @@ class RelocalisedParams(Params):
 
 
 @dataclass(frozen=True)
+class KeyParams(Params):
+    """What proves that a message is of one of us."""
+
+    key_file: str = param(
+        "",
+        "file with a key of 16 to 4096 bytes that all robots share, read at the start: keyframes, summaries and "
+        "requests are signed with it, and others are not read; empty: no signatures",
+    )
+
+
+@dataclass(frozen=True)
 class ExchangeParams(Params):
     """How registrars that each keep their own store close loops between their robots."""
 

@@ -19,7 +19,7 @@ from objreg_ros.adapters.params import (
     ToLioSamParams,
     ToRtabmapParams,
 )
-from objreg_ros.bridge.params import DoorParams, ExchangeParams, ManagedParams, RelocalisedParams
+from objreg_ros.bridge.params import DoorParams, ExchangeParams, KeyParams, ManagedParams, RelocalisedParams
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.mapper.params import MapperNodeParams, MapperParams
 from objreg_ros.params import Declaration, Params
@@ -36,11 +36,12 @@ NODES: dict[str, tuple[type[Params], ...]] = {
         RegistrarParams,
         RegistrarNodeParams,
         ExchangeParams,
+        KeyParams,
         RelocalisedParams,
         ManagedParams,
         DoorParams,
     ),
-    "keyframer": (KeyframeParams, KeyframerNodeParams, ManagedParams, DoorParams),
+    "keyframer": (KeyframeParams, KeyframerNodeParams, KeyParams, ManagedParams, DoorParams),
     "mapper": (MapperParams, MapperNodeParams, ManagedParams, DoorParams),
     "objreg_to_rtabmap": (ToRtabmapParams, BodyParams, AdapterParams, DoorParams),
     "objreg_to_lio_sam": (ToLioSamParams, AdapterParams, DoorParams),

@@ -16,9 +16,10 @@ from sensor_msgs.msg import CompressedImage
 from objreg_ros.bridge import qos
 from objreg_ros.bridge.frames_in import FramesDoor
 from objreg_ros.bridge.indoors import Indoors
+from objreg_ros.bridge.key import read_key
 from objreg_ros.bridge.keyframes_msg import SentKeyframe, keyframe
 from objreg_ros.bridge.lifetime import await_kernels
-from objreg_ros.bridge.params import ManagedParams
+from objreg_ros.bridge.params import KeyParams, ManagedParams
 from objreg_ros.bridge.spin import run
 from objreg_ros.bridge.sync import Match
 from objreg_ros.bridge.worker import Backlog, Limit
@@ -40,11 +41,12 @@ class KeyframerNode(FramesDoor):
     """
 
     def __init__(self, indoors: Indoors | None = None) -> None:
-        super().__init__("keyframer", KeyframeParams, KeyframerNodeParams, ManagedParams, indoors=indoors)
+        kinds = KeyframeParams, KeyframerNodeParams, KeyParams, ManagedParams
+        super().__init__("keyframer", *kinds, indoors=indoors)
 
     def open(self) -> None:
         """Load the kernels, publish and listen."""
-        inputs = self.settings.of(KeyframerNodeParams)
+        inputs, self._key = self.settings.of(KeyframerNodeParams), read_key(self.settings.of(KeyParams).key_file)
         await_kernels(lambda: warm(self.settings.of(KeyframeParams)), self.get_logger().info)
         self._run = uuid.uuid4().hex
         self._keyframer = Keyframer(self.settings.of(KeyframeParams))
@@ -94,7 +96,7 @@ class KeyframerNode(FramesDoor):
         if made.objects and self.context.ok():
             clock = window.clock
             sent = SentKeyframe(made.stamp_ns, made.frame_id, self._run, clock.began_ns, clock.session, packed)
-            self._keyframes.publish(keyframe(sent))
+            self._keyframes.publish(self._key.sign(self._keyframes.topic_name, keyframe(sent)))
             self._sent, self._sent_bytes = self._sent + 1, self._sent_bytes + len(packed)
         return True
 

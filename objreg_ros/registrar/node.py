@@ -22,10 +22,11 @@ from objreg_ros.bridge.door import DroppedError
 from objreg_ros.bridge.exchanging import Delivered, Exchanging
 from objreg_ros.bridge.frames_in import FramesDoor
 from objreg_ros.bridge.indoors import Indoors
+from objreg_ros.bridge.key import read_key
 from objreg_ros.bridge.keyframes_in import FromRobot, KeyframesIn
 from objreg_ros.bridge.lifetime import await_kernels
 from objreg_ros.bridge.markers import Scene
-from objreg_ros.bridge.params import ExchangeParams, ManagedParams, RelocalisedParams
+from objreg_ros.bridge.params import ExchangeParams, KeyParams, ManagedParams, RelocalisedParams
 from objreg_ros.bridge.relocalised import Whereabouts
 from objreg_ros.bridge.robots import prefixes_of
 from objreg_ros.bridge.spin import run
@@ -68,12 +69,12 @@ class RegistrarNode(FramesDoor):
     """
 
     def __init__(self, indoors: Indoors | None = None) -> None:
-        kinds = RegistrarParams, RegistrarNodeParams, ExchangeParams, RelocalisedParams, ManagedParams
+        kinds = RegistrarParams, RegistrarNodeParams, ExchangeParams, KeyParams, RelocalisedParams, ManagedParams
         super().__init__("registrar", *kinds, indoors=indoors)
 
     def open(self) -> None:
         """Load the kernels, open the store, publish and listen."""
-        inputs = self.settings.of(RegistrarNodeParams)
+        inputs, self._key = self.settings.of(RegistrarNodeParams), read_key(self.settings.of(KeyParams).key_file)
         self._seconds = inputs.limit
         await_kernels(lambda: warm(self.settings.of(RegistrarParams)), self.get_logger().info)
         self._registrar = Registrar(self.settings.of(RegistrarParams))
@@ -84,10 +85,9 @@ class RegistrarNode(FramesDoor):
 
     def _open_to(self, inputs: RegistrarNodeParams, refused: ExitStack) -> None:
         self._tracking, self._telling = threading.Lock(), threading.Lock()
-        self._enabled, self._unsearched = True, 0
+        self._enabled, self._unsearched, self._scene = True, 0, Scene()
         self.when_silent(lambda doubt: self._publish(self._registrar.release(doubt)))
         self._counts = dict(self._registrar.counts())
-        self._scene = Scene()
         self._robots = prefixes_of(self, list(inputs.cameras)) if inputs.robots else {}
         self._robot = self._asked_to_exchange()
         limit, nice = self._limit(), self._niceness()
@@ -103,9 +103,9 @@ class RegistrarNode(FramesDoor):
         if self._robot:
             asked = self.settings.of(ExchangeParams)
             self._exchange = Exchange(self._registrar, self._robot, 1000.0 * asked.exchange_kilobytes)
-            self._others = Exchanging(self, asked.exchange, self._exchange, self._take)
+            self._others = Exchanging(self, asked.exchange, self._exchange, self._take, self._key)
         if self._robots:
-            self._keyframes = KeyframesIn(self, self._robots, list(inputs.cameras.values()), self._take)
+            self._keyframes = KeyframesIn(self, self._robots, [*inputs.cameras.values()], self._take, self._key)
         else:
             self.listen_to_frames(inputs.mounting, round(inputs.odom_slop * 1e9))
 

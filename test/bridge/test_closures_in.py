@@ -60,7 +60,10 @@ def whole(closure: LoopClosure, robot: str) -> SimpleNamespace:
     }
     pose = to_msg.constraint(closure).pose
     name = closures_msg.closure_id(closure, robot)
-    return SimpleNamespace(id=name, retracted=False, labels=["cup"], objects=[], evidence=[], pose=pose, **ends)
+    header = to_msg.header(closure.to_ns, "camera")
+    return SimpleNamespace(
+        header=header, id=name, retracted=False, labels=["cup"], objects=[], evidence=[], pose=pose, **ends
+    )
 
 
 def test_what_comes_on_both_topics_is_taken_once_whichever_names_the_robot() -> None:

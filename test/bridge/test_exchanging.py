@@ -17,6 +17,7 @@ from objreg_ros import limits
 from objreg_ros.bridge import to_msg
 from objreg_ros.bridge.door import Door
 from objreg_ros.bridge.exchanging import FORMAT, Delivered, Exchanging
+from objreg_ros.bridge.key import Key
 
 
 class Spoken:
@@ -164,3 +165,21 @@ def test_a_flood_of_summaries_of_one_keeps_none_of_another_unread(door: Door, mo
     ended.set()
     made._reader.shutdown()
     assert compared.index(b"honest") <= 2 and len(compared) == 11 and not door._ignored
+
+
+def test_with_a_key_only_what_it_signed_is_read(door: Door, monkeypatch: pytest.MonkeyPatch) -> None:
+    taken, key = list[Delivered](), Key(b"0123456789abcdef")
+    made = Exchanging(door, "/fleet", Spoken(), taken.append, key)
+    (subscription,) = [s for s in door.subscriptions if s.topic_name == "/fleet/keyframes"]
+    for sent in (
+        message(b"forged"),
+        key.sign("/fleet/requests", message(b"moved")),
+        key.sign("/fleet/keyframes", message(b"k")),
+    ):
+        subscription.callback(sent, {"publication_sequence_number": 1})
+    assert [one.packed for one in taken] == [b"k"] and door._ignored == {"malformed /fleet/keyframes": 2}
+    out = list[CompressedImage]()
+    monkeypatch.setattr(made._summaries, "publish", out.append)
+    made.tell(7, b"summary")
+    assert bytes(key.check("/fleet/summaries", out[0]).data) == b"summary"
+    made.close()

@@ -11,6 +11,7 @@ import rclpy
 from std_msgs.msg import String
 
 from objreg_ros.bridge.frames_in import FramesDoor
+from objreg_ros.bridge.key import Key
 from objreg_ros.bridge.keyframes_in import FromRobot, KeyframesIn
 from objreg_ros.bridge.keyframes_msg import SentKeyframe, keyframe
 
@@ -84,3 +85,14 @@ def test_of_two_cameras_of_a_robot_under_one_frame_the_first_is_taken_and_robots
         ("fleet/r1", "camera"),
     ]
     assert door.ledger.balance().dropped == {"same_camera": 1}
+
+
+def test_with_a_key_a_keyframe_is_of_the_robot_on_whose_topic_it_was_signed(door: FramesDoor) -> None:
+    taken, key = list[FromRobot](), Key(b"0123456789abcdef")
+    heard = KeyframesIn(door, PREFIXES, [(), ()], taken.append, key)
+    signed = key.sign("/fleet/r1/keyframes", keyframe(SENT))
+    heard._hear("fleet/r2", "r2/keyframes", signed)
+    heard._hear("fleet/r1", "r1/keyframes", keyframe(SENT))
+    assert taken == [] and door.ledger.balance().dropped == {"malformed_keyframes": 2}
+    heard._hear("fleet/r1", "r1/keyframes", signed)
+    assert taken == [FromRobot("fleet/r1", SENT)]

@@ -150,11 +150,16 @@ def test_a_registrar_that_starts_anew_takes_what_was_sent_meanwhile_and_nothing_
     stored.close()
 
 
-def test_two_registrars_that_each_keep_a_store_close_loops_between_their_robots(fleet: Graph, tmp_path: Path) -> None:
+@pytest.mark.parametrize("is_signed", [False, True])
+def test_two_registrars_that_each_keep_a_store_close_loops_between_their_robots(
+    fleet: Graph, tmp_path: Path, is_signed: bool
+) -> None:
+    (tmp_path / "key").write_text("a key of the whole fleet")
+    key = [f"-p key_file:={tmp_path / 'key'}"] if is_signed else []
     for robot in SEEN:
         fleet.hear(Header, f"{robot}/finished")
         fleet.hear(OdometryMsg, f"{robot}/constraints", qos.latched(qos.KEPT_CONSTRAINTS))
-        own = "-p exchange:=/fleet", f"-p store:={tmp_path / robot}.db", "-p reliable:=true", MOUNT
+        own = "-p exchange:=/fleet", f"-p store:={tmp_path / robot}.db", "-p reliable:=true", MOUNT, *key
         fleet.start(f"/{robot}/registrar", "registrar", f"-r __ns:=/{robot}", *own)
     fleet.start("mapper", "mapper", "-p robots:=[r1, r2]", "-p publish_tf:=false", MOUNT)
     drive(fleet, "r1", 100, "registrar", 0)
