@@ -73,6 +73,7 @@ OPTIONS = {
     "managed": "true for nodes with a life cycle (~/change_state); not with composed",
     "autostart": "false to leave managed nodes unconfigured until somebody asks for more",
     "respawn": "true to start a process again that has ended with an error or was killed",
+    "enclaves": "path of the nodes' enclaves under SROS 2, as /objreg: each node runs in <path>/<its name>",
     "rviz": "true to start RViz too, where it is installed",
     "log_level": "how much the nodes log",
 }
@@ -106,7 +107,6 @@ def _nodes(context: LaunchContext) -> list[Node]:
         "namespace": said["namespace"],
         "remappings": [*TF, *_remappings(said)],
         "output": "screen",
-        "ros_arguments": ["--log-level", said["log_level"]] if said["log_level"] else [],
         "respawn": _is_true(said["respawn"]),
         "respawn_delay": RESPAWN_S,
     }
@@ -126,6 +126,7 @@ def _alone(room: str, said: dict[str, str], alike: dict) -> Node:
         name=room,
         exec_name=room,
         parameters=_parameters(room, said),
+        ros_arguments=_ros_arguments(room, said),
         **alike,
     )
 
@@ -134,8 +135,20 @@ def _together(rooms: tuple[str, ...], said: dict[str, str], alike: dict) -> Node
     """One process; launch names no node of it, and so a file says whose each parameter is."""
     words = ["-m", "objreg_ros.graph", *rooms]
     return Node(
-        executable=sys.executable, arguments=words, exec_name="objreg_graph", parameters=_shared(rooms, said), **alike
+        executable=sys.executable,
+        arguments=words,
+        exec_name="objreg_graph",
+        parameters=_shared(rooms, said),
+        ros_arguments=_ros_arguments("graph", said),
+        **alike,
     )
+
+
+def _ros_arguments(process: str, said: dict[str, str]) -> list[str]:
+    """What the log says, and the enclave of a process."""
+    level = ["--log-level", said["log_level"]] if said["log_level"] else []
+    enclave = ["--enclave", f"{said['enclaves'].rstrip('/')}/{process}"] if said["enclaves"] else []
+    return [*level, *enclave]
 
 
 def _shared(rooms: tuple[str, ...], said: dict[str, str]) -> list[str]:

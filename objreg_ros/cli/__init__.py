@@ -37,6 +37,7 @@ SUMMARIES = {
     "fetch-model": "Get a detector model.",
     "report": "Draw pictures and tables of a run.",
     "params": "Show every parameter, or write the files that are made from them.",
+    "policy": "Show a policy of SROS 2: who may write, read and call what.",
     "doctor": "Say whether a run can work here, and what is missing.",
 }
 FOLDER = Path(__file__).parent

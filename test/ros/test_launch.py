@@ -269,3 +269,13 @@ def test_a_replay_brings_every_frame_through_the_nodes_and_ends_the_launch(
     )  # fmt: skip
     assert "registrar: 5 published" in launched.stdout, launched.stdout + launched.stderr
     assert launched.stdout.count("process has finished cleanly") == 4
+
+
+def test_each_process_runs_in_an_enclave_of_its_own_where_they_are_asked_for(
+    repository: Path, said: dict[str, Any]
+) -> None:
+    arguments = launch_file(repository)["_ros_arguments"]
+    assert arguments("detector", said) == []
+    given = {**said, "enclaves": "/objreg/", "log_level": "warn"}
+    assert arguments("detector", given) == ["--log-level", "warn", "--enclave", "/objreg/detector"]
+    assert arguments("graph", given)[-1] == "/objreg/graph"

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The table behind the policies of SROS 2 against nodes that run: what they open, it allows, and no more."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from objreg_ros.bridge import vision_to_msg
+from objreg_ros.bridge.closures_msg import LoopClosureMsg
+from objreg_ros.bridge.transforms import is_installed
+from objreg_ros.cli.access import TF, Access, expanded
+from objreg_ros.cli.policy import Asked
+
+from .graph import START_S, Graph
+
+pytestmark = pytest.mark.ros
+
+SPACE = "/robot1"
+MANAGED = ("-p managed:=true", f"-r __ns:={SPACE}", "-r /tf:=tf", "-r /tf_static:=tf_static", "-p use_sim_time:=true")
+ASKED = Asked(SPACE, robots={"r1": (), "r2": ("front",)}, exchange="/fleet")
+# What a start, a parameter or a package that is not there decides.
+LATER = {"tf", "initialpose", "labels"}
+IN_PLACE = {  # by node what robots in its place stand for
+    "registrar": {"r1/keyframes", "r1/labels", "r2/front/keyframes", "r2/front/labels"},
+    "mapper": {"odom", "path", "correction"},
+    "segmenter": {"odom", "detections_in", "label_info"},
+}
+
+
+@pytest.fixture(scope="module")
+def open_nodes(graph: Graph, tiny_model: Path) -> Iterator[Graph]:
+    """All five nodes, managed and active."""
+    more = {
+        "detector": (f"-p model:={tiny_model}",),
+        "registrar": ("-p exchange:=/fleet",),
+        "mapper": ("-p robots:=[r1,r2]",) if find_spec("gtsam") else (),
+    }
+    rooms = ["detector", "segmenter", "registrar", "keyframer", *(["mapper"] if find_spec("gtsam") else [])]
+    for room in rooms:
+        graph.start(room, "keyframes" if room == "keyframer" else room, *MANAGED, *more.get(room, ()))
+    graph.wait_for(lambda: {f"{SPACE}/{room}" for room in rooms} <= set(graph.books), START_S, "the books of all nodes")
+    graph.wait_for(lambda: all(is_active(graph, room) for room in rooms), START_S, "active nodes")
+    yield graph
+    for room in rooms:
+        graph.stop(room)
+
+
+def is_active(graph: Graph, room: str) -> bool:
+    values = {pair.key: pair.value for pair in graph.status[f"{SPACE}/{room}"].values}
+    return values.get("state") == "active"
+
+
+def opened(graph: Graph, room: str) -> Access:
+    """What a node has opened, by full names."""
+    node = graph.node
+    asked = (
+        node.get_publisher_names_and_types_by_node,
+        node.get_subscriber_names_and_types_by_node,
+        node.get_service_names_and_types_by_node,
+        node.get_client_names_and_types_by_node,
+    )
+    return Access(*(tuple(name for name, _ in ask(room, SPACE)) for ask in asked))
+
+
+@pytest.mark.parametrize("room", ["detector", "segmenter", "registrar", "keyframer", "mapper"])
+def test_all_that_a_node_opens_is_allowed_and_nothing_is_that_it_never_opens(open_nodes: Graph, room: str) -> None:
+    if room not in open_nodes.processes:
+        pytest.skip("gtsam is not installed: the mapper does not start")
+    allowed, there = ASKED.nodes()[room], opened(open_nodes, room)
+    for kind in ("writes", "reads", "serves", "calls"):
+        have, may = set(getattr(there, kind)), set(expanded(getattr(allowed, kind), SPACE, room))
+        assert have <= may, f"{room} {kind} what no policy allows"
+        idle = may - have - set(expanded(LATER | IN_PLACE.get(room, set()) | absent(), SPACE, room))
+        assert not idle, f"{room} never {kind} what a policy allows"
+
+
+def absent() -> set[str]:
+    """Topics of packages that are not installed here."""
+    return {
+        *(() if is_installed() else TF),
+        *(() if vision_to_msg.Detection2DArray else ("detections", "detections_3d")),
+        *(() if LoopClosureMsg else ("loop_closures", "r1/loop_closures", "r2/loop_closures")),
+        *(() if LoopClosureMsg else ("closure_refusals", "object_landmarks")),
+    }
