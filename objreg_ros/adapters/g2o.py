@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from objreg_ros.bridge.door import DroppedError
 from objreg_ros.bridge.spin import run
 from objreg_ros.data import LoopClosure, Moments, Odometry
 from objreg_ros.mapper.adapters.g2o import graph_text
+from objreg_ros.mapper.map_files import graph_file, require_ours
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.pose_graph import ImplausibleError, PoseGraph
 from objreg_ros.mapper.restart import Anew
@@ -31,14 +33,14 @@ class ToG2o(Adapter):
     def __init__(self) -> None:
         super().__init__("objreg_to_g2o", ToG2oParams, BodyParams)
         self._params_g2o = self.settings.of(ToG2oParams)
-        self._path = Path(self._params_g2o.graph_path).expanduser().absolute()
-        if not self._path.parent.is_dir():
-            raise ValueError(f"graph_path: expected a file in a folder that is there, got {self._path}")
+        self._path = graph_file(self._params_g2o.graph_path)
+        self._writer = ThreadPoolExecutor(max_workers=1, thread_name_prefix="writer")  # in turn, beside the executor
+        self._writing = self._writer.submit(lambda: None)
         self._maps = 0
         self._graph, self._has_news = self._empty(), False
         self._body = Body(self)
         self._odom = OdometryIn(self, self._follow, self._begin_anew)
-        self.create_service(Trigger, "~/save", self._save)
+        self.create_service(Trigger, "~/save", self._save, callback_group=self.apart)
         self.create_timer(self._params_g2o.period, self._write_news, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.expect("odom", "odom")
         self.listen_for_closures()
@@ -59,7 +61,8 @@ class ToG2o(Adapter):
 
     def _begin_anew(self, anew: Anew) -> None:
         """Nothing ties what comes to what was: the old map's file stays, and what waits for it goes."""
-        self._write_news()
+        if self._has_news:
+            self._write()
         self._maps += 1
         self._graph = self._empty()
         for key in list(self.waiting):
@@ -92,25 +95,33 @@ class ToG2o(Adapter):
     # The file
 
     def _write_news(self) -> None:
-        if not self._has_news:
-            return
-        try:
-            self.write()
-        except OSError as error:
+        if self._has_news and self._writing.done():
+            self._write()
+
+    def _write(self) -> Future[None]:
+        """Begin to write the graph as it is now, whole or not at all; OSError in what comes back if it cannot be."""
+        self._has_news = False
+        self._writing = self._writer.submit(_written, self.path, graph_text(*self._graph.flat()))
+        self._writing.add_done_callback(self._look_at)
+        return self._writing
+
+    def _look_at(self, writing: Future[None]) -> None:
+        error = writing.exception()
+        if error is not None:
+            self._has_news = True
             self.throttled.warn("unwritable", f"the graph is not written, and will be tried again: {error}")
 
-    def write(self) -> None:
-        """Write the file, whole or not at all. OSError where that cannot be."""
-        write_whole(self.path, graph_text(*self._graph.flat()))
-        self._has_news = False
-
-    def _save(self, _: Any, response: Any) -> Any:
+    async def _save(self, _: Any, response: Any) -> Any:
+        if not self._writing.done():
+            response.success, response.message = False, "an earlier graph is not written yet; call again"
+            return response
+        path, writing = self.path, self._write()
         try:
-            self.write()
+            await self.aside(writing.result)
         except OSError as error:
             response.success, response.message = False, str(error)
         else:
-            response.success, response.message = True, str(self.path)
+            response.success, response.message = True, str(path)
         return response
 
     def extra_diagnostics(self) -> Mapping[str, object]:
@@ -122,9 +133,15 @@ class ToG2o(Adapter):
         """Write what is new, then end."""
         try:
             if self._has_news:
-                self.write()
+                self._write().result()
         finally:
+            self._writer.shutdown()
             super().close()
+
+
+def _written(path: Path, text: str) -> None:
+    require_ours(path)
+    write_whole(path, text)
 
 
 def main() -> int:

@@ -69,7 +69,9 @@ class ToHydraParams(Params):
 class ToG2oParams(Params):
     """The file, and how dense its vertices are."""
 
-    graph_path: str = param("objreg.g2o", "where the graph is written; a second map goes beside it as objreg_1.g2o")
+    graph_path: str = param(
+        "objreg.g2o", "where the graph is written; a second map goes beside it as objreg_1.g2o", is_path=True
+    )
     period: float = param(5.0, "between two writings, where there is news", unit="s", ge=0.1)
     keyframe_translation: float = param(0.25, "motion after which odometry becomes a vertex", "m", ge=0.01)
     keyframe_rotation: float = param(15.0, "rotation after which odometry becomes a vertex", "deg", ge=0.1, le=180.0)

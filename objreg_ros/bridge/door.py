@@ -22,7 +22,7 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 from std_msgs.msg import Header
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 from objreg_ros.bridge import qos, to_msg
 from objreg_ros.bridge.choice import Choice
@@ -86,7 +86,7 @@ class Door(ManagedNode):
         self._choices: dict[str, Choice[Subscription | Ear]] = {}  # by the input of `listen_to_first`
         self._passed_on = set[str]()
         self._ignored: Counter[str] = Counter()  # messages that are no frame by themselves, by what is wrong with them
-        self.most_pixels = params.most_pixels
+        self.most_pixels, self.is_enabled = params.most_pixels, True
         self.watch, self._drops = Watch(self.count_publishers, params.silence), Drops(params.silence)
         self.worker: Worker[tuple[int, Any]] = Worker(self._work, self._overtaken, self.fail)
 
@@ -333,13 +333,34 @@ class Door(ManagedNode):
         return future
 
     def serve_aside(self, name: str, work: Callable[[], tuple[bool, str]]) -> None:
-        """A service of std_srvs/Trigger: ``work`` is done `aside`, and says whether it could be, and what to know."""
+        """A service of std_srvs/Trigger: ``work`` is done `aside`, and says whether it could be, and what to know.
+
+        A call that comes while another one is answered is refused: whoever calls often begins no second thread.
+        """
+        in_hand = threading.Lock()
 
         async def answer(_: Any, response: Any) -> Any:
-            response.success, response.message = await self.aside(work)
+            if not in_hand.acquire(blocking=False):
+                response.success, response.message = False, f"{name}: an earlier call is not done yet; call again"
+                return response
+            try:
+                response.success, response.message = await self.aside(work)
+            finally:
+                in_hand.release()
             return response
 
         self.create_service(Trigger, name, answer, callback_group=self.apart)
+
+    def serve_enable(self, inputs: str) -> None:
+        """``~/enable`` of std_srvs/SetBool: whether ``inputs`` are used, as ``is_enabled``; a warning while not."""
+
+        def answer(request: Any, response: Any) -> Any:
+            self.is_enabled, response.success = request.data, True
+            response.message = "enabled" if request.data else f"{inputs} are dropped as disabled"
+            self.get_logger().warning(f"~/enable: {response.message}")
+            return response
+
+        self.create_service(SetBool, "~/enable", answer)
 
     def end_aside(self) -> None:
         """Wait for what is done `aside`."""
@@ -365,7 +386,8 @@ class Door(ManagedNode):
         extra = {**state, **connected, **self._ignored, **(self.extra_diagnostics() if self.is_open else {})}
         found = self.found() if self.is_open else ()
         extra |= {f"{FOUND}{finding.anchor}": finding.text for finding in found}
-        troubles = (*silent.values(), *self._drops.lasting().values(), *(finding.what for finding in found))
+        asked = () if self.is_enabled else ("disabled by ~/enable",)
+        troubles = (*asked, *silent.values(), *self._drops.lasting().values(), *(finding.what for finding in found))
         self._diagnostics.publish(diagnostic(name, stamp, balance, rate, troubles, extra))
 
     def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> SetParametersResult:

@@ -63,6 +63,7 @@ class KeyParams(Params):
         "",
         "file with a key of 16 to 4096 bytes that all robots share, read at the start: keyframes, summaries and "
         "requests are signed with it, and others are not read; empty: no signatures",
+        is_path=True,
     )
 
 

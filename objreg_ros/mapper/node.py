@@ -8,12 +8,11 @@ import threading
 import time
 from collections.abc import Mapping
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from nav_msgs.msg import Odometry as OdometryMsg
 from rclpy.clock import Clock, ClockType
-from std_srvs.srv import SetBool, Trigger
+from std_srvs.srv import Trigger
 
 from objreg_ros.bridge import from_msg, qos
 from objreg_ros.bridge.closures_in import ClosuresIn
@@ -29,6 +28,7 @@ from objreg_ros.mapper import saved
 from objreg_ros.mapper.adapters.g2o import graph_text
 from objreg_ros.mapper.follower import Follower, Followers
 from objreg_ros.mapper.incremental import load
+from objreg_ros.mapper.map_files import graph_file, require_ours
 from objreg_ros.mapper.params import MapperNodeParams, MapperParams
 from objreg_ros.mapper.pose_graph import PoseGraph, Summary
 from objreg_ros.mapper.restart import Anew
@@ -53,8 +53,11 @@ class MapperNode(Door):
         """Begin a map or go on with one, publish and listen."""
         load()
         self._inputs = self.settings.of(MapperNodeParams)
-        self._graph_lock = threading.Lock()
-        self._enabled, self._withdrawn_count = True, 0
+        self._graph_lock, self._save_lock = threading.Lock(), threading.Lock()
+        self._graph_file = graph_file(self._inputs.graph_path)
+        self._saved_file = saved.beside(self._graph_file)
+        require_ours(self._saved_file)
+        self._withdrawn_count = 0
         self._riding: list[int] = []  # moments of jobs that the next solution settles too
         self._path_due_s = 0.0
         self._shared_frames = set[str]()  # of which the log has told
@@ -73,14 +76,14 @@ class MapperNode(Door):
 
     def _serve(self) -> None:
         self.create_service(Trigger, "~/reset", self._reset)
-        self.create_service(Trigger, "~/save", self._save)
-        self.create_service(SetBool, "~/enable", self._enable)
+        self.serve_aside("~/save", self._save)
+        self.serve_enable("constraints")
 
     def _resumed(self) -> PoseGraph | None:
         """The map of another day, solved; None where none is asked for. ValueError, OSError where it cannot be read."""
         if not self._inputs.resume:
             return None
-        return saved.load(saved.beside(_absolute(self._inputs.graph_path)), self.settings.of(MapperParams))
+        return saved.load(self._saved_file, self.settings.of(MapperParams))
 
     def _begin(self, graph: PoseGraph | None = None) -> None:
         self._graph = graph or PoseGraph(self.settings.of(MapperParams))
@@ -95,7 +98,7 @@ class MapperNode(Door):
             self.drop(closure.to_ns, reason)
 
     def adopt(self) -> None:
-        """Live parameters hold from the next odometry, closure, solution and save on."""
+        """Live parameters hold from the next odometry, closure and solution on."""
         self._inputs = self.settings.of(MapperNodeParams)
         with self._graph_lock:
             self._graph.params = self.settings.of(MapperParams)
@@ -155,7 +158,7 @@ class MapperNode(Door):
     # Closures
 
     def _take(self, closure: LoopClosure) -> None:
-        if not self._enabled:
+        if not self.is_enabled:
             self._leave(closure, "disabled")
         elif self.let_in(closure.to_ns):
             self._waiting.closures.append(closure)
@@ -287,28 +290,20 @@ class MapperNode(Door):
         response.success, response.message = True, "started a new map"
         return response
 
-    def _save(self, _: Any, response: Any) -> Any:
+    def _save(self) -> tuple[bool, str]:
+        """Whether both files are written, and where they are or why not."""
         try:
-            path = _absolute(self._inputs.graph_path)
-            with self._graph_lock:
-                poses, edges = self._graph.flat()
-                arrays = saved.packed(self._graph)
-            write_whole(path, graph_text(poses, edges))
-            saved.save(arrays, saved.beside(path))
-        except (OSError, RuntimeError) as error:  # the latter of a home that there is not
-            response.success, response.message = False, str(error)
-        else:
-            response.success, response.message = True, f"{path} and {saved.beside(path).name}"
-        return response
-
-    def _enable(self, request: Any, response: Any) -> Any:
-        self._enabled = request.data
-        response.success, response.message = True, "enabled" if request.data else "constraints are dropped as disabled"
-        return response
-
-
-def _absolute(graph_path: str) -> Path:
-    return Path(graph_path).expanduser().absolute()
+            with self._save_lock:
+                with self._graph_lock:
+                    poses, edges = self._graph.flat()
+                    arrays = saved.packed(self._graph)
+                for path in (self._graph_file, self._saved_file):
+                    require_ours(path)
+                write_whole(self._graph_file, graph_text(poses, edges))
+                saved.save(arrays, self._saved_file)
+        except OSError as error:
+            return False, str(error)
+        return True, f"{self._graph_file} and {self._saved_file.name}"
 
 
 def main() -> int:

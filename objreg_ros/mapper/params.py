@@ -115,7 +115,7 @@ class MapperNodeParams(MountedParams):
     )
     publish_tf: bool = param(True, "whether the correction is broadcast on /tf, where tf2_ros is installed", live=True)
     graph_path: str = param(
-        "objreg_map.g2o", "where ~/save writes the pose graph; beside it, as .npz, what resume needs", live=True
+        "objreg_map.g2o", "where ~/save writes the pose graph; beside it, as .npz, what resume needs", is_path=True
     )
     resume: bool = param(False, "whether the map that was saved at graph_path is gone on with; it has to be there")
 

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
+MAGIC = b"SQLite format 3\0"
 HELPERS = ("-wal", "-shm", "-journal")  # files of SQLite's beside the one that they belong to
 HELD: dict[tuple[int, int], tuple[int, int]] = {}  # process and descriptor of what is claimed, by device and inode
 
@@ -74,6 +75,9 @@ class Claim:
         descriptor = _locked(beside, os.O_RDWR | os.O_CREAT)
         if descriptor < 0:
             return
+        if os.pread(descriptor, len(MAGIC), 0) not in (b"", MAGIC):
+            _let_go(descriptor)
+            raise StoreError(f"{beside}: expected no file, got one of another kind; move it, or use another store")
         done = False
         try:
             if new and self._real.exists():  # another one was faster

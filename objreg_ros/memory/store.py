@@ -33,7 +33,16 @@ from objreg_ros.memory.codec import (
 from objreg_ros.memory.landmarks import Merge
 from objreg_ros.memory.migration import renew, renewed
 from objreg_ros.memory.sighting import Sighting
-from objreg_ros.memory.store_file import SCHEMA_VERSION, bear, check, connect, create, read_only_uri, require_place
+from objreg_ros.memory.store_file import (
+    SCHEMA_VERSION,
+    bear,
+    check,
+    connect,
+    create,
+    dated_link,
+    read_only_uri,
+    require_place,
+)
 from objreg_ros.memory.transaction import OBJECTS, SESSION, delete, rename_landmarks, write, write_closures
 from objreg_ros.registration.keyframe import Keyframe
 
@@ -175,14 +184,37 @@ class Store:
             self._cache.pop(keyframe_id, None), self._heads.pop(keyframe_id, None)
         self._shrink(STEP)
 
-    def clear(self) -> None:
-        """Forget everything."""
+    def clear(self) -> str:
+        """Forget everything but the ids that were given; where what was is now, empty where it is nowhere.
+
+        A file is not emptied: it keeps all that it has under a dated name beside, and a new one takes its place.
+        StoreError where that cannot be: then everything is as it was.
+        """
+        if self._claim is not None and (self._heads or self._books.closure_rows):
+            return self._set_aside(self._claim)
         with self._told("forget everything"), self._changing() as (transaction, books):
             for table in ("closure", "object", "keyframe"):
                 delete(transaction, books, table)
             books.forgotten = 0
         self._cache, self._heads = OrderedDict(), {}
-        self._shrink()
+        return ""
+
+    def _set_aside(self, claim: Claim) -> str:
+        path, given = Path(self.path), self._books.emptied()
+        self.save()  # all is in the one file
+        with self._told("set it aside"):
+            self._connection.close()
+            try:
+                dated = dated_link(path)
+                try:
+                    claim.replace(lambda beside: create(beside, given))
+                except BaseException:
+                    dated.unlink()
+                    raise
+            finally:
+                self._connection = self._opened(path, claim)
+        self._cache, self._heads, self._books = OrderedDict(), {}, given
+        return str(dated)
 
     def _shrink(self, most: int = 0) -> None:
         """Give room that lies free in the file back to the disk: all beyond `SPARE`, or ``most`` pages of it."""
@@ -290,7 +322,9 @@ class Store:
         """Say of any error of the database or of what it holds which file it is and what could not be done."""
         try:
             yield
-        except (sqlite3.Error, ValueError, OverflowError) as error:
+        except StoreError:
+            raise
+        except (sqlite3.Error, ValueError, OverflowError, OSError) as error:
             why = " ".join(str(error).split())
             raise StoreError(f"{self.path or 'memory'}: cannot {what}: {why}{advice}") from error
 

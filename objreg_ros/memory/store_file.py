@@ -3,16 +3,20 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import sqlite3
+import time
 from contextlib import closing
 from pathlib import Path
 
 from objreg_ros.memory.books import Books
-from objreg_ros.memory.claim import StoreError, read_header
+from objreg_ros.memory.claim import MAGIC, StoreError, read_header
+from objreg_ros.whole_file import whole_file
 
-MAGIC = b"SQLite format 3\0"
 APPLICATION_ID = 0x4F424A52  # "OBJR" at byte 68 of the file
 SCHEMA_VERSION = 6  # at byte 60
+MOST_AGAIN = 1000  # files that one second may be the date of
 SCHEMA = """
 CREATE TABLE keyframe (
   id INTEGER PRIMARY KEY, robot TEXT NOT NULL, origin TEXT NOT NULL, session INTEGER NOT NULL,
@@ -60,20 +64,38 @@ def require_place(path: Path, read_only: bool) -> None:
         raise StoreError(f"{path}: expected a file in an existing folder, got none; make the folder, or use another")
 
 
-def create(path: Path) -> None:
-    """An empty store in an empty file."""
+def create(path: Path, books: Books | None = None) -> None:
+    """An empty store in an empty file, with the ids that ``books`` say were given."""
     with closing(sqlite3.connect(path)) as connection:
-        bear(connection)
+        bear(connection, books)
 
 
-def bear(connection: sqlite3.Connection) -> None:
+def bear(connection: sqlite3.Connection, books: Books | None = None) -> None:
     """Make a store of an empty database."""
     connection.executescript(
         f"PRAGMA auto_vacuum = INCREMENTAL; PRAGMA application_id = {APPLICATION_ID};"
         f"BEGIN; PRAGMA user_version = {SCHEMA_VERSION}; {SCHEMA} COMMIT;"
     )
     with connection as transaction:
-        Books().write(transaction)
+        (books or Books()).write(transaction)
+
+
+def dated_link(path: Path) -> Path:
+    """A second name of a file, ``place-20261127-101500.db`` by the clock here; OSError if it cannot have one.
+
+    Where the file system knows one name only for a file, it is a copy.
+    """
+    for again in range(MOST_AGAIN):
+        dated = path.with_stem(f"{path.stem}-{time.strftime('%Y%m%d-%H%M%S')}{f'-{again}' if again else ''}")
+        if os.path.lexists(dated):
+            continue
+        try:
+            os.link(path, dated)
+        except OSError:
+            with whole_file(dated) as copy, path.open("rb") as source:
+                shutil.copyfileobj(source, copy)
+        return dated
+    raise FileExistsError(f"{dated}: expected a free name, got {MOST_AGAIN} that are taken")
 
 
 def check(path: Path) -> int:

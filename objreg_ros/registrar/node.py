@@ -13,9 +13,7 @@ import time
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import replace
-from typing import Any, NamedTuple
-
-from std_srvs.srv import SetBool
+from typing import NamedTuple
 
 from objreg_ros.bridge.announcements import Announcements
 from objreg_ros.bridge.door import DroppedError
@@ -85,7 +83,8 @@ class RegistrarNode(FramesDoor):
 
     def _open_to(self, inputs: RegistrarNodeParams, refused: ExitStack) -> None:
         self._tracking, self._telling = threading.Lock(), threading.Lock()
-        self._enabled, self._unsearched, self._scene = True, 0, Scene()
+        self._unsearched, self._scene = 0, Scene()
+        self._may_reset = inputs.allow_remote_reset
         self.when_silent(lambda doubt: self._publish(self._registrar.release(doubt)))
         self._counts = dict(self._registrar.counts())
         self._robots = prefixes_of(self, list(inputs.cameras)) if inputs.robots else {}
@@ -99,7 +98,7 @@ class RegistrarNode(FramesDoor):
         self._whereabouts = Whereabouts(self, lambda: (self._registrar.relocalised, self._registrar.whereabouts))
         self.serve_aside("~/reset", self._forget)
         self.serve_aside("~/save", self._settle_and_save)
-        self.create_service(SetBool, "~/enable", self._enable)
+        self.serve_enable("frames")
         if self._robot:
             asked = self.settings.of(ExchangeParams)
             self._exchange = Exchange(self._registrar, self._robot, 1000.0 * asked.exchange_kilobytes)
@@ -136,7 +135,7 @@ class RegistrarNode(FramesDoor):
 
     def compute(self, stamp_ns: int, payload: Match) -> bool:
         """Follow one frame; a keyframe goes on to the searcher."""
-        if not self._enabled:
+        if not self.is_enabled:
             raise DroppedError("disabled", "")
         frame, T_body_camera = self.frame_of(payload)
         if self._robot:
@@ -153,7 +152,7 @@ class RegistrarNode(FramesDoor):
 
     def _take(self, seen: FromRobot | Delivered) -> None:
         """A keyframe of a robot that is in the books goes on to the searcher."""
-        if self._enabled:
+        if self.is_enabled:
             self.searcher.put(Job(seen.stamp_ns, seen, time.monotonic()))
         else:
             self.drop(seen.stamp_ns, "disabled")
@@ -227,15 +226,17 @@ class RegistrarNode(FramesDoor):
     # Services
 
     def _forget(self) -> tuple[bool, str]:
-        """Whether everything is forgotten; if the store does not let it, why, and nothing is.
+        """Whether everything is forgotten; why not, if the store or a parameter does not let it, and nothing is.
 
         Once the search in hand is over; the keyframes that wait for theirs are dropped.
         """
+        if self.settings.of(RegistrarParams).store and not self._may_reset:
+            return False, "expected allow_remote_reset:=true for a store in a file, got false; set it at the start"
         with self._tracking:
             waiting = self.searcher.rest()
             self.searcher.drain()  # what is in hand may still be unpacked, and would be stored after the reset
             try:
-                self._registrar.reset()
+                aside = self._registrar.reset()
                 self._counts = dict(self._registrar.counts())
             except OSError as error:
                 self.searcher.give_back(waiting)
@@ -245,7 +246,7 @@ class RegistrarNode(FramesDoor):
         with self._telling:
             self._scene.clear()
         self._whereabouts.look()
-        return True, "forgot every keyframe"
+        return True, "forgot every keyframe" + (f"; what was stored is in {aside}" if aside else "")
 
     def _settle_and_save(self) -> tuple[bool, str]:
         """Whether it could be, and where it is or what was in the way. The last keyframe comes after all others.
@@ -261,11 +262,6 @@ class RegistrarNode(FramesDoor):
             return True, self._registrar.save()
         except (ValueError, OSError) as error:
             return False, str(error)
-
-    def _enable(self, request: Any, response: Any) -> Any:
-        self._enabled = request.data
-        response.success, response.message = True, "enabled" if request.data else "frames are dropped as disabled"
-        return response
 
     def shut(self) -> None:
         """End both workers, the search in hand early, store what they had not come to, let go of the store."""

@@ -260,11 +260,15 @@ class Registrar:
         with self._lock:
             return in_turn([track.release(self._recollection, doubt) for track in self._tracks.all()])
 
-    def reset(self) -> None:
-        """Forget everything, in the store too; StoreError, and nothing is forgotten, where that cannot be."""
+    def reset(self) -> str:
+        """Forget everything; where a store's file was put, empty for a store in memory, or one without anything.
+
+        StoreError, and nothing is forgotten, where that cannot be.
+        """
         with self._lock:
-            self._store.clear()
+            aside = self._store.clear()
             self._start(self._numbers.next)
+            return aside
 
     def save(self, path: str = "") -> str:
         """Bring the store's file up to date, or write a copy of it to ``path``; returns where it is.

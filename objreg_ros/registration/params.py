@@ -38,7 +38,7 @@ class RegistrarParams(KeyframeParams):
     )
     seed: int = param(0, "seed of what a registration draws at random", ge=0)
 
-    store: str = param("", "the SQLite file that remembers; empty: memory only, forgotten at the end")
+    store: str = param("", "the SQLite file that remembers; empty: memory only, forgotten at the end", is_path=True)
     max_views: int = param(8, "views of one object that are kept, the most diverse", ge=1)
     max_keyframes: int = param(20000, "most keyframes that are kept; the oldest go first", ge=1)
 
@@ -126,6 +126,9 @@ class RegistrarNodeParams(FramesParams):
     )
     search_seconds: float = param(
         0.0, "longest search for one keyframe; 0: as long as it takes", "s", ge=0.0, live=True
+    )
+    allow_remote_reset: bool = param(
+        False, "whether ~/reset, which any peer can call, may put a store that is a file aside and begin an empty one"
     )
 
     def __post_init__(self) -> None:

@@ -158,8 +158,8 @@ REFUSALS = {
     ),
     "clock_began_anew": Words(
         "what was seen before then has stamps of now, and is left out",
-        "A bag was played again into the same store, or a simulation was started anew. Take another store, or clear "
-        "this one by `~/reset`.",
+        "A bag was played again into the same store, or a simulation was started anew. Take another store, or put "
+        "this one aside by `~/reset` (`allow_remote_reset`).",
         ("registrar.store",),
     ),
 }

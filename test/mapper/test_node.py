@@ -18,7 +18,7 @@ from nav_msgs.msg import Odometry as OdometryMsg
 from nav_msgs.msg import Path as PathMsg
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
-from std_srvs.srv import SetBool, Trigger
+from std_srvs.srv import Trigger
 
 from objreg_ros.bridge import from_msg, qos, to_msg
 from objreg_ros.bridge.log import ThrottledLog
@@ -343,11 +343,11 @@ def test_the_services_answer(outside: Outside, tmp_path: Path) -> None:
     door = outside.door
     offered = {name for name, _ in door.get_service_names_and_types_by_node("mapper", "/")}
     assert offered >= {"/mapper/reset", "/mapper/save", "/mapper/enable"}
-    saved = door._save(None, Trigger.Response())
-    assert saved.success and saved.message == f"{tmp_path / 'map.g2o'} and map.npz"
+    saved, message = door._save()
+    assert saved and message == f"{tmp_path / 'map.g2o'} and map.npz"
     text = (tmp_path / "map.g2o").read_text()
     assert text.count("VERTEX_SE3:QUAT") == len(door._graph.keyframes) == text.count("EDGE_SE3:QUAT") + 1
-    assert door._enable(SetBool.Request(data=False), SetBool.Response()).success
+    door.is_enabled = False
     outside.send(ROUND_TRIP[:1])
     outside.wait(lambda: door.ledger.balance().dropped == {"disabled": 1})
     assert door._reset(None, Trigger.Response()).success
@@ -381,7 +381,7 @@ def test_a_saved_map_is_gone_on_with(outside: Outside) -> None:
     outside.send(ROUND_TRIP)
     outside.wait(lambda: outside.door.extra_diagnostics()["constraints kept"] == len(ROUND_TRIP))
     outside.wait(outside.settled)
-    assert outside.door._save(None, Trigger.Response()).success
+    assert outside.door._save()[0]
     outside.door._inputs = outside.door._inputs.replaced(resume=True)
     resumed = outside.door._resumed()
     outside.door._begin(resumed)
@@ -440,11 +440,19 @@ def test_the_broadcast_is_switched_off_and_on_while_the_node_runs(
     assert sent == [0, 1, 1]
 
 
-def test_a_save_goes_where_the_parameter_says_by_then(outside: Outside, tmp_path: Path) -> None:
+def test_nobody_sets_where_a_save_goes_while_the_node_runs(outside: Outside, tmp_path: Path) -> None:
     outside.drive(BENT[:20])
-    outside.door.set_parameters([Parameter("graph_path", value=str(tmp_path / "other.g2o"))])
-    answer = outside.door._save(None, Trigger.Response())
-    assert answer.success and (tmp_path / "other.g2o").is_file() and (tmp_path / "other.npz").is_file()
+    (refused,) = outside.door.set_parameters([Parameter("graph_path", value=str(tmp_path / "other.g2o"))])
+    assert not refused.successful and outside.door._save()[0]
+    assert {path.name for path in tmp_path.glob("*.g2o")} == {"map.g2o"}
+
+
+def test_a_save_keeps_a_file_of_another_kind_that_came_to_its_place(outside: Outside, tmp_path: Path) -> None:
+    outside.drive(BENT[:20])
+    (tmp_path / "map.npz").write_text("precious")
+    saved, message = outside.door._save()
+    assert not saved and "map.npz: expected a map or none, got another file" in message
+    assert (tmp_path / "map.npz").read_text() == "precious" and not (tmp_path / "map.g2o").exists()
 
 
 @pytest.mark.parametrize("publish_tf", [True, False])

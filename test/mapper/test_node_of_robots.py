@@ -17,7 +17,6 @@ from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry as OdometryMsg
 from nav_msgs.msg import Path as PathMsg
 from rclpy.executors import SingleThreadedExecutor
-from std_srvs.srv import Trigger
 
 from objreg_ros.bridge import from_msg, qos, to_msg
 from objreg_ros.data import LoopClosure
@@ -151,7 +150,7 @@ def test_a_saved_map_is_gone_on_with_by_both(fleet: Fleet) -> None:
     for a, b in ((40, 10), (20, 20)):
         fleet.close(met(a, b))
     fleet.wait(lambda: fleet.told("b", "placed in the map"))
-    assert fleet.door._save(None, Trigger.Response()).success
+    assert fleet.door._save()[0]
     fleet.door._inputs = fleet.door._inputs.replaced(resume=True)
     fleet.door._begin(fleet.door._resumed())
     assert [one.robot for one in fleet.door._graph.sessions] == ["fleet/a", "fleet/b"]

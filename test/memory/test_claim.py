@@ -120,6 +120,14 @@ def test_readers_and_the_locks_of_the_database_are_not_disturbed(tmp_path: Path,
     claim.release()
 
 
+def test_a_file_of_another_kind_at_the_name_beside_is_kept(tmp_path: Path) -> None:
+    (tmp_path / "place.db.new").write_bytes(b"precious")
+    with pytest.raises(StoreError, match=r"place\.db\.new: expected no file, got one of another kind"):
+        Claim(tmp_path / "place.db", lambda beside: None)
+    assert [path.name for path in tmp_path.iterdir()] == ["place.db.new"]
+    assert (tmp_path / "place.db.new").read_bytes() == b"precious"
+
+
 def test_a_place_that_cannot_be_locked_is_a_store_error(tmp_path: Path) -> None:
     (tmp_path / "place.db.new").mkdir()
     with pytest.raises(StoreError, match=r"place\.db: cannot keep it from other registrars: .*place\.db\.new"):

@@ -95,7 +95,7 @@ def test_a_renewal_that_fails_or_is_killed_leaves_the_old_store(
         with pytest.raises(StoreError, match=r"place\.db: cannot open: database or disk is full; it was left as it is"):
             Store(path)
         assert path.read_bytes() == DATA.read_bytes() and [p.name for p in tmp_path.iterdir()] == ["place.db"]
-    (tmp_path / "place.db.new").write_bytes(b"what a killed process left" * 1000)
+    (tmp_path / "place.db.new").write_bytes(b"SQLite format 3\0" + b"what a killed process left" * 1000)
     (tmp_path / "place.db.new-journal").write_bytes(b"its journal")
     with closing(Store(path)) as opened:
         assert opened.keyframe_ids() == [1, 3]

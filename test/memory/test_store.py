@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import random
+import re
 import shutil
 import signal
 import sqlite3
@@ -543,6 +545,56 @@ def test_the_file_shrinks_by_steps_where_many_keyframes_go(tmp_path: Path, monke
         assert store.counts()["forgotten"] == 10
         store.clear()
         assert path.stat().st_size < full / 6
+
+
+def test_a_store_in_a_file_is_put_aside_whole_not_emptied(tmp_path: Path) -> None:
+    path = tmp_path / "place.db"
+    with closing(Store(path)) as store:
+        _add(store)
+        aside = Path(store.clear())
+        assert aside.parent == tmp_path and re.fullmatch(r"place-\d{8}-\d{6}\.db", aside.name)
+        assert store.counts()["keyframes"] == 0 and store.next_keyframe() == 2
+        assert store.clear() == ""  # nothing is in it
+        _add(store)
+        assert Path(store.clear()) != aside
+        with closing(Store(aside)) as before:
+            assert before.keyframe_ids() == [1]
+        with pytest.raises(StoreError, match="in use by another registrar"):
+            Store(path)
+    with closing(Store(path)) as store:
+        assert store.keyframe_ids() == [] and store.next_keyframe() == 3
+    assert len(list(tmp_path.glob("place-*.db"))) == 2 and not list(tmp_path.glob("*.new*"))
+
+
+def test_a_store_that_cannot_be_put_aside_stays_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with closing(Store(tmp_path / "place.db")) as store:
+        _add(store)
+        for what in ("create", "dated_link"):
+            with (
+                monkeypatch.context() as patch,
+                pytest.raises(StoreError, match=r"place\.db: cannot set it aside: .*space"),
+            ):
+                patch.setattr(f"objreg_ros.memory.store.{what}", full)
+                store.clear()
+            assert store.keyframe_ids() == [1] and store.counts()["keyframes"] == 1
+            assert not list(tmp_path.glob("place-*")) and not list(tmp_path.glob("*.new*"))
+        assert _add(store) == 2
+
+
+def test_where_a_file_has_one_name_only_what_is_put_aside_is_a_copy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr(os, "link", refuse)
+    with closing(Store(tmp_path / "place.db")) as store:
+        _add(store)
+        with closing(Store(store.clear())) as before:
+            assert before.keyframe(1).labels == ("cup",)
 
 
 def test_nothing_hangs_on_the_log_alone(tmp_path: Path) -> None:

@@ -37,7 +37,8 @@ Making = Callable[[], RegistrarNode]
 def make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Making]:
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
     monkeypatch.setattr("objreg_ros.registrar.node.warm", lambda params: None)
-    rclpy.init(args=["registrar", "--ros-args", "-p", f"store:={tmp_path / 'place.db'}", "-r", "__ns:=/test_node"])
+    parameters = f"store:={tmp_path / 'place.db'}", "allow_remote_reset:=true"
+    rclpy.init(args=["--ros-args", *(part for one in parameters for part in ("-p", one)), "-r", "__ns:=/test_node"])
 
     def made() -> RegistrarNode:
         node = RegistrarNode()
@@ -76,10 +77,31 @@ def test_a_store_that_is_locked_refuses_a_reset_and_keeps_what_waits(make: Makin
     node._registrar.search(window)
     with held(tmp_path / "place.db"):
         answer, _ = call(node, "reset")
-        assert not answer.success and "place.db: cannot forget everything" in answer.message
+        assert not answer.success and "place.db: cannot" in answer.message
     assert node._registrar.counts()["keyframes"] == 1
     answer, _ = call(node, "reset")
     assert answer.success and node._registrar.counts()["keyframes"] == 0
+    node.close()
+
+
+def test_a_store_in_a_file_is_not_reset_unless_the_start_allows_it(make: Making) -> None:
+    node = make()
+    node._may_reset = False
+    node._registrar.track(frame(0, CUP))
+    answer, _ = call(node, "reset")
+    assert not answer.success and "expected allow_remote_reset:=true for a store in a file" in answer.message
+    assert len(node._registrar.end()) == 1  # nor is the keyframe in hand gone
+    node.close()
+
+
+def test_a_reset_says_where_what_was_stored_is_now(make: Making, tmp_path: Path) -> None:
+    node = make()
+    node._registrar.track(frame(0, CUP))
+    (window,) = node._registrar.end()
+    node._registrar.search(window)
+    answer, _ = call(node, "reset")
+    (aside,) = tmp_path.glob("place-*.db")
+    assert answer.success and answer.message == f"forgot every keyframe; what was stored is in {aside}"
     node.close()
 
 

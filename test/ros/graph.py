@@ -62,6 +62,11 @@ class Graph:
         """Start a node as a process; its output goes to `log`."""
         self._start(name, self.command(room, *ros_args))
 
+    def start_module(self, name: str, module: str, *ros_args: str) -> None:
+        """Start a module that is a node, as an adapter's."""
+        arguments = [word for pair in ros_args for word in pair.split(" ", 1)]
+        self._start(name, [sys.executable, "-m", module, "--ros-args", *arguments])
+
     def start_composed(self, *words: str) -> None:
         """Start all nodes in one process, called ``graph``."""
         self._start("graph", [sys.executable, "-m", "objreg_ros.graph", *words])

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The files that a map is written to: never over what is not a map of ours."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from pathlib import Path
+
+VERTEX = re.compile(rb"VERTEX_SE3:QUAT 0( -?\d+\.\d{9}){7}\n")  # as `graph_text` begins
+MEMBERS = {"told.npy", "ends.npy"}  # of what `saved.save` writes
+MOST_LINE = 500  # bytes of the first line
+
+
+def graph_file(graph_path: str) -> Path:
+    """The absolute place of a graph's text. ValueError where its folder is not there or a file that is not ours is."""
+    try:
+        path = Path(graph_path).expanduser().absolute()
+        if not path.parent.is_dir():
+            raise ValueError(f"expected a file in a folder that is there, got {path}")
+        require_ours(path)
+    except (ValueError, OSError, RuntimeError) as error:  # the latter of a home that there is not
+        raise ValueError(f"graph_path: {error}") from error
+    return path
+
+
+def require_ours(path: Path) -> None:
+    """OSError where what is at ``path`` is no plain file, or one that is neither empty nor written by a map's save."""
+    if not path.exists():
+        return
+    if not path.is_file():
+        raise OSError(f"{path}: expected a plain file or none, got a folder, pipe or device; choose another place")
+    if path.stat().st_size and not (_is_saved_map(path) if path.suffix == ".npz" else _is_graph_text(path)):
+        raise OSError(f"{path}: expected a map or none, got another file, which is kept; choose another place")
+
+
+def _is_graph_text(path: Path) -> bool:
+    with path.open("rb") as file:
+        return VERTEX.fullmatch(file.readline(MOST_LINE)) is not None
+
+
+def _is_saved_map(path: Path) -> bool:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return set(archive.namelist()) >= MEMBERS
+    except zipfile.BadZipFile:
+        return False
