@@ -124,6 +124,13 @@ class Intrinsics:
             height=len(range(top, self.height, step)),
         )
 
+    def step_within(self, most_pixels: int) -> int:
+        """The least step with which `scaled` leaves no more pixels than that."""
+        step = 1
+        while math.prod(max(1, len(range(step // 2, size, step))) for size in (self.width, self.height)) > most_pixels:
+            step += 1
+        return step
+
 
 @word
 class ColourImage:
@@ -296,6 +303,12 @@ class ObjectCloud:
 
     def __len__(self) -> int:
         return len(self.xyz)
+
+    @property
+    def nbytes(self) -> int:
+        """The memory of its points."""
+        arrays = self.xyz, self.normals, self.rgb, self.flags
+        return sum(array.nbytes for array in arrays if array is not None)
 
     def has(self, flag: PointFlag) -> bool:
         """Whether every point carries ``flag``; False without points."""

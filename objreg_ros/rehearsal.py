@@ -52,7 +52,7 @@ class _CutsNothing:
         *,
         gravity_sigma_deg: float | None = None,
     ) -> Frame:
-        step = step_for(depth.depth.shape[1], self._params.view_step)
+        step = step_for(depth.intrinsics, self._params.view_step)
         view = reduced_view(depth, step, self._params.z_min, self._params.z_max)
         return Frame(
             objects=(),

@@ -56,6 +56,15 @@ class RelocalisedParams(Params):
 
 
 @dataclass(frozen=True)
+class PeerParams(Params):
+    """What peers may ask of a registrar."""
+
+    allow_remote_reset: bool = param(
+        False, "whether ~/reset, which any peer can call, may put a store that is a file aside and begin an empty one"
+    )
+
+
+@dataclass(frozen=True)
 class KeyParams(Params):
     """What proves that a message is of one of us."""
 

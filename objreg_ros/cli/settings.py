@@ -19,7 +19,7 @@ from objreg_ros.adapters.params import (
     ToLioSamParams,
     ToRtabmapParams,
 )
-from objreg_ros.bridge.params import DoorParams, ExchangeParams, KeyParams, ManagedParams, RelocalisedParams
+from objreg_ros.bridge.params import DoorParams, ExchangeParams, KeyParams, ManagedParams, PeerParams, RelocalisedParams
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.mapper.params import MapperNodeParams, MapperParams
 from objreg_ros.params import Declaration, Params
@@ -37,6 +37,7 @@ NODES: dict[str, tuple[type[Params], ...]] = {
         RegistrarNodeParams,
         ExchangeParams,
         KeyParams,
+        PeerParams,
         RelocalisedParams,
         ManagedParams,
         DoorParams,

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from objreg_ros.data import Array
+from objreg_ros.data import Array, ObjectCloud
 from objreg_ros.registration.keyframe import Keyframe, KeyObject
 
 NEAREST_M = 0.01  # no camera measures depth so near
@@ -34,7 +34,10 @@ def _thinned_object(item: KeyObject, share: float) -> KeyObject:
 
 
 def _kept(item: KeyObject, chosen: Array) -> KeyObject:
-    cloud = item.cloud
+    return replace(item, cloud=picked(item.cloud, chosen))
+
+
+def picked(cloud: ObjectCloud, chosen: Array | slice) -> ObjectCloud:
+    """The cloud with the ``chosen`` of its points, each with its own colour, normal and flags."""
     arrays = {name: getattr(cloud, name)[chosen] for name in ("xyz", "normals", "flags")}
-    rgb = None if cloud.rgb is None else cloud.rgb[chosen]
-    return replace(item, cloud=replace(cloud, rgb=rgb, **arrays))
+    return replace(cloud, rgb=None if cloud.rgb is None else cloud.rgb[chosen], **arrays)

@@ -89,9 +89,8 @@ class FrameWindow:
 
 def _nbytes(frame: Frame) -> int:
     clouds = frame.objects if frame.support is None else (*frame.objects, frame.support)
-    arrays = [frame.view.xyz, frame.view.grey]
-    arrays += [array for cloud in clouds for array in (cloud.xyz, cloud.normals, cloud.rgb, cloud.flags)]
-    return sum(array.nbytes for array in arrays if array is not None)
+    pixels = [frame.view.xyz, frame.view.grey]
+    return sum(cloud.nbytes for cloud in clouds) + sum(array.nbytes for array in pixels if array is not None)
 
 
 def alone(frame: Frame) -> Frame:

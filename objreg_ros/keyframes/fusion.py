@@ -3,15 +3,17 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from objreg_ros.data import UNNAMED, Array, Frame, ObjectCloud, PointFlag
 from objreg_ros.geometry import inverse, rigid, rotate, transform
 from objreg_ros.keyframes.frame_window import FrameWindow
+from objreg_ros.keyframes.own_size import FRAME_POINTS, OBJECT_POINTS, best, sized_context, thinned
 from objreg_ros.registration.keyframe import Context, Keyframe, KeyObject, bounding_box
 from objreg_ros.registration.labels import LabelGroups
 from objreg_ros.registration.params import KeyframeParams
@@ -19,11 +21,10 @@ from objreg_ros.registration.prepare.normals import view_normals
 from objreg_ros.registration.prepare.voxels import _keys, thin
 
 OBJECT_VOXEL_M = 0.004  # edge of a voxel when the frames of an object are fused: finer than a Kinect's pixels at 1 m
-OBJECT_POINTS = 2000  # most of an object that are kept: what a row of the store holds
 CONTEXT_RADIUS_M = 1.0  # how far around an object the context reaches: a table, not a room
 CONTEXT_VOXEL_M = 0.03  # edge of a voxel of the context; finer ones gain nothing
+Box = tuple[Array, float]  # middle (3,) and extent of a cloud, m
 CUT = np.uint16(PointFlag.CUT_BY_IMAGE | PointFlag.CUT_BY_BOX)
-SPARE = 3  # points of each sighting for each one that is kept of the object
 CENTRE_SPREAD = 0.05  # m: how far the middle of one small object wanders between neighbouring frames
 
 
@@ -64,22 +65,25 @@ def fuse_objects(
     """Every object once: the same label group at the same place is the same object, seen from several sides.
 
     One without points is nowhere, and is passed over. So is one without a name that only one of several frames shows;
-    where another frame names it, it is that.
+    where another frame names it, it is that. Of more than `own_size.OBJECTS` those that were surest are kept.
     """
     groups = LabelGroups(label_groups)
     tracks: list[_Track] = []
     for frame, T in zip(frames, T_reference_frame, strict=True):
         free = list(tracks)
         for item in (item for item in frame.objects if len(item)):
-            sighting = _moved(item, T, most=SPARE * OBJECT_POINTS)
-            track = _nearest(sighting, free, groups)
+            sighting = _moved(item, T)
+            box = bounding_box(sighting.xyz)
+            track = _nearest(sighting, box, free, groups)
             if track is None:
-                tracks.append(_Track([sighting]))
+                tracks.append(_Track([sighting], box))
             else:
                 free.remove(track)
                 track.sightings.append(sighting)
+                track.box = box
     kept = [track for track in tracks if track.name != UNNAMED or len(track.sightings) > 1 or len(frames) == 1]
-    return tuple(track.fused(number) for number, track in enumerate(kept, start=1))
+    surest = best(kept, lambda track: max(sighting.score for sighting in track.sightings))
+    return tuple(track.fused(number) for number, track in enumerate(surest, start=1))
 
 
 def fuse_context(
@@ -90,7 +94,7 @@ def fuse_context(
     points, normals = (np.concatenate(part) for part in zip(*seen, strict=True))
     xyz, directions = thin(points, normals, CONTEXT_VOXEL_M)
     near = _near(xyz, [item.centroid for item in objects], CONTEXT_RADIUS_M)
-    return Context(xyz=xyz[near], normals=directions[near])
+    return sized_context(Context(xyz=xyz[near], normals=directions[near]))
 
 
 def _surface(frame: Frame, T_reference_frame: Array, reach: float) -> tuple[Array, Array]:
@@ -102,9 +106,10 @@ def _surface(frame: Frame, T_reference_frame: Array, reach: float) -> tuple[Arra
 
 @dataclass(slots=True, eq=False)
 class _Track:
-    """The sightings of one object, all in the reference frame."""
+    """The sightings of one object, all in the reference frame, and the bounding box of the last."""
 
-    sightings: list[ObjectCloud] = field(default_factory=list)
+    sightings: list[ObjectCloud]
+    box: Box
 
     @property
     def name(self) -> str:
@@ -141,33 +146,23 @@ def _merge(sightings: Sequence[ObjectCloud], label: str, best: ObjectCloud, inst
     )
 
 
-def _nearest(item: ObjectCloud, tracks: Sequence[_Track], groups: LabelGroups) -> _Track | None:
-    middle, extent = bounding_box(item.xyz)
-    best, best_distance = None, np.inf
+def _nearest(item: ObjectCloud, box: Box, tracks: Sequence[_Track], groups: LabelGroups) -> _Track | None:
+    """The track whose last sighting is the same object; ``box`` is the item's."""
+    group = None if item.label == UNNAMED else groups.of(item.label)
+    near, nearest_m = None, np.inf
     for track in tracks:
-        last = track.sightings[-1]
-        if UNNAMED not in (item.label, track.name) and groups.of(track.name) != groups.of(item.label):
+        if group is not None and track.name != UNNAMED and groups.of(track.name) != group:
             continue
-        last_middle, last_extent = bounding_box(last.xyz)
-        distance = float(np.linalg.norm(middle - last_middle))
-        if distance < min(best_distance, CENTRE_SPREAD + 0.25 * min(extent, last_extent)):
-            best, best_distance = track, distance
-    return best
+        distance = math.dist(box[0], track.box[0])
+        if distance < min(nearest_m, CENTRE_SPREAD + 0.25 * min(box[1], track.box[1])):
+            near, nearest_m = track, distance
+    return near
 
 
-def _moved(item: ObjectCloud, T: Array, most: int) -> ObjectCloud:
-    """The cloud in another frame; of more than ``most`` points every so many."""
-    every = slice(None, None, 1 + (len(item) - 1) // most)
-    return ObjectCloud(
-        label=item.label,
-        score=item.score,
-        instance=item.instance,
-        xyz=transform(T, item.xyz[every]),
-        normals=rotate(T, item.normals[every]),
-        rgb=None if item.rgb is None else item.rgb[every],
-        flags=item.flags[every],
-        density=item.density,
-    )
+def _moved(item: ObjectCloud, T: Array) -> ObjectCloud:
+    """The cloud in another frame, of no more points than a keyframe needs."""
+    few = thinned(item, FRAME_POINTS)
+    return replace(few, xyz=transform(T, few.xyz), normals=rotate(T, few.normals))
 
 
 def _near(points: Array, centres: Sequence[Array], radius: float) -> Array:

@@ -18,6 +18,7 @@ from objreg_ros.geometry import inverse, leaps, rigid, rotation_angle
 from objreg_ros.keyframes.frame_window import Clock, FrameWindow, SessionNumbers, alone, with_gravity_of
 from objreg_ros.keyframes.gravity_filter import GravityFilter
 from objreg_ros.keyframes.odometry import TravelledPath
+from objreg_ros.keyframes.own_size import sized_frame
 from objreg_ros.keyframes.tracking import TrackedSurface, same_picture, tracked_surface, view_motion
 from objreg_ros.keyframes.turn import LastPicture
 from objreg_ros.registration.params import KeyframeParams
@@ -133,6 +134,7 @@ class Keyframer:
         """Track the frame and collect it. A lost track, odometry that leaps or a clock that does begins a new session.
         One that is not later than the last, but by no jump, is passed over.
         """
+        frame = sized_frame(frame)
         last_ns, session = self._last_ns, self._session
         if last_ns is not None and 0 <= last_ns - frame.stamp_ns < JUMP_NS:
             return None

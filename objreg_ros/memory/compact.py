@@ -24,6 +24,7 @@ from objreg_ros.geometry import back_project
 from objreg_ros.keyframes import quantised
 from objreg_ros.keyframes.columns import Columns, column
 from objreg_ros.keyframes.fewer_points import in_front, thinned
+from objreg_ros.keyframes.own_size import sized_keyframe
 from objreg_ros.memory.codec import camera_of, camera_text, gravity_of, pose_of
 from objreg_ros.registration.keyframe import Context, Keyframe, KeyObject
 
@@ -65,7 +66,10 @@ def pack_keyframe(keyframe: Keyframe, most_bytes: int = MOST_BYTES) -> bytes:
 
 
 def unpack_keyframe(packed: bytes) -> Keyframe:
-    """The keyframe of `pack_keyframe`, with id 0. ValueError if it is damaged, of another format, or too large."""
+    """The keyframe of `pack_keyframe`, with id 0, at its `own_size`.
+
+    ValueError if it is damaged, of another format, or too large.
+    """
     body = _decompressed(packed)
     line, _, rest = body.partition(b"\n")
     try:
@@ -77,7 +81,7 @@ def unpack_keyframe(packed: bytes) -> Keyframe:
         raise ValueError(
             f"expected a packed keyframe, got {len(packed)} bytes that are none ({str(error)[:MOST_SAID]})"
         ) from error
-    return keyframe
+    return sized_keyframe(keyframe)
 
 
 def _packed(keyframe: Keyframe) -> bytes:

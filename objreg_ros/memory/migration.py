@@ -19,8 +19,9 @@ from objreg_ros.memory.checksum import (
     sealed_keyframe,
     sealed_object,
 )
+from objreg_ros.memory.claim import Claim
 from objreg_ros.memory.store_file import SCHEMA as NEWEST
-from objreg_ros.memory.store_file import bear, check, read_only_uri
+from objreg_ros.memory.store_file import SCHEMA_VERSION, bear, check, connect, read_only_uri
 
 LAST = 4  # the last version without checksums
 ROBOTLESS = 5  # the last that knew of one robot only
@@ -200,3 +201,22 @@ def _parts(connection: sqlite3.Connection) -> set[tuple[str, str, str, str]]:
         columns = connection.execute(f'PRAGMA table_info("{quoted}")').fetchall() if kind == "table" else []
         parts |= {(str(kind), str(name), "", "")} | {(str(kind), str(name), str(c[1]), str(c[2])) for c in columns}
     return parts
+
+
+def opened(path: Path, claim: Claim | None) -> sqlite3.Connection:
+    """A connection to the store at ``path``, as of this version; without a claim to read it only. StoreError if bad."""
+    old = check(path) < SCHEMA_VERSION
+    if claim is None and old:
+        connection = connect("")  # a file of SQLite's own, which goes with it
+        renew(path, connection)
+        return connection
+    if claim is None:
+        connection = connect(read_only_uri(path))
+        connection.execute("BEGIN")  # all that is read is of one moment
+        return connection
+    if old:
+        claim.replace(lambda beside: renewed(path, beside))
+    connection = connect(str(path))
+    connection.execute("PRAGMA journal_mode = WAL")
+    connection.execute("PRAGMA wal_autocheckpoint = 1")
+    return connection

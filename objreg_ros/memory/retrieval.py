@@ -149,11 +149,21 @@ class Index:
 
 
 @numba.njit(cache=True, nogil=True)
+def _gap(xyz, i, j):  # type: ignore[no-untyped-def]
+    x, y, z = xyz[i, 0] - xyz[j, 0], xyz[i, 1] - xyz[j, 1], xyz[i, 2] - xyz[j, 2]
+    return np.sqrt(x * x + y * y + z * z)
+
+
+@numba.njit(cache=True, nogil=True)
 def _tally(keyframe_ids, ballots, votes, xyz, asked_xyz):  # type: ignore[no-untyped-def]
     """A row of each keyframe, the oldest first, and its votes: of each ballot the first, its nearest object's.
 
     And those of pairs of objects that are as far from each other as the two that were asked for.
     """
+    asked_gaps = np.empty((len(asked_xyz), len(asked_xyz)))
+    for i in range(len(asked_xyz)):
+        for j in range(len(asked_xyz)):
+            asked_gaps[i, j] = _gap(asked_xyz, i, j)
     order = np.argsort(keyframe_ids, kind="mergesort")
     first, total, found, start = np.empty(len(order), np.int64), np.zeros(len(order)), 0, 0
     while start < len(order):
@@ -165,25 +175,27 @@ def _tally(keyframe_ids, ballots, votes, xyz, asked_xyz):  # type: ignore[no-unt
         for k, row in enumerate(rows):
             if k == 0 or ballots[row] != ballots[rows[k - 1]]:
                 total[found] += votes[row]
-        total[found] += _arranged(ballots[rows], votes[rows], xyz[rows], asked_xyz)
+        total[found] += _arranged(ballots[rows], votes[rows], xyz[rows], asked_gaps)
         found, start = found + 1, stop
     return first[:found], total[:found]
 
 
 @numba.njit(cache=True, nogil=True)
-def _arranged(ballots, votes, xyz, asked_xyz):  # type: ignore[no-untyped-def]
+def _arranged(ballots, votes, xyz, asked_gaps):  # type: ignore[no-untyped-def]
     """The votes of pairs of one keyframe's objects: each object has as much to give as by itself, over all others."""
     if len(votes) < 2 or ballots[0] == ballots[-1]:
         return 0.0
-    objects = len(asked_xyz)
+    objects = len(asked_gaps)
     best = np.zeros((objects, objects))
     for i in range(len(votes)):
         for j in range(i):
             a, b = ballots[j], ballots[i]
-            gap = np.sqrt(np.sum((xyz[i] - xyz[j]) ** 2))
-            if a == b or gap == 0.0:  # two answers to one object, or one to two
+            if a == b:  # two answers to one object
                 continue
-            off = (gap - np.sqrt(np.sum((asked_xyz[a] - asked_xyz[b]) ** 2))) / GAP_SIGMA_M
+            gap = _gap(xyz, i, j)
+            if gap == 0.0:  # one answer to two
+                continue
+            off = (gap - asked_gaps[a, b]) / GAP_SIGMA_M
             best[a, b] = max(best[a, b], np.sqrt(votes[i] * votes[j]) * np.exp(-0.5 * off * off))
     return best.sum() / (objects - 1)
 

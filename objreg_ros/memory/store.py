@@ -5,21 +5,21 @@ What `Store.add` has returned from is on the disk: the file is in WAL mode with 
 with its objects and closures is one transaction, so a process that is killed at any moment leaves whole keyframes.
 The log is folded into the file after each of them, so that nothing hangs on the log alone. What is read was written:
 every row has a checksum of all that it says (`seal`), and the `books` say how many there are. Memory is bounded: only
-the last few keyframes that were used stay decoded. So is the file: room that is left free goes back to the disk.
+the last keyframes that were used stay decoded. So is the file: room that is left free goes back to the disk.
 """
 
 from __future__ import annotations
 
+import math
 import sqlite3
-from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from objreg_ros.data import LoopClosure
+from objreg_ros.keyframes.recent import RecentKeyframes
 from objreg_ros.memory.books import Books, read_books
 from objreg_ros.memory.checksum import HEAD, require_head
 from objreg_ros.memory.claim import Claim, StoreError
@@ -31,27 +31,27 @@ from objreg_ros.memory.codec import (
     sighting_from_row,
 )
 from objreg_ros.memory.landmarks import Merge
-from objreg_ros.memory.migration import renew, renewed
+from objreg_ros.memory.migration import opened
 from objreg_ros.memory.sighting import Sighting
 from objreg_ros.memory.store_file import (
-    SCHEMA_VERSION,
+    STEP,
     bear,
-    check,
+    bytes_in_use,
+    bytes_of,
     connect,
+    copy,
     create,
     dated_link,
-    read_only_uri,
+    fold_log,
     require_place,
+    shrink,
 )
 from objreg_ros.memory.transaction import OBJECTS, SESSION, delete, rename_landmarks, write, write_closures
 from objreg_ros.registration.keyframe import Keyframe
 
 LEFT = "; it was left as it is. Use a copy of it or another path"
-CACHED = 64  # decoded keyframes in memory, about 1 MB each
 MOST_CLOSURES = 100_000  # of 1.5 kB; the oldest are forgotten
 HEADS = f"SELECT {', '.join(HEAD)}, seal FROM keyframe ORDER BY id"
-SPARE = 2048  # pages of 4 kB that may lie free in the file: what comes next takes them
-STEP = 4096  # pages that are given back at once: 16 MB, so that no keyframe waits long
 
 
 class Store:
@@ -64,7 +64,7 @@ class Store:
 
     def __init__(self, path: str | Path = "", read_only: bool = False) -> None:
         self.path = str(Path(path).expanduser().resolve()) if str(path) else ""  # of a link what it leads to
-        self._cache: OrderedDict[int, Keyframe] = OrderedDict()
+        self._recent = RecentKeyframes()
         self._heads: dict[int, Mapping[str, Any]] = {}  # of the keyframes, the oldest first
         self._books = Books()
         self._claim: Claim | None = None
@@ -77,31 +77,13 @@ class Store:
             if not read_only:
                 self._claim = Claim(Path(self.path), create)
                 undo.callback(self._claim.release)
-            self._connection = self._opened(Path(self.path), self._claim)
+            self._connection = opened(Path(self.path), self._claim)
             undo.callback(self._connection.close)
             self._books = read_books(self._connection)
             for head in self._connection.execute(HEADS):
                 require_head(head)
                 self._heads[head["id"]] = head
             undo.pop_all()
-
-    @staticmethod
-    def _opened(path: Path, claim: Claim | None) -> sqlite3.Connection:
-        old = check(path) < SCHEMA_VERSION
-        if claim is None and old:
-            connection = connect("")  # a file of SQLite's own, which goes with it
-            renew(path, connection)
-            return connection
-        if claim is None:
-            connection = connect(read_only_uri(path))
-            connection.execute("BEGIN")  # all that is read is of one moment
-            return connection
-        if old:
-            claim.replace(lambda beside: renewed(path, beside))
-        connection = connect(str(path))
-        connection.execute("PRAGMA journal_mode = WAL")
-        connection.execute("PRAGMA wal_autocheckpoint = 1")
-        return connection
 
     def add(
         self,
@@ -125,7 +107,7 @@ class Store:
             write_closures(transaction, books, closures, MOST_CLOSURES)
             rename_landmarks(transaction, books, merged or {})
         self._heads[keyframe.keyframe_id] = {name: row[name] for name in HEAD}
-        self._remember(keyframe)
+        self._recent.keep(keyframe)
 
     def add_closure(self, closure: LoopClosure, merged: Mapping[int, Merge]) -> None:
         """Write a closure of keyframes that are stored already; ``merged`` and StoreError as in `add`."""
@@ -135,16 +117,15 @@ class Store:
 
     def keyframe(self, keyframe_id: int) -> Keyframe:
         """A stored keyframe; KeyError if it is not there, StoreError if it is damaged."""
-        if keyframe_id in self._cache:
-            self._cache.move_to_end(keyframe_id)
-            return self._cache[keyframe_id]
+        if (recent := self._recent.get(keyframe_id)) is not None:
+            return recent
         with self._told(f"read keyframe {keyframe_id}"):
             row = self._connection.execute("SELECT * FROM keyframe WHERE id = ?", (keyframe_id,)).fetchone()
             if row is None:
                 raise KeyError(keyframe_id)
             objects = self._connection.execute("SELECT * FROM object WHERE keyframe = ? ORDER BY id", (keyframe_id,))
             keyframe = keyframe_from_rows(row, objects.fetchall())
-        self._remember(keyframe)
+        self._recent.keep(keyframe)
         return keyframe
 
     def sightings(self, keyframe_id: int | None = None) -> Iterator[Sighting]:
@@ -165,9 +146,20 @@ class Store:
         """The ids of the stored keyframes, oldest first."""
         return list(self._heads)
 
-    def beyond(self, most: int) -> list[int]:
-        """The ids of the oldest keyframes, those that are more than ``most``."""
-        return list(islice(self._heads, max(len(self._heads) - most, 0)))
+    def beyond(self, most: int, most_bytes: float = math.inf) -> list[int]:
+        """The ids of the oldest keyframes, those that are more than ``most`` or make the store larger than that.
+
+        The newest is never one of them.
+        """
+        with self._told("look at its size"):
+            spare = bytes_in_use(self._connection) - most_bytes
+            ids = list(self._heads)
+            count = max(len(ids) - most, 0)
+            spare -= sum(bytes_of(self._connection, number) for number in ids[:count]) if spare > 0 else 0
+            while spare > 0 and count < len(ids) - 1:
+                spare -= bytes_of(self._connection, ids[count])
+                count += 1
+            return ids[:count]
 
     def remove(self, keyframe_ids: Sequence[int], forgotten: int = 0) -> None:
         """Forget keyframes and their objects; their closures stay, up to `MOST_CLOSURES`.
@@ -181,8 +173,10 @@ class Store:
                 delete(transaction, books, "keyframe", "WHERE id = ?", (keyframe_id,))
             books.forgotten += forgotten
         for keyframe_id in keyframe_ids:
-            self._cache.pop(keyframe_id, None), self._heads.pop(keyframe_id, None)
-        self._shrink(STEP)
+            self._recent.drop(keyframe_id)
+            self._heads.pop(keyframe_id, None)
+        with self._told("give room back"):
+            shrink(self._connection, STEP)
 
     def clear(self) -> str:
         """Forget everything but the ids that were given; where what was is now, empty where it is nowhere.
@@ -196,7 +190,7 @@ class Store:
             for table in ("closure", "object", "keyframe"):
                 delete(transaction, books, table)
             books.forgotten = 0
-        self._cache, self._heads = OrderedDict(), {}
+        self._begin(books)
         return ""
 
     def _set_aside(self, claim: Claim) -> str:
@@ -212,17 +206,13 @@ class Store:
                     dated.unlink()
                     raise
             finally:
-                self._connection = self._opened(path, claim)
-        self._cache, self._heads, self._books = OrderedDict(), {}, given
+                self._connection = opened(path, claim)
+        self._begin(given)
         return str(dated)
 
-    def _shrink(self, most: int = 0) -> None:
-        """Give room that lies free in the file back to the disk: all beyond `SPARE`, or ``most`` pages of it."""
-        with self._told("give room back"):
-            spare = self._connection.execute("PRAGMA freelist_count").fetchone()[0] - SPARE
-            if spare > 0:
-                pages = min(spare, most) if most else spare
-                self._connection.executescript(f"PRAGMA incremental_vacuum({pages})")  # to its end
+    def _begin(self, books: Books) -> None:
+        self._recent.clear()
+        self._heads, self._books = {}, books
 
     @contextmanager
     def _changing(self) -> Iterator[tuple[sqlite3.Connection, Books]]:
@@ -280,34 +270,13 @@ class Store:
         """
         with self._told(f"copy it to {path}" if path else "save it"):
             if path:
-                self._copy(Path(path).expanduser())
+                copy(self._connection, Path(path).expanduser())
                 return str(path)
             if not self.path:
                 raise ValueError("expected a store in a file, got one in memory only; start with a path for it")
-            self._shrink()
-            busy, *_ = self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
-            if busy:
-                name = Path(self.path).name
-                raise ValueError(
-                    f"expected nobody else to read it, got another program that does; all is written, but what is in "
-                    f"{name}-wal is not in {name} yet: end that program and save again"
-                )
+            shrink(self._connection)
+            fold_log(self._connection, Path(self.path).name)
             return self.path
-
-    def _copy(self, path: Path) -> None:
-        """Write a whole copy in the place of what is there, if it is nobody's."""
-
-        def make(beside: Path) -> None:
-            with closing(sqlite3.connect(beside)) as copy:
-                self._connection.backup(copy)
-
-        there = path.exists()
-        claim = Claim(path, make)
-        try:
-            if there:
-                claim.replace(make)
-        finally:
-            claim.release()
 
     def close(self) -> None:
         """End it; everything that was added is already written."""
@@ -327,8 +296,3 @@ class Store:
         except (sqlite3.Error, ValueError, OverflowError, OSError) as error:
             why = " ".join(str(error).split())
             raise StoreError(f"{self.path or 'memory'}: cannot {what}: {why}{advice}") from error
-
-    def _remember(self, keyframe: Keyframe) -> None:
-        self._cache[keyframe.keyframe_id] = keyframe
-        while len(self._cache) > CACHED:
-            self._cache.popitem(last=False)

@@ -11,11 +11,16 @@ from contextlib import closing
 from pathlib import Path
 
 from objreg_ros.memory.books import Books
-from objreg_ros.memory.claim import MAGIC, StoreError, read_header
+from objreg_ros.memory.claim import MAGIC, Claim, StoreError, read_header
 from objreg_ros.whole_file import whole_file
 
 APPLICATION_ID = 0x4F424A52  # "OBJR" at byte 68 of the file
 SCHEMA_VERSION = 6  # at byte 60
+SPARE = 2048  # pages of 4 kB that may lie free in the file: what comes next takes them
+STEP = 4096  # pages that are given back at once: 16 MB, so that no keyframe waits long
+PAGES = "page_count", "freelist_count", "page_size"
+BYTES = """SELECT (SELECT LENGTH(view) + LENGTH(context) FROM keyframe WHERE id = ?)
+  + COALESCE((SELECT SUM(LENGTH(cloud)) FROM object WHERE keyframe = ?), 0)"""
 MOST_AGAIN = 1000  # files that one second may be the date of
 SCHEMA = """
 CREATE TABLE keyframe (
@@ -80,6 +85,51 @@ def bear(connection: sqlite3.Connection, books: Books | None = None) -> None:
         (books or Books()).write(transaction)
 
 
+def shrink(connection: sqlite3.Connection, most: int = 0) -> None:
+    """Give room that lies free in the file back to the disk: all beyond `SPARE`, or ``most`` pages of it."""
+    spare = connection.execute("PRAGMA freelist_count").fetchone()[0] - SPARE
+    if spare > 0:
+        pages = min(spare, most) if most else spare
+        connection.executescript(f"PRAGMA incremental_vacuum({pages})")  # to its end
+
+
+def fold_log(connection: sqlite3.Connection, name: str) -> None:
+    """Fold the write-ahead log into the file of that name; ValueError where another program reads it."""
+    busy, *_ = connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
+    if busy:
+        raise ValueError(
+            f"expected nobody else to read it, got another program that does; all is written, but what is in "
+            f"{name}-wal is not in {name} yet: end that program and save again"
+        )
+
+
+def bytes_in_use(connection: sqlite3.Connection) -> int:
+    """What the pages take that are not free."""
+    pages, free, size = (connection.execute(f"PRAGMA {what}").fetchone()[0] for what in PAGES)
+    return int((pages - free) * size)
+
+
+def bytes_of(connection: sqlite3.Connection, keyframe_id: int) -> int:
+    """About what a keyframe and its objects take."""
+    return int(connection.execute(BYTES, (keyframe_id, keyframe_id)).fetchone()[0])
+
+
+def copy(connection: sqlite3.Connection, path: Path) -> None:
+    """Write a whole copy of an open store in the place of what is at ``path``, if it is nobody's."""
+
+    def make(beside: Path) -> None:
+        with closing(sqlite3.connect(beside)) as into:
+            connection.backup(into)
+
+    there = path.exists()
+    claim = Claim(path, make)
+    try:
+        if there:
+            claim.replace(make)
+    finally:
+        claim.release()
+
+
 def dated_link(path: Path) -> Path:
     """A second name of a file, ``place-20261127-101500.db`` by the clock here; OSError if it cannot have one.
 
@@ -92,8 +142,8 @@ def dated_link(path: Path) -> Path:
         try:
             os.link(path, dated)
         except OSError:
-            with whole_file(dated) as copy, path.open("rb") as source:
-                shutil.copyfileobj(source, copy)
+            with whole_file(dated) as into, path.open("rb") as source:
+                shutil.copyfileobj(source, into)
         return dated
     raise FileExistsError(f"{dated}: expected a free name, got {MOST_AGAIN} that are taken")
 

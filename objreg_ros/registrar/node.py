@@ -24,7 +24,7 @@ from objreg_ros.bridge.key import read_key
 from objreg_ros.bridge.keyframes_in import FromRobot, KeyframesIn
 from objreg_ros.bridge.lifetime import await_kernels
 from objreg_ros.bridge.markers import Scene
-from objreg_ros.bridge.params import ExchangeParams, KeyParams, ManagedParams, RelocalisedParams
+from objreg_ros.bridge.params import ExchangeParams, KeyParams, ManagedParams, PeerParams, RelocalisedParams
 from objreg_ros.bridge.relocalised import Whereabouts
 from objreg_ros.bridge.robots import prefixes_of
 from objreg_ros.bridge.spin import run
@@ -67,8 +67,8 @@ class RegistrarNode(FramesDoor):
     """
 
     def __init__(self, indoors: Indoors | None = None) -> None:
-        kinds = RegistrarParams, RegistrarNodeParams, ExchangeParams, KeyParams, RelocalisedParams, ManagedParams
-        super().__init__("registrar", *kinds, indoors=indoors)
+        kinds = RegistrarParams, RegistrarNodeParams, ExchangeParams, KeyParams, PeerParams
+        super().__init__("registrar", *kinds, RelocalisedParams, ManagedParams, indoors=indoors)
 
     def open(self) -> None:
         """Load the kernels, open the store, publish and listen."""
@@ -84,7 +84,7 @@ class RegistrarNode(FramesDoor):
     def _open_to(self, inputs: RegistrarNodeParams, refused: ExitStack) -> None:
         self._tracking, self._telling = threading.Lock(), threading.Lock()
         self._unsearched, self._scene = 0, Scene()
-        self._may_reset = inputs.allow_remote_reset
+        self._may_reset = self.settings.of(PeerParams).allow_remote_reset
         self.when_silent(lambda doubt: self._publish(self._registrar.release(doubt)))
         self._counts = dict(self._registrar.counts())
         self._robots = prefixes_of(self, list(inputs.cameras)) if inputs.robots else {}
@@ -210,8 +210,9 @@ class RegistrarNode(FramesDoor):
         if self._counts["forgotten"] != forgotten:
             self.throttled.warn(
                 "forgotten",
-                f"the store is full: it keeps {self._counts['keyframes']} keyframes (max_keyframes), and has forgotten "
-                f"the oldest {self._counts['forgotten']}; places that only they show are not recognised any more",
+                f"the store is full: it keeps {self._counts['keyframes']} keyframes (max_keyframes, max_megabytes), "
+                f"and has forgotten the oldest {self._counts['forgotten']}; places that only they show are not "
+                "recognised any more",
             )
 
     def extra_diagnostics(self) -> Mapping[str, object]:

@@ -106,7 +106,8 @@ class Recollection:
 
     def _forget_surplus(self, named: Sequence[Sighting]) -> None:
         spare = self.landmarks.surplus(sighting.landmark for sighting in named)
-        beyond = [k for k in self.store.beyond(self.params.max_keyframes) if k not in spare]
+        most = self.params.max_keyframes, 1e6 * self.params.max_megabytes
+        beyond = [number for number in self.store.beyond(*most) if number not in spare]
         spare += beyond
         if spare:
             self.store.remove(spare, forgotten=len(beyond))

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The room's one verb: frames in, closures and refusals out.
+"""Frames in, closures and refusals out.
 
 `Registrar.track` is the part for every frame, `Registrar.search` the part for every keyframe; they may run in two
 threads, each in one. `Registrar.process` is both in a row: the same frames always give the same closures. Frames of
-several robots, and of several cameras of one, may come in turn. `Registrar.receive` takes keyframes of machines that
-track by themselves.
+several robots and cameras may come in turn. `Registrar.receive` takes keyframes of machines that track by themselves.
 """
 
 from __future__ import annotations
@@ -134,8 +133,8 @@ class Registrar:
         The likeliest places come first; those that are not begun within ``seconds``, or before ``hurried``, are refused
         as over budget: with no time the keyframe is only stored. Without a limit the outcome depends on the frames
         alone. Keyframes are numbered as they come here: in the order of their frames. StoreError where one cannot be
-        stored; then it closes nothing. Of a frame window that a `reset` overtook nothing comes, nor of
-        one whose objects have no name and were seen but once. One whose camera is in doubt is refused, and not stored.
+        stored; then it closes nothing. Of a frame window that a `reset` overtook nothing comes, nor of one whose
+        objects have no name and were seen but once. One whose camera is in doubt is refused, and not stored.
         """
         budget = Budget(time.monotonic() + seconds, hurried)
         with self._lock:
@@ -261,14 +260,11 @@ class Registrar:
             return in_turn([track.release(self._recollection, doubt) for track in self._tracks.all()])
 
     def reset(self) -> str:
-        """Forget everything; where a store's file was put, empty for a store in memory, or one without anything.
-
-        StoreError, and nothing is forgotten, where that cannot be.
-        """
+        """Forget everything as `Store.clear` does, whose answer it is."""
         with self._lock:
-            aside = self._store.clear()
+            kept_at = self._store.clear()
             self._start(self._numbers.next)
-            return aside
+        return kept_at
 
     def save(self, path: str = "") -> str:
         """Bring the store's file up to date, or write a copy of it to ``path``; returns where it is.

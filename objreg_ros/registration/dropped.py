@@ -10,10 +10,10 @@ from __future__ import annotations
 CONSTANT_OF = {
     "keyframes/fusion.py": {
         "object_voxel": "OBJECT_VOXEL_M",
-        "object_points": "OBJECT_POINTS",
         "context_radius": "CONTEXT_RADIUS_M",
         "context_voxel": "CONTEXT_VOXEL_M",
     },
+    "keyframes/own_size.py": {"object_points": "OBJECT_POINTS"},
     "keyframes/keyframer.py": {
         "keyframe_min_objects": "LEAST_OBJECTS",
         "keyframe_frames": "MOST_FRAMES",

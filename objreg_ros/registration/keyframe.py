@@ -97,6 +97,12 @@ class Keyframe:
         """The label of each object, in their order."""
         return tuple(item.label for item in self.objects)
 
+    @property
+    def nbytes(self) -> int:
+        """The memory of its points, pixels and colours."""
+        arrays = [self.context.xyz, self.context.normals, self.view.xyz, self.view.grey]
+        return sum(item.cloud.nbytes for item in self.objects) + sum(a.nbytes for a in arrays if a is not None)
+
     def numbered(self, keyframe_id: int) -> Keyframe:
         """The same keyframe under the id that a store gave it."""
         return replace(self, keyframe_id=keyframe_id)

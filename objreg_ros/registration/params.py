@@ -41,6 +41,7 @@ class RegistrarParams(KeyframeParams):
     store: str = param("", "the SQLite file that remembers; empty: memory only, forgotten at the end", is_path=True)
     max_views: int = param(8, "views of one object that are kept, the most diverse", ge=1)
     max_keyframes: int = param(20000, "most keyframes that are kept; the oldest go first", ge=1)
+    max_megabytes: float = param(10000.0, "largest store; the oldest keyframes go first", "MB", ge=1.0)
 
     # Which stored keyframes a new one is compared with.
     min_gap: float = param(2.0, "least time between the two moments of a constraint", "s", ge=0.0, live=True)
@@ -126,9 +127,6 @@ class RegistrarNodeParams(FramesParams):
     )
     search_seconds: float = param(
         0.0, "longest search for one keyframe; 0: as long as it takes", "s", ge=0.0, live=True
-    )
-    allow_remote_reset: bool = param(
-        False, "whether ~/reset, which any peer can call, may put a store that is a file aside and begin an empty one"
     )
 
     def __post_init__(self) -> None:

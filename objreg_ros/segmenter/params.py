@@ -47,7 +47,7 @@ class SegmenterParams(Params):
     view_step: int = param(
         4,
         "the view keeps one pixel of so many in each row and column; a smaller step is taken where less than 160 "
-        "columns would be left",
+        "columns would be left, a larger one where more than 160 000 pixels would be",
         ge=1,
         le=32,
     )

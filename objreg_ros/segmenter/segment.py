@@ -97,7 +97,7 @@ class Segmenter:
         """
         params, outlines = self.params, _outlines(masks, detections, depth)
         depth = self.sensor.register(_plain(depth))
-        seen = (depth, step_for(depth.depth.shape[1], params.view_step), params.z_min, params.limits[0])
+        seen = (depth, step_for(depth.intrinsics, params.view_step), params.z_min, params.limits[0])
         view = self._beside.submit(reduced_view, *seen)
         ground = self._ground(depth, gravity, gravity_sigma_deg)
         taken = np.zeros(ground.surface.depth.shape, np.bool_)

@@ -7,15 +7,19 @@ import cv2
 import numba
 import numpy as np
 
-from objreg_ros.data import Array, DepthImage, View
+from objreg_ros import limits
+from objreg_ros.data import Array, DepthImage, Intrinsics, View
 
 BETWEEN = np.array([-1.0, 9.0, 9.0, -1.0]) / 16.0  # of four pixels: what is between the two in the middle
 LEAST_WIDTH = 160  # px: what a narrower view holds is too coarse to tell where a pose is
 
 
-def step_for(width: int, most: int) -> int:
-    """The step of the view of a picture so many pixels wide: ``most``, or what leaves `LEAST_WIDTH` columns."""
-    return max(1, min(most, width // LEAST_WIDTH))
+def step_for(camera: Intrinsics, most: int) -> int:
+    """The step of the view of a camera's picture: ``most``, or what leaves `LEAST_WIDTH` columns.
+
+    Of a huge picture a larger one, so that it leaves the pixels that the registrar works with.
+    """
+    return max(1, min(most, camera.width // LEAST_WIDTH), camera.step_within(limits.OWN_VIEW_PIXELS))
 
 
 def reduced_view(image: DepthImage, step: int, z_min: float, z_max: float) -> View:

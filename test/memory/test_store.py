@@ -23,7 +23,6 @@ from registration.samples import box, keyframe, moved
 
 from objreg_ros.data import LoopClosure
 from objreg_ros.geometry import rotation_from_vector
-from objreg_ros.memory import store as store_module
 from objreg_ros.memory.books import MOST_IDS
 from objreg_ros.memory.codec import pack
 from objreg_ros.memory.landmarks import Merge
@@ -270,22 +269,27 @@ def test_a_store_that_was_saved_is_whole_without_the_log_beside_it(tmp_path: Pat
     assert Store(tmp_path / "alone.db").counts()["keyframes"] == 1
 
 
-def test_what_was_not_used_for_longest_leaves_the_memory_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(store_module, "CACHED", 2)
+def test_only_the_last_keyframes_stay_in_memory() -> None:
     store = Store()
-    first, second = (_add(store, float(i)) for i in range(2))
-    left, kept = store.keyframe(second), store.keyframe(first)
-    _add(store, 2.0)
-    assert store.keyframe(first) is kept and store.keyframe(second) is not left
-
-
-def test_only_the_last_few_keyframes_stay_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(store_module, "CACHED", 3)
-    store = Store()
+    store._recent.most_bytes = 3 * keyframe().nbytes
     numbers = [_add(store, float(i)) for i in range(6)]
-    for number in numbers:
-        assert store.keyframe(number).keyframe_id == number
-    assert len(store._cache) == 3
+    first = [store.keyframe(number) for number in numbers]
+    assert [store.keyframe(number) is was for number, was in zip(numbers[3:], first[3:], strict=True)] == [True] * 3
+    assert [store.keyframe(number) is was for number, was in zip(numbers[:3], first[:3], strict=True)] == [False] * 3
+    assert store._recent.nbytes <= store._recent.most_bytes
+
+
+def test_what_makes_a_store_too_large_is_found_by_its_size_the_oldest_first(tmp_path: Path) -> None:
+    with closing(Store(tmp_path / "place.db")) as store:
+        numbers = [_add(store, float(i)) for i in range(12)]
+        store.save()
+        size = (tmp_path / "place.db").stat().st_size
+        assert store.beyond(12, size) == [] and store.beyond(10, size) == numbers[:2]
+        beyond = store.beyond(12, 0.5 * size)
+        assert numbers[:5] <= beyond <= numbers[:8]
+        store.remove(beyond, forgotten=len(beyond))
+        assert store.beyond(12, 0.5 * size) == []
+        assert store.beyond(12, 1.0) == store.keyframe_ids()[:-1]
 
 
 def test_a_store_that_is_only_read_is_not_changed(tmp_path: Path) -> None:
@@ -338,7 +342,7 @@ def test_closures_are_counted_over_restarts_and_outlive_their_keyframes(tmp_path
 
 
 def test_the_oldest_closures_make_room(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(store_module, "MOST_CLOSURES", 3)
+    monkeypatch.setattr("objreg_ros.memory.store.MOST_CLOSURES", 3)
     store = Store()
     for k in range(4):
         closures = [
@@ -387,7 +391,7 @@ def test_a_damaged_blob_is_reported_when_it_is_read(tmp_path: Path) -> None:
     store = Store(path)
     number = _add(store)
     store._connection.execute("UPDATE keyframe SET context = x'00ff00'")
-    store._cache.clear()
+    store._recent.clear()
     with pytest.raises(StoreError, match=r"keyframe 1: .*damaged"):
         store.keyframe(number)
 
@@ -529,8 +533,8 @@ def test_ids_that_are_used_up_are_a_store_error(what: str) -> None:
 
 
 def test_the_file_shrinks_by_steps_where_many_keyframes_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(store_module, "SPARE", 20)
-    monkeypatch.setattr(store_module, "STEP", 100)
+    monkeypatch.setattr("objreg_ros.memory.store_file.SPARE", 20)
+    monkeypatch.setattr("objreg_ros.memory.store.STEP", 100)
     path = tmp_path / "place.db"
     with closing(Store(path)) as store:
         numbers = [_add(store, float(k)) for k in range(12)]

@@ -203,7 +203,7 @@ def test_a_full_store_says_what_goes(make: Making, monkeypatch: pytest.MonkeyPat
     for _ in range(2):
         node._publish(Outcome())
     (line,) = said
-    assert "keeps 2 keyframes (max_keyframes), and has forgotten the oldest 3" in line
+    assert "keeps 2 keyframes (max_keyframes, max_megabytes), and has forgotten the oldest 3" in line
     assert node.extra_diagnostics()["forgotten keyframes"] == 3
     node.close()
 

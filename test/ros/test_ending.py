@@ -6,11 +6,17 @@ from __future__ import annotations
 import signal
 import sys
 from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from std_msgs.msg import Header
 
+from objreg_ros import limits
+from objreg_ros.data import Frame
+from objreg_ros.keyframes.own_size import OBJECTS
 from objreg_ros.memory.store import Store
 
 from .graph import Graph
@@ -63,3 +69,30 @@ def test_a_signal_during_a_search_ends_with_status_0_says_nothing_and_loses_noth
     stored = Store(store, read_only=True)
     assert len(stored.keyframe_ids()) == 3  # that in hand, and the one that no frame followed, too
     stored.close()
+
+
+def test_frames_of_hundreds_of_alike_objects_hold_up_neither_a_registrar_nor_its_end(
+    fresh: Graph, tmp_path: Path
+) -> None:
+    store = tmp_path / "place.db"
+    fresh.hear(Header, "finished")
+    fresh.start("registrar", "registrar", f"-p store:={store}", "-p reliable:=true", MOUNT)
+    crowds = [crowded(10 + 3 * k, T) for k, T in enumerate((HERE, BESIDE, HERE, BESIDE))]
+    for one in crowds[:3]:
+        tell(fresh, one, {0: "cup"})
+        assert fresh.answer("registrar", one.stamp_ns) == "published"
+    tell(fresh, crowds[3], {0: "cup"})
+    assert fresh.stop("registrar") == 0
+    with closing(Store(store, read_only=True)) as stored:
+        kept = [len(stored.keyframe(number).objects) for number in stored.keyframe_ids()]
+    assert len(kept) >= 3 and set(kept) == {OBJECTS}  # of the last frame nothing is known: it may be on its way
+    assert store.stat().st_size < 4 * 4_000_000
+
+
+def crowded(seconds: float, T: np.ndarray) -> Frame:
+    """A frame with as many objects of one label as one may have."""
+    (cup, *_), random = frame(seconds, T, T).objects, np.random.default_rng(1)
+    at = random.uniform((-1.0, -0.8, 1.0), (1.0, 0.8, 3.0), (limits.MOST_OBJECTS, 3))
+    near = [(cup.xyz - cup.xyz.mean(axis=0) + place).astype(np.float32) for place in at]
+    cups = [replace(cup, label="cup", instance=k + 1, xyz=xyz) for k, xyz in enumerate(near)]
+    return replace(frame(seconds, T, T), objects=tuple(cups))

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from objreg_ros import limits
 from objreg_ros.data import DepthImage, Intrinsics
 from objreg_ros.segmenter.view import LEAST_WIDTH, reduced_view, step_for
 
@@ -63,5 +64,14 @@ def test_depth_out_of_range_is_nan() -> None:
 
 @pytest.mark.parametrize(("width", "step"), [(1280, 4), (640, 4), (512, 3), (320, 2), (160, 1), (40, 1)])
 def test_a_narrow_picture_keeps_more_of_its_pixels(width: int, step: int) -> None:
-    assert step_for(width, 4) == step
-    assert width // step_for(width, 4) >= min(width, LEAST_WIDTH)
+    camera = Intrinsics(fx=500.0, fy=500.0, cx=0.0, cy=0.0, width=width, height=100)
+    assert step_for(camera, 4) == step
+    assert width // step_for(camera, 4) >= min(width, LEAST_WIDTH)
+
+
+@pytest.mark.parametrize(("width", "height", "step"), [(1920, 1080, 4), (3840, 2160, 8), (4096, 3072, 9)])
+def test_of_a_huge_picture_fewer_pixels_are_kept(width: int, height: int, step: int) -> None:
+    camera = Intrinsics(fx=500.0, fy=500.0, cx=0.0, cy=0.0, width=width, height=height)
+    assert step_for(camera, 4) == step
+    small = camera.scaled(step)
+    assert 0.7 * limits.OWN_VIEW_PIXELS < small.width * small.height <= limits.OWN_VIEW_PIXELS
