@@ -71,9 +71,7 @@ def test_a_signal_during_a_search_ends_with_status_0_says_nothing_and_loses_noth
     stored.close()
 
 
-def test_frames_of_hundreds_of_alike_objects_hold_up_neither_a_registrar_nor_its_end(
-    fresh: Graph, tmp_path: Path
-) -> None:
+def test_frames_of_hundreds_of_objects_hold_up_neither_a_registrar_nor_its_end(fresh: Graph, tmp_path: Path) -> None:
     store = tmp_path / "place.db"
     fresh.hear(Header, "finished")
     fresh.start("registrar", "registrar", f"-p store:={store}", "-p reliable:=true", MOUNT)
