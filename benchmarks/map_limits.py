@@ -45,8 +45,17 @@ class Case:
     closures: list[LoopClosure]
 
 
+def require_own(folder: Path) -> None:
+    """Make a folder that only this user writes; `click.ClickException` for one of another: what it has may be code."""
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    status = folder.stat()
+    if status.st_uid != os.getuid() or status.st_mode & 0o022:
+        raise click.ClickException(f"{folder}: expected a folder that only you write, got another; choose by --keep")
+
+
 def kept(path: Path, folder: Path, make: Callable[[], Any], suffix: str = ".pickle") -> Any:
     """What is made of a recording; out of a file in the folder where it was made before."""
+    require_own(folder)
     stat = path.stat()
     tag = hashlib.sha1(f"{path.resolve()} {stat.st_mtime_ns} {stat.st_size}".encode()).hexdigest()[:8]
     file = folder / f"{path.name}_{tag}{suffix}"
@@ -54,7 +63,6 @@ def kept(path: Path, folder: Path, make: Callable[[], Any], suffix: str = ".pick
         click.echo(f"{path.name}: as found before, in {file}", err=True)
         return pickle.loads(file.read_bytes())
     made = make()
-    folder.mkdir(parents=True, exist_ok=True)
     unfinished = file.with_suffix(".part")
     unfinished.write_bytes(pickle.dumps(made))
     os.replace(unfinished, file)

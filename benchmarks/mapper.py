@@ -27,7 +27,7 @@ by place, by closures, by both as the registrar does, or by truth.
 from __future__ import annotations
 
 import json
-import tempfile
+import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -44,7 +44,7 @@ from tqdm import tqdm
 
 from objreg_ros.mapper.params import MapperParams
 
-KEPT = Path(tempfile.gettempdir()) / "objreg_mapper"
+KEPT = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "objreg_mapper"
 JSON = click.option("--json", "json_file", type=click.Path(dir_okay=False, path_type=Path), help="Write figures here.")
 
 

@@ -319,8 +319,8 @@ class ObjectCloud:
 class View:
     """A frame at reduced size: what free space and texture are checked against, and what refinement holds on to.
 
-    ``xyz (h, w, 3) float32`` m, within `limits.MOST_RANGE` of the camera, NaN where nothing was measured; ``grey (h, w)
-    uint8`` or None; ``intrinsics`` of the reduced camera.
+    ``xyz (h, w, 3) float32`` m, from `limits.LEAST_RANGE` before the camera to `limits.MOST_RANGE`, NaN where nothing
+    was measured; ``grey (h, w) uint8`` or None; ``intrinsics`` of the reduced camera.
     """
 
     xyz: Array
@@ -335,6 +335,8 @@ class View:
         size = self.intrinsics.width, self.intrinsics.height
         _require(self, size[0] * size[1] <= limits.MOST_VIEW_PIXELS, f"at most {limits.MOST_VIEW_PIXELS} pixels", size)
         _require_reach(self, self.xyz, "points")
+        nearest = float(np.fmin.reduce(self.xyz[..., 2], axis=None, initial=np.inf))
+        _require(self, nearest >= limits.LEAST_RANGE, f"points at z = {limits.LEAST_RANGE:g} m or farther", nearest)
 
 
 @word

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from objreg_ros import data
+from objreg_ros import data, limits
 from objreg_ros.data import PointFlag, framed, robot_of
 
 NAN = np.float32(np.nan)
@@ -25,7 +25,7 @@ def cloud(**changes: Any) -> data.ObjectCloud:
 
 
 def view(**changes: Any) -> data.View:
-    return data.View(**{"xyz": floats(48, 64, 3), "grey": None, "intrinsics": CAMERA, **changes})
+    return data.View(**{"xyz": 1.0 + floats(48, 64, 3), "grey": None, "intrinsics": CAMERA, **changes})
 
 
 def frame(**changes: Any) -> data.Frame:
@@ -229,8 +229,19 @@ def test_a_camera_of_more_pixels_than_any_picture_is_refused() -> None:
 
 def test_a_view_that_no_registrar_would_take_is_refused_where_it_is_made() -> None:
     camera = data.Intrinsics(fx=50.0, fy=50.0, cx=40.0, cy=30000.0, width=80, height=60000)
-    with pytest.raises(ValueError, match=r"View: expected at most 4000000 pixels, got \(80, 60000\)"):
+    with pytest.raises(ValueError, match=r"View: expected at most 600000 pixels, got \(80, 60000\)"):
         data.View(xyz=np.zeros((60000, 80, 3), np.float32), grey=None, intrinsics=camera)
+
+
+@pytest.mark.parametrize("nearest", [0.0, 1e-9, 9e-4, -1.0])
+def test_a_view_has_nothing_nearer_than_a_millimetre(nearest: float) -> None:
+    xyz = 1.0 + floats(48, 64, 3)
+    xyz[3, 4, 2] = nearest
+    with pytest.raises(ValueError, match=r"View: expected points at z = 0\.001 m or farther"):
+        view(xyz=xyz)
+    xyz[3, 4] = np.nan, np.nan, limits.LEAST_RANGE
+    xyz[5] = np.nan
+    assert np.isnan(view(xyz=xyz).xyz[5]).all() and view(xyz=np.full_like(xyz, np.nan)).xyz.shape == xyz.shape
 
 
 def test_a_place_in_an_earlier_map_has_rigid_poses_and_a_finite_covariance() -> None:

@@ -6,12 +6,13 @@ from __future__ import annotations
 import json
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from objreg_ros import limits
 from objreg_ros.data import Array, LoopClosure
 from objreg_ros.mapper.constraint import Constraint
 from objreg_ros.mapper.params import MapperParams
@@ -21,10 +22,10 @@ from objreg_ros.mapper.solver import End, Tie
 from objreg_ros.whole_file import whole_file
 
 VERSIONS = 1, 2  # before robots, and now
-MOST_BYTES = 2_000_000_000  # of a file and of what is unpacked from it
+MOST_BYTES = 400_000_000  # of a file and of what is unpacked from it: a day of odometry has some 50 million
 BROKEN = (
-    *(KeyError, IndexError, TypeError, ValueError, AttributeError, EOFError, MemoryError, RuntimeError),
-    *(zipfile.BadZipFile, zlib.error),
+    *(KeyError, IndexError, TypeError, ValueError, ArithmeticError, AttributeError, EOFError, MemoryError),
+    *(RuntimeError, zipfile.BadZipFile, zlib.error),
 )  # what numpy, zipfile and json say of a file that is not whole
 
 
@@ -32,13 +33,19 @@ def _labels(told: Any) -> tuple[str, ...]:
     return tuple(str(label) for label in told)
 
 
+def _stamp(told: Any) -> int:
+    if type(told) is not int or not limits.LEAST_STAMP_NS <= told <= limits.MOST_STAMP_NS:
+        raise ValueError(f"closure: expected a stamp that ROS has, got {told!r}")
+    return told
+
+
 def _session(told: Any) -> int | None:
     return None if told is None else int(told)
 
 
 KINDS: dict[str, Callable[[Any], Any]] = {
-    "from_ns": int,
-    "to_ns": int,
+    "from_ns": _stamp,
+    "to_ns": _stamp,
     "labels": _labels,
     "from_frame_id": str,
     "to_frame_id": str,
@@ -47,6 +54,7 @@ KINDS: dict[str, Callable[[Any], Any]] = {
     "from_robot": str,
     "to_robot": str,
 }  # of a closure, by what makes each of what a file tells
+OF_CLOSURES = "ends", "T_1_2", "covariances", "T_from_to", "closure_covariances"  # a row for each
 
 
 def beside(graph_path: Path) -> Path:
@@ -96,19 +104,31 @@ def load(path: Path, params: MapperParams) -> PoseGraph:
         if unpacked > MOST_BYTES:
             raise ValueError(f"expected at most {MOST_BYTES} bytes unpacked, got {unpacked}")
         with np.load(path, allow_pickle=False) as arrays:
-            return _graph({name: arrays[name] for name in arrays.files}, params)
+            told = json.loads(arrays["told"].tobytes())
+            _require_members(told, arrays.files)
+            return _graph(told, {name: arrays[name] for name in arrays.files}, params)
     except BROKEN as error:
         raise ValueError(f"{path}: expected a map that ~/save wrote, got a file that is none: {error}") from error
 
 
-def _graph(arrays: Mapping[str, Array], params: MapperParams) -> PoseGraph:
-    told = json.loads(arrays["told"].tobytes())
+def _require_members(told: Mapping[str, Any], names: Sequence[str]) -> None:
+    """ValueError unless a file has what it says, and nothing else, before that is unpacked."""
     if told["version"] not in VERSIONS:
         raise ValueError(f"version: expected {' or '.join(map(str, VERSIONS))}, got {told['version']!r}")
-    graph = PoseGraph(params)
-    graph.sessions.clear()
     if not told["names"]:
         raise ValueError("expected at least one session, got none")
+    expected = {"told", *OF_CLOSURES, *(f"{k}_{key}" for k in range(len(told["names"])) for key in Session.ARRAYS)}
+    if len(names) != len(expected) or expected.symmetric_difference(names):
+        odd = sorted(expected.symmetric_difference(names)) or sorted(names)
+        raise ValueError(f"expected arrays of {len(told['names'])} sessions, got more or fewer: {', '.join(odd[:3])}")
+
+
+def _graph(told: Mapping[str, Any], arrays: Mapping[str, Array], params: MapperParams) -> PoseGraph:
+    counts = {name: len(arrays[name]) for name in OF_CLOSURES}
+    if set(counts.values()) != {len(told["closures"])}:
+        raise ValueError(f"expected {len(told['closures'])} closures everywhere, got {counts}")
+    graph = PoseGraph(params)
+    graph.sessions.clear()
     robots = told.get("robots", [""] * len(told["names"]))
     for number, (names, robot) in enumerate(zip(told["names"], robots, strict=True)):
         session = Session.of_arrays({key: arrays[f"{number}_{key}"] for key in Session.ARRAYS})

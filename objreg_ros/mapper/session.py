@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from objreg_ros import limits
 from objreg_ros.data import Array, Odometry
 from objreg_ros.geometry import inverse, is_rigid, rotation_angle
 from objreg_ros.mapper.constraint import Constraint, unseen, wandering
@@ -68,6 +69,9 @@ class Session:
             raise ValueError(f"session: expected stamps and gaps in whole nanoseconds, got {gaps.shape} {stamps.dtype}")
         if shapes != [len(poses), (steps, 2), (max(count, 1),)] or not np.isin(keyframes, stamps).all():
             raise ValueError(f"session: expected arrays that go together, got {shapes} of {count} keyframes")
+        known = np.concatenate([stamps, gaps.ravel()])
+        if len(known) and not limits.LEAST_STAMP_NS <= known.min() <= known.max() <= limits.MOST_STAMP_NS:
+            raise ValueError(f"session: expected stamps that ROS has, got {known.min()} to {known.max()} ns")
         spread = (variances > 0) & (variances < np.inf)
         if not (np.isfinite(poses).all() and all(is_rigid(T) for T in poses) and spread.all()):
             raise ValueError("session: expected rigid poses and positive variances, got others")

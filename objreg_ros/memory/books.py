@@ -41,6 +41,12 @@ class Books:
             raise ValueError(f"expected ids of {what}s up to {MOST_IDS[what]}, got {given}: they are used up")
         return given + 1
 
+    def give_landmark(self, given: int) -> None:
+        """Book that a landmark has an id; ValueError for one that no message could hold."""
+        if given > MOST_IDS["landmark"]:
+            raise ValueError(f"expected ids of landmarks up to {MOST_IDS['landmark']}, got {given}: they are used up")
+        self.landmark = max(self.landmark, given)
+
     def emptied(self) -> Books:
         """Those of a store in which nothing is, but where the same ids were given."""
         return Books(keyframe=self.keyframe, object=self.object, closure=self.closure, landmark=self.landmark)

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from objreg_ros import limits
 from objreg_ros.data import Array, Intrinsics, LoopClosure, ObjectCloud, View
 from objreg_ros.geometry import back_project, is_rigid
 from objreg_ros.memory.checksum import (
@@ -156,6 +157,7 @@ def keyframe_from_rows(row: Mapping[str, Any], objects: Sequence[Mapping[str, An
         require_object(item)
     camera = camera_of(row["camera"])
     depth, grey = _unpacked(row, "view", 2)
+    depth = np.where(depth < limits.LEAST_RANGE, np.float32(np.nan), depth)  # of a store of before that bound
     xyz = back_project(depth, camera.fx, camera.fy, camera.cx, camera.cy)
     context_xyz, context_normals = _unpacked(row, "context", 2)
     return Keyframe(

@@ -196,7 +196,7 @@ def _view(head: Head, columns: Columns) -> View:
     pixels = within("pixels of a view", shape[0] * shape[1], limits.MOST_VIEW_PIXELS)
     known = np.cumsum(columns.take(pixels)) > 0
     depth = np.full(pixels, np.nan, np.float32)
-    depth[known] = quantised.depth_of(np.cumsum(columns.take(int(known.sum()))))
+    depth[known] = np.maximum(quantised.depth_of(np.cumsum(columns.take(int(known.sum())))), limits.LEAST_RANGE)
     grey = None
     if whole(head, "grey", 0, 1):
         grey = quantised.grey_of(np.cumsum(np.cumsum(columns.take(pixels).reshape(shape), axis=0), axis=1))

@@ -102,8 +102,7 @@ class Store:
             write(transaction, books, "keyframe", row)
             for item, sighting in zip(keyframe.objects, sightings, strict=True):
                 write(transaction, books, "object", object_row(books.next("object"), item, sighting))
-            newest = max((sighting.landmark for sighting in sightings), default=0)
-            books.landmark = max(books.landmark, newest)
+            books.give_landmark(max((sighting.landmark for sighting in sightings), default=0))
             write_closures(transaction, books, closures, MOST_CLOSURES)
             rename_landmarks(transaction, books, merged or {})
         self._heads[keyframe.keyframe_id] = {name: row[name] for name in HEAD}

@@ -35,7 +35,7 @@ def reduced_view(image: DepthImage, step: int, z_min: float, z_max: float) -> Vi
     x = ((np.arange(camera.width) - camera.cx) / camera.fx).astype(np.float32)
     y = ((np.arange(camera.height) - camera.cy) / camera.fy).astype(np.float32)
     xyz = np.empty((*depth.shape, 3), np.float32)
-    _back_project(depth, x, y, np.float32(z_min), np.float32(z_max), xyz)
+    _back_project(depth, x, y, np.float32(max(z_min, limits.LEAST_RANGE)), np.float32(z_max), xyz)
     grey = None if image.rgb is None else _grey(image.rgb, step)
     return View(xyz=xyz, grey=grey, intrinsics=camera)
 

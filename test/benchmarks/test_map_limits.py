@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import click
 import numpy as np
 import pytest
 
@@ -70,3 +72,17 @@ def test_perfect_closures_of_a_walk_leave_nothing_of_its_error(case: Any) -> Non
     for name in (map_limits.OURS, map_limits.PERFECT):
         before, after, pruned = map_limits.trajectory_errors(case, case.frames, map_limits.variants()[name])
         assert before < 1e-6 and pruned == 0 and (after < 1e-3) == (name == map_limits.PERFECT)
+
+
+@pytest.mark.parametrize("mode", [0o777, 0o720, 0o702])
+def test_a_folder_that_others_write_gives_no_pickles(tmp_path: Path, mode: int) -> None:
+    from map_limits import kept
+
+    folder = tmp_path / "kept"
+    folder.mkdir()
+    folder.chmod(mode)
+    with pytest.raises(click.ClickException, match="expected a folder that only you write"):
+        kept(tmp_path, folder, lambda: 1)
+    assert kept(tmp_path, tmp_path / "mine" / "new", lambda: 2) == 2
+    assert (tmp_path / "mine" / "new").stat().st_mode & 0o777 == 0o700
+    assert kept(tmp_path, tmp_path / "mine" / "new", lambda: 3) == 2

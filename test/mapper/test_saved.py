@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -120,6 +122,50 @@ def test_a_file_with_a_wrong_byte_is_refused_or_the_same_map(yesterday: PoseGrap
         except ValueError:
             continue
         assert len(found.closure_ties) == len(yesterday.closure_ties)
+
+
+def changed(arrays: dict[str, np.ndarray], change: Callable[[dict[str, Any]], object]) -> dict[str, np.ndarray]:
+    """The arrays of a map whose text was changed."""
+    told = json.loads(arrays["told"].tobytes())
+    change(told)
+    return arrays | {"told": np.frombuffer(json.dumps(told).encode(), np.uint8)}
+
+
+@pytest.mark.parametrize("stamp", [np.inf, -np.inf, np.nan, 1e300, 2**70, -(2**70), "1", None, True])
+def test_a_stamp_that_no_clock_has_is_refused(yesterday: PoseGraph, tmp_path: Path, stamp: object) -> None:
+    arrays = changed(saved.packed(yesterday), lambda told: told["closures"][0].update(from_ns=stamp))
+    saved.save(arrays, tmp_path / "map.npz")
+    with pytest.raises(ValueError, match="expected a map that ~/save wrote"):
+        saved.load(tmp_path / "map.npz", MapperParams())
+
+
+def test_stamps_of_odometry_that_no_message_holds_are_refused(yesterday: PoseGraph, tmp_path: Path) -> None:
+    arrays = saved.packed(yesterday)
+    for name in ("0_stamps_ns", "0_keyframes"):
+        arrays[name] = arrays[name] + 2**62
+    saved.save(arrays, tmp_path / "map.npz")
+    with pytest.raises(ValueError, match="expected stamps that ROS has"):
+        saved.load(tmp_path / "map.npz", MapperParams())
+
+
+def test_a_map_without_some_of_its_closures_is_refused(yesterday: PoseGraph, tmp_path: Path) -> None:
+    saved.save(changed(saved.packed(yesterday), lambda told: told["closures"].pop()), tmp_path / "map.npz")
+    with pytest.raises(ValueError, match=r"expected 5 closures everywhere, got .*'ends': 6"):
+        saved.load(tmp_path / "map.npz", MapperParams())
+
+
+def test_what_no_map_has_is_refused_before_it_is_unpacked(yesterday: PoseGraph, tmp_path: Path) -> None:
+    arrays = saved.packed(yesterday)
+    saved.save(arrays | {"spare": np.zeros(1000)}, tmp_path / "map.npz")
+    with pytest.raises(ValueError, match="expected arrays of 1 sessions, got more or fewer: spare"):
+        saved.load(tmp_path / "map.npz", MapperParams())
+    saved.save(arrays | {"T_1_2": np.zeros((saved.MOST_BYTES // 128 + 1, 4, 4))}, tmp_path / "map.npz")
+    with pytest.raises(ValueError, match=f"expected at most {saved.MOST_BYTES} bytes unpacked"):
+        saved.load(tmp_path / "map.npz", MapperParams())
+    del arrays["ends"]
+    saved.save(arrays, tmp_path / "map.npz")
+    with pytest.raises(ValueError, match="got more or fewer: ends"):
+        saved.load(tmp_path / "map.npz", MapperParams())
 
 
 def test_a_map_of_before_robots_is_of_one_without_a_name(yesterday: PoseGraph, tmp_path: Path) -> None:

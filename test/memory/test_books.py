@@ -44,3 +44,11 @@ def test_ids_end(what: str) -> None:
     books = Books(**{what: MOST_IDS[what]})
     with pytest.raises(ValueError, match=f"expected ids of {what}s up to .* used up"):
         books.next(what)
+
+
+def test_a_landmark_with_an_id_that_no_message_holds_is_not_booked() -> None:
+    books = Books()
+    books.give_landmark(MOST_IDS["landmark"])
+    with pytest.raises(ValueError, match="expected ids of landmarks up to 4294967294, got 4294967295"):
+        books.give_landmark(MOST_IDS["landmark"] + 1)
+    assert books.landmark == MOST_IDS["landmark"]

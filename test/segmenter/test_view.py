@@ -62,6 +62,13 @@ def test_depth_out_of_range_is_nan() -> None:
     assert np.isnan(reduced_view(image(48, 64), 4, 0.2, 0.9).xyz).all()
 
 
+def test_what_is_nearer_than_a_millimetre_is_nan_though_every_depth_is_believed() -> None:
+    seen = image(48, 64)
+    depth = np.full_like(seen.depth, 1e-4)
+    near = reduced_view(DepthImage(depth=depth, rgb=None, intrinsics=seen.intrinsics, stamp_ns=0), 4, 0.0, 4.0)
+    assert np.isnan(near.xyz).all()
+
+
 @pytest.mark.parametrize(("width", "step"), [(1280, 4), (640, 4), (512, 3), (320, 2), (160, 1), (40, 1)])
 def test_a_narrow_picture_keeps_more_of_its_pixels(width: int, step: int) -> None:
     camera = Intrinsics(fx=500.0, fy=500.0, cx=0.0, cy=0.0, width=width, height=100)
