@@ -41,7 +41,7 @@ class Declaration:
     live: bool = False
     counts: tuple[int, ...] = ()  # how long a list may be; empty: as long as it likes
     or_auto: bool = False  # whether "auto" stands for an empty list
-    is_path: bool = False  # whether it names a file: set at the start, and by nobody afterwards
+    at_start: bool = False  # whether it is set at the start alone, in a managed node too
 
     def check(self, value: Any) -> Any:
         """The value in its declared type; ValueError with expected and got if it is not that or out of range."""
@@ -91,14 +91,14 @@ def param(
     live: bool = False,
     counts: tuple[int, ...] = (),
     or_auto: bool = False,
-    is_path: bool = False,
+    at_start: bool = False,
 ) -> Any:
     """Declare one parameter. ``live`` ones may be changed while a node runs; the others are read-only there.
 
-    ``is_path`` ones are set at the start only: whoever may set parameters must not choose files of this machine.
+    ``at_start`` ones are set at the start only, in a managed node too: what is written, and what peers may ask for.
     """
     metadata = {"doc": doc, "unit": unit, "ge": ge, "le": le, "choices": choices, "live": live, "counts": counts}
-    metadata |= {"or_auto": or_auto, "is_path": is_path}
+    metadata |= {"or_auto": or_auto, "at_start": at_start}
     return dataclasses.field(default=default, metadata=metadata)
 
 

@@ -125,7 +125,9 @@ def allowed(importer: str, imported: str) -> bool:
             "bridge.spin",
         )
     if room in ROOMS and importer.endswith(".node"):
-        return below(imported, room, "data", "bridge", "share") or (room == "registrar" and floor(imported) is not None)
+        return below(imported, room, "data", "bridge", "share", "plausibility") or (
+            room == "registrar" and floor(imported) is not None
+        )
     if importer == "keyframes.node":
         return below(imported, "keyframes", "memory", "registration", "data", "bridge", "share")
     if floor(importer) is not None:

@@ -70,7 +70,7 @@ class ToG2oParams(Params):
     """The file, and how dense its vertices are."""
 
     graph_path: str = param(
-        "objreg.g2o", "where the graph is written; a second map goes beside it as objreg_1.g2o", is_path=True
+        "objreg.g2o", "where the graph is written; a second map goes beside it as objreg_1.g2o", at_start=True
     )
     period: float = param(5.0, "between two writings, where there is news", unit="s", ge=0.1)
     keyframe_translation: float = param(0.25, "motion after which odometry becomes a vertex", "m", ge=0.01)

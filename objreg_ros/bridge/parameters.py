@@ -40,7 +40,7 @@ class Parameters:
 
     ValueError at construction for a start value that is refused; a name that nobody declared is warned of.
     ``changed`` is called after a change. Those of a managed node that are not live can be changed too, while
-    ``are_open`` is true, unless they name files.
+    ``are_open`` is true, unless they are of the start alone.
     """
 
     def __init__(self, node: Node, *kinds: type[Params]) -> None:
@@ -76,7 +76,7 @@ class Parameters:
 
     def _is_fixed(self, declaration: Declaration) -> bool:
         """Whether ROS itself refuses every change."""
-        for_life = declaration.is_path or declaration.name in FOR_LIFE
+        for_life = declaration.at_start or declaration.name in FOR_LIFE
         return not declaration.live and (not self._is_managed or for_life)
 
     def _typed(self, change: Parameter) -> Parameter:

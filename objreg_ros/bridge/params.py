@@ -60,7 +60,9 @@ class PeerParams(Params):
     """What peers may ask of a registrar."""
 
     allow_remote_reset: bool = param(
-        False, "whether ~/reset, which any peer can call, may put a store that is a file aside and begin an empty one"
+        False,
+        "whether ~/reset, which any peer can call, may put a store that is a file aside and begin an empty one",
+        at_start=True,
     )
 
 
@@ -72,7 +74,7 @@ class KeyParams(Params):
         "",
         "file with a key of 16 to 4096 bytes that all robots share, read at the start: keyframes, summaries and "
         "requests are signed with it, and others are not read; empty: no signatures",
-        is_path=True,
+        at_start=True,
     )
 
 

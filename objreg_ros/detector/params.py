@@ -16,12 +16,10 @@ class DetectorParams(Params):
         "auto",
         "ONNX model: a path, or a file name in models/ or in the user's data folder; auto: a COCO model that `objreg "
         "fetch-model` brought, else objreg_ssd.onnx",
-        is_path=True,
     )
     labels: str = param(
         "",
         "file of one label a line, or YAML with names:; empty: from the model's metadata, or a file beside the model",
-        is_path=True,
     )
     label_offset: str = param(
         "auto", "number of the first class: 0 (converted TFLite), 1 (TF detection API)", choices=("auto", "0", "1")

@@ -6,7 +6,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -34,6 +34,7 @@ from objreg_ros.mapper.pose_graph import PoseGraph, Summary
 from objreg_ros.mapper.restart import Anew
 from objreg_ros.mapper.solver import Problem, Solution
 from objreg_ros.mapper.waiting import Waiting
+from objreg_ros.plausibility.finding import Finding
 from objreg_ros.whole_file import write_whole
 
 PACE = 20.0  # a path of many keyframes takes long to write: one in so many times as long
@@ -273,13 +274,27 @@ class MapperNode(Door):
 
     def extra_diagnostics(self) -> Mapping[str, object]:
         """What the last solution believed, and what is known of each robot."""
+        strain = self._summary.strain
         return self._followers.told(self._graph) | {
             "sessions": len(self._graph.sessions),
             "constraints kept": len(self._summary.kept),
             "constraints pruned": len(self._summary.pruned),
             "constraints retracted": self._withdrawn_count,
             "constraints without odometry": len(self._waiting.closures),
+            "constraints against odometry": strain.beyond,
+            "farthest from odometry": strain.farthest,
+            "suspicious": strain.is_suspicious,
         }
+
+    def found(self) -> Sequence[Finding]:
+        """Whether closures bend the map farther than odometry lets expect."""
+        strain = self._summary.strain
+        if not strain.is_suspicious:
+            return ()
+        what = f"{strain.beyond} of {strain.judged} constraints contradict odometry, by up to {strain.farthest}"
+        cause = "they are false and agree with each other, or odometry is worse than odometry_*_error say"
+        todo = "set trust to who is right, or these parameters to what odometry does"
+        return (Finding(what, cause, todo, "constraints-against-odometry"),)
 
     # Services
 

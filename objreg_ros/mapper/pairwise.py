@@ -19,6 +19,8 @@ from objreg_ros.mapper.chain import Chain
 from objreg_ros.mapper.constraint import inverted, local_covariance, rotation_vectors
 from objreg_ros.mapper.session import Session, stacked
 from objreg_ros.mapper.steady import Steady
+from objreg_ros.mapper.strain import LIMIT as MOST_SIGMAS
+from objreg_ros.mapper.strain import misfits
 
 if TYPE_CHECKING:
     from objreg_ros.mapper.solver import Tie
@@ -56,7 +58,8 @@ class PairwiseConsistency:
     """Who agrees with whom among all closures of a map."""
 
     def __init__(self) -> None:
-        self._taken = 0
+        self._taken = self._judged = 0
+        self._contradicted: set[int] = set()
         self._chains: dict[int, Chain] = {}
         self._agreements: dict[tuple[int, int], Agreement] = {}
 
@@ -69,6 +72,19 @@ class PairwiseConsistency:
             self._agreements.setdefault(ends, Agreement()).add(number, tie, chains)
         self._taken = len(ties)
         return frozenset(number for one in self._agreements.values() for number in one.outside())
+
+    def contradicted(
+        self, ties: Sequence[Tie], sessions: Sequence[Session], picture_sigmas: tuple[float, float]
+    ) -> frozenset[int]:
+        """The numbers of ties within a session that odometry alone contradicts, beyond the deviations of both."""
+        for number in range(self._judged, len(ties)):
+            (session, _), (other, _), *_ = tie = ties[number]
+            if session == other:
+                chain = self._chain(session, sessions)
+                if misfits([tie], chain, picture_sigmas)[2][0] > MOST_SIGMAS:
+                    self._contradicted.add(number)
+        self._judged = len(ties)
+        return frozenset(self._contradicted)
 
     def _chain(self, number: int, sessions: Sequence[Session]) -> Chain:
         session = sessions[number]

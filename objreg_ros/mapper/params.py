@@ -19,6 +19,7 @@ GONE = dict.fromkeys(
 # 0.044 m and 1.5 to 3.6 degrees on two recordings of a Kinect, slow and fast; 0.06 to 0.07 m and 1 to 1.3
 # degrees with a simulated RealSense D435, and by less with other simulated sensors.
 TRACKING_ERRORS = 0.07, 3.0
+VAGUER = 10.0  # times the deviations of odometry, where closures are trusted
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,12 @@ class MapperParams(Params):
     max_residual: float = param(
         3.5, "a constraint farther than this from all the others is pruned", "standard deviations", ge=1.0, live=True
     )
+    trust: str = param(
+        "weigh",
+        "who decides where constraints that agree contradict odometry: weigh, both by their deviations; odometry, what "
+        "it contradicts beyond both deviations is held back; closures, its deviations are taken for ten times as large",
+        choices=("weigh", "odometry", "closures"),
+    )
     pairwise_consistency: bool = param(
         False, "whether constraints come into the graph only where they agree with most others in pairs", live=True
     )
@@ -84,8 +91,9 @@ class MapperParams(Params):
 
     @property
     def odometry_sigmas(self) -> tuple[float, float]:
-        """How odometry wanders in m and rad, after one metre or one radian."""
-        return self.odometry_translation_error, float(np.radians(self.odometry_rotation_error))
+        """How odometry wanders in m and rad, after one metre or one radian, as far as it is trusted."""
+        vague = VAGUER if self.trust == "closures" else 1.0
+        return vague * self.odometry_translation_error, vague * float(np.radians(self.odometry_rotation_error))
 
     @property
     def picture_sigmas(self) -> tuple[float, float]:
@@ -115,7 +123,7 @@ class MapperNodeParams(MountedParams):
     )
     publish_tf: bool = param(True, "whether the correction is broadcast on /tf, where tf2_ros is installed", live=True)
     graph_path: str = param(
-        "objreg_map.g2o", "where ~/save writes the pose graph; beside it, as .npz, what resume needs", is_path=True
+        "objreg_map.g2o", "where ~/save writes the pose graph; beside it, as .npz, what resume needs", at_start=True
     )
     resume: bool = param(False, "whether the map that was saved at graph_path is gone on with; it has to be there")
 

@@ -17,6 +17,7 @@ from objreg_ros.mapper.session import Session, stacked
 from objreg_ros.mapper.sessions import Sessions, moments_of
 from objreg_ros.mapper.solver import Course, End, Problem, Solution, Solver, Tie
 from objreg_ros.mapper.sparse import SparseTrajectory
+from objreg_ros.mapper.strain import Strain, strain_of
 from objreg_ros.mapper.trajectory import Trajectory
 
 LEAST_SIGMAS = 1e-3, float(np.radians(0.025))  # m and rad: no constraint is believed to know better, whatever it claims
@@ -29,12 +30,13 @@ VAGUEST = 1e12  # m^2 and rad^2: ROS says "unknown" by less; what is known no be
 class Summary:
     """What an optimisation came to: the closures that it kept, and those that it pruned, and with what ``residuals``.
 
-    These are of the pruned ones, in standard deviations.
+    These are of the pruned ones, in standard deviations. ``strain`` is how far those that are kept are from odometry.
     """
 
     kept: tuple[LoopClosure, ...] = ()
     pruned: tuple[LoopClosure, ...] = ()
     residuals: tuple[float, ...] = ()
+    strain: Strain = Strain()
 
 
 class ImplausibleError(ValueError):
@@ -201,9 +203,12 @@ class PoseGraph:
         )
 
     def _inconsistent(self) -> frozenset[int]:
-        if not self.params.pairwise_consistency:
-            return frozenset()
-        return self._pairwise.inconsistent(self._closures, self.sessions) - self._withdrawn
+        doubted = frozenset[int]()
+        if self.params.pairwise_consistency:
+            doubted |= self._pairwise.inconsistent(self._closures, self.sessions)
+        if self.params.trust == "odometry":
+            doubted |= self._pairwise.contradicted(self._closures, self.sessions, self.params.picture_sigmas)
+        return doubted - self._withdrawn
 
     def adopt(self, problem: Problem, solution: Solution) -> Summary:
         """Take over the solution of a problem of this graph; keyframes that came since then follow its last one."""
@@ -214,7 +219,18 @@ class PoseGraph:
             closure = self._closures[k].closure
             if closure is not None and k not in problem.withdrawn and not np.isnan(residual):
                 (kept if is_kept else pruned).append((closure, float(residual)))
-        return Summary(tuple(row[0] for row in kept), tuple(row[0] for row in pruned), tuple(row[1] for row in pruned))
+        return Summary(
+            tuple(row[0] for row in kept),
+            tuple(row[0] for row in pruned),
+            tuple(row[1] for row in pruned),
+            self._strain(problem, solution),
+        )
+
+    def _strain(self, problem: Problem, solution: Solution) -> Strain:
+        """How far the closures that are kept are from odometry, with what is steadily wrong taken out of it."""
+        chains = {s: course.chain for s, course in enumerate(solution.courses) if course}
+        kept = [self._closures[k] for k in np.flatnonzero(solution.kept).tolist()]
+        return strain_of(kept, chains, problem.params.picture_sigmas)
 
     # What comes of it
 

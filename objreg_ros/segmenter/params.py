@@ -87,7 +87,6 @@ class SegmenterNodeParams(MountedParams):
         "",
         "the camera in place of camera_info: fx,fy,cx,cy[,width,height] in pixels, or a file of ROS, OpenCV, "
         "RTAB-Map, ORB-SLAM, kalibr or Open3D; of another size of the same shape it is scaled",
-        is_path=True,
     )
     colour: bool = param(True, "take the colour of the points from `image` when depth comes as an image")
     level_odom: bool = param(

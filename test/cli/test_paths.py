@@ -30,6 +30,7 @@ NAMES_NO_FILE = {
     "size",
     "lens",
     "settings",
+    *("namespace", "robots", "exchange", "sources", "enclaves", "remap", "robot", "source"),  # of policy
 }
 """Texts of options that are never opened."""
 

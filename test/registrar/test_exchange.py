@@ -158,7 +158,8 @@ def test_a_session_of_another_that_a_stored_closure_names_keeps_its_number_to_it
     again.close()
 
 
-def test_what_is_too_large_to_be_told_is_counted_and_its_outcome_stays() -> None:
+def test_what_is_too_large_to_be_told_is_counted_and_its_outcome_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("objreg_ros.limits.MOST_SUMMARY", 1000)
     a = Robot("a")
     seen = _frame(10, HERE)
     named = [replace(seen.objects[0], label=f"{k:0900d}", instance=k + 1) for k in range(480)]
