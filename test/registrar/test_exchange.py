@@ -15,6 +15,7 @@ from registration.samples import SECOND, candidate
 
 from objreg_ros.data import Array, Frame, LoopClosure, Reason
 from objreg_ros.geometry import inverse, pose_error
+from objreg_ros.registrar import summary
 from objreg_ros.registrar.exchange import Allowance, Exchange
 from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.peers import known, pending, wishes
@@ -159,7 +160,7 @@ def test_a_session_of_another_that_a_stored_closure_names_keeps_its_number_to_it
 
 
 def test_what_is_too_large_to_be_told_is_counted_and_its_outcome_stays(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("objreg_ros.limits.MOST_SUMMARY", 1000)
+    monkeypatch.setitem(summary.MOST, summary.SUMMARY, (1000, 1000))
     a = Robot("a")
     seen = _frame(10, HERE)
     named = [replace(seen.objects[0], label=f"{k:0900d}", instance=k + 1) for k in range(480)]
