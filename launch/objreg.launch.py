@@ -13,7 +13,8 @@ from pathlib import Path
 from tempfile import NamedTemporaryFile
 
 from ament_index_python.packages import get_package_prefix
-from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
+from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction, Shutdown
+from launch.events.process import ProcessExited
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import LifecycleNode, Node
 
@@ -87,6 +88,8 @@ CHOICES = {
 }
 FOREIGN = ("vision_msgs", "masks")  # detections that are another detector's
 RESPAWN_S = 2.0
+REFUSED = 1  # the status of a node that was refused at its start, with one line that says why
+POSE_NUMBERS = 7
 OWN = {"detector": ("model",), "segmenter": ("source", "detections", "camera"), "registrar": ("exchange",)}
 
 
@@ -109,6 +112,7 @@ def _nodes(context: LaunchContext) -> list[Node]:
         "output": "screen",
         "respawn": _is_true(said["respawn"]),
         "respawn_delay": RESPAWN_S,
+        "on_exit": None if _is_true(said["respawn"]) else _ended,
     }
     if _is_true(said["composed"]):
         nodes = [_together(rooms, said, alike)]
@@ -142,6 +146,17 @@ def _together(rooms: tuple[str, ...], said: dict[str, str], alike: dict) -> Node
         ros_arguments=_ros_arguments("graph", said),
         **alike,
     )
+
+
+def _ended(event: ProcessExited, context: LaunchContext) -> list:
+    """All ends where a node was refused: the others would wait for it. One that was killed is named."""
+    if event.returncode == REFUSED:
+        why = f"{event.process_name} was refused: a line above says what it expected, and got"
+        return [LogInfo(msg=f"{why}; all is ended"), Shutdown(reason=why)]
+    if event.returncode and not context.is_shutdown:
+        ended = f"{event.process_name} ended with status {event.returncode}: the others go on without it"
+        return [LogInfo(msg=f"{ended}; with respawn:=true it is started again")]
+    return []
 
 
 def _ros_arguments(process: str, said: dict[str, str]) -> list[str]:
@@ -200,8 +215,19 @@ def _parameters(room: str, said: dict[str, str]) -> list:
     values: dict = {name: _is_true(said[name]) for name in SWITCHES if said[name]}
     values |= {name: said[name] for name in OWN.get(room, ()) if said[name]}
     if said["T_base_camera"] and room != "detector":
-        values["T_base_camera"] = [float(number) for number in said["T_base_camera"].split(",")]
+        values["T_base_camera"] = _numbers("T_base_camera", said["T_base_camera"])
     return [given for given in (said["params_file"], values) if given]
+
+
+def _numbers(argument: str, text: str) -> list[float]:
+    """The seven numbers of an argument; ValueError that names it for anything else."""
+    try:
+        numbers = [float(number) for number in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != POSE_NUMBERS:
+        raise ValueError(f"{argument}: expected seven numbers with commas (x,y,z,qx,qy,qz,qw), got {text!r}")
+    return numbers
 
 
 def _remappings(said: dict[str, str]) -> list[tuple[str, str]]:

@@ -24,10 +24,15 @@ data.py holds the words that pass between them; bridge/ is the border to ROS; of
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any
+
+from objreg_ros import kernel_cache
 
 if TYPE_CHECKING:
     from objreg_ros.library import Camera, Registration, register, register_clouds, register_keyframes, segment
+
+kernel_cache.settle(os.environ)
 
 __all__ = ["Camera", "Registration", "register", "register_clouds", "register_keyframes", "segment"]
 

@@ -105,7 +105,7 @@ def allowed(importer: str, imported: str) -> bool:
     if imported in ("limits", "sensor", "whole_file", "terminal") and importer != "":
         return True
     if importer == "":  # what `import objreg_ros` offers, loaded when it is asked for
-        return imported == "library"
+        return imported in ("library", "kernel_cache")
     if importer in CORE:
         return (importer, imported) in (("lens", "data"), ("params", "geometry"))
     if importer == "library":

@@ -219,7 +219,10 @@ def compiled_code() -> Check:
         todo = "set NUMBA_CACHE_DIR to a folder that can be written"
         return Check("machine", name, f"{folder} cannot be written", todo)
     is_warm = any(folder.glob("*.nbi"))
-    return Check("machine", name, f"{'there' if is_warm else 'none: the first run compiles for a minute'}, in {folder}")
+    is_passing = folder.is_relative_to(tempfile.gettempdir())
+    todo = "set NUMBA_CACHE_DIR to a folder that stays: this one goes with a restart" if is_passing else ""
+    found = f"{'there' if is_warm else 'none: the first run compiles for a minute'}, in {folder}"
+    return Check("machine", name, found, todo)
 
 
 def _size(count: int) -> str:

@@ -14,6 +14,7 @@ from typing import Any
 
 import launch_ros  # noqa: F401  (the folder launch/ of the checkout would pass for launch)
 import pytest
+from launch.events.process import ProcessExited
 from launch_ros.actions import LifecycleNode
 from recording.folders import tum_folder
 
@@ -279,3 +280,36 @@ def test_each_process_runs_in_an_enclave_of_its_own_where_they_are_asked_for(
     given = {**said, "enclaves": "/objreg/", "log_level": "warn"}
     assert arguments("detector", given) == ["--log-level", "warn", "--enclave", "/objreg/detector"]
     assert arguments("graph", given)[-1] == "/objreg/graph"
+
+
+@pytest.mark.parametrize("text", ["1,2,x", "1,2,3", "1,2,3,0,0,0,1,9", "nan,", ""])
+def test_a_mount_that_is_no_seven_numbers_is_refused_by_its_name(repository: Path, text: str) -> None:
+    with pytest.raises(ValueError, match="T_base_camera: expected seven numbers with commas"):
+        launch_file(repository)["_numbers"]("T_base_camera", text)
+
+
+@pytest.mark.parametrize(("refused", "started"), [("model:=/nowhere.onnx", "detector"), ("T_base_camera:=1,2,x", "")])
+def test_a_launch_ends_where_something_is_refused_and_says_what(
+    graph: Graph, repository: Path, tiny_model: Path, tmp_path: Path, refused: str, started: str
+) -> None:
+    file = str(repository / "launch" / "objreg.launch.py")
+    launched = subprocess.run(
+        [sys.executable, "-c", PROGRAM, file, f"model:={tiny_model}", refused],
+        env={**graph.environment(), "ROS_LOG_DIR": str(tmp_path)}, cwd=repository, timeout=2 * START_S,
+        capture_output=True, text=True,
+    )  # fmt: skip
+    said = launched.stdout + launched.stderr
+    assert refused.partition(":=")[2] in said and "expected" in said, said
+    if started:
+        assert f"{started}-1 was refused" in said and "registrar" in said, said
+    else:
+        assert "T_base_camera: expected seven numbers" in said and "process started" not in said, said
+
+
+def test_a_node_that_was_killed_is_named_and_the_others_go_on(repository: Path) -> None:
+    ended = launch_file(repository)["_ended"]
+    context = LaunchContext()
+    for status, words in ((0, []), (-9, ["mapper-4 ended with status -9: the others go on without it"])):
+        event = ProcessExited(returncode=status, action=None, name="mapper-4", cmd=[], cwd=None, env=None, pid=1)
+        said = ["".join(part.text for part in action.msg) for action in ended(event, context)]
+        assert [line.partition(";")[0] for line in said] == words
