@@ -136,3 +136,11 @@ def test_what_cannot_complete_is_no_obstacle(checkout: Path) -> None:
     objreg.chmod(0o755)
     asked, said = heard(checkout)
     assert asked and "objreg works without" in said
+
+
+def test_the_versions_of_ubuntu_go_into_an_environment_of_their_own(checkout: Path) -> None:
+    shutil.copytree(checkout / ".venv", checkout / ".venv-noble")
+    noble = "--require-hashes --no-build-isolation --no-deps --requirement requirements/noble.lock"
+    assert bootstrap(checkout, "--test", "--noble") == [BUILD, noble, ITSELF]
+    assert bootstrap(checkout, "--test", "--noble") == []
+    assert bootstrap(checkout) == [BUILD, LOCKED, ITSELF]

@@ -44,3 +44,10 @@ def test_nothing_is_tested_where_a_tool_complains(checkout: Path, tool: str) -> 
     (checkout / "fails").write_text(tool)
     status, called = run(checkout)
     assert status != 0 and not any("pytest" in line for line in called)
+
+
+def test_with_the_versions_of_ubuntu_the_tests_alone_are_run(checkout: Path) -> None:
+    shutil.copytree(checkout / ".venv", checkout / ".venv-noble")
+    status, called = run(checkout, "--noble", "test/cli")
+    assert status == 0 and called[0] == "bootstrap --test --noble" and called[-1].endswith("test/cli")
+    assert len(called) == 3 and not any(line.startswith(("ruff", "mypy")) for line in called)
