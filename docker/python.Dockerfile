@@ -2,6 +2,8 @@
 # The command `objreg` and the library, from the locked wheels; ROS 2 comes as wheels too.
 #   docker build --file docker/python.Dockerfile --tag objreg .
 #   docker run --rm --volume "$PWD:/data" objreg offline /data/my_bag --json /data/out.json
+#   docker run --rm --shm-size=1g --volume "$PWD:/data" objreg demo --out /data/demo
+# The nodes of a demo pass clouds by shared memory, of which Docker's 64 MB are too few; --ipc=host does as well.
 FROM python:3.12.11-slim-bookworm AS system
 SHELL ["/bin/bash", "-o", "pipefail", "-c"]
 # What Open3D's wheels load, as in scripts/bootstrap. Debian keeps one version of each package.
@@ -37,6 +39,8 @@ FROM system
 COPY --from=build /opt/objreg /opt/objreg
 ENV PATH=/opt/objreg/bin:$PATH NUMBA_CACHE_DIR=/home/objreg/.cache/numba ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
 USER 1000
+# The kernels are compiled for the processor that builds the image; on another kind the first run compiles them anew.
+RUN python -c 'from objreg_ros.registrar import warm; warm.warm(warm.RegistrarParams())'
 WORKDIR /data
 ENTRYPOINT ["objreg"]
 CMD ["--help"]

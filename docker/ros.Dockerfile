@@ -3,19 +3,21 @@
 #   docker build --file docker/ros.Dockerfile --tag objreg-ros .
 #   docker run --rm --network host --ipc host objreg-ros
 #   docker run --rm --network host --ipc host objreg-ros ros2 launch objreg_ros objreg.launch.py image:=/camera/image
+# --ipc=host shares the host's shared memory with its nodes. Without it say --shm-size=1g: Docker's 64 MB are too few.
 FROM ros:jazzy-ros-base-noble
 SHELL ["/bin/bash", "-o", "pipefail", "-c"]
-ENV PIP_BREAK_SYSTEM_PACKAGES=1 PIP_NO_CACHE_DIR=1 PIP_CONSTRAINT=/ws/src/objreg_ros/config/constraints.txt
+ENV PIP_BREAK_SYSTEM_PACKAGES=1 PIP_NO_CACHE_DIR=1
 WORKDIR /ws
 COPY . src/objreg_ros
-# Ubuntu keeps one version of each package; pip's are held by config/constraints.txt and requirements/robot.txt.
+# Ubuntu keeps one version of each package; pip's are those of requirements/robot.lock, by their hashes.
 # hadolint ignore=DL3008
 RUN apt-get update \
     && apt-get install --yes --no-install-recommends python3-pip \
     && rosdep update --rosdistro jazzy \
-    && rosdep install --rosdistro jazzy --from-paths src src/objreg_ros/objreg_msgs --ignore-src --as-root pip:false \
+    && rosdep install --rosdistro jazzy --from-paths src src/objreg_ros/objreg_msgs --ignore-src \
+        --skip-keys "python3-onnxruntime-pip python3-open3d-pip python3-rosbags-pip" \
         --dependency-types exec --dependency-types build --dependency-types buildtool --default-yes \
-    && python3 -m pip install --requirement src/objreg_ros/requirements/robot.txt \
+    && python3 -m pip install --require-hashes --no-deps --requirement src/objreg_ros/requirements/robot.lock \
     && rm -rf /var/lib/apt/lists/* ~/.ros
 RUN . /opt/ros/jazzy/setup.bash \
     && colcon build --base-paths src src/objreg_ros/objreg_msgs \
@@ -23,5 +25,8 @@ RUN . /opt/ros/jazzy/setup.bash \
 ENV NUMBA_CACHE_DIR=/home/ubuntu/.cache/numba
 # The image's own user, ubuntu.
 USER 1000
+# The kernels are compiled for the processor that builds the image; on another kind the first start compiles them anew.
+RUN . /opt/ros/jazzy/setup.bash && . /ws/install/setup.bash \
+    && python3 -c 'from objreg_ros.registrar import warm; warm.warm(warm.RegistrarParams())'
 ENTRYPOINT ["/bin/bash", "-c", ". /opt/ros/jazzy/setup.bash && . /ws/install/setup.bash && exec \"$@\"", "ros"]
 CMD ["ros2", "launch", "objreg_ros", "objreg.launch.py"]

@@ -62,3 +62,39 @@ def test_a_workflow_builds_every_image(repository: Path) -> None:
     workflow = (repository / ".github/workflows/images.yml").read_text()
     assert sorted(re.findall(r"- file: (\w+)", workflow)) == sorted(IMAGES)
     assert {path.name for path in (repository / "docker").glob("*.Dockerfile")} == {f"{n}.Dockerfile" for n in IMAGES}
+
+
+@pytest.mark.parametrize("name", ["images", "jazzy"])
+def test_actions_are_pinned_by_their_commit_and_pip_by_hashes(repository: Path, name: str) -> None:
+    workflow = (repository / f".github/workflows/{name}.yml").read_text()
+    used = re.findall(r"uses: (\S+)(.*)", workflow)
+    assert used and all(re.fullmatch(r"[\w/-]+@[0-9a-f]{40}", action) for action, _ in used)
+    assert all(re.fullmatch(r"  # v\d+\.\d+\.\d+", version) for _, version in used)
+    installs = re.findall(r"pip install (.*)", workflow)
+    assert installs and all("--require-hashes" in words for words in installs) and "pipx" not in workflow
+
+
+def test_what_pip_installs_into_an_image_has_its_hash(dockerfile: Path) -> None:
+    commands = re.findall(r"pip install ([^&]*)", " ".join(instructions(dockerfile, "RUN")))
+    own = [words for words in commands if words.split()[-1] == "."]
+    assert len(commands) > len(own)
+    assert all("--require-hashes" in words for words in commands if words not in own)
+    assert all("--no-deps" in words for words in own)
+
+
+def test_kernels_are_compiled_as_an_image_is_built_by_the_user_that_runs_it(dockerfile: Path) -> None:
+    last = dockerfile.read_text().rpartition("\nFROM ")[2]
+    assert "warm.warm(" in last.partition("\nUSER 1000\n")[2]
+
+
+def test_a_robots_image_has_the_solver_of_the_map(repository: Path) -> None:
+    lock = (repository / "requirements/robot.lock").read_text()
+    assert {"gtsam", "numba", "onnxruntime", "open3d", "rosbags"} <= set(re.findall(r"^([\w-]+)==", lock, re.M))
+    assert not {"numpy", "scipy", "setuptools"} & set(re.findall(r"^([\w-]+)==", lock, re.M))
+
+
+@pytest.mark.parametrize("name", ["build", "python3.12", "robot", "robot-test", "tools", "noble"])
+def test_every_package_of_a_lock_has_hashes(repository: Path, name: str) -> None:
+    lines = (repository / f"requirements/{name}.lock").read_text().replace("\\\n", " ").splitlines()
+    packages = [line for line in lines if re.match(r"[\w-]+==", line)]
+    assert packages and all("--hash=sha256:" in line for line in packages)

@@ -35,7 +35,7 @@ def checkout(repository: Path, tmp_path: Path) -> Path:
     python.chmod(0o755)
     uname = tmp_path / "bin" / "uname"
     uname.parent.mkdir()
-    uname.write_text('#!/bin/bash\necho "${SYSTEM:-Linux x86_64}"\n')
+    uname.write_text("#!/bin/bash\nset -- $1 ${SYSTEM:-Linux x86_64}\n[[ $1 == -m ]] && echo $3 || echo $2 $3\n")
     uname.chmod(0o755)
     return tmp_path
 
@@ -86,9 +86,9 @@ def test_what_another_setup_or_lock_asked_for_is_not_taken_as_installed(checkout
             "no lock fits Python 3.13.0 on Linux x86_64",
         ),
         (
-            {"SYSTEM": "Linux aarch64"},
-            "--editable .[simulation,mapper,report,ros]",
-            "no lock fits Python 3.12.0 on Linux aarch64",
+            {"SYSTEM": "Linux aarch64", "ROS_DISTRO": "jazzy"},
+            "--editable .[simulation,mapper,report] --constraint config/constraints.txt",
+            "no lock fits Python 3.12.0 beside a sourced ROS",
         ),
         (
             {"ROS_DISTRO": "jazzy"},
@@ -102,6 +102,13 @@ def test_where_no_lock_fits_pip_chooses_and_the_script_says_so(
 ) -> None:
     asked, said = heard(checkout, **variables)
     assert asked == [wanted] and reason in said
+
+
+def test_on_an_arm_without_a_sourced_ros_it_says_what_to_do(checkout: Path) -> None:
+    with pytest.raises(subprocess.CalledProcessError) as failed:
+        bootstrap(checkout, SYSTEM="Linux aarch64")
+    assert "expected a sourced ROS 2 Jazzy on aarch64, got none" in failed.value.stderr
+    assert "ros-jazzy-ros-base" in failed.value.stderr and not (checkout / "notes").read_text()
 
 
 OBJREG = """#!/bin/bash
