@@ -76,6 +76,7 @@ class OneCloud:
         )
         camera = depth.intrinsics
         xyz = back_project(depth.depth, camera.fx, camera.fy, camera.cx, camera.cy)
+        xyz[depth.depth == 0.0] = np.nan
         return Frame(
             objects=(cloud,),
             support=None,

@@ -10,6 +10,7 @@ import copy
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from golden import files, record, runs
@@ -19,6 +20,7 @@ from objreg_ros.data import ColourImage
 from objreg_ros.geometry import pose, rotation_from_vector
 
 LEAST = 5  # constraints, and refusals for which something was registered, without which a recording shows little
+RECORDED_WITH = 5  # OpenCV
 FEW = 3  # refusals of a pose, in the shortest recording
 
 
@@ -35,6 +37,8 @@ def test_a_real_recording_gives_what_it_gave(name: str, shared: Path) -> None:
 
 
 def require_the_same(name: str, path: Path) -> None:
+    if int(cv2.__version__.partition(".")[0]) < RECORDED_WITH:
+        pytest.skip(f"recorded with OpenCV {RECORDED_WITH}, got {cv2.__version__}: its resampling has other digits")
     golden = files.read(name)
     now = runs.results(runs.run(path, runs.Stored(golden.detections), runs.SOURCES[name].frames))
     found = differences(golden.results, now, real=isinstance(runs.SOURCES[name], runs.Real))

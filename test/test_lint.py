@@ -40,8 +40,10 @@ def main(monkeypatch: pytest.MonkeyPatch, repository: Path) -> Callable[..., Cal
     monkeypatch.chdir(repository)
 
     def found(linter: str, command: str = "main") -> Callable[..., int]:
-        module = pytest.importorskip(f"{linter}.main", reason=f"{linter} is not installed", exc_type=ImportError)
-        return getattr(module, command)
+        try:
+            return getattr(importlib.import_module(f"{linter}.main"), command)
+        except ImportError:
+            pytest.skip(f"{linter} is not installed")
 
     return found
 

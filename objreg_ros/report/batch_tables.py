@@ -115,7 +115,7 @@ def _items(row: Mapping[str, Any], *names: str) -> dict[str, Any]:
 def _schemas(arrow: ModuleType) -> dict[str, Any]:
     text, whole, number = arrow.string(), arrow.int64(), arrow.float64()
     numbers = arrow.map_(text, number)
-    ends = {"recording": text, "from_ns": whole, "to_ns": whole, "T_from_to": arrow.list_(number, 16)}
+    ends = {"recording": text, "from_ns": whole, "to_ns": whole, "T_from_to": arrow.list_(number)}
     counts = ("frames", "detections", "objects", "constraints", "strict", "loose", "false")
     recordings = {
         **dict.fromkeys(("name", "recording", "file", "error"), text),
@@ -125,7 +125,7 @@ def _schemas(arrow: ModuleType) -> dict[str, Any]:
         "stage_p50_ms": numbers,
     }
     errors = {"error_rotation_deg": number, "error_translation_cm": number, "false": arrow.bool_()}
-    constraints = {"covariance": arrow.list_(number, 36), "labels": arrow.list_(text), "evidence": numbers, **errors}
+    constraints = {"covariance": arrow.list_(number), "labels": arrow.list_(text), "evidence": numbers, **errors}
     refusals = {"reason": text, "detail": text, "evidence": numbers}
     tables = {"recordings": recordings, "constraints": {**ends, **constraints}, "refusals": {**ends, **refusals}}
     return {name: arrow.schema(columns) for name, columns in tables.items()}

@@ -63,7 +63,7 @@ def objects(stamp_ns: int, *labels: str) -> Any:
             )
         )  # fmt: skip
     view = View(
-        xyz=np.zeros((6, 8, 3), np.float32), grey=None,
+        xyz=np.ones((6, 8, 3), np.float32), grey=None,
         intrinsics=Intrinsics(fx=5.0, fy=5.0, cx=3.5, cy=2.5, width=8, height=6),
     )  # fmt: skip
     frame = Frame(

@@ -16,7 +16,7 @@ def frame(stamp_ns: int, x: float) -> Frame:
     return Frame(
         objects=(),
         support=None,
-        view=View(xyz=np.zeros((2, 2, 3), np.float32), grey=None, intrinsics=CAMERA),
+        view=View(xyz=np.ones((2, 2, 3), np.float32), grey=None, intrinsics=CAMERA),
         gravity=None,
         gravity_confidence=0.0,
         T_odom_camera=pose(np.eye(3), np.array([x, 0.0, 0.0])),

@@ -53,6 +53,7 @@ def cloud_of(label: str, instance: int, count: int, coloured: bool = True) -> Ob
 
 def frame_of(*objects: ObjectCloud, support: ObjectCloud | None = None, grey: bool = True) -> Frame:
     xyz = RNG.normal(size=(6, 8, 3)).astype(np.float32)
+    xyz[..., 2] = np.abs(xyz[..., 2]) + np.float32(0.1)
     xyz[0, 0] = np.nan
     return Frame(
         objects=objects,
@@ -120,6 +121,7 @@ def test_a_camera_comes_back_as_it_was() -> None:
 @pytest.mark.parametrize("coloured", [True, False])
 def test_a_cloud_comes_back_with_its_holes_and_with_colour_only_if_it_had_some(coloured: bool) -> None:
     xyz = RNG.normal(size=(6, 8, 3)).astype(np.float32)
+    xyz[..., 2] = np.abs(xyz[..., 2]) + np.float32(0.1)
     xyz[2, 3] = np.nan
     rgb = RNG.integers(0, 256, (6, 8, 3), dtype=np.uint8) if coloured else None
     message = to_msg.points(PointCloud(xyz=xyz, rgb=rgb, stamp_ns=STAMP))

@@ -13,7 +13,7 @@ from objreg_ros.segmenter.view import LEAST_WIDTH, reduced_view, step_for
 
 def image(height: int, width: int) -> DepthImage:
     camera = Intrinsics(fx=100.0, fy=100.0, cx=width / 2, cy=height / 2, width=width, height=height)
-    depth = np.arange(height * width, dtype=np.float32).reshape(height, width) / (height * width) + 1
+    depth = np.linspace(1.0, 2.0, height * width, endpoint=False, dtype=np.float32).reshape(height, width)
     rgb = np.full((height, width, 3), 90, np.uint8)
     return DepthImage(depth=depth, rgb=rgb, intrinsics=camera, stamp_ns=0)
 
