@@ -55,7 +55,7 @@ def borrowed(path: str) -> ModuleType:
 def store_attempt(folder: Path) -> Attempt:
     """Bits of a store flip; what it says is that which was written, or it is refused and left alone."""
     whole, place = folder / "whole.db", folder / "damaged.db"
-    _write_store(whole)
+    write_store(whole)
     good, truth = whole.read_bytes(), _said(whole, True)
 
     def attempt(draw: random.Random) -> None:
@@ -85,7 +85,8 @@ def _damaged(draw: random.Random, good: bytes) -> bytes:
     return bytes(made)
 
 
-def _write_store(path: Path) -> None:
+def write_store(path: Path) -> None:
+    """A store of `KEYFRAMES` keyframes with their objects and closures."""
     draw = np.random.default_rng(0)
     with closing(Store(path)) as store:
         for k in range(KEYFRAMES):

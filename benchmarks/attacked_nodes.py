@@ -12,7 +12,7 @@ import os
 import random
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,20 +20,19 @@ from typing import Any
 
 import attacked_messages as good
 from attacked_files import borrowed
-from trials import NoTrialError, Tally
+from trials import GREED_MB, NoTrialError, Tally
 
 from objreg_ros.bridge import to_msg
 from objreg_ros.bridge.from_msg import stamp_ns as stamp_of
 from objreg_ros.geometry import back_project
 
-TARGETS = {"live detector": 1.0, "live segmenter": 1.0, "live registrar": 1.0, "live mapper": 0.7}  # share of the time
+SHARES = {"detector": 1.0, "segmenter": 1.0, "registrar": 1.0, "mapper": 0.7, "keyframer": 0.7}  # of the time
 BATCH = 40
 THROUGH_S = 30.0  # within which a good frame comes through again, on a machine that is busy
 PACE_S = 0.01
 START_S = 600.0  # a first start compiles kernels
 STEP_NS = good.SECOND // 10
 GOOD = 0.3  # of the frames in a batch
-DOMAIN = 48
 
 
 @dataclass(frozen=True)
@@ -42,7 +41,7 @@ class Room:
 
     frame: Callable[[int], dict[str, Any]]
     before: Callable[[], dict[str, Any]]  # once
-    books: str = "finished"
+    package: str = ""  # whose node it is, where that has another name
 
 
 def _detector(stamp_ns: int) -> dict[str, Any]:
@@ -78,34 +77,42 @@ ROOMS = {
     "segmenter": Room(_segmenter, _labels),
     "registrar": Room(_registrar, _labels),
     "mapper": Room(_mapper, dict),
+    "keyframer": Room(_registrar, _labels, "keyframes"),
 }
 
 
 def run_live(target: str, seconds: float, first: int) -> Tally:
     """Attack a live node for so long, in one batch at least; the first batch is that of seed ``first``."""
-    room = target.removeprefix("live ")
-    with tempfile.TemporaryDirectory() as name, closing(_Siege(room, Path(name))) as siege:
+    kind, room = target.split(" ")
+    return besieged(SIEGES[kind], room, seconds, first)
+
+
+def besieged(siege: type[Siege], room: str, seconds: float, first: int) -> Tally:
+    """What comes of the batches of one siege."""
+    with tempfile.TemporaryDirectory() as name, closing(siege(room, Path(name))) as live:
         began, seed = time.monotonic(), first
         try:
             while seed == first or time.monotonic() - began < seconds:
-                siege.batch(seed)
+                live.batch(seed)
                 seed += 1
-            siege.settle(seed)
+            live.settle(seed)
         except AssertionError as error:  # the node that should follow the one that ended does not begin
-            siege.tally.find(seed, "death", str(error).splitlines()[0][:200], "")
-        return siege.tally
+            live.tally.find(seed, "death", str(error).splitlines()[0][:200], "")
+        return live.tally
 
 
-class _Siege:
+class Siege:
     """One node, and what it is sent."""
+
+    DOMAIN = 48
 
     def __init__(self, room: str, folder: Path) -> None:
         from std_msgs.msg import Header
 
         self.name, self.room, self.tally, self.folder = room, ROOMS[room], Tally(), folder
-        self.graph = borrowed("ros/graph.py").Graph(DOMAIN + list(ROOMS).index(room), folder)
+        self.graph = borrowed("ros/graph.py").Graph(self.DOMAIN + list(ROOMS).index(room), folder)
         self.graph.hear(Header, "/finished")
-        self._options = ["-p reliable:=true"]
+        self._options = ["-p reliable:=true", *self.options()]
         if room == "detector":
             tiny = borrowed("detector/tiny_model.py")
             (folder / "labelmap.txt").write_text("cup\ntv\n")
@@ -116,10 +123,20 @@ class _Siege:
 
     def _start(self) -> None:
         """Start the node and see a good frame through."""
-        self.graph.start(f"/{self.name}", self.name, *self._options)
+        self.graph.start(f"/{self.name}", self.room.package or self.name, *self._options)
         for topic, message in {**self.room.before(), **self.room.frame(self._now_ns)}.items():
             self._connect(topic, message)
         self._sees_good(START_S)
+        self._began_mb = _peak_mb(self.pid)
+
+    def options(self) -> Sequence[str]:
+        """More arguments of the node."""
+        return ()
+
+    @property
+    def pid(self) -> int:
+        """Of the node's process."""
+        return int(self.graph.processes[f"/{self.name}"].pid)
 
     def _connect(self, topic: str, message: Any) -> None:
         """Wait until the node listens to a topic."""
@@ -138,15 +155,22 @@ class _Siege:
     def batch(self, seed: int) -> None:
         """Publish a batch and see what became of the node."""
         draw = random.Random(seed)
-        for _ in range(BATCH):
-            self._send_one(draw)
-            self.graph.executor.spin_once(timeout_sec=PACE_S)
+        self._attack(draw, seed)
         if not self._alive():
             self._bury(seed)
         elif not self._sees_good(THROUGH_S):
             kind = "hang" if self._alive() else "death"
             self.tally.find(seed, kind, f"no good frame within {THROUGH_S:.0f} s", self._last_words())
             self._restart()
+        elif (grown := _peak_mb(self.pid) - self._began_mb) > GREED_MB:
+            self.tally.find(seed, "greed", f"{grown:.0f} MB", "")
+            self._restart()
+
+    def _attack(self, draw: random.Random, seed: int) -> None:
+        """What is done in one batch."""
+        for _ in range(BATCH):
+            self._send_one(draw)
+            self.graph.executor.spin_once(timeout_sec=PACE_S)
 
     def _send_one(self, draw: random.Random) -> None:
         """One frame: whole, or with some of its messages spoilt, lost or of another time."""
@@ -238,3 +262,16 @@ def _of_the_time(draw: random.Random, message: Any, original: Any) -> Any:
         message.header = good.from_msg_copy(message.header)
         message.header.stamp = original.header.stamp
     return message
+
+
+def _peak_mb(pid: int) -> float:
+    """The most memory that a process has had so far; 0 where it has ended."""
+    try:
+        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    except OSError:
+        return 0.0
+    return next((int(line.split()[1]) / 1024 for line in lines if line.startswith("VmHWM")), 0.0)
+
+
+SIEGES: dict[str, type[Siege]] = {"live": Siege}
+TARGETS = {f"live {room}": share for room, share in SHARES.items()}

@@ -1,15 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Attacks: spoilt messages into every decoder, room and live node, and damaged stores, recordings and models.
+"""Attacks: spoilt messages into every decoder, room and live node, hostile peers, files and servers.
 
     python benchmarks/attacks.py --seconds 900 --json attacks.json
     python benchmarks/attacks.py --only frame --seed 1234
 
 For each target the trials, how many of them were refused as they should be (ValueError or OSError), and the findings:
 ``bug`` (another exception; in a node it is caught at the door), ``death`` (the end of the process), ``hang`` (more than
-5 s of the processor, or 30 s of waiting), ``greed`` (more than 1 GB at once) and ``wrong`` (an answer that is not true,
-without an error). The JSON holds every kind of finding with seeds; ``--only TARGET --seed S`` makes that trial again,
-and shows the traceback. ``decoded`` are the messages that went through decoders and rooms, ``live`` those that were
-published to nodes in processes of their own. The exit status is 1 where anything was found.
+5 s of the processor, or 30 s of waiting), ``greed`` (more than 500 MB), ``wrong`` (an answer that is not true, without
+an error) and ``outside`` (a file written outside of the folder that was given). The JSON holds every kind of finding
+with seeds; ``--only TARGET --seed S`` makes that trial again, and shows the traceback. ``decoded`` are the messages
+that went through decoders and rooms, ``live`` those that were published to nodes in processes of their own, and the
+calls of their services. The exit status is 1 where anything was found. The groups of targets:
+
+\b
+decoders  every kind of message            rooms     what is done with it
+peers     packed keyframes, summaries, requests, deliveries: an honest peer must still be served
+files     stores, recordings, models       results   folders of a batch, saved maps
+commands  outputs that are inputs, fetch-model from a hostile server
+live      spoilt messages to each node     calls     parameters at extremes, services in floods
 """
 
 from __future__ import annotations
@@ -22,9 +30,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import attacked_calls
+import attacked_commands
 import attacked_files
 import attacked_messages
 import attacked_nodes
+import attacked_peers
+import attacked_results
 import attacked_rooms
 import click
 from tqdm import tqdm
@@ -33,19 +45,24 @@ from trials import KINDS, Target, judged, run_trials
 GROUPS: dict[str, Sequence[Target]] = {
     "decoders": attacked_messages.TARGETS,
     "rooms": attacked_rooms.TARGETS,
+    "peers": attacked_peers.TARGETS,
     "files": attacked_files.TARGETS,
+    "results": attacked_results.TARGETS,
+    "commands": attacked_commands.TARGETS,
 }
-LIVE = attacked_nodes.TARGETS
-SHARES = {"decoders": 0.4, "rooms": 0.2, "files": 0.2, "live": 0.2}  # of the time
+LIVE_GROUPS = {"live": attacked_nodes.TARGETS, "calls": attacked_calls.TARGETS}
+LIVE = {name: share for targets in LIVE_GROUPS.values() for name, share in targets.items()}
+SHARES = {"decoders": 0.2, "rooms": 0.15, "peers": 0.1, "files": 0.15, "results": 0.05, "commands": 0.05}  # of the time
+SHARES |= {"live": 0.15, "calls": 0.15}
 TARGETS = {target.name: target for targets in GROUPS.values() for target in targets}
+BY_GROUP = {**{name: {t.name: t.share for t in targets} for name, targets in GROUPS.items()}, **LIVE_GROUPS}
 NAMES = (*TARGETS, *LIVE)
 
 
 def seconds_of(chosen: Sequence[str], seconds: float) -> dict[str, float]:
     """How long each target has: the groups by `SHARES`, within them by the targets' own."""
-    groups = {**{name: {t.name: t.share for t in targets} for name, targets in GROUPS.items()}, "live": LIVE}
     weights: dict[str, float] = {}
-    for group, targets in groups.items():
+    for group, targets in BY_GROUP.items():
         whole = sum(share for name, share in targets.items() if name in chosen)
         weights |= {name: SHARES[group] * share / whole for name, share in targets.items() if name in chosen}
     return {name: seconds * weight / sum(weights.values()) for name, weight in weights.items()}
@@ -66,7 +83,7 @@ def attack(chosen: Sequence[str], seconds: float, workers: int, first: int) -> d
 
 def summary(rows: dict[str, dict[str, Any]]) -> dict[str, Any]:
     """The counts over all targets."""
-    messages = [t.name for group in ("decoders", "rooms") for t in GROUPS[group]]
+    messages = [t.name for group in ("decoders", "rooms", "peers") for t in GROUPS[group]]
     return {
         "decoded": sum(rows[name]["tries"] for name in messages if name in rows),
         "live": sum(rows[name]["tries"] for name in LIVE if name in rows),
@@ -77,9 +94,9 @@ def summary(rows: dict[str, dict[str, Any]]) -> dict[str, Any]:
 def table(rows: dict[str, dict[str, Any]]) -> str:
     """The rows as text."""
     head = ("target", "tries", "refused", *KINDS)
-    lines = ["".join(f"{word:>9}" if k else f"{word:<16}" for k, word in enumerate(head))]
+    lines = ["".join(f"{word:>9}" if k else f"{word:<20}" for k, word in enumerate(head))]
     for name, row in rows.items():
-        lines.append(f"{name:<16}" + "".join(f"{row[key]:>9}" for key in head[1:]))
+        lines.append(f"{name:<20}" + "".join(f"{row[key]:>9}" for key in head[1:]))
         for found in row["findings"]:
             lines.append(f"    {found['count']} × {found['kind']}: {found['what'][:120]} at {found['where']}")
             lines.append(f"      --only {name} --seed {found['seeds'][0]}")
@@ -104,10 +121,9 @@ def replay(name: str, seed: int) -> bool:
 
 
 def _names(_: click.Context, __: click.Parameter, text: str | None) -> tuple[str, ...]:
-    groups = {**{name: [t.name for t in targets] for name, targets in GROUPS.items()}, "live": list(LIVE)}
-    asked = NAMES if text is None else tuple(n for word in text.split(",") for n in groups.get(word, [word]))
+    asked = NAMES if text is None else tuple(n for word in text.split(",") for n in BY_GROUP.get(word, [word]))
     if set(asked) - set(NAMES):
-        raise click.BadParameter(f"expected some of {','.join((*groups, *NAMES))}, got {text!r}")
+        raise click.BadParameter(f"expected some of {','.join((*BY_GROUP, *NAMES))}, got {text!r}")
     return asked
 
 

@@ -3,8 +3,8 @@
 
 A trial is made of a seed alone, so that each can be run again. It may give anything or raise ValueError or OSError
 (refused). Whatever else it does is a finding: another exception (``bug``), the end of the process (``death``), more
-than `PATIENCE_S` seconds (``hang``), more than `GREED_MB` of memory (``greed``), or an answer that is not true
-without an error (``wrong``).
+than `PATIENCE_S` seconds (``hang``), more than `GREED_MB` of memory (``greed``), an answer that is not true
+without an error (``wrong``), or a file written outside of the folder that it was given (``outside``).
 """
 
 from __future__ import annotations
@@ -26,16 +26,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from fence import Fence
 
 PATIENCE_S = 5.0  # of the processor; of the clock where a trial only waits:
 WAITING_S = 30.0
 PREPARING_S = 600.0  # a first start compiles kernels
-GREED_MB = 1000
+GREED_MB = 500
 MEMORY = 4 << 30  # bytes of addresses beyond those that a process has when it begins
 PACKAGE = "objreg_ros/"
 KEPT_SEEDS = 5  # of findings that are alike
 MANY = 1 << 60
-KINDS = ("bug", "death", "hang", "greed", "wrong")
+KINDS = ("bug", "death", "hang", "greed", "wrong", "outside")
 TICKS = os.sysconf("SC_CLK_TCK")
 
 Attempt = Callable[[random.Random], None]
@@ -43,6 +44,14 @@ Attempt = Callable[[random.Random], None]
 
 class WrongAnswerError(Exception):
     """What was read or computed is not true, and nobody said so."""
+
+
+class LateError(Exception):
+    """An answer came, but later than `PATIENCE_S`."""
+
+
+class OutsideError(Exception):
+    """A file was changed that was not to be written."""
 
 
 class NoTrialError(Exception):
@@ -206,8 +215,10 @@ class _Worker:
             os.dup2(log.fileno(), 2)
             os.dup2(log.fileno(), 1)
             faulthandler.enable(log)
-            place = tempfile.mkdtemp(dir=self.folder)
+            place, aside = (tempfile.mkdtemp(dir=self.folder) for _ in range(2))
+            tempfile.tempdir = os.environ["TMPDIR"] = aside
             attempt = self.target.prepare(Path(place))
+            self._fence = Fence(Path(place), Path(aside))
             _limit_memory()
             for seed in self.seeds:
                 if self.book.over:
@@ -225,6 +236,8 @@ class _Worker:
         self.book.refused += kind == "refused"
         if error is not None and kind != "refused":
             self._tell(seed, kind, f"{type(error).__name__}: {error}"[:300], _where(error))
+        for path in self._fence.crossed():
+            self._tell(seed, "outside", f"{path}"[:300], "" if error is None else _where(error))
         if _peak_mb() - before > GREED_MB:
             self._tell(seed, "greed", f"{_peak_mb() - before:.0f} MB", "" if error is None else _where(error))
 
@@ -233,7 +246,10 @@ class _Worker:
 
 
 def judged(attempt: Attempt, seed: int | random.Random) -> tuple[str, Exception | None]:
-    """What one trial comes to in this process: "passed", "refused", "wrong" or "bug", and the exception."""
+    """What one trial comes to in this process, and the exception.
+
+    "passed", "refused", "wrong", "hang", "outside" or "bug".
+    """
     draw = random.Random(seed) if isinstance(seed, int) else seed
     try:
         with np.errstate(all="ignore"):
@@ -242,8 +258,8 @@ def judged(attempt: Attempt, seed: int | random.Random) -> tuple[str, Exception 
         return "refused", error
     except (ValueError, OSError) as error:
         return ("refused" if any(_own_frames(error)) else "bug"), error
-    except WrongAnswerError as error:
-        return "wrong", error
+    except (WrongAnswerError, LateError, OutsideError) as error:
+        return {WrongAnswerError: "wrong", LateError: "hang", OutsideError: "outside"}[type(error)], error
     except Exception as error:
         return "bug", error
     return "passed", None
