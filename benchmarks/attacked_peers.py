@@ -2,7 +2,8 @@
 """What registrars and keyframers send each other, under attack: packed keyframes, summaries, requests, deliveries.
 
 A hostile peer knows all that an honest one said. It forges, floods and damages; its checksums are right. What an
-honest peer says before or after that must still be of use: nobody silences another.
+honest peer says before or after that must still be of use: nobody silences another. A newcomer that comes after more
+invented names than a registrar knows others waits for a place; that limit (docs/robots.md) is not attacked.
 """
 
 from __future__ import annotations
@@ -170,19 +171,22 @@ def exchange_attempt(what: bytes, _: Path, make: Callable[[Side], Any] = Side.ex
     kind, bomb = KINDS[what], _deflated(bytes(BOMB))
 
     def attempt(draw: random.Random) -> None:
+        known_first = draw.random() < 0.5
         if draw.random() < FLOODED:
-            hostile = list(flood(draw, kind, draw.choice(goods)))
+            many = draw.random() < 0.5
+            hostile = list(flood(draw, kind, draw.choice(goods), many))
+            known_first = known_first or many
         else:
             hostile = [forged(draw, kind, draw.choice(goods), bomb) for _ in range(draw.randint(1, 6))]
-        require_honest_served(make(ours), honest, what, hostile, draw.random() < 0.5)
+        require_honest_served(make(ours), honest, what, hostile, known_first)
 
     return attempt
 
 
-def flood(draw: random.Random, kind: Kind, good: bytes) -> Iterable[bytes]:
-    """Very many messages that are well formed: of one run or of many, with numbers that rise or leap."""
+def flood(draw: random.Random, kind: Kind, good: bytes, many: bool) -> Iterable[bytes]:
+    """Very many messages that are well formed: of one run or of ``many``, with numbers that rise or leap."""
     head, _, rest = kind.unpack(good[PREFIX.size :]).partition(b"\n")
-    said, many, step = json.loads(head), draw.random() < 0.5, draw.choice((1, 1000, 1 << 40))
+    said, step = json.loads(head), draw.choice((1, 1000, 1 << 40))
     for k in range(FLOOD):
         named = {"run": f"hostile {k if many else 0}"} if kind.magic != REQUEST else {"asker": f"hostile {k}"}
         number = 1 if kind.magic == REQUEST else 1 + k * step

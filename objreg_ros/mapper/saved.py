@@ -124,6 +124,8 @@ def _require_members(told: Mapping[str, Any], names: Sequence[str]) -> None:
 
 
 def _graph(told: Mapping[str, Any], arrays: Mapping[str, Array], params: MapperParams) -> PoseGraph:
+    if odd := sorted(name for name, array in arrays.items() if array.dtype.kind not in "fiu"):
+        raise ValueError(f"expected real numbers, got others in {', '.join(odd[:3])}")
     counts = {name: len(arrays[name]) for name in OF_CLOSURES}
     if set(counts.values()) != {len(told["closures"])}:
         raise ValueError(f"expected {len(told['closures'])} closures everywhere, got {counts}")

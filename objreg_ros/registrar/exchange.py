@@ -197,15 +197,21 @@ class Exchange:
         return self._named(self._registrar.compare(keyframe, clock, asked.candidates, seconds, hurried))
 
     def _answered(self, name: Name, came: Keyframe) -> Asked:
-        """What a keyframe is the answer to; ValueError where it is not that of the summary."""
+        """What a keyframe is the answer to; ValueError where it is not that of a summary."""
         with self._lock:
             asked = self._pending.find(name, came.stamp_ns, came.session, came.frame_id)
-        if asked is None:
-            raise ValueError(
-                f"expected the keyframe of its summary, got one at {came.stamp_ns} ns of {came.frame_id!r}"
-            )
-        asked.require(sightings_of(came))
-        return asked
+        refused = ValueError(
+            f"expected the keyframe of its summary, got one at {came.stamp_ns} ns of {came.frame_id!r}"
+        )
+        seen = sightings_of(came)
+        for one in asked:
+            try:
+                one.require(seen)
+            except ValueError as error:
+                refused = error
+            else:
+                return one
+        raise refused
 
     def _is_news(self, summary: Summary, packed: bytes, now: float) -> bool:
         if summary.name.run == self.run:

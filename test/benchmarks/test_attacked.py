@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 import importlib
+import json
 import random
 import socket
+import struct
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -75,14 +77,6 @@ def test_the_fence_knows_what_an_event_writes(event: str, args: tuple[Any, ...],
 
 
 # ---------------------------------------------------------------------------------------------------------------- peers
-
-
-@pytest.fixture(scope="module")
-def _warm() -> None:
-    from objreg_ros.registrar.warm import warm
-    from objreg_ros.registration.params import RegistrarParams
-
-    warm(RegistrarParams(threads=1))
 
 
 def test_forged_keyframes_are_refused_or_sound(tmp_path: Path) -> None:
@@ -198,7 +192,7 @@ def test_a_command_that_writes_over_what_it_reads_is_seen_and_that_is_restored(t
 
         def invoke(self, context: click.Context) -> None:
             """Write."""
-            Path(context.protected_args[-1] if False else self.words[-1]).write_text("overwritten")
+            Path(self.words[-1]).write_text("overwritten")
 
         def parse_args(self, context: click.Context, args: list[str]) -> list[str]:
             """Take any words."""
@@ -238,3 +232,137 @@ def test_the_server_of_the_attacks_answers(tmp_path: Path) -> None:
         connection.settimeout(5.0)
         connection.recv(100)
     server.close()
+
+
+# ---------------------------------------------------------------------------------------------------------------- calls
+
+
+def value(**fields: Any) -> Any:
+    from rcl_interfaces.msg import ParameterValue
+
+    return ParameterValue(**fields)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "successful", "reason", "old", "new", "fault"),
+    [
+        (2, True, "", 1, 2, ""),
+        (2, False, "too large", 1, 1, ""),
+        (2, False, "", 1, 1, "refused without a reason"),
+        (2, False, "too large", 1, 2, "refused, and changed all the same"),
+        (2, True, "", 1, 1, "accepted, and is not what was set"),
+    ],
+)
+def test_an_answer_about_a_parameter_that_is_not_true_is_seen(
+    wanted: int, successful: bool, reason: str, old: int, new: int, fault: str
+) -> None:
+    calls = script("attacked_calls")
+    values = [value(type=2, integer_value=number) for number in (wanted, old, new)]
+    result = SimpleNamespace(successful=successful, reason=reason)
+    assert calls.fault_of(values[0], result, *values[1:]) == fault
+
+
+def test_a_whole_number_and_an_empty_list_are_what_was_set() -> None:
+    calls, done = script("attacked_calls"), SimpleNamespace(successful=True, reason="")
+    real, none = value(type=3, double_value=1.0), value(type=9)
+    assert not calls.fault_of(value(type=2, integer_value=1), done, real, real)
+    assert not calls.fault_of(value(type=6), done, none, none)
+    assert calls.fault_of(value(type=2, integer_value=2), done, real, real)
+
+
+def besieged(calls: ModuleType, kind: str, folder: Path, **more: Any) -> Any:
+    """A siege without its node."""
+    siege: Any = object.__new__(getattr(calls, kind))
+    siege.tally, siege.name, siege._home = script("trials").Tally(), "registrar", calls._home(folder)
+    siege._before, siege._stored, siege._last_words = calls.contents(siege._home), 4, lambda: ""
+    siege.__dict__.update(more)
+    return siege
+
+
+def test_a_file_of_the_home_folder_and_a_store_that_is_emptied_are_seen(tmp_path: Path) -> None:
+    siege = besieged(script("attacked_calls"), "Services", tmp_path, stored=lambda: 4)
+    siege.require_kept(1)
+    assert not siege.tally.findings
+    (siege._home / "precious.npz").write_text("a map")
+    siege.require_kept(2)
+    siege.stored = lambda: 0
+    siege.require_kept(3)
+    assert [(row["kind"], row["seeds"]) for row in siege.tally.findings.values()] == [("outside", [2]), ("wrong", [3])]
+
+
+@pytest.mark.parametrize(("answers", "kinds"), [(False, ["hang"]), (True, [])])
+def test_a_service_that_does_not_answer_is_seen(
+    answers: bool, kinds: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = script("attacked_calls")
+    monkeypatch.setattr(calls, "ANSWER_S", 0.1)
+    answer = SimpleNamespace(done=lambda: answers, result=lambda: "yes")
+    client = SimpleNamespace(call_async=lambda request: answer)
+    executor = SimpleNamespace(spin_once=lambda timeout_sec: None)
+    siege = besieged(calls, "Services", tmp_path, graph=SimpleNamespace(executor=executor))
+    siege.client, siege._alive = lambda kind, name: client, lambda: True
+    assert siege.call(SimpleNamespace(Request=dict), "save", 5) == ("yes" if answers else None)
+    assert [row["kind"] for row in siege.tally.findings.values()] == kinds
+
+
+class Remembers(SimpleNamespace):
+    """A node's parameters, as services: ``stuck`` says that it sets what it leaves as it is."""
+
+    def call(self, kind: Any, name: str, seed: int = -1, **asked: Any) -> Any:
+        """Answer."""
+        if name == "get_parameters":
+            return SimpleNamespace(values=[value(type=2, integer_value=self.at)] * len(asked["names"]))
+        if not self.stuck:
+            self.at = asked["parameters"][-1].value.integer_value
+        done = SimpleNamespace(successful=True, reason="")
+        return SimpleNamespace(result=done, results=[done] * len(asked["parameters"]))
+
+
+@pytest.mark.parametrize("stuck", [False, True])
+def test_a_parameter_that_is_not_set_though_it_is_said_to_be_is_seen(stuck: bool, tmp_path: Path) -> None:
+    from rcl_interfaces.msg import Parameter
+
+    siege = besieged(script("attacked_calls"), "Parameters", tmp_path, call=Remembers(stuck=stuck, at=1).call)
+    siege._set(0, [Parameter(name="candidates", value=value(type=2, integer_value=7))], False)
+    assert siege.tally.counts["wrong"] == stuck and siege.tally.tries == 1
+
+
+def test_extremes_of_every_type_can_be_sent(tmp_path: Path) -> None:
+    from rcl_interfaces.msg import ParameterDescriptor
+    from rclpy.serialization import serialize_message
+
+    calls = script("attacked_calls")
+    siege, draw = besieged(calls, "Parameters", tmp_path), random.Random(0)
+    kinds = set()
+    for kind in list(calls.FIELDS) * 8:
+        made = siege.extreme(draw, ParameterDescriptor(type=kind))
+        kinds.add(made.type)
+        assert len(serialize_message(made)) < 3 * calls.MOST_BYTES
+    assert kinds == set(calls.FIELDS)
+
+
+# --------------------------------------------------------------------------------------------------------- hostile peer
+
+
+def test_the_ratio_is_of_the_constraints_and_is_not_taken_of_none() -> None:
+    hostile = script("hostile_peer")
+    assert hostile.ratio_of({"constraints": 10}, {"constraints": 9}) == pytest.approx(0.9)
+    with pytest.raises(click.ClickException, match="expected constraints without a hostile peer"):
+        hostile.ratio_of({"constraints": 0}, {"constraints": 9})
+
+
+def test_a_forged_message_has_a_right_checksum_most_often(tmp_path: Path) -> None:
+    peers = script("attacked_peers")
+    good = peers.pack_request(peers.Request(peers.Name("a", 1), 1.0, "b"))
+    kind, draw = peers.KINDS[peers.REQUEST], random.Random(0)
+    made = [peers.forged(draw, kind, good, b"") for _ in range(200)]
+    right = [m for m in made if len(m) > 12 and struct.unpack_from("<I", m, 4)[0] == peers.zlib.crc32(m[8:])]
+    assert len(set(made)) > 100 and len(right) > 150
+
+
+def test_an_edit_changes_something_and_is_the_same_again() -> None:
+    edits, value = script("edits"), {"a": [1, 2.5, {"b": None}], "c": "text"}
+    whole = json.dumps(value)
+    made = [edits.edited_text(random.Random(seed), value) for seed in range(100)]
+    assert made == [edits.edited_text(random.Random(seed), value) for seed in range(100)]
+    assert sum(one != whole for one in made) > 90 and json.dumps(value) == whole

@@ -168,6 +168,14 @@ def test_what_no_map_has_is_refused_before_it_is_unpacked(yesterday: PoseGraph, 
         saved.load(tmp_path / "map.npz", MapperParams())
 
 
+@pytest.mark.parametrize("name", ["T_1_2", "covariances", "0_poses"])
+def test_a_map_of_complex_numbers_is_refused(yesterday: PoseGraph, tmp_path: Path, name: str) -> None:
+    arrays = saved.packed(yesterday)
+    np.savez(tmp_path / "map.npz", **{**arrays, name: arrays[name] * (1 + 0j)})
+    with pytest.raises(ValueError, match=f"expected real numbers, got others in {name}"):
+        saved.load(tmp_path / "map.npz", MapperParams())
+
+
 def test_a_map_of_before_robots_is_of_one_without_a_name(yesterday: PoseGraph, tmp_path: Path) -> None:
     arrays = saved.packed(yesterday)
     told = json.loads(arrays["told"].tobytes())

@@ -410,6 +410,24 @@ def test_a_summary_under_the_name_of_the_true_one_keeps_that_out_of_nothing() ->
     assert outcome is not None and outcome.closures
 
 
+@pytest.mark.parametrize("forged_first", [True, False])
+def test_a_summary_with_the_moment_of_the_true_one_and_other_objects_does_not_take_its_place(
+    forged_first: bool,
+) -> None:
+    a, b = Robot("a"), Robot("b")
+    a.sees(10, HERE)
+    true = b.sees(30, BESIDE)
+    summary = unpack_summary(true)
+    moved = tuple(replace(one, position=one.position + 0.5) for one in summary.sightings)
+    forged = pack_summary(replace(summary, sightings=moved))
+    requests = [a.exchange.hear(packed) for packed in ((forged, true) if forged_first else (true, forged))]
+    b.exchange.note(next(filter(None, requests)), NOW)
+    answer = b.exchange.answer(NOW)
+    assert answer is not None
+    outcome = a.exchange.take(answer)
+    assert outcome is not None and outcome.closures
+
+
 def test_a_forged_keyframe_does_not_use_up_the_request_for_the_true_one() -> None:
     a, b = Robot("a"), Robot("b")
     a.sees(10, HERE)

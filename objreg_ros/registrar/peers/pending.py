@@ -17,6 +17,8 @@ MOST_ASKED = 1000  # keyframes that did not come yet
 ASKED_S = 600.0  # that we wait for one
 APART_M = 0.2  # between an object of a summary and of its keyframe, which has fewer points of it
 
+Moment = tuple[Name, int, int, str]  # of a keyframe: name, stamp, session and camera
+
 
 class Asked(NamedTuple):
     """A keyframe that we asked for, and what it is to be compared with."""
@@ -26,10 +28,11 @@ class Asked(NamedTuple):
     since: float
 
     @property
-    def moment(self) -> tuple[Name, int, int, str]:
-        """What the answer has to have: name, stamp, session and camera."""
-        first = self.summary.sightings[0]
-        return self.summary.name, first.stamp_ns, first.session, self.summary.frame_id
+    def key(self) -> tuple[Moment, bytes]:
+        """What the answer has to have: its moment, and the labels and positions of its objects."""
+        first, seen = self.summary.sightings[0], self.summary.sightings
+        moment = self.summary.name, first.stamp_ns, first.session, self.summary.frame_id
+        return moment, repr([(one.label, one.position.tolist()) for one in seen]).encode()
 
     def require(self, seen: Sequence[Sighting]) -> None:
         """ValueError unless the objects of an answer stand where the summary has some of their label."""
@@ -44,33 +47,34 @@ class Pending:
 
     def __init__(self, books: Counter[str]) -> None:
         self._books = books
-        self._asked: dict[tuple[Name, int, int, str], Asked] = {}  # the oldest first
+        self._asked: dict[tuple[Moment, bytes], Asked] = {}  # by moment and objects, the oldest first
 
     def __contains__(self, name: object) -> bool:
-        return any(moment[0] == name for moment in self._asked)
+        return any(moment[0] == name for moment, _ in self._asked)
 
     def add(self, asked: Asked) -> bool:
         """Whether it may wait: of too many the newest of the run that has most does not."""
-        for moment in [m for m, one in self._asked.items() if asked.since - one.since > ASKED_S]:
-            self._drop(moment)
+        for key in [k for k, one in self._asked.items() if asked.since - one.since > ASKED_S]:
+            self._drop(key)
         if len(self._asked) >= MOST_ASKED:
-            counts = Counter(moment[0].run for moment in self._asked)
+            counts = Counter(moment[0].run for moment, _ in self._asked)
             fullest, most = counts.most_common(1)[0]
             if counts[asked.summary.name.run] + 1 >= most:
                 self._books["dropped: too many asked for"] += 1
                 return False
-            self._drop(next(moment for moment in reversed(self._asked) if moment[0].run == fullest))
-        self._asked[asked.moment] = asked
+            self._drop(next(key for key in reversed(self._asked) if key[0][0].run == fullest))
+        self._asked[asked.key] = asked
         return True
 
-    def find(self, name: Name, stamp_ns: int, session: int, frame_id: str) -> Asked | None:
-        """What an answer is the answer to; None if another keyframe, or none, was asked for by this name."""
-        return self._asked.get((name, stamp_ns, session, frame_id))
+    def find(self, name: Name, stamp_ns: int, session: int, frame_id: str) -> list[Asked]:
+        """What an answer may be the answer to: several where summaries of one name differ, as a forged one does."""
+        wanted = name, stamp_ns, session, frame_id
+        return [asked for (moment, _), asked in self._asked.items() if moment == wanted]
 
     def forget(self, asked: Asked) -> None:
         """Its answer came, and was the right one."""
-        self._asked.pop(asked.moment, None)
+        self._asked.pop(asked.key, None)
 
-    def _drop(self, moment: tuple[Name, int, int, str]) -> None:
-        del self._asked[moment]
+    def _drop(self, key: tuple[Moment, bytes]) -> None:
+        del self._asked[key]
         self._books["dropped: not answered"] += 1
