@@ -40,6 +40,7 @@ from objreg_ros.bridge.worker import Worker
 from objreg_ros.params import Params
 from objreg_ros.plausibility.finding import Finding
 
+REST = 5.0  # times as long as a service worked it then rests
 INACTIVE = "inactive"  # why a frame ends that came to a managed node that is not active
 
 
@@ -335,17 +336,25 @@ class Door(ManagedNode):
     def serve_aside(self, name: str, work: Callable[[], tuple[bool, str]]) -> None:
         """A service of std_srvs/Trigger: ``work`` is done `aside`, and says whether it could be, and what to know.
 
-        A call that comes while another one is answered is refused: whoever calls often begins no second thread.
+        A call that comes while another one is answered is refused, and so is one that comes before the service has
+        rested `REST` times as long as that took: whoever calls all the time holds up little of the rest.
         """
-        in_hand = threading.Lock()
+        in_hand, rested_s = threading.Lock(), 0.0
 
         async def answer(_: Any, response: Any) -> Any:
+            nonlocal rested_s
+            begun_s = time.monotonic()
+            if begun_s < rested_s:
+                response.success = False
+                response.message = f"{name}: call again in {rested_s - begun_s:.1f} s: an earlier call is just done"
+                return response
             if not in_hand.acquire(blocking=False):
-                response.success, response.message = False, f"{name}: an earlier call is not done yet; call again"
+                response.success, response.message = False, f"{name}: call again: an earlier call is not done yet"
                 return response
             try:
                 response.success, response.message = await self.aside(work)
             finally:
+                rested_s = time.monotonic() + REST * (time.monotonic() - begun_s)
                 in_hand.release()
             return response
 

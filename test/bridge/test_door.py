@@ -4,6 +4,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,7 +15,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from objreg_ros.bridge import qos
-from objreg_ros.bridge.door import Door, DroppedError
+from objreg_ros.bridge.door import REST, Door, DroppedError
 from objreg_ros.bridge.drops import Drops
 from objreg_ros.bridge.log import ThrottledLog
 
@@ -293,6 +294,29 @@ def test_while_a_service_waits_for_work_aside_the_node_hears_on(door: Door) -> N
     while not asked.done() and time.monotonic() < deadline:
         rclpy.spin_once(door, timeout_sec=0.05)
     assert heard == ["one"] and asked.result().success
+
+
+def test_whoever_calls_a_service_all_the_time_is_refused_for_most_of_it(door: Door) -> None:
+    worked: list[float] = []
+
+    def work() -> tuple[bool, str]:
+        worked.append(time.monotonic())
+        time.sleep(0.2)
+        return True, "saved"
+
+    door.serve_aside("~/save", work)
+    client, answers, refused = door.create_client(Trigger, "~/save"), [], set()
+    assert client.wait_for_service(10.0)
+    while len(worked) < 3:
+        asked = [client.call_async(Trigger.Request()) for _ in range(2)]
+        deadline = time.monotonic() + 20.0
+        while not all(one.done() for one in asked) and time.monotonic() < deadline:
+            rclpy.spin_once(door, timeout_sec=0.05)
+        answers += [one.result().success for one in asked]
+        refused |= {one.result().message.partition(" in ")[0] for one in asked if not one.result().success}
+    assert refused == {"~/save: call again", "~/save: call again: an earlier call is not done yet"}
+    assert sum(answers) <= len(worked) < len(answers)
+    assert all(b - a >= 0.2 * (1 + REST) for a, b in pairwise(worked))
 
 
 def test_what_is_done_aside_is_over_before_a_node_ends(door: Door) -> None:
