@@ -69,6 +69,7 @@ OPTIONS = {
     "reliable": "true to ask cameras for reliable delivery",
     "keyframer": "true to start a keyframer in the registrar's place, which sends keyframes to a registrar elsewhere",
     "exchange": "namespace of the topics by which registrars of several robots exchange keyframes, as /fleet",
+    "key_file": "file with the key that the robots share, by which keyframes of registrar and keyframer are signed",
     "mapper": "true to start the reference mapper too, which publishes path and correction",
     "composed": "true for all nodes in one process, which takes half of the memory",
     "managed": "true for nodes with a life cycle (~/change_state); not with composed",
@@ -90,7 +91,12 @@ FOREIGN = ("vision_msgs", "masks")  # detections that are another detector's
 RESPAWN_S = 2.0
 REFUSED = 1  # the status of a node that was refused at its start, with one line that says why
 POSE_NUMBERS = 7
-OWN = {"detector": ("model",), "segmenter": ("source", "detections", "camera"), "registrar": ("exchange",)}
+OWN = {
+    "detector": ("model",),
+    "segmenter": ("source", "detections", "camera"),
+    "registrar": ("exchange", "key_file"),
+    "keyframer": ("key_file",),
+}
 
 
 def generate_launch_description() -> LaunchDescription:

@@ -282,6 +282,12 @@ def test_each_process_runs_in_an_enclave_of_its_own_where_they_are_asked_for(
     assert arguments("graph", given)[-1] == "/objreg/graph"
 
 
+def test_registrar_and_keyframer_get_the_key_of_the_robots(repository: Path, said: dict[str, Any]) -> None:
+    parameters, given = launch_file(repository)["_parameters"], {**said, "key_file": "fleet.key"}
+    assert parameters("registrar", given) == parameters("keyframer", given) == [{"key_file": "fleet.key"}]
+    assert parameters("segmenter", given) == []
+
+
 @pytest.mark.parametrize("text", ["1,2,x", "1,2,3", "1,2,3,0,0,0,1,9", "nan,", ""])
 def test_a_mount_that_is_no_seven_numbers_is_refused_by_its_name(repository: Path, text: str) -> None:
     with pytest.raises(ValueError, match="T_base_camera: expected seven numbers with commas"):
