@@ -126,7 +126,8 @@ def test_a_replay_that_is_told_to_end_does_so_with_the_usual_status(
             assert process.poll() is None
         process.send_signal(how)
         _, said = process.communicate(timeout=60)
-    assert process.returncode == status and "Traceback" not in said, said
+    ours = said.partition("Exception ignored in: <function tqdm")[0]  # which Ubuntu's version says of a half-made bar
+    assert process.returncode == status and "Traceback" not in ours, said
 
 
 def end_keyframe(graph: Graph) -> None:
