@@ -51,6 +51,6 @@ def _written(event: str, args: tuple[Any, ...]) -> Iterator[str]:
         return
     for at, folder in CHANGES.get(event, ()):
         path, base = args[at], -1 if folder is None or folder >= len(args) else args[folder]
-        if isinstance(path, int) or (text := os.fsdecode(path)) == ":memory:" or "mode=ro" in text:
+        if isinstance(path, int) or (text := os.fsdecode(path)) in ("", ":memory:") or "mode=ro" in text:
             continue
         yield os.path.join(f"/proc/self/fd/{base}" if base not in (-1, None) else "", text.removeprefix("file:"))

@@ -73,11 +73,13 @@ class PictureMotion:
     def see(self, image: DepthImage) -> Array | None:
         """The angular velocity (2,) rad/s about x and y at the frame before this one; None where it is not known."""
         assert image.rgb is not None
-        every = max(1, image.rgb.shape[1] // PICTURE_WIDTH)
+        height, width = image.rgb.shape[:2]
+        every = max(1, min(width // PICTURE_WIDTH, height))  # a strip keeps a row
         small = cv2.resize(image.rgb, None, fx=1.0 / every, fy=1.0 / every, interpolation=cv2.INTER_AREA)
         grey = cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32)
         seconds = 1e-9 * (image.stamp_ns - self._stamp_ns)
         same = self._grey is not None and self._grey.shape == grey.shape and 0.0 < seconds <= LONGEST_S
+        same = same and min(grey.shape) > 1  # of one row nothing is told
         focal = np.array([image.intrinsics.fx, image.intrinsics.fy]) / every
         after = self._moved(grey, focal, seconds) if same else None
         before, self._before, self._grey, self._stamp_ns = self._before, after, grey, image.stamp_ns

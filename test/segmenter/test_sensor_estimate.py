@@ -139,6 +139,15 @@ def test_no_velocity_is_told_across_a_gap_or_as_time_goes_back() -> None:
         assert told[2] is not None and told[3] is None
 
 
+def test_a_picture_of_one_row_ends_nothing() -> None:
+    camera = Intrinsics(fx=500.0, fy=500.0, cx=960.0, cy=0.0, width=1920, height=1)
+    depth, rgb = np.ones((1, 1920), np.float32), np.zeros((1, 1920, 3), np.uint8)
+    motion = PictureMotion()
+    for stamp_ns in range(0, 300_000_000, 33_000_000):
+        image = DepthImage(depth=depth, rgb=rgb, intrinsics=camera, stamp_ns=stamp_ns)
+        assert motion.see(image) is None
+
+
 def test_the_noise_of_depth_is_told_in_a_kinects() -> None:
     plain = replace(stream(0.0, count=1, speed=0.0)[0], rgb=None)
     flat = np.full(plain.depth.shape, 2.0)
