@@ -10,6 +10,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import packages_distributions
@@ -213,16 +214,23 @@ def compiled_code() -> Check:
     try:
         folder = Path(import_module(KERNEL).moved.stats.cache_path)
     except Exception as error:  # numba's own of a folder that there is not, or numba itself is broken
-        todo = "set NUMBA_CACHE_DIR to a folder that can be written: without one each start compiles for a minute"
-        return Check("machine", name, f"not kept: {' '.join(str(error).split())}", todo)
+        todo = "set NUMBA_CACHE_DIR to a folder that can be written: numba loads no kernel without one"
+        return Check("machine", name, f"cannot be loaded: {' '.join(str(error).split())}", todo, stops=True)
     if not os.access(folder if folder.exists() else folder.parent, os.W_OK):
         todo = "set NUMBA_CACHE_DIR to a folder that can be written"
         return Check("machine", name, f"{folder} cannot be written", todo)
     is_warm = any(folder.glob("*.nbi"))
-    is_passing = folder.is_relative_to(tempfile.gettempdir())
-    todo = "set NUMBA_CACHE_DIR to a folder that stays: this one goes with a restart" if is_passing else ""
+    todo = "set NUMBA_CACHE_DIR to a folder that stays: this one goes with a restart" if _is_passing(folder) else ""
     found = f"{'there' if is_warm else 'none: the first run compiles for a minute'}, in {folder}"
     return Check("machine", name, found, todo)
+
+
+def _is_passing(folder: Path) -> bool:
+    """Whether it lies where nothing stays."""
+    places = [SHARED_MEMORY]
+    with suppress(OSError):  # no temporary folder
+        places.append(Path(tempfile.gettempdir()))
+    return any(map(folder.is_relative_to, places))
 
 
 def _size(count: int) -> str:

@@ -91,7 +91,9 @@ def test_a_disk_without_a_place_for_what_is_temporary_stops_runs(monkeypatch: py
         raise FileNotFoundError(2, "No usable temporary directory found in ['/tmp']")
 
     monkeypatch.setattr("tempfile.gettempdir", nowhere)
-    check = next(check for check in checks.of_machine() if check.name == "free disk for a while")
+    machine = {check.name: check for check in checks.of_machine()}
+    check = machine["free disk for a while"]
+    assert "kernels" in machine["compiled kernels"].found
     assert check.stops and check.found.startswith("No usable temporary directory") and "TMPDIR" in check.todo
 
 
@@ -106,6 +108,15 @@ def test_compiled_code_is_found_and_a_folder_that_cannot_be_written_is_advice(mo
     monkeypatch.setattr("os.access", lambda *_: False)
     check = checks.compiled_code()
     assert "cannot be written" in check.found and "NUMBA_CACHE_DIR" in check.todo and not check.stops
+
+
+def test_kernels_that_have_no_folder_at_all_stop_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    def nowhere(name: str) -> None:
+        raise RuntimeError("cannot cache function 'moved': no locator available")
+
+    monkeypatch.setattr(checks, "import_module", nowhere)
+    check = checks.compiled_code()
+    assert check.stops and "no locator available" in check.found and "NUMBA_CACHE_DIR" in check.todo
 
 
 def test_the_first_lines_say_what_this_is() -> None:
