@@ -89,7 +89,7 @@ CHOICES = {
 }
 FOREIGN = ("vision_msgs", "masks")  # detections that are another detector's
 RESPAWN_S = 2.0
-REFUSED = 1  # the status of a node that was refused at its start, with one line that says why
+REFUSED = 1  # the status of a node that was refused at its start, with one line that says why; Python's own of a bug
 POSE_NUMBERS = 7
 OWN = {
     "detector": ("model",),
@@ -155,9 +155,9 @@ def _together(rooms: tuple[str, ...], said: dict[str, str], alike: dict) -> Node
 
 
 def _ended(event: ProcessExited, context: LaunchContext) -> list:
-    """All ends where a node was refused: the others would wait for it. One that was killed is named."""
+    """All ends where a node was refused or has a bug: the others would wait for it. One that was killed is named."""
     if event.returncode == REFUSED:
-        why = f"{event.process_name} was refused: a line above says what it expected, and got"
+        why = f"{event.process_name} was refused, or has a bug: the lines above say which"
         return [LogInfo(msg=f"{why}; all is ended"), Shutdown(reason=why)]
     if event.returncode and not context.is_shutdown:
         ended = f"{event.process_name} ended with status {event.returncode}: the others go on without it"
