@@ -3,6 +3,7 @@
 #   docker build --file docker/python.Dockerfile --tag objreg .
 #   docker run --rm --volume "$PWD:/data" objreg offline /data/my_bag --json /data/out.json
 #   docker run --rm --shm-size=1g --volume "$PWD:/data" objreg demo --out /data/demo
+# For x86_64, as ROS's wheels are; docker/ros.Dockerfile is for arm64 too.
 # The nodes of a demo pass clouds by shared memory, of which Docker's 64 MB are too few; --ipc=host does as well.
 FROM python:3.12.11-slim-bookworm AS system
 SHELL ["/bin/bash", "-o", "pipefail", "-c"]
@@ -23,6 +24,8 @@ USER 1000
 
 FROM system AS build
 WORKDIR /src
+RUN [[ "$(uname -m)" == x86_64 ]] \
+    || { echo "expected x86_64, got $(uname -m): ROS has no wheels for it; build docker/ros.Dockerfile" >&2; exit 1; }
 COPY requirements/build.lock requirements/python3.12.lock requirements/
 RUN python -m venv /opt/objreg \
     && /opt/objreg/bin/pip install --no-cache-dir --require-hashes --requirement requirements/build.lock \

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 IMAGES = ("python", "ros")
+AMD64, ARM64 = "ubuntu-24.04", "ubuntu-24.04-arm"  # runners of workflows
 
 
 @pytest.fixture(params=IMAGES)
@@ -58,10 +59,34 @@ def test_the_libraries_are_those_of_bootstrap(repository: Path) -> None:
     assert set(re.findall(r"=(\S+)", table[1])) <= set(installed)
 
 
-def test_a_workflow_builds_every_image(repository: Path) -> None:
+def test_a_workflow_builds_every_image_and_that_of_a_robot_on_arm64_too(repository: Path) -> None:
     workflow = (repository / ".github/workflows/images.yml").read_text()
-    assert sorted(re.findall(r"- file: (\w+)", workflow)) == sorted(IMAGES)
+    built = re.findall(r"- file: (\w+)\n +runner: (\S+)", workflow)
+    assert sorted(built) == [("python", AMD64), ("ros", AMD64), ("ros", ARM64)]
     assert {path.name for path in (repository / "docker").glob("*.Dockerfile")} == {f"{n}.Dockerfile" for n in IMAGES}
+
+
+def test_a_workflow_tests_the_robots_workspace_on_arm64_too(repository: Path) -> None:
+    robot = (
+        (repository / ".github/workflows/jazzy.yml").read_text().partition("\n  robot:\n")[2].partition("\n  arm64")[0]
+    )
+    assert f"runner: [{AMD64}, {ARM64}]" in robot and "runs-on: ${{ matrix.runner }}" in robot
+    assert "colcon test" in robot
+
+
+def test_the_image_of_wheels_says_on_arm64_which_other_to_build(repository: Path) -> None:
+    commands = instructions(repository / "docker/python.Dockerfile", "RUN")
+    (check,) = [command for command in commands if "uname -m" in command]
+    for processor, status in (("x86_64", 0), ("aarch64", 1)):
+        machine = f"uname() {{ echo {processor}; }}; {check}"
+        done = subprocess.run(["bash", "-o", "pipefail", "-c", machine], capture_output=True, text=True)
+        assert done.returncode == status and ("docker/ros.Dockerfile" in done.stderr) == bool(status)
+
+
+@pytest.mark.parametrize("name", IMAGES)
+def test_the_lines_that_run_an_image_give_its_nodes_shared_memory(repository: Path, name: str) -> None:
+    head = (repository / f"docker/{name}.Dockerfile").read_text().partition("\nFROM ")[0]
+    assert "--shm-size=" in head and "--ipc=host" in head
 
 
 @pytest.mark.parametrize("name", ["images", "jazzy"])
@@ -98,3 +123,10 @@ def test_every_package_of_a_lock_has_hashes(repository: Path, name: str) -> None
     lines = (repository / f"requirements/{name}.lock").read_text().replace("\\\n", " ").splitlines()
     packages = [line for line in lines if re.match(r"[\w-]+==", line)]
     assert packages and all("--hash=sha256:" in line for line in packages)
+
+
+def test_a_workflow_looks_for_known_faults_in_what_images_and_robots_install(repository: Path) -> None:
+    supply = (repository / ".github/workflows/jazzy.yml").read_text().partition("\n  supply:\n")[2]
+    locks = re.search(r"for lock in (.+); do\n.+pip-audit .*--require-hashes", supply)
+    assert locks is not None and {"build", "python3.12", "robot", "tools"} <= set(locks[1].split())
+    assert all((repository / f"requirements/{lock}.lock").exists() for lock in locks[1].split())
