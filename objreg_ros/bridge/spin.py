@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
-from objreg_ros.bridge import profile
+from objreg_ros.bridge import profile, shared_memory
 from objreg_ros.bridge.door import Door
 from objreg_ros.bridge.lifetime import (
     Abandoned,
@@ -41,6 +41,7 @@ def run_together(makes: Sequence[Callable[[], Door]], args: Sequence[str] | None
     first_signal = hear_first_signal()
     share_arenas()
     transport = profile.apply()
+    shared_memory.free_abandoned()
     try:
         begin(args)
     except ValueError as error:

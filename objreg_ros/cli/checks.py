@@ -19,6 +19,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from objreg_ros import share
+from objreg_ros.bridge.shared_memory import abandoned
 from objreg_ros.report.about import commit, version
 
 OLDEST_PYTHON = (3, 11)
@@ -204,8 +205,10 @@ def _shared_memory() -> Check:
     if not SHARED_MEMORY.is_dir():
         return Check("machine", "shared memory", "absent", "for the live graph: mount a tmpfs at /dev/shm")
     free = shutil.disk_usage(SHARED_MEMORY).free
+    left = sum(abandoned(SHARED_MEMORY).values())
     todo = "for the live graph in a container: docker run --shm-size=1g, or --ipc=host"
-    return Check("machine", "shared memory", f"{_size(free)} free", todo if free < LEAST_SHARED_BYTES else "")
+    found = f"{_size(free)} free" + (f", {left >> 20} MiB of killed nodes, which the next node frees" if left else "")
+    return Check("machine", "shared memory", found, todo if free + left < LEAST_SHARED_BYTES else "")
 
 
 def compiled_code() -> Check:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -101,6 +102,16 @@ def test_a_disk_that_is_full_stops_runs(tmp_path: Path) -> None:
     assert not checks.free_disk("here", lambda: tmp_path, least=0).stops
     check = checks.free_disk("here", lambda: tmp_path, least=1 << 62)
     assert check.stops and check.todo.startswith("make room")
+
+
+def test_shared_memory_of_killed_nodes_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(checks, "SHARED_MEMORY", tmp_path)
+    assert "killed" not in checks._shared_memory().found
+    segment = tmp_path / "fastrtps_0123456789abcdef"
+    segment.write_bytes(bytes(3 << 20))
+    segment.with_name(f"{segment.name}_el").touch()
+    os.utime(segment, (0, 0))
+    assert "3 MiB of killed nodes" in checks._shared_memory().found
 
 
 def test_compiled_code_is_found_and_a_folder_that_cannot_be_written_is_advice(monkeypatch: pytest.MonkeyPatch) -> None:
