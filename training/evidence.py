@@ -42,7 +42,7 @@ from objreg_ros.simulation.camera import SENSORS
 from objreg_ros.simulation.write import simulate
 from objreg_ros.truth import Truth
 
-SCENARIOS = ("loop", "opposite", "look-alikes", "moved")
+SCENARIOS = ("loop", "opposite", "posters", "moved")
 RIGS = {
     "plain": (),
     "stress": (),

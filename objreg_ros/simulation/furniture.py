@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -127,15 +127,24 @@ class Room:
 
 OPENING = (1.2, 2.1)
 """Width and height of an opening in a wall, metres."""
+POSTER = (0.6, 0.8, 1.1)
+"""Width, height and height above the floor of posters that hang more than once, metres."""
 OVERHANG_M = 1.0
 """So far what hangs on a wall may reach beyond the right end of the length that it is given."""
 
 
-def room(rng: Random, half: tuple[float, float], height: float = 2.7, open_to: Collection[float] = ()) -> Room:
+def room(
+    rng: Random,
+    half: tuple[float, float],
+    height: float = 2.7,
+    open_to: Collection[float] = (),
+    posters: Sequence[Material] = (),
+) -> Room:
     """A room of the given half widths with pictures, a window, a door, skirting, and perhaps a rug.
 
     ``open_to`` are the walls with an opening in their middle that one walks through, each by the degrees by which it is
-    turned from that at +y: 90 is the wall at -x, 270 that at +x.
+    turned from that at +y: 90 is the wall at -x, 270 that at +x. Every picture is one of the ``posters``, where there
+    are any, at the same size and height.
     """
     x, y = half
     floor = _floor_material(rng)
@@ -144,9 +153,9 @@ def room(rng: Random, half: tuple[float, float], height: float = 2.7, open_to: C
     skirting = Material(texture.speckled(rng, texture.grey(rng), 0.02))
     for k, (degrees, T, length) in enumerate(_walls(half)):
         if degrees in open_to:
-            wall = _open_wall(rng, length, height, paint[k], skirting, floor)
+            wall = _open_wall(rng, length, height, paint[k], skirting, floor, posters)
         else:
-            wall = _wall(rng, length, height, paint[k], skirting)
+            wall = _wall(rng, length, height, paint[k], skirting, posters)
         parts += [mesh.placed(T) for mesh in wall]
     if rng.random() < 0.5:
         rug = box((rng.uniform(1.2, 2.4), rng.uniform(1.0, 2.0), 0.006), Material(texture.fabric(rng), 0.0), tile=1.0)
@@ -156,15 +165,23 @@ def room(rng: Random, half: tuple[float, float], height: float = 2.7, open_to: C
     return Room(half, height, merge(parts), ceiling)
 
 
-def _wall(rng: Random, length: float, height: float, paint: Material, skirting: Material) -> list[Mesh]:
+def _wall(
+    rng: Random, length: float, height: float, paint: Material, skirting: Material, posters: Sequence[Material]
+) -> list[Mesh]:
     """A wall in its own frame with what hangs on it."""
     wall = box((length + 0.2, 0.1, height), paint, tile=rng.uniform(1.0, 3.0)).moved(y=0.05)
     base = box((length, 0.015, rng.uniform(0.05, 0.1)), skirting).moved(y=-0.007)
-    return [wall, base, *_decoration(rng, length, height)]
+    return [wall, base, *_decoration(rng, length, height, posters)]
 
 
 def _open_wall(
-    rng: Random, length: float, height: float, paint: Material, skirting: Material, floor: Material
+    rng: Random,
+    length: float,
+    height: float,
+    paint: Material,
+    skirting: Material,
+    floor: Material,
+    posters: Sequence[Material],
 ) -> list[Mesh]:
     """A wall in its own frame with an opening in its middle: two short walls, a lintel and a threshold."""
     width, tall = OPENING
@@ -174,7 +191,7 @@ def _open_wall(
     lintel = box((width, 0.1, height - tall), paint, tile=2.0).moved(0.0, 0.05, tall)
     parts = [lintel, box((width, 0.1, 0.1), floor, tile=1.0).moved(0.0, 0.05, -0.1)]
     for middle in (-(width + side) / 2, (width + side) / 2):
-        hung = [mesh.moved(x=-OVERHANG_M / 2) for mesh in _decoration(rng, side - OVERHANG_M, height)]
+        hung = [mesh.moved(x=-OVERHANG_M / 2) for mesh in _decoration(rng, side - OVERHANG_M, height, posters)]
         parts += [mesh.moved(x=middle) for mesh in (short, base, *hung)]
     return parts
 
@@ -209,13 +226,16 @@ def _wall_material(rng: Random) -> Material:
     return Material(picture, specular=0.02)
 
 
-def _decoration(rng: Random, length: float, height: float) -> list[Mesh]:
+def _decoration(rng: Random, length: float, height: float, posters: Sequence[Material]) -> list[Mesh]:
     """Pictures, a window or a door on a wall, side by side."""
     out, x = [], -length / 2 + rng.uniform(0.2, 0.8)
     while x < length / 2 - 0.5:
         width = float(rng.uniform(0.25, 1.1))
         kind = rng.random()
-        if kind < 0.5:
+        if kind < 0.5 and posters:
+            width, tall, bottom = POSTER
+            out.append(_flat(x, width, bottom, tall, posters[int(rng.integers(len(posters)))]))
+        elif kind < 0.5:
             tall = width * rng.uniform(0.6, 1.4)
             frame = Material(print_design.poster(rng), specular=rng.uniform(0, 0.2), gloss=6)
             out.append(_flat(x, width, rng.uniform(1.0, 1.5), min(tall, 1.0), frame))

@@ -7,6 +7,7 @@
 | `loop` | three rounds past a table and another, out of sight of it, each time from a little aside |
 | `opposite` | two rounds, and on the second both tables are seen from their other side |
 | `look-alikes` | like `loop`, but the two tables are alike and things of the same classes lie on them |
+| `posters` | like `look-alikes`, and every picture on the walls is one of two |
 | `moved` | like `loop`, but the things on the first table are rearranged while the second is looked at |
 
 A round leads along one long wall to the second table and along the other one back.
@@ -14,15 +15,16 @@ A round leads along one long wall to the second table and along the other one ba
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import transform
-from objreg_ros.simulation import distractors, furniture
+from objreg_ros.simulation import distractors, furniture, print_design
 from objreg_ros.simulation.furniture import Furniture
+from objreg_ros.simulation.mesh import Material
 from objreg_ros.simulation.model import ObjectModel, turn
 from objreg_ros.simulation.objects import make_object
 from objreg_ros.simulation.rooms import (
@@ -87,9 +89,9 @@ class _Setting:
         return transform(T, np.array([0.0, 0.0, piece.boards[0][2] + 0.08]))
 
 
-def _setting(rng: Random, occluders: int, alike: bool = False) -> _Setting:
+def _setting(rng: Random, occluders: int, alike: bool = False, posters: Sequence[Material] = ()) -> _Setting:
     """A room with two tables far apart, furniture along the walls, chairs, and things on everything."""
-    room = furniture.room(rng, ROOM_HALF)
+    room = furniture.room(rng, ROOM_HALF, posters=posters)
     tables = _two_tables(rng, alike)
     walls = along_the_walls(rng, _spots())
     models = things(rng, int(rng.integers(5, 8)), int(rng.integers(1, 4)))
@@ -186,8 +188,12 @@ def _opposite(rng: Random, occluders: int) -> Plot:
     return (setting.scene_with(setting.on_table),), _rounds(setting, looks), None
 
 
-def _alike(rng: Random, occluders: int) -> Plot:
-    setting = _setting(rng, occluders, alike=True)
+def _posters(rng: Random, occluders: int) -> Plot:
+    return _alike(rng, occluders, [Material(print_design.poster(rng)) for _ in range(2)])
+
+
+def _alike(rng: Random, occluders: int, posters: Sequence[Material] = ()) -> Plot:
+    setting = _setting(rng, occluders, alike=True, posters=posters)
     return (setting.scene_with(setting.on_table),), _rounds(setting, _a_little_aside(rng, setting)), None
 
 
@@ -214,6 +220,7 @@ SCENARIOS: dict[str, Callable[[Random, int], Plot]] = {
     "opposite": _opposite,
     "look-alikes": _alike,
     "moved": _moved,
+    "posters": _posters,
 }
 
 

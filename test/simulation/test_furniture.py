@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from objreg_ros.data import Intrinsics
-from objreg_ros.simulation import furniture
+from objreg_ros.simulation import furniture, print_design
 from objreg_ros.simulation.light import looking
-from objreg_ros.simulation.mesh import merge
+from objreg_ros.simulation.mesh import Material, merge
 from objreg_ros.simulation.raster import rasterise
 
 WIDE = Intrinsics(fx=40.0, fy=40.0, cx=39.5, cy=29.5, width=80, height=60)
@@ -41,6 +41,16 @@ def test_a_room_is_closed_on_all_sides() -> None:
             view = looking(np.array([0.0, 0.0, 1.3]), np.array(target, float), np.array([0.0, 0.3, 1.0]))
             depth, _ = rasterise(mesh.vertices, mesh.faces, mesh.open_surface, view, WIDE)
             assert (depth > 0).all() and depth.max() < 4.0
+
+
+def test_posters_that_are_given_hang_again_and_again_and_no_other_picture_does() -> None:
+    posters = [Material(print_design.poster(np.random.default_rng(seed))) for seed in (1, 2)]
+    mesh = furniture.room(np.random.default_rng(0), (4.4, 3.2), posters=posters).mesh
+    hung = [mesh.vertices[mesh.faces[mesh.material == k]] for k, one in enumerate(mesh.materials) if one in posters]
+    counts = [len(faces) // 12 for faces in hung]  # a box has twelve
+    assert len(hung) >= 2 and sum(counts) >= 5
+    heights = {round(float(np.ptp(box[..., 2])), 3) for faces in hung for box in np.split(faces, len(faces) // 12)}
+    assert heights == {0.8}
 
 
 def test_an_open_wall_lets_one_see_out_of_its_middle_and_nowhere_else() -> None:

@@ -41,7 +41,7 @@ def test_a_story_moves_at_the_speed_of_a_hand(scenario: str) -> None:
     assert moved.max() < 0.55 and turned.max() < 45.0
 
 
-@pytest.mark.parametrize("scenario", ["loop", "opposite", "look-alikes", "moved"])
+@pytest.mark.parametrize("scenario", ["loop", "opposite", "look-alikes", "moved", "posters"])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_the_first_table_is_left_out_of_sight_and_seen_again(scenario: str, seed: int) -> None:
     story = make_story(scenario, seed, frames=60)
