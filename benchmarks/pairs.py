@@ -7,6 +7,8 @@ degrees and 5 cm, loose 5 degrees and 10 cm, wrong is beyond 8 degrees or 15 cm.
 at every lag of the truth up to that are counted beside those that are wrong at the stamps.
 
     python benchmarks/pairs.py REC --json pairs.json --pictures failures/
+    python benchmarks/pairs.py REC --every 25 --peers ""                          # as if the camera took stills
+    python benchmarks/pairs.py REC --every 25 --peers "" --unregistered           # its depth not brought upon colour
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from frame_pairs import Pair, Truths, draw_pairs
 from pair_figures import Row, figures, line
 from pair_pictures import draw_failures
 from peers import PEERS, Answer, Peer, Shot, named
-from sources import Source, detector_of, read_source
+from sources import Reading, Source, detector_of, read_source
 
 from objreg_ros.data import Array, Frame, Reason
 from objreg_ros.geometry import back_project, pose_error
@@ -216,6 +218,8 @@ def compare(source: Source, params: RegistrarParams, options: dict[str, Any]) ->
 )
 @click.option("--pictures", type=click.Path(file_okay=False, path_type=Path), help="Draw the worst failures here.")
 @click.option("--lag-ms", default=0, show_default=True, help="Most that what is seen may be behind its stamp.")
+@click.option("--every", type=click.IntRange(min=1), default=1, show_default=True, help="As stills: every N-th frame.")
+@click.option("--unregistered", is_flag=True, help="Leave depth beside colour as it comes.")
 @click.option("--seed", default=1, show_default=True)
 @click.pass_context
 def main(
@@ -230,6 +234,8 @@ def main(
     names: tuple[str, ...],
     pictures: Path | None,
     lag_ms: int,
+    every: int,
+    unregistered: bool,
     seed: int,
 ) -> None:
     """Register pairs of frames of RECORDING by every method and compare."""
@@ -243,7 +249,8 @@ def main(
         "lags_ms": range(LAG_STEP_MS, lag_ms + 1, LAG_STEP_MS),
         "seed": seed,
     }
-    with read_source(recording, detector_of(model, threshold), seed) as source:
+    reading = Reading(every, not unregistered)
+    with read_source(recording, detector_of(model, threshold), seed, reading=reading) as source:
         result = compare(source, RegistrarParams(), options)
     if json_file is not None:
         json_file.write_text(json.dumps(result, indent=1))

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 from peers import Shot
+from stills import stills
 
 from objreg_ros import share
-from objreg_ros.data import Array, ColourImage, Detections, Frame, LoopClosure, Rejected
+from objreg_ros.data import Array, ColourImage, DepthImage, Detections, Frame, LoopClosure, Rejected
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import pose, rotation_between
@@ -21,6 +22,7 @@ from objreg_ros.offline import Rooms, run_offline
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.report.pictures import Album
+from objreg_ros.segmenter.depth_to_colour import DepthToColour
 from objreg_ros.segmenter.organise import organise
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
@@ -135,8 +137,26 @@ class Source:
         )
 
 
+class Unturned(DepthToColour):
+    """Leaves depth beside colour as it comes."""
+
+    def register(self, image: DepthImage) -> DepthImage:
+        """The image itself."""
+        return image
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a recording is read: ``every`` so many-th frame, with its depth brought upon its colour or not."""
+
+    every: int = 1
+    registered: bool = True
+
+
 @contextmanager
-def read_source(path: Path, detector: DetectorParams, seed: int, drift: float = 1.0) -> Iterator[Source]:
+def read_source(
+    path: Path, detector: DetectorParams, seed: int, drift: float = 1.0, reading: Reading = Reading()
+) -> Iterator[Source]:
     """A recording, open. Without odometry of its own it gets one that drifts from its ground truth, by ``seed``.
 
     It drifts ``drift`` times 2 % and 1 degree a metre.
@@ -146,7 +166,7 @@ def read_source(path: Path, detector: DetectorParams, seed: int, drift: float = 
         truth = Truth.of(recording, inputs.ground_truth)
         if not truth.stamps_ns:
             raise ValueError(f"{path}: expected a recording with ground truth, got none")
-        frames, seen = _frames(recording, detector)
+        frames, seen = _frames(recording, detector, reading)
         if inputs.odom is None:
             frames = with_drift(frames, truth, seed, drift)
         yield Source(frames, truth, Album(recording, inputs), seen, SIMULATED if _is_simulated(path) else {})
@@ -160,12 +180,13 @@ def _is_simulated(path: Path) -> bool:
     return True
 
 
-def _frames(recording: Recording, asked: DetectorParams) -> tuple[list[Frame], dict[int, Detections]]:
+def _frames(recording: Recording, asked: DetectorParams, reading: Reading) -> tuple[list[Frame], dict[int, Detections]]:
     inputs = choose_inputs(recording.topics)
     detector = Remembered(_detector(recording, asked))
     collector, segmenter = Collector(), Segmenter(SegmenterParams())
-    records = recording.records(set(inputs.chosen().values()))
-    run_offline(records, Rooms(detector, segmenter, collector, organise), inputs)
+    if not reading.registered:
+        segmenter.sensor.depth_to_colour = Unturned()
+    run_offline(stills(recording, inputs, reading.every), Rooms(detector, segmenter, collector, organise), inputs)
     return collector.frames, detector.seen
 
 

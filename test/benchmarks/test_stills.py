@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of recordings that are read as stills."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+MS = 1_000_000
+PICTURES = np.arange(10) * 100 * MS
+
+
+def records(offset_ms: int = 0) -> list[SimpleNamespace]:
+    """Pictures and their depth, which is so many ms later, and odometry in between."""
+    colour = [SimpleNamespace(topic="rgb", stamp_ns=int(t)) for t in PICTURES]
+    depth = [SimpleNamespace(topic="depth", stamp_ns=int(t) + offset_ms * MS) for t in PICTURES]
+    odom = [SimpleNamespace(topic="odom", stamp_ns=int(t) + 50 * MS) for t in PICTURES]
+    return sorted([*colour, *depth, *odom], key=lambda record: record.stamp_ns)
+
+
+@pytest.mark.parametrize("offset_ms", [0, 20, -20])
+@pytest.mark.parametrize("every", [2, 3, 25])
+def test_of_every_so_many_moments_one_is_left_with_all_that_belongs_to_it(every: int, offset_ms: int) -> None:
+    from stills import thinned
+
+    left = list(thinned(records(offset_ms), {"rgb", "depth"}, PICTURES, every))
+    for topic, offset in (("rgb", 0), ("depth", offset_ms * MS)):
+        assert [one.stamp_ns - offset for one in left if one.topic == topic] == list(PICTURES[::every])
+    assert sum(one.topic == "odom" for one in left) == len(PICTURES)
+
+
+def test_a_recording_without_pictures_has_no_stills() -> None:
+    from stills import stills
+
+    from objreg_ros.recording.inputs import Inputs
+
+    recording = SimpleNamespace(records=lambda topics: iter(()))
+    with pytest.raises(ValueError, match="expected a recording with pictures"):
+        stills(recording, Inputs(odom="odom"), 2)
+
+
+def test_depth_is_left_beside_colour_where_that_is_asked() -> None:
+    from sources import Unturned
+
+    image = SimpleNamespace()
+    assert Unturned().register(image) is image
