@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`objreg offline`: a recording through the three rooms without ROS."""
+"""`objreg offline`: a recording through detector, segmenter and registrar without ROS."""
 
 from __future__ import annotations
 
