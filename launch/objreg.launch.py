@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The nodes: ``ros2 launch objreg_ros objreg.launch.py image:=/kinect/rgb points:=/kinect/points``.
 
-Every argument is optional; ``mapper:=true`` starts the reference mapper beside the three rooms, ``composed:=true`` all
-of them in one process. Where another detector says what is where, ours is not started. No parameter's default is
-repeated here; what is not said is as in the code. In a namespace, /tf and /tf_static are those of the namespace.
+Every argument is optional; ``mapper:=true`` starts the reference mapper beside the other three nodes,
+``composed:=true`` all of them in one process. Where another detector says what is where, ours is not started. No
+parameter's default is repeated here; what is not said is as in the code. In a namespace, /tf and /tf_static are
+those of the namespace.
 """
 
 import atexit

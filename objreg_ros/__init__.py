@@ -13,13 +13,14 @@ uint16 millimetres. `register_clouds` takes two coloured clouds, `register_keyfr
 `segment` makes; `objreg_ros.registrar.registrar.Registrar` takes in a stream of them and remembers. Own detections, and
 a detector, a gate and a method of one's own: `help(objreg_ros.register)` and `objreg_ros.registration.api`.
 
-Three rooms in a row, one door between each:
+Three stages, each of which takes what the one before it returns:
 
-    detector/    colour image                -> Detections     (MobileNet-SSD, ONNX Runtime)
+    detector/    colour image                -> Detections     (an ONNX model)
     segmenter/   Detections + depth image    -> Frame          (the object and nothing but the object)
     registrar/   Frames                      -> LoopClosures   (propose with objects, decide with context)
 
-data.py holds the words that pass between them; bridge/ is the border to ROS; offline.py drives them without it.
+Each is a ROS node; `keyframer` and `mapper` are nodes too. `data` holds the types that pass between the stages,
+`bridge` converts them to ROS messages and back, and `offline` runs the stages without ROS.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """All nodes in one process: ``objreg_graph [detector] [segmenter] [registrar] [mapper] --ros-args …``.
 
-Without names it is the three rooms. Between detector, segmenter and registrar no picture and no cloud goes through DDS:
-each hands the next one its words. Topics are published as by nodes of their own, where somebody listens. A parameter or
-a remap for one of them bears its name: ``-p detector:threshold:=0.4``.
+Without names it runs detector, segmenter and registrar. No picture and no cloud between them goes through DDS: each
+node passes its results to the next one in memory. A topic is published as well where it has a subscriber. A parameter
+or a remap for one node bears its name: ``-p detector:threshold:=0.4``.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A recording through the three rooms without ROS: deterministic, as fast as the CPU goes.
+"""A recording through detector, segmenter and registrar without ROS: deterministic, as fast as the CPU goes.
 
 The inputs are decoded and brought together by the code that the nodes use, so the same recording gives the same
 constraints here and in the live graph, where that loses no frame (a lossless replay).
@@ -109,7 +109,7 @@ class Registers(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Rooms:
-    """The three rooms, and how a cloud becomes a depth image."""
+    """Detector, segmenter and registrar, and how a cloud becomes a depth image."""
 
     detector: Detects
     segmenter: Segments
@@ -268,7 +268,7 @@ def percentiles_ms(seconds: list[float]) -> dict[str, float]:
 
 
 class Line:
-    """The three rooms in a row. Give it messages in order of time, then `finish`.
+    """Detector, segmenter and registrar, one after another. Give it messages in order of time, then `finish`.
 
     With ``recorded`` the detector is not asked: what another one found comes as "detections", and as "label_info" the
     names of its numbers.

@@ -15,13 +15,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "objreg_ros"
 ROOMS = ("detector", "segmenter", "registrar", "mapper")
 # The registrar's own folders: each may import those before it, in the order in which a pair of keyframes goes.
 FLOORS = (
-    *(
-        "registration.dropped",
-        "registration.params",
-        "registration.labels",
-        "registration.keyframe",
-        "registration.candidate",
-    ),
+    *("registration.params", "registration.labels", "registration.keyframe", "registration.candidate"),
     *("registration.kernels", "registration.shapes", "registration.prepare", "registration.score"),
     *("registration.refine", "registration.certainty", "registration.propose", "registration.gate"),
     *("registration", "keyframes", "memory", "registrar"),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the gate sees of poses that are known to be right or false: simulated recordings through the three rooms.
+"""What the gate sees of poses that are known to be right or false: simulated recordings, run offline.
 
 Every keyframe is held against ten others, as `memory/` proposes them, and nothing is left out that the gate is asked
 about. What is written of a recording are the readings of each candidate (`gate/kinds.py`), whether a rule refuses it,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What nodes of one process say to each other without DDS: words, by the full names of their topics."""
+"""Values that the nodes of one process pass to each other in memory, without DDS, by full topic names."""
 
 from __future__ import annotations
 
@@ -12,44 +12,47 @@ from rclpy.publisher import Publisher
 
 
 class Surplus(NamedTuple):
-    """The word of a picture that was left out to keep a pace."""
+    """Stands for an image that the detector left out to keep to its rate."""
 
     stamp_ns: int
     frame_id: str
 
 
 class Indoors:
-    """The topics that nodes of this process offer to each other, and who listens. Offered before it is listened to."""
+    """The topics that nodes of this process pass to each other in memory, and the subscribers of each.
+
+    A topic must be offered before a subscriber is added.
+    """
 
     def __init__(self) -> None:
         self._ears: dict[str, list[Ear]] = {}
 
     def offer(self, topic: str) -> None:
-        """A node will hand over words of a topic."""
+        """Announce that a node of this process will publish a topic."""
         self._ears.setdefault(topic, [])
 
     def offers(self, topic: str) -> bool:
-        """Whether a node of this process hands over words of a topic."""
+        """Whether a node of this process publishes a topic."""
         return topic in self._ears
 
     def add(self, ear: Ear) -> None:
-        """From now on an ear hears the words of its topic; KeyError for one that nobody offers."""
+        """Add a subscriber of its topic; KeyError if no node of this process offers that topic."""
         self._ears[ear.topic_name].append(ear)
 
     def remove(self, ear: Ear) -> None:
-        """It hears no more."""
+        """Remove a subscriber."""
         self._ears[ear.topic_name].remove(ear)
 
     def hand_over(self, topic: str, word: Any) -> None:
-        """Give a word to all who listen, from whatever thread; never waits."""
+        """Pass a value to all subscribers of a topic. Any thread may call this; it never blocks."""
         for ear in tuple(self._ears.get(topic, ())):
             ear.inlet.put(ear.hear, word)
 
 
 class Inlet:
-    """Brings words to a node in the order in which they came, by its executor, as if they were messages.
+    """Queues values for a node. The executor of the node takes them in order, as it takes messages.
 
-    It needs no bound: what is handed over was made of what the same executor had time to hear.
+    The queue needs no limit: each value was made from a message that the same executor took before.
     """
 
     def __init__(self, node: Node) -> None:
@@ -57,7 +60,7 @@ class Inlet:
         self._bell = node.create_guard_condition(self._bring)
 
     def put(self, hear: Callable[[Any], None], word: Any) -> None:
-        """Let the executor call ``hear`` with a word."""
+        """Let the executor call ``hear`` with a value."""
         self._waiting.append((hear, word))
         self._bell.trigger()
 
@@ -68,7 +71,7 @@ class Inlet:
 
 
 class Ear(NamedTuple):
-    """Takes the place of a subscription."""
+    """A subscriber, in the place of a subscription of ROS."""
 
     topic_name: str
     inlet: Inlet
@@ -76,14 +79,14 @@ class Ear(NamedTuple):
 
 
 class Outlet:
-    """A topic that a node publishes where somebody listens, and hands over as a word to nodes of its own process."""
+    """Publishes a topic of a node: in memory to nodes of its process, as messages to the subscribers of ROS."""
 
     def __init__(self, publisher: Publisher, indoors: Indoors) -> None:
         self._publisher, self._indoors = publisher, indoors
         indoors.offer(publisher.topic_name)
 
     def tell(self, word: Any, write: Callable[[], Any]) -> None:
-        """Tell a word; ``write`` makes the message of it, and is called only where a message has a reader."""
+        """Publish a value. ``write`` makes its message, and is called only if the topic has a subscriber of ROS."""
         self._indoors.hand_over(self._publisher.topic_name, word)
         if self._publisher.get_subscription_count():
             self._publisher.publish(write())

@@ -70,7 +70,11 @@ class MatchingDoor(Door):
             self._hand_over(self._sync.add(name, stamp_ns, payload))
 
     def _look_after(self) -> None:
-        """Every `ALONE_S`: see to what would wait for a message that does not come."""
+        """Hand over the frames that wait for a message that may never come. A timer calls this every `ALONE_S`.
+
+        A stamp far from the others is taken for a jump of the clock if nothing contradicts it for that time. After
+        `QUIET_S` without any message, frames are handed over without the optional messages that they lack.
+        """
         if self._sync is None:
             return
         self._hand_over(self._sync.believe(round(1e9 * ALONE_S)))

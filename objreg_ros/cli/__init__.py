@@ -28,7 +28,7 @@ from objreg_ros.whole_file import unwritten
 SUMMARIES = {
     "demo": "Run a recording through the live graph and show what came out.",
     "inspect": "Say what is in a recording and what the graph would use of it, or what a store remembers.",
-    "offline": "Run a recording through the three rooms without ROS.",
+    "offline": "Run a recording through detector, segmenter and registrar, without ROS.",
     "batch": "Run many recordings, over the cores of this machine or a cluster.",
     "replay": "Publish a recording into the live graph.",
     "convert": "Write any recording as rosbag2.",

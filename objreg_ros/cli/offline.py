@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`objreg offline`: a recording through the three rooms without ROS."""
+"""`objreg offline`: a recording through detector, segmenter and registrar without ROS."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def command(recording: Path, json_file: Path | None, **given: Any) -> int:
 
 
 def _run(opened: Opened, registrar: RegistrarParams) -> Run:
-    click.echo(f"preparing the rooms ({FIRST_TIME})", err=True)
+    click.echo(f"preparing detector, segmenter and registrar ({FIRST_TIME})", err=True)
     with tqdm(total=opened.frames, unit="frame", disable=None, leave=False) as bar:
         return opened.run(registrar, lambda count: bar.update(count - bar.n))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Closures whose moments odometry has yet to come to, and what becomes of each."""
+"""A queue of closures that wait for odometry at both their stamps, and the outcome of each closure."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FindMount = Callable[[Sequence[Odometry], str], Array | None]  # T_body_camera b
 
 
 class Fate(NamedTuple):
-    """A closure that waits no more: it is tied, or refused for a ``reason``."""
+    """The outcome of a closure: added to the graph, or refused for a ``reason``, with ``words`` for the log."""
 
     closure: LoopClosure
     reason: str = ""
@@ -23,7 +23,7 @@ class Fate(NamedTuple):
 
 
 class Waiting:
-    """At most ``most`` closures, the oldest first: odometry and closures come in any order."""
+    """At most ``most`` closures that wait for odometry, the oldest first. Odometry may come before or after them."""
 
     def __init__(self, followers: Followers, find_mount: FindMount, most: int) -> None:
         self.closures: list[LoopClosure] = []
@@ -31,13 +31,16 @@ class Waiting:
         self._followers, self._find_mount = followers, find_mount
 
     def take_out(self, is_meant: Callable[[LoopClosure], bool] = lambda _: True) -> list[LoopClosure]:
-        """Those that are meant, which wait no more; all of them without a question."""
+        """Remove the closures for which ``is_meant`` is true from the queue, all by default, and return them."""
         out = [closure for closure in self.closures if is_meant(closure)]
         self.closures = [closure for closure in self.closures if not is_meant(closure)]
         return out
 
     def tie(self, graph: PoseGraph) -> list[Fate]:
-        """Tie those whose odometry is there; what became of them and of those of which nothing can become any more."""
+        """Add the closures to the graph whose odometry is known. Returns the outcomes of all that leave the queue.
+
+        A closure also leaves the queue if its odometry can no longer come, or if the queue is full.
+        """
         fates = []
         for closure in self.take_out():
             fate = self._fate(graph, closure)
@@ -49,7 +52,7 @@ class Waiting:
         return fates
 
     def _fate(self, graph: PoseGraph, closure: LoopClosure) -> Fate | None:
-        """None for one that goes on waiting."""
+        """The outcome of one closure, which is added to the graph if it can be; None if it must wait longer."""
         refused = partial(Fate, closure)
         try:
             self._refuse_unknown(graph, closure)
@@ -64,6 +67,7 @@ class Waiting:
         return next((refused(*why) for why in self._why_never(graph, closure)), None)
 
     def _why_never(self, graph: PoseGraph, closure: LoopClosure) -> Iterator[tuple[str, str]]:
+        """The reasons why odometry of a closure can no longer come, each with its explanation."""
         if graph.in_gap(closure):
             yield "odometry_gap", "no odometry came around a moment of the constraint"
         if graph.is_before_odometry(closure):
@@ -72,6 +76,7 @@ class Waiting:
             yield "time_jump", "it was found before time jumped back, and came after that"
 
     def _refuse_unknown(self, graph: PoseGraph, closure: LoopClosure) -> None:
+        """`UnknownRobotError` if a closure names a robot of which the mapper has neither odometry nor a session."""
         known = {*self._followers, *(session.robot for session in graph.sessions)}
         unknown = set(closure.robots) - known - {""}
         if unknown and "" not in known:
@@ -79,7 +84,11 @@ class Waiting:
             raise UnknownRobotError(f"expected robots of {expected}, got {got}; the parameter robots names them")
 
     def _T_body_camera(self, robot: str, frame_id: str) -> Array | None:
-        """By a frame without the robot's prefix where the odometry's body has none: then it has none on /tf either."""
+        """The mount of a camera on the body of a robot; None if it is not known.
+
+        If the body frame of the odometry lacks the robot's prefix, the frames on /tf lack it too, and the camera is
+        looked up without the prefix.
+        """
         words = [one.newest for one in self._followers.meant(robot) if one.newest is not None]
         is_bare = robot and not any(word.child_frame_id.startswith(f"{robot}/") for word in words)
         return self._find_mount(words, frame_id.removeprefix(f"{robot}/") if is_bare else frame_id)

@@ -16,6 +16,7 @@ from objreg_ros.whole_file import whole_file
 
 APPLICATION_ID = 0x4F424A52  # "OBJR" at byte 68 of the file
 SCHEMA_VERSION = 6  # at byte 60
+OLDEST_VERSION = 5  # that of the first release
 SPARE = 2048  # pages of 4 kB that may lie free in the file: what comes next takes them
 STEP = 4096  # pages that are given back at once: 16 MB, so that no keyframe waits long
 PAGES = "page_count", "freelist_count", "page_size"
@@ -170,10 +171,11 @@ def _refuse_version(path: Path, version: int) -> None:
             f"{path}: expected schema version {SCHEMA_VERSION} or older, got {version}; it was left as it is. "
             "Use the newer objreg_ros that wrote it, or another path"
         )
-    if version < 1:
+    if version < OLDEST_VERSION:
+        advice = "Open it with objreg_ros 0.2.0 first, or use" if version > 0 else "Use"
         raise StoreError(
-            f"{path}: expected schema version 1 to {SCHEMA_VERSION}, got {version}; it was left as it is. "
-            "Use another path"
+            f"{path}: expected schema version {OLDEST_VERSION} to {SCHEMA_VERSION}, got {version}; "
+            f"it was left as it is. {advice} another path"
         )
 
 

@@ -43,7 +43,7 @@ PATIENCE_S = 1.0  # a newer keyframe waits before the search in hand is cut shor
 WAITING_KEYFRAMES = 8  # most that wait for a search; no frame is followed while so many do
 WAITING_BYTES = 200_000_000  # most memory of those
 BEHIND = 64  # keyframes of a robot that may wait for their search: those of a link that was away come all at once
-GIVING_WAY = 10  # niceness of the search: the next image must not wait for it
+GIVING_WAY = 10  # niceness of the search in a process of its own: the next image must not wait for it
 
 
 class Job(NamedTuple):
@@ -128,7 +128,10 @@ class RegistrarNode(FramesDoor):
         self._seconds = self.settings.of(RegistrarNodeParams).limit
 
     def _niceness(self) -> int:
-        """None where other rooms share Python's lock: a nice thread that holds it and has no processor holds up all."""
+        """The niceness of the search: `GIVING_WAY`, but 0 where the segmenter runs in this process.
+
+        Both share Python's lock there. A nice thread that waits for a processor with the lock held stops both.
+        """
         return 0 if self.hears_words else GIVING_WAY
 
     # Compute

@@ -14,8 +14,8 @@ propose     hypotheses, the shortlist of them, their end and their evidence, com
 gate        the only place that says yes
 
 `keyframe` is what goes in, `candidate` a pose with its evidence, `result` what comes out with the verdict;
-`labels` are the names that a detector confuses, `params` what a user may set and `dropped` what was once, `api` the
-Protocols of what may be exchanged. `engine` calls the steps in order; `paper` is the founding method.
+`labels` are the names that a detector confuses, `params` what a user may set, `api` the Protocols of what
+may be exchanged. `engine` calls the steps in order; `paper` is the founding method.
 """
 
 from __future__ import annotations

@@ -7,8 +7,8 @@ import math
 from dataclasses import dataclass
 
 from objreg_ros.params import MountedParams, Params, param, require_namespaces
-from objreg_ros.registration.dropped import DROPPED
 
+GONE = {"waiting_megabytes": "it is fixed now: WAITING_BYTES in objreg_ros/registrar/node.py"}
 OWN = "."  # in place of a robot's namespace: that of the registrar itself
 
 
@@ -30,8 +30,6 @@ class KeyframeParams(Params):
 @dataclass(frozen=True)
 class RegistrarParams(KeyframeParams):
     """Everything that a user may set in this room."""
-
-    DROPPED = DROPPED
 
     method: str = param(
         "objreg", "how keyframes are registered; paper is the founding point-to-point ICP", choices=("objreg", "paper")
@@ -119,6 +117,8 @@ class KeyframerNodeParams(FramesParams):
 @dataclass(frozen=True)
 class RegistrarNodeParams(FramesParams):
     """How the registrar's node brings its inputs together, and when it searches."""
+
+    DROPPED = GONE
 
     robots: tuple[str, ...] = param(
         (),

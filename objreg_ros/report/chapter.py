@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any
 
 from objreg_ros.data import UNTRIED
-from objreg_ros.report import clouds, figures, thumbnails
+from objreg_ros.report import clouds, figures, findings, thumbnails
 from objreg_ros.report.camera_map import of_one_clock
 from objreg_ros.report.clouds import Clouds
 from objreg_ros.report.pairs import ACCEPTED, Pair, pairs_of
@@ -90,7 +90,7 @@ def _verdict(story: Story) -> str:
     by = f" by {seen}" if seen else ""
     false, of = judged(story)
     truth = f"; truth finds {false or 'none'} of them false" if of else "; there is no truth to judge them by"
-    return f"{len(story.closures)} loops closed{by}{truth}."
+    return f"{findings.number_of(len(story.closures), 'loop')} closed{by}{truth}."
 
 
 def _tiles(story: Story, tracks: Tracks | None) -> list[View]:

@@ -265,6 +265,11 @@ def counted(counts: Mapping[str, int]) -> str:
     return ", ".join(f"{count} {reason}" for reason, count in sorted(counts.items(), key=lambda row: -row[1]))
 
 
+def number_of(count: int, noun: str) -> str:
+    """``1 loop``, ``2 loops``."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def verdict(summary: Mapping[str, Any], findings: Sequence[Finding] = ()) -> str:
     """Whether the run worked and how well, in one line."""
     counts, truth = Counts.of(summary), summary.get("truth", {})
@@ -272,11 +277,11 @@ def verdict(summary: Mapping[str, Any], findings: Sequence[Finding] = ()) -> str
         return "It did not work: no frame got through."
     if not counts.constraints:
         return f"No loop was closed: {findings[0].what}." if findings else "No loop was closed."
-    closed = f"It worked: {counts.constraints} loops closed in {counts.frames} frames"
+    closed = f"{number_of(counts.constraints, 'loop')} closed in {number_of(counts.frames, 'frame')}"
     if not truth.get("count"):
-        return f"{closed}; there is no truth to judge them by."
+        return f"It worked: {closed}; there is no truth to judge them by."
     error = f"{truth['rotation_deg']['median']:.2f}° and {truth['translation_cm']['median']:.1f} cm off (median)"
     wrong = truth["false"]
     if not wrong:
-        return f"{closed}, none of {truth['count']} false, {error}."
-    return f"Not quite: {counts.constraints} loops closed in {counts.frames} frames, {wrong} of {truth['count']} false."
+        return f"It worked: {closed}, none of {truth['count']} false, {error}."
+    return f"Not quite: {closed}, {wrong} of {truth['count']} false."

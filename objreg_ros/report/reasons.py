@@ -46,7 +46,7 @@ REFUSALS = {
         (("registration/refine/batch_icp.py", "LEAST_PAIRS"),),
     ),
     "low_overlap": Words(
-        "too little of the two views is the same, or they like the pose too little",
+        "the two views have too little in common, or the view score of the pose is too low",
         "Come back along a similar view, or look at the place longer. Where one object fills the picture, step back: "
         "what is around it must agree too.",
         ("registrar.least_odds", "registrar.confirm_seconds"),

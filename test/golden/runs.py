@@ -89,7 +89,7 @@ def simulated(told: Told, folder: Path, progress: Progress = lambda done: None) 
 
 
 def run(path: Path, detector: Detects, frames: int, progress: Progress = lambda done: None) -> Run:
-    """The first frames of a recording through the three rooms, with default parameters."""
+    """The first frames of a recording through detector, segmenter and registrar, with default parameters."""
     registrar = Registrar(RegistrarParams())
     try:
         with open_recording(path) as recording:

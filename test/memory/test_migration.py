@@ -10,28 +10,23 @@ from pathlib import Path
 
 import pytest
 
-from objreg_ros.keyframes.gravity_filter import DOUBT, ONE_VIEW
 from objreg_ros.memory import migration as renewal
+from objreg_ros.memory.books import MOST_IDS, read_books
 from objreg_ros.memory.store import Store
 from objreg_ros.memory.store_file import SCHEMA_VERSION, StoreError
 
-DATA = Path(__file__).parent / "data" / "store_v4.db"  # written by the last code of that version
-SEALED = DATA.with_name("store_v5.db")  # likewise
-FIRST = (
-    "ALTER TABLE closure DROP COLUMN from_frame_id; ALTER TABLE closure RENAME COLUMN to_frame_id TO frame_id;"
-    "DROP TABLE highest; PRAGMA user_version = 1;"
-)
+DATA = Path(__file__).parent / "data" / "store_v5.db"  # written by the last code of that version
 
 
-def _old(folder: Path, changes: str = "", data: Path = DATA) -> Path:
+def _old(folder: Path, changes: str = "") -> Path:
     path = folder / "place.db"
-    shutil.copy(data, path)
+    shutil.copy(DATA, path)
     with closing(sqlite3.connect(path)) as connection:
         connection.executescript(changes)
     return path
 
 
-def test_a_store_of_the_fourth_version_says_all_that_it_said(tmp_path: Path) -> None:
+def test_a_store_of_the_release_before_says_all_that_it_said_of_its_one_robot(tmp_path: Path) -> None:
     path = _old(tmp_path)
     for read_only in (True, False, True):
         with closing(Store(path, read_only=read_only)) as opened:
@@ -39,23 +34,15 @@ def test_a_store_of_the_fourth_version_says_all_that_it_said(tmp_path: Path) -> 
             assert opened.keyframe_ids() == [1, 3] and (opened.next_keyframe(), opened.next_landmark()) == (5, 51)
             assert opened.keyframe(1).labels == ("cup", "book") and opened.keyframe(3).session == 1
             assert opened.keyframe(3).view.grey.shape == (30, 40)
+            assert [opened.keyframe(k).robot for k in (1, 3)] == ["", ""] and opened.origins() == {}
             assert [s.landmark for s in opened.sightings()] == [3, 10, 6, 13]
             assert [(c.to_ns, c.labels, c.evidence) for c in opened.closures()] == [
                 (1, ("cup",), {"score": 0.5}),
                 (2, ("cup",), {"score": 0.5}),
                 (3, ("cup",), {"score": 0.5}),
             ]
+            assert [(c.robots, c.from_session) for c in opened.closures()] == [(("", ""), None)] * 3
         assert [p.name for p in tmp_path.iterdir()] == ["place.db"]
-    assert path.read_bytes()[63] == SCHEMA_VERSION
-
-
-def test_a_store_of_the_fifth_version_is_that_of_one_robot(tmp_path: Path) -> None:
-    path = _old(tmp_path, data=SEALED)
-    for read_only in (True, False, True):
-        with closing(Store(path, read_only=read_only)) as opened:
-            assert opened.keyframe_ids() == [1, 3] and (opened.next_keyframe(), opened.next_landmark()) == (5, 51)
-            assert [opened.keyframe(k).robot for k in (1, 3)] == ["", ""] and opened.origins() == {}
-            assert [(c.robots, c.from_session, c.labels) for c in opened.closures()] == [(("", ""), None, ("cup",))] * 3
     assert path.read_bytes()[63] == SCHEMA_VERSION
 
 
@@ -68,8 +55,8 @@ def test_a_store_of_the_fifth_version_is_that_of_one_robot(tmp_path: Path) -> No
         "DELETE FROM closure WHERE id = 1",
     ],
 )
-def test_a_store_of_the_fifth_version_that_was_changed_is_refused_and_left(tmp_path: Path, change: str) -> None:
-    path = _old(tmp_path, change, SEALED)
+def test_an_older_store_that_was_changed_is_refused_and_left(tmp_path: Path, change: str) -> None:
+    path = _old(tmp_path, change)
     before = path.read_bytes()
     with pytest.raises(StoreError, match="damaged"):
         Store(path)
@@ -102,23 +89,21 @@ def test_a_renewal_that_fails_or_is_killed_leaves_the_old_store(
     assert [p.name for p in tmp_path.iterdir()] == ["place.db"]
 
 
-def test_a_store_of_the_fourth_version_whose_log_was_left_is_renewed_with_it(tmp_path: Path) -> None:
-    path, killed = _old(tmp_path), tmp_path / "killed" / "place.db"
+def test_an_older_store_whose_log_was_left_is_renewed_with_it(tmp_path: Path) -> None:
+    path, killed = _old(tmp_path, "UPDATE keyframe SET session = 4 WHERE id = 3;"), tmp_path / "killed" / "place.db"
     killed.parent.mkdir()
-    with closing(sqlite3.connect(path)) as connection:
-        connection.executescript("PRAGMA journal_mode = WAL; UPDATE keyframe SET session = 4 WHERE id = 3;")
+    with closing(sqlite3.connect(path)) as connection:  # what is whole is in the log alone
+        connection.executescript("PRAGMA journal_mode = WAL; UPDATE keyframe SET session = 1 WHERE id = 3;")
         for name in ("place.db", "place.db-wal"):
             shutil.copy(tmp_path / name, killed.parent / name)
     for _ in range(2):
         with closing(Store(killed)) as opened:
-            assert opened.keyframe(3).session == 4 and opened.next_session() == 5
+            assert opened.keyframe(3).session == 1 and opened.next_session() == 2
 
 
 STRANGE = {
-    "UPDATE highest SET landmark = 'many'": "the highest id",
-    "DELETE FROM highest": "the highest id",
-    "UPDATE sqlite_sequence SET seq = 9223372036854775807": "used up",
-    "UPDATE highest SET landmark = 9223372036854775807": "used up",
+    "DELETE FROM books": "expected one row of books",
+    "UPDATE books SET landmark = 9223372036854775807": "the books: expected the checksum",
     "UPDATE keyframe SET session = 9223372036854775807": "session: expected less than",
     "UPDATE object SET id = 9223372036854775807 WHERE id = 1": "id: expected less than",
     "UPDATE keyframe SET stamp_ns = 'soon'": "stamp_ns: expected INTEGER, got 'soon'",
@@ -127,10 +112,9 @@ STRANGE = {
     "CREATE VIEW v AS SELECT * FROM keyframe": "view v",
     "ALTER TABLE object ADD COLUMN more": "object more",
     "ALTER TABLE object DROP COLUMN density": "object density",
-    "PRAGMA user_version = 0": "expected schema version 1 to",
-    "PRAGMA user_version = 5": "version 5",
+    "PRAGMA user_version = 0": "expected schema version 5 to 6, got 0; it was left as it is. Use another path",
+    "PRAGMA user_version = 4": "expected schema version 5 to 6, got 4; .* with objreg_ros 0.2.0 first",
     "PRAGMA user_version = 6": "one that no store has|another or none",
-    "PRAGMA user_version = 2": "version 2",
 }
 
 
@@ -144,23 +128,15 @@ def test_an_older_store_that_no_registrar_wrote_is_one_line_and_left_untouched(t
     assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["place.db"]
 
 
-def test_a_store_of_the_first_version_is_read_as_it_is_and_renewed_when_it_is_written(tmp_path: Path) -> None:
-    path = _old(tmp_path, FIRST)
-    for read_only in (True, False, True):
-        with closing(Store(path, read_only=read_only)) as opened:
-            back = next(opened.closures())
-            assert (back.from_frame_id, back.to_frame_id) == ("camera", "camera")
-            assert opened.keyframe(1).labels == ("cup", "book")
-    assert path.read_bytes()[63] == SCHEMA_VERSION
-
-
-def test_gravity_of_the_second_version_is_that_of_one_view(tmp_path: Path) -> None:
-    path = _old(tmp_path, "DROP TABLE highest; PRAGMA user_version = 2;")
-    for _ in range(2):  # once and for all
-        with closing(Store(path)) as opened:
-            assert opened.keyframe(1).gravity_confidence == pytest.approx(ONE_VIEW * 1.0**DOUBT)
-
-
-def test_landmarks_of_the_third_version_keep_their_ids(tmp_path: Path) -> None:
-    path = _old(tmp_path, "DROP TABLE highest; PRAGMA user_version = 3;")
-    assert Store(path).next_landmark() == 14
+def test_an_older_store_whose_ids_are_used_up_is_refused_and_left(tmp_path: Path) -> None:
+    path = _old(tmp_path)
+    with closing(sqlite3.connect(path)) as connection:
+        connection.row_factory = sqlite3.Row
+        books = read_books(connection)
+        books.landmark = MOST_IDS["landmark"]
+        with connection as transaction:
+            books.write(transaction)
+    before = path.read_bytes()
+    with pytest.raises(StoreError, match=r"place\.db: .* they are used up"):
+        Store(path)
+    assert path.read_bytes() == before

@@ -17,7 +17,7 @@ from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store
 from objreg_ros.memory.store_file import SCHEMA_VERSION, StoreError
 
-DATA = Path(__file__).parent / "data" / "store_v4.db"  # of an older version
+DATA = Path(__file__).parent / "data" / "store_v5.db"  # of the release before
 CHILD = """
 import resource, sys
 from objreg_ros.memory.store import Store

@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 
+from objreg_ros.cli.settings import NODES, names_of, read_settings
 from objreg_ros.registration.params import RegistrarNodeParams
 
 
@@ -26,6 +27,14 @@ def test_where_the_camera_is_mounted_is_a_pose_and_nothing_is_none() -> None:
 def test_a_mounting_that_cannot_be_is_refused_when_it_is_set() -> None:
     with pytest.raises(ValueError, match="expected x y z qx qy qz qw or nothing, got"):
         RegistrarNodeParams(T_base_camera=(1.0, 2.0, 3.0))
+
+
+def test_a_parameter_of_the_last_release_is_refused_with_the_name_of_its_constant() -> None:
+    with pytest.raises(ValueError, match=r"^waiting_megabytes: no parameter any more; .* WAITING_BYTES in objreg_ros/"):
+        RegistrarNodeParams.from_mapping({"waiting_megabytes": 200})
+    with pytest.raises(ValueError, match=r"^registrar: waiting_megabytes: no parameter any more; "):
+        read_settings(None, ["registrar.waiting_megabytes=200"])
+    assert not set(RegistrarNodeParams.DROPPED) & {name for kind in NODES["registrar"] for name in names_of(kind)}
 
 
 def test_the_node_s_other_values_are_checked_too() -> None:

@@ -51,6 +51,12 @@ def test_a_run_with_findings_does_not_say_that_nothing_was_sure_enough() -> None
     assert view({"frames": 0, "constraints": []})["said"] == "No loop was closed."
 
 
+def test_one_loop_is_counted_in_the_singular() -> None:
+    told = summary()
+    assert view({**told, "constraints": told["constraints"][:1]})["said"].startswith("1 loop closed by ")
+    assert view(told)["said"].startswith(f"{len(told['constraints'])} loops closed by ")
+
+
 def test_without_odometry_the_truth_is_drawn() -> None:
     told = summary()
     told["glimpses"] = [{**row, "T_odom_camera": None} for row in told["glimpses"]]

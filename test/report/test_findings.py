@@ -113,7 +113,8 @@ def test_what_the_recording_has_comes_after_where_the_run_stopped() -> None:
 def test_one_line_says_whether_it_worked() -> None:
     assert verdict({**EMPTY, "frames": 0}) == "It did not work: no frame got through."
     assert verdict(EMPTY, find(EMPTY)).startswith("No loop was closed: 20 objects in 40 frames")
-    assert verdict(CLOSED) == "It worked: 1 loops closed in 40 frames; there is no truth to judge them by."
+    assert verdict(CLOSED) == "It worked: 1 loop closed in 40 frames; there is no truth to judge them by."
+    assert verdict({**CLOSED, "constraints": [{}, {}]}).startswith("It worked: 2 loops closed in 40 frames;")
     off = {"count": 1, "rotation_deg": {"median": 9.0}, "translation_cm": {"median": 4.0}}
     assert "none of 1 false, 9.00° and 4.0 cm" in verdict({**CLOSED, "truth": {**off, "false": 0}})
     assert verdict({**CLOSED, "truth": {**off, "false": 1}}).startswith("Not quite")

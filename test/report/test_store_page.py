@@ -44,11 +44,11 @@ def test_a_page_has_all_sessions_all_objects_and_the_pictures_that_there_are(tmp
     assert "http" not in page.replace("http://www.w3.org", "")
 
 
-def test_a_page_says_what_moved_or_that_nobody_tells(tmp_path: Path) -> None:
+def test_a_page_says_what_moved_or_that_no_constraint_shows_it(tmp_path: Path) -> None:
     shown = [(1.0, 0, at(0.0)), (2.0, 0, at(0.4))]
     still = store_page(survey(store_of(tmp_path / "a.db", shown)), {})
     moved = store_page(survey(store_of(tmp_path / "b.db", shown, [told(1.0, 2.0), told(1.0, 9.0)])), {})
-    assert "No constraint of this store tells" in still
+    assert "No constraint of this store shows that an object moved" in still
     assert "went 0.40 m between 0.0 s of session 0 and 1.0 s of session 0" in moved
     assert "1 constraints tell of another" in moved
 

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a camera sees points, and what its image holds there: the kernels that other kernels begin with.
+"""Kernels that project points into a camera and read its image there. Other kernels call them first.
 
-All points are projected before the image is asked of any: a processor does that for several at a time, and so it does
-what follows if it may look up first and doubt afterwards. Together they take a third of the time that they take point
-by point. Indices are unsigned, since those of a signed one are looked at for being negative.
+All points are projected before any pixel is read, so that the processor projects several points at a time. The code
+that follows reads a pixel first and tests its value afterwards, so that it too runs for several points at a time.
+Together this takes a third of the time of one loop over the points. Indices are unsigned, because numba tests each
+signed index for a negative value.
 """
 
 from __future__ import annotations

@@ -79,24 +79,27 @@ def score_objects(matched: Pairs, moved: Pairs, silhouette_score: float | None) 
 
 
 def margin_over(candidate: Candidate, competitors: Iterable[Candidate]) -> float:
-    """The margin of a candidate's score over the best competing one; over the lowest score where there is none.
+    """The margin of a candidate's score over the best competing score; over `WORST` where nothing competes.
 
-    What is hidden says nothing of which of two poses is the right one. V counts it against a pose all the same, as
-    wrong ones hide much; but so does the true one where the views see a large thing from either side. Nor does it say
-    anything that an object looks alike: the back of a box may have the print of its front, and the views share no side
-    of it under the true pose. That it looks otherwise does.
+    Two parts of the score do not separate a right pose from a false one, and are left out:
+
+    Occlusion. V falls with the share of occluded pixels, since false poses occlude many. The true pose occludes as
+    many where the two views see a large object from opposite sides. Occluded pixels count here as if they agreed.
+
+    A positive silhouette score. The back of a box may bear the same print as its front, while the views share no side
+    of the box under the true pose. A negative score does speak against a pose, and counts.
     """
     others = (_comparable_score(competitor).total for competitor in competitors if competitor is not candidate)
     return _comparable_score(candidate).total - max(others, default=WORST)
 
 
 def _comparable_score(candidate: Candidate) -> Score:
-    """The score of a pose by what tells it from others."""
+    """The score of a pose without occlusion and without a positive silhouette score: see `margin_over`."""
     inconsistent = min(0.0, candidate.silhouette_score or 0.0)
     objects = score_objects(candidate.matched, candidate.moved, inconsistent)
     return Score(unoccluded_score(candidate.verification), *objects)
 
 
 def unoccluded_score(seen: Verification) -> float:
-    """V, had all that is hidden been seen to agree."""
+    """V as it would be if all occluded pixels agreed."""
     return seen.score + seen.occluded

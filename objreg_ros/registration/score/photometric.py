@@ -24,7 +24,7 @@ WINDOW = 15  # px: its mean is the slow part of grey; a wide one tells rooms apa
 NARROW = 9  # px: sees best that a pose was perturbed
 CONTRAST = 3.0  # grey levels that are added to the contrast of a window: sensor noise is no print
 COVERED = 0.1  # weight of the points about a pixel from which on it has a grey
-COUNTS = 10  # of `visibility.count`
+COUNTS = 10  # of `free_space.count`
 LAYERS = 5  # that are summed in a window: where there is grey, either grey, and its square
 OURS, THEIRS = [SUM_A, SUM_AA], [SUM_B, SUM_BB]
 
@@ -38,7 +38,7 @@ def texture(source: Sight, target: Sight, T_target_source: Array) -> float:
 
 
 def compare(asked: Sight, seen: Sight, T_seen_asked: Array, window: int = WINDOW) -> Array:
-    """The sums (10,) of `visibility.count` for a correlation, over the pixels of ``seen`` that ``asked`` meets."""
+    """The sums (10,) of `free_space.count` for a correlation, over the pixels of ``seen`` that ``asked`` meets."""
     slops = depth_tolerance(asked.noise, seen.noise)
     laid = _laid(asked.grey.points, asked.grey.shades, T_seen_asked, seen.near, seen.far, seen.camera, slops)
     return np.asarray(_sums(cv2.GaussianBlur(laid, (0, 0), SMOOTH), seen.grey.detail, window))

@@ -99,7 +99,7 @@ def _asked(source: Sight, target: Sight, sample: int | None) -> int:
 
 
 def count_visibility(source: Sight, target: Sight, T_target_source: Array, sample: int | None) -> Array:
-    """What the target view says of the source's points; the counts of `visibility.count`."""
+    """What the target view says of the source's points; the counts (10,) of `free_space.count`."""
     slops = depth_tolerance(source.noise, target.noise)
     return np.asarray(count(source.points[:sample], source.shades[:sample], T_target_source, *_image(target), *slops))
 
