@@ -33,7 +33,7 @@ import closers
 from closure_table import draw, grouped, table, table_of_totals, totals
 from command_line import quick_values
 from peers import PEERS, named
-from sources import Source, detector_of, read_source
+from sources import NO_JITTER, Jitter, Source, detector_of, read_source
 
 import objreg_ros
 from objreg_ros.detector.params import DetectorParams
@@ -55,6 +55,7 @@ class Asked:
     candidates: int
     seed: int
     drift: float
+    jitter: Jitter = NO_JITTER
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -68,6 +69,7 @@ class Asked:
         parts = [code(), model, f"{self.candidates}", f"{self.seed}"]
         parts += [f"{self.detector.threshold:g}"] if self.detector.threshold != usual.threshold else []
         parts += [f"x{self.drift:g}"] if self.drift != 1.0 else []
+        parts += ["j{:g}-{:g}".format(*self.jitter)] if self.jitter != NO_JITTER else []
         return "_".join(parts)
 
 
@@ -108,7 +110,7 @@ def compare(path: Path, asked: Asked, kept: Kept) -> dict[str, Any]:
         click.echo(f"{path.name}: {', '.join(known)} as measured before; --again METHOD measures anew", err=True)
     if missing:
         click.echo(f"{path.name}: detecting and segmenting", err=True)
-        with read_source(path, asked.detector, asked.seed, asked.drift) as source:
+        with read_source(path, asked.detector, asked.seed, asked.drift, asked.jitter) as source:
             _measure(source, asked, missing, kept)
     methods = {name: kept.row["methods"][name] for name in asked.methods}
     return {**kept.row, "methods": methods}
@@ -160,6 +162,17 @@ def stories(texts: Sequence[str]) -> list[tuple[str, int]]:
     return found
 
 
+def jitter_of(context: click.Context, parameter: click.Parameter, text: str) -> Jitter:
+    """``3,4`` as 3 degrees and 4 cm; `click.BadParameter` for what is no two numbers from 0 to 45 and 100."""
+    try:
+        degrees, cm = (float(number) for number in text.split(","))
+    except ValueError:
+        degrees = cm = -1.0
+    if not (0.0 <= degrees <= 45.0 and 0.0 <= cm <= 100.0):
+        raise click.BadParameter(f"expected DEG,CM with numbers from 0 to 45 and from 0 to 100, got {text!r}")
+    return degrees, cm
+
+
 def _require_own_names(names: Sequence[str]) -> None:
     """Figures are kept and told by the name of the recording; `click.UsageError` where two have one."""
     twice = sorted(name for name, count in Counter(names).items() if count > 1)
@@ -197,6 +210,14 @@ def _compared(
 @click.option("--seed", default=1, show_default=True, help="Seed of the synthetic drift and of the registrar.")
 @click.option("--drift", default=1.0, show_default=True, help="Synthetic odometry drifts so many times 2 % and 1°/m.")
 @click.option(
+    "--jitter",
+    default="0,0",
+    show_default=True,
+    metavar="DEG,CM",
+    callback=jitter_of,
+    help="Each pose of odometry errs by this for itself, besides.",
+)
+@click.option(
     "--keep", type=click.Path(file_okay=False, path_type=Path), default=Path("out/closure"), show_default=True
 )
 @click.option("--again", multiple=True, metavar="METHOD", help="Measure this method anew.")
@@ -217,7 +238,9 @@ def main(
     if not recordings and not told:
         raise click.UsageError("expected RECORDINGS or --simulate SCENARIO:SEED, got neither")
     detector = detector_of(options["model"], options["threshold"])
-    asked = Asked(detector, options["names"], options["candidates"], options["seed"], options["drift"])
+    asked = Asked(
+        detector, options["names"], options["candidates"], options["seed"], options["drift"], options["jitter"]
+    )
     paths = [partial(Path, path) for path in recordings]
     paths += [partial(simulated, keep, *story, options["frames"]) for story in told]
     names = [*(path.name for path in recordings), *(f"{name}_{seed}" for name, seed in told)]

@@ -26,7 +26,7 @@ from objreg_ros.segmenter.depth_to_colour import DepthToColour
 from objreg_ros.segmenter.organise import organise
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
-from objreg_ros.simulation.odometry import drifted
+from objreg_ros.simulation.odometry import drifted, jittered
 from objreg_ros.simulation.params import OdometryParams
 from objreg_ros.simulation.truth import read_truth
 from objreg_ros.truth import Truth
@@ -34,6 +34,8 @@ from objreg_ros.truth import Truth
 TRUE_BOXES, NO_BOXES = "truth", "nothing"  # in a model's stead
 SIMULATED = {"covariance_calibration": 0.01}  # such a camera is as its calibration says: see config/covariance.yaml
 LEAST_VISIBLE = 0.3
+Jitter = tuple[float, float]  # by which each pose of odometry errs for itself: degrees, cm
+NO_JITTER: Jitter = (0.0, 0.0)
 
 
 @dataclass
@@ -155,11 +157,16 @@ class Reading:
 
 @contextmanager
 def read_source(
-    path: Path, detector: DetectorParams, seed: int, drift: float = 1.0, reading: Reading = Reading()
+    path: Path,
+    detector: DetectorParams,
+    seed: int,
+    drift: float = 1.0,
+    jitter: Jitter = NO_JITTER,
+    reading: Reading = Reading(),
 ) -> Iterator[Source]:
     """A recording, open. Without odometry of its own it gets one that drifts from its ground truth, by ``seed``.
 
-    It drifts ``drift`` times 2 % and 1 degree a metre.
+    It drifts ``drift`` times 2 % and 1 degree a metre. Either odometry jitters by ``jitter``.
     """
     with open_recording(path) as recording:
         inputs = choose_inputs(recording.topics)
@@ -169,6 +176,7 @@ def read_source(
         frames, seen = _frames(recording, detector, reading)
         if inputs.odom is None:
             frames = with_drift(frames, truth, seed, drift)
+        frames = with_jitter(frames, jitter, seed)
         yield Source(frames, truth, Album(recording, inputs), seen, SIMULATED if _is_simulated(path) else {})
 
 
@@ -210,6 +218,18 @@ def with_drift(frames: list[Frame], truth: Truth, seed: int, drift: float = 1.0)
     drifting = usual.replaced(distance_drift=drift * usual.distance_drift, turn_drift=drift * usual.turn_drift)
     poses, _ = drifted(level, drifting, seed)
     return [replace(frame, T_odom_camera=T) for frame, T in zip(known, poses, strict=True)]
+
+
+def with_jitter(frames: list[Frame], jitter: Jitter, seed: int) -> list[Frame]:
+    """The frames with odometry each of whose poses errs for itself, by ``jitter``."""
+    degrees, cm = jitter
+    posed = [(k, frame.T_odom_camera) for k, frame in enumerate(frames) if frame.T_odom_camera is not None]
+    if not posed or jitter == NO_JITTER:
+        return frames
+    params, found = OdometryParams(turn_jitter=degrees, distance_jitter=cm / 100), list(frames)
+    for (k, _), T in zip(posed, jittered(np.array([T for _, T in posed]), params, seed), strict=True):
+        found[k] = replace(found[k], T_odom_camera=T)
+    return found
 
 
 def _levelling(frames: list[Frame], true: Array) -> Array:

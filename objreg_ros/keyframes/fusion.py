@@ -10,10 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from objreg_ros.data import UNNAMED, Array, Frame, ObjectCloud, PointFlag
+from objreg_ros.data import UNNAMED, Array, Frame, ObjectCloud, PointFlag, View
 from objreg_ros.geometry import inverse, rigid, rotate, transform
 from objreg_ros.keyframes.frame_window import FrameWindow
 from objreg_ros.keyframes.own_size import FRAME_POINTS, OBJECT_POINTS, best, sized_context, thinned
+from objreg_ros.keyframes.tracking import SAME_PICTURE, TrackedSurface, same_picture, tracked_surface, view_motion
 from objreg_ros.registration.keyframe import Context, Keyframe, KeyObject, bounding_box
 from objreg_ros.registration.labels import LabelGroups
 from objreg_ros.registration.params import KeyframeParams
@@ -32,8 +33,7 @@ def fuse(window: FrameWindow, params: KeyframeParams) -> Keyframe:
     """The keyframe of a frame window, in the camera frame of its reference; its id is 0 until a store gives one."""
     chosen = reference_index(window.frames)
     reference = window.frames[chosen]
-    T_reference_first = inverse(window.T_first_frame[chosen])
-    motions = [T_reference_first @ T for T in window.T_first_frame]
+    motions = motions_to(window, chosen)
     objects = fuse_objects(window.frames, motions, params.label_groups)
     return Keyframe(
         keyframe_id=0,
@@ -51,6 +51,33 @@ def fuse(window: FrameWindow, params: KeyframeParams) -> Keyframe:
         turned=window.turned,
         robot=reference.robot,
     )
+
+
+def motions_to(window: FrameWindow, chosen: int) -> list[Array]:
+    """``T_reference_frame`` of each frame: by the window's track, or by the views where odometry shows another picture.
+
+    Odometry that jitters from one frame to the next would smear the objects. Our own tracking has looked already.
+    """
+    T_reference_first = inverse(window.T_first_frame[chosen])
+    motions = [T_reference_first @ T for T in window.T_first_frame]
+    if not window.by_odometry or len(motions) == 1:
+        return motions
+    surface = tracked_surface(window.frames[chosen].view)
+    return [
+        T if k == chosen else _as_seen(frame.view, surface, T)
+        for k, (frame, T) in enumerate(zip(window.frames, motions, strict=True))
+    ]
+
+
+def _as_seen(view: View, surface: TrackedSurface, T_reference_frame: Array) -> Array:
+    """The motion by the views where they show the same picture by that, and not by the one that is given."""
+    shown = same_picture(view, surface, T_reference_frame)
+    if shown >= SAME_PICTURE:
+        return T_reference_frame
+    T_seen = view_motion(view, surface, T_reference_frame)
+    if T_seen is None or same_picture(view, surface, T_seen) < max(shown, SAME_PICTURE):
+        return T_reference_frame
+    return rigid(T_seen)
 
 
 def reference_index(frames: Sequence[Frame]) -> int:

@@ -19,7 +19,7 @@ from objreg_ros.keyframes.frame_window import Clock, FrameWindow, SessionNumbers
 from objreg_ros.keyframes.gravity_filter import GravityFilter
 from objreg_ros.keyframes.odometry import TravelledPath
 from objreg_ros.keyframes.own_size import sized_frame
-from objreg_ros.keyframes.tracking import TrackedSurface, same_picture, tracked_surface, view_motion
+from objreg_ros.keyframes.tracking import SAME_PICTURE, TrackedSurface, same_picture, tracked_surface, view_motion
 from objreg_ros.keyframes.turn import LastPicture
 from objreg_ros.registration.params import KeyframeParams
 
@@ -27,7 +27,6 @@ MOST_FRAMES = 4  # that are fused into one keyframe
 LEAST_OBJECTS = 1  # of a keyframe: one without objects proposes nothing
 GRAVITY_PATH_M = 2.0  # path after which gravity carried by odometry counts half
 GRAVITY_TURN_DEG = 120.0  # turn after which gravity carried by odometry counts half
-SAME_PICTURE = 0.8  # correlation of grey: right poses have more (370 looked at), of slipped ones 19 of 20 have less
 SURELY_SAME = 0.95  # correlation from which no other guess is tried
 SILENCE_S = 5.0  # odometry may have begun anew in it without a leap
 UNSET_NS = 0  # the stamp of a camera that starts before the simulated clock does: no clock began then

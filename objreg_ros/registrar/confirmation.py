@@ -11,10 +11,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+
 from objreg_ros.data import Reason, Rejected
 from objreg_ros.registrar.closure import Accepted, Waiting, rejected
 from objreg_ros.registrar.consistency import Consistency, Standpoint, Statement, Support
 from objreg_ros.registration.candidate import Candidate
+from objreg_ros.registration.certainty.covariance import spread_of
 from objreg_ros.registration.gate.likelihood import odds_of
 from objreg_ros.registration.gate.limits import limits_of
 from objreg_ros.registration.gate.refusal import Refusal
@@ -135,12 +138,16 @@ def _by_odometry(tried: Tried) -> bool:
 
 
 def _statement(tried: Tried, candidate: Candidate) -> Statement:
+    variances = np.diag(spread_of(candidate.alignment))
     return Statement(
         Standpoint.of(tried.source),
         Standpoint.of(tried.target),
         candidate.T_target_source,
         odds_of(candidate),
         tried.registration.accepted,
+        _by_odometry(tried),
+        rotation_deg=float(np.degrees(np.sqrt(variances[3:].sum()))),
+        translation_m=float(np.sqrt(variances[:3].sum())),
     )
 
 

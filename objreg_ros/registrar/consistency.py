@@ -3,7 +3,7 @@
 
 Pairwise consistency (Olson, "Recognizing places using spectrally clustered local matches", 2009; Mangelson et al.,
 "Pairwise consistent measurement set maximization for robust multi-robot map merging", 2018). Wrong poses agree as well
-where they slide along the same surface. So what disagrees counts too.
+where they slide along the same surface. So what disagrees counts too, unless it is by no more than odometry jitters.
 """
 
 from __future__ import annotations
@@ -15,12 +15,15 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import inverse
+from objreg_ros.keyframes.jitter import ENDS, Jitter, JitterMeter
 from objreg_ros.registration.keyframe import Keyframe
 
 REACH_M = 3.0  # of path, at both ends together, over which odometry carries a pose
 NEAR_M = 2.0  # of path: poses so near speak of the same place
 ROTATION_DEG, ROTATION_GROWTH_DEG_M = 2.0, 2.0  # between poses that agree: the noise of both, and of the way
 TRANSLATION_M, TRANSLATION_GROWTH = 0.05, 0.06
+MEASURED_M = 1.0  # of path, over which jitter is measured: drift is little by then
+TOLERANCE_SIGMAS = 1.5  # times the root mean square of what is no jitter: 9 of 10 true poses agree then
 MOST = 512  # statements that are kept, the newest
 
 
@@ -42,7 +45,8 @@ class Standpoint(NamedTuple):
 class Statement(NamedTuple):
     """The best pose ``T_target_source (4, 4)`` of a pair of keyframes, and the ``odds`` that it is right.
 
-    ``sure`` where the gate accepts it by itself.
+    ``sure`` where the gate accepts it by itself, ``by_odometry`` where that says where both keyframes were. The pose is
+    known to ``rotation_deg`` and ``translation_m`` (root mean square).
     """
 
     source: Standpoint
@@ -50,6 +54,9 @@ class Statement(NamedTuple):
     T_target_source: Array
     odds: float
     sure: bool
+    by_odometry: bool = True
+    rotation_deg: float = 0.0
+    translation_m: float = 0.0
 
     @property
     def weight(self) -> float:
@@ -61,12 +68,26 @@ class Support(NamedTuple):
     """What other statements say of one.
 
     ``agreeing`` counts those that agree with it and with each other, each of two keyframes of its own, one of them
-    ``sure`` or it itself is. Of all that speak of the same place, weighing ``heard``, ``share`` agrees.
+    ``sure`` or it itself is. Of all that speak of the same place, weighing ``heard``, ``share`` agrees. What disagrees
+    by no more than odometry jitters is left out.
     """
 
     agreeing: int
     share: float
     heard: float
+
+
+class Excess(NamedTuple):
+    """How far the difference of two poses is beyond what those that agree may differ by; at most 0 where they agree."""
+
+    rotation_deg: float
+    translation_m: float
+
+    def is_beyond(self, allowance: Jitter) -> bool:
+        """Whether jitter of odometry does not excuse it either."""
+        most_deg, most_m = allowance
+        disagrees = self.rotation_deg > 0.0 or self.translation_m > 0.0
+        return disagrees and (self.rotation_deg > most_deg or self.translation_m > most_m)
 
 
 class Consistency:
@@ -75,8 +96,8 @@ class Consistency:
     def __init__(self) -> None:
         self._statements: dict[int, Statement] = {}
         self._agree: dict[int, set[int]] = {}
-        self._near: dict[int, set[int]] = {}
-        self._next = 0
+        self._near: dict[int, dict[int, Excess]] = {}
+        self._next, self._meter = 0, JitterMeter()
 
     def __len__(self) -> int:
         return len(self._statements)
@@ -84,27 +105,51 @@ class Consistency:
     def __contains__(self, number: int) -> bool:
         return number in self._statements
 
+    @property
+    def jitter(self) -> Jitter:
+        """Of odometry, as measured until now."""
+        return self._meter.jitter
+
     def add(self, statement: Statement) -> int:
         """Take in a statement; its number. Forgets what nothing that comes can speak of any more."""
         self._forget(statement.source)
         number, self._next = self._next, self._next + 1
         others = [n for n, other in self._statements.items() if _same_sessions(other, statement)]
-        metres = np.array([path_m(self._statements[n], statement) for n in others])
-        agrees = agree([self._statements[n] for n in others], statement, metres)
+        known = [self._statements[n] for n in others]
+        metres = np.array([path_m(other, statement) for other in known])
+        differences = differences_of(known, statement)
+        self._measure(known, statement, metres, differences)
         self._statements[number] = statement
-        self._agree[number] = {n for n, yes in zip(others, agrees, strict=True) if yes}
-        self._near[number] = {n for n, way in zip(others, metres, strict=True) if way <= NEAR_M}
-        for table in (self._agree, self._near):
-            for n in table[number]:
-                table[n].add(number)
+        self._link(number, others, metres, differences)
         return number
+
+    def _link(self, number: int, others: Sequence[int], metres: Array, differences: Array) -> None:
+        """Note which others a statement agrees with, and how far it is from those that are near."""
+        excess = differences - tolerance(metres)
+        agrees, near = _within(excess, metres), metres <= NEAR_M
+        self._agree[number] = {n for n, yes in zip(others, agrees, strict=True) if yes}
+        beyond = zip(others, map(Excess._make, excess.tolist()), near, strict=True)
+        self._near[number] = {n: by for n, by, yes in beyond if yes}
+        for n in self._agree[number]:
+            self._agree[n].add(number)
+        for n, by in self._near[number].items():
+            self._near[n][number] = by
 
     def support(self, number: int) -> Support:
         """What the others say of a statement that is still known."""
-        near = self._near[number]
-        heard = sum(self._statements[n].weight for n in near)
-        agreeing = sum(self._statements[n].weight for n in near & self._agree[number])
-        return Support(self._clique(number), agreeing / heard if heard > 0.0 else 0.0, heard)
+        near, allowance = self._near[number], self.jitter.allowance()
+        agreeing = sum(self._statements[n].weight for n in near if n in self._agree[number])
+        opposing = sum(self._statements[n].weight for n, excess in near.items() if excess.is_beyond(allowance))
+        weight = agreeing + opposing
+        return Support(self._clique(number), agreeing / weight if weight > 0.0 else 0.0, weight)
+
+    def _measure(self, others: Sequence[Statement], one: Statement, metres: Array, differences: Array) -> None:
+        """Learn how far odometry jitters where both poses are sure."""
+        near = [k for k, path in enumerate(metres) if path <= MEASURED_M and _measures(others[k])]
+        if near and _measures(one):
+            sure, noise = [others[k] for k in near], tolerance(metres[near]) / TOLERANCE_SIGMAS
+            explained = np.array([variances(other, one) for other in sure]) + np.square(noise)
+            self._meter.add(differences[near], explained, np.array([ends_between(other, one) for other in sure]))
 
     def _clique(self, number: int) -> int:
         """How many others agree with a statement and each other, the surest first; 0 where none of them all is sure.
@@ -132,9 +177,10 @@ class Consistency:
         gone += list(self._statements)[: max(len(self._statements) + 1 - MOST - len(gone), 0)]
         for n in dict.fromkeys(gone):
             del self._statements[n]
-            for table in (self._agree, self._near):
-                for m in table.pop(n):
-                    table[m].discard(n)
+            for m in self._agree.pop(n):
+                self._agree[m].discard(n)
+            for m in self._near.pop(n):
+                del self._near[m][n]
 
 
 def _same_sessions(one: Statement, other: Statement) -> bool:
@@ -149,8 +195,41 @@ def path_m(one: Statement, other: Statement) -> float:
 
 def agree(others: Sequence[Statement], one: Statement, metres: Array) -> Array:
     """(N,) bool: whether odometry carries the pose of ``one`` to where each of ``others`` is, or back."""
+    return _within(differences_of(others, one) - tolerance(metres), metres)
+
+
+def _within(excess: Array, metres: Array) -> Array:
+    return np.asarray((metres <= REACH_M) & (excess <= 0.0).all(axis=1))
+
+
+def _measures(one: Statement) -> bool:
+    return one.sure and one.by_odometry
+
+
+def variances(one: Statement, other: Statement) -> tuple[float, float]:
+    """The variance of the difference of two poses, in degrees and metres squared, by what both are unsure of."""
+    return one.rotation_deg**2 + other.rotation_deg**2, one.translation_m**2 + other.translation_m**2
+
+
+def ends_between(one: Statement, other: Statement) -> int:
+    """How many poses of odometry carry one pose to the other: that of a keyframe that both share cancels out."""
+    shared = (one.source.stamp_ns == other.source.stamp_ns) + (one.target.stamp_ns == other.target.stamp_ns)
+    return ENDS - 2 * shared
+
+
+def tolerance(metres: Array) -> Array:
+    """(N, 2) degrees and metres by which poses that agree may differ over so much path."""
+    growth = np.array([ROTATION_GROWTH_DEG_M, TRANSLATION_GROWTH])
+    return np.asarray(np.array([ROTATION_DEG, TRANSLATION_M]) + growth * metres[:, None])
+
+
+def differences_of(others: Sequence[Statement], one: Statement) -> Array:
+    """(N, 2) degrees and metres between the pose of each of ``others`` and that of ``one``, carried by odometry.
+
+    Carried there or back: the less of both distances.
+    """
     if not others:
-        return np.zeros(0, bool)
+        return np.zeros((0, 2))
     T_there = np.array([other.target.T_session_camera for other in others])
     T_here = np.array([other.source.T_session_camera for other in others])
     T_others = np.array([other.T_target_source for other in others])
@@ -161,5 +240,4 @@ def agree(others: Sequence[Statement], one: Statement, metres: Array) -> Array:
     degrees = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
     apart = np.linalg.norm(forth[:, :3, 3] - T_others[:, :3, 3], axis=1)
     apart = np.minimum(apart, np.linalg.norm(back[:, :3, 3] - one.T_target_source[:3, 3], axis=1))
-    turned = degrees <= ROTATION_DEG + ROTATION_GROWTH_DEG_M * metres
-    return np.asarray((metres <= REACH_M) & turned & (apart <= TRANSLATION_M + TRANSLATION_GROWTH * metres))
+    return np.stack((degrees, apart), axis=1)

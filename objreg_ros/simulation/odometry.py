@@ -7,7 +7,8 @@ After one metre the relative pose error is about ``distance_drift`` in position 
   Systematic Odometry Errors in Mobile Robots", 1996), and wanders; the wandering is a tenth of the variance,
 * every motion is wrong by a constant share of its length, as much along it (scale) as across it (mounting), and the
   position wanders; the wandering is half of the variance,
-* a tilt error wanders about zero with the standard deviation ``tilt_error``, because gravity is observed.
+* a tilt error wanders about zero with the standard deviation ``tilt_error``, because gravity is observed,
+* each pose errs for itself by ``turn_jitter`` and ``distance_jitter`` (root mean square, white): a jittering tracker.
 
 What is constant has a sign at random and a size within a quarter of the stated one, so that every run drifts about as
 much. What wanders grows with the root of the way; what is constant grows with the way.
@@ -52,7 +53,18 @@ def drifted(T_world_camera: Array, params: OdometryParams, seed: int) -> tuple[A
         if k > 0:
             at = at + _turn(heading[k - 1]) @ believed[k - 1]
         out.append(pose(_turn(heading[k]) @ rotation_from_vector(tilt[k]) @ start[:3, :3].T @ T[:3, :3], at))
-    return np.stack(out), _covariances(np.concatenate([[0.0], np.cumsum(length)]), params)
+    covariances = _covariances(np.concatenate([[0.0], np.cumsum(length)]), params)
+    return jittered(np.stack(out), params, seed), covariances
+
+
+def jittered(T_odom_camera: Array, params: OdometryParams, seed: int) -> Array:
+    """Poses (N, 4, 4) that each err for themselves besides: in position, and in rotation about their own camera."""
+    if not (params.turn_jitter or params.distance_jitter):
+        return T_odom_camera
+    noise = np.random.default_rng([seed, 22]).standard_normal((len(T_odom_camera), 2, 3)) / np.sqrt(3.0)
+    turns, shifts = np.radians(params.turn_jitter) * noise[:, 0], params.distance_jitter * noise[:, 1]
+    rotations = np.array([T[:3, :3] @ rotation_from_vector(turn) for T, turn in zip(T_odom_camera, turns, strict=True)])
+    return np.stack([pose(R, T[:3, 3] + s) for R, T, s in zip(rotations, T_odom_camera, shifts, strict=True)])
 
 
 def odometry_origin(T_world_camera: Array) -> Array:
@@ -106,7 +118,8 @@ def _covariances(distance: Array, params: OdometryParams) -> Array:
     tilt = np.full_like(d, np.radians(params.tilt_error))
     sigma = np.concatenate([position, position, position, tilt, tilt, heading], axis=1)
     floor = np.array([1e-3] * 3 + [np.radians(0.05)] * 3)
-    return np.maximum(sigma, floor)[:, :, None] ** 2 * np.eye(6)
+    jitter = np.array([params.distance_jitter] * 3 + [np.radians(params.turn_jitter)] * 3) / np.sqrt(3.0)
+    return (np.maximum(sigma, floor) ** 2 + jitter**2)[:, :, None] * np.eye(6)
 
 
 def _growth(distance: Array, steady: float) -> Array:

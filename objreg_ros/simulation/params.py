@@ -133,3 +133,5 @@ class OdometryParams(Params):
     tilt_error: float = param(
         0.3, "error of roll and pitch; it does not grow, gravity is observed", "deg", ge=0.0, le=45.0
     )
+    turn_jitter: float = param(0.0, "rotation by which each pose errs for itself, rms", "deg", ge=0.0, le=45.0)
+    distance_jitter: float = param(0.0, "distance by which each pose errs for itself, rms", "m", ge=0.0, le=1.0)

@@ -56,6 +56,18 @@ def test_what_is_no_scenario_and_seed_is_refused(benchmark: Benchmark, tmp_path:
     assert "expected SCENARIO:SEED" in said and f"got '{story}'" in said
 
 
+@pytest.mark.parametrize("jitter", ["3", "3,x", "-1,4", "3,4,5", "3,101", "nan,1"])
+def test_jitter_that_is_no_two_sizes_is_refused(benchmark: Benchmark, tmp_path: Path, jitter: str) -> None:
+    said = refusal(benchmark("closure").main, "--jitter", jitter, "--keep", str(tmp_path))
+    assert "expected DEG,CM with numbers from 0 to 45 and from 0 to 100" in said and f"got '{jitter}'" in said
+
+
+def test_figures_with_jitter_are_kept_apart(benchmark: Benchmark) -> None:
+    closure, sources = benchmark("closure"), benchmark("sources")
+    plain, jittering = (closure.Asked(sources.detector_of(), (), 1, 1, 1.0, j) for j in ((0.0, 0.0), (3.0, 4.0)))
+    assert jittering.tag() == f"{plain.tag()}_j3-4"
+
+
 @pytest.mark.parametrize(("name", "needed"), [("closure", ()), ("pairs", (".",))])
 def test_a_peer_that_there_is_not_is_refused_at_once(benchmark: Benchmark, name: str, needed: tuple[str, ...]) -> None:
     said = refusal(benchmark(name).main, *needed, "--peers", "orb_pnp,nonsense")

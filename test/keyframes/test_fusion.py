@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from registration.samples import box, cloud, frame, moved, scene_view
 
-from objreg_ros.data import UNNAMED, PointFlag
-from objreg_ros.geometry import inverse, transform
+from objreg_ros.data import UNNAMED, Array, PointFlag
+from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector, transform
 from objreg_ros.keyframes import fusion
 from objreg_ros.keyframes.frame_window import FrameWindow
-from objreg_ros.keyframes.fusion import fuse, fuse_objects, reference_index
+from objreg_ros.keyframes.fusion import fuse, fuse_objects, motions_to, reference_index
 from objreg_ros.registration.params import RegistrarParams
 
 PARAMS = RegistrarParams()
@@ -122,3 +122,37 @@ def test_two_names_at_one_place_stay_two_objects_with_one_without_a_name_between
     seen = [frame(0.1 * i, (box(name, (0, 0, 1)),)) for i, name in enumerate(("cup", UNNAMED, "book"))]
     items = fuse_objects(seen, [np.eye(4)] * 3, GROUPS)
     assert sorted(item.label for item in items) == ["book", "cup"]
+
+
+def seen_from(T_first_second: Array, T_odometry: Array, by_odometry: bool = True) -> FrameWindow:
+    """Two views of the scene, and what odometry says of the motion between them."""
+    things = (box("cup", (0, 0, 1)),)
+    frames = (frame(0, things), frame(0.1, things, view=scene_view(T_first_second)))
+    motions = (np.eye(4), T_odometry)
+    return FrameWindow(
+        frames=frames, T_first_frame=motions, T_session_first=np.eye(4), session=0, by_odometry=by_odometry
+    )
+
+
+JITTERED = pose(rotation_from_vector(np.radians([0.0, 4.0, 2.0])), np.array([0.06, -0.03, 0.02]))
+
+
+def test_where_odometry_shows_another_picture_the_views_say_the_motion() -> None:
+    (first, second) = motions_to(seen_from(moved(0.02), JITTERED), 0)
+    assert np.array_equal(first, np.eye(4))
+    degrees, cm = pose_error(second, moved(0.02))
+    assert degrees < 0.5 and cm < 1.0
+
+
+@pytest.mark.parametrize("by_odometry", [True, False])
+def test_where_odometry_shows_the_same_picture_it_says_the_motion(by_odometry: bool) -> None:
+    near = moved(0.022)
+    assert np.array_equal(motions_to(seen_from(moved(0.02), near, by_odometry), 0)[1], near)
+
+
+def test_our_own_tracking_is_not_tracked_again() -> None:
+    assert np.array_equal(motions_to(seen_from(moved(0.02), JITTERED, by_odometry=False), 0)[1], JITTERED)
+
+
+def test_where_the_views_agree_nowhere_odometry_says_the_motion() -> None:
+    assert np.array_equal(motions_to(seen_from(moved(40.0), JITTERED), 0)[1], JITTERED)

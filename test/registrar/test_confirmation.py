@@ -10,13 +10,14 @@ import pytest
 from registration.samples import box, candidate, keyframe, moved
 
 from objreg_ros.data import Array, Reason, Rejected
+from objreg_ros.keyframes.jitter import Jitter
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.registrar.closure import Accepted, Waiting, waiting_of
 from objreg_ros.registrar.confirmation import Confirmation, Held, Tried
 from objreg_ros.registration.gate.verdict import judge
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.result import Registration
-from registrar.test_consistency import ASIDE, TRUE
+from registrar.test_consistency import ASIDE, TRUE, passes
 
 PARAMS = RegistrarParams(confirm_seconds=10.0)
 THINGS = (box("cup", (0.0, 0.0, 1.0)), box("book", (0.3, 0.0, 1.0), instance=2))
@@ -95,6 +96,15 @@ def test_an_accepted_pose_that_its_neighbours_contradict_is_not_published() -> N
     hold(confirmation, false, confirmation.hear(false))
     confirmed, (refused,) = confirmation.settle(None)
     assert confirmed == [] and refused.reason is Reason.NEIGHBOURS and "0.00 < 0.5" in refused.detail
+
+
+def test_an_accepted_pose_that_jitter_excuses_is_published_and_a_moved_one_is_not() -> None:
+    for T, kind in ((moved(0.12, 0.0, 0.3), Accepted), (moved(0.4, 0.0, 0.3), Held)):
+        confirmation = Confirmation(PARAMS)
+        confirmation._consistency = passes(Jitter(3.0, 0.04))
+        for at_m in (10.0, 10.2, 10.4):
+            confirmation.hear(tried(at_m))
+        assert isinstance(confirmation.hear(tried(10.5, T)), kind)
 
 
 def test_our_own_tracking_confirms_and_contradicts_nothing() -> None:

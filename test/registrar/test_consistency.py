@@ -9,7 +9,8 @@ from registration.samples import SECOND, moved
 
 from objreg_ros.data import Array
 from objreg_ros.geometry import pose, rotation_from_vector
-from objreg_ros.registrar.consistency import MOST, REACH_M, Consistency, Standpoint, Statement
+from objreg_ros.keyframes.jitter import Jitter
+from objreg_ros.registrar.consistency import MOST, REACH_M, Consistency, Standpoint, Statement, Support
 
 TRUE = moved(0.0, 0.0, 0.3)  # of the second pass in the first, at the same place
 ASIDE = moved(0.25, 0.0, 0.3)  # slides along the wall
@@ -90,3 +91,75 @@ def test_odometry_may_drift_by_some_degrees_over_a_metre(degrees: float, agrees:
     other = other._replace(T_target_source=other.T_target_source @ turned)
     consistency, numbers = heard(one, other)
     assert (consistency.support(numbers[0]).share == 1.0) is agrees
+
+
+def turned(degrees: float, metres: float = 0.0) -> Array:
+    return pose(rotation_from_vector(np.radians([0.0, degrees, 0.0])), np.array([metres, 0.0, 0.0]))
+
+
+def random_pose(jitter: Jitter, rng: np.random.Generator) -> Array:
+    """A small motion of that root mean square."""
+    turn, shift = rng.standard_normal((2, 3)) / np.sqrt(3.0)
+    return pose(rotation_from_vector(np.radians(jitter.rotation_deg) * turn), jitter.translation_m * shift)
+
+
+def passes(jitter: Jitter, false: int = 0, seed: int = 0, by_odometry: bool = True) -> Consistency:
+    """Two passes of 3 m with a sure pose each 5 cm, of 1 degree and 2 cm; ``false`` of ten slide along the wall."""
+    rng, consistency = np.random.default_rng(seed), Consistency()
+    for k in range(60):
+        T = (ASIDE if k % 10 < false else TRUE) @ random_pose(Jitter(1.0, 0.02), rng)
+        one = statement(0.05 * k, 0.05 * k, T)
+        here, there = (
+            end._replace(T_session_camera=end.T_session_camera @ random_pose(jitter, rng)) for end in one[:2]
+        )
+        consistency.add(one._replace(source=here, target=there, by_odometry=by_odometry))
+    return consistency
+
+
+@pytest.mark.parametrize("jitter", [Jitter(3.0, 0.04), Jitter(2.0, 0.06), Jitter(6.0, 0.1)])
+@pytest.mark.parametrize("seed", range(3))
+def test_jitter_of_odometry_is_measured_from_sure_poses(jitter: Jitter, seed: int) -> None:
+    assert passes(jitter, seed=seed).jitter == pytest.approx(jitter, rel=0.3)
+
+
+def test_odometry_without_jitter_has_next_to_none() -> None:
+    assert passes(Jitter(0.0, 0.0)).jitter == pytest.approx((0.0, 0.0), abs=1e-9)
+
+
+@pytest.mark.parametrize("false", [1, 3])
+def test_false_poses_do_not_move_the_measurement(false: int) -> None:
+    assert passes(Jitter(0.0, 0.0), false).jitter == pytest.approx((0.0, 0.0), abs=1e-9)
+    assert passes(Jitter(3.0, 0.04), false).jitter == pytest.approx((3.0, 0.04), rel=0.5)
+
+
+def test_what_is_not_sure_or_by_our_own_tracking_measures_no_jitter() -> None:
+    assert passes(Jitter(3.0, 0.04), by_odometry=False).jitter == (0.0, 0.0)
+    unsure = [statement(0.05 * k, 0.05 * k, TRUE @ turned(5.0 * k), sure=False) for k in range(20)]
+    assert heard(*unsure)[0].jitter == (0.0, 0.0)
+
+
+def support_of(T: Array, jitter: Jitter) -> Support:
+    """What three true poses, farther on, say of a pose, once so much jitter was measured."""
+    consistency = passes(jitter)
+    for x in (10.0, 10.1, 10.2):
+        consistency.add(statement(x, x))
+    return consistency.support(consistency.add(statement(10.3, 10.3, T)))
+
+
+def test_with_jitter_a_neighbour_2_degrees_beyond_the_tolerance_no_longer_opposes() -> None:
+    off = TRUE @ turned(5.0)
+    assert support_of(off, Jitter(0.0, 0.0)) == (0, 0.0, pytest.approx(3.0, abs=0.1))
+    assert support_of(off, Jitter(3.0, 0.04)) == (0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("metres", [0.4, -0.4, 0.8])
+def test_with_jitter_what_moved_or_has_a_twin_40_cm_off_is_still_opposed(metres: float) -> None:
+    for jitter in (Jitter(0.0, 0.0), Jitter(3.0, 0.04), Jitter(10.0, 0.3)):
+        support = support_of(moved(metres) @ TRUE, jitter)
+        assert support.heard > 2.9 and support.share == 0.0
+
+
+def test_jitter_lets_no_more_poses_agree() -> None:
+    for off in (TRUE @ turned(4.0), TRUE @ turned(0.0, 0.1)):
+        assert support_of(off, Jitter(6.0, 0.1)).agreeing == 0
+    assert support_of(TRUE, Jitter(6.0, 0.1)).agreeing == 3

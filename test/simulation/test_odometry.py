@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import inverse, pose_error, rotation_angle
-from objreg_ros.simulation.odometry import drifted, odometry_origin
+from objreg_ros.simulation.odometry import drifted, jittered, odometry_origin
 from objreg_ros.simulation.params import OdometryParams
 from objreg_ros.simulation.trajectory import Hand, Waypoint, carried
 
@@ -67,6 +67,23 @@ def test_the_same_seed_drifts_the_same_way() -> None:
     first, again, other = (drifted(truth, OdometryParams(), seed)[0] for seed in (5, 5, 6))
     assert np.array_equal(first, again) and not np.array_equal(first, other)
     assert max(rotation_angle(a[:3, :3].T @ b[:3, :3]) for a, b in zip(first, truth, strict=True)) < np.pi
+
+
+def test_jitter_errs_at_each_pose_for_itself_by_the_stated_size() -> None:
+    truth = straight(2.0)
+    params = NONE.replaced(turn_jitter=3.0, distance_jitter=0.04)
+    (clean, _), (jittering, covariance) = (drifted(truth, of, seed=1) for of in (NONE, params))
+    errors = np.array([pose_error(a, b) for a, b in zip(jittering, clean, strict=True)])
+    assert np.sqrt(np.mean(errors**2, axis=0)) == pytest.approx([3.0, 4.0], rel=0.25)
+    assert np.sqrt(np.trace(covariance[-1][:3, :3])) == pytest.approx(0.04, rel=0.01)
+
+
+def test_jitter_leaves_the_drift_as_it_is() -> None:
+    truth = straight(2.0)
+    steady, _ = drifted(truth, OdometryParams(), seed=3)
+    params = OdometryParams(turn_jitter=1.0, distance_jitter=0.01)
+    assert np.array_equal(jittered(steady, params, 3), drifted(truth, params, 3)[0])
+    assert jittered(steady, OdometryParams(), 3) is steady
 
 
 def end_error(truth: np.ndarray, params: OdometryParams, seed: int) -> tuple[float, float]:

@@ -26,7 +26,8 @@ NEVER_NEGATIVE = [
     (DepthParams, "near"), (DepthParams, "far"), (DepthParams, "edge_jitter"), (ColourParams, "brightness"),
     (ColourParams, "blur"), (ColourParams, "shot_noise"), (ColourParams, "read_noise"), (StressParams, "warp"),
     (StressParams, "ragged"), (StressParams, "motion_blur"), (OdometryParams, "turn_drift"),
-    (OdometryParams, "tilt_error"), (StereoParams, "subpixel"), (StereoParams, "projector"),
+    (OdometryParams, "tilt_error"), (OdometryParams, "turn_jitter"), (OdometryParams, "distance_jitter"),
+    (StereoParams, "subpixel"), (StereoParams, "projector"),
     (TimeOfFlightParams, "noise"), (TimeOfFlightParams, "multipath"), (RigParams, "rolling_ms"),
     (RigParams, "blur_ms"), (RigParams, "misregistration_px"),
 ]  # fmt: skip
