@@ -50,6 +50,17 @@ class Verification:
     score: float
 
 
+class KeypointAgreement(NamedTuple):
+    """``matches`` of keypoints that a pose brings together, and the ``cells`` of the pictures in which they lie: the
+    smaller number of the two. ``rival_matches`` and ``rival_cells`` are the most that any other pose has.
+    """
+
+    matches: int
+    cells: int
+    rival_matches: int
+    rival_cells: int
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Candidate:
     """One hypothesis after refinement, with its evidence. It decides nothing: the gate does.
@@ -65,7 +76,7 @@ class Candidate:
     ``surroundings`` is what the views say of it without the objects that it matches; None where those are small in
     both, and where they are none, or so many that they would not move together. ``systematic_depth_error (6, 6)`` is
     the covariance [t r] that it adds to the alignment's. ``certain_violations`` is the share of the tested pixels that
-    float in seen free space beyond doubt.
+    float in seen free space beyond doubt. ``keypoints`` is what matched keypoints say, None where there are hardly any.
     """
 
     alignment: Alignment
@@ -83,6 +94,7 @@ class Candidate:
     perturbation_margin: float | None = None
     surroundings: Verification | None = None
     certain_violations: float = 1.0
+    keypoints: KeypointAgreement | None = None
     systematic_depth_error: Array = field(default_factory=lambda: np.zeros((6, 6)))
 
     @property

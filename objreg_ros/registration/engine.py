@@ -35,6 +35,7 @@ from objreg_ros.registration.propose.hypotheses import Hypothesis
 from objreg_ros.registration.propose.refinement import refine
 from objreg_ros.registration.propose.shortlist import shortlist
 from objreg_ros.registration.refine.batch_icp import LEAST_PAIRS
+from objreg_ros.registration.score.keypoint_agreement import agreements
 from objreg_ros.registration.score.view_score import LEAST_SCORE
 
 HOLDING_SILHOUETTE_SCORE = 0.3  # of an object from which on it resolves a degenerate direction
@@ -67,7 +68,7 @@ class Engine:
         if min(len(pair.source.xyz), len(pair.target.xyz)) < LEAST_PAIRS:
             return ()
         # propose/: what is worth finishing, of all that the proposers propose
-        best, hypotheses = self._shortlist(pair, T_target_source_prior)
+        best, hypotheses, of_keypoints = self._shortlist(pair, T_target_source_prior)
         if not best:
             return ()
         # refine/ and score/: each is refined, and its evidence gathered
@@ -76,6 +77,7 @@ class Engine:
         competitors = self._competitors(pair, [one for one in candidates if self._promises(one, candidates[0])])
         if competitors:
             candidates = merged([*candidates, *competitors], pair.source.middle)
+        candidates = with_keypoints(pair, candidates, of_keypoints)
         # certainty/: how the views resist a perturbation, and what gravity tells
         perturbed = (self._perturbed(pair, one) if self._promises(one, candidates[0]) else one for one in candidates)
         return tuple(self._gravity_updated(pair, one) for one in perturbed)
@@ -176,6 +178,12 @@ def brought(candidate: Candidate, T_target_source: Array) -> Candidate:
 def without_degeneracy(alignment: Alignment) -> Alignment:
     """The alignment without its degenerate directions."""
     return replace(alignment, degenerate=np.zeros((0, 6)))
+
+
+def with_keypoints(pair: Pair, candidates: list[Candidate], proposed: Sequence[Hypothesis]) -> list[Candidate]:
+    """The candidates with what the keypoints say of each; what these ``proposed`` may be its rival."""
+    found = agreements(pair, *(np.array([one.T_target_source for one in ones]) for ones in (candidates, proposed)))
+    return [replace(one, keypoints=agreement) for one, agreement in zip(candidates, found, strict=True)]
 
 
 def merged(candidates: list[Candidate], middle: Array) -> list[Candidate]:

@@ -64,6 +64,7 @@ def evidence_of(candidate: Candidate) -> dict[str, float]:
         "violations": seen.violations,
         "floating": candidate.certain_violations,
         "occluded": seen.occluded,
+        "keypoints": None if candidate.keypoints is None else candidate.keypoints.cells,
         "texture": seen.texture,
         "tested": seen.tested,
         "overlap": aligned.overlap,

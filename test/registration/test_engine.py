@@ -118,6 +118,15 @@ def test_an_object_that_tells_its_yaw_and_looks_alike_takes_away_the_degenerate_
     assert len(engine._gathered(pair, one.alignment, ("objects",)).alignment.degenerate) == left
 
 
+def test_the_true_pose_has_keypoints_that_agree_and_no_rival_has_as_many() -> None:
+    seen = [keyframe(seen_from(angle), seed=k) for k, angle in enumerate((0.0, 20.0))]
+    best = Engine(PARAMS).propose(*seen)[0]
+    assert best.keypoints is not None and "keypoints" in best.agreeing_proposers
+    assert best.keypoints.cells >= 6 and best.keypoints.cells > best.keypoints.rival_cells + 2
+    dark = [replace(one, view=replace(one.view, grey=None)) for one in seen]
+    assert all(one.keypoints is None for one in Engine(PARAMS).propose(*dark))
+
+
 def test_a_proposer_of_ones_own_is_asked_instead_of_ours() -> None:
     asked: list[object] = []
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from objreg_ros.data import Reason
 from objreg_ros.geometry import inverse, pose, rotation_from_vector, vector_from_rotation
+from objreg_ros.registration.candidate import KeypointAgreement
 from objreg_ros.registration.result import Registration, evidence_of
 from registration.samples import candidate
 
@@ -35,6 +36,12 @@ def test_between_other_cameras_the_covariance_is_that_of_many_disturbed_poses() 
         turn = vector_from_rotation(found[:3, :3] @ inverse(moved.T_1_2)[:3, :3])
         errors.append([*(found[:3, 3] - moved.T_1_2[:3, 3]), *turn])
     np.testing.assert_allclose(np.cov(np.array(errors).T), moved.covariance, rtol=0.1, atol=4e-7)
+
+
+def test_evidence_has_in_how_many_cells_keypoints_agree_where_there_are_any() -> None:
+    agreement = KeypointAgreement(matches=30, cells=9, rival_matches=4, rival_cells=2)
+    assert evidence_of(candidate(keypoints=agreement))["keypoints"] == 9.0
+    assert "keypoints" not in evidence_of(candidate(keypoints=None))
 
 
 def test_evidence_leaves_out_what_is_not_known() -> None:

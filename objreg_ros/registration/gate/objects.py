@@ -12,9 +12,10 @@ from objreg_ros.registration.gate.refusal import Refusal
 SEVERAL = 2  # matched objects; fewer tell where one thing is, and not which way the camera looked at it
 LEAST_UNNAMED = 3  # matched objects without a name that make up for one with a name
 UNNAMED_COUNTS = 0.5  # of what an object with a name counts: any two of these may be taken for one
-SAME_EVIDENCE = {"centroids": "objects", "odometry": "objects"}
+SAME_EVIDENCE = {"centroids": "objects", "odometry": "objects", "keypoints": "features"}
 """Proposers that are no evidence beside another one. The search for object poses starts from the centroids too. What
-drifting odometry expects is refined to whatever the objects fit nearby, right or wrong."""
+drifting odometry expects is refined to whatever the objects fit nearby, right or wrong. What keypoints say is weighed
+by how many of them agree."""
 
 
 def is_lone(matched: Sequence[ObjectPair]) -> bool:

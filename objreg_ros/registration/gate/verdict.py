@@ -75,7 +75,7 @@ def check_possible(one: Candidate, prior: Prior | None = None, limits: Limits = 
         convergence.check(one.alignment.converged, one.alignment.inliers)
         or odometry.check_plausible(one.T_target_source, limits.translation_m)
         or _check_gravity(one, limits)
-        or free_space.check(one.verification.violations, one.certain_violations, limits.free_space)
+        or free_space.check(one.verification.violations, one.certain_violations, one.keypoints, limits.free_space)
         or objects.check_moved(objects.counted(one.matched), objects.counted(one.moved))
         or odometry.check(one.T_target_source, prior, limits.odometry_sigmas)
     )

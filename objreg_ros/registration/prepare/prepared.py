@@ -7,7 +7,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeVar, overload
 
 import numpy as np
@@ -18,6 +18,7 @@ from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.labels import LabelGroups
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.fpfh import Features, describe, salient
+from objreg_ros.registration.prepare.keypoints import KeypointMatches, Keypoints, find_keypoints, match_keypoints
 from objreg_ros.registration.prepare.normals import view_normals
 from objreg_ros.registration.prepare.views import DETAIL_SIGMA_PX, Sight, halved, own_pixels, prepare_sight
 from objreg_ros.registration.prepare.voxels import thin
@@ -71,8 +72,8 @@ class AtNeed(Sequence[Made]):
 class Prepared:
     """All that was seen, thinned: ``sight`` to look with and, at half its size, the one in ``halves``.
 
-    ``surface`` to be aligned to, ``xyz`` and ``normals (M, 3)`` to align with; ``up (3,)`` is against gravity, or None,
-    ``up_weight`` 0..1 how much was seen that tells it, and
+    The keypoints of its grey are in ``pictures``; ``surface`` to be aligned to, ``xyz`` and ``normals (M, 3)`` to
+    align with; ``up (3,)`` is against gravity, or None, ``up_weight`` 0..1 how much was seen that tells it, and
     ``up_sigma_deg`` the standard deviation of either tilt of it; ``groups`` the confusable group of each object,
     ``centroids (K, 3)`` their middles and ``extents (K,)`` m, ``shapes`` what is laid upon others and ``yaw_known``
     whether that tells a turn; ``own`` is where the view shows each (h, w) bool; ``together`` holds all of them as one
@@ -82,6 +83,7 @@ class Prepared:
     keyframe: Keyframe
     sight: Sight
     halves: Sequence[Sight]
+    pictures: Sequence[Keypoints]
     surface: Surface
     features: Features
     xyz: Array
@@ -104,6 +106,11 @@ class Prepared:
         return self.halves[0]
 
     @property
+    def keypoints(self) -> Keypoints:
+        """The keypoints of its grey."""
+        return self.pictures[0]
+
+    @property
     def scene(self) -> Shape | None:
         """All objects as one shape."""
         return self.together[0]
@@ -115,6 +122,14 @@ class Pair:
 
     source: Prepared
     target: Prepared
+    _matched: list[KeypointMatches] = field(default_factory=list, init=False, repr=False)
+
+    @property
+    def keypoint_matches(self) -> KeypointMatches:
+        """The matched keypoints of the two, made when it is asked for."""
+        if not self._matched:
+            self._matched.append(match_keypoints(self.source.keypoints, self.target.keypoints))
+        return self._matched[0]
 
 
 def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
@@ -139,6 +154,7 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
             keyframe=keyframe,
             sight=sight,
             halves=AtNeed(1, lambda _: prepare_sight(halved(keyframe.view), *seeing)),
+            pictures=AtNeed(1, lambda _: find_keypoints(keyframe.view, params.context_range)),
             **_shuffled(*joined(coarse, sampled(things, OBJECT_POINTS, params.seed)), params.seed),
             up=up,
             up_weight=keyframe.gravity_confidence,

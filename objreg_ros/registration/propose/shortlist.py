@@ -36,6 +36,7 @@ from objreg_ros.registration.propose.hypotheses import (
     from_objects,
     from_prior,
 )
+from objreg_ros.registration.propose.keypoint_poses import from_keypoints
 from objreg_ros.registration.propose.object_poses import from_shapes
 from objreg_ros.registration.refine.batch_icp import ITERATIONS, REACHES_M, align, settle
 from objreg_ros.registration.refine.photometric_icp import finish
@@ -61,13 +62,15 @@ TILTED = 5.5  # deviations of gravity: what is not refined; photometric ICP may 
 
 
 class Shortlist(NamedTuple):
-    """What is worth finishing, the ``best`` first, and ``hypotheses``: all that may agree with it.
+    """What is worth finishing, the ``best`` first, ``hypotheses``: all that may agree with it, and ``of_keypoints``.
 
-    What grey held where it was proposed agrees as it was proposed: it was chosen for being near, and drawn nearer.
+    These are what the keypoints proposed, as they did: they may be rivals of it. What grey held where it was proposed
+    agrees as it was proposed: it was chosen for being near, and drawn nearer.
     """
 
     best: tuple[Hypothesis, ...]
     hypotheses: tuple[Hypothesis, ...]
+    of_keypoints: tuple[Hypothesis, ...] = ()
 
 
 def shortlist(pair: Pair, T_target_source_prior: Array | None) -> Shortlist:
@@ -75,21 +78,22 @@ def shortlist(pair: Pair, T_target_source_prior: Array | None) -> Shortlist:
 
     ``T_target_source_prior (4, 4)`` is a pose to start from too, or None.
     """
-    proposers, shapes = _proposed(pair, T_target_source_prior), _upright(pair)
+    of_keypoints, shapes = from_keypoints(pair), _upright(pair)
+    proposers = [*_proposed(pair, T_target_source_prior), of_keypoints]
     drawn = [hypothesis for proposed in proposers for hypothesis in _drawn_best(pair, proposed)]
     hypotheses = _settled(pair, drawn + shapes) + _scored(pair, shapes)
     if not hypotheses:
         return Shortlist((), ())
     best = _best(pair, hypotheses)
     if _total(best[0]) < HOPELESS:
-        return Shortlist(tuple(best[:1]), tuple(hypotheses))
+        return Shortlist(tuple(best[:1]), tuple(hypotheses), tuple(of_keypoints))
     about = _about(pair, best, [hypothesis for proposed in proposers for hypothesis in proposed])
     anchored = _anchored(pair, about)
-    return Shortlist(tuple(_best(pair, best + anchored)), (*hypotheses, *about))
+    return Shortlist(tuple(_best(pair, best + anchored)), (*hypotheses, *about), tuple(of_keypoints))
 
 
 def _proposed(pair: Pair, prior: Array | None) -> list[list[Hypothesis]]:
-    """What each proposer proposes."""
+    """What each proposer but the keypoints proposes."""
     source, target = pair.source, pair.target
     return [
         from_prior(prior),

@@ -16,7 +16,7 @@ from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.prepare.prepared import Pair, prepare
 from objreg_ros.registration.propose.evidence import FINISHED_MARGIN
 from objreg_ros.registration.propose.hypotheses import Hypothesis
-from objreg_ros.registration.propose.shortlist import FINISHED, HOPELESS, TILTED, _hopeful, _total, shortlist
+from objreg_ros.registration.propose.shortlist import FINISHED, HOPELESS, TILTED, Shortlist, _hopeful, _total, shortlist
 from objreg_ros.sensor import session_gravity_sigma_deg
 from registration.rooms import keyframe, look_at, seen_from
 
@@ -50,7 +50,7 @@ def _bulged(xyz: Array, at: float) -> tuple[Array, Array]:
 @pytest.mark.parametrize("grey", [True, False])
 def test_what_warped_depth_draws_away_is_held_where_it_was_proposed_by_grey_alone(grey: bool) -> None:
     nudged = pose(np.eye(3), np.array([0.015, 0.0, 0.0]))
-    best, hypotheses = shortlist(pair_of(warped_wall(0.0, grey), warped_wall(APART, grey)), nudged)
+    best, hypotheses, _ = shortlist(pair_of(warped_wall(0.0, grey), warped_wall(APART, grey)), nudged)
     assert (
         max(
             pose_error(hypothesis.T_target_source, np.eye(4))[1]
@@ -66,13 +66,15 @@ def test_what_warped_depth_draws_away_is_held_where_it_was_proposed_by_grey_alon
 
 
 def test_the_best_come_first_and_are_distinct_and_few() -> None:
-    best, hypotheses = shortlist(pair_of(keyframe(seen_from(0.0), seed=1), keyframe(seen_from(25.0), seed=2)), None)
+    pair = pair_of(keyframe(seen_from(0.0), seed=1), keyframe(seen_from(25.0), seed=2))
+    best, hypotheses, of_keypoints = shortlist(pair, None)
     truth = inverse(seen_from(25.0)) @ seen_from(0.0)
     rotation, distance = pose_error(best[0].T_target_source, truth)
     assert rotation < 1.0 and distance < 2.0
     scores = [hypothesis.score.total for hypothesis in best if hypothesis.score is not None]
     assert scores == sorted(scores, reverse=True) and scores[-1] >= scores[0] - FINISHED_MARGIN
     assert len(scores) == len(best) <= FINISHED and len({hypothesis.proposer for hypothesis in hypotheses}) >= 2
+    assert {hypothesis.proposer for hypothesis in of_keypoints} == {"keypoints"}
 
 
 def test_what_is_held_and_keeps_gravity_about_as_well_as_the_gate_wants_it_goes_on_and_all_where_nothing_does() -> None:
@@ -88,10 +90,10 @@ def test_what_is_held_and_keeps_gravity_about_as_well_as_the_gate_wants_it_goes_
 
 def test_one_hypothesis_is_finished_where_none_is_hopeful(monkeypatch: pytest.MonkeyPatch) -> None:
     pair = pair_of(keyframe(seen_from(0.0)), keyframe(seen_from(30.0)))
-    best, known = shortlist(pair, None)
+    best, known, _ = shortlist(pair, None)
     assert _total(best[0]) > HOPELESS
     monkeypatch.setattr("objreg_ros.registration.propose.shortlist.HOPELESS", np.inf)
-    (one,), fewer = shortlist(pair, None)
+    (one,), fewer, _ = shortlist(pair, None)
     assert len(fewer) <= len(known) and one.score is not None
 
 
@@ -99,4 +101,4 @@ def test_nothing_is_short_listed_where_no_proposer_proposes_anything() -> None:
     bare, nothing = keyframe(SQUARELY, WALL, noise=0.0), np.zeros((0, 3), np.float32)
     dark = View(xyz=np.full_like(bare.view.xyz, np.nan), grey=None, intrinsics=bare.view.intrinsics)
     empty = replace(bare, context=Context(xyz=nothing, normals=nothing), view=dark)
-    assert shortlist(pair_of(bare, empty), None) == ((), ())
+    assert shortlist(pair_of(bare, empty), None) == Shortlist((), ())
