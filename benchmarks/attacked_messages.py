@@ -23,7 +23,7 @@ from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import String
 from trials import Attempt, Target, WrongAnswerError
 
-from objreg_ros.bridge import from_msg, to_msg
+from objreg_ros.bridge.messages import from_msg, to_msg
 from objreg_ros.data import (
     ColourImage,
     DepthImage,
@@ -38,7 +38,7 @@ from objreg_ros.data import (
 from objreg_ros.data import Odometry as OdometryWord
 from objreg_ros.geometry import back_project
 from objreg_ros.registrar.warm import drawn
-from objreg_ros.segmenter.organise import organise
+from objreg_ros.segmenter.sensor.organise import organise
 
 SMALL = Intrinsics(fx=35.0, fy=35.0, cx=19.5, cy=14.5, width=40, height=30)
 SECOND = 1_000_000_000

@@ -22,8 +22,8 @@ import attacked_messages as good
 from attacked_files import borrowed
 from trials import GREED_MB, NoTrialError, Tally
 
-from objreg_ros.bridge import to_msg
-from objreg_ros.bridge.from_msg import stamp_ns as stamp_of
+from objreg_ros.bridge.messages import to_msg
+from objreg_ros.bridge.messages.from_msg import stamp_ns as stamp_of
 from objreg_ros.geometry import back_project
 
 SHARES = {"detector": 1.0, "segmenter": 1.0, "registrar": 1.0, "mapper": 0.7, "keyframer": 0.7}  # of the time
@@ -140,7 +140,7 @@ class Siege:
 
     def _connect(self, topic: str, message: Any) -> None:
         """Wait until the node listens to a topic."""
-        from objreg_ros.bridge import qos
+        from objreg_ros.bridge.node import qos
 
         if topic not in self.graph.publishers:
             profile = qos.latched() if topic in ("labels", "constraints") else qos.room()

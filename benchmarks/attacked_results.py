@@ -22,16 +22,16 @@ from edits import edited, edited_text
 from mutation import flipped, other_float, other_int
 from trials import Attempt, Target, WrongAnswerError
 
-from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.messages import from_msg
 from objreg_ros.cli.batch_work import BatchWork
 from objreg_ros.cli.recorded import Asked
 from objreg_ros.cli.settings import read_settings
 from objreg_ros.mapper import saved
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.pose_graph import PoseGraph
-from objreg_ros.report.batch_page import batch_page
-from objreg_ros.report.batch_rows import Row
-from objreg_ros.report.batch_tables import batch_tables
+from objreg_ros.report.batch.batch_page import batch_page
+from objreg_ros.report.batch.batch_rows import Row
+from objreg_ros.report.batch.batch_tables import batch_tables
 
 POSES = 24
 BOMB = 1 << 30  # bytes of a member that unpacks from a thousandth of it
@@ -47,7 +47,7 @@ def result_attempt(folder: Path) -> Attempt:
     recording.mkdir()
     (recording / "rgb.txt").write_text("")
     work = BatchWork.of(Asked(read_settings(None, ())), folder, ("batch",))
-    good = borrowed("report/test_batch_schema.py").RESULT
+    good = borrowed("report/batch/test_batch_schema.py").RESULT
 
     def attempt(draw: random.Random) -> None:
         _place(draw, work.file(recording), good)

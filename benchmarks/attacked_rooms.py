@@ -34,7 +34,7 @@ from mutation import mutated
 from trials import Attempt, Target, WrongAnswerError
 
 from objreg_ros import share
-from objreg_ros.bridge import from_msg, to_msg
+from objreg_ros.bridge.messages import from_msg, to_msg
 from objreg_ros.data import DepthImage, Detections, Frame, Intrinsics
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
@@ -43,10 +43,10 @@ from objreg_ros.mapper.pose_graph import PoseGraph
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.segmenter.doubts import range_doubt, registration_doubt
-from objreg_ros.segmenter.organise import organise
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
+from objreg_ros.segmenter.sensor.doubts import range_doubt, registration_doubt
+from objreg_ros.segmenter.sensor.organise import organise
 
 CAMERA = Intrinsics(fx=70.0, fy=70.0, cx=39.5, cy=29.5, width=80, height=60)
 GAP_NS = 3 * SECOND

@@ -29,8 +29,8 @@ from objreg_ros.cli.batch_work import BatchWork
 from objreg_ros.cli.recorded import Asked
 from objreg_ros.cli.settings import read_settings
 from objreg_ros.cli.simulate import camera_of, sensors_of
-from objreg_ros.report.batch_rows import Row
-from objreg_ros.report.batch_tables import batch_tables
+from objreg_ros.report.batch.batch_rows import Row
+from objreg_ros.report.batch.batch_tables import batch_tables
 from objreg_ros.simulation.write import simulate
 from objreg_ros.workers import Done, spread
 

@@ -20,9 +20,9 @@ from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.report.export import constraint
-from objreg_ros.report.revisits import Revisit, Seen, recall_by_view_change, revisits
-from objreg_ros.report.trajectory_error import absolute_trajectory_error
+from objreg_ros.report.exports.export import constraint
+from objreg_ros.report.run.revisits import Revisit, Seen, recall_by_view_change, revisits
+from objreg_ros.report.run.trajectory_error import absolute_trajectory_error
 from objreg_ros.truth import FALSE, LOOSE, Truth, within
 
 GAP_NS = 2_000_000_000  # what is nearer in time is no loop

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which places robots saw that another robot had seen before, by truth, and where a right constraint ties the two.
 
-A keyframe is a meeting with another robot when an earlier keyframe of that one saw the same surfaces (`report.revisits`
-says how much). Meetings that follow each other are one stretch. A constraint between the two robots closes a meeting
-when it is right (5 degrees, 10 cm) and one of its ends is within `TOLERANCE_NS` of the keyframe; it closes the stretch
-of every meeting that it closes.
+A keyframe is a meeting with another robot when an earlier keyframe of that one saw the same surfaces
+(`report.run.revisits` says how much). Meetings that follow each other are one stretch. A constraint between the two
+robots closes a meeting when it is right (5 degrees, 10 cm) and one of its ends is within `TOLERANCE_NS` of the
+keyframe; it closes the stretch of every meeting that it closes.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 from closers import TOLERANCE_NS
 
 from objreg_ros.data import LoopClosure
-from objreg_ros.report.revisits import VIEW_CHANGES, Revisit, Seen, revisit_of
+from objreg_ros.report.run.revisits import VIEW_CHANGES, Revisit, Seen, revisit_of
 from objreg_ros.truth import FALSE, LOOSE, Truths, within
 
 APART_NS = 2_000_000_000

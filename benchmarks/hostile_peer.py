@@ -48,7 +48,7 @@ def play(path: Path, seconds: float) -> None:
     """Play a recording over and over to the nodes of the robot, at the camera's rate."""
     import rclpy
 
-    from objreg_ros.bridge.player import Player
+    from objreg_ros.bridge.streams.player import Player
 
     with open_recording(path) as source:
         found = graph_names(source, choose_inputs(source.topics, parse_remaps(())))
@@ -75,7 +75,7 @@ class Peer:
         from sensor_msgs.msg import CompressedImage
         from std_srvs.srv import SetBool, Trigger
 
-        from objreg_ros.bridge import qos
+        from objreg_ros.bridge.node import qos
 
         self._good, self._peers, self._draw = good, peers, random.Random(seed)
         self._node = rclpy.create_node("peer")
@@ -120,8 +120,8 @@ class Peer:
     def _exchange(self) -> None:
         from sensor_msgs.msg import CompressedImage
 
-        from objreg_ros.bridge import qos
-        from objreg_ros.bridge.exchanging import FORMAT
+        from objreg_ros.bridge.node import qos
+        from objreg_ros.bridge.streams.exchanging import FORMAT
 
         name = self._draw.choice(list(self._said))
         kind, goods = self._said[name]
@@ -135,7 +135,7 @@ class Peer:
         self._publish(f"{FLEET}/{name}", CompressedImage(format=FORMAT, data=data), profile)
 
     def _message(self) -> None:
-        from objreg_ros.bridge import qos
+        from objreg_ros.bridge.node import qos
 
         self._stamp_ns += STEP_NS
         objects, view, info, _, _ = self._good.frame_messages(self._good.frame_word(self._stamp_ns))

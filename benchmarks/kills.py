@@ -56,7 +56,8 @@ class Robot:
         import rclpy
         from sensor_msgs.msg import PointCloud2
 
-        from objreg_ros.bridge import from_msg, qos, to_msg
+        from objreg_ros.bridge.messages import from_msg, to_msg
+        from objreg_ros.bridge.node import qos
 
         rclpy.init(args=[])
         self._node = rclpy.create_node("robot")
@@ -71,7 +72,7 @@ class Robot:
 
     def go_on(self) -> None:
         """Publish the next frame if it is due, and hear what came meanwhile."""
-        from objreg_ros.bridge import to_msg
+        from objreg_ros.bridge.messages import to_msg
 
         if time.monotonic() >= self._next_s:
             self._next_s = time.monotonic() + PERIOD_S
@@ -91,7 +92,7 @@ class Robot:
         self._spin(self._node, timeout_sec=0.01)
 
     def _send(self, topic: str, message: Any, profile: Any = None) -> None:
-        from objreg_ros.bridge import qos
+        from objreg_ros.bridge.node import qos
 
         if topic not in self._publishers:
             self._publishers[topic] = self._node.create_publisher(type(message), topic, profile or qos.room())

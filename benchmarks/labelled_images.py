@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from objreg_ros.data import Array, DepthImage, Detections, PointCloud
-from objreg_ros.segmenter.organise import organise
+from objreg_ros.segmenter.sensor.organise import organise
 from objreg_ros.simulation.render import Rendering, render
 from objreg_ros.simulation.scene import random_scene, random_view
 

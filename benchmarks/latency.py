@@ -45,8 +45,8 @@ class Witness:
         from sensor_msgs.msg import CompressedImage
         from std_msgs.msg import Header
 
-        from objreg_ros.bridge import qos
-        from objreg_ros.bridge.from_msg import stamp_ns
+        from objreg_ros.bridge.messages.from_msg import stamp_ns
+        from objreg_ros.bridge.node import qos
 
         self.seen: dict[int, float] = {}
         self.done: dict[tuple[str, int], float] = {}

@@ -29,7 +29,7 @@ from objreg_ros.mapper.pose_graph import PoseGraph
 from objreg_ros.memory.landmarks import MIDDLE_WANDERS, RADIUS_M, Landmarks, Link, Merge
 from objreg_ros.memory.sighting import Sighting, sightings_of
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.report.trajectory_error import absolute_trajectory_error
+from objreg_ros.report.run.trajectory_error import absolute_trajectory_error
 from objreg_ros.truth import Truth
 
 LEAST_SIGMA_M = 0.005  # of an object's middle

@@ -11,7 +11,7 @@ from map_peers import PEERS, Dense, Solved
 from objreg_ros.data import Array
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.pose_graph import PoseGraph
-from objreg_ros.report.trajectory_error import absolute_trajectory_error
+from objreg_ros.report.run.trajectory_error import absolute_trajectory_error
 from objreg_ros.simulation.walk import PERIOD_NS, Walk, WalkParams, walk
 
 OURS, CLEAN_LM = "objreg", "GTSAM LM, right ones alone"

@@ -23,7 +23,7 @@ from objreg_ros.data import Array, Frame, LoopClosure, Odometry
 from objreg_ros.geometry import inverse, rotation_angle, vector_from_rotation
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.pose_graph import PoseGraph
-from objreg_ros.report.trajectory_error import absolute_trajectory_error
+from objreg_ros.report.run.trajectory_error import absolute_trajectory_error
 from objreg_ros.truth import LOOSE, Truth, within
 
 SEED = 1  # of the odometry with which closures are found

@@ -17,7 +17,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from trials import NoTrialError
 
-from objreg_ros.bridge.layout import DATATYPES, FORMATS
+from objreg_ros.bridge.messages.layout import DATATYPES, FORMATS
 
 FLOATS = (
     math.nan, math.inf, -math.inf, 0.0, -0.0, -1.0, 1.0, 0.5, 2.0, 1e-45, 1e-30, 1e-12, 1e-3, 255.5, 65535.0, 65536.0,

@@ -55,7 +55,7 @@ class Gauge:
         from rclpy.executors import SingleThreadedExecutor
         from rclpy.node import Node
 
-        from objreg_ros.bridge import qos
+        from objreg_ros.bridge.node import qos
 
         self.told: dict[str, dict[str, str]] = {}  # node → what it told last
         self.rows: list[tuple[float, dict[str, str]]] = []  # when, and what the registrar told
@@ -103,7 +103,7 @@ def shifted(cdr: bytes, by_ns: int) -> bytes:
 
 def endless(messages: Sequence[tuple[str, int, bytes]], seconds: float) -> Iterator[Any]:
     """The messages (topic, stamp, bytes) over and over for so many seconds of their own time, as items of a player."""
-    from objreg_ros.bridge.player import Item
+    from objreg_ros.bridge.streams.player import Item
 
     first_ns, last_ns = messages[0][1], messages[-1][1]
     period_ns = last_ns - first_ns + (last_ns - first_ns) * 3 // len(messages)
@@ -120,7 +120,7 @@ def play(path: Path, seconds: float, speed: float) -> None:
     """Play a recording for so many seconds at so many times its speed."""
     import rclpy
 
-    from objreg_ros.bridge.player import Player
+    from objreg_ros.bridge.streams.player import Player
 
     with open_recording(path) as source:
         names = graph_names(source, choose_inputs(source.topics, parse_remaps(())))

@@ -43,8 +43,8 @@ from objreg_ros.registrar.outcome import Outcome
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.report.revisits import Seen
-from objreg_ros.report.trajectory_error import absolute_trajectory_error
+from objreg_ros.report.run.revisits import Seen
+from objreg_ros.report.run.trajectory_error import absolute_trajectory_error
 from objreg_ros.simulation.write import simulate_fleet
 from objreg_ros.truth import FALSE, Truth, Truths, within
 

@@ -51,7 +51,7 @@ from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registrar.warm import warm
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.report.revisits import Seen, overlap
+from objreg_ros.report.run.revisits import Seen, overlap
 from objreg_ros.simulation.write import simulate
 from objreg_ros.truth import FALSE, LOOSE, Truth, within
 

@@ -4,10 +4,10 @@
     python benchmarks/sensor.py --json OUT --picture sensor.png
 
 Every depth sensor is carried through rooms with a rig that is built well, one that is misregistered, one with a lag of
-depth, and one with both. ``offset``: the rotation that brings depth upon colour, as `segmenter/depth_to_colour.py`
-finds it in every frame, against the true one; that of stereo is not used. ``noise``: that of depth in a Kinect's, as
-`sensor.depth_noise` measures it. ``lag``: how late depth is behind colour, as `segmenter/sensor_estimate.py` tells it,
-beside the rig's; not that of stereo.
+depth, and one with both. ``offset``: the rotation that brings depth upon colour, as
+`segmenter/sensor/depth_to_colour.py` finds it in every frame, against the true one; that of stereo is not used.
+``noise``: that of depth in a Kinect's, as `sensor.depth_noise` measures it. ``lag``: how late depth is behind colour,
+as `segmenter/sensor/sensor_estimate.py` finds it, beside the rig's; not that of stereo.
 It takes ``--frames 240`` or more: fewer are too far apart.
 """
 
@@ -24,9 +24,9 @@ from tqdm import tqdm
 
 from objreg_ros.data import Array, DepthImage
 from objreg_ros.geometry import inverse, vector_from_rotation
-from objreg_ros.segmenter.depth_to_colour import DepthToColour
-from objreg_ros.segmenter.sensor_estimate import SensorEstimate
-from objreg_ros.segmenter.view import reduced_view, step_for
+from objreg_ros.segmenter.sensor.depth_to_colour import DepthToColour
+from objreg_ros.segmenter.sensor.sensor_estimate import SensorEstimate
+from objreg_ros.segmenter.sensor.view import reduced_view, step_for
 from objreg_ros.sensor import depth_noise
 from objreg_ros.simulation.camera import CAMERAS, SENSORS
 from objreg_ros.simulation.params import RigParams

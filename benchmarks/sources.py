@@ -21,11 +21,11 @@ from objreg_ros.geometry import pose, rotation_between
 from objreg_ros.offline import Rooms, run_offline
 from objreg_ros.recording import Recording, open_recording
 from objreg_ros.recording.inputs import choose_inputs
-from objreg_ros.report.pictures import Album
-from objreg_ros.segmenter.depth_to_colour import DepthToColour
-from objreg_ros.segmenter.organise import organise
+from objreg_ros.report.run.pictures import Album
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
+from objreg_ros.segmenter.sensor.depth_to_colour import DepthToColour
+from objreg_ros.segmenter.sensor.organise import organise
 from objreg_ros.simulation.odometry import drifted, jittered
 from objreg_ros.simulation.params import OdometryParams
 from objreg_ros.simulation.truth import read_truth

@@ -28,7 +28,7 @@ from objreg_ros.plausibility.finding import Finding
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.mounts import first_frames
 from objreg_ros.recording.troubles import troubles
-from objreg_ros.report.findings import find
+from objreg_ros.report.run.findings import find
 
 LEAST_SHARE = 0.8  # of the constraints of the right recording; fewer are a loss
 DRIFT_SEED = 1  # of all recordings but the right ones that are counted for themselves

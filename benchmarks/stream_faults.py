@@ -30,7 +30,7 @@ from stream_recording import (
     restamped,
 )
 
-from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.messages import from_msg
 from objreg_ros.data import Array
 from objreg_ros.geometry import inverse, pose, rotation_from_quaternion, rotation_from_vector
 from objreg_ros.recording import messages

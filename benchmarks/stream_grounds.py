@@ -38,7 +38,7 @@ from stream_recording import (
 )
 
 from objreg_ros import share
-from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.messages import from_msg
 from objreg_ros.data import Array
 from objreg_ros.geometry import interpolate, inverse, pose, rotation_from_vector
 from objreg_ros.recording import Recording, messages, open_recording

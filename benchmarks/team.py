@@ -40,7 +40,7 @@ from robots import Robot, Team, team_of
 from sources import SIMULATED
 from team_ends import GO, READY, SAVE, SAVED, SPENT, TOLD
 
-from objreg_ros.bridge import to_msg
+from objreg_ros.bridge.messages import to_msg
 from objreg_ros.cli.live import private_environment
 from objreg_ros.data import Frame, LoopClosure, Odometry, robot_of
 from objreg_ros.memory.store import Store

@@ -35,7 +35,7 @@ def drive(folder: Path, robot: str) -> None:
     """Publish the frames of a robot, as the script has laid them down, each at its moment."""
     import rclpy
 
-    from objreg_ros.bridge import profile
+    from objreg_ros.bridge.node import profile
 
     profile.apply()
     rclpy.init(args=[])
@@ -60,7 +60,7 @@ def _publishers(node: Any) -> dict[str, Any]:
     from sensor_msgs.msg import CameraInfo, PointCloud2
     from std_msgs.msg import String
 
-    from objreg_ros.bridge import qos
+    from objreg_ros.bridge.node import qos
 
     clouds = {"objects": PointCloud2, "view": PointCloud2}
     kinds = {**clouds, "view/camera_info": CameraInfo, "gravity": Vector3Stamped, "odom": Odometry}
@@ -98,7 +98,7 @@ def hear(folder: Path) -> None:
     from nav_msgs.msg import Odometry
     from std_srvs.srv import Trigger
 
-    from objreg_ros.bridge import profile, qos
+    from objreg_ros.bridge.node import profile, qos
 
     profile.apply()
     rclpy.init(args=[])
@@ -128,7 +128,7 @@ def _note(told: dict[str, dict[str, str]], message: Any) -> None:
 
 
 def _hurried(message: Any) -> set[int]:
-    from objreg_ros.bridge.diagnostics import refusal_of
+    from objreg_ros.bridge.node.diagnostics import refusal_of
     from objreg_ros.data import Reason
 
     refused = [refusal_of(status) for status in message.status]
@@ -136,7 +136,7 @@ def _hurried(message: Any) -> set[int]:
 
 
 def _closure(message: Any) -> dict[str, Any]:
-    from objreg_ros.bridge import from_msg
+    from objreg_ros.bridge.messages import from_msg
 
     closure = from_msg.loop_closure(message)
     ends = {end: [getattr(closure, f"{end}_frame_id"), getattr(closure, f"{end}_ns")] for end in ("from", "to")}

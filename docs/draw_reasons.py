@@ -3,7 +3,7 @@
 
     python -m docs.draw_reasons [RUN.json …]
 
-The words are those of `objreg_ros/report/reasons.py`, the schemes those of `docs/schemes.py`. A RUN is what
+The words are those of `objreg_ros/report/run/reasons.py`, the schemes those of `docs/schemes.py`. A RUN is what
 `objreg offline REC --json RUN.json` wrote: of each reason that is met in it, the pair that is seen best becomes a
 picture. Without a RUN the pictures of pairs stay as they are.
 """
@@ -24,8 +24,8 @@ from docs.schemes import SCHEMES
 from objreg_ros.data import UNTRIED, Array
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.opening import open_recording
-from objreg_ros.report.pictures import Album, overlay
-from objreg_ros.report.reasons import DROPS, REFUSALS, Words
+from objreg_ros.report.run.pictures import Album, overlay
+from objreg_ros.report.run.reasons import DROPS, REFUSALS, Words
 
 FOLDER = Path(__file__).parent
 PICTURES = FOLDER / "pictures"

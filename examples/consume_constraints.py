@@ -7,7 +7,7 @@ In a node `edge` is the callback of a subscription to `nav_msgs/Odometry`, relia
 import numpy as np
 from nav_msgs.msg import Odometry
 
-from objreg_ros.bridge import from_msg, to_msg
+from objreg_ros.bridge.messages import from_msg, to_msg
 from objreg_ros.data import LoopClosure
 from objreg_ros.mapper.adapters.g2o import edge_text
 from objreg_ros.mapper.constraint import Constraint

@@ -21,7 +21,7 @@ from launch_ros.actions import LifecycleNode, Node
 
 from launch import LaunchContext, LaunchDescription
 from objreg_ros import share
-from objreg_ros.bridge import profile
+from objreg_ros.bridge.node import profile
 
 ROOMS = ("detector", "segmenter", "registrar")
 

@@ -13,9 +13,9 @@ import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from objreg_ros.bridge.door import Door
-from objreg_ros.bridge.indoors import Indoors
-from objreg_ros.bridge.spin import run_together
+from objreg_ros.bridge.node.door import Door
+from objreg_ros.bridge.node.indoors import Indoors
+from objreg_ros.bridge.node.spin import run_together
 from objreg_ros.detector.node import DetectorNode
 from objreg_ros.keyframes.node import KeyframerNode
 from objreg_ros.mapper.node import MapperNode

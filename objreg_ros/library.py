@@ -28,9 +28,9 @@ from objreg_ros.registration.api import Gate, Method
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.result import Registration
-from objreg_ros.segmenter.organise import organise
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
+from objreg_ros.segmenter.sensor.organise import organise
 
 NO_DEPTH_MM = 65535  # what drivers send where nothing was measured, beside 0
 

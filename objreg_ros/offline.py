@@ -17,12 +17,13 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from objreg_ros.bridge import colour_frame, from_msg, lenses, vision_from_msg
-from objreg_ros.bridge.camera_stream import CameraStream
-from objreg_ros.bridge.frames import FrameTree
-from objreg_ros.bridge.mount import Mount, nameless_body
-from objreg_ros.bridge.pace import Pace
-from objreg_ros.bridge.sync import Drop, Match, Need, Stream, Synchroniser
+from objreg_ros.bridge.camera import colour_frame, lenses
+from objreg_ros.bridge.camera.camera_stream import CameraStream
+from objreg_ros.bridge.camera.frames import FrameTree
+from objreg_ros.bridge.camera.mount import Mount, nameless_body
+from objreg_ros.bridge.camera.pace import Pace
+from objreg_ros.bridge.messages import from_msg, vision_from_msg
+from objreg_ros.bridge.streams.sync import Drop, Match, Need, Stream, Synchroniser
 from objreg_ros.data import (
     Array,
     ColourImage,
@@ -42,11 +43,11 @@ from objreg_ros.recording.mounts import is_moving
 from objreg_ros.recording.record import Record
 from objreg_ros.recording.recorded_detections import RecordedDetections
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.report.export import constraint
-from objreg_ros.segmenter.gravity_choice import GravityChoice
-from objreg_ros.segmenter.imu import Imu
+from objreg_ros.report.exports.export import constraint
+from objreg_ros.segmenter.gravity.gravity_choice import GravityChoice
+from objreg_ros.segmenter.gravity.imu import Imu
 from objreg_ros.segmenter.params import SegmenterParams
-from objreg_ros.segmenter.sensor_estimate import Lag, SensorEstimate
+from objreg_ros.segmenter.sensor.sensor_estimate import Lag, SensorEstimate
 from objreg_ros.truth import Truth, summarise
 
 Word = TypeVar("Word")
@@ -128,8 +129,8 @@ def build_rooms(
     from objreg_ros.detector.detector import Detector
     from objreg_ros.registrar.registrar import Registrar
     from objreg_ros.registrar.warm import warm
-    from objreg_ros.segmenter.organise import organise
     from objreg_ros.segmenter.segment import Segmenter
+    from objreg_ros.segmenter.sensor.organise import organise
 
     detects = detects or Detector.of(detector, share.model)
     segments = Segmenter(segmenter)

@@ -14,11 +14,11 @@ from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.mounts import camera_frame, frame_tree, moving_topics
 from objreg_ros.recording.record import Record, Recording
 from objreg_ros.registrar.outcome import Outcome
-from objreg_ros.segmenter.gravity_choice import GravityChoice
-from objreg_ros.segmenter.organise import organise
+from objreg_ros.segmenter.gravity.gravity_choice import GravityChoice
 from objreg_ros.segmenter.params import SegmenterParams
-from objreg_ros.segmenter.sensor_estimate import SensorEstimate
-from objreg_ros.segmenter.view import reduced_view, step_for
+from objreg_ros.segmenter.sensor.organise import organise
+from objreg_ros.segmenter.sensor.sensor_estimate import SensorEstimate
+from objreg_ros.segmenter.sensor.view import reduced_view, step_for
 
 FRAMES = 400  # that are looked at: most cameras have turned enough by then
 

@@ -22,8 +22,8 @@ from objreg_ros.data import (
 )
 from objreg_ros.geometry import back_project, inverse
 from objreg_ros.offline import Rooms
-from objreg_ros.segmenter.gravity_choice import GravityChoice
-from objreg_ros.segmenter.sensor_estimate import SensorEstimate
+from objreg_ros.segmenter.gravity.gravity_choice import GravityChoice
+from objreg_ros.segmenter.sensor.sensor_estimate import SensorEstimate
 
 
 @dataclass

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from objreg_ros.bridge.sync import Drop
+from objreg_ros.bridge.streams.sync import Drop
 from objreg_ros.data import Reason
 
 REPOSITORY = Path(__file__).resolve().parents[1]

@@ -15,8 +15,8 @@ from recording.folders import CAMERA, records, uncalibrated
 from recording.vision import detected
 from simple_rooms import OneBox, simple_rooms
 
-from objreg_ros.bridge import from_msg
-from objreg_ros.bridge.frames import FrameTree
+from objreg_ros.bridge.camera.frames import FrameTree
+from objreg_ros.bridge.messages import from_msg
 from objreg_ros.data import ColourImage, DepthImage, Detections, Frame, Intrinsics
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
@@ -26,9 +26,9 @@ from objreg_ros.recording import Record, messages
 from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.mounts import TRANSFORMS
 from objreg_ros.recording.recorded_detections import RecordedDetections
-from objreg_ros.segmenter.organise import organise
 from objreg_ros.segmenter.segment import Segmenter
-from objreg_ros.segmenter.sensor_estimate import Lag, SensorEstimate
+from objreg_ros.segmenter.sensor.organise import organise
+from objreg_ros.segmenter.sensor.sensor_estimate import Lag, SensorEstimate
 from objreg_ros.truth import Truth
 
 INPUTS = Inputs(image="/image", depth="/depth/image", camera_info="/camera_info", odom="/odom")

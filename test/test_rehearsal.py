@@ -11,7 +11,7 @@ from objreg_ros.recording import Recording, messages, open_recording, write_rosb
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.record import Record
 from objreg_ros.rehearsal import rehearse
-from objreg_ros.report.findings import found_in
+from objreg_ros.report.run.findings import found_in
 
 PERIOD_NS = 33_000_000
 

@@ -35,9 +35,9 @@ from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.registration.propose.evidence import CONSIDERED_MARGIN
 from objreg_ros.registration.propose.prior import Prior
-from objreg_ros.segmenter.organise import organise
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
+from objreg_ros.segmenter.sensor.organise import organise
 from objreg_ros.simulation.camera import SENSORS
 from objreg_ros.simulation.write import simulate
 from objreg_ros.truth import Truth

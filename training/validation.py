@@ -22,7 +22,7 @@ import numpy as np
 from objreg_ros.data import Array, ColourImage, Detections
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
-from objreg_ros.report.average_precision import TrueBoxes, average_precision
+from objreg_ros.report.run.average_precision import TrueBoxes, average_precision
 from objreg_ros.simulation.render import Rendering, render
 from objreg_ros.simulation.scenarios import SCENARIOS, make_story
 from objreg_ros.simulation.scene import Scene, random_scene, random_view

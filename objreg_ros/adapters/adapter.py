@@ -12,8 +12,9 @@ from nav_msgs.msg import Odometry
 from rclpy.clock import Clock, ClockType
 
 from objreg_ros.adapters.params import AdapterParams
-from objreg_ros.bridge import closures_msg, from_msg, qos
-from objreg_ros.bridge.door import Door
+from objreg_ros.bridge.messages import closures_msg, from_msg
+from objreg_ros.bridge.node import qos
+from objreg_ros.bridge.node.door import Door
 from objreg_ros.data import LoopClosure, Moments
 from objreg_ros.params import Params
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from objreg_ros.adapters.params import BodyParams
-from objreg_ros.bridge import transforms
-from objreg_ros.bridge.door import Door
+from objreg_ros.bridge.camera import transforms
+from objreg_ros.bridge.node.door import Door
 from objreg_ros.data import Array, LoopClosure, Odometry
 
 

@@ -12,8 +12,9 @@ import sys
 from objreg_ros.adapters.adapter import Adapter, require
 from objreg_ros.adapters.body import Body
 from objreg_ros.adapters.params import BodyParams, ToHydraParams
-from objreg_ros.bridge import qos, to_msg
-from objreg_ros.bridge.spin import run
+from objreg_ros.bridge.messages import to_msg
+from objreg_ros.bridge.node import qos
+from objreg_ros.bridge.node.spin import run
 from objreg_ros.data import LoopClosure
 from objreg_ros.mapper.adapters.pose_graph_tools import fill_edge
 

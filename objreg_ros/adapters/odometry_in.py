@@ -8,8 +8,9 @@ from typing import Any
 
 from nav_msgs.msg import Odometry as OdometryMsg
 
-from objreg_ros.bridge import from_msg, qos
-from objreg_ros.bridge.door import Door
+from objreg_ros.bridge.messages import from_msg
+from objreg_ros.bridge.node import qos
+from objreg_ros.bridge.node.door import Door
 from objreg_ros.data import Odometry
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.restart import Anew, Restart

@@ -21,9 +21,9 @@ from objreg_ros.adapters.body import Body
 from objreg_ros.adapters.odometry_in import OdometryIn
 from objreg_ros.adapters.params import BodyParams, ToRtabmapParams
 from objreg_ros.adapters.rtabmap_nodes import RtabmapNodes
-from objreg_ros.bridge import qos
-from objreg_ros.bridge.door import DroppedError
-from objreg_ros.bridge.spin import run
+from objreg_ros.bridge.node import qos
+from objreg_ros.bridge.node.door import DroppedError
+from objreg_ros.bridge.node.spin import run
 from objreg_ros.data import LoopClosure, Moments, Odometry
 from objreg_ros.mapper.adapters.rtabmap import fill_link
 from objreg_ros.mapper.restart import Anew

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from objreg_ros import limits
-from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.messages import from_msg
 from objreg_ros.data import Array, LoopClosure
 from objreg_ros.mapper.constraint import Constraint, between_keyframes
 from objreg_ros.mapper.params import MapperParams

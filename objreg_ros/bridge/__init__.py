@@ -1,2 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The border: ROS messages to the words of data.py and back. No algorithm lives here."""
+"""The border to ROS. No algorithm lives here.
+
+`messages` converts messages to data types and back, `node` is what every node has, `camera` what a camera is and where
+it sits, `streams` brings inputs together and publishes. Each imports only those before it.
+"""

@@ -28,7 +28,7 @@ from objreg_ros.whole_file import unwritten
 SUMMARIES = {
     "demo": "Run a recording through the live graph and show what came out.",
     "inspect": "Say what is in a recording and what the graph would use of it, or what a store remembers.",
-    "offline": "Run a recording through detector, segmenter and registrar, without ROS.",
+    "offline": "Run a recording through the three stages, without ROS.",
     "batch": "Run many recordings, over the cores of this machine or a cluster.",
     "replay": "Publish a recording into the live graph.",
     "convert": "Write any recording as rosbag2.",
@@ -96,7 +96,7 @@ def _module(name: str) -> str:
 
 def _tell_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
     if wanted:
-        from objreg_ros.report.about import version
+        from objreg_ros.report.run.about import version
 
         click.echo(f"{NAME} {version()}")
         context.exit()

@@ -19,9 +19,9 @@ from objreg_ros.cli.paths import OutputPath, RecordingPath
 from objreg_ros.cli.recorded import Asked
 from objreg_ros.cli.settings import tell_ignored
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.report.batch_page import batch_page, totals
-from objreg_ros.report.batch_rows import Row
-from objreg_ros.report.batch_tables import batch_tables, require_pyarrow
+from objreg_ros.report.batch.batch_page import batch_page, totals
+from objreg_ros.report.batch.batch_rows import Row
+from objreg_ros.report.batch.batch_tables import batch_tables, require_pyarrow
 from objreg_ros.whole_file import write_whole
 from objreg_ros.workers import require_dask, spread
 

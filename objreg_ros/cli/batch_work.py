@@ -14,9 +14,9 @@ from typing import Any
 from objreg_ros.cli.recorded import Asked
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.recording.troubles import troubles
-from objreg_ros.report.about import about
-from objreg_ros.report.batch_schema import require_result
-from objreg_ros.report.findings import as_json, find
+from objreg_ros.report.batch.batch_schema import require_result
+from objreg_ros.report.run.about import about
+from objreg_ros.report.run.findings import as_json, find
 from objreg_ros.whole_file import write_whole
 
 MOST_BYTES = 1 << 28  # of a result: eight hours at 30 Hz

@@ -19,8 +19,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from objreg_ros import share
-from objreg_ros.bridge.shared_memory import abandoned
-from objreg_ros.report.about import commit, version
+from objreg_ros.bridge.node.shared_memory import abandoned
+from objreg_ros.report.run.about import commit, version
 
 OLDEST_PYTHON = (3, 11)
 LIBRARIES = {  # that Open3D loads, and the package of Debian and Ubuntu that has it
@@ -173,7 +173,7 @@ def _middleware(ask: Callable[[], str]) -> Check:
 
 
 def _profile(environment: Mapping[str, str]) -> str:
-    from objreg_ros.bridge import profile
+    from objreg_ros.bridge.node import profile
 
     try:
         return profile.apply(dict(environment))

@@ -14,8 +14,8 @@ from typing import Any
 import click
 
 from objreg_ros import share
-from objreg_ros.bridge import from_msg
-from objreg_ros.bridge.calibration import absolute
+from objreg_ros.bridge.camera.calibration import absolute
+from objreg_ros.bridge.messages import from_msg
 from objreg_ros.cli import live_table, options
 from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
 from objreg_ros.cli.loudness import aside
@@ -34,9 +34,9 @@ from objreg_ros.recording.tf_odometry import with_transforms
 from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.recording.troubles import FOLDER, troubles
 from objreg_ros.registration.params import RegistrarNodeParams
-from objreg_ros.report.about import about
-from objreg_ros.report.findings import as_json, find, setting
-from objreg_ros.report.live_pictures import draw_sight, draw_way
+from objreg_ros.report.run.about import about
+from objreg_ros.report.run.findings import as_json, find, setting
+from objreg_ros.report.run.live_pictures import draw_sight, draw_way
 from objreg_ros.report.write import write_report
 from objreg_ros.segmenter.params import SegmenterNodeParams
 from objreg_ros.truth import Truth, summarise
@@ -212,7 +212,7 @@ def mounting_of(asked: Asked) -> tuple[float, ...]:
 
 def _mounting_by_tf(source: Recording, inputs: Inputs) -> tuple[float, ...]:
     """The same by the recording's /tf_static, where the nodes hear it."""
-    from objreg_ros.bridge.player import is_installed
+    from objreg_ros.bridge.streams.player import is_installed
 
     T = camera_on_body(source, inputs)[2] if is_installed(TRANSFORMS) else None
     return () if T is None else (*T[:3, 3].tolist(), *map(float, quaternion_from_rotation(T[:3, :3])))

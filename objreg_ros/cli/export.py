@@ -9,7 +9,7 @@ import click
 from tqdm import tqdm
 
 from objreg_ros.cli.paths import InputPath, OutputPath
-from objreg_ros.report.export import export
+from objreg_ros.report.exports.export import export
 
 
 @click.command()

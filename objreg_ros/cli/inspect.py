@@ -24,12 +24,12 @@ from objreg_ros.recording.tf_odometry import by_transforms, with_transforms
 from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.recording.troubles import warnings
 from objreg_ros.rehearsal import FRAMES, rehearse
-from objreg_ros.report.findings import found_in
-from objreg_ros.report.live_pictures import write_picture
-from objreg_ros.report.portraits import portraits
-from objreg_ros.report.store_drawing import draw
-from objreg_ros.report.store_page import store_page
-from objreg_ros.report.store_survey import describe, survey
+from objreg_ros.report.run.findings import found_in
+from objreg_ros.report.run.live_pictures import write_picture
+from objreg_ros.report.store.portraits import portraits
+from objreg_ros.report.store.store_drawing import draw
+from objreg_ros.report.store.store_page import store_page
+from objreg_ros.report.store.store_survey import describe, survey
 from objreg_ros.truth import Truth
 from objreg_ros.whole_file import write_whole
 

@@ -11,14 +11,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from objreg_ros.bridge.ledger import Balance
+from objreg_ros.bridge.node.ledger import Balance
 from objreg_ros.cli import FIRST_TIME
 from objreg_ros.cli.loudness import is_quiet, is_verbose
 from objreg_ros.cli.processes import Processes
 from objreg_ros.data import LoopClosure, Rejected
 
 if TYPE_CHECKING:
-    from objreg_ros.bridge.collector import Collector, Sight
+    from objreg_ros.bridge.streams.collector import Collector, Sight
 
 ROOMS = ("detector", "segmenter", "registrar")
 START_S = 600.0  # a first start compiles kernels, on a machine that may be busy
@@ -84,7 +84,7 @@ def _addressed(room: str, word: str) -> str:
 
 def private_environment() -> dict[str, str]:
     """This process's environment with the DDS profile, and a domain of its own unless the user named one."""
-    from objreg_ros.bridge import profile
+    from objreg_ros.bridge.node import profile
 
     environment = dict(os.environ)
     profile.apply(environment)
@@ -99,7 +99,7 @@ def _listening(environment: Mapping[str, str]) -> Iterator[Collector]:
     os.environ.update(environment)  # DDS reads it here
     from rclpy.context import Context
 
-    from objreg_ros.bridge.collector import Collector
+    from objreg_ros.bridge.streams.collector import Collector
 
     context = Context()
     context.init(args=[])  # not the command line: its --remap is not for ROS

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from objreg_ros.bridge.ledger import Balance
+from objreg_ros.bridge.node.ledger import Balance
 from objreg_ros.cli.live import ROOMS, Live
 
 

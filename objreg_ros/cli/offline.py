@@ -28,10 +28,10 @@ from objreg_ros.cli.told import (
 from objreg_ros.offline import Run
 from objreg_ros.recording.troubles import troubles
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.report.findings import as_json, find, verdict
-from objreg_ros.report.map_files import VOXEL_M
-from objreg_ros.report.pictures import Album
-from objreg_ros.report.story import Story
+from objreg_ros.report.exports.map_files import VOXEL_M
+from objreg_ros.report.run.findings import as_json, find, verdict
+from objreg_ros.report.run.pictures import Album
+from objreg_ros.report.run.story import Story
 
 FILE = OutputPath(dir_okay=False, path_type=Path)
 

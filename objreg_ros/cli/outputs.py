@@ -11,11 +11,11 @@ import click
 from objreg_ros.cli.loudness import aside
 from objreg_ros.recording import Recording
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.report.map_files import MapFiles
-from objreg_ros.report.pictures import Album
-from objreg_ros.report.run_scene import scene_of
-from objreg_ros.report.scene_files import SceneFiles
-from objreg_ros.report.story import Story
+from objreg_ros.report.exports.map_files import MapFiles
+from objreg_ros.report.exports.run_scene import scene_of
+from objreg_ros.report.exports.scene_files import SceneFiles
+from objreg_ros.report.run.pictures import Album
+from objreg_ros.report.run.story import Story
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from objreg_ros.bridge.params import DoorParams
+from objreg_ros.bridge.node.params import DoorParams
 from objreg_ros.cli.settings import KEY, NODES
 from objreg_ros.params import Declaration, Params
 from objreg_ros.whole_file import write_whole

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from objreg_ros.bridge.calibration import absolute
+from objreg_ros.bridge.camera.calibration import absolute
 from objreg_ros.cli.settings import Settings, read_settings
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.offline import Detects, Run, Timing, build_rooms, run_offline
@@ -25,9 +25,9 @@ from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.recording.troubles import FOLDER, unpaired
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.rehearsal import SeesNothing
-from objreg_ros.report.about import about
-from objreg_ros.report.camera_map import TRACKED
-from objreg_ros.report.findings import setting
+from objreg_ros.report.run.about import about
+from objreg_ros.report.run.camera_map import TRACKED
+from objreg_ros.report.run.findings import setting
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_ros.truth import Truth
 

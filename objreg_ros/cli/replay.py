@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 from tqdm import tqdm
 
-from objreg_ros.bridge.receipts import DEPTH, IMAGE, Receipts
+from objreg_ros.bridge.streams.receipts import DEPTH, IMAGE, Receipts
 from objreg_ros.cli import NOTHING, options
 from objreg_ros.cli.told import tell
 from objreg_ros.recording import Recording, open_recording
@@ -24,7 +24,7 @@ from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.recording.troubles import troubles
 
 if TYPE_CHECKING:
-    from objreg_ros.bridge.player import Item, Player
+    from objreg_ros.bridge.streams.player import Item, Player
 
 LISTEN = (
     "start the nodes with `objreg_graph`, or play to the names that they have, "
@@ -77,9 +77,9 @@ def command(
     not allow, are left out, and named. Arguments behind -- go to ROS, like -- --ros-args -r __ns:=/robot.
     With --lossless it ends with 3 if no frame got through.
     """
-    from objreg_ros.bridge import profile
-    from objreg_ros.bridge.lifetime import begin, shutdown_as_interrupt
-    from objreg_ros.bridge.player import Player
+    from objreg_ros.bridge.node import profile
+    from objreg_ros.bridge.node.lifetime import begin, shutdown_as_interrupt
+    from objreg_ros.bridge.streams.player import Player
 
     asked = parse_remaps(remaps)
     with open_recording(recording) as opened:
@@ -130,7 +130,7 @@ def _begun(player: Player) -> Iterator[Player]:
 
 def _mounts(source: Recording) -> dict[str, str]:
     """The recording's /tf_static, which says how camera and IMU are mounted, where its type is installed."""
-    from objreg_ros.bridge.player import is_installed
+    from objreg_ros.bridge.streams.player import is_installed
 
     return {topic: "/tf_static" for topic in static_topics(source)[:1] if is_installed(TRANSFORMS)}
 
@@ -154,7 +154,7 @@ def playable_names(source: Recording, inputs: Inputs) -> dict[str, str]:
 
 def _obstacles(source: Recording) -> dict[str, str]:
     """The topics that cannot be published here, each with the reason. The bytes of a rosbag2 go out as they are."""
-    from objreg_ros.bridge.player import is_installed
+    from objreg_ros.bridge.streams.player import is_installed
 
     absent = {t.name: f"{t.msgtype} is not installed" for t in source.topics.values() if not is_installed(t.msgtype)}
     return {**absent, **source.obstacles(shipped_only=False)}
@@ -193,7 +193,7 @@ def _advance(bar: tqdm) -> None:
 
 
 def _items(source: Recording, selection: Selection, inputs: Inputs) -> Iterator[Item]:
-    from objreg_ros.bridge.player import Item
+    from objreg_ros.bridge.streams.player import Item
 
     kinds = {inputs.image: IMAGE, inputs.depth: DEPTH, inputs.points: DEPTH}
     for record in selection.records(source):
@@ -205,7 +205,7 @@ def _items(source: Recording, selection: Selection, inputs: Inputs) -> Iterator[
 @contextmanager
 def _told_at_the_end(player: Player, receipts: Receipts | None) -> Iterator[None]:
     """Says what was sent, where a signal ends the play too."""
-    from objreg_ros.bridge.lifetime import shutdown_as_interrupt
+    from objreg_ros.bridge.node.lifetime import shutdown_as_interrupt
 
     try:
         with shutdown_as_interrupt():

@@ -19,7 +19,14 @@ from objreg_ros.adapters.params import (
     ToLioSamParams,
     ToRtabmapParams,
 )
-from objreg_ros.bridge.params import DoorParams, ExchangeParams, KeyParams, ManagedParams, PeerParams, RelocalisedParams
+from objreg_ros.bridge.node.params import (
+    DoorParams,
+    ExchangeParams,
+    KeyParams,
+    ManagedParams,
+    PeerParams,
+    RelocalisedParams,
+)
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.mapper.params import MapperNodeParams, MapperParams
 from objreg_ros.params import Declaration, Params

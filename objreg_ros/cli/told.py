@@ -19,7 +19,7 @@ from objreg_ros.cli.paths import STANDARD_OUTPUT
 from objreg_ros.data import Rejected
 from objreg_ros.offline import Run
 from objreg_ros.plausibility.finding import Finding
-from objreg_ros.report.findings import Counts, verdict
+from objreg_ros.report.run.findings import Counts, verdict
 from objreg_ros.whole_file import write_whole
 
 STILL = "all frames have the stamp {} ns, so none closes a loop: record them again with the time in their headers"

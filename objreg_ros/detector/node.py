@@ -12,14 +12,15 @@ from sensor_msgs.msg import CompressedImage, Image, PointCloud2
 from std_msgs.msg import String
 
 from objreg_ros import share
-from objreg_ros.bridge import from_msg, qos, to_msg, vision_to_msg
-from objreg_ros.bridge.door import Door
-from objreg_ros.bridge.indoors import Indoors, Surplus
-from objreg_ros.bridge.pace import Pace
-from objreg_ros.bridge.params import ManagedParams
-from objreg_ros.bridge.spin import run
-from objreg_ros.bridge.sync import Drop
-from objreg_ros.bridge.turns import Turns
+from objreg_ros.bridge.camera.pace import Pace
+from objreg_ros.bridge.messages import from_msg, to_msg, vision_to_msg
+from objreg_ros.bridge.node import qos
+from objreg_ros.bridge.node.door import Door
+from objreg_ros.bridge.node.indoors import Indoors, Surplus
+from objreg_ros.bridge.node.params import ManagedParams
+from objreg_ros.bridge.node.spin import run
+from objreg_ros.bridge.streams.sync import Drop
+from objreg_ros.bridge.streams.turns import Turns
 from objreg_ros.data import ColourImage
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams

@@ -13,16 +13,16 @@ from typing import Any
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import CompressedImage
 
-from objreg_ros.bridge import qos
-from objreg_ros.bridge.frames_in import FramesDoor
-from objreg_ros.bridge.indoors import Indoors
-from objreg_ros.bridge.key import read_key
-from objreg_ros.bridge.keyframes_msg import SentKeyframe, keyframe
-from objreg_ros.bridge.lifetime import await_kernels
-from objreg_ros.bridge.params import KeyParams, ManagedParams
-from objreg_ros.bridge.spin import run
-from objreg_ros.bridge.sync import Match
-from objreg_ros.bridge.worker import Backlog, Limit
+from objreg_ros.bridge.messages.keyframes_msg import SentKeyframe, keyframe
+from objreg_ros.bridge.node import qos
+from objreg_ros.bridge.node.indoors import Indoors
+from objreg_ros.bridge.node.lifetime import await_kernels
+from objreg_ros.bridge.node.params import KeyParams, ManagedParams
+from objreg_ros.bridge.node.spin import run
+from objreg_ros.bridge.node.worker import Backlog, Limit
+from objreg_ros.bridge.streams.frames_in import FramesDoor
+from objreg_ros.bridge.streams.key import read_key
+from objreg_ros.bridge.streams.sync import Match
 from objreg_ros.keyframes.frame_window import FrameWindow
 from objreg_ros.keyframes.fusion import fuse
 from objreg_ros.keyframes.keyframer import SILENCE_S, Keyframer

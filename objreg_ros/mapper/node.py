@@ -14,15 +14,16 @@ from nav_msgs.msg import Odometry as OdometryMsg
 from rclpy.clock import Clock, ClockType
 from std_srvs.srv import Trigger
 
-from objreg_ros.bridge import from_msg, qos
-from objreg_ros.bridge.closures_in import ClosuresIn
-from objreg_ros.bridge.door import Door
-from objreg_ros.bridge.indoors import Indoors
-from objreg_ros.bridge.map_announcements import MapAnnouncements
-from objreg_ros.bridge.params import ManagedParams
-from objreg_ros.bridge.robots import prefixes_of
-from objreg_ros.bridge.spin import run
-from objreg_ros.bridge.transforms import hear_mount
+from objreg_ros.bridge.camera.transforms import hear_mount
+from objreg_ros.bridge.messages import from_msg
+from objreg_ros.bridge.node import qos
+from objreg_ros.bridge.node.door import Door
+from objreg_ros.bridge.node.indoors import Indoors
+from objreg_ros.bridge.node.params import ManagedParams
+from objreg_ros.bridge.node.spin import run
+from objreg_ros.bridge.streams.closures_in import ClosuresIn
+from objreg_ros.bridge.streams.map_announcements import MapAnnouncements
+from objreg_ros.bridge.streams.robots import prefixes_of
 from objreg_ros.data import LoopClosure, Moments, Robots, may_be_same
 from objreg_ros.mapper import saved
 from objreg_ros.mapper.adapters.g2o import graph_text

@@ -15,8 +15,8 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
-from objreg_ros.bridge.calibration import Calibration
-from objreg_ros.bridge.layout import fields_of
+from objreg_ros.bridge.camera.calibration import Calibration
+from objreg_ros.bridge.messages.layout import fields_of
 from objreg_ros.data import Intrinsics
 from objreg_ros.geometry import quaternion_from_rotation
 
@@ -211,7 +211,7 @@ def told_camera_info(camera: Calibration, stamp_ns: int, frame_id: str) -> Any:
 
 
 def point_cloud(records: Array, stamp_ns: int, frame_id: str) -> Any:
-    """sensor_msgs/PointCloud2 of structured records (H, W); `objreg_ros.bridge.layout` has layouts."""
+    """sensor_msgs/PointCloud2 of structured records (H, W); `objreg_ros.bridge.messages.layout` has layouts."""
     packed = np.ascontiguousarray(records)
     fields = [
         message("sensor_msgs/PointField", name=name, offset=offset, datatype=datatype, count=1)

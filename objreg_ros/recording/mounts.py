@@ -8,9 +8,9 @@ from contextlib import suppress
 from itertools import islice
 from typing import Any, NamedTuple
 
-from objreg_ros.bridge.chains import body_of
-from objreg_ros.bridge.frames import FrameTree, Tie
-from objreg_ros.bridge.mount import Body, nameless_body
+from objreg_ros.bridge.camera.chains import body_of
+from objreg_ros.bridge.camera.frames import FrameTree, Tie
+from objreg_ros.bridge.camera.mount import Body, nameless_body
 from objreg_ros.data import Array
 from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.record import Record, Recording

@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 
 from objreg_ros import limits
-from objreg_ros.bridge.calibration import SAME_SHAPE
-from objreg_ros.bridge.pictures import require_picture
+from objreg_ros.bridge.camera.calibration import SAME_SHAPE
+from objreg_ros.bridge.messages.pictures import require_picture
 from objreg_ros.data import Array
 from objreg_ros.recording import messages
 from objreg_ros.recording.text import require_regular

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.messages import from_msg
 from objreg_ros.data import Odometry
 from objreg_ros.recording.record import Record
 

@@ -19,7 +19,7 @@ from typing import Any, Self
 import cv2
 import numpy as np
 
-from objreg_ros.bridge.calibration import of_mapping
+from objreg_ros.bridge.camera.calibration import of_mapping
 from objreg_ros.data import Array
 from objreg_ros.recording import messages
 from objreg_ros.recording.folder import (

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from objreg_ros.bridge.calibration import Calibration, of_file
-from objreg_ros.bridge.calibration_files import parse_camera
+from objreg_ros.bridge.camera.calibration import Calibration, of_file
+from objreg_ros.bridge.camera.calibration_files import parse_camera
 from objreg_ros.data import Array, Intrinsics
 from objreg_ros.geometry import is_rigid, rigid
 from objreg_ros.recording.folder import NUMBERED, FolderRecording, Moment, Pair, moments_of_pairs, true_moment

@@ -8,7 +8,7 @@ from itertools import islice
 
 import numpy as np
 
-from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.messages import from_msg
 from objreg_ros.data import Array
 from objreg_ros.plausibility.finding import Finding
 from objreg_ros.recording.inputs import Inputs

@@ -16,8 +16,8 @@ import cv2
 import numpy as np
 
 from objreg_ros import limits
-from objreg_ros.bridge.calibration import of_file
-from objreg_ros.bridge.calibration_files import parse_camera
+from objreg_ros.bridge.camera.calibration import of_file
+from objreg_ros.bridge.camera.calibration_files import parse_camera
 from objreg_ros.data import Array
 from objreg_ros.recording import messages
 from objreg_ros.recording.folder import (

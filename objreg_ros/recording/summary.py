@@ -8,8 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from objreg_ros.bridge import from_msg, lenses, vision_from_msg
-from objreg_ros.bridge.layout import table
+from objreg_ros.bridge.camera import lenses
+from objreg_ros.bridge.messages import from_msg, vision_from_msg
+from objreg_ros.bridge.messages.layout import table
 from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.mounts import first_readable
 from objreg_ros.recording.record import Recording

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from rosbags.interfaces import Qos
 
-from objreg_ros.bridge import from_msg
-from objreg_ros.bridge.chains import moved, names_of, odometry_edge, truth_edge
-from objreg_ros.bridge.frames import Edge, FrameTree
+from objreg_ros.bridge.camera.chains import moved, names_of, odometry_edge, truth_edge
+from objreg_ros.bridge.camera.frames import Edge, FrameTree
+from objreg_ros.bridge.messages import from_msg
 from objreg_ros.recording import messages
 from objreg_ros.recording.inputs import TF_ODOM, TF_TRUTH, Inputs, choose_inputs
 from objreg_ros.recording.mounts import first_frames, first_readable, frame_of, frame_tree, moving_topics

@@ -12,7 +12,7 @@ from typing import Any
 
 from rosbags.interfaces import Qos
 
-from objreg_ros.bridge.calibration import Calibration, fitted, read_camera
+from objreg_ros.bridge.camera.calibration import Calibration, fitted, read_camera
 from objreg_ros.recording import messages
 from objreg_ros.recording.inputs import CAMERA_INFO, choose_inputs
 from objreg_ros.recording.mounts import first_frames

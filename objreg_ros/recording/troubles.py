@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from objreg_ros.bridge import colour_frame, from_msg, lenses
-from objreg_ros.bridge.camera_checks import check_camera
-from objreg_ros.bridge.frames import Tie
+from objreg_ros.bridge.camera import colour_frame, lenses
+from objreg_ros.bridge.camera.camera_checks import check_camera
+from objreg_ros.bridge.camera.frames import Tie
+from objreg_ros.bridge.messages import from_msg
 from objreg_ros.data import Array, Intrinsics
 from objreg_ros.plausibility.finding import Finding
 from objreg_ros.plausibility.findings import two_cameras

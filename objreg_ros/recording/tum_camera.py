@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The camera of a TUM RGB-D folder: ``camera.yaml``, and what is assumed where that says nothing.
 
-The file has the keys below, or is one that a calibration tool wrote (`objreg_ros.bridge.calibration_files`), to which
+The file has the keys below, or is one that a calibration tool wrote (`bridge/camera/calibration_files.py`), to which
 ``depth_scale`` may be added. It may be of the colour pictures where those are larger than depth.
 
 The benchmark's own advice for sequences without calibration is ROS's default camera, 525 px for pictures that are 640
@@ -18,8 +18,8 @@ from typing import Any
 
 import yaml
 
-from objreg_ros.bridge.calibration import SAME_SHAPE, of_file
-from objreg_ros.bridge.calibration_files import parse_camera
+from objreg_ros.bridge.camera.calibration import SAME_SHAPE, of_file
+from objreg_ros.bridge.camera.calibration_files import parse_camera
 from objreg_ros.data import Intrinsics
 from objreg_ros.lens import require_model
 from objreg_ros.recording.text import SETTINGS_BYTES, read_text

@@ -15,21 +15,21 @@ from contextlib import ExitStack
 from dataclasses import replace
 from typing import NamedTuple
 
-from objreg_ros.bridge.announcements import Announcements
-from objreg_ros.bridge.door import DroppedError
-from objreg_ros.bridge.exchanging import Delivered, Exchanging
-from objreg_ros.bridge.frames_in import FramesDoor
-from objreg_ros.bridge.indoors import Indoors
-from objreg_ros.bridge.key import read_key
-from objreg_ros.bridge.keyframes_in import FromRobot, KeyframesIn
-from objreg_ros.bridge.lifetime import await_kernels
-from objreg_ros.bridge.markers import Scene
-from objreg_ros.bridge.params import ExchangeParams, KeyParams, ManagedParams, PeerParams, RelocalisedParams
-from objreg_ros.bridge.relocalised import Whereabouts
-from objreg_ros.bridge.robots import prefixes_of
-from objreg_ros.bridge.spin import run
-from objreg_ros.bridge.sync import Match
-from objreg_ros.bridge.worker import Backlog, Limit
+from objreg_ros.bridge.messages.markers import Scene
+from objreg_ros.bridge.node.door import DroppedError
+from objreg_ros.bridge.node.indoors import Indoors
+from objreg_ros.bridge.node.lifetime import await_kernels
+from objreg_ros.bridge.node.params import ExchangeParams, KeyParams, ManagedParams, PeerParams, RelocalisedParams
+from objreg_ros.bridge.node.spin import run
+from objreg_ros.bridge.node.worker import Backlog, Limit
+from objreg_ros.bridge.streams.announcements import Announcements
+from objreg_ros.bridge.streams.exchanging import Delivered, Exchanging
+from objreg_ros.bridge.streams.frames_in import FramesDoor
+from objreg_ros.bridge.streams.key import read_key
+from objreg_ros.bridge.streams.keyframes_in import FromRobot, KeyframesIn
+from objreg_ros.bridge.streams.relocalised import Whereabouts
+from objreg_ros.bridge.streams.robots import prefixes_of
+from objreg_ros.bridge.streams.sync import Match
 from objreg_ros.data import framed
 from objreg_ros.keyframes.frame_window import FrameWindow
 from objreg_ros.registrar.exchange import Exchange

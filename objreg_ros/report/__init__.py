@@ -1,2 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures and tables of a run, and its map as files that other programs read."""
+"""What people and other programs get of a run.
+
+`run` is the page of a run, `store` that of a store, `batch` that of many recordings, `exports` are files of other
+programs. `page` and `write` make pages of templates; `drawing`, `packed` and `bundle` are what all of them draw with.
+"""

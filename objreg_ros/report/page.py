@@ -10,10 +10,10 @@ from pathlib import Path
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from objreg_ros.report.bundle import plotly_bundle
-from objreg_ros.report.chapter import chapter
-from objreg_ros.report.comparison import comparison
-from objreg_ros.report.pictures import Album
-from objreg_ros.report.story import Story
+from objreg_ros.report.run.chapter import chapter
+from objreg_ros.report.run.comparison import comparison
+from objreg_ros.report.run.pictures import Album
+from objreg_ros.report.run.story import Story
 
 TEMPLATES = Path(__file__).parent / "templates"
 

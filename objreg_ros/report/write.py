@@ -20,10 +20,10 @@ from objreg_ros.recording.poses import pose_of
 from objreg_ros.recording.text import read_text
 from objreg_ros.recording.tf_odometry import with_transforms
 from objreg_ros.recording.told_camera import with_camera
-from objreg_ros.report.form import require_form
 from objreg_ros.report.page import page
-from objreg_ros.report.pictures import Album
-from objreg_ros.report.story import Story
+from objreg_ros.report.run.form import require_form
+from objreg_ros.report.run.pictures import Album
+from objreg_ros.report.run.story import Story
 from objreg_ros.truth import Truth
 from objreg_ros.whole_file import write_whole
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Room 2: Detections and a depth image in, a Frame of ObjectClouds and one reduced View out.
+"""Detections and a depth image in, a Frame of ObjectClouds and one reduced View out.
 
-`gravity_choice` decides between what the picture shows (`gravity`) and what an IMU feels (`imu`, by its `attitude`).
-`unnamed` finds what stands there without a detection. `sensor_estimate` keeps what the stream tells of its sensor.
+`segment` calls the steps in order. `sensor` brings what comes into one depth image and measures how it errs; `gravity` is the direction of up, by level
+surfaces or by an IMU; `surface` has the cells, their parts and the planes that things stand on; `objects` are cut out
+of it, each in its detection box, and those without a name wherever they stand.
 """

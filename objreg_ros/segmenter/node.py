@@ -23,24 +23,26 @@ from rclpy.qos import DurabilityPolicy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from sensor_msgs.msg import Imu as ImuMessage
 
-from objreg_ros.bridge import colour_frame, from_msg, lenses, qos, registered_depth, rvl, to_msg, vision_to_msg
-from objreg_ros.bridge.calibration import fitted, read_calibration
-from objreg_ros.bridge.detections_in import DetectionsIn
-from objreg_ros.bridge.indoors import Indoors, Surplus
-from objreg_ros.bridge.lifetime import await_kernels
-from objreg_ros.bridge.matching import MatchingDoor
-from objreg_ros.bridge.mount import Mount
-from objreg_ros.bridge.overridable import FIXED
-from objreg_ros.bridge.params import ManagedParams
-from objreg_ros.bridge.spin import run
-from objreg_ros.bridge.sync import Drop, Match, Need, Stream
-from objreg_ros.bridge.transforms import hear_frames
+from objreg_ros.bridge.camera import colour_frame, lenses, registered_depth
+from objreg_ros.bridge.camera.calibration import fitted, read_calibration
+from objreg_ros.bridge.camera.mount import Mount
+from objreg_ros.bridge.camera.transforms import hear_frames
+from objreg_ros.bridge.messages import from_msg, rvl, to_msg, vision_to_msg
+from objreg_ros.bridge.node import qos
+from objreg_ros.bridge.node.indoors import Indoors, Surplus
+from objreg_ros.bridge.node.lifetime import await_kernels
+from objreg_ros.bridge.node.overridable import FIXED
+from objreg_ros.bridge.node.params import ManagedParams
+from objreg_ros.bridge.node.spin import run
+from objreg_ros.bridge.streams.detections_in import DetectionsIn
+from objreg_ros.bridge.streams.matching import MatchingDoor
+from objreg_ros.bridge.streams.sync import Drop, Match, Need, Stream
 from objreg_ros.data import Array, ColourImage, DepthImage, Detections, FeltGravity, Frame, PointCloud
-from objreg_ros.segmenter.doubts import range_doubt, registration_doubt
-from objreg_ros.segmenter.imu import Imu
-from objreg_ros.segmenter.organise import organise
+from objreg_ros.segmenter.gravity.imu import Imu
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
+from objreg_ros.segmenter.sensor.doubts import range_doubt, registration_doubt
+from objreg_ros.segmenter.sensor.organise import organise
 
 POINTS = {"points": PointCloud2}
 DEPTH = {"depth/image": Image, "depth/image/compressedDepth": CompressedImage}

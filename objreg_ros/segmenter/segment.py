@@ -12,19 +12,19 @@ import numpy as np
 
 from objreg_ros import limits
 from objreg_ros.data import UNNAMED, Array, DepthImage, Detections, Frame, Intrinsics, ObjectCloud, PointFlag
-from objreg_ros.segmenter import boxes, paper
-from objreg_ros.segmenter.boxes import NOTHING, Box
-from objreg_ros.segmenter.depth_to_colour import warm as warm_offset
-from objreg_ros.segmenter.extract import Pixels, cell_points, colours
-from objreg_ros.segmenter.gravity import camera_up, estimate_up, known_normals
-from objreg_ros.segmenter.gravity_choice import GravityChoice, choose_gravity
-from objreg_ros.segmenter.isolate import Isolated, Outline, cut_out, isolate, mark
+from objreg_ros.segmenter.gravity.gravity_choice import GravityChoice, choose_gravity
+from objreg_ros.segmenter.gravity.level_surfaces import camera_up, estimate_up, known_normals
+from objreg_ros.segmenter.objects import boxes, paper
+from objreg_ros.segmenter.objects.boxes import NOTHING, Box
+from objreg_ros.segmenter.objects.extract import Pixels, cell_points, colours
+from objreg_ros.segmenter.objects.isolate import Isolated, Outline, cut_out, isolate, mark
+from objreg_ros.segmenter.objects.unnamed import PERSON, find_things
 from objreg_ros.segmenter.params import SegmenterParams
-from objreg_ros.segmenter.sensor_estimate import SensorEstimate
-from objreg_ros.segmenter.support import Ground, find_supports
-from objreg_ros.segmenter.surface import Surface, cell_size, reduce
-from objreg_ros.segmenter.unnamed import PERSON, find_things
-from objreg_ros.segmenter.view import reduced_view, step_for
+from objreg_ros.segmenter.sensor.depth_to_colour import warm as warm_offset
+from objreg_ros.segmenter.sensor.sensor_estimate import SensorEstimate
+from objreg_ros.segmenter.sensor.view import reduced_view, step_for
+from objreg_ros.segmenter.surface.cells import Surface, cell_size, reduce
+from objreg_ros.segmenter.surface.support import Ground, find_supports
 
 COARSE = 2  # every so many cells tell gravity and the support surfaces
 WARM_SIZES = ((640, 480), (320, 240))  # two and one pixel a cell: each has a kernel of its own

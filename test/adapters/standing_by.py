@@ -15,7 +15,8 @@ from nav_msgs.msg import Odometry as OdometryMsg
 from rclpy.executors import SingleThreadedExecutor
 
 from objreg_ros.adapters.adapter import Adapter
-from objreg_ros.bridge import closures_msg, qos, to_msg
+from objreg_ros.bridge.messages import closures_msg, to_msg
+from objreg_ros.bridge.node import qos
 from objreg_ros.data import LoopClosure, Odometry
 from objreg_ros.geometry import pose, rotation_from_vector
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from objreg_ros.adapters.adapter import Adapter
-from objreg_ros.bridge import closures_msg, to_msg
+from objreg_ros.bridge.messages import closures_msg, to_msg
 from objreg_ros.data import LoopClosure, Moments
 
 from .standing_by import Around, closure

@@ -11,8 +11,10 @@ import pytest
 
 from objreg_ros.adapters.body import Body
 from objreg_ros.adapters.params import BodyParams
-from objreg_ros.bridge import qos, to_msg, transforms
-from objreg_ros.bridge.door import Door
+from objreg_ros.bridge.camera import transforms
+from objreg_ros.bridge.messages import to_msg
+from objreg_ros.bridge.node import qos
+from objreg_ros.bridge.node.door import Door
 from objreg_ros.data import Odometry
 
 from .standing_by import AHEAD, AHEAD_TEXT, Around, closure

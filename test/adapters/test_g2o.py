@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.adapters.g2o import ToG2o
-from objreg_ros.bridge import closures_msg, to_msg
+from objreg_ros.bridge.messages import closures_msg, to_msg
 from objreg_ros.data import Odometry
 from objreg_ros.geometry import inverse, pose, rotation_from_quaternion
 from objreg_ros.mapper.constraint import Constraint, compensated, local_information

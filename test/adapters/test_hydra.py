@@ -14,7 +14,8 @@ from mapper.adapters.blank import blank, numbers
 
 from objreg_ros.adapters import hydra
 from objreg_ros.adapters.hydra import ToHydra
-from objreg_ros.bridge import from_msg, qos
+from objreg_ros.bridge.messages import from_msg
+from objreg_ros.bridge.node import qos
 from objreg_ros.geometry import inverse
 from objreg_ros.mapper.adapters.pose_graph_tools import fill_edge
 from objreg_ros.mapper.constraint import Constraint, compensated, inverted

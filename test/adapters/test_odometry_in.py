@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 from objreg_ros.adapters.odometry_in import OdometryIn
-from objreg_ros.bridge import to_msg
-from objreg_ros.bridge.door import Door
+from objreg_ros.bridge.messages import to_msg
+from objreg_ros.bridge.node.door import Door
 from objreg_ros.data import Odometry
 from objreg_ros.mapper.restart import Anew
 

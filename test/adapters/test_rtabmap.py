@@ -15,7 +15,7 @@ from rclpy.task import Future
 
 from objreg_ros.adapters import rtabmap
 from objreg_ros.adapters.rtabmap import ToRtabmap
-from objreg_ros.bridge import from_msg, to_msg
+from objreg_ros.bridge.messages import from_msg, to_msg
 from objreg_ros.geometry import inverse
 from objreg_ros.mapper.constraint import Constraint, compensated, local_information
 

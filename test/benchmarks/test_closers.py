@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import pose
-from objreg_ros.report.trajectory_error import absolute_trajectory_error
+from objreg_ros.report.run.trajectory_error import absolute_trajectory_error
 from objreg_ros.truth import Truth
 
 

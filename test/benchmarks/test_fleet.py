@@ -10,7 +10,7 @@ import pytest
 
 from objreg_ros.data import Intrinsics, LoopClosure, View
 from objreg_ros.geometry import inverse, pose
-from objreg_ros.report.revisits import Seen
+from objreg_ros.report.run.revisits import Seen
 from objreg_ros.truth import Truth, Truths
 
 SECOND = 10**9

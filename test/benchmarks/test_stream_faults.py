@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.messages import from_msg
 from objreg_ros.data import Intrinsics
 from objreg_ros.geometry import inverse, pose, rotation_angle, rotation_from_vector
 from objreg_ros.recording import messages

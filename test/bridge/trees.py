@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from objreg_ros.bridge.frames import FrameTree
+from objreg_ros.bridge.camera.frames import FrameTree
 from objreg_ros.geometry import pose, quaternion_from_rotation, rotation_from_vector
 
 SECOND = 10**9

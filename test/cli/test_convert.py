@@ -9,7 +9,7 @@ from recording.folders import humble_bag, noetic_bag, records, tum_folder
 from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_typestore
 
-from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.messages import from_msg
 from objreg_ros.cli.convert import command
 from objreg_ros.recording import open_recording, write_rosbag2
 from objreg_ros.recording.bags import latched_qos

@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 import pytest
 
-from objreg_ros.bridge.ledger import Balance
+from objreg_ros.bridge.node.ledger import Balance
 from objreg_ros.cli.live import ROOMS, Live, Setup, private_environment, run_live
 from objreg_ros.data import LoopClosure, Reason, Rejected
 
@@ -117,7 +117,7 @@ def stage(monkeypatch: pytest.MonkeyPatch) -> Stage:
     made.events = [(1.0, made.reports(**dict.fromkeys(ROOMS, books(0)))), (1.0, made.ends)]
     monkeypatch.setattr("objreg_ros.cli.live.Processes", made.processes)
     monkeypatch.setattr("rclpy.context.Context", lambda: made)
-    monkeypatch.setattr("objreg_ros.bridge.collector.Collector", lambda context: made)
+    monkeypatch.setattr("objreg_ros.bridge.streams.collector.Collector", lambda context: made)
     monkeypatch.setattr("os.environ", {"HOME": "/home/me"})
     return made
 

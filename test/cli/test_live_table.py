@@ -4,7 +4,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from objreg_ros.bridge.ledger import Balance
+from objreg_ros.bridge.node.ledger import Balance
 from objreg_ros.cli.live import Live
 from objreg_ros.cli.live_table import lines, require_balance
 from objreg_ros.data import LoopClosure

@@ -13,8 +13,8 @@ from click.testing import CliRunner, Result
 from rclpy.executors import ExternalShutdownException
 from recording.folders import STEP_NS, humble_bag, noetic_bag, records, robot_bag, tum_folder
 
-from objreg_ros.bridge.player import Item
-from objreg_ros.bridge.receipts import DEPTH, IMAGE, ORDER, Receipts
+from objreg_ros.bridge.streams.player import Item
+from objreg_ros.bridge.streams.receipts import DEPTH, IMAGE, ORDER, Receipts
 from objreg_ros.cli.replay import command, playable_names
 from objreg_ros.recording import open_recording, write_rosbag2
 from objreg_ros.recording.bags import latched_qos
@@ -85,8 +85,8 @@ class Stage:
 @pytest.fixture
 def stage(monkeypatch: pytest.MonkeyPatch) -> Stage:
     made = Stage()
-    monkeypatch.setattr("objreg_ros.bridge.player.Player", made)
-    monkeypatch.setattr("objreg_ros.bridge.profile.apply", lambda: "the transport")
+    monkeypatch.setattr("objreg_ros.bridge.streams.player.Player", made)
+    monkeypatch.setattr("objreg_ros.bridge.node.profile.apply", lambda: "the transport")
     monkeypatch.setattr("rclpy.init", made.init)
     monkeypatch.setattr("rclpy.try_shutdown", made.try_shutdown)
     return made

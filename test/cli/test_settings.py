@@ -125,7 +125,7 @@ def test_a_node_takes_a_change_as_an_offline_run_does(change: str) -> None:
     from rclpy.context import Context
     from rclpy.node import Node
 
-    from objreg_ros.bridge.parameters import Parameters
+    from objreg_ros.bridge.node.parameters import Parameters
 
     room, name, value = parse_change(change)
     context = Context()

@@ -12,7 +12,7 @@ import pytest
 from docs.draw_reasons import PAGE, PICTURES, SCHEMES, SYMPTOM, common, details, section, side_by_side, with_reference
 from docs.schemes import DROPS as DROP_SCHEMES
 from objreg_ros.data import DepthImage, Intrinsics, Reason
-from objreg_ros.report.reasons import DROPS, REFUSALS, Words
+from objreg_ros.report.run.reasons import DROPS, REFUSALS, Words
 
 MOST_BYTES, MOST_OF_ALL = 60_000, 1_000_000
 CAMERA = Intrinsics(fx=300.0, fy=300.0, cx=159.5, cy=119.5, width=320, height=240)

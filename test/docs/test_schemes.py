@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 import pytest
 
 from docs.schemes import DROPS, HEIGHT, SCHEMES, WIDTH, arrow, picture, words
-from objreg_ros.report.reasons import DROPS as DROP_WORDS
-from objreg_ros.report.reasons import REFUSALS
+from objreg_ros.report.run.reasons import DROPS as DROP_WORDS
+from objreg_ros.report.run.reasons import REFUSALS
 
 
 def test_every_refusal_has_a_scheme() -> None:

@@ -16,10 +16,10 @@ from objreg_ros.recording import open_recording
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.registrar.registrar import Registrar
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.report.export import constraint
-from objreg_ros.segmenter.organise import organise
+from objreg_ros.report.exports.export import constraint
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
+from objreg_ros.segmenter.sensor.organise import organise
 from objreg_ros.simulation.write import simulate
 
 FOLDER = Path(__file__).resolve().parent

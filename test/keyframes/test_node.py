@@ -12,7 +12,7 @@ import pytest
 import rclpy
 from registration.samples import SECOND, box, frame
 
-from objreg_ros.bridge.keyframes_msg import SentKeyframe, read_keyframe
+from objreg_ros.bridge.messages.keyframes_msg import SentKeyframe, read_keyframe
 from objreg_ros.geometry import pose
 from objreg_ros.keyframes.node import KeyframerNode
 from objreg_ros.memory.compact import unpack_keyframe

@@ -20,8 +20,9 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
-from objreg_ros.bridge import from_msg, qos, to_msg
-from objreg_ros.bridge.log import ThrottledLog
+from objreg_ros.bridge.messages import from_msg, to_msg
+from objreg_ros.bridge.node import qos
+from objreg_ros.bridge.node.log import ThrottledLog
 from objreg_ros.data import LoopClosure
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.mapper.node import MapperNode
@@ -411,7 +412,7 @@ class Broadcaster:
 def test_every_odometry_that_is_not_late_brings_the_correction_to_tf(
     outside: Outside, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("objreg_ros.bridge.map_announcements.TransformBroadcaster", Broadcaster)
+    monkeypatch.setattr("objreg_ros.bridge.streams.map_announcements.TransformBroadcaster", Broadcaster)
     broadcaster = outside.door._out._broadcaster = Broadcaster(outside.door)
     for word in odometry(BENT[:3]):
         outside.door._hear_odometry(to_msg.odometry(word))
@@ -421,7 +422,7 @@ def test_every_odometry_that_is_not_late_brings_the_correction_to_tf(
 
 
 def test_the_correction_is_of_the_frame_that_odometry_is_in(outside: Outside, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("objreg_ros.bridge.map_announcements.TransformBroadcaster", Broadcaster)
+    monkeypatch.setattr("objreg_ros.bridge.streams.map_announcements.TransformBroadcaster", Broadcaster)
     broadcaster = outside.door._out._broadcaster = Broadcaster(outside.door)
     outside.door._hear_odometry(to_msg.odometry(replace(odometry(BENT)[0], frame_id="world")))
     assert [(m.header.frame_id, m.child_frame_id) for m in broadcaster.sent] == [("map", "world")]
@@ -430,7 +431,7 @@ def test_the_correction_is_of_the_frame_that_odometry_is_in(outside: Outside, mo
 def test_the_broadcast_is_switched_off_and_on_while_the_node_runs(
     outside: Outside, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("objreg_ros.bridge.map_announcements.TransformBroadcaster", Broadcaster)
+    monkeypatch.setattr("objreg_ros.bridge.streams.map_announcements.TransformBroadcaster", Broadcaster)
     outside.door._out._broadcaster = None
     sent: list[int] = []
     for k, publish_tf in enumerate((False, True, False)):
@@ -459,7 +460,7 @@ def test_a_save_keeps_a_file_of_another_kind_that_came_to_its_place(outside: Out
 def test_the_correction_is_broadcast_unless_that_is_switched_off(
     publish_tf: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("objreg_ros.bridge.map_announcements.TransformBroadcaster", Broadcaster)
+    monkeypatch.setattr("objreg_ros.bridge.streams.map_announcements.TransformBroadcaster", Broadcaster)
     rclpy.init(args=["--ros-args", "-p", f"publish_tf:={publish_tf}".lower()])
     door = MapperNode()
     try:

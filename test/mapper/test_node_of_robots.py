@@ -18,7 +18,8 @@ from nav_msgs.msg import Odometry as OdometryMsg
 from nav_msgs.msg import Path as PathMsg
 from rclpy.executors import SingleThreadedExecutor
 
-from objreg_ros.bridge import from_msg, qos, to_msg
+from objreg_ros.bridge.messages import from_msg, to_msg
+from objreg_ros.bridge.node import qos
 from objreg_ros.data import LoopClosure
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.mapper.node import MapperNode
@@ -133,7 +134,7 @@ def test_a_closure_of_a_robot_that_is_not_named_is_dropped(fleet: Fleet) -> None
 def test_frames_of_one_name_are_not_broadcast_and_that_is_said_once(
     fleet: Fleet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("objreg_ros.bridge.map_announcements.TransformBroadcaster", Broadcaster)
+    monkeypatch.setattr("objreg_ros.bridge.streams.map_announcements.TransformBroadcaster", Broadcaster)
     broadcaster = fleet.door._out._broadcaster = Broadcaster(fleet.door)
     said: list[str] = []
     monkeypatch.setattr(fleet.door, "get_logger", lambda: SimpleNamespace(warning=said.append))

@@ -15,7 +15,7 @@ from objreg_ros.geometry import inverse, pose, rotation_from_vector
 from objreg_ros.mapper import saved
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.pose_graph import PoseGraph, UnknownRobotError
-from objreg_ros.report.trajectory_error import absolute_trajectory_error
+from objreg_ros.report.run.trajectory_error import absolute_trajectory_error
 from objreg_ros.simulation.walk import PERIOD_NS, Walk, WalkParams, walk
 
 from .bent import SECOND, closure, distances, odometry, square

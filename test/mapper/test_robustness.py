@@ -16,7 +16,7 @@ import pytest
 from objreg_ros.data import Array, LoopClosure, Odometry
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.mapper.pose_graph import PoseGraph
-from objreg_ros.report.trajectory_error import absolute_trajectory_error
+from objreg_ros.report.run.trajectory_error import absolute_trajectory_error
 from objreg_ros.simulation.walk import Walk, WalkParams, walk
 
 from .bent import bent, closure, distances, odometry, square

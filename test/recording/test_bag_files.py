@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
-from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.messages import from_msg
 from objreg_ros.recording import open_recording, write_rosbag2
 from objreg_ros.recording.bag_files import bag_files
 from objreg_ros.recording.messages import standard_types

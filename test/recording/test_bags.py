@@ -12,7 +12,7 @@ from rosbags.rosbag1 import Writer as Rosbag1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.messages import from_msg
 from objreg_ros.recording import Record, bag_files, messages, open_recording, write_rosbag2
 from objreg_ros.recording.messages import standard_types
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.messages import from_msg
 from objreg_ros.geometry import inverse, pose, pose_error, rotation_from_vector
 from objreg_ros.recording import open_recording
 from objreg_ros.recording.drift import ODOM, Drift, DriftingOdometry, with_drifting_odometry

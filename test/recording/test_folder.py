@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.messages import from_msg
 from objreg_ros.recording.folder import FolderRecording, odometry_moment, pose_of_numbers, true_moment
 
 

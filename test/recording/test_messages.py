@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_typestore
 
-from objreg_ros.bridge import from_msg
-from objreg_ros.bridge.layout import OBJECTS, VIEW, table
+from objreg_ros.bridge.messages import from_msg
+from objreg_ros.bridge.messages.layout import OBJECTS, VIEW, table
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.recording import messages
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from objreg_ros.bridge.frames import Tie
+from objreg_ros.bridge.camera.frames import Tie
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.recording import Record, messages, open_recording, write_rosbag2
 from objreg_ros.recording.inputs import choose_inputs

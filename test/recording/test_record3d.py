@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.messages import from_msg
 from objreg_ros.recording import open_recording, record3d
 
 METADATA = {

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.messages import from_msg
 from objreg_ros.recording import Recording, open_recording, write_rosbag2
 from objreg_ros.recording.bags import latched_qos
 from objreg_ros.recording.inputs import Inputs, choose_inputs

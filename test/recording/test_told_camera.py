@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.messages import from_msg
 from objreg_ros.recording import open_recording
 from objreg_ros.recording.inputs import CAMERA_INFO, choose_inputs
 from objreg_ros.recording.told_camera import TOLD, with_camera

@@ -10,7 +10,8 @@ import cv2
 import numpy as np
 import pytest
 
-from objreg_ros.bridge import from_msg, lenses
+from objreg_ros.bridge.camera import lenses
+from objreg_ros.bridge.messages import from_msg
 from objreg_ros.recording import open_recording
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.tum import ASSOCIATION_NS, Picture, _associate

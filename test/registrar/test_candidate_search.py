@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from registration.samples import box, candidate, keyframe
 
-from objreg_ros.bridge.worker import give_way
+from objreg_ros.bridge.node.worker import give_way
 from objreg_ros.data import Reason
 from objreg_ros.memory.retrieval import CandidateKeyframe
 from objreg_ros.memory.sighting import sightings_of

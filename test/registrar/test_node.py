@@ -19,9 +19,9 @@ from rclpy.parameter import Parameter
 from registration.samples import SECOND, box, frame, keyframe
 from std_srvs.srv import Trigger
 
-from objreg_ros.bridge.diagnostics import refusal_of
-from objreg_ros.bridge.keyframes_in import FromRobot
-from objreg_ros.bridge.keyframes_msg import SentKeyframe
+from objreg_ros.bridge.messages.keyframes_msg import SentKeyframe
+from objreg_ros.bridge.node.diagnostics import refusal_of
+from objreg_ros.bridge.streams.keyframes_in import FromRobot
 from objreg_ros.data import Reason, Rejected
 from objreg_ros.geometry import pose
 from objreg_ros.keyframes.frame_window import Arrival, Clock, FrameWindow

@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 
 from objreg_ros.data import DepthImage, Intrinsics
-from objreg_ros.report.run_scene import RunScene, scene_of
-from objreg_ros.report.story import Story
+from objreg_ros.report.exports.run_scene import RunScene, scene_of
+from objreg_ros.report.run.story import Story
 
 from .runs import STEP_NS, TRUTH, summary
 

@@ -11,11 +11,11 @@ import pytest
 
 from objreg_ros.report.bundle import plotly_bundle
 from objreg_ros.report.page import page
-from objreg_ros.report.story import Story
+from objreg_ros.report.run.story import Story
+from report.run.test_thumbnails import Wall
 
 from .chromium import chromium
 from .runs import TRUTH, summary
-from .test_thumbnails import Wall
 
 WEBGL = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")  # 3D without a graphics card
 ADVICE = "willReadFrequently"  # of Chromium to plotly, how it could measure letters faster

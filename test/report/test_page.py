@@ -8,11 +8,11 @@ from html.parser import HTMLParser
 
 import pytest
 
-from objreg_ros.report import clouds, thumbnails
 from objreg_ros.report import page as pages
 from objreg_ros.report.bundle import plotly_bundle
 from objreg_ros.report.page import page
-from objreg_ros.report.story import Story
+from objreg_ros.report.run import clouds, thumbnails
+from objreg_ros.report.run.story import Story
 from objreg_ros.truth import Truth
 
 from .runs import TRUTH, closure, summary, with_a_stray

@@ -7,9 +7,9 @@ import re
 
 import pytest
 
-from objreg_ros.report.figures import SERIES
 from objreg_ros.report.page import TEMPLATES, page
-from objreg_ros.report.story import Story
+from objreg_ros.report.run.figures import SERIES
+from objreg_ros.report.run.story import Story
 
 from .runs import TRUTH, summary
 

@@ -13,7 +13,7 @@ from recording.folders import lost, records
 
 from objreg_ros.recording import write_rosbag2
 from objreg_ros.recording.inputs import Inputs
-from objreg_ros.report.story import Story
+from objreg_ros.report.run.story import Story
 from objreg_ros.report.write import write_report
 
 from .runs import summary

@@ -19,9 +19,10 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Header
 
-from objreg_ros.bridge import from_msg, profile, qos
-from objreg_ros.bridge.diagnostics import CONNECTED, balance_of
-from objreg_ros.bridge.ledger import Balance
+from objreg_ros.bridge.messages import from_msg
+from objreg_ros.bridge.node import profile, qos
+from objreg_ros.bridge.node.diagnostics import CONNECTED, balance_of
+from objreg_ros.bridge.node.ledger import Balance
 
 START_S = 600.0  # a first start compiles kernels, on a machine that may be busy
 ANSWER_S = 60.0

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from objreg_ros.bridge import from_msg, to_msg
+from objreg_ros.bridge.messages import from_msg, to_msg
 from objreg_ros.data import ColourImage, DepthImage, Intrinsics
 from objreg_ros.recording.inputs import GRAPH_TOPICS, choose_inputs
 from objreg_ros.recording.opening import open_recording

@@ -11,7 +11,8 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import Image
 
-from objreg_ros.bridge import qos, to_msg
+from objreg_ros.bridge.messages import to_msg
+from objreg_ros.bridge.node import qos
 
 from .graph import START_S, Graph
 from .moments import SECOND

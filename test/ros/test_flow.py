@@ -13,9 +13,10 @@ from sensor_msgs.msg import CameraInfo, PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
-from objreg_ros.bridge import from_msg, qos
-from objreg_ros.bridge.diagnostics import refusal_of
-from objreg_ros.bridge.layout import table
+from objreg_ros.bridge.messages import from_msg
+from objreg_ros.bridge.messages.layout import table
+from objreg_ros.bridge.node import qos
+from objreg_ros.bridge.node.diagnostics import refusal_of
 
 from .graph import ANSWER_S, REPOSITORY, START_S, Graph
 from .moments import Moment, drawn, recorded

@@ -14,7 +14,8 @@ from sensor_msgs.msg import Image
 from std_msgs.msg import Header, String
 from std_srvs.srv import Trigger
 
-from objreg_ros.bridge import from_msg, qos, to_msg, vision_to_msg
+from objreg_ros.bridge.messages import from_msg, to_msg, vision_to_msg
+from objreg_ros.bridge.node import qos
 from objreg_ros.cli.simulate import camera_of, sensors_of
 from objreg_ros.data import Detections, LoopClosure, Odometry
 from objreg_ros.simulation.truth import TrueFrame, Truth, read_truth

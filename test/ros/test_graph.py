@@ -14,7 +14,8 @@ from nav_msgs.msg import Odometry
 from recording.folders import CAMERA, tum_folder
 from sensor_msgs.msg import PointCloud2
 
-from objreg_ros.bridge import from_msg, qos
+from objreg_ros.bridge.messages import from_msg
+from objreg_ros.bridge.node import qos
 
 from .graph import START_S, Graph
 from .test_replay import await_release, end_keyframe, objreg, start

@@ -13,8 +13,8 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CompressedImage, Image, PointCloud2
 from std_msgs.msg import Header, String
 
-from objreg_ros.bridge import to_msg
-from objreg_ros.bridge.layout import OBJECTS
+from objreg_ros.bridge.messages import to_msg
+from objreg_ros.bridge.messages.layout import OBJECTS
 from objreg_ros.data import Frame, Intrinsics
 from objreg_ros.registrar.warm import drawn
 

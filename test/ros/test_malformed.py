@@ -15,7 +15,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import Header
 
-from objreg_ros.bridge import to_msg
+from objreg_ros.bridge.messages import to_msg
 from objreg_ros.data import Detections, PointCloud
 from objreg_ros.geometry import back_project
 

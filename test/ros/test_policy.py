@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from objreg_ros.bridge import vision_to_msg
-from objreg_ros.bridge.closures_msg import LoopClosureMsg
-from objreg_ros.bridge.transforms import is_installed
+from objreg_ros.bridge.camera.transforms import is_installed
+from objreg_ros.bridge.messages import vision_to_msg
+from objreg_ros.bridge.messages.closures_msg import LoopClosureMsg
 from objreg_ros.cli.access import TF, Access, expanded
 from objreg_ros.cli.policy import Asked
 

@@ -16,7 +16,9 @@ from registration import rooms
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
-from objreg_ros.bridge import qos, relocalised, to_msg
+from objreg_ros.bridge.messages import to_msg
+from objreg_ros.bridge.node import qos
+from objreg_ros.bridge.streams import relocalised
 from objreg_ros.data import Array, Frame, Odometry
 from objreg_ros.geometry import pose, rotation_from_vector
 from objreg_ros.registrar.registrar import Registrar

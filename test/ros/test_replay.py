@@ -20,8 +20,9 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Image
 from std_srvs.srv import Trigger
 
-from objreg_ros.bridge import closures_msg, from_msg, qos
-from objreg_ros.bridge.diagnostics import refusal_of
+from objreg_ros.bridge.messages import closures_msg, from_msg
+from objreg_ros.bridge.node import qos
+from objreg_ros.bridge.node.diagnostics import refusal_of
 
 from .graph import START_S, Graph
 

@@ -19,8 +19,9 @@ from nav_msgs.msg import Odometry as OdometryMsg
 from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import Header
 
-from objreg_ros.bridge import from_msg, qos, to_msg
-from objreg_ros.bridge.keyframes_msg import read_keyframe
+from objreg_ros.bridge.messages import from_msg, to_msg
+from objreg_ros.bridge.messages.keyframes_msg import read_keyframe
+from objreg_ros.bridge.node import qos
 from objreg_ros.data import Array, Frame, LoopClosure, Odometry
 from objreg_ros.geometry import inverse, pose, pose_error
 from objreg_ros.memory.store import Store

@@ -7,8 +7,8 @@ import numpy as np
 
 from objreg_ros.data import DepthImage, Detections, Intrinsics
 from objreg_ros.segmenter.params import SegmenterParams
-from objreg_ros.segmenter.support import Ground, find_supports
-from objreg_ros.segmenter.surface import cell_size, reduce
+from objreg_ros.segmenter.surface.cells import cell_size, reduce
+from objreg_ros.segmenter.surface.support import Ground, find_supports
 
 CAMERA = Intrinsics(fx=525.0, fy=525.0, cx=319.5, cy=239.5, width=640, height=480)
 SMALL = Intrinsics(fx=262.5, fy=262.5, cx=159.5, cy=119.5, width=320, height=240)

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from objreg_ros.data import UNNAMED, DepthImage, Detections, Intrinsics, ObjectCloud, PointCloud
-from objreg_ros.segmenter.organise import organise
 from objreg_ros.segmenter.params import SegmenterParams
 from objreg_ros.segmenter.segment import Segmenter
+from objreg_ros.segmenter.sensor.organise import organise
 
 SIZES = st.tuples(st.integers(1, 60), st.integers(1, 80))
 NUMBERS = st.floats(-200, 200, width=32)

@@ -24,9 +24,9 @@ Forms = dict[str, list[str]]
 def compiled_forms() -> Forms:
     """The signatures for which each kernel of the segmenter is compiled in this process."""
     found = {}
-    for module in pkgutil.iter_modules(objreg_ros.segmenter.__path__):
-        if module.name != "node":
-            for name, kernel in vars(importlib.import_module(f"objreg_ros.segmenter.{module.name}")).items():
+    for module in pkgutil.walk_packages(objreg_ros.segmenter.__path__, "objreg_ros.segmenter."):
+        if module.name != "objreg_ros.segmenter.node":
+            for name, kernel in vars(importlib.import_module(module.name)).items():
                 if isinstance(kernel, CPUDispatcher):
                     found[f"{module.name}.{name}"] = sorted(map(str, kernel.signatures))
     return found

@@ -9,8 +9,9 @@ from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from ros.graph import Graph
 
-from objreg_ros.bridge import from_msg, qos
-from objreg_ros.bridge.diagnostics import refusal_of
+from objreg_ros.bridge.messages import from_msg
+from objreg_ros.bridge.node import qos
+from objreg_ros.bridge.node.diagnostics import refusal_of
 
 from .walk import PATIENCE_S, Walk
 

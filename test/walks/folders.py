@@ -9,7 +9,7 @@ from pathlib import Path
 
 import cv2
 
-from objreg_ros.bridge import from_msg
+from objreg_ros.bridge.messages import from_msg
 from objreg_ros.recording import Record, open_recording, write_rosbag2
 
 ODD_COLOUR = "/people/mask_preview"

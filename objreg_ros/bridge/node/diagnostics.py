@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The books of a node as diagnostic_msgs, and back for those who read them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterable, Mapping
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from std_msgs.msg import Header
+
+from objreg_ros.bridge.node.ledger import Balance
+from objreg_ros.data import Reason, Rejected
+
+DROPPED = "dropped: "
+LOST = "lost in transport: "
+LATENCY = "latency "
+REJECTED = "rejected: "
+CONNECTED = "connected: "
+FOUND = "found: "
+
+
+def diagnostic(
+    node: str,
+    now: Time,
+    balance: Balance,
+    rate_hz: float,
+    troubles: Collection[str],
+    extra: Mapping[str, object],
+) -> DiagnosticArray:
+    """One status: counts, rate, latencies per stage and what the node adds; with ``troubles`` a warning of them."""
+    status = DiagnosticStatus(
+        level=DiagnosticStatus.WARN if troubles else DiagnosticStatus.OK,
+        name=f"{node}: frames",
+        message="; ".join(troubles) or f"{rate_hz:.1f} frames/s",
+        hardware_id="objreg_ros",
+        values=[KeyValue(key=key, value=str(value)) for key, value in {**_counts(balance, rate_hz), **extra}.items()],
+    )
+    return DiagnosticArray(header=Header(stamp=now), status=[status])
+
+
+def refusals(node: str, now: Time, rejected: Iterable[Rejected]) -> DiagnosticArray:
+    """A status for every refusal: the reason with its numbers, the two moments, and the pose that was turned down."""
+    return DiagnosticArray(header=Header(stamp=now), status=[_refusal(node, item) for item in rejected])
+
+
+def _refusal(node: str, rejected: Rejected) -> DiagnosticStatus:
+    pose = None if rejected.T_from_to is None else rejected.T_from_to.tolist()
+    values = {"from [ns]": rejected.from_ns, "to [ns]": rejected.to_ns, "T_from_to": json.dumps(pose)}
+    return DiagnosticStatus(
+        level=DiagnosticStatus.OK,
+        name=f"{node}: refusal",
+        message=f"{rejected.reason.value}: {rejected.detail}",
+        hardware_id="objreg_ros",
+        values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+    )
+
+
+def refusal_of(status: DiagnosticStatus) -> Rejected:
+    """The refusal that a status of `refusals` tells."""
+    values = {pair.key: pair.value for pair in status.values}
+    reason, _, detail = status.message.partition(": ")
+    pose = json.loads(values["T_from_to"])
+    return Rejected(
+        reason=Reason(reason),
+        from_ns=int(values["from [ns]"]),
+        to_ns=int(values["to [ns]"]),
+        detail=detail,
+        T_from_to=None if pose is None else np.array(pose),
+    )
+
+
+def _counts(balance: Balance, rate_hz: float) -> dict[str, object]:
+    latencies = {
+        f"{LATENCY}{stage} {name} [ms]": f"{value:.2f}"
+        for stage, values in sorted(balance.stage_ms.items())
+        for name, value in zip(("p50", "p95"), values, strict=True)
+    }
+    return {
+        "received": balance.received,
+        "published": balance.published,
+        "waiting": balance.waiting,
+        **{f"{DROPPED}{reason}": count for reason, count in sorted(balance.dropped.items())},
+        **{f"{LOST}{topic}": count for topic, count in sorted(balance.lost.items())},
+        "rate [Hz]": f"{rate_hz:.2f}",
+        **latencies,
+    }
+
+
+def balance_of(status: DiagnosticStatus) -> Balance:
+    """The books that a status of `diagnostic` tells."""
+    values = {pair.key: pair.value for pair in status.values}
+    stages = sorted({key.split(" ")[1] for key in values if key.startswith(LATENCY)})
+    return Balance(
+        received=int(values["received"]),
+        published=int(values["published"]),
+        waiting=int(values["waiting"]),
+        dropped=_counts_of(values, DROPPED),
+        lost=_counts_of(values, LOST),
+        stage_ms={
+            stage: (float(values[f"{LATENCY}{stage} p50 [ms]"]), float(values[f"{LATENCY}{stage} p95 [ms]"]))
+            for stage in stages
+        },
+    )
+
+
+def _counts_of(values: Mapping[str, str], prefix: str) -> dict[str, int]:
+    return {key.removeprefix(prefix): int(value) for key, value in values.items() if key.startswith(prefix)}

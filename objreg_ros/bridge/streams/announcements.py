@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The topics by which the registrar tells what it found.
+
+Those of common_interfaces are always there, those of objreg_msgs where that is installed.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import TransformStamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from sensor_msgs.msg import PointCloud2
+from visualization_msgs.msg import MarkerArray
+
+from objreg_ros.bridge.messages import closures_msg, to_msg
+from objreg_ros.bridge.node import qos
+from objreg_ros.bridge.node.diagnostics import REJECTED, refusals
+from objreg_ros.data import LoopClosure, Observation, Rejected
+
+
+class Announcements:
+    """Publishes for ``node``, and counts. Not for two threads at once.
+
+    What names no robot is of the one that the node's namespace is called.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._node, self._robot = node, node.get_namespace().strip("/")
+        self._constraints = node.create_publisher(Odometry, "constraints", qos.latched(qos.KEPT_CONSTRAINTS))
+        self._refusals = node.create_publisher(DiagnosticArray, "refusals", qos.room(qos.REFUSALS))
+        self._transforms = node.create_publisher(TransformStamped, "transforms", qos.room(depth=100))
+        self._landmarks = node.create_publisher(PointCloud2, "landmarks", qos.room(depth=100))
+        self._markers = node.create_publisher(MarkerArray, "markers", qos.latched())
+        self._whole = _Whole(node) if closures_msg.LoopClosureMsg is not None else None
+        self._published = Counter[bool]()  # constraints, by whether others confirmed them
+        self._refused, self._last_refusals = Counter[str](), dict[str, str]()  # by reason
+        self._last_moved = dict[str, float]()  # m by label
+
+    def closures(self, closures: Sequence[LoopClosure]) -> None:
+        """Tell constraints to the mapper and anyone."""
+        self._published.update("agreeing" in closure.evidence for closure in closures)
+        for closure in closures:
+            self._last_moved = closure.moved or self._last_moved
+            self._constraints.publish(to_msg.constraint(closure))
+            for transform in to_msg.transforms(closure):
+                self._transforms.publish(transform)
+            if self._whole is not None:
+                self._whole.closures.publish(closures_msg.loop_closure(closure, self._robot))
+
+    def refusals(self, rejected: Sequence[Rejected]) -> None:
+        """Tell what was refused; nothing where nothing was."""
+        self._refused.update(item.reason.value for item in rejected)
+        self._last_refusals.update((item.reason.value, item.detail) for item in rejected)
+        if rejected:
+            name, now = self._node.get_fully_qualified_name(), self._node.get_clock().now().to_msg()
+            self._refusals.publish(refusals(name, now, rejected))
+        if self._whole is not None:
+            for item in rejected:
+                self._whole.refusals.publish(closures_msg.refusal(item, self._robot))
+
+    def landmarks(
+        self,
+        observations: Sequence[Observation],
+        stamp_ns: int,
+        frame_id: str,
+        names: to_msg.Labels,
+        session: int | None,
+        robot: str = "",
+    ) -> None:
+        """Tell the objects of a keyframe, in the camera ``frame_id`` at ``stamp_ns``."""
+        seen = observations, stamp_ns, frame_id, names
+        self._landmarks.publish(to_msg.landmarks(*seen))
+        if self._whole is not None:
+            self._whole.landmarks.publish(closures_msg.object_landmarks(*seen, session, robot or self._robot))
+
+    def markers(self, scene: MarkerArray) -> None:
+        """Show the scene in RViz."""
+        self._markers.publish(scene)
+
+    def told(self) -> dict[str, object]:
+        """For diagnostics: constraints, refusals by reason, the last refusal of each, and what moved last."""
+        confirmed = {"constraints": self._published.total(), "constraints confirmed by others": self._published[True]}
+        refused = {f"{REJECTED}{reason}": count for reason, count in sorted(self._refused.items())}
+        last = {f"last rejected: {reason}": detail for reason, detail in sorted(self._last_refusals.items())}
+        moved = {f"last moved: {label}": f"{metres:.2f} m" for label, metres in sorted(self._last_moved.items())}
+        return {**confirmed, **refused, **last, **moved}
+
+
+class _Whole:
+    """The topics of objreg_msgs, which tell all that is known."""
+
+    def __init__(self, node: Node) -> None:
+        kept = qos.latched(qos.KEPT_CONSTRAINTS)
+        self.closures = node.create_publisher(closures_msg.LoopClosureMsg, "loop_closures", kept)
+        self.refusals = node.create_publisher(closures_msg.Refusal, "closure_refusals", qos.room(qos.SINGLE_REFUSALS))
+        self.landmarks = node.create_publisher(closures_msg.ObjectLandmarks, "object_landmarks", qos.room(depth=100))

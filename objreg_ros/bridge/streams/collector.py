@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A node that listens to the whole graph: what came out, the books of every node, the frame with most objects."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import Odometry
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from objreg_ros.bridge.messages import from_msg
+from objreg_ros.bridge.node import qos
+from objreg_ros.bridge.node.diagnostics import REJECTED, balance_of, refusal_of
+from objreg_ros.bridge.node.ledger import Balance
+from objreg_ros.data import Detections, LoopClosure, ObjectCloud, Rejected
+
+RECENT = 100  # detections that wait for their objects
+
+
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """One frame as the graph saw it."""
+
+    detections: Detections
+    objects: tuple[ObjectCloud, ...]
+
+
+class Collector(Node):
+    """Collects while `spin_until` runs."""
+
+    def __init__(self, context: Context) -> None:
+        super().__init__("collector", context=context)
+        self.books: dict[str, Balance] = {}
+        self.rejected: dict[str, int] = {}
+        self.closures: list[LoopClosure] = []
+        self.refusals: list[Rejected] = []
+        self.sight: Sight | None = None
+        self.glimpses: dict[int, dict[str, Any]] = {}  # stamp → labels detected, middles of objects
+        self._names: Mapping[int, str] = {}
+        self._recent: deque[Detections] = deque(maxlen=RECENT)
+        self._executor = SingleThreadedExecutor(context=context)
+        self._executor.add_node(self)
+        self._listen()
+
+    def _listen(self) -> None:
+        self.create_subscription(DiagnosticArray, "/diagnostics", self._hear_books, qos.room(depth=100))
+        self.create_subscription(DiagnosticArray, "refusals", self._hear_refusals, qos.room(depth=qos.REFUSALS))
+        self.create_subscription(Odometry, "constraints", self._hear_constraint, qos.latched(qos.KEPT_CONSTRAINTS))
+        self.create_subscription(String, "labels", self._hear_labels, qos.latched())
+        self.create_subscription(PointCloud2, "detections_table", self._hear_detections, qos.room())
+        self.create_subscription(PointCloud2, "objects", self._hear_objects, qos.room())
+
+    def spin_until(self, true: Callable[[], bool], seconds: float) -> bool:
+        """Let messages come in until something is true or the time is over; whether it became true."""
+        deadline = time.monotonic() + seconds
+        while not true() and time.monotonic() < deadline:
+            self._executor.spin_once(timeout_sec=0.05)
+        return true()
+
+    def call(self, service: str, seconds: float) -> str:
+        """Call a Trigger service; its message, empty if it did not answer in time."""
+        client = self.create_client(Trigger, service)
+        if not self.spin_until(client.service_is_ready, seconds):
+            return ""
+        future = client.call_async(Trigger.Request())
+        return str(future.result().message) if self.spin_until(future.done, seconds) else ""
+
+    def close(self) -> None:
+        """End the node."""
+        self.destroy_node()
+        self._executor.shutdown()  # last, as in `player`
+
+    def _hear_books(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.hardware_id == "objreg_ros":
+                self.books[status.name.removesuffix(": frames")] = balance_of(status)
+                refused = {v.key: int(v.value) for v in status.values if v.key.startswith(REJECTED)}
+                self.rejected.update({key.removeprefix(REJECTED): count for key, count in refused.items()})
+
+    def _hear_refusals(self, message: DiagnosticArray) -> None:
+        self.refusals += map(refusal_of, message.status)
+
+    def _hear_constraint(self, message: Any) -> None:
+        self.closures.append(from_msg.loop_closure(message))
+
+    def _hear_labels(self, message: Any) -> None:
+        self._names = from_msg.labels(message)
+
+    def _hear_detections(self, message: Any) -> None:
+        if message.width:
+            detections = from_msg.detections(message, self._names)
+            self._recent.append(detections)
+            self._glimpse(detections.stamp_ns)["labels"] = list(detections.label)
+
+    def _hear_objects(self, message: Any) -> None:
+        """Keep the frame with the most objects, and of those the latest."""
+        stamp_ns = from_msg.stamp_ns(message)
+        objects, _ = from_msg.objects(message, self._names)
+        middles = [[item.label, np.median(item.xyz, axis=0).astype(float).round(4).tolist()] for item in objects]
+        self._glimpse(stamp_ns)["objects"] = middles
+        if not self._recent:
+            return
+        if self.sight is None or len(objects) >= len(self.sight.objects):
+            seen = min(self._recent, key=lambda detections: abs(detections.stamp_ns - stamp_ns))
+            self.sight = Sight(seen, objects)
+
+    def _glimpse(self, stamp_ns: int) -> dict[str, Any]:
+        return self.glimpses.setdefault(stamp_ns, {"stamp_ns": stamp_ns, "labels": [], "objects": []})

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A run as things in space, for viewers: ways of the camera, closures, objects, and what it saw."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from objreg_ros.data import Array, DepthImage, Intrinsics, LoopClosure
+from objreg_ros.geometry import back_project, rigid_fit
+from objreg_ros.report.run.pictures import Album
+from objreg_ros.report.run.story import Story, positions
+
+WIDTH = 320  # px of a picture
+MOST_POINTS = 6000  # of a cloud
+MOST_MOMENTS = 200  # with picture and cloud
+FARTHEST_M = 6.0  # what is farther errs by decimetres
+LEAST_COMMON = 3  # poses that truth and map have to have in common to be laid over each other
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Way:
+    """Where the camera was: ``poses (N, 4, 4)`` in the frame of the map at ``stamps_ns``, which rise."""
+
+    stamps_ns: tuple[int, ...]
+    poses: Array
+
+    @property
+    def positions(self) -> Array:
+        """(N, 3) m."""
+        return np.asarray(self.poses[:, :3, 3])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Edge:
+    """A closure between two places, ``ends (2, 3)`` m, with its labels and true error in words.
+
+    ``verdict`` is ``accepted``, ``pruned`` by the mapper, or ``false`` where truth says so.
+    """
+
+    closure: LoopClosure
+    ends: Array
+    verdict: str
+    words: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Moment:
+    """What a ``camera`` saw at one moment: ``rgb (H, W, 3)``, and points ``xyz (N, 3)`` m in it with ``colours``."""
+
+    stamp_ns: int
+    T_map_camera: Array
+    camera: Intrinsics
+    rgb: Array
+    xyz: Array
+    colours: Array
+
+
+@dataclass(frozen=True, eq=False)
+class RunScene:
+    """A run in the frame in which odometry began; ``ways`` are ``odometry``, ``corrected`` and, if known, ``true``.
+
+    ``tracked`` stands for ``odometry`` where the way is that of our own tracking. Without either the one way is the
+    true one, in the frame of the truth. ``objects`` are labels with positions (3,) m, one for each frame that saw one.
+    """
+
+    name: str
+    ways: Mapping[str, Way]
+    edges: tuple[Edge, ...]
+    objects: tuple[tuple[str, Array], ...]
+    album: Album
+
+    @property
+    def main(self) -> Way:
+        """The way on which the camera is shown."""
+        return self.ways["corrected"] if "corrected" in self.ways else self.ways["true"]
+
+    def moments(self) -> Iterator[Moment]:
+        """What was seen at moments that are spread evenly; those whose picture cannot be read are passed over."""
+        way = self.main
+        count = len(way.stamps_ns)
+        for k in np.unique(np.linspace(0, count - 1, min(count, MOST_MOMENTS)).round().astype(int)).tolist():
+            image = self.album.at(way.stamps_ns[k])
+            if image is not None and image.rgb is not None:
+                yield _moment(image, image.rgb, way.stamps_ns[k], way.poses[k])
+
+
+def scene_of(story: Story, album: Album) -> RunScene:
+    """The scene of a run; ValueError where neither odometry nor truth tells where the camera was."""
+    ways = _ways(story)
+    if not ways:
+        raise ValueError(f"{story.name}: expected odometry or a ground truth to show where the camera was, got neither")
+    scene = RunScene(story.name, ways, (), tuple((label, xyz) for label, _, xyz in story.objects()), album)
+    return RunScene(story.name, ways, _edges(story, scene.main), scene.objects, album)
+
+
+def _ways(story: Story) -> dict[str, Way]:
+    stamps, odometry, corrected = story.poses_before_and_after()
+    if not story.has_way:
+        return _true_way(story, [glimpse.stamp_ns for glimpse in story.glimpses] or story.truth.stamps_ns)
+    ways = {name: Way(tuple(stamps), np.array(poses)) for name, poses in
+            ((story.source, odometry), ("corrected", corrected))}  # fmt: skip
+    true = _true_way(story, stamps).get("true")
+    if true is not None and len(true.stamps_ns) >= LEAST_COMMON:
+        of = dict(zip(stamps, corrected, strict=True))
+        T_map_truth = rigid_fit(true.positions, positions([of[stamp] for stamp in true.stamps_ns]))
+        ways["true"] = Way(true.stamps_ns, T_map_truth @ true.poses)
+    return ways
+
+
+def _true_way(story: Story, stamps_ns: list[int]) -> dict[str, Way]:
+    known = {stamp: T for stamp in sorted(set(stamps_ns)) if (T := story.truth.at(stamp)) is not None}
+    return {"true": Way(tuple(known), np.array(list(known.values())))} if known else {}
+
+
+def _edges(story: Story, way: Way) -> tuple[Edge, ...]:
+    """The closures whose two moments are both on the way, at the nearest of its poses."""
+    stamps, places = np.array(way.stamps_ns), way.positions
+    pruned = set(map(id, story.pruned))
+    edges = []
+    for closure in story.closures:
+        if min(closure.from_ns, closure.to_ns) < stamps[0] or max(closure.from_ns, closure.to_ns) > stamps[-1]:
+            continue
+        ends = places[[int(np.abs(stamps - stamp).argmin()) for stamp in (closure.from_ns, closure.to_ns)]]
+        verdict = "false" if story.is_false(closure) else "pruned" if id(closure) in pruned else "accepted"
+        edges.append(Edge(closure, ends, verdict, _words(story, closure)))
+    return tuple(edges)
+
+
+def _words(story: Story, closure: LoopClosure) -> str:
+    error = story.error(closure)
+    off = "" if error is None else f": off by {error[0]:.1f}°, {error[1]:.1f} cm"
+    return f"{', '.join(closure.labels)}{off}"
+
+
+def _moment(image: DepthImage, rgb: Array, stamp_ns: int, T_map_camera: Array) -> Moment:
+    camera = image.intrinsics
+    step = max(1, round((image.depth.size / MOST_POINTS) ** 0.5))
+    at = np.s_[step // 2 :: step, step // 2 :: step]
+    xyz = back_project(image.depth, camera.fx, camera.fy, camera.cx, camera.cy)[at]
+    seen = (image.depth[at] > 0) & (image.depth[at] < FARTHEST_M)
+    reduced = max(1, camera.width // WIDTH)
+    small = camera.scaled(reduced)
+    return Moment(
+        stamp_ns=stamp_ns,
+        T_map_camera=T_map_camera,
+        camera=small,
+        rgb=cv2.resize(np.ascontiguousarray(rgb), (small.width, small.height), interpolation=cv2.INTER_AREA),
+        xyz=xyz[seen].astype(np.float32),
+        colours=rgb[at][seen],
+    )

@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs side by side: what differs between them, and which constraints one has and another lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from string import ascii_uppercase
+from typing import Any
+
+from objreg_ros.data import LoopClosure, Rejected
+from objreg_ros.registration.params import RegistrarParams
+from objreg_ros.report.run.chapter import View, judged, spaced
+from objreg_ros.report.run.pairs import Pair, pairs_of
+from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.trajectory_error import root_mean_square
+
+DEFAULT = "default"
+KEYFRAME_NS = round(RegistrarParams().keyframe_seconds * 1e9)  # moments so near are of one keyframe
+
+
+def comparison(stories: Sequence[Story]) -> View:
+    """The section of two runs or more; each after the first is held against the first."""
+    names = names_of(stories)
+    recordings = {story.summary.get("recording", "") for story in stories}
+    same = len(recordings) == 1
+    changes = [_change(stories, k, names) for k in range(1, len(stories))] if same else []
+    return {"names": names, "table": _table(stories), "changes": changes, "same": same}
+
+
+def names_of(stories: Sequence[Story]) -> list[str]:
+    """A letter for each run, and what differs from the others: parameters, model, version, recording."""
+    told = [_flat(story) for story in stories]
+    keys = dict.fromkeys(key for made in told for key in made)
+    differing = [key for key in keys if len({str(made.get(key, DEFAULT)) for made in told}) > 1]
+    names = []
+    for k, made in enumerate(told):
+        words = ", ".join(f"{key} {made.get(key, DEFAULT)}" for key in differing)
+        letter = ascii_uppercase[k] if k < len(ascii_uppercase) else str(k + 1)
+        names.append(f"{letter}: {words}" if words else f"{letter}: {stories[k].name}, made as the others")
+    return names
+
+
+def _flat(story: Story) -> dict[str, Any]:
+    """What a run was made with, by one name each; without what differs always."""
+    about: Mapping[str, Any] = story.summary.get("about", {})
+    model = about.get("model") or {}
+    told = {
+        **about.get("params", {}),
+        "model": f"{model.get('name')} {model.get('sha256')}" if model else None,
+        "version": about.get("version"),
+        "commit": about.get("commit"),
+        "recording": story.name,
+        "odometry": story.summary.get("odometry"),
+    }
+    told.pop("detector.model", None)
+    return {key: value for key, value in told.items() if value is not None}
+
+
+def _table(stories: Sequence[Story]) -> list[tuple[str, list[str]]]:
+    """Rows of a measure and its value in each run."""
+    rows = [
+        ("frames", [_count(story, "frames") for story in stories]),
+        ("detections", [_count(story, "detections") for story in stories]),
+        ("objects", [_count(story, "objects") for story in stories]),
+        ("constraints", [f"{len(story.closures)}" for story in stories]),
+        ("false constraints", [_false(story) for story in stories]),
+        ("error before correction", [_trajectory_error(story, "odometry_error") for story in stories]),
+        ("error corrected", [_trajectory_error(story, "corrected_error") for story in stories]),
+    ]
+    reasons = dict.fromkeys(reason for story in stories for reason in story.summary.get("rejected", {}))
+    stages = dict.fromkeys(stage for story in stories for stage in story.summary.get("stage_ms", {}))
+    refused = [(spaced(reason), [_refused(story, reason) for story in stories]) for reason in reasons]
+    return [*rows, *refused, *((f"{stage}, median", [_time(story, stage) for story in stories]) for stage in stages)]
+
+
+def _count(story: Story, key: str) -> str:
+    return f"{story.summary[key]:,}" if key in story.summary else "–"
+
+
+def _false(story: Story) -> str:
+    false, of = judged(story)
+    return f"{false} of {of}" if of else "–"
+
+
+def _trajectory_error(story: Story, which: str) -> str:
+    errors = getattr(story.tracks(), which, None)
+    return "–" if errors is None else f"{100 * root_mean_square(errors):.1f} cm"
+
+
+def _refused(story: Story, reason: str) -> str:
+    return str(story.summary.get("rejected", {}).get(reason, 0))
+
+
+def _time(story: Story, stage: str) -> str:
+    ms = story.summary.get("stage_ms", {}).get(stage)
+    return "–" if ms is None else f"{ms['p50']:.1f} ms"
+
+
+def _change(stories: Sequence[Story], k: int, names: Sequence[str]) -> View:
+    """What a run gained and lost against the first."""
+    before, after = stories[0], stories[k]
+    kept = matched(before.closures, after.closures)
+    lost = [pair for i, pair in enumerate(pairs_of(before)[: len(before.closures)]) if i not in kept]
+    gained = [pair for i, pair in enumerate(pairs_of(after)[: len(after.closures)]) if i not in kept.values()]
+    return {
+        "title": f"{names[k].split(':')[0]} against {names[0].split(':')[0]}",
+        "kept": len(kept),
+        "gained": [_told(pair, k, before) for pair in gained],
+        "lost": [_told(pair, 0, after) for pair in lost],
+    }
+
+
+def matched(before: Sequence[LoopClosure], after: Sequence[LoopClosure]) -> dict[int, int]:
+    """Which closure of one run is which of another: both moments within `KEYFRAME_NS`, the nearest first."""
+    near = sorted(
+        (apart, i, j)
+        for i, one in enumerate(before)
+        for j, other in enumerate(after)
+        if (apart := _apart_ns(one, other)) <= KEYFRAME_NS
+    )
+    found: dict[int, int] = {}
+    taken: set[int] = set()
+    for _, i, j in near:
+        if i not in found and j not in taken:
+            found[i] = j
+            taken.add(j)
+    return found
+
+
+def _apart_ns(one: LoopClosure, other: LoopClosure | Rejected) -> int:
+    return max(abs(one.from_ns - other.from_ns), abs(one.to_ns - other.to_ns))
+
+
+def _told(pair: Pair, run: int, other: Story) -> View:
+    """A closure that only one run has, and what became of it in the other."""
+    error = "" if pair.error is None else f"{pair.error[0]:.1f}° and {pair.error[1]:.1f} cm"
+    times = f"{pair.seconds[0]:.1f} s ↔ {pair.seconds[1]:.1f} s"
+    labels = ", ".join(pair.labels)
+    return {"run": run, "key": pair.key, "verdict": pair.verdict, "times": times, "labels": labels, "error": error,
+            "instead": _instead(pair, other)}  # fmt: skip
+
+
+def _instead(pair: Pair, other: Story) -> str:
+    """Why the other run refused the same moments; that it did not try them where it did not."""
+    if not isinstance(pair.told, LoopClosure):
+        return ""
+    told = [(apart, refusal) for refusal in other.refusals if (apart := _apart_ns(pair.told, refusal)) <= KEYFRAME_NS]
+    if not told:
+        return "not tried"
+    refusal = min(told, key=lambda item: item[0])[1]
+    return f"{spaced(refusal.reason.value)}: {refusal.detail}"

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every pair of moments that a run accepted or refused, as a row that one can look up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from objreg_ros.data import UNTRIED, LoopClosure, Rejected
+from objreg_ros.geometry import rotation_angle
+from objreg_ros.report.run.story import Story
+from objreg_ros.truth import Error
+
+ACCEPTED = "accepted"
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A constraint or a refusal. ``key`` names it on the page, within its run."""
+
+    key: str
+    told: LoopClosure | Rejected
+    story: Story
+
+    @property
+    def verdict(self) -> str:
+        """Accepted, false or refused: its CSS class."""
+        if isinstance(self.told, Rejected):
+            return "refused"
+        return "false" if self.story.is_false(self.told) else ACCEPTED
+
+    @property
+    def reason(self) -> str:
+        """Why it was refused, `ACCEPTED` where it was not."""
+        return self.told.reason.value if isinstance(self.told, Rejected) else ACCEPTED
+
+    @property
+    def tried(self) -> bool:
+        """Whether something was registered."""
+        return isinstance(self.told, LoopClosure) or self.told.reason not in UNTRIED
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """What closed it, each once; of a refusal what was detected at both moments."""
+        if isinstance(self.told, LoopClosure):
+            return tuple(dict.fromkeys(self.told.labels))
+        return self.story.seen_at_both(self.told.from_ns, self.told.to_ns)
+
+    @property
+    def seconds(self) -> tuple[float, float]:
+        """Both moments since the run began."""
+        return self.story.seconds(self.told.from_ns), self.story.seconds(self.told.to_ns)
+
+    @cached_property
+    def error(self) -> Error | None:
+        """Degrees and centimetres by which the pose is wrong; None where truth does not tell or there is no pose."""
+        return self.story.truth.error(self.told)
+
+    @property
+    def words(self) -> str:
+        """The numbers behind a refusal, what moved, and what truth says."""
+        if isinstance(self.told, Rejected):
+            parts = [self.told.detail]
+        else:
+            parts = [f"{label} moved by {metres:.2f} m" for label, metres in self.told.moved.items()]
+        return ". ".join(part for part in (*parts, self._in_truth) if part)
+
+    @property
+    def _in_truth(self) -> str:
+        """How far the two moments are apart, and by how much the pose is wrong; empty without truth."""
+        truth = self.story.truth.between(self.told.from_ns, self.told.to_ns)
+        if truth is None or self.told.from_ns == self.told.to_ns:
+            return ""
+        degrees, metres = np.degrees(rotation_angle(truth[:3, :3])), float(np.linalg.norm(truth[:3, 3]))
+        apart = f"In truth {degrees:.0f}° and {metres:.1f} m apart"
+        off = "" if self.error is None else f"; the pose is off by {self.error[0]:.1f}° and {self.error[1]:.1f} cm"
+        return f"{apart}{off}."
+
+
+def pairs_of(story: Story) -> list[Pair]:
+    """All constraints (keys c0, c1, …) and then all refusals (r0, r1, …) of a run, in the order of its JSON."""
+    told: Iterable[tuple[str, LoopClosure | Rejected]] = (
+        *((f"c{k}", closure) for k, closure in enumerate(story.closures)),
+        *((f"r{k}", refusal) for k, refusal in enumerate(story.refusals)),
+    )
+    return [Pair(key, item, story) for key, item in told]
+
+
+def by_interest(pairs: Iterable[Pair]) -> list[Pair]:
+    """False constraints first, then right ones, refused poses, what was tried without one, and the rest."""
+    ranks = {"false": 0, ACCEPTED: 1, "refused": 2}
+    return sorted(pairs, key=lambda pair: (not pair.tried, pair.told.T_from_to is None, ranks[pair.verdict]))

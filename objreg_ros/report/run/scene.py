@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The ways, the closures and the objects of a run in space, for a drawing that one can turn about."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from objreg_ros.data import UNNAMED, Array
+from objreg_ros.geometry import pose, transform
+from objreg_ros.report.packed import packed
+from objreg_ros.report.run import figures
+from objreg_ros.report.run.story import Story, Tracks
+
+MOST_POSES = 5000  # of one way
+MOST_SIGHTINGS = 20_000  # of all objects
+NEAR_AXIS = np.cos(np.radians(30))  # of the mean up of a camera: a frame's axis so near is what is up
+NAMES = {"true": "truth", "tracked": "our own tracking"}
+APART_M = 0.4  # names nearer than this would cover each other
+
+
+def scene(story: Story, stamps_ns: Array, lines: Mapping[str, Array], tracks: Tracks | None) -> dict[str, Any]:
+    """Ways (N, 3) by name, the closures on the last of them, and objects of the map: packed points, z is up."""
+    T_level_drawn = _levelling(story, stamps_ns, tracks)
+    flat = {name: transform(T_level_drawn, xyz) for name, xyz in lines.items()}
+    step = -(-len(stamps_ns) // MOST_POSES)
+    last = list(flat.values())[-1]
+    seen = [] if tracks is None else story.objects()
+    kept = seen[:: -(-len(seen) // MOST_SIGHTINGS) or 1]
+    T_level_map = T_level_drawn if tracks is None else T_level_drawn @ tracks.T_drawn_map
+    at = transform(T_level_map, np.array([row[2] for row in kept])) if kept else np.zeros((0, 3))
+    return {
+        "ways": [{"name": NAMES.get(name, name), "style": name, **packed(xyz[::step])} for name, xyz in flat.items()],
+        "closures": _closures(story, stamps_ns, last),
+        **_objects([row[0] for row in kept], at),
+        "words": f"Of {len(seen)} sightings of objects {len(kept)} are shown." if len(kept) < len(seen) else "",
+    }
+
+
+def _levelling(story: Story, stamps_ns: Array, tracks: Tracks | None) -> Array:
+    """The rotation (4, 4) that turns the frame of the drawing until z is up, by some of the poses."""
+    stamps_ns = stamps_ns[:: len(stamps_ns) // 100 or 1]
+    if tracks is None:
+        poses = [T for stamp in stamps_ns if (T := story.truth.at(int(stamp))) is not None]
+        if not poses and (tracked := story.tracked_way()) is not None:
+            poses = list(tracked[1])
+    else:
+        mapped = {frame.stamp_ns: frame.T_map_camera for frame in story.map.frames}
+        poses = [tracks.T_drawn_map @ mapped[stamp] for stamp in stamps_ns.tolist()]
+    return levelling(np.array(poses).reshape(-1, 4, 4))
+
+
+def levelling(poses: Array) -> Array:
+    """The rotation (4, 4) by which what is up for cameras at poses (N, 4, 4), on the mean, becomes z.
+
+    An axis of their frame is what is up where it is near. Where cameras have no up in common, nothing is turned.
+    """
+    mean = -poses[:, :3, 1].mean(axis=0)
+    length = np.linalg.norm(mean)
+    if not length > 0.2:
+        return np.eye(4)
+    up, axis = mean / length, np.abs(mean).argmax()
+    if abs(up[axis]) > NEAR_AXIS:
+        up = np.sign(up[axis]) * np.eye(3)[axis]
+    level = np.eye(3)[np.abs(up).argmin()]
+    right = level - (level @ up) * up
+    right /= np.linalg.norm(right)
+    return pose(np.array([right, np.cross(up, right), up]), np.zeros(3))
+
+
+def _closures(story: Story, stamps_ns: Array, way: Array) -> list[dict[str, Any]]:
+    """The closures by verdict and by whether the mapper pruned them, with the key and the words of each."""
+    pruned = {id(closure) for closure in story.pruned}
+    groups: dict[tuple[str, bool], list[int]] = {}
+    for k, closure in enumerate(story.closures):
+        groups.setdefault((figures.verdict(story, closure), id(closure) in pruned), []).append(k)
+    return [
+        {
+            "style": style,
+            "pruned": is_pruned,
+            "name": " ".join(["pruned"] * is_pruned + ["false"] * (style == "false") + ["closure"]),
+            "keys": [f"c{k}" for k in members],
+            "words": [figures.closure_words(story, story.closures[k]) for k in members],
+            **packed(np.concatenate([figures.ends(story.closures[k], stamps_ns, way) for k in members])),
+        }
+        for (style, is_pruned), members in sorted(groups.items())
+    ]
+
+
+def _objects(labels: list[str], xyz: Array) -> dict[str, Any]:
+    """The sightings in the colours of the object map, and the names of what was seen often."""
+    order = [label for label, _ in Counter(labels).most_common()]
+    own, shared = order[: figures.SERIES - 1], order[figures.SERIES - 1 :]
+    groups = [(label, [label]) for label in own] + (
+        [(shared[0] if len(shared) == 1 else "others", shared)] if shared else []
+    )
+    names = _names(labels, xyz)
+    return {
+        "objects": [
+            {"name": name, "style": f"s{k}", **packed(xyz[np.isin(labels, members)])}
+            for k, (name, members) in enumerate(groups)
+        ],
+        "names": {"text": [label for label, _ in names], **packed(np.array([at for _, at in names]).reshape(-1, 3))},
+    }
+
+
+def _names(labels: list[str], xyz: Array) -> list[tuple[str, Array]]:
+    """The names of heaps that are apart; what the detector has no name for has one only where nothing else is."""
+    kept: list[tuple[str, Array]] = []
+    for label, at in sorted(figures.heaps(labels, xyz), key=lambda heap: heap[0] == UNNAMED):
+        if all(np.linalg.norm(at - other) > APART_M for _, other in kept):
+            kept.append((label, at))
+    return kept

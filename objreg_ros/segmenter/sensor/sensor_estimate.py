@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a stream tells of its own sensor: the noise of depth, how depth lies upon colour, and how late it is.
+
+Depth that shows the room of ``lag`` seconds before colour is turned against it by ``-lag`` times the angular velocity
+of the camera, beside what its calibration is wrong by. So the slope of the one over the other is the lag (Furgale,
+Rehder and Siegwart, "Unified temporal and spatial calibration for multi-sensor systems", 2013, estimate an offset in
+time like it). The angular velocity is that by which the picture moves from frame to frame, by phase correlation. It
+tells two axes, and what the camera's own way adds to them moves depth on colour as well.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from objreg_ros.data import Array, DepthImage
+from objreg_ros.segmenter.sensor.depth_to_colour import DepthToColour
+from objreg_ros.sensor import measured_noise, thinned
+
+NOISE_EVERY = 10  # frames: so it costs a tenth of a millisecond of each
+NOISES = 100  # that are remembered
+PICTURE_WIDTH = 160  # px: to so many or more a picture is halved, to see how it moves
+LEAST_RESPONSE = 0.1  # of a phase correlation, for the picture to have moved as a whole
+MOST_SHIFT = 0.05  # of the picture: as it rolls or moves by more, its shift says too little of that moment's offset
+LONGEST_S = 0.25  # between two frames for a velocity; a hand that carries a camera turns back in half a second
+TURNS = 1000  # that are remembered
+LEAST_TURNS, LEAST_CLUSTERS = 30, 5  # for a lag to be told
+LEAST_VELOCITY = 0.1  # rad/s, its deviation: below, a lag of 10 ms is lost in what an offset errs by
+CLUSTER_S = 1.0  # what frames of so long err by is alike
+OUTLIER = 3.0  # deviations, from the median of all: what differs by more counts in none of the rounds after
+ROUNDS = 5
+FLOOR_MS = 3.0  # what lags of simulated streams err by beyond what their scatter tells
+MOST_SIGMA_MS = 10.0  # a lag that is known less well is not told
+
+
+class Lag(NamedTuple):
+    """How late depth is behind colour, and its standard deviation, in ms; negative where colour is late."""
+
+    ms: float
+    sigma_ms: float
+
+    def text(self) -> str:
+        """The lag in words."""
+        return f"{self.ms:.0f} +- {self.sigma_ms:.0f} ms"
+
+
+class Turn(NamedTuple):
+    """By what depth is turned against colour, ``offset (2,)`` rad about x and y, as the camera turns by
+    ``velocity (2,)`` rad/s; ``seconds`` of the stream's clock."""
+
+    seconds: float
+    velocity: Array
+    offset: Array
+
+
+@dataclass(slots=True, eq=False)
+class PictureMotion:
+    """How fast a picture moves about each frame: the mean of before and after, so it is told one frame later."""
+
+    _grey: Array | None = None
+    _window: Array | None = None
+    _stamp_ns: int = 0
+    _before: Array | None = None  # (2,) rad/s: from the frame before the last to the last
+
+    def forget(self) -> None:
+        """Begin with another stream."""
+        self._grey, self._before = None, None
+
+    def see(self, image: DepthImage) -> Array | None:
+        """The angular velocity (2,) rad/s about x and y at the frame before this one; None where it is not known."""
+        assert image.rgb is not None
+        height, width = image.rgb.shape[:2]
+        every = max(1, min(width // PICTURE_WIDTH, height))  # a strip keeps a row
+        small = cv2.resize(image.rgb, None, fx=1.0 / every, fy=1.0 / every, interpolation=cv2.INTER_AREA)
+        grey = cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32)
+        seconds = 1e-9 * (image.stamp_ns - self._stamp_ns)
+        same = self._grey is not None and self._grey.shape == grey.shape and 0.0 < seconds <= LONGEST_S
+        same = same and min(grey.shape) > 1  # of one row nothing is told
+        focal = np.array([image.intrinsics.fx, image.intrinsics.fy]) / every
+        after = self._moved(grey, focal, seconds) if same else None
+        before, self._before, self._grey, self._stamp_ns = self._before, after, grey, image.stamp_ns
+        return None if before is None or after is None else 0.5 * (before + after)
+
+    def _moved(self, grey: Array, focal: Array, seconds: float) -> Array | None:
+        """The angular velocity (2,) rad/s by which the last picture became this one."""
+        if self._window is None or self._window.shape != grey.shape:
+            self._window = np.asarray(cv2.createHanningWindow(grey.shape[::-1], cv2.CV_32F))
+        assert self._grey is not None
+        shift, response = cv2.phaseCorrelate(self._grey, grey, self._window)
+        if response < LEAST_RESPONSE or max(np.abs(shift)) > MOST_SHIFT * grey.shape[1]:
+            return None
+        right, down = np.array(shift) / (focal * seconds)
+        return np.array([down, -right])
+
+
+@dataclass(slots=True, eq=False)
+class SensorEstimate:
+    """The noise, the offset and the lag of one stream's depth."""
+
+    depth_to_colour: DepthToColour = field(default_factory=DepthToColour)
+    _motion: PictureMotion = field(default_factory=PictureMotion)
+    _turns: deque[Turn] = field(default_factory=lambda: deque(maxlen=TURNS))
+    _noises: deque[float] = field(default_factory=lambda: deque(maxlen=NOISES))
+    _seen: int = 0
+    _camera: tuple[str, tuple[int, ...]] | None = None
+    _waiting: tuple[float, Array] | None = None  # of the last frame: when it was, and its offset
+
+    def forget(self) -> None:
+        """Begin with another stream."""
+        self.depth_to_colour.forget()
+        self._forget_own()
+
+    def _forget_own(self) -> None:
+        self._motion.forget()
+        self._turns.clear()
+        self._noises.clear()
+        self._seen, self._waiting = 0, None
+
+    def register(self, image: DepthImage) -> DepthImage:
+        """The image with its depth brought upon its colour, as `DepthToColour.register` does; measures both.
+
+        Another camera begins anew.
+        """
+        camera = image.frame_id, image.depth.shape
+        if self._camera not in (None, camera):
+            self._forget_own()
+        self._camera = camera
+        if self._seen % NOISE_EVERY == 0:
+            self._measure_noise(image)
+        self._seen += 1
+        registered = self.depth_to_colour.register(image)
+        if image.rgb is not None:
+            self._note_turn(image)
+        return registered
+
+    def text(self) -> dict[str, str]:
+        """What is known, in words, by what `/diagnostics` calls it; without what no frame told."""
+        noise, offset, lag = self.noise, self.depth_to_colour.text(), self.lag
+        return {
+            **({} if noise is None else {"depth noise (a Kinect v1 has 1)": f"{noise:.2f}"}),
+            **({"depth is turned against colour by": offset} if offset else {}),
+            **({} if lag is None else {"depth is behind colour by": lag.text()}),
+        }
+
+    def _note_turn(self, image: DepthImage) -> None:
+        """Put the offset of the frame before beside its velocity, which this frame tells."""
+        velocity, found = self._motion.see(image), self.depth_to_colour.found
+        if velocity is not None and self._waiting is not None:
+            self._turns.append(Turn(self._waiting[0], velocity, self._waiting[1]))
+        self._waiting = None if found is None else (1e-9 * image.stamp_ns, found[:2])
+
+    def _measure_noise(self, image: DepthImage) -> None:
+        noise = measured_noise(thinned(image.depth))
+        if noise is not None:
+            self._noises.append(noise)
+
+    @property
+    def noise(self) -> float | None:
+        """The noise of depth in that of a Kinect v1, the median of the last frames that told it; None before any."""
+        return float(np.median(self._noises.copy())) if self._noises else None
+
+    @property
+    def lag(self) -> Lag | None:
+        """How late depth is; None where it is not known within 10 ms, as of a camera that hardly turns."""
+        found = fit_lag(list(self._turns.copy()))
+        return None if found is None or found.sigma_ms > MOST_SIGMA_MS else found
+
+
+def fit_lag(turns: list[Turn]) -> Lag | None:
+    """The lag, by least squares of the offsets over the velocities with a constant for each axis.
+
+    None of too few of them, and of a camera that hardly turns.
+
+    The standard deviation is cluster-robust, as the edges of one second err alike, and has a floor.
+    """
+    if len(turns) < LEAST_TURNS:
+        return None
+    velocity, offset = np.array([t.velocity for t in turns]), np.array([t.offset for t in turns])
+    cluster = np.floor(np.array([t.seconds for t in turns]) / CLUSTER_S).astype(np.int64)
+    kept = np.ones(len(turns), np.bool_)
+    for _ in range(ROUNDS):
+        x, y = velocity - velocity[kept].mean(axis=0), offset - offset[kept].mean(axis=0)
+        spread = float(np.sum(x[kept] ** 2))
+        if spread < LEAST_VELOCITY**2 * np.count_nonzero(kept):
+            return None
+        slope = float(np.sum(x[kept] * y[kept])) / spread
+        left = y - slope * x
+        size = np.abs(left) / np.maximum(1.4826 * np.median(np.abs(left), axis=0), 1e-9)
+        kept = (size <= OUTLIER).all(axis=1)
+    names, which = np.unique(cluster[kept], return_inverse=True)
+    if len(names) < LEAST_CLUSTERS:
+        return None
+    pulls = np.bincount(which, np.sum(x[kept] * left[kept], axis=1))
+    variance = float(np.sum(pulls**2)) / spread**2 * len(names) / (len(names) - 1)
+    return Lag(-1e3 * slope, float(np.hypot(1e3 * np.sqrt(variance), FLOOR_MS)))

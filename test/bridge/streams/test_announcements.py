@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the registrar tells, on topics of common_interfaces and, where it is installed, of objreg_msgs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rclpy
+from rclpy.node import Node
+
+from objreg_ros.bridge.messages import closures_msg
+from objreg_ros.bridge.node import qos
+from objreg_ros.bridge.streams.announcements import Announcements
+from objreg_ros.data import LoopClosure, Observation, Reason, Rejected
+
+CLOSURE = LoopClosure(from_ns=5, to_ns=9, T_from_to=np.eye(4), covariance=np.eye(6), labels=("cup",), to_session=1)
+REJECTED = Rejected(reason=Reason.NO_CANDIDATE, from_ns=9, to_ns=9, detail="none of 3")
+SEEN = (Observation(label="cup", object_id=4, xyz=np.array([0.0, 0.0, 1.0])),)
+COMMON = {"constraints", "landmarks", "markers", "refusals", "transforms"}
+WHOLE = {"closure_refusals", "loop_closures", "object_landmarks"}
+
+
+@pytest.fixture
+def node(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Node]:
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
+    rclpy.init()
+    made = Node("teller", namespace="/fleet/robot1")
+    yield made
+    made.destroy_node()
+    rclpy.try_shutdown()
+
+
+def topics(node: Node) -> set[str]:
+    told = node.get_publisher_names_and_types_by_node("teller", "/fleet/robot1")
+    return {name.rpartition("/")[2] for name, _ in told} & (COMMON | WHOLE)
+
+
+def heard(node: Node, kind: type, topic: str, profile: Any) -> list[Any]:
+    """Collects the messages of a topic."""
+    messages: list[Any] = []
+    node.create_subscription(kind, topic, messages.append, profile)
+    return messages
+
+
+def wait_for(node: Node, *heaps: list[Any]) -> None:
+    deadline = time.monotonic() + 20.0
+    while not all(heaps) and time.monotonic() < deadline:
+        rclpy.spin_once(node, timeout_sec=0.1)
+
+
+def test_without_objreg_msgs_the_other_topics_are_as_they_are_with_it(
+    node: Node, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(closures_msg, "LoopClosureMsg", None)
+    telling = Announcements(node)
+    telling.closures([CLOSURE])
+    telling.refusals([REJECTED])
+    telling.landmarks(SEEN, 9, "kinect", {0: "cup"}, 1)
+    assert topics(node) == COMMON
+
+
+def test_with_objreg_msgs_all_that_is_known_is_told_under_the_name_of_the_namespace(node: Node) -> None:
+    if closures_msg.LoopClosureMsg is None:
+        pytest.skip("objreg_msgs is not installed: colcon builds it from this repository")
+    telling = Announcements(node)
+    assert topics(node) == COMMON | WHOLE
+    refusals = heard(node, closures_msg.Refusal, "closure_refusals", qos.room())
+    landmarks = heard(node, closures_msg.ObjectLandmarks, "object_landmarks", qos.room())
+    telling.closures([CLOSURE])
+    closures = heard(node, closures_msg.LoopClosureMsg, "loop_closures", qos.latched())  # it comes late
+    deadline = time.monotonic() + 20.0
+    while node.count_subscribers("closure_refusals") == 0 and time.monotonic() < deadline:
+        time.sleep(0.05)
+    telling.refusals([REJECTED])
+    telling.landmarks(SEEN, 9, "kinect", {0: "cup"}, 1)
+    wait_for(node, closures, refusals, landmarks)
+    assert closures[0].id == closures_msg.closure_id(CLOSURE, "fleet/robot1")
+    assert closures[0].to_moment.robot == refusals[0].to_moment.robot == landmarks[0].robot == "fleet/robot1"
+    assert refusals[0].reason == refusals[0].NO_CANDIDATE and landmarks[0].landmarks[0].id == 4

@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Detections by whichever topic they come, behind a door that only notes what is asked of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from sensor_msgs.msg import Image
+
+from objreg_ros.bridge.camera import lenses
+from objreg_ros.bridge.messages import from_msg, to_msg, vision_from_msg
+from objreg_ros.bridge.streams import detections_in
+from objreg_ros.bridge.streams.detections_in import DetectionsIn
+from objreg_ros.bridge.streams.sync import Drop, Match
+from objreg_ros.data import UNNAMED, ColourImage, DepthImage, Detections, Intrinsics
+
+CAMERA = Intrinsics(fx=60.0, fy=60.0, cx=40.0, cy=30.0, width=80, height=60)
+DEPTH = DepthImage(depth=np.ones((60, 80), np.float32), rgb=None, intrinsics=CAMERA, stamp_ns=5)
+NAMES = {0: "cup", 1: "tv"}
+
+
+class Door:
+    """Notes what it is fed and what is published."""
+
+    most_pixels = 10_000
+
+    def __init__(self) -> None:
+        self.fed: list[tuple[str, int, Any]] = []
+        self.published: list[Any] = []
+        self.acknowledged: list[int] = []
+        self.topics: dict[str, type] = {}
+        self.heard: dict[str, Callable[[Any], None]] = {}
+
+    def listen(self, _kind: type, topic: str, heard: Callable[[Any], None], _profile: Any) -> None:
+        self.heard[topic] = heard
+
+    def listen_to_first(self, _name: str, topics: dict[str, type], decode: Any, heard: Any, *_profiles: Any) -> None:
+        self.topics, self.decode, self.hear = topics, decode, heard
+
+    def sensor(self) -> None: ...
+
+    def feed(self, name: str, stamp_ns: int, payload: Any) -> None:
+        self.fed.append((name, stamp_ns, payload))
+
+    def read(self, _topic: str, decode: Callable[..., Any], *messages: Any) -> Any:
+        return decode(*messages)
+
+    def read_aside(self, _topic: str, decode: Callable[..., Any], message: Any) -> Any:
+        return decode(message)
+
+    def create_publisher(self, *_: Any) -> Any:
+        return SimpleNamespace(
+            publish=self.published.append,
+            wait_for_all_acked=lambda _timeout: self.acknowledged.append(len(self.published)),
+        )
+
+
+def match(message: Any, **more: Any) -> Match:
+    return Match(5, {"detections": message, "labels": {}, **more})
+
+
+def read(inputs: DetectionsIn, message: Any, **more: Any) -> detections_in.Asked:
+    return inputs.read(match(message, **more), DEPTH, None, lenses.Raw(), None)
+
+
+def masks() -> Image:
+    numbers = np.zeros((60, 80), np.uint8)
+    numbers[10:20, 30:50] = 4
+    return Image(
+        header=to_msg.header(5, "camera"), height=60, width=80, step=80, encoding="mono8", data=numbers.tobytes()
+    )
+
+
+def boxes(count: int) -> Detections:
+    xyxy = np.array([[10, 10, 20, 20]], np.float32).repeat(count, axis=0)
+    return Detections(
+        xyxy=xyxy, score=np.ones(count, np.float32), label=("cup",) * count, image_hw=(60, 80), stamp_ns=5
+    )
+
+
+def test_our_table_is_read_with_the_names_that_were_told() -> None:
+    door = Door()
+    inputs = DetectionsIn(door, "table")  # type: ignore[arg-type]
+    door.heard["labels"](to_msg.labels(NAMES))
+    message = to_msg.detections_table(boxes(2), NAMES)
+    door.hear("detections_table", message)
+    assert door.fed == [("labels", 0, NAMES), ("detections", 5, message)]
+    asked = read(inputs, message, labels=NAMES)
+    assert asked.detections.label == ("cup", "cup") and asked.detections.instances is None and asked.names == NAMES
+    assert door.published == []
+
+
+def test_masks_of_our_table_reach_the_segmenter_as_a_message_and_as_a_word() -> None:
+    instances = np.zeros((60, 80), np.uint16)
+    instances[12:18, 11:15] = 1
+    word = replace(boxes(1), instances=instances)
+    for told in (word, to_msg.detections_table(word, NAMES)):
+        seen = read(DetectionsIn(Door(), "table"), told, labels=NAMES).detections  # type: ignore[arg-type]
+        np.testing.assert_array_equal(seen.instances, instances)
+
+
+def test_a_surplus_picture_is_fed_as_one() -> None:
+    door = Door()
+    DetectionsIn(door, "table")  # type: ignore[arg-type]
+    door.hear("detections_table", to_msg.surplus(5, "camera"))
+    assert door.fed == [("detections", 5, Drop.SURPLUS)]
+
+
+def test_masks_bring_a_table_of_names_that_is_everywhere_before_their_objects() -> None:
+    door = Door()
+    inputs = DetectionsIn(door, "masks")  # type: ignore[arg-type]
+    door.hear("masks", masks())
+    assert [name for name, *_ in door.fed] == ["labels", "detections"]
+    asked = read(inputs, masks())
+    assert asked.detections.label == (UNNAMED,) and asked.detections.instances is not None
+    assert np.bincount(asked.detections.instances.ravel())[1:].tolist() == [200]
+    assert [from_msg.labels(message) for message in door.published] == [{}] and door.acknowledged == [1]
+    inputs._names = {4: "cup"}
+    for _ in range(2):
+        assert read(inputs, masks()).names == {0: "cup"}
+    assert [from_msg.labels(message) for message in door.published] == [{}, {0: "cup"}] and door.acknowledged == [1, 2]
+
+
+def test_boxes_are_of_the_size_of_the_raw_picture_where_there_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    met: list[tuple[int, int]] = []
+    monkeypatch.setattr(vision_from_msg, "boxes", lambda _message, _names, image_hw: met.append(image_hw) or boxes(1))
+    inputs = DetectionsIn(Door(), "auto")  # type: ignore[arg-type]
+    read(inputs, SimpleNamespace())
+    read(inputs, SimpleNamespace(), image=Image(height=120, width=160))
+    read(inputs, SimpleNamespace(), image=ColourImage(rgb=np.zeros((90, 120, 3), np.uint8), stamp_ns=5))
+    assert met == [(60, 80), (120, 160), (90, 120)]
+
+
+def test_boxes_of_a_compressed_picture_are_of_the_size_of_its_camera(monkeypatch: pytest.MonkeyPatch) -> None:
+    met: list[tuple[int, int]] = []
+    monkeypatch.setattr(vision_from_msg, "boxes", lambda _message, _names, image_hw: met.append(image_hw) or boxes(1))
+    inputs = DetectionsIn(Door(), "auto")  # type: ignore[arg-type]
+    of_colour = to_msg.camera_info(replace(CAMERA, width=160, height=120), 5, "colour")
+    inputs.read(match(SimpleNamespace()), DEPTH, of_colour, lenses.Raw(), None)
+    assert met == [(120, 160)]
+
+
+def test_a_table_that_another_tells_meanwhile_is_told_again_with_the_names_that_were_met() -> None:
+    door = Door()
+    inputs = DetectionsIn(door, "auto")  # type: ignore[arg-type]
+    inputs._names = {4: "sofa"}
+    assert read(inputs, masks()).names == {0: "sofa"}
+    door.heard["labels"](to_msg.labels(NAMES))  # our own detector was started beside
+    assert read(inputs, masks()).names == {**NAMES, 2: "sofa"}
+    assert from_msg.labels(door.published[-1]) == {**NAMES, 2: "sofa"} and len(door.published) == 2
+    door.heard["labels"](door.published[-1])  # its own word
+    read(inputs, masks())
+    assert len(door.published) == 2
+
+
+def test_boxes_without_vision_msgs_are_refused_with_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(detections_in.SOURCES, "vision_msgs", {"detections_in": None})
+    with pytest.raises(ValueError, match="install ros-jazzy-vision-msgs"):
+        DetectionsIn(Door(), "vision_msgs")  # type: ignore[arg-type]
+
+
+def test_a_picture_that_is_no_mask_is_not_taken() -> None:
+    door = Door()
+    DetectionsIn(door, "masks")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="expected an encoding of mono8"):
+        door.decode("masks", Image(height=1, width=1, step=3, encoding="rgb8", data=b"abc"))
+
+
+def test_names_that_a_foreign_detector_takes_back_are_gone() -> None:
+    inputs = DetectionsIn(Door(), "auto")  # type: ignore[arg-type]
+    inputs._hear_names(SimpleNamespace(class_map=[SimpleNamespace(class_id=4, class_name="cup")]))
+    assert read(inputs, masks()).detections.label == ("cup",)
+    inputs._hear_names(SimpleNamespace(class_map=[]))
+    assert read(inputs, masks()).detections.label == (UNNAMED,)

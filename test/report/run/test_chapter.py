@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a run's part of the page says."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from objreg_ros.report.page import page
+from objreg_ros.report.run.chapter import chapter
+from objreg_ros.report.run.story import Story
+from objreg_ros.truth import Truth
+from report.runs import TRUTH, summary, tracked
+
+FINDING = {"what": "No image was read.", "cause": "All <malformed>.", "todo": "objreg inspect x", "anchor": "no-images"}
+
+
+def view(told: dict[str, Any], truth: Truth = TRUTH) -> dict[str, Any]:
+    return chapter(Story.of("walk", told, truth), None)
+
+
+def test_every_pair_has_a_row_with_its_numbers() -> None:
+    told = summary(false=True)
+    told["refusals"][1]["evidence"] = {"score": 0.31, "odds": -2.0}
+    rows = {row["key"]: row for row in view(told)["pairs"]["rows"]}
+    assert len(rows) == 8 and rows["c4"]["name"] == "false" and round(rows["c4"]["centimetres"]) == 50
+    assert (rows["r1"]["name"], rows["r1"]["score"], rows["r1"]["odds"]) == ("texture disagrees", 0.31, -2.0)
+    assert rows["r0"]["centimetres"] is None
+
+
+def test_a_run_tells_how_it_was_made() -> None:
+    made = {"command": "objreg offline x", "version": "0.1.0", "commit": "abc-dirty", "date": "2026-01-01",
+            "model": {"name": "cups.onnx", "sha256": "0123"}, "params": {"detector.threshold": 0.4}}  # fmt: skip
+    rows = dict(view({**summary(), "about": made})["about"])
+    assert rows["version"] == "0.1.0 abc-dirty" and rows["not the defaults"] == "detector.threshold = 0.4"
+    assert rows["model"] == "cups.onnx (sha256 0123…)" and rows["command"] == "objreg offline x"
+    assert view(summary())["about"] == []
+
+
+def test_findings_are_told_in_the_head_and_escaped() -> None:
+    text = page([(Story.of("walk", {**summary(), "findings": [FINDING]}, TRUTH), None)])
+    head = text[: text.index('class="tiles"')]
+    assert "No image was read." in head and "All &lt;malformed&gt;." in head
+    assert "<code>objreg inspect x</code>" in head and "no-images" in head
+
+
+def test_a_run_with_findings_does_not_say_that_nothing_was_sure_enough() -> None:
+    told = {**summary(), "constraints": []}
+    assert view(told)["said"].endswith("nothing in this run was sure enough.")
+    assert view({**told, "findings": [FINDING]})["said"] == "No loop was closed."
+    assert view({"frames": 0, "constraints": []})["said"] == "No loop was closed."
+
+
+def test_one_loop_is_counted_in_the_singular() -> None:
+    told = summary()
+    assert view({**told, "constraints": told["constraints"][:1]})["said"].startswith("1 loop closed by ")
+    assert view(told)["said"].startswith(f"{len(told['constraints'])} loops closed by ")
+
+
+def test_without_odometry_the_truth_is_drawn() -> None:
+    told = summary()
+    told["glimpses"] = [{**row, "T_odom_camera": None} for row in told["glimpses"]]
+    way = view(told)["way"]
+    assert "that of the ground truth" in way["words"] and [mark for mark, _ in way["legend"]] == ["true", "accepted"]
+    assert 'data-pair="c0"' in way["drawing"]["wide"]
+    assert "neither odometry nor ground truth" in view(told, Truth([]))["way"]["words"]
+
+
+def test_without_odometry_and_truth_our_own_tracking_is_drawn_in_its_longest_stretch() -> None:
+    told = summary()
+    rows, lost = told["glimpses"], len(told["glimpses"]) // 4
+    told["glimpses"] = [
+        {**row, "T_odom_camera": None, "tracked": {"session": int(k >= lost), "T_session_camera": row["T_odom_camera"]}}
+        for k, row in enumerate(rows)
+    ]
+    way = view(told, Truth([]))["way"]
+    assert f"{len(rows) - lost} of {len(rows)} frames" in way["words"]
+    assert way["legend"][0] == ("tracked", "our own tracking") and "line tracked" in way["drawing"]["wide"]
+    assert way["scene"]["ways"][0]["name"] == "our own tracking"
+
+
+def test_our_own_tracking_is_drawn_corrected_with_what_of_it_is_left_out() -> None:
+    lost = tracked(begins=45)
+    lost["constraints"] = []
+    for told, words in ((tracked(), "120 of 120 frames"), (lost, "45 frames in 1 more sessions are not: nothing ties")):
+        way = view(told)["way"]
+        assert words in way["words"] and "There is no odometry" in way["words"]
+        assert ("tracked", "our own tracking") in way["legend"] and ("corrected", "corrected") in way["legend"]
+        assert 'class="line tracked"' in way["drawing"]["wide"]
+    assert "than our own tracking" in next(tile for tile in view(tracked())["tiles"] if "error" in tile["name"])["note"]
+    assert page([(Story.of("walk", tracked(), TRUTH), None)])

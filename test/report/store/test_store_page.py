@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A store as a page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+from registration.samples import box
+
+from objreg_ros.memory.sighting import Sighting
+from objreg_ros.memory.store import Store
+from objreg_ros.report.store.portraits import TILE
+from objreg_ros.report.store.store_page import store_page
+from objreg_ros.report.store.store_survey import survey
+from report.places import at, cup_and_book, store_of, told
+
+
+class Rows(HTMLParser):
+    """Counts tags."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: object) -> None:
+        self.tags.append(tag)
+
+
+def tags(page: str) -> list[str]:
+    reader = Rows()
+    reader.feed(page)
+    return reader.tags
+
+
+def test_a_page_has_all_sessions_all_objects_and_the_pictures_that_there_are(tmp_path: Path) -> None:
+    found = survey(cup_and_book(tmp_path / "s.db"))
+    page = store_page(found, {found.landmarks[0].landmark: np.zeros((TILE, TILE, 3), np.uint8)})
+    assert "Session 0" in page and "Session 1" in page and "x [m]" in page
+    assert tags(page).count("tr") == 1 + len(found.landmarks) and tags(page).count("img") == 1
+    assert "http" not in page.replace("http://www.w3.org", "")
+
+
+def test_a_page_says_what_moved_or_that_no_constraint_shows_it(tmp_path: Path) -> None:
+    shown = [(1.0, 0, at(0.0)), (2.0, 0, at(0.4))]
+    still = store_page(survey(store_of(tmp_path / "a.db", shown)), {})
+    moved = store_page(survey(store_of(tmp_path / "b.db", shown, [told(1.0, 2.0), told(1.0, 9.0)])), {})
+    assert "No constraint of this store shows that an object moved" in still
+    assert "went 0.40 m between 0.0 s of session 0 and 1.0 s of session 0" in moved
+    assert "1 constraints tell of another" in moved
+
+
+def test_labels_are_escaped_and_an_empty_store_has_a_page(tmp_path: Path) -> None:
+    file = store_of(tmp_path / "s.db", [(1.0, 0, (box("<b>", (0, 0, 1)),))])
+    assert "<b>" not in store_page(survey(file), {})
+    Store(tmp_path / "empty.db").close()
+    assert "The store is empty" in store_page(survey(tmp_path / "empty.db"), {})
+
+
+class Counted(tuple[Sighting, ...]):
+    """Sightings that count how often all of them are gone through."""
+
+    times = 0
+
+    def __iter__(self) -> Iterator[Sighting]:
+        self.times += 1
+        return super().__iter__()
+
+
+def test_how_often_the_sightings_are_gone_through_does_not_grow_with_the_objects(tmp_path: Path) -> None:
+    times = []
+    for count in (2, 12):
+        objects = tuple(box(f"thing {k}", (k, 0, 1), instance=k + 1) for k in range(count))
+        found = survey(store_of(tmp_path / f"{count}.db", [(1.0, 0, objects), (2.0, 1, objects)]))
+        sightings = Counted(found.sightings)
+        assert len(found.landmarks) >= count and store_page(replace(found, sightings=sightings), {})
+        times.append(sightings.times)
+    assert times[0] == times[1]
