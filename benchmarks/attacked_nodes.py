@@ -111,7 +111,7 @@ class Siege:
 
         self.name, self.room, self.tally, self.folder = room, ROOMS[room], Tally(), folder
         self.graph = borrowed("ros/graph.py").Graph(self.DOMAIN + list(ROOMS).index(room), folder)
-        self.graph.hear(Header, "/finished")
+        self.graph.receive(Header, "/finished")
         self._options = ["-p reliable:=true", *self.options()]
         if room == "detector":
             tiny = borrowed("detector/tiny_model.py")
@@ -204,7 +204,7 @@ class Siege:
                 self._publish(topic, message)
             for _ in range(5):
                 self.graph.executor.spin_once(timeout_sec=0.02)
-            told = self.graph.heard["/finished"]
+            told = self.graph.received["/finished"]
             if any(m.frame_id == f"{self.name} published" and stamp_of(m) in stamps for m in told):
                 told.clear()
                 return True
@@ -213,11 +213,11 @@ class Siege:
     def settle(self, seed: int) -> None:
         """The books of the node balance: received = published + waiting + dropped."""
         node = f"/{self.name}"
-        self.graph.books.pop(node, None)
+        self.graph.counters.pop(node, None)
         until = time.monotonic() + THROUGH_S
-        while node not in self.graph.books and time.monotonic() < until and self._alive():
+        while node not in self.graph.counters and time.monotonic() < until and self._alive():
             self.graph.executor.spin_once(timeout_sec=0.1)
-        book = self.graph.books.get(node)
+        book = self.graph.counters.get(node)
         if book is None:
             self.tally.find(seed - 1, "hang", "no books on /diagnostics", self._last_words())
         elif book.received != book.published + book.waiting + sum(book.dropped.values()):

@@ -219,7 +219,7 @@ def _ask(exchange: Any, honest: Side) -> Iterable[bytes | None]:
     """The requests for an honest peer's keyframes."""
     for summary in honest.summaries:
         exchange.sender(summary)
-        yield exchange.hear(summary, 0.5)
+        yield exchange.receive(summary, 0.5)
 
 
 def _receive(exchange: Any, what: bytes, packed: bytes) -> None:
@@ -227,7 +227,7 @@ def _receive(exchange: Any, what: bytes, packed: bytes) -> None:
     try:
         if what == SUMMARY:
             exchange.sender(packed)
-            exchange.hear(packed, 0.5)
+            exchange.receive(packed, 0.5)
         elif what == REQUEST:
             exchange.note(packed, 0.5)
         elif exchange.awaits(packed):

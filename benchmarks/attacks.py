@@ -5,7 +5,7 @@
     python benchmarks/attacks.py --only frame --seed 1234
 
 For each target the trials, how many of them were refused as they should be (ValueError or OSError), and the findings:
-``bug`` (another exception; in a node it is caught at the door), ``death`` (the end of the process), ``hang`` (more than
+``bug`` (another exception; in a node it is caught at the node), ``death`` (the end of the process), ``hang`` (more than
 5 s of the processor, or 30 s of waiting), ``greed`` (more than 500 MB), ``wrong`` (an answer that is not true, without
 an error) and ``outside`` (a file written outside of the folder that was given). The JSON holds every kind of finding
 with seeds; ``--only TARGET --seed S`` makes that trial again, and shows the traceback. ``decoded`` are the messages

@@ -39,16 +39,16 @@ TABLES = ("constraints", "refusals")
 
 
 def measure(
-    recordings: Sequence[Path], workers: int, folder: Path, hear: Callable[[int], None] = lambda ended: None
+    recordings: Sequence[Path], workers: int, folder: Path, receive: Callable[[int], None] = lambda ended: None
 ) -> dict[str, Any]:
-    """The figures of one run over all recordings; ``hear`` is told how many have ended."""
+    """The figures of one run over all recordings; ``receive`` is told how many have ended."""
     settings = read_settings(None, ["registrar.threads=1", "detector.threads=1"])
     work = BatchWork.of(Asked(settings), folder, ("batch",))
     start, ended = time.perf_counter(), list[Done[Path, None]]()
     for done in spread(work, recordings, workers):
         done.result()
         ended.append(done)
-        hear(len(ended))
+        receive(len(ended))
     seconds = time.perf_counter() - start
     rows = _written(work, recordings)
     return {
@@ -84,7 +84,7 @@ class Killer:
         self._after = after
 
     def __call__(self, ended: int) -> None:
-        """Hear how many have ended."""
+        """Receive how many have ended."""
         if ended == self._after:
             workers = [child for child in multiprocessing.active_children() if "Dask" in child.name]
             os.kill(int(workers[0].pid or 0), signal.SIGKILL)

@@ -50,7 +50,7 @@ class Count:
 
 
 class Robot:
-    """Publishes frames of a camera that drives on, and hears which keyframes are announced."""
+    """Publishes frames of a camera that drives on, and receives which keyframes are announced."""
 
     def __init__(self) -> None:
         import rclpy
@@ -71,7 +71,7 @@ class Robot:
         self._send("labels", to_msg.labels(NAMES), qos.latched())
 
     def go_on(self) -> None:
-        """Publish the next frame if it is due, and hear what came meanwhile."""
+        """Publish the next frame if it is due, and receive what came meanwhile."""
         from objreg_ros.bridge.messages import to_msg
 
         if time.monotonic() >= self._next_s:

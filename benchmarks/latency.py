@@ -2,9 +2,10 @@
 """The live graph at the camera's rate with 1, 4 and 8 objects in view: latency, processor, memory, and what was lost.
 
 Simulated recordings are played in real time through the three node processes. A frame's end-to-end latency is from the
-arrival of its image to the registrar's receipt for it; that of a frame that completed a keyframe includes the whole
-search for loops. A constraint's latency is from the arrival of the image that it is about: until its keyframe is
-complete (a second at most), searched for and told. The books say what every node dropped and why: in = out + dropped.
+arrival of its image to the registrar's acknowledgement for it; that of a frame that completed a keyframe includes the
+whole search for loops. A constraint's latency is from the arrival of the image that it is about: until its keyframe is
+complete (a second at most), searched for and published. The counters say what every node dropped and why: in = out +
+dropped.
 
     python benchmarks/latency.py --json latency.json
     python benchmarks/latency.py --objects 4 --composed 3     three processes and one in turn, three times each
@@ -35,7 +36,7 @@ TICKS = os.sysconf("SC_CLK_TCK")
 
 
 class Witness:
-    """Hears images and receipts, and remembers when."""
+    """Receives images and acknowledgements, and remembers when."""
 
     def __init__(self) -> None:
         import rclpy
@@ -57,7 +58,7 @@ class Witness:
         self._node = rclpy.create_node("witness", context=self._context)
         self._node.create_subscription(CompressedImage, "image/compressed", self._see, qos.sensor(True))
         self._node.create_subscription(Header, "finished", self._finish, qos.room(depth=1000))
-        self._node.create_subscription(Odometry, "constraints", self._hear, qos.latched(qos.KEPT_CONSTRAINTS))
+        self._node.create_subscription(Odometry, "constraints", self._receive, qos.latched(qos.KEPT_CONSTRAINTS))
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._executor.spin, daemon=True)
@@ -66,29 +67,29 @@ class Witness:
     def _see(self, message: Any) -> None:
         self.seen[self._stamp_ns(message)] = time.monotonic()
 
-    def _finish(self, receipt: Any) -> None:
-        node, verdict, *_ = receipt.frame_id.split(" ")
+    def _finish(self, acknowledgement: Any) -> None:
+        node, verdict, *_ = acknowledgement.frame_id.split(" ")
         if verdict == "published":
-            self.done[node, self._stamp_ns(receipt)] = time.monotonic()
+            self.done[node, self._stamp_ns(acknowledgement)] = time.monotonic()
 
-    def _hear(self, constraint: Any) -> None:
+    def _receive(self, constraint: Any) -> None:
         self.told.append((self._stamp_ns(constraint), time.monotonic()))
 
     @property
     def span(self) -> tuple[float, float]:
-        """From the first image to the last receipt, in seconds of the clock that never jumps.
+        """From the first image to the last acknowledgement, in seconds of the clock that never jumps.
 
-        `click.ClickException` where nothing was heard.
+        `click.ClickException` where nothing was received.
         """
         if not self.seen or not self.done:
             raise click.ClickException(
-                "expected images on image/compressed and receipts on finished, "
+                "expected images on image/compressed and acknowledgements on finished, "
                 f"got {len(self.seen)} and {len(self.done)}; does the ROS_DOMAIN_ID reach this process?"
             )
         return min(self.seen.values()), max(self.done.values())
 
     def latency_ms(self, node: str) -> dict[str, float]:
-        """p50 and p95 from the image to the node's receipt, and of how many frames."""
+        """p50 and p95 from the image to the node's acknowledgement, and of how many frames."""
         return self._latency_ms([(stamp, at) for (name, stamp), at in self.done.items() if name == node])
 
     def constraint_ms(self) -> dict[str, float]:
@@ -198,7 +199,7 @@ def books_of(live: Live) -> dict[str, Any]:
             "lost_in_transport": balance.lost,
             "stage_ms": {stage: {"p50": p50, "p95": p95} for stage, (p50, p95) in balance.stage_ms.items()},
         }
-        for node, balance in live.books.items()
+        for node, balance in live.counters.items()
     }
 
 

@@ -47,7 +47,7 @@ TOLD = ("stored keyframes", "stored unsearched", "waiting keyframes", "constrain
 
 
 class Gauge:
-    """Hears what the nodes tell of themselves on /diagnostics, in a thread of its own."""
+    """Receives what the nodes tell of themselves on /diagnostics, in a thread of its own."""
 
     def __init__(self) -> None:
         from diagnostic_msgs.msg import DiagnosticArray
@@ -62,13 +62,13 @@ class Gauge:
         self._context = Context()
         self._context.init(args=[])
         node = Node("gauge", context=self._context)
-        node.create_subscription(DiagnosticArray, "/diagnostics", self._hear, qos.room(depth=100))
+        node.create_subscription(DiagnosticArray, "/diagnostics", self._receive, qos.room(depth=100))
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(node)
         self._thread = threading.Thread(target=self._executor.spin, daemon=True)
         self._thread.start()
 
-    def _hear(self, message: Any) -> None:
+    def _receive(self, message: Any) -> None:
         for status in message.status:
             name, _, what = status.name.strip("/").partition(": ")
             if what == "frames":

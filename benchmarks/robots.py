@@ -120,7 +120,7 @@ def packed(team: Team) -> tuple[list[LoopClosure], dict[str, Any]]:
 
 
 class Peers:
-    """A registrar for each robot; what one says all others hear at once. ``now`` is of the frames, in s."""
+    """A registrar for each robot; what one says all others receive at once. ``now`` is of the frames, in s."""
 
     def __init__(self, team: Team, bytes_per_second: float) -> None:
         self.registrars = {name: Registrar(PARAMS) for name in team}
@@ -138,7 +138,7 @@ class Peers:
             return
         self.sizes.append(len(summary))
         for other in self._others(name):
-            if (request := other.hear(summary)) is not None:
+            if (request := other.receive(summary)) is not None:
                 self.exchanges[name].note(request, now)
 
     def answer(self, now: float) -> None:
@@ -168,10 +168,10 @@ def each_its_own(team: Team, kilobytes: float) -> tuple[list[LoopClosure], dict[
     return peers.closures, {
         "summary_bytes": dict(zip(("p50", "most"), np.percentile(peers.sizes, (50, 100)).tolist(), strict=True)),
         "kB_per_s": {
-            name: 1e-3 * exchange.books["bytes sent"] / (now - 1e-9 * team[name].frames[0].stamp_ns)
+            name: 1e-3 * exchange.counters["bytes sent"] / (now - 1e-9 * team[name].frames[0].stamp_ns)
             for name, exchange in peers.exchanges.items()
         },
-        "books": {name: dict(sorted(exchange.books.items())) for name, exchange in peers.exchanges.items()},
+        "books": {name: dict(sorted(exchange.counters.items())) for name, exchange in peers.exchanges.items()},
         "waiting": {name: exchange.waiting for name, exchange in peers.exchanges.items()},
     }
 

@@ -35,8 +35,8 @@ from frame_cost import frame_costs, table_frames
 from tqdm import tqdm
 
 from objreg_ros.data import Intrinsics, ObjectCloud, View
-from objreg_ros.memory.books import Books
 from objreg_ros.memory.checksum import sealed_keyframe, sealed_object
+from objreg_ros.memory.counters import Counters
 from objreg_ros.memory.descriptor import SIZE
 from objreg_ros.memory.landmarks import Landmarks
 from objreg_ros.memory.migration import insert
@@ -179,28 +179,28 @@ def _fill(path: Path, objects: int, draw: np.random.Generator, points: int) -> N
             keyframe = make_keyframe(number, draw, points)
             store.add(keyframe, [_landmark(s, i) for i, s in enumerate(sightings_of(keyframe))])
         for shift in range(made, keyframes, made):
-            with store._changing() as (transaction, books):
-                _copy_keyframes(transaction, books, shift, made)
-                _copy_objects(transaction, books, shift, made, draw)
+            with store._changing() as (transaction, counters):
+                _copy_keyframes(transaction, counters, shift, made)
+                _copy_objects(transaction, counters, shift, made, draw)
 
 
-def _copy_keyframes(transaction: Any, books: Books, shift: int, made: int) -> None:
+def _copy_keyframes(transaction: Any, counters: Counters, shift: int, made: int) -> None:
     for found in transaction.execute("SELECT * FROM keyframe WHERE id <= ?", (made,)).fetchall():
         moment = {"id": found["id"] + shift, "stamp_ns": found["stamp_ns"] + shift * 10**9}
         row = sealed_keyframe({**found, **moment})
         insert(transaction, "keyframe", row)
-        books.enter("keyframe", row)
+        counters.enter("keyframe", row)
 
 
-def _copy_objects(transaction: Any, books: Books, shift: int, made: int, draw: np.random.Generator) -> None:
+def _copy_objects(transaction: Any, counters: Counters, shift: int, made: int, draw: np.random.Generator) -> None:
     rows = [dict(row) for row in transaction.execute("SELECT * FROM object WHERE keyframe <= ?", (made,))]
     for row in rows:
         descriptor = np.frombuffer(row["descriptor"], np.float32) + draw.normal(0, 0.3, SIZE).astype(np.float32)
         landmark = row["landmark"] + shift // VIEWS * PER_KEYFRAME
         row.update(keyframe=row["keyframe"] + shift, landmark=landmark, descriptor=descriptor.tobytes())
-        copy = sealed_object({**row, "id": books.next("object")})
+        copy = sealed_object({**row, "id": counters.next("object")})
         insert(transaction, "object", copy)
-        books.enter("object", copy)
+        counters.enter("object", copy)
 
 
 def _landmark(sighting: Sighting, number: int) -> Sighting:

@@ -214,7 +214,7 @@ def start_all(field: Field) -> None:
     given = [f"-p {name}:={value}" for name, value in {**SIMULATED, "seed": 1}.items()]
     robots = f"-p robots:=[{','.join(field.robots)}]"
     field.node("registrar", home, "registrar", robots, f"-p store:={field.folder / 'team.db'}", *given)
-    field.start("witness", home, WIFI, ENDS, "hear", str(field.folder))
+    field.start("witness", home, WIFI, ENDS, "receive", str(field.folder))
     for host, robot in enumerate(field.robots):
         field.node(f"{robot}/keyframer", host, "keyframes", f"-r __ns:=/{robot}", "-p reliable:=true")
         field.start(f"{robot}/drive", host, LOCAL, ENDS, "drive", str(field.folder), robot)
@@ -227,7 +227,7 @@ def start_all(field: Field) -> None:
         return ready and nodes <= told.keys() and all(met)
 
     if not field.wait(START_S, "all to find each other", there):
-        raise click.ClickException(f"expected {', '.join(nodes)} to meet, heard of {', '.join(field.told()['told'])}")
+        raise click.ClickException(f"expected {', '.join(nodes)} to meet, known {', '.join(field.told()['told'])}")
 
 
 def is_settled(told: Mapping[str, Mapping[str, str]], frames: Mapping[str, int]) -> bool:
@@ -247,7 +247,7 @@ def end_all(field: Field) -> int:
     field.wait(LAST_S, "the last keyframe of each robot", lambda: came() >= len(field.robots))
     Path(field.folder, SAVE).touch()
     field.wait(END_S, "the registrar to save", Path(field.folder, SAVED).exists)
-    time.sleep(2.0)  # the witness hears what that settled, and writes it down
+    time.sleep(2.0)  # the witness receives what that settled, and writes it down
     last = came()
     field.end("registrar")
     return last
@@ -286,7 +286,7 @@ def machine_seconds() -> float:
 
 
 def figures_of(
-    team: Team, told: Mapping[str, Mapping[str, str]], heard: Mapping[str, Any], store: Path
+    team: Team, told: Mapping[str, Mapping[str, str]], received: Mapping[str, Any], store: Path
 ) -> dict[str, Any]:
     """What a run came to."""
     here = told["registrar"]
@@ -312,13 +312,13 @@ def figures_of(
         for node, words in told.items()
     }
     truths = Truths({name: robot.truth for name, robot in team.items()})
-    found = [closure_of(words, list(team)) for words in heard["closures"]]
+    found = [closure_of(words, list(team)) for words in received["closures"]]
     errors = [(closure, error) for closure in found if (error := truths.error(closure)) is not None]
     wrong = [closure for closure, error in errors if not within(error, FALSE)]
     return {
         "robots": robots,
         "ms": stages,
-        "hurried": heard["hurried"] - sum(n["stored unsearched"] for n in robots.values()),
+        "hurried": received["hurried"] - sum(n["stored unsearched"] for n in robots.values()),
         "refused": {key.split()[1]: int(value) for key, value in here.items() if key.startswith("rejected: ")},
         "dropped": {node: words for node, words in dropped.items() if words},
         "closures": len(found),

@@ -20,7 +20,7 @@ import click
 READY, GO, SPENT, SAVE, SAVED, TOLD = "ready", "go", "spent", "save", "saved", "told.json"
 LINGER_S = 2.0  # after the last frame, in which what is late may come
 FOLDER = click.Path(exists=True, file_okay=False, path_type=Path)
-LATCHED = "labels"  # which the registrar hears too
+LATCHED = "labels"  # which the registrar receives too
 
 
 @click.group()
@@ -88,7 +88,7 @@ def _await(node: Any, there: Callable[[], bool]) -> None:
 
 @main.command()
 @click.argument("folder", type=FOLDER)
-def hear(folder: Path) -> None:
+def receive(folder: Path) -> None:
     """Write down once a second what nodes tell of themselves, until the process is ended.
 
     And the constraints so far, and for how many keyframes some place was not looked at, for want of time.

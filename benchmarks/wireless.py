@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What comes of keyframes that a robot sends over Wi-Fi: two hosts, a bad link between them, and real nodes on both.
 
-One node sends a message of 80 kB every second, reliable and transient local, the other one hears it. For each profile
-of Fast DDS and each trouble of the link: how many were sent, came, came twice, how old they were when they came, and
-what both ends sent. It needs root; benchmarks/hosts.py has the hosts.
+One node sends a message of 80 kB every second, reliable and transient local, the other one receives it. For each
+profile of Fast DDS and each trouble of the link: how many were sent, came, came twice, how old they were when they
+came, and what both ends sent. It needs root; benchmarks/hosts.py has the hosts.
 
     python benchmarks/wireless.py --json OUT
     python benchmarks/wireless.py --trouble 0.2:30 --profiles config/fastdds_wifi.xml --peers
@@ -111,9 +111,9 @@ def summary(lines: Sequence[str], met_s: float, seconds: float, sent_bytes: tupl
 def run(case: Case) -> Result:
     conditions = conditions_of(case.loss, case.delay_ms, case.mbit, case.seed)
     with Hosts(2, conditions) as hosts, tempfile.TemporaryDirectory() as folder:
-        heard, said = Path(folder, "heard"), Path(folder, "said")
+        received, said = Path(folder, "received"), Path(folder, "said")
         start = time.monotonic()
-        hosts.start(1, [sys.executable, ENDS, "hear", str(heard)], environment_of(case, hosts.address(0)))
+        hosts.start(1, [sys.executable, ENDS, "receive", str(received)], environment_of(case, hosts.address(0)))
         command = [
             sys.executable,
             ENDS,
@@ -133,7 +133,7 @@ def run(case: Case) -> Result:
         carry(hosts, sender, case.pause_s)
         seconds = time.monotonic() - met - case.linger_s
         result = summary(
-            heard.read_text().splitlines(), met - start, seconds, (hosts.bytes_sent(0), hosts.bytes_sent(1))
+            received.read_text().splitlines(), met - start, seconds, (hosts.bytes_sent(0), hosts.bytes_sent(1))
         )
         longest = max(link.longest_bytes for link in hosts.relay.links) if hosts.relay else None
         return replace(result, longest_frame=longest)

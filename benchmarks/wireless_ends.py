@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The two ends of benchmarks/wireless.py: one node sends numbered keyframes, the other writes down what it hears.
+"""The two ends of benchmarks/wireless.py: one node sends numbered keyframes, the other writes down what it receives.
 
 Both run in hosts of one machine, so they have one clock. Each line that the receiver writes is a
 message: its number, and its age in seconds.
@@ -59,7 +59,7 @@ def send(count: int, size: int, hz: float, linger_s: float, met: Path | None) ->
 
 @main.command()
 @click.argument("out", type=click.File("w", lazy=False))
-def hear(out: TextIO) -> None:
+def receive(out: TextIO) -> None:
     """Write a line for each message until the process is ended."""
     import rclpy
     from sensor_msgs.msg import CompressedImage

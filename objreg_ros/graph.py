@@ -13,8 +13,8 @@ import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from objreg_ros.bridge.node.door import Door
-from objreg_ros.bridge.node.indoors import Indoors
+from objreg_ros.bridge.node.intra_process import IntraProcessBus
+from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.bridge.node.spin import run_together
 from objreg_ros.detector.node import DetectorNode
 from objreg_ros.keyframes.node import KeyframerNode
@@ -23,7 +23,7 @@ from objreg_ros.registrar.node import RegistrarNode
 from objreg_ros.segmenter.node import SegmenterNode
 
 # In the order in which a frame comes to them: who offers a topic is made before who listens to it.
-NODES: dict[str, Callable[[Indoors], Door]] = {
+NODES: dict[str, Callable[[IntraProcessBus], NodeBase]] = {
     "detector": DetectorNode,
     "segmenter": SegmenterNode,
     "registrar": RegistrarNode,
@@ -47,8 +47,8 @@ def chosen(words: Sequence[str]) -> list[str]:
 
 def main() -> int:
     """The executable ``objreg_graph``."""
-    indoors = Indoors()
-    return run_together([partial(NODES[name], indoors) for name in chosen(sys.argv[1:])])
+    bus = IntraProcessBus()
+    return run_together([partial(NODES[name], bus) for name in chosen(sys.argv[1:])])
 
 
 if __name__ == "__main__":

@@ -290,8 +290,8 @@ class Line:
         self._named = colour_frame.named_registered(inputs.depth, inputs.image)
         self._pace = Pace(timing.max_rate)
         self._imu = Imu(timing.T_camera_imu, timing.frames.between)
-        self._mount = Mount(timing.T_base_camera, timing.frames, self._hear_of_mount)
-        self._stream = CameraStream(self._mount, self._hear_of_mount)
+        self._mount = Mount(timing.T_base_camera, timing.frames, self._on_of_mount)
+        self._stream = CameraStream(self._mount, self._on_of_mount)
         self._level_mount = Mount(timing.T_level_camera, timing.frames)
         self._odom_topic = inputs.odom or ""
         self.run.imu_passed_over = self._imu.counts
@@ -357,13 +357,13 @@ class Line:
                 self._track(self._frames.add(name, stamp_ns, odometry))
         elif name == "imu":
             sample = self._kept(name, partial(from_msg.imu, message))
-            felt = None if sample is None else self._imu.hear(sample)
+            felt = None if sample is None else self._imu.receive(sample)
             if felt is not None:
                 self._feed(name, stamp_ns, felt)
 
     def _take_tf(self, message: Any) -> None:
         """What /tf says; frames wait until the joints that carry the camera are known."""
-        self._kept("tf", partial(self._timing.frames.hear_moving, message))
+        self._kept("tf", partial(self._timing.frames.receive_moving, message))
         reached_ns = self._mount.reached_ns
         if reached_ns is not None:
             self._track(self._frames.add("joints", reached_ns, None))
@@ -480,7 +480,7 @@ class Line:
                 self.run.glimpses[-1]["tracked"] = tracked(self._rooms.registrar)
             self._note(outcome)
 
-    def _hear_of_mount(self, text: str) -> None:
+    def _on_of_mount(self, text: str) -> None:
         self.run.mount = text
 
     def _note(self, outcome: Outcome) -> None:
@@ -519,7 +519,7 @@ def run_offline(
 ) -> Run:
     """Drive the rooms with a recording's records, to their end or to ``max_frames``; what came out.
 
-    ``on_frame`` hears how many frames are through, those that were left out among them. ``recorded`` are detections
+    ``on_frame`` receives how many frames are through, those that were left out among them. ``recorded`` are detections
     that take the place of the detector's.
     """
     line = Line(rooms, inputs, timing or Timing(), max_frames, recorded is not None)

@@ -116,7 +116,7 @@ def _client(workers: int, scheduler: str) -> Iterator[Any]:
 
 
 def _own(distributed: ModuleType, workers: int) -> Any:
-    """Processes of this machine. What they say is not heard: what became of the work comes back."""
+    """Processes of this machine. What they say is not received: what became of the work comes back."""
     return distributed.LocalCluster(
         n_workers=workers,
         threads_per_worker=1,

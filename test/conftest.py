@@ -106,7 +106,7 @@ def pytest_runtest_call() -> Generator[None, object, object]:
 
 
 class Count:
-    """Fails a session of the whole suite in which hardly a test ran, and says so. Under xdist it hears all workers."""
+    """Fails a session of the whole suite in which hardly a test ran, and says so. Under xdist it counts all workers."""
 
     def __init__(self) -> None:
         self.ran = 0

@@ -87,13 +87,13 @@ def test_a_new_file_has_the_permissions_that_any_new_file_has(tmp_path: Path) ->
 
 
 def test_a_pipe_is_written_into(tmp_path: Path) -> None:
-    pipe, heard = tmp_path / "pipe", list[str]()
+    pipe, received = tmp_path / "pipe", list[str]()
     os.mkfifo(pipe)
-    reader = threading.Thread(target=lambda: heard.append(pipe.read_text()))
+    reader = threading.Thread(target=lambda: received.append(pipe.read_text()))
     reader.start()
     write_whole(pipe, "told")
     reader.join(5)
-    assert heard == ["told"] and names(tmp_path) == ["pipe"]
+    assert received == ["told"] and names(tmp_path) == ["pipe"]
 
 
 def test_links_in_a_circle_are_named_and_stay(tmp_path: Path) -> None:
@@ -119,13 +119,13 @@ def test_what_is_made_elsewhere_takes_the_place_behind_a_link(tmp_path: Path) ->
 
 
 def test_what_is_made_elsewhere_is_written_into_a_pipe_which_stays_one(tmp_path: Path) -> None:
-    pipe, heard = tmp_path / "pipe", list[str]()
+    pipe, received = tmp_path / "pipe", list[str]()
     os.mkfifo(pipe)
-    reader = threading.Thread(target=lambda: heard.append(pipe.read_text()), daemon=True)
+    reader = threading.Thread(target=lambda: received.append(pipe.read_text()), daemon=True)
     reader.start()
     made(pipe)
     reader.join(5)
-    assert heard == ["new"] and stat.S_ISFIFO(pipe.stat().st_mode) and names(tmp_path) == ["pipe"]
+    assert received == ["new"] and stat.S_ISFIFO(pipe.stat().st_mode) and names(tmp_path) == ["pipe"]
 
 
 def test_what_is_made_elsewhere_names_the_place_that_takes_nothing(tmp_path: Path) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every node here is: a door through which constraints come once each, wait for a consumer and go to it."""
+"""What every node here is: a node through which constraints come once each, wait for a consumer and go to it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rclpy.clock import Clock, ClockType
 from objreg_ros.adapters.params import AdapterParams
 from objreg_ros.bridge.messages import closures_msg, from_msg
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.door import Door
+from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.data import LoopClosure, Moments
 from objreg_ros.params import Params
 
@@ -28,7 +28,7 @@ def require(kind: object, package: str, install: str) -> None:
         raise ValueError(f"expected the messages of {package}, got none that are installed: {install}")
 
 
-class Adapter(Door):
+class Adapter(NodeBase):
     """The books count constraints. A subclass fills in `hand_over`, and calls `listen_for_closures` when it is made."""
 
     def __init__(self, name: str, *kinds: type[Params]) -> None:
@@ -70,15 +70,15 @@ class Adapter(Door):
                 whole, "objreg_msgs", "build objreg_msgs/ of this repository with colcon, or set input:=constraints"
             )
         if self._params.input != "constraints" and whole is not None:
-            self.listen(whole, "loop_closures", self._hear_whole, kept)
+            self.listen(whole, "loop_closures", self._on_whole, kept)
         if self._params.input != "loop_closures":
-            self.listen(Odometry, "constraints", self._hear_constraint, kept)
+            self.listen(Odometry, "constraints", self._on_constraint, kept)
         self.create_timer(LOOK_S, self.go_through, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def _hear_constraint(self, message: Any) -> None:
+    def _on_constraint(self, message: Any) -> None:
         self._take("constraints", message, from_msg.loop_closure)
 
-    def _hear_whole(self, message: Any) -> None:
+    def _on_whole(self, message: Any) -> None:
         if message.retracted:
             self._retract(message.id)
             return

@@ -7,7 +7,7 @@ import numpy as np
 
 from objreg_ros.adapters.params import BodyParams
 from objreg_ros.bridge.camera import transforms
-from objreg_ros.bridge.node.door import Door
+from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.data import Array, LoopClosure, Odometry
 
 
@@ -17,13 +17,13 @@ class Body:
     Nothing is assumed of frames that nobody ties: a camera's axes are not a body's, and a mapper forgets no edge.
     """
 
-    def __init__(self, door: Door) -> None:
-        params = door.settings.of(BodyParams)
+    def __init__(self, node: NodeBase) -> None:
+        params = node.settings.of(BodyParams)
         self._told = params.mounting
         self._frame = params.base_frame
-        self._frames = transforms.hear_frames(door, self._told is None)
-        self._mount = transforms.Mount(self._told, self._frames, door.get_logger().info)
-        self._remind = door.throttled.remind
+        self._frames = transforms.receive_frames(node, self._told is None)
+        self._mount = transforms.Mount(self._told, self._frames, node.get_logger().info)
+        self._remind = node.throttled.remind
 
     def T_body_camera(self, from_or_to: str, newest: Odometry | None = None) -> Array | None:
         """The pose (4, 4) of a camera's frame on the body; None as long as nobody has said it.

@@ -16,7 +16,7 @@ from objreg_ros.adapters.adapter import Adapter
 from objreg_ros.adapters.body import Body
 from objreg_ros.adapters.odometry_in import OdometryIn
 from objreg_ros.adapters.params import BodyParams, ToG2oParams
-from objreg_ros.bridge.node.door import DroppedError
+from objreg_ros.bridge.node.node_base import DroppedError
 from objreg_ros.bridge.node.spin import run
 from objreg_ros.data import LoopClosure, Moments, Odometry
 from objreg_ros.mapper.adapters.g2o import graph_text

@@ -14,7 +14,7 @@ from std_msgs.msg import Float64MultiArray
 from objreg_ros.adapters.adapter import Adapter, seconds
 from objreg_ros.adapters.params import ToLioSamParams
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.door import DroppedError
+from objreg_ros.bridge.node.node_base import DroppedError
 from objreg_ros.bridge.node.spin import run
 from objreg_ros.data import LoopClosure
 from objreg_ros.mapper.adapters.lio_sam import fill_loop

@@ -10,29 +10,29 @@ from nav_msgs.msg import Odometry as OdometryMsg
 
 from objreg_ros.bridge.messages import from_msg
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.door import Door
+from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.data import Odometry
 from objreg_ros.mapper.params import MapperParams
 from objreg_ros.mapper.restart import Anew, Restart
 
 
 class OdometryIn:
-    """Hears ``odom``; ``follow`` is given every pose that goes on, ``anew`` why it began elsewhere, before that."""
+    """Receives ``odom``; ``follow`` is given every pose that goes on, ``anew`` why it began elsewhere, before that."""
 
-    def __init__(self, door: Door, follow: Callable[[Odometry], object], anew: Callable[[Anew], object]) -> None:
+    def __init__(self, node: NodeBase, follow: Callable[[Odometry], object], anew: Callable[[Anew], object]) -> None:
         self.newest: Odometry | None = None
         self.passed_over = 0
-        self._door, self._follow, self._anew = door, follow, anew
+        self._node, self._follow, self._anew = node, follow, anew
         self._restart = Restart(MapperParams().max_speed, self._pass_over)
-        door.listen(OdometryMsg, "odom", self._hear, door.sensor(qos.ODOMETRY), watched="odom")
+        node.listen(OdometryMsg, "odom", self._receive, node.sensor(qos.ODOMETRY), watched="odom")
 
-    def _hear(self, message: Any) -> None:
-        odometry = self._door.read_aside("odom", from_msg.odometry, message)
+    def _receive(self, message: Any) -> None:
+        odometry = self._node.read_aside("odom", from_msg.odometry, message)
         if odometry is None:
             return
         course = self._restart.admit(odometry)
         if course.anew is not None:
-            self._door.throttled.warn("new_map", f"odometry began anew ({course.anew.value})")
+            self._node.throttled.warn("new_map", f"odometry began anew ({course.anew.value})")
             self._anew(course.anew)
         for admitted in course.poses:
             self.newest = admitted

@@ -22,7 +22,7 @@ from objreg_ros.adapters.odometry_in import OdometryIn
 from objreg_ros.adapters.params import BodyParams, ToRtabmapParams
 from objreg_ros.adapters.rtabmap_nodes import RtabmapNodes
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.door import DroppedError
+from objreg_ros.bridge.node.node_base import DroppedError
 from objreg_ros.bridge.node.spin import run
 from objreg_ros.data import LoopClosure, Moments, Odometry
 from objreg_ros.mapper.adapters.rtabmap import fill_link
@@ -65,7 +65,7 @@ class ToRtabmap(Adapter):
         self._wants_graph = True
         self._graph: Future | None = None
         self._graph_since = -math.inf  # when it was asked for
-        self.listen(MapData, "mapData", self._hear_map, qos.room(depth=10))
+        self.listen(MapData, "mapData", self._on_map, qos.room(depth=10))
         self.listen_for_closures()
 
     # What RTAB-Map and odometry tell
@@ -76,8 +76,8 @@ class ToRtabmap(Adapter):
     def _begin_anew(self, _: Anew) -> None:
         self._odometry = SparseTrajectory()
 
-    def _hear_map(self, message: Any) -> None:
-        is_other = self.read_aside("mapData", self._nodes.hear, message)
+    def _on_map(self, message: Any) -> None:
+        is_other = self.read_aside("mapData", self._nodes.receive, message)
         if is_other:
             self._databases += 1
             self._want_graph()
@@ -112,12 +112,12 @@ class ToRtabmap(Adapter):
             self._get.remove_pending_request(self._graph)
         request = GetMap.Request(global_map=True, optimized=False, graph_only=True)
         self._graph, self._graph_since = self._get.call_async(request), seconds()
-        self._graph.add_done_callback(self._hear_graph)
+        self._graph.add_done_callback(self._on_graph)
 
-    def _hear_graph(self, future: Future) -> None:
+    def _on_graph(self, future: Future) -> None:
         if future.exception() is None and future.result() is not None:
             self._wants_graph = False
-            self._hear_map(future.result().data)
+            self._on_map(future.result().data)
 
     # What it is told
 
@@ -165,9 +165,9 @@ class ToRtabmap(Adapter):
         self._attempts[key] += 1
         future = self._add.call_async(request)
         self._asked = _Asked(key, future, seconds())
-        future.add_done_callback(partial(self._hear_answer, self._asked))
+        future.add_done_callback(partial(self._on_answer, self._asked))
 
-    def _hear_answer(self, asked: _Asked, future: Future) -> None:
+    def _on_answer(self, asked: _Asked, future: Future) -> None:
         if self._asked is None or self._asked.future is not future or future.cancelled():
             return
         self._asked = None

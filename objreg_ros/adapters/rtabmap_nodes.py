@@ -41,7 +41,7 @@ class RtabmapNodes:
     def __len__(self) -> int:
         return len(self._nodes)
 
-    def hear(self, message: Any) -> bool:
+    def receive(self, message: Any) -> bool:
         """Take the nodes of a MapData in; True if they are of another database, and the old ones are forgotten.
 
         Nodes without odometry and intermediate ones, which no link may name, are left out. ValueError for too many, and

@@ -21,7 +21,7 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-from objreg_ros.cli import loudness
+from objreg_ros.cli import verbosity
 from objreg_ros.whole_file import unwritten
 
 # What `objreg --help` says without importing a command. A name without its file is not shown.
@@ -61,7 +61,7 @@ class LazyGroup(click.Group):
         command: click.Command = import_module(f"objreg_ros.cli.{_module(cmd_name)}").command
         from objreg_ros.cli import paths
 
-        return paths.guarded(loudness.heard_by(command))
+        return paths.guarded(verbosity.received_by(command))
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """What a tab brings: the commands without their import, and the options."""
@@ -85,7 +85,7 @@ class LazyGroup(click.Group):
             _leave_output()
             ctx.exit(UNHEARD)
         except (OSError, ValueError) as error:
-            if loudness.is_verbose():
+            if verbosity.is_verbose():
                 traceback.print_exception(error)
             raise
 
@@ -113,7 +113,7 @@ def group() -> None:
     """
 
 
-loudness.heard_by(group)
+verbosity.received_by(group)
 
 
 def main(*arguments: Any) -> None:
@@ -159,7 +159,7 @@ def _leave_output() -> None:
 def _ended_by_signals() -> Iterator[None]:
     """Within the block SIGTERM leaves through every `with` and `finally`, as Ctrl-C does.
 
-    Libraries hear of them too: ROS shuts down, an import fails. What they say of that, even in place of the exit, is
+    Libraries receive them too: ROS shuts down, an import fails. What they say of that, even in place of the exit, is
     no bug. Where one swallows the interrupt, as a compiler does that calls back into Python, it comes again.
     """
     told: list[int] = []
@@ -170,7 +170,7 @@ def _ended_by_signals() -> Iterator[None]:
             raise KeyboardInterrupt
         sys.exit(TERMINATED)
 
-    with _heard(end), _never_swallowed():
+    with _received(end), _never_swallowed():
         try:
             yield
         except BaseException:  # a library may leave with a status of its own
@@ -181,7 +181,7 @@ def _ended_by_signals() -> Iterator[None]:
 
 
 @contextmanager
-def _heard(end: Any) -> Iterator[None]:
+def _received(end: Any) -> Iterator[None]:
     """Both signals call ``end`` within the block; an interrupt that is ignored, as behind nohup, stays so."""
     before = {signal.SIGTERM: signal.signal(signal.SIGTERM, end)}
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:

@@ -14,10 +14,10 @@ from tqdm import tqdm
 
 from objreg_ros.cli import FIRST_TIME, NOTHING, options
 from objreg_ros.cli.batch_work import BatchWork
-from objreg_ros.cli.loudness import aside
 from objreg_ros.cli.paths import OutputPath, RecordingPath
 from objreg_ros.cli.recorded import Asked
 from objreg_ros.cli.settings import tell_ignored
+from objreg_ros.cli.verbosity import aside
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.report.batch.batch_page import batch_page, totals
 from objreg_ros.report.batch.batch_rows import Row

@@ -18,20 +18,20 @@ from objreg_ros.bridge.camera.calibration import absolute
 from objreg_ros.bridge.messages import from_msg
 from objreg_ros.cli import live_table, options
 from objreg_ros.cli.live import ROOMS, Live, Setup, run_live
-from objreg_ros.cli.loudness import aside
 from objreg_ros.cli.paths import OutputPath, RecordingPath
 from objreg_ros.cli.played import as_rosbag2, simulated_room
+from objreg_ros.cli.run_output import closing_lines, exit_code, print_reasons, tell
 from objreg_ros.cli.settings import parse_change, read_settings, ros_argument, tell_ignored
-from objreg_ros.cli.told import closing_lines, exit_code, tell, tell_reasons
+from objreg_ros.cli.verbosity import aside
 from objreg_ros.data import ColourImage, Intrinsics
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.geometry import quaternion_from_rotation
 from objreg_ros.offline import constraint_with_error, refusal_with_evidence
 from objreg_ros.recording import Recording, open_recording
+from objreg_ros.recording.camera_from_text import with_camera
 from objreg_ros.recording.inputs import Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.mounts import TRANSFORMS, camera_on_body, first_frames
 from objreg_ros.recording.tf_odometry import with_transforms
-from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.recording.troubles import FOLDER, troubles
 from objreg_ros.registration.params import RegistrarNodeParams
 from objreg_ros.report.run.about import about
@@ -84,7 +84,8 @@ class Asked:
 def command(**asked: Any) -> int:
     """Play RECORDING (or a simulated room) through three live nodes and show what came out.
 
-    Ends with the books of every node, latencies, constraints and their true error, and with pictures in the folder of
+    Ends with the counters of every node, latencies, constraints and their true error, and with pictures in the folder
+    of
     --out. Of a recording that is no rosbag2, what the graph uses is written as one first. The last lines say whether it
     worked, how well, and what to do next; it ends with 3 if no frame got through.
     """
@@ -92,7 +93,7 @@ def command(**asked: Any) -> int:
 
 
 def run(asked: Asked) -> int:
-    """The whole demo and its exit code; ValueError or OSError if it cannot be, or if the books do not balance."""
+    """The whole demo and its exit code; ValueError or OSError if it cannot be, or if the counters do not balance."""
     own = asked.recording is not None
     asked = asked if asked.recording else calibrated(asked)
     recording = asked.recording or simulated_room(asked.out)
@@ -114,7 +115,7 @@ def run(asked: Asked) -> int:
     _say(f"wrote {asked.out / 'report.html'}")
     with aside():
         click.echo("\n".join(live_table.lines(live, sent, summarise(truth.errors(live.closures)))))
-        tell_reasons(live.refusals)
+        print_reasons(live.refusals)
         click.echo()
     live_table.require_balance(live, sent)
     tell(findings)
@@ -201,7 +202,7 @@ def _sent(source: Recording, inputs: Inputs, seconds: float | None, live: Live) 
     return {
         "detector": counts[inputs.image or ""],
         "segmenter": counts[depth or ""],
-        "registrar": live.books["segmenter"].published,
+        "registrar": live.counters["segmenter"].published,
     }
 
 
@@ -211,7 +212,7 @@ def mounting_of(asked: Asked) -> tuple[float, ...]:
 
 
 def _mounting_by_tf(source: Recording, inputs: Inputs) -> tuple[float, ...]:
-    """The same by the recording's /tf_static, where the nodes hear it."""
+    """The same by the recording's /tf_static, where the nodes receive it."""
     from objreg_ros.bridge.streams.player import is_installed
 
     T = camera_on_body(source, inputs)[2] if is_installed(TRANSFORMS) else None
@@ -233,7 +234,7 @@ def summary_of(told: Mapping[str, Any], live: Live, truth: Truth) -> dict[str, A
     """The run as JSON, after what is told of its recording."""
     return {
         **told,
-        "nodes": {room: asdict(books) for room, books in live.books.items()},
+        "nodes": {room: asdict(counters) for room, counters in live.counters.items()},
         "constraints": [constraint_with_error(closure, truth) for closure in live.closures],
         "rejected": dict(live.rejected),
         "truth": summarise(truth.errors(live.closures)),

@@ -12,7 +12,7 @@ import click
 
 from objreg_ros.cli import BROKEN
 from objreg_ros.cli.checks import Check, all_checks
-from objreg_ros.cli.loudness import aside
+from objreg_ros.cli.verbosity import aside
 
 GOOD, ADVICE, PROBLEM = " ", "-", "!"
 

@@ -12,16 +12,16 @@ from tqdm import tqdm
 
 from objreg_ros.cli import NOTHING, options
 from objreg_ros.cli.paths import OutputPath
-from objreg_ros.cli.told import tell, tell_next
+from objreg_ros.cli.run_output import print_next, tell
 from objreg_ros.memory.store_file import is_store
 from objreg_ros.plausibility.finding import Finding
 from objreg_ros.recording import Recording, open_recording
+from objreg_ros.recording.camera_from_text import with_camera
 from objreg_ros.recording.inputs import GRAPH_TOPICS, Inputs, alternatives, choose_inputs, parse_remaps
 from objreg_ros.recording.mounts import first_frames
 from objreg_ros.recording.recorded_detections import recorded_detections
 from objreg_ros.recording.summary import describe_lens, describe_topics
 from objreg_ros.recording.tf_odometry import by_transforms, with_transforms
-from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.recording.troubles import warnings
 from objreg_ros.rehearsal import FRAMES, rehearse
 from objreg_ros.report.run.findings import found_in
@@ -29,7 +29,7 @@ from objreg_ros.report.run.live_pictures import write_picture
 from objreg_ros.report.store.portraits import portraits
 from objreg_ros.report.store.store_drawing import draw
 from objreg_ros.report.store.store_page import store_page
-from objreg_ros.report.store.store_survey import describe, survey
+from objreg_ros.report.store.store_summary import describe, survey
 from objreg_ros.truth import Truth
 from objreg_ros.whole_file import write_whole
 
@@ -74,7 +74,7 @@ def command(recording: Path, remaps: tuple[str, ...], camera: str, picture: Path
     if not runs:
         return NOTHING
     told = [f"--remap={remap}" for remap in remaps] + ([f"--camera={camera}"] if camera else [])
-    tell_next("objreg", "offline", str(recording), *told, "--json", "run.json")
+    print_next("objreg", "offline", str(recording), *told, "--json", "run.json")
     return 0
 
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from objreg_ros.bridge.node.ledger import Balance
+from objreg_ros.bridge.node.accounting import Balance
 from objreg_ros.cli import FIRST_TIME
-from objreg_ros.cli.loudness import is_quiet, is_verbose
 from objreg_ros.cli.processes import Processes
+from objreg_ros.cli.verbosity import is_quiet, is_verbose
 from objreg_ros.data import LoopClosure, Rejected
 
 if TYPE_CHECKING:
@@ -28,9 +28,9 @@ QUIET_S = 3.0  # nothing moved for so long: all is through
 
 @dataclass(frozen=True, slots=True)
 class Live:
-    """What came out of the live graph; ``books`` by node, ``glimpses`` as in `offline`, without poses."""
+    """What came out of the live graph; ``counters`` by node, ``glimpses`` as in `offline`, without poses."""
 
-    books: Mapping[str, Balance]
+    counters: Mapping[str, Balance]
     rejected: Mapping[str, int]
     closures: tuple[LoopClosure, ...]
     sight: Sight | None = None
@@ -62,10 +62,10 @@ def run_live(recording: Path, setup: Setup, folder: Path, say: Callable[[str], N
         processes.require_alive()
         say("waiting for the last frames")
         _drain(collector)
-        books = {name.strip("/"): balance for name, balance in collector.books.items()}
+        counters = {name.strip("/"): balance for name, balance in collector.counters.items()}
         glimpses = tuple(glimpse for _, glimpse in sorted(collector.glimpses.items()))
         closures, refusals = tuple(collector.closures), tuple(collector.refusals)
-        return Live(books, collector.rejected, closures, collector.sight, refusals, glimpses)
+        return Live(counters, collector.rejected, closures, collector.sight, refusals, glimpses)
 
 
 def _programs(setup: Setup) -> list[tuple[str, str, list[str]]]:
@@ -114,14 +114,16 @@ def _listening(environment: Mapping[str, str]) -> Iterator[Collector]:
 def _wait_for_nodes(collector: Collector, processes: Processes) -> None:
     def there() -> bool:
         processes.require_alive()
-        return {f"/{room}" for room in ROOMS} <= set(collector.books)
+        return {f"/{room}" for room in ROOMS} <= set(collector.counters)
 
     if not collector.spin_until(there, START_S):
-        raise ValueError(f"expected {', '.join(ROOMS)} to report within {START_S:.0f} s, got {sorted(collector.books)}")
+        raise ValueError(
+            f"expected {', '.join(ROOMS)} to report within {START_S:.0f} s, got {sorted(collector.counters)}"
+        )
 
 
 def _drain(collector: Collector) -> None:
-    """Until no books move any more; then the registrar ends the keyframe in hand."""
+    """Until no counters move any more; then the registrar ends the keyframe in hand."""
     while collector.spin_until(_movement(collector), _patience(collector)):
         pass
     collector.call("registrar/save", DRAIN_S)
@@ -134,10 +136,10 @@ def _movement(collector: Collector) -> Callable[[], bool]:
 
 
 def _state(collector: Collector) -> Any:
-    return {name: (books.published, books.dropped) for name, books in collector.books.items()}
+    return {name: (counters.published, counters.dropped) for name, counters in collector.counters.items()}
 
 
 def _patience(collector: Collector) -> float:
     """A frame that is worked on may take long; one that waits for a partner may wait for ever."""
-    working = any(collector.books[f"/{room}"].waiting for room in ("detector", "registrar"))
+    working = any(collector.counters[f"/{room}"].waiting for room in ("detector", "registrar"))
     return DRAIN_S if working else QUIET_S

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from objreg_ros.bridge.node.ledger import Balance
+from objreg_ros.bridge.node.accounting import Balance
 from objreg_ros.cli.live import ROOMS, Live
 
 
@@ -17,30 +17,30 @@ def lines(live: Live, sent: Mapping[str, int], truth: Mapping[str, Any]) -> Iter
     """
     yield f"{'frames':<12}{'sent':>7}{'in':>7}{'out':>7}{'waiting':>9}  dropped"
     for room in ROOMS:
-        yield _frames(room, sent[room], live.books[room])
+        yield _frames(room, sent[room], live.counters[room])
     yield ""
     yield f"{'latency':<12}{'stage':<12}{'p50 ms':>9}{'p95 ms':>9}"
     for room in ROOMS:
-        yield from _latencies(room, live.books[room])
+        yield from _latencies(room, live.counters[room])
     yield ""
     yield f"constraints: {len(live.closures)}"
     yield f"rejected: {_counts(live.rejected)}"
     yield _errors(truth)
 
 
-def _frames(room: str, sent: int, books: Balance) -> str:
-    dropped = dict(books.dropped)
-    if sent > books.received:
-        dropped["lost on the way"] = sent - books.received
-    return f"{room:<12}{sent:>7}{books.received:>7}{books.published:>7}{books.waiting:>9}  {_counts(dropped)}"
+def _frames(room: str, sent: int, counters: Balance) -> str:
+    dropped = dict(counters.dropped)
+    if sent > counters.received:
+        dropped["lost on the way"] = sent - counters.received
+    return f"{room:<12}{sent:>7}{counters.received:>7}{counters.published:>7}{counters.waiting:>9}  {_counts(dropped)}"
 
 
 def _counts(counts: Mapping[str, int]) -> str:
     return ", ".join(f"{count} {reason}" for reason, count in sorted(counts.items())) or "–"
 
 
-def _latencies(room: str, books: Balance) -> Iterator[str]:
-    for stage, (p50, p95) in sorted(books.stage_ms.items(), key=lambda item: item[0] == "total"):
+def _latencies(room: str, counters: Balance) -> Iterator[str]:
+    for stage, (p50, p95) in sorted(counters.stage_ms.items(), key=lambda item: item[0] == "total"):
         yield f"{room:<12}{stage:<12}{p50:>9.1f}{p95:>9.1f}"
 
 
@@ -58,10 +58,10 @@ def _errors(truth: Mapping[str, Any]) -> str:
 def require_balance(live: Live, sent: Mapping[str, int]) -> None:
     """ValueError if a node received more than was sent to it, or if in is not out + waiting + dropped."""
     for room in ROOMS:
-        books = live.books[room]
-        ended = books.published + books.waiting + sum(books.dropped.values())
-        if books.received != ended or books.received > sent[room]:
+        counters = live.counters[room]
+        ended = counters.published + counters.waiting + sum(counters.dropped.values())
+        if counters.received != ended or counters.received > sent[room]:
             raise ValueError(
                 f"{room}: expected in = out + waiting + dropped and no more than the {sent[room]} that were sent, "
-                f"got {books.received} in and {ended} accounted for"
+                f"got {counters.received} in and {ended} accounted for"
             )

@@ -15,23 +15,23 @@ from objreg_ros.cli import FIRST_TIME, options
 from objreg_ros.cli.outputs import Outputs
 from objreg_ros.cli.paths import STANDARD_OUTPUT, OutputPath
 from objreg_ros.cli.recorded import Asked, Opened
-from objreg_ros.cli.settings import tell_ignored
-from objreg_ros.cli.told import (
+from objreg_ros.cli.run_output import (
     exit_code,
     json_to,
+    print_next,
+    print_reasons,
+    print_run,
+    print_trajectory,
     tell,
-    tell_next,
-    tell_reasons,
-    tell_run,
-    tell_trajectory,
 )
+from objreg_ros.cli.settings import tell_ignored
 from objreg_ros.offline import Run
 from objreg_ros.recording.troubles import troubles
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.report.exports.map_files import VOXEL_M
 from objreg_ros.report.run.findings import as_json, find, verdict
 from objreg_ros.report.run.pictures import Album
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_summary import RunSummary
 
 FILE = OutputPath(dir_okay=False, path_type=Path)
 
@@ -76,14 +76,14 @@ def command(recording: Path, json_file: Path | None, **given: Any) -> int:
         registrar = outputs.remembering(asked.settings.of("registrar", RegistrarParams), folder)
         run = _run(opened, registrar)
         summary = opened.summary(run, sys.argv[1:])
-        tell_run(run, summary)
-        tell_reasons(run.refusals)
+        print_run(run, summary)
+        print_reasons(run.refusals)
         findings = find(summary, troubles(opened.source, opened.inputs))
         click.echo(verdict(summary, findings))
         tell(findings)
-        story = Story.of(recording.name, summary, opened.truth)
+        story = RunSummary.of(recording.name, summary, opened.truth)
         trajectory = story.trajectory()
-        tell_trajectory(trajectory)
+        print_trajectory(trajectory)
         write_json({**summary, "trajectory": trajectory, "findings": as_json(findings)})
         if outputs.wanted:
             outputs.write(story, Album(opened.source, opened.inputs, summary["rectified"]), Path(registrar.store))
@@ -102,4 +102,4 @@ def _say_what_follows(recording: Path, json_file: Path | None) -> None:
     """How one looks at the closed loops, unless this run is part of that already."""
     asked = click.get_current_context().find_root().invoked_subcommand
     if asked != "report" and json_file != STANDARD_OUTPUT:
-        tell_next("objreg", "report", str(json_file or recording))
+        print_next("objreg", "report", str(json_file or recording))

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import click
 
-from objreg_ros.cli.loudness import aside
+from objreg_ros.cli.verbosity import aside
 from objreg_ros.recording import Recording
 from objreg_ros.registration.params import RegistrarParams
 from objreg_ros.report.exports.map_files import MapFiles
 from objreg_ros.report.exports.run_scene import scene_of
 from objreg_ros.report.exports.scene_files import SceneFiles
 from objreg_ros.report.run.pictures import Album
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_summary import RunSummary
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ class Outputs:
         return registrar.replaced(store=str(Path(folder, "keyframes.db")))
 
     @aside()
-    def write(self, story: Story, album: Album, store: Path) -> None:
+    def write(self, story: RunSummary, album: Album, store: Path) -> None:
         """Write what is asked for, and say what became of it; nothing of a run of which no frame got through."""
         if not story.glimpses:
             return

@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from objreg_ros.bridge.node.params import DoorParams
+from objreg_ros.bridge.node.params import NodeBaseParams
 from objreg_ros.cli.settings import KEY, NODES
 from objreg_ros.params import Declaration, Params
 from objreg_ros.whole_file import write_whole
@@ -87,9 +87,9 @@ def yaml_value(value: Any) -> str:
 
 def table_text() -> str:
     """The parameters as Markdown tables, one a node; what every node has comes last."""
-    own = {node: [kind for kind in kinds if kind is not DoorParams] for node, kinds in NODES.items()}
+    own = {node: [kind for kind in kinds if kind is not NodeBaseParams] for node, kinds in NODES.items()}
     sections = [line for node, kinds in own.items() for line in _section(f"`{node}`", kinds)]
-    return "\n".join([*sections, *_section("Every node", [DoorParams])]) + "\n"
+    return "\n".join([*sections, *_section("Every node", [NodeBaseParams])]) + "\n"
 
 
 def _section(title: str, kinds: list[type[Params]]) -> Iterator[str]:

@@ -16,12 +16,12 @@ from objreg_ros.cli.settings import Settings, read_settings
 from objreg_ros.detector.params import DetectorParams
 from objreg_ros.offline import Detects, Run, Timing, build_rooms, run_offline
 from objreg_ros.recording import Record, Recording, open_recording
+from objreg_ros.recording.camera_from_text import with_camera
 from objreg_ros.recording.drift import ODOM, with_drifting_odometry
 from objreg_ros.recording.inputs import TF_ODOM, Inputs, alternatives, choose_inputs, parse_remaps
 from objreg_ros.recording.mounts import camera_frame, first_frames, frame_tree, moving_topics
 from objreg_ros.recording.recorded_detections import RecordedDetections, choose_detections
 from objreg_ros.recording.tf_odometry import by_transforms, with_transforms
-from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.recording.troubles import FOLDER, unpaired
 from objreg_ros.registration.params import RegistrarNodeParams, RegistrarParams
 from objreg_ros.rehearsal import SeesNothing

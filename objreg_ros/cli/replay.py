@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING
 import click
 from tqdm import tqdm
 
-from objreg_ros.bridge.streams.receipts import DEPTH, IMAGE, Receipts
+from objreg_ros.bridge.streams.acknowledgements import DEPTH, IMAGE, Acknowledgements
 from objreg_ros.cli import NOTHING, options
-from objreg_ros.cli.told import tell
+from objreg_ros.cli.run_output import tell
 from objreg_ros.recording import Recording, open_recording
+from objreg_ros.recording.camera_from_text import with_camera
 from objreg_ros.recording.inputs import SOURCES, Inputs, choose_inputs, parse_remaps
 from objreg_ros.recording.messages import header_stamp_ns
 from objreg_ros.recording.mounts import TRANSFORMS, first_frames, static_topics
 from objreg_ros.recording.replay import Selection, graph_names, read_ahead, recorded_names
 from objreg_ros.recording.tf_odometry import with_transforms
-from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.recording.troubles import troubles
 
 if TYPE_CHECKING:
@@ -99,20 +99,22 @@ def command(
         kinds = {out: source.topics[topic].msgtype for topic, out in names.items()}
         with shutdown_as_interrupt(), _begun(Player(kinds, clock, latched)) as player:
             _prepare(player, inputs, names, wait)
-            receipts = player.listen_to_receipts(wait) if lossless else None
+            acknowledgements = player.subscribe_to_acknowledgements(wait) if lossless else None
             again = True
-            with _told_at_the_end(player, receipts):
+            with _told_at_the_end(player, acknowledgements):
                 while again:
-                    _play_once(player, source, selection, inputs, None if lossless else rate, receipts, patience)
+                    _play_once(
+                        player, source, selection, inputs, None if lossless else rate, acknowledgements, patience
+                    )
                     again = loop
-    return _exit_code(receipts)
+    return _exit_code(acknowledgements)
 
 
-def _exit_code(receipts: Receipts | None) -> int:
-    """`NOTHING` where the last node that receipts frames published none; without receipts nobody can tell."""
-    if receipts is None or receipts.outcomes[receipts.nodes[-1]]["published"]:
+def _exit_code(acknowledgements: Acknowledgements | None) -> int:
+    """`NOTHING` where the last node that acknowledges frames published none; 0 without acknowledgements."""
+    if acknowledgements is None or acknowledgements.outcomes[acknowledgements.nodes[-1]]["published"]:
         return 0
-    click.echo(f"! no frame got through the {receipts.nodes[-1]}; docs/troubleshooting.md#no-frame-got-through")
+    click.echo(f"! no frame got through the {acknowledgements.nodes[-1]}; docs/troubleshooting.md#no-frame-got-through")
     return NOTHING
 
 
@@ -177,12 +179,12 @@ def _play_once(
     selection: Selection,
     inputs: Inputs,
     rate: float | None,
-    receipts: Receipts | None,
+    acknowledgements: Acknowledgements | None,
     patience: float,
 ) -> None:
     items = read_ahead(_items(source, selection, inputs))
     with tqdm(total=selection.count(source), unit="message", disable=None, leave=False) as bar:
-        if receipts is None:
+        if acknowledgements is None:
             player.play(items, rate, lambda item: _advance(bar))
         else:
             player.play_lossless(items, patience, lambda item: _advance(bar))
@@ -203,7 +205,7 @@ def _items(source: Recording, selection: Selection, inputs: Inputs) -> Iterator[
 
 
 @contextmanager
-def _told_at_the_end(player: Player, receipts: Receipts | None) -> Iterator[None]:
+def _told_at_the_end(player: Player, acknowledgements: Acknowledgements | None) -> Iterator[None]:
     """Says what was sent, where a signal ends the play too."""
     from objreg_ros.bridge.node.lifetime import shutdown_as_interrupt
 
@@ -211,16 +213,16 @@ def _told_at_the_end(player: Player, receipts: Receipts | None) -> Iterator[None
         with shutdown_as_interrupt():
             yield
     except (KeyboardInterrupt, SystemExit):
-        _say(player, receipts)
+        _say(player, acknowledgements)
         raise
-    _say(player, receipts)
+    _say(player, acknowledgements)
 
 
-def _say(player: Player, receipts: Receipts | None) -> None:
+def _say(player: Player, acknowledgements: Acknowledgements | None) -> None:
     for topic, count in sorted(player.published.items()):
         click.echo(f"{count} {topic}")
-    if receipts is not None:
-        for node, outcomes in receipts.outcomes.items():
+    if acknowledgements is not None:
+        for node, outcomes in acknowledgements.outcomes.items():
             click.echo(f"{node}: " + ", ".join(f"{count} {verdict}" for verdict, count in sorted(outcomes.items())))
     if player.lost:
-        click.echo(f"{len(player.lost)} frames without a receipt, the first of {player.lost[0]} ns")
+        click.echo(f"{len(player.lost)} frames without an acknowledgement, the first of {player.lost[0]} ns")

@@ -20,10 +20,10 @@ from objreg_ros.adapters.params import (
     ToRtabmapParams,
 )
 from objreg_ros.bridge.node.params import (
-    DoorParams,
     ExchangeParams,
     KeyParams,
     ManagedParams,
+    NodeBaseParams,
     PeerParams,
     RelocalisedParams,
 )
@@ -37,8 +37,8 @@ from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
 Kind = TypeVar("Kind", bound=Params)
 
 NODES: dict[str, tuple[type[Params], ...]] = {
-    "detector": (DetectorParams, ManagedParams, DoorParams),
-    "segmenter": (SegmenterParams, SegmenterNodeParams, ManagedParams, DoorParams),
+    "detector": (DetectorParams, ManagedParams, NodeBaseParams),
+    "segmenter": (SegmenterParams, SegmenterNodeParams, ManagedParams, NodeBaseParams),
     "registrar": (
         RegistrarParams,
         RegistrarNodeParams,
@@ -47,14 +47,14 @@ NODES: dict[str, tuple[type[Params], ...]] = {
         PeerParams,
         RelocalisedParams,
         ManagedParams,
-        DoorParams,
+        NodeBaseParams,
     ),
-    "keyframer": (KeyframeParams, KeyframerNodeParams, KeyParams, ManagedParams, DoorParams),
-    "mapper": (MapperParams, MapperNodeParams, ManagedParams, DoorParams),
-    "objreg_to_rtabmap": (ToRtabmapParams, BodyParams, AdapterParams, DoorParams),
-    "objreg_to_lio_sam": (ToLioSamParams, AdapterParams, DoorParams),
-    "objreg_to_hydra": (ToHydraParams, BodyParams, AdapterParams, DoorParams),
-    "objreg_to_g2o": (ToG2oParams, BodyParams, AdapterParams, DoorParams),
+    "keyframer": (KeyframeParams, KeyframerNodeParams, KeyParams, ManagedParams, NodeBaseParams),
+    "mapper": (MapperParams, MapperNodeParams, ManagedParams, NodeBaseParams),
+    "objreg_to_rtabmap": (ToRtabmapParams, BodyParams, AdapterParams, NodeBaseParams),
+    "objreg_to_lio_sam": (ToLioSamParams, AdapterParams, NodeBaseParams),
+    "objreg_to_hydra": (ToHydraParams, BodyParams, AdapterParams, NodeBaseParams),
+    "objreg_to_g2o": (ToG2oParams, BodyParams, AdapterParams, NodeBaseParams),
 }
 KEY, ALL = "ros__parameters", "/**"
 EVERYWHERE = ("use_sim_time",)  # what rclpy itself declares

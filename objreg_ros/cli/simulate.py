@@ -10,7 +10,7 @@ import click
 from tqdm import tqdm
 
 from objreg_ros.cli.paths import OutputPath
-from objreg_ros.cli.told import tell_next
+from objreg_ros.cli.run_output import print_next
 from objreg_ros.data import Intrinsics
 from objreg_ros.params import Params
 from objreg_ros.simulation.camera import CAMERAS, LENSES, SENSORS
@@ -95,7 +95,7 @@ def command(
     stories = _simulated(out, scenario, (seed, frames, rate, sensors, points, jpeg))
     for story in stories:
         _tell(out / story.robot, story, scenario, seed, rate)
-    tell_next("objreg", "inspect", str(out / stories[0].robot))
+    print_next("objreg", "inspect", str(out / stories[0].robot))
 
 
 def _simulated(out: Path, scenario: str, of: tuple[int, int, float, Sensors, bool, bool]) -> list[Story]:

@@ -18,7 +18,7 @@ TOLD, QUERIED = ("labels", "boxes", "scores"), ("logits", "pred_boxes")
 
 
 @dataclass(frozen=True)
-class DetrTold:
+class DetrOutput:
     """``labels [1,N]``, ``boxes [1,N,4]`` x_min y_min x_max y_max and ``scores [1,N]``, as the authors export them.
 
     The boxes are in pixels of what the input orig_target_sizes says, which is told the size of the model's picture.
@@ -30,7 +30,7 @@ class DetrTold:
     look: ClassVar[Look] = STRETCHED
 
     @classmethod
-    def of(cls, graph: Graph) -> DetrTold:
+    def of(cls, graph: Graph) -> DetrOutput:
         """The contract of such outputs."""
         rows = graph.probe["labels"].shape
         if len(rows) != 2 or graph.probe["scores"].shape != rows or graph.probe["boxes"].shape != (*rows, 4):

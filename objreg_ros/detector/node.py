@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The door of the detector: ``image`` (raw or compressed) in; ``detections_table``, ``detections``, ``labels`` out."""
+"""The node of the detector: ``image`` (raw or compressed) in; ``detections_table``, ``detections``, ``labels`` out."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from objreg_ros import share
 from objreg_ros.bridge.camera.pace import Pace
 from objreg_ros.bridge.messages import from_msg, to_msg, vision_to_msg
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.door import Door
-from objreg_ros.bridge.node.indoors import Indoors, Surplus
+from objreg_ros.bridge.node.intra_process import IntraProcessBus, Surplus
+from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.bridge.node.params import ManagedParams
 from objreg_ros.bridge.node.spin import run
+from objreg_ros.bridge.streams.frame_order import Turns
 from objreg_ros.bridge.streams.sync import Drop
-from objreg_ros.bridge.streams.turns import Turns
 from objreg_ros.data import ColourImage
 from objreg_ros.detector.detector import Detector
 from objreg_ros.detector.params import DetectorParams
@@ -28,14 +28,14 @@ from objreg_ros.detector.params import DetectorParams
 IMAGES = {"image": Image, "image/compressed": CompressedImage}
 
 
-class DetectorNode(Door):
+class DetectorNode(NodeBase):
     """Detects the objects of the newest image of those that keep the pace; the others are surplus and not decoded.
 
     A table goes out for every image, empty if it shows no object, and of a kind of its own if it is surplus.
     """
 
-    def __init__(self, indoors: Indoors | None = None) -> None:
-        super().__init__("detector", DetectorParams, ManagedParams, indoors=indoors)
+    def __init__(self, bus: IntraProcessBus | None = None) -> None:
+        super().__init__("detector", DetectorParams, ManagedParams, bus=bus)
 
     def open(self) -> None:
         """Load the model, tell its labels, and listen."""
@@ -48,9 +48,9 @@ class DetectorNode(Door):
         self._array = None if array is None else self.create_publisher(array, "detections", qos.room())
         self._labels = self.create_publisher(String, "labels", qos.latched())
         self._labels.publish(to_msg.labels(self._names))
-        for topic in IMAGES:  # what it has decoded is not decoded again next door
+        for topic in IMAGES:  # what it has decoded is not decoded again next node
             self.pass_on(topic)
-        self.listen_to_first("image", IMAGES, self._decode, self._hear, self.sensor())
+        self.listen_to_first("image", IMAGES, self._decode, self._receive, self.sensor())
 
     def adopt(self) -> None:
         """Live parameters hold from the next image on."""
@@ -59,7 +59,7 @@ class DetectorNode(Door):
     def _decode(self, _: str, message: Any) -> ColourImage:
         return from_msg.image(message, self.most_pixels)
 
-    def _hear(self, _: str, message: Any) -> None:
+    def _receive(self, _: str, message: Any) -> None:
         stamp_ns = from_msg.stamp_ns(message)
         self.accept(stamp_ns)
         if not self.let_in(stamp_ns):
@@ -78,7 +78,7 @@ class DetectorNode(Door):
         self.leave_out(stamp_ns, Drop.SURPLUS.value)
 
     def conclude(self, stamp_ns: int, work: Callable[[], bool]) -> None:
-        """As any door; those behind it have their turn."""
+        """As any node; those behind it have their turn."""
         super().conclude(stamp_ns, work)
         self._turns.end(stamp_ns)
 
@@ -90,7 +90,7 @@ class DetectorNode(Door):
         """One image."""
         image = self.read("image", from_msg.image, payload, self.most_pixels)
         self._hand_over_picture(image)
-        with self.ledger.timed("detect"):
+        with self.accounting.timed("detect"):
             detections = self._detector.detect(image)
         self._table.tell(detections, partial(to_msg.detections_table, detections, self._names))
         if self._array is not None and self._array.get_subscription_count():
@@ -100,7 +100,7 @@ class DetectorNode(Door):
     def _hand_over_picture(self, word: ColourImage | Surplus) -> None:
         topic = self.taken("image")
         if topic is not None:
-            self.indoors.hand_over(self.resolve_topic_name(topic), word)
+            self.bus.hand_over(self.resolve_topic_name(topic), word)
 
 
 def main() -> int:

@@ -99,7 +99,7 @@ def alone(frame: Frame) -> Frame:
 
 
 def with_gravity_of(gravity_filter: GravityFilter, T_session_frame: Array, frame: Frame) -> Frame:
-    """The frame with gravity as a filter tells it that has heard of the frame too."""
+    """The frame with gravity as a filter tells it that knows of the frame too."""
     gravity, weight = gravity_filter.update(T_session_frame, frame.gravity, frame.gravity_confidence)
     return replace(frame, gravity=gravity, gravity_confidence=weight)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The door of the keyframer: objects, views, gravity and odometry in; packed keyframes out, for a registrar."""
+"""The node of the keyframer: objects, views, gravity and odometry in; packed keyframes out, for a registrar."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from sensor_msgs.msg import CompressedImage
 
 from objreg_ros.bridge.messages.keyframes_msg import SentKeyframe, keyframe
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.indoors import Indoors
+from objreg_ros.bridge.node.intra_process import IntraProcessBus
 from objreg_ros.bridge.node.lifetime import await_kernels
 from objreg_ros.bridge.node.params import KeyParams, ManagedParams
 from objreg_ros.bridge.node.spin import run
 from objreg_ros.bridge.node.worker import Backlog, Limit
-from objreg_ros.bridge.streams.frames_in import FramesDoor
+from objreg_ros.bridge.streams.frames_in import FramesNode
 from objreg_ros.bridge.streams.key import read_key
 from objreg_ros.bridge.streams.sync import Match
 from objreg_ros.keyframes.frame_window import FrameWindow
@@ -34,15 +34,15 @@ LOOK_S = 1.0  # between two looks at whether frames still come
 WAITING = Limit(8, 200_000_000, math.inf)  # keyframes that wait to be fused and packed
 
 
-class KeyframerNode(FramesDoor):
+class KeyframerNode(FramesNode):
     """Follows every frame of one camera, and sends the keyframes that come of them.
 
     A frame that completes a keyframe is in the books until that was sent. What was sent is kept for who was away.
     """
 
-    def __init__(self, indoors: Indoors | None = None) -> None:
+    def __init__(self, bus: IntraProcessBus | None = None) -> None:
         kinds = KeyframeParams, KeyframerNodeParams, KeyParams, ManagedParams
-        super().__init__("keyframer", *kinds, indoors=indoors)
+        super().__init__("keyframer", *kinds, bus=bus)
 
     def open(self) -> None:
         """Load the kernels, publish and listen."""
@@ -67,7 +67,7 @@ class KeyframerNode(FramesDoor):
     def compute(self, stamp_ns: int, payload: Match) -> bool:
         """Follow one frame; what becomes a keyframe goes on to be sent."""
         frame, _ = self.frame_of(payload)
-        with self._tracking, self.ledger.timed("track"):
+        with self._tracking, self.accounting.timed("track"):
             window = self._keyframer.add(frame)
             self._seen_s = time.monotonic()
         if window is not None:
@@ -90,7 +90,7 @@ class KeyframerNode(FramesDoor):
         self.conclude(stamp_ns, lambda: self._publish(window))
 
     def _publish(self, window: FrameWindow) -> bool:
-        with self.ledger.timed("pack"):
+        with self.accounting.timed("pack"):
             made = fuse(window, self.settings.of(KeyframeParams))
             packed = pack_keyframe(made, 1000 * self.settings.of(KeyframerNodeParams).kilobytes)
         if made.objects and self.context.ok():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The door of the mapper: ``odom`` and closures in; ``path`` and ``correction`` (map → odom, also as TF) out."""
+"""The node of the mapper: ``odom`` and closures in; ``path`` and ``correction`` (map → odom, also as TF) out."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from nav_msgs.msg import Odometry as OdometryMsg
 from rclpy.clock import Clock, ClockType
 from std_srvs.srv import Trigger
 
-from objreg_ros.bridge.camera.transforms import hear_mount
+from objreg_ros.bridge.camera.transforms import receive_mount
 from objreg_ros.bridge.messages import from_msg
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.door import Door
-from objreg_ros.bridge.node.indoors import Indoors
+from objreg_ros.bridge.node.intra_process import IntraProcessBus
+from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.bridge.node.params import ManagedParams
 from objreg_ros.bridge.node.spin import run
 from objreg_ros.bridge.streams.closures_in import ClosuresIn
@@ -42,14 +42,14 @@ PACE = 20.0  # a path of many keyframes takes long to write: one in so many time
 LOOK_S = 0.1  # between two looks at whether the path is due
 
 
-class MapperNode(Door):
+class MapperNode(NodeBase):
     """Keeps the pose graph, solves it whenever a closure came in. The books count closures.
 
     The worker solves a snapshot, so that odometry never waits; ``_graph_lock`` guards what both threads touch.
     """
 
-    def __init__(self, indoors: Indoors | None = None) -> None:
-        super().__init__("mapper", MapperParams, MapperNodeParams, ManagedParams, indoors=indoors)
+    def __init__(self, bus: IntraProcessBus | None = None) -> None:
+        super().__init__("mapper", MapperParams, MapperNodeParams, ManagedParams, bus=bus)
 
     def open(self) -> None:
         """Begin a map or go on with one, publish and listen."""
@@ -64,7 +64,7 @@ class MapperNode(Door):
         self._path_due_s = 0.0
         self._shared_frames = set[str]()  # of which the log has told
         self._followers = Followers()
-        mount = hear_mount(self, self._inputs.mounting)
+        mount = receive_mount(self, self._inputs.mounting)
         self._waiting = Waiting(self._followers, mount.T_body_camera, qos.KEPT_CONSTRAINTS)
         self._begin(self._resumed())
         prefixes = prefixes_of(self, self._inputs.robots)
@@ -110,11 +110,11 @@ class MapperNode(Door):
     def _follow(self, robot: str, topic: str) -> None:
         on_leap = partial(self._tell_leap, topic)
         self._followers[robot] = Follower(robot, self.settings.of(MapperParams).max_speed, on_leap)
-        hear = partial(self._hear_odometry, robot=robot)
-        self.listen(OdometryMsg, topic, hear, self.sensor(qos.ODOMETRY), watched=topic)
+        receive = partial(self._on_odometry, robot=robot)
+        self.listen(OdometryMsg, topic, receive, self.sensor(qos.ODOMETRY), watched=topic)
         self.expect(topic, topic)
 
-    def _hear_odometry(self, message: Any, robot: str = "") -> None:
+    def _on_odometry(self, message: Any, robot: str = "") -> None:
         odometry = self.read_aside("odom", from_msg.odometry, message)
         if odometry is None:
             return
@@ -206,7 +206,7 @@ class MapperNode(Door):
         """Solve the graph as it is now, and settle every closure that came until now."""
         with self._graph_lock:
             graph, problem, riding = self._graph, self._graph.problem(), len(self._riding)
-        with self.ledger.timed("optimise"):
+        with self.accounting.timed("optimise"):
             solution = problem.solve() if payload is not None else self._without_withdrawn(problem)
         if solution is None:
             return False

@@ -12,7 +12,6 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from objreg_ros.memory.books import MOST_IDS, read_books
 from objreg_ros.memory.checksum import (
     require_head,
     require_keyframe,
@@ -23,6 +22,7 @@ from objreg_ros.memory.checksum import (
     sealed_object,
 )
 from objreg_ros.memory.claim import Claim
+from objreg_ros.memory.counters import MOST_IDS, read_counters
 from objreg_ros.memory.store_file import OLDEST_VERSION, SCHEMA, SCHEMA_VERSION, bear, check, connect, read_only_uri
 
 HEAD = ("id", "session", "stamp_ns", "travelled", "by_odometry")  # of a keyframe, in the version of one robot
@@ -42,7 +42,7 @@ def renewed(path: Path, beside: Path) -> None:
     with closing(sqlite3.connect(beside)) as target:
         renew(path, target)
         target.row_factory = sqlite3.Row
-        read_books(target)
+        read_counters(target)
     check(beside)
     with closing(sqlite3.connect(path)) as old:  # a log that stays behind would be taken for the new file's
         old.execute("PRAGMA journal_mode = DELETE").fetchall()
@@ -57,18 +57,18 @@ def renew(path: Path, target: sqlite3.Connection) -> None:
 
 
 def _copy(source: sqlite3.Connection, target: sqlite3.Connection) -> None:
-    books = read_books(source).emptied()  # the ids that were given are used up
+    counters = read_counters(source).emptied()  # the ids that were given are used up
     bear(target)
     with target as transaction:
         for table, sealing in (("keyframe", sealed_keyframe), ("object", sealed_object), ("closure", _sealed_closure)):
             for row in _rows(source, table):
                 written = sealing({**row, **ADDED[table]})
                 insert(transaction, table, written)
-                books.enter(table, written)
-                books.landmark = max(books.landmark, row.get("landmark", 0))
+                counters.enter(table, written)
+                counters.landmark = max(counters.landmark, row.get("landmark", 0))
         for what in MOST_IDS:
-            books.next(what)
-        books.write(transaction)
+            counters.next(what)
+        counters.write(transaction)
 
 
 def insert(transaction: sqlite3.Connection, table: str, row: Mapping[str, Any]) -> None:

@@ -2,10 +2,10 @@
 """What the registrar remembers, in one SQLite file: keyframes, their objects and closures.
 
 What `Store.add` has returned from is on the disk: the file is in WAL mode with full synchronisation, and a keyframe
-with its objects and closures is one transaction, so a process that is killed at any moment leaves whole keyframes.
-The log is folded into the file after each of them, so that nothing hangs on the log alone. What is read was written:
-every row has a checksum of all that it says (`seal`), and the `books` say how many there are. Memory is bounded: only
-the last keyframes that were used stay decoded. So is the file: room that is left free goes back to the disk.
+with its objects and closures is one transaction, so a process that is killed at any moment leaves whole keyframes. The
+log is folded into the file after each of them, so that nothing hangs on the log alone. What is read was written: every
+row has a checksum of all that it says (`seal`), and the `counters` say how many there are. Memory is bounded: only the
+last keyframes that were used stay decoded. So is the file: room that is left free goes back to the disk.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from typing import Any
 
 from objreg_ros.data import LoopClosure
 from objreg_ros.keyframes.recent import RecentKeyframes
-from objreg_ros.memory.books import Books, read_books
 from objreg_ros.memory.checksum import HEAD, require_head
 from objreg_ros.memory.claim import Claim, StoreError
 from objreg_ros.memory.codec import (
@@ -30,6 +29,7 @@ from objreg_ros.memory.codec import (
     object_row,
     sighting_from_row,
 )
+from objreg_ros.memory.counters import Counters, read_counters
 from objreg_ros.memory.landmarks import Merge
 from objreg_ros.memory.migration import opened
 from objreg_ros.memory.sighting import Sighting
@@ -66,7 +66,7 @@ class Store:
         self.path = str(Path(path).expanduser().resolve()) if str(path) else ""  # of a link what it leads to
         self._recent = RecentKeyframes()
         self._heads: dict[int, Mapping[str, Any]] = {}  # of the keyframes, the oldest first
-        self._books = Books()
+        self._counters = Counters()
         self._claim: Claim | None = None
         if not self.path and not read_only:
             self._connection = connect(":memory:")
@@ -79,7 +79,7 @@ class Store:
                 undo.callback(self._claim.release)
             self._connection = opened(Path(self.path), self._claim)
             undo.callback(self._connection.close)
-            self._books = read_books(self._connection)
+            self._counters = read_counters(self._connection)
             for head in self._connection.execute(HEADS):
                 require_head(head)
                 self._heads[head["id"]] = head
@@ -97,22 +97,22 @@ class Store:
         ``merged`` says which landmarks became which, and in whose axes: known objects that turned out to be the same.
         StoreError where it cannot be written: then nothing of it is.
         """
-        with self._told(f"write keyframe {keyframe.keyframe_id}"), self._changing() as (transaction, books):
+        with self._told(f"write keyframe {keyframe.keyframe_id}"), self._changing() as (transaction, counters):
             row = keyframe_row(keyframe)
-            write(transaction, books, "keyframe", row)
+            write(transaction, counters, "keyframe", row)
             for item, sighting in zip(keyframe.objects, sightings, strict=True):
-                write(transaction, books, "object", object_row(books.next("object"), item, sighting))
-            books.give_landmark(max((sighting.landmark for sighting in sightings), default=0))
-            write_closures(transaction, books, closures, MOST_CLOSURES)
-            rename_landmarks(transaction, books, merged or {})
+                write(transaction, counters, "object", object_row(counters.next("object"), item, sighting))
+            counters.give_landmark(max((sighting.landmark for sighting in sightings), default=0))
+            write_closures(transaction, counters, closures, MOST_CLOSURES)
+            rename_landmarks(transaction, counters, merged or {})
         self._heads[keyframe.keyframe_id] = {name: row[name] for name in HEAD}
         self._recent.keep(keyframe)
 
     def add_closure(self, closure: LoopClosure, merged: Mapping[int, Merge]) -> None:
         """Write a closure of keyframes that are stored already; ``merged`` and StoreError as in `add`."""
-        with self._told("write a closure"), self._changing() as (transaction, books):
-            write_closures(transaction, books, (closure,), MOST_CLOSURES)
-            rename_landmarks(transaction, books, merged)
+        with self._told("write a closure"), self._changing() as (transaction, counters):
+            write_closures(transaction, counters, (closure,), MOST_CLOSURES)
+            rename_landmarks(transaction, counters, merged)
 
     def keyframe(self, keyframe_id: int) -> Keyframe:
         """A stored keyframe; KeyError if it is not there, StoreError if it is damaged."""
@@ -166,11 +166,11 @@ class Store:
         ``forgotten`` is how many of them go for no other reason than that there is a limit: they are counted. Of the
         room that is free then, the file gives back what is more than `SPARE`, `STEP` pages at a time.
         """
-        with self._told("remove keyframes"), self._changing() as (transaction, books):
+        with self._told("remove keyframes"), self._changing() as (transaction, counters):
             for keyframe_id in keyframe_ids:
-                delete(transaction, books, "object", "WHERE keyframe = ?", (keyframe_id,))
-                delete(transaction, books, "keyframe", "WHERE id = ?", (keyframe_id,))
-            books.forgotten += forgotten
+                delete(transaction, counters, "object", "WHERE keyframe = ?", (keyframe_id,))
+                delete(transaction, counters, "keyframe", "WHERE id = ?", (keyframe_id,))
+            counters.forgotten += forgotten
         for keyframe_id in keyframe_ids:
             self._recent.drop(keyframe_id)
             self._heads.pop(keyframe_id, None)
@@ -183,17 +183,17 @@ class Store:
         A file is not emptied: it keeps all that it has under a dated name beside, and a new one takes its place.
         StoreError where that cannot be: then everything is as it was.
         """
-        if self._claim is not None and (self._heads or self._books.closure_rows):
+        if self._claim is not None and (self._heads or self._counters.closure_rows):
             return self._set_aside(self._claim)
-        with self._told("forget everything"), self._changing() as (transaction, books):
+        with self._told("forget everything"), self._changing() as (transaction, counters):
             for table in ("closure", "object", "keyframe"):
-                delete(transaction, books, table)
-            books.forgotten = 0
-        self._begin(books)
+                delete(transaction, counters, table)
+            counters.forgotten = 0
+        self._begin(counters)
         return ""
 
     def _set_aside(self, claim: Claim) -> str:
-        path, given = Path(self.path), self._books.emptied()
+        path, given = Path(self.path), self._counters.emptied()
         self.save()  # all is in the one file
         with self._told("set it aside"):
             self._connection.close()
@@ -209,28 +209,28 @@ class Store:
         self._begin(given)
         return str(dated)
 
-    def _begin(self, books: Books) -> None:
+    def _begin(self, counters: Counters) -> None:
         self._recent.clear()
-        self._heads, self._books = {}, books
+        self._heads, self._counters = {}, counters
 
     @contextmanager
-    def _changing(self) -> Iterator[tuple[sqlite3.Connection, Books]]:
-        """A transaction with the books that it changes, which are written with it or stay as they were."""
-        books = replace(self._books)
+    def _changing(self) -> Iterator[tuple[sqlite3.Connection, Counters]]:
+        """A transaction with the counters that it changes, which are written with it or stay as they were."""
+        counters = replace(self._counters)
         with self._connection as transaction:
-            yield transaction, books
-            books.write(transaction)
-        self._books = books
+            yield transaction, counters
+            counters.write(transaction)
+        self._counters = counters
 
     def next_keyframe(self) -> int:
         """An id that no keyframe ever had here; StoreError where they are used up."""
         with self._told("number a keyframe"):
-            return self._books.next("keyframe")
+            return self._counters.next("keyframe")
 
     def next_landmark(self) -> int:
         """An id that no landmark ever had here, whatever was forgotten since; StoreError where they are used up."""
         with self._told("number a landmark"):
-            return self._books.next("landmark")
+            return self._counters.next("landmark")
 
     def next_session(self) -> int:
         """The number of a session that nothing is stored of yet, nor is a closure to it, as to a keyframe elsewhere."""
@@ -254,12 +254,12 @@ class Store:
         with self._told("count"):
             landmarks = self._connection.execute("SELECT COUNT(DISTINCT landmark) FROM object").fetchone()[0]
         return {
-            "keyframes": self._books.keyframe_rows,
-            "objects": self._books.object_rows,
+            "keyframes": self._counters.keyframe_rows,
+            "objects": self._counters.object_rows,
             "landmarks": landmarks,
             "sessions": len({head["session"] for head in self._heads.values()}),
-            "closures": self._books.closure_rows,
-            "forgotten": self._books.forgotten,
+            "closures": self._counters.closure_rows,
+            "forgotten": self._counters.forgotten,
         }
 
     def save(self, path: str | Path = "") -> str:

@@ -10,8 +10,8 @@ import time
 from contextlib import closing
 from pathlib import Path
 
-from objreg_ros.memory.books import Books
 from objreg_ros.memory.claim import MAGIC, Claim, StoreError, read_header
+from objreg_ros.memory.counters import Counters
 from objreg_ros.whole_file import whole_file
 
 APPLICATION_ID = 0x4F424A52  # "OBJR" at byte 68 of the file
@@ -70,20 +70,20 @@ def require_place(path: Path, read_only: bool) -> None:
         raise StoreError(f"{path}: expected a file in an existing folder, got none; make the folder, or use another")
 
 
-def create(path: Path, books: Books | None = None) -> None:
-    """An empty store in an empty file, with the ids that ``books`` say were given."""
+def create(path: Path, counters: Counters | None = None) -> None:
+    """An empty store in an empty file, with the ids that ``counters`` say were given."""
     with closing(sqlite3.connect(path)) as connection:
-        bear(connection, books)
+        bear(connection, counters)
 
 
-def bear(connection: sqlite3.Connection, books: Books | None = None) -> None:
+def bear(connection: sqlite3.Connection, counters: Counters | None = None) -> None:
     """Make a store of an empty database."""
     connection.executescript(
         f"PRAGMA auto_vacuum = INCREMENTAL; PRAGMA application_id = {APPLICATION_ID};"
         f"BEGIN; PRAGMA user_version = {SCHEMA_VERSION}; {SCHEMA} COMMIT;"
     )
     with connection as transaction:
-        (books or Books()).write(transaction)
+        (counters or Counters()).write(transaction)
 
 
 def shrink(connection: sqlite3.Connection, most: int = 0) -> None:

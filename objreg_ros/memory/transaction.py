@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from objreg_ros.data import LoopClosure
-from objreg_ros.memory.books import Books, count
 from objreg_ros.memory.checksum import LIGHT, require_light, sealed_light
 from objreg_ros.memory.codec import closure_row
+from objreg_ros.memory.counters import Counters, count
 from objreg_ros.memory.landmarks import Merge
 from objreg_ros.memory.migration import insert
 
@@ -21,36 +21,38 @@ SESSION = "SELECT COALESCE(MAX(MAX(COALESCE(from_session, -1), COALESCE(to_sessi
 OBJECTS = f"SELECT {', '.join(LIGHT)}, seal FROM object"
 
 
-def write(transaction: sqlite3.Connection, books: Books, table: str, row: Mapping[str, Any]) -> None:
+def write(transaction: sqlite3.Connection, counters: Counters, table: str, row: Mapping[str, Any]) -> None:
     """Enter a row and book it."""
     insert(transaction, table, row)
-    books.enter(table, row)
+    counters.enter(table, row)
 
 
 def delete(
-    transaction: sqlite3.Connection, books: Books, table: str, where: str = "", values: Sequence[Any] = ()
+    transaction: sqlite3.Connection, counters: Counters, table: str, where: str = "", values: Sequence[Any] = ()
 ) -> None:
     """Delete the rows of a table that ``where`` names, all without it, and book that."""
     rows, seals = count(transaction, table, where, values)
     transaction.execute(f"DELETE FROM {table} {where}", values)
-    books.change(table, -rows, -seals)
+    counters.change(table, -rows, -seals)
 
 
-def write_closures(transaction: sqlite3.Connection, books: Books, closures: Iterable[LoopClosure], most: int) -> None:
+def write_closures(
+    transaction: sqlite3.Connection, counters: Counters, closures: Iterable[LoopClosure], most: int
+) -> None:
     """Enter closures, and forget the oldest of more than ``most``."""
     for closure in closures:
-        write(transaction, books, "closure", closure_row(books.next("closure"), closure))
-    if books.closure_rows > most:
-        delete(transaction, books, "closure", OLDEST, (books.closure_rows - most,))
+        write(transaction, counters, "closure", closure_row(counters.next("closure"), closure))
+    if counters.closure_rows > most:
+        delete(transaction, counters, "closure", OLDEST, (counters.closure_rows - most,))
 
 
-def rename_landmarks(transaction: sqlite3.Connection, books: Books, merged: Mapping[int, Merge]) -> None:
+def rename_landmarks(transaction: sqlite3.Connection, counters: Counters, merged: Mapping[int, Merge]) -> None:
     """Make every sighting of the landmarks that are gone one of that which stays."""
     for old, merge in merged.items():
-        _rename_landmark(transaction, books, old, merge)
+        _rename_landmark(transaction, counters, old, merge)
 
 
-def _rename_landmark(transaction: sqlite3.Connection, books: Books, old: int, merge: Merge) -> None:
+def _rename_landmark(transaction: sqlite3.Connection, counters: Counters, old: int, merge: Merge) -> None:
     """Make every sighting of a landmark one of that which stays, in its axes."""
     for row in transaction.execute(f"{OBJECTS} WHERE landmark = ?", (old,)).fetchall():
         require_light(row)
@@ -60,4 +62,4 @@ def _rename_landmark(transaction: sqlite3.Connection, books: Books, old: int, me
             "UPDATE object SET landmark = ?, R_landmark_session = ?, seal = ? WHERE id = ?",
             (new["landmark"], new["R_landmark_session"], new["seal"], row["id"]),
         )
-        books.change("object", 0, new["seal"] - row["seal"])
+        counters.change("object", 0, new["seal"] - row["seal"])

@@ -188,10 +188,10 @@ def camera_info(camera: Intrinsics, stamp_ns: int, frame_id: str, distortion: Se
     K = (camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0)
     P = (camera.fx, 0.0, camera.cx, 0.0, 0.0, camera.fy, camera.cy, 0.0, 0.0, 0.0, 1.0, 0.0)
     told = Calibration(k=K, p=P, width=camera.width, height=camera.height, d=tuple(distortion))
-    return told_camera_info(told, stamp_ns, frame_id)
+    return camera_info_from_text(told, stamp_ns, frame_id)
 
 
-def told_camera_info(camera: Calibration, stamp_ns: int, frame_id: str) -> Any:
+def camera_info_from_text(camera: Calibration, stamp_ns: int, frame_id: str) -> Any:
     """sensor_msgs/CameraInfo of a camera that somebody names."""
     roi = message("sensor_msgs/RegionOfInterest", x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
     return message(

@@ -46,10 +46,10 @@ def frame_tree(recording: Recording, *followed: str) -> FrameTree:
     tree.follow(*followed)
     for record in recording.records(static) if static else ():
         with suppress(ValueError):
-            tree.hear(record.message)
+            tree.receive(record.message)
     for record in _glances(recording, moving_topics(recording)):
         with suppress(ValueError):
-            tree.hear_moving(record.message)
+            tree.receive_moving(record.message)
     return tree
 
 

@@ -112,7 +112,7 @@ class CameraTrack:
         """A constraint that waited, written down."""
         settled, ends = recollection.remember_late(waiting)
         if ends is not None:
-            self.relocalisation.hear(settled.closure, *ends)
+            self.relocalisation.receive(settled.closure, *ends)
         return settled.closure
 
 

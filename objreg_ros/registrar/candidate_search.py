@@ -104,7 +104,7 @@ class Search:
                 continue
             tries -= 1
             tried = ask()
-            verdict = self._means.confirmation.hear(tried) if isinstance(tried, Tried) else tried
+            verdict = self._means.confirmation.receive(tried) if isinstance(tried, Tried) else tried
             if isinstance(verdict, Accepted):
                 self._thinning.accept(stored.session, stored.stamp_ns, self._keyframe.stamp_ns)
                 found.accepted.append(verdict)

@@ -53,7 +53,7 @@ class Held(NamedTuple):
 
 
 class Confirmation:
-    """Hears of every pair that was tried, and says which poses others confirm.
+    """Receives of every pair that was tried, and says which poses others confirm.
 
     It remembers statements within reach (`consistency`), and what waits. The same pairs in the same order give the same
     answers.
@@ -68,8 +68,8 @@ class Confirmation:
         """How many wait."""
         return len(self._waiting)
 
-    def hear(self, tried: Tried) -> Accepted | Held | Rejected:
-        """What a registration comes to beside what was heard before; ValueError where a gate gave no reason."""
+    def receive(self, tried: Tried) -> Accepted | Held | Rejected:
+        """What a registration comes to beside what was received before; ValueError where a gate gave no reason."""
         registration = tried.registration
         candidate, accepted = registration.candidate, registration.accepted
         if candidate is None or not (accepted or (self._wait_ns and self._possible(candidate, tried.prior))):
@@ -129,7 +129,7 @@ def _confirmed(support: Support) -> bool:
 
 
 def _opposed(support: Support) -> bool:
-    return support.heard >= HEARD and support.share < OPPOSED_SHARE
+    return support.received >= HEARD and support.share < OPPOSED_SHARE
 
 
 def _by_odometry(tried: Tried) -> bool:

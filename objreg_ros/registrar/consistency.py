@@ -68,13 +68,13 @@ class Support(NamedTuple):
     """What other statements say of one.
 
     ``agreeing`` counts those that agree with it and with each other, each of two keyframes of its own, one of them
-    ``sure`` or it itself is. Of all that speak of the same place, weighing ``heard``, ``share`` agrees. What disagrees
-    by no more than odometry jitters is left out.
+    ``sure`` or it itself is. Of all that speak of the same place, weighing ``received``, ``share`` agrees. What
+    disagrees by no more than odometry jitters is left out.
     """
 
     agreeing: int
     share: float
-    heard: float
+    received: float
 
 
 class Excess(NamedTuple):

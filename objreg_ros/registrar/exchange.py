@@ -2,8 +2,8 @@
 """Registrars that each keep a store of their own, and still close loops between their robots.
 
 A registrar tells the others a summary of each keyframe. Who finds places of its own alike asks for the keyframe, and
-compares it with those. Every pair of keyframes is looked at once: by the registrar that had its own when it heard of
-the other; where both were told before either was heard, by that of the older one.
+compares it with those. Every pair of keyframes is looked at once: by the registrar that had its own when it known
+the other; where both were told before either was received, by that of the older one.
 
 What is answered stays within bytes per second: askers take turns, each with the most promising. Names are believed of
 nobody: `peers/` says what a false one cannot do. Times are in s, of any clock that goes on.
@@ -68,9 +68,10 @@ class Allowance:
 
 
 class Exchange:
-    """What ``registrar`` says to those of other robots and hears of them; ``robot`` is the name of frames without one.
+    """What ``registrar`` says to those of other robots and receives them; ``robot`` is the name of frames without one.
 
-    ``books`` counts what was sent and heard, with its bytes, and what was dropped, by reason. ``run`` names this start.
+    ``counters`` counts what was sent and received, with its bytes, and what was dropped, by reason. ``run`` names this
+    start.
     """
 
     def __init__(self, registrar: Registrar, robot: str, bytes_per_second: float = np.inf, run: str = "") -> None:
@@ -78,8 +79,8 @@ class Exchange:
         self._allowance, self._lock = Allowance(bytes_per_second), threading.Lock()
         self._from_before = self._told = registrar.newest_keyframe  # ids up to these
         self._sessions = OrderedDict[tuple[str, int], int]()  # by run and session there, the number here
-        self.books: Counter[str] = Counter()
-        self._peers, self._pending, self._wishes = Peers(robot), Pending(self.books), Wishes(self.books)
+        self.counters: Counter[str] = Counter()
+        self._peers, self._pending, self._wishes = Peers(robot), Pending(self.counters), Wishes(self.counters)
 
     @property
     def waiting(self) -> int:
@@ -103,12 +104,12 @@ class Exchange:
         with self._lock:
             self._told = name.keyframe_id
             summary = Summary(
-                name=name, frame_id=named.frame_id, clock=clock, sightings=sightings, heard=self._peers.newest
+                name=name, frame_id=named.frame_id, clock=clock, sightings=sightings, received=self._peers.newest
             )
             try:
                 return self._sent("summaries", pack_summary(summary))
             except ValueError:
-                self.books["dropped: too large to be told"] += 1
+                self.counters["dropped: too large to be told"] += 1
                 return None
 
     def sender(self, packed: bytes) -> str:
@@ -116,7 +117,7 @@ class Exchange:
         run = name_of(packed).run
         return run if run in self._peers else ""
 
-    def hear(self, packed: bytes, now: float = 0.0) -> bytes | None:
+    def receive(self, packed: bytes, now: float = 0.0) -> bytes | None:
         """A request for the keyframe of a summary, where it may show a place that is stored here; else None.
 
         ValueError where the bytes are no summary.
@@ -132,7 +133,7 @@ class Exchange:
         ours = [one for one in found if one.keyframe_id <= told and self._falls_to_us(one, summary)]
         with self._lock:
             if not ours:
-                self.books["dropped: unlike"] += 1
+                self.counters["dropped: unlike"] += 1
                 return None
             if not self._pending.add(Asked(summary, ours, now)):
                 return None
@@ -147,7 +148,7 @@ class Exchange:
         if request.name.run != self.run:
             return
         with self._lock:
-            self.books["requests heard"] += 1
+            self.counters["requests received"] += 1
             asker = request.asker if request.asker in self._peers else ""
             self._wishes.add(asker, request.name.keyframe_id, request.votes, now)
 
@@ -160,7 +161,7 @@ class Exchange:
             try:
                 packed = pack_delivery(self.run, self._ours(self._registrar.moment(number)[0]))
             except (KeyError, StoreError, ValueError):
-                self.books["dropped: not to be had"] += 1
+                self.counters["dropped: not to be had"] += 1
                 continue
             with self._lock:
                 return self._sent("keyframes", packed)
@@ -181,10 +182,10 @@ class Exchange:
         """
         name, came = unpack_delivery(packed)
         with self._lock:
-            self.books["keyframes heard"] += 1
-            self.books["bytes heard"] += len(packed)
+            self.counters["keyframes received"] += 1
+            self.counters["bytes received"] += len(packed)
             if name not in self._pending:
-                self.books["dropped: not asked for"] += 1
+                self.counters["dropped: not asked for"] += 1
                 return None
         asked = self._answered(name, came)
         first, began = asked.summary.sightings[0], asked.summary.clock
@@ -216,15 +217,15 @@ class Exchange:
     def _is_news(self, summary: Summary, packed: bytes, now: float) -> bool:
         if summary.name.run == self.run:
             return False
-        self.books["summaries heard"] += 1
-        self.books["bytes heard"] += len(packed)
+        self.counters["summaries received"] += 1
+        self.counters["bytes received"] += len(packed)
         if why := self._peers.refuse(summary, packed, now):
-            self.books[f"dropped: {why}"] += 1
+            self.counters[f"dropped: {why}"] += 1
         return not why
 
     def _falls_to_us(self, stored: CandidateKeyframe, summary: Summary) -> bool:
-        """Whether it is for us to look at a pair: the other had heard of ours, or ours is older."""
-        known = max(self._from_before, summary.heard.get(self.run, 0))
+        """Whether it is for us to look at a pair: the other knew of ours, or ours is older."""
+        known = max(self._from_before, summary.received.get(self.run, 0))
         theirs = summary.sightings[0].stamp_ns, summary.name.run
         return stored.keyframe_id <= known or (stored.stamp_ns, self.run) < theirs
 
@@ -248,8 +249,8 @@ class Exchange:
         return replace(keyframe, robot=robot, frame_id=framed(robot, keyframe.frame_id))
 
     def _sent(self, what: str, packed: bytes) -> bytes:
-        self.books[f"{what} sent"] += 1
-        self.books["bytes sent"] += len(packed)
+        self.counters[f"{what} sent"] += 1
+        self.counters["bytes sent"] += len(packed)
         self._allowance.spend(len(packed))
         return packed
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The door of the registrar: objects, views, gravity and odometry in; constraints, refusals and landmarks out.
+"""The node of the registrar: objects, views, gravity and odometry in; constraints, refusals and landmarks out.
 
 Or the keyframes of robots in, which track by themselves (`keyframes/node.py`).
 """
@@ -16,15 +16,15 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from objreg_ros.bridge.messages.markers import Scene
-from objreg_ros.bridge.node.door import DroppedError
-from objreg_ros.bridge.node.indoors import Indoors
+from objreg_ros.bridge.node.intra_process import IntraProcessBus
 from objreg_ros.bridge.node.lifetime import await_kernels
+from objreg_ros.bridge.node.node_base import DroppedError
 from objreg_ros.bridge.node.params import ExchangeParams, KeyParams, ManagedParams, PeerParams, RelocalisedParams
 from objreg_ros.bridge.node.spin import run
 from objreg_ros.bridge.node.worker import Backlog, Limit
 from objreg_ros.bridge.streams.announcements import Announcements
 from objreg_ros.bridge.streams.exchanging import Delivered, Exchanging
-from objreg_ros.bridge.streams.frames_in import FramesDoor
+from objreg_ros.bridge.streams.frames_in import FramesNode
 from objreg_ros.bridge.streams.key import read_key
 from objreg_ros.bridge.streams.keyframes_in import FromRobot, KeyframesIn
 from objreg_ros.bridge.streams.relocalised import Whereabouts
@@ -54,21 +54,21 @@ class Job(NamedTuple):
     since: float
 
 
-class RegistrarNode(FramesDoor):
+class RegistrarNode(FramesNode):
     """Follows every frame; searches, in a second worker, for the places that a keyframe shows again.
 
-    A frame that completes a keyframe is in the books until its search is over. A keyframe that a newer one overtakes is
-    stored without a search: nothing that was seen is lost. A search that newer ones wait for is cut short, and no frame
-    is followed while too many wait.
+    A frame that completes a keyframe is in the counters until its search is over. A keyframe that a newer one overtakes
+    is stored without a search: nothing that was seen is lost. A search that newer ones wait for is cut short, and no
+    frame is followed while too many wait.
 
     With ``robots`` it follows no frame: keyframes come from keyframers. Robots take turns, each with its oldest
     keyframe; `BEHIND` of them may wait before the oldest is stored without a search. With ``exchange`` it asks other
     registrars for keyframes that look alike, and compares them with its own.
     """
 
-    def __init__(self, indoors: Indoors | None = None) -> None:
+    def __init__(self, bus: IntraProcessBus | None = None) -> None:
         kinds = RegistrarParams, RegistrarNodeParams, ExchangeParams, KeyParams, PeerParams
-        super().__init__("registrar", *kinds, RelocalisedParams, ManagedParams, indoors=indoors)
+        super().__init__("registrar", *kinds, RelocalisedParams, ManagedParams, bus=bus)
 
     def open(self) -> None:
         """Load the kernels, open the store, publish and listen."""
@@ -132,7 +132,7 @@ class RegistrarNode(FramesDoor):
 
         Both share Python's lock there. A nice thread that waits for a processor with the lock held stops both.
         """
-        return 0 if self.hears_words else GIVING_WAY
+        return 0 if self.receives_values else GIVING_WAY
 
     # Compute
 
@@ -145,7 +145,7 @@ class RegistrarNode(FramesDoor):
             frame = replace(frame, robot=self._robot, frame_id=framed(self._robot, frame.frame_id))
         self._scene.see(frame)
         with self._tracking:  # until it waits: none that a service ends comes before it
-            with self.ledger.timed("track"):
+            with self.accounting.timed("track"):
                 window = self._registrar.track(frame)
             if window is not None:
                 self.searcher.put(Job(stamp_ns, window, time.monotonic()))
@@ -154,14 +154,14 @@ class RegistrarNode(FramesDoor):
         return window is None
 
     def _take(self, seen: FromRobot | Delivered) -> None:
-        """A keyframe of a robot that is in the books goes on to the searcher."""
+        """A keyframe of a robot that is in the counters goes on to the searcher."""
         if self.is_enabled:
             self.searcher.put(Job(seen.stamp_ns, seen, time.monotonic()))
         else:
             self.drop(seen.stamp_ns, "disabled")
 
     def _search(self, job: Job) -> None:
-        self.ledger.spend("wait", time.monotonic() - job.since)
+        self.accounting.spend("wait", time.monotonic() - job.since)
         self.conclude(job.stamp_ns, lambda: self._find(job, "search", self._seconds))
 
     def _keep(self, job: Job) -> None:
@@ -171,7 +171,7 @@ class RegistrarNode(FramesDoor):
         self.conclude(job.stamp_ns, lambda: self._find(job, "keep", 0.0))
 
     def _find(self, job: Job, stage: str, seconds: float) -> bool:
-        with self.ledger.timed(stage):
+        with self.accounting.timed(stage):
             outcome = self._outcome(job.seen, seconds)
         if outcome is None:
             self.leave_out(job.stamp_ns, "known")

@@ -172,7 +172,7 @@ class Registrar:
                 track.thinning.withdraw(item.target.session, item.target.stamp_ns, keyframe.stamp_ns)
             raise
         for item, closure in zip(believed, closures, strict=True):
-            track.relocalisation.hear(closure, keyframe, item.target)
+            track.relocalisation.receive(closure, keyframe, item.target)
         if not proven:
             track.wait_for_proof(found.accepted, keyframe, named)
         for held in found.held:

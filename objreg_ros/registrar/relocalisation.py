@@ -73,7 +73,7 @@ def drift(metres: float) -> Array:
 
 
 class Relocalisation:
-    """Hears of every frame and every closure; `relocalised` says where the camera is, `reason` why that is not known.
+    """Follows every frame and every closure; `relocalised` says where the camera is, `reason` why that is not known.
 
     It stays with the session in whose map it was sure first. All is forgotten where odometry begins anew, or may have
     in a silence. For several threads.
@@ -88,7 +88,7 @@ class Relocalisation:
         """Forget everything: the frames from ``began_ns`` on are in odometry of their own."""
         self._session, self._began_ns = session, began_ns
         self._ties: list[Tie] = []
-        self._heard = Counter[int]()  # closures, by the earlier session
+        self._received = Counter[int]()  # closures, by the earlier session
         self._camera: tuple[int, Array] | None = None  # the newest: stamp and T_odom_camera
         self._map: int | None = None  # the session in whose map the camera is
         self._T_map_odom: Array = np.eye(4)
@@ -122,7 +122,7 @@ class Relocalisation:
         before = (metres for step_ns, metres in reversed(self._steps) if step_ns <= stamp_ns)
         return next(before, self._steps[0][1])
 
-    def hear(self, closure: LoopClosure, source: Keyframe, target: Keyframe) -> None:
+    def receive(self, closure: LoopClosure, source: Keyframe, target: Keyframe) -> None:
         """Take in a closure of these keyframes, the later one first; those of one session tell nothing."""
         with self._lock:
             is_of_now = source.session == self._session and source.stamp_ns >= self._began_ns
@@ -130,7 +130,7 @@ class Relocalisation:
                 return
             if self._camera is None or not source.by_odometry:  # our own tracking tells no frame between keyframes
                 self._go(source.stamp_ns, _pose_of(source))
-            self._heard[target.session] += 1
+            self._received[target.session] += 1
             tie = _tie(closure, source, target)
             self._weigh(tie)
             self._ties = [*self._ties, tie][-MOST:]
@@ -183,10 +183,10 @@ class Relocalisation:
         with self._lock:
             if self._map is not None:
                 return f"{self._agreeing} closures that agree, to session {self._map}"
-            if not self._heard:
+            if not self._received:
                 return "no closure to an earlier session yet"
-            heard = ", ".join(f"{count} to session {session}" for session, count in sorted(self._heard.items()))
-            return f"closures so far: {heard}; expected two that agree, or one with odds of {ALONE_ODDS:g}"
+            received = ", ".join(f"{count} to session {session}" for session, count in sorted(self._received.items()))
+            return f"closures so far: {received}; expected two that agree, or one with odds of {ALONE_ODDS:g}"
 
 
 def fused(poses: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:

@@ -56,7 +56,7 @@ class Summary:
     """What others need to know of a keyframe to tell whether it may show a place of theirs.
 
     ``sightings``, at least one, have their robot, session and positions as the registrar that tells it has them, and no
-    extent, score or camera. ``heard`` has the newest keyframe of each other run that had been heard of when this one
+    extent, score or camera. ``received`` has the newest keyframe of each other run that had been known when this one
     was told.
     """
 
@@ -64,7 +64,7 @@ class Summary:
     frame_id: str
     clock: Clock
     sightings: tuple[Sighting, ...]
-    heard: Mapping[str, int] = field(default_factory=dict)
+    received: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def robot(self) -> str:
@@ -93,7 +93,7 @@ def pack_summary(summary: Summary) -> bytes:
         "stamp_ns": first.stamp_ns,
         "travelled": first.travelled,
         "by_odometry": int(first.by_odometry),
-        "heard": dict(summary.heard),
+        "received": dict(summary.received),
         "labels": [sighting.label for sighting in summary.sightings],
     }
     positions = np.array([sighting.position for sighting in summary.sightings], "<f4")
@@ -175,7 +175,7 @@ def _summary(head: Head, rest: bytes) -> Summary:
         name=_name(head),
         frame_id=text(head, "frame_id"),
         clock=_clock(head),
-        heard=_heard(head),
+        received=_received(head),
         sightings=tuple(
             Sighting(instance=k, label=label, position=position, descriptor=descriptor, **told)
             for k, (label, position, descriptor) in objects
@@ -197,9 +197,11 @@ def _clock(head: Head) -> Clock:
     )
 
 
-def _heard(head: Head) -> dict[str, int]:
-    within("runs that were heard", len(head["heard"]), MOST_RUNS)
-    return {text({"run": run}, "run"): within("heard", number, MOST_WHOLE) for run, number in head["heard"].items()}
+def _received(head: Head) -> dict[str, int]:
+    within("runs that were received", len(head["received"]), MOST_RUNS)
+    return {
+        text({"run": run}, "run"): within("received", number, MOST_WHOLE) for run, number in head["received"].items()
+    }
 
 
 def _bounded(name: str, numbers: Array, most: float) -> Array:

@@ -10,15 +10,15 @@ from pathlib import Path
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from objreg_ros.report.bundle import plotly_bundle
-from objreg_ros.report.run.chapter import chapter
 from objreg_ros.report.run.comparison import comparison
 from objreg_ros.report.run.pictures import Album
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_summary import RunSummary
+from objreg_ros.report.run.sections import chapter
 
 TEMPLATES = Path(__file__).parent / "templates"
 
 
-def page(chapters: Sequence[tuple[Story, Album | None]]) -> str:
+def page(chapters: Sequence[tuple[RunSummary, Album | None]]) -> str:
     """The HTML of a report, a chapter for each run; one without an album has no pictures.
 
     More runs than one are compared before them.

@@ -14,16 +14,16 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.geometry import mounting
 from objreg_ros.recording import Recording
+from objreg_ros.recording.camera_from_text import with_camera
 from objreg_ros.recording.inputs import choose_inputs
 from objreg_ros.recording.opening import open_recording
 from objreg_ros.recording.poses import pose_of
 from objreg_ros.recording.text import read_text
 from objreg_ros.recording.tf_odometry import with_transforms
-from objreg_ros.recording.told_camera import with_camera
 from objreg_ros.report.page import page
-from objreg_ros.report.run.form import require_form
 from objreg_ros.report.run.pictures import Album
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_schema import require_form
+from objreg_ros.report.run.run_summary import RunSummary
 from objreg_ros.truth import Truth
 from objreg_ros.whole_file import write_whole
 
@@ -46,18 +46,18 @@ def write_report(out: Path, runs: Sequence[Path]) -> list[str]:
     ]
 
 
-def _chapter(file: Path, stack: ExitStack) -> tuple[Story, Album | None]:
+def _chapter(file: Path, stack: ExitStack) -> tuple[RunSummary, Album | None]:
     summary = _read(file)
     place = Path(summary.get("recording", ""))
     if not summary.get("recording") or not place.exists():
-        return Story.of(file.stem, summary, Truth([])), None
+        return RunSummary.of(file.stem, summary, Truth([])), None
     opened = with_transforms(stack.enter_context(open_recording(place)))
     recording = with_camera(opened, summary.get("camera", ""), _inputs_of(summary, opened))
     inputs = choose_inputs(recording.topics, _inputs_of(summary, recording))
     T_base_camera = mounting(summary.get("T_base_camera", ()))
     glimpses = _with_odometry(summary.get("glimpses", ()), recording, inputs.odom, T_base_camera)
     told = {**_of_nodes(summary), **summary, "glimpses": glimpses}
-    story = Story.of(summary.get("name", place.resolve().name), told, Truth.of(recording, inputs.ground_truth))
+    story = RunSummary.of(summary.get("name", place.resolve().name), told, Truth.of(recording, inputs.ground_truth))
     return story, Album(recording, inputs, summary.get("rectified", "auto"))
 
 
@@ -97,12 +97,12 @@ def _nearest(stamps: Array, stamp_ns: int) -> int:
 
 
 def _of_nodes(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """What the books of live nodes tell: how many frames, and how long each stage took."""
+    """What the counters of live nodes tell: how many frames, and how long each stage took."""
     nodes = summary.get("nodes", {})
     stages = {
         f"{node}: {stage}": {"p50": p50, "p95": p95}
-        for node, books in nodes.items()
-        for stage, (p50, p95) in books["stage_ms"].items()
+        for node, counters in nodes.items()
+        for stage, (p50, p95) in counters["stage_ms"].items()
     }
     return {"frames": nodes["segmenter"]["published"], "stage_ms": stages} if "segmenter" in nodes else {}
 

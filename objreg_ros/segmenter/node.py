@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The door of the segmenter: depth and detections in, objects and views out.
+"""The node of the segmenter: depth and detections in, objects and views out.
 
 In: ``points``, or ``depth/image`` with ``camera_info`` and ``image``, and ``colour/camera_info`` where depth is not
 registered to colour; ``detections_table`` with ``labels``, or ``detections_in``, or ``masks``; ``imu``, or ``odom``
@@ -26,17 +26,17 @@ from sensor_msgs.msg import Imu as ImuMessage
 from objreg_ros.bridge.camera import colour_frame, lenses, registered_depth
 from objreg_ros.bridge.camera.calibration import fitted, read_calibration
 from objreg_ros.bridge.camera.mount import Mount
-from objreg_ros.bridge.camera.transforms import hear_frames
+from objreg_ros.bridge.camera.transforms import receive_frames
 from objreg_ros.bridge.messages import from_msg, rvl, to_msg, vision_to_msg
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.indoors import Indoors, Surplus
+from objreg_ros.bridge.node.intra_process import IntraProcessBus, Surplus
 from objreg_ros.bridge.node.lifetime import await_kernels
 from objreg_ros.bridge.node.overridable import FIXED
 from objreg_ros.bridge.node.params import ManagedParams
 from objreg_ros.bridge.node.spin import run
 from objreg_ros.bridge.streams.detections_in import DetectionsIn
-from objreg_ros.bridge.streams.matching import MatchingDoor
 from objreg_ros.bridge.streams.sync import Drop, Match, Need, Stream
+from objreg_ros.bridge.streams.synchronised_node import SynchronisedNode
 from objreg_ros.data import Array, ColourImage, DepthImage, Detections, FeltGravity, Frame, PointCloud
 from objreg_ros.segmenter.gravity.imu import Imu
 from objreg_ros.segmenter.params import SegmenterNodeParams, SegmenterParams
@@ -55,11 +55,11 @@ ENOUGH_COMPARED, ODD_DEG = 20, 20.0  # of so many half disagree by more: the IMU
 IMAGES = {"image": Image, "image/compressed": CompressedImage}
 
 
-class SegmenterNode(MatchingDoor):
+class SegmenterNode(SynchronisedNode):
     """Segments every depth image or cloud that has detections; a frame goes out also where there is no object."""
 
-    def __init__(self, indoors: Indoors | None = None) -> None:
-        super().__init__("segmenter", SegmenterParams, SegmenterNodeParams, ManagedParams, indoors=indoors)
+    def __init__(self, bus: IntraProcessBus | None = None) -> None:
+        super().__init__("segmenter", SegmenterParams, SegmenterNodeParams, ManagedParams, bus=bus)
 
     def open(self) -> None:
         """Load the kernels, publish and listen."""
@@ -68,7 +68,7 @@ class SegmenterNode(MatchingDoor):
         await_kernels(self._warm, self.get_logger().info)
         self._camera_info: Any = read_calibration(self._inputs.camera) if self._inputs.camera else None
         self._colour_info: Any = None
-        frames = hear_frames(self)
+        frames = receive_frames(self)
         self._find_pose = frames.between
         self._imu = Imu(self._inputs.imu_mounting, self._find_pose)
         self._mount = Mount(self._inputs.mounting, frames, self.get_logger().info)
@@ -94,11 +94,11 @@ class SegmenterNode(MatchingDoor):
         if self._inputs.source != "points":
             self._listen_for_colour()
         sources = SOURCES[self._inputs.source]
-        self.listen_to_first("depth", sources, self._decode_depth, self._hear_depth, self.sensor())
+        self.listen_to_first("depth", sources, self._decode_depth, self._on_depth, self.sensor())
         if self._inputs.level_odom:
-            self.listen(Odometry, "odom", self._hear_odom, self.sensor(qos.ODOMETRY))
+            self.listen(Odometry, "odom", self._on_odom, self.sensor(qos.ODOMETRY))
         else:
-            self.listen(ImuMessage, "imu", self._hear_imu, self.sensor(qos.ODOMETRY))
+            self.listen(ImuMessage, "imu", self._on_imu, self.sensor(qos.ODOMETRY))
         self._detections = DetectionsIn(self, self._inputs.detections)
 
     def _listen_for_camera(self) -> None:
@@ -106,15 +106,15 @@ class SegmenterNode(MatchingDoor):
         if self._camera_info is not None:
             self.feed("camera_info", 0, self._camera_info)
             return
-        self.listen(CameraInfo, "camera_info", self._hear_camera, self.sensor(), watched="camera_info")
+        self.listen(CameraInfo, "camera_info", self._on_camera, self.sensor(), watched="camera_info")
         self.listen(CameraInfo, COLOUR_INFO, self._receive_colour_camera, self.sensor())
-        self._kept = {"camera_info": self._hear_camera, COLOUR_INFO: self._receive_colour_camera}
+        self._kept = {"camera_info": self._on_camera, COLOUR_INFO: self._receive_colour_camera}
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._look = self.create_timer(LOOK_S, self._look_for_kept_camera, clock=steady)
 
     def _listen_for_colour(self) -> None:
         if self._inputs.colour:
-            self.listen_to_first("image", IMAGES, self._decode_image, self._hear_image, self.sensor())
+            self.listen_to_first("image", IMAGES, self._decode_image, self._on_image, self.sensor())
 
     def _look_for_kept_camera(self) -> None:
         """Get what a driver that publishes its cameras once keeps for who comes late, unless they came in time.
@@ -135,9 +135,9 @@ class SegmenterNode(MatchingDoor):
         publishers = self.get_publishers_info_by_topic(self.resolve_topic_name(topic))
         return any(publisher.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL for publisher in publishers)
 
-    # Hear
+    # Receive
 
-    def _hear_camera(self, message: Any) -> None:
+    def _on_camera(self, message: Any) -> None:
         self._camera_info = message
         self.watch.forget("camera_info")  # once is enough
         self.feed("camera_info", from_msg.stamp_ns(message), message)
@@ -145,18 +145,18 @@ class SegmenterNode(MatchingDoor):
     def _receive_colour_camera(self, message: Any) -> None:
         self._colour_info = message
 
-    def _hear_image(self, _: str, message: Any) -> None:
+    def _on_image(self, _: str, message: Any) -> None:
         surplus = isinstance(message, Surplus)
         self.feed("image", from_msg.stamp_ns(message), Drop.SURPLUS if surplus else message)
 
-    def _hear_odom(self, message: Any) -> None:
+    def _on_odom(self, message: Any) -> None:
         odometry = self.read_aside("odom", from_msg.odometry, message)
         if odometry is not None:
             self.feed("odom", odometry.stamp_ns, odometry)
 
-    def _hear_imu(self, message: Any) -> None:
+    def _on_imu(self, message: Any) -> None:
         sample = self.read_aside("imu", from_msg.imu, message)
-        felt = None if sample is None else self._imu.hear(sample)
+        felt = None if sample is None else self._imu.receive(sample)
         if felt is not None:
             self.feed("imu", felt.stamp_ns, felt)
 
@@ -166,7 +166,7 @@ class SegmenterNode(MatchingDoor):
     def _decode_depth(self, topic: str, message: Any) -> Array | PointCloud:
         return from_msg.depth(message, self.most_pixels) if topic in DEPTH else from_msg.point_cloud(message)
 
-    def _hear_depth(self, topic: str, message: Any) -> None:
+    def _on_depth(self, topic: str, message: Any) -> None:
         stamp_ns = from_msg.stamp_ns(message)
         if self.taken("depth") != topic:
             self._turn_away(stamp_ns, topic, message)
@@ -214,7 +214,7 @@ class SegmenterNode(MatchingDoor):
         depth = seen.depth
         asked = self._detections.read(payload, depth, seen.camera_info, seen.raw, cloud)
         gravity, felt = self._level_gravity(payload, depth.frame_id), self._felt_gravity(payload, depth.frame_id)
-        with self.ledger.timed("segment"):
+        with self.accounting.timed("segment"):
             told = (gravity, None) if felt is None else (felt.gravity, felt.gravity_sigma_deg)
             frame = self._segmenter.segment(asked.detections, depth, told[0], gravity_sigma_deg=told[1])
         self._note_gravity()
@@ -314,7 +314,7 @@ class SegmenterNode(MatchingDoor):
         cloud = self.read("points", from_msg.point_cloud, match["depth"])
         cloud = colour_frame.in_optical_frame(cloud, picture_frame, self._find_pose)
         camera = self.read("camera_info", from_msg.camera_of_cloud, camera_info, cloud, self.most_pixels)
-        with self.ledger.timed("organise"):
+        with self.accounting.timed("organise"):
             return colour_frame.Seen(organise(cloud, camera), camera_info, raw), cloud
 
     def _publish(self, frame: Frame, names: to_msg.Labels) -> None:

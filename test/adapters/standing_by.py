@@ -47,7 +47,7 @@ class Around:
         self.node = rclpy.create_node("around")
         self.executor = SingleThreadedExecutor()
         self.executor.add_node(self.node)
-        self.doors: list[Adapter] = []
+        self.nodes: list[Adapter] = []
         self.constraints = self.node.create_publisher(OdometryMsg, "constraints", qos.latched(100))
         self.odom = self.node.create_publisher(OdometryMsg, "odom", qos.room(1000))
         self.whole: Any = None
@@ -55,28 +55,28 @@ class Around:
             self.whole = self.node.create_publisher(closures_msg.LoopClosureMsg, "loop_closures", qos.latched(100))
 
     def start(self, make: Callable[[], Adapter]) -> Adapter:
-        self.doors.append(make())
-        self.executor.add_node(self.doors[-1])
-        return self.doors[-1]
+        self.nodes.append(make())
+        self.executor.add_node(self.nodes[-1])
+        return self.nodes[-1]
 
     def send(self, *closures: LoopClosure) -> None:
         for one in closures:
             self.constraints.publish(to_msg.constraint(one))
 
-    def drive(self, door: Adapter, first_s: float, last_s: float, step_s: float = 0.5) -> None:
-        """Odometry along the walk; it waits until the last word has been heard."""
+    def drive(self, node: Adapter, first_s: float, last_s: float, step_s: float = 0.5) -> None:
+        """Odometry along the walk; it waits until the last word has been received."""
         self.wait(self.odom.get_subscription_count)
         stamps = np.arange(first_s, last_s + step_s / 2, step_s)
         for seconds in stamps:
             word = Odometry(T_odom_body=body_at(seconds), stamp_ns=round(seconds * SECOND), child_frame_id="base_link")
             self.odom.publish(to_msg.odometry(word))
-            self.wait(partial(_has_heard, door, word.stamp_ns))
+            self.wait(partial(_has_heard, node, word.stamp_ns))
 
     def wait(self, done: Callable[[], Any], seconds: float = 20.0) -> None:
         end = time.monotonic() + seconds
         while not done():
-            books = [door.ledger.balance() for door in self.doors]
-            assert time.monotonic() < end, f"nothing came; the books say {books}"
+            counters = [node.accounting.balance() for node in self.nodes]
+            assert time.monotonic() < end, f"nothing came; the counters say {counters}"
             self.executor.spin_once(timeout_sec=0.02)
 
     def pass_time(self, seconds: float) -> None:
@@ -86,13 +86,13 @@ class Around:
 
     def close(self) -> None:
         self.executor.shutdown()
-        for door in self.doors:
-            door.close()
+        for node in self.nodes:
+            node.close()
         self.node.destroy_node()
 
 
-def _has_heard(door: Any, stamp_ns: int) -> bool:
-    newest = door._odom.newest
+def _has_heard(node: Any, stamp_ns: int) -> bool:
+    newest = node._odom.newest
     return newest is not None and newest.stamp_ns >= stamp_ns
 
 

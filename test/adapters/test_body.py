@@ -14,17 +14,17 @@ from objreg_ros.adapters.params import BodyParams
 from objreg_ros.bridge.camera import transforms
 from objreg_ros.bridge.messages import to_msg
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.door import Door
+from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.data import Odometry
 
 from .standing_by import AHEAD, AHEAD_TEXT, Around, closure
 
 
 def made(graph: Around) -> Body:
-    door = Door("somebody", BodyParams)
-    graph.doors.append(door)  # type: ignore[arg-type]
-    graph.executor.add_node(door)
-    return Body(door)
+    node = NodeBase("somebody", BodyParams)
+    graph.nodes.append(node)  # type: ignore[arg-type]
+    graph.executor.add_node(node)
+    return Body(node)
 
 
 def test_the_parameter_counts_more_than_anything(around: Callable[..., Any]) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a stand-in for Hydra hears."""
+"""What a stand-in for Hydra receives."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ needs_messages = pytest.mark.skipif(find_spec("pose_graph_tools_msgs") is None, 
 @needs_messages
 def test_an_edge_between_bodies_arrives_field_by_field_once_hydra_listens(around: Callable[..., Any]) -> None:
     graph = around(f"T_base_camera:={AHEAD_TEXT}", "robot:=2")
-    door = graph.start(ToHydra)
+    node = graph.start(ToHydra)
     graph.send(closure())
-    graph.wait(lambda: door.ledger.balance().waiting == 1)
-    heard: list[Any] = []
-    graph.node.create_subscription(hydra.PoseGraph, "external_loop_closures", heard.append, qos.room())
-    graph.wait(lambda: heard)
-    (edge,) = heard[0].edges
+    graph.wait(lambda: node.accounting.balance().waiting == 1)
+    received: list[Any] = []
+    graph.node.create_subscription(hydra.PoseGraph, "external_loop_closures", received.append, qos.room())
+    graph.wait(lambda: received)
+    (edge,) = received[0].edges
     assert (edge.key_from, edge.key_to, edge.type) == (1_500_000_000, 63_250_000_000, edge.LOOPCLOSE)
     assert (edge.robot_from, edge.robot_to) == (2, 2)
     expected = inverted(compensated(Constraint(MEASURED, COVARIANCE), AHEAD, inverse(AHEAD)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a stand-in for LIO-SAM hears."""
+"""What a stand-in for LIO-SAM receives."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ AS_LIO_SAM = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 def stand_in(around: Around) -> list[tuple[float, list[float]]]:
     """When something came, and what."""
-    heard: list[tuple[float, list[float]]] = []
-    put = lambda message: heard.append((time.monotonic(), list(message.data)))  # noqa: E731
+    received: list[tuple[float, list[float]]] = []
+    put = lambda message: received.append((time.monotonic(), list(message.data)))  # noqa: E731
     around.node.create_subscription(Float64MultiArray, TOPIC, put, AS_LIO_SAM)
-    return heard
+    return received
 
 
 def test_pairs_go_one_a_period_the_later_moment_first_and_near_ones_are_dropped(around: Callable[..., Any]) -> None:
     graph = around("period:=0.4")
-    door = graph.start(ToLioSam)
+    node = graph.start(ToLioSam)
     graph.send(closure(1.5, 63.25), closure(1.5, 31.0), closure(2.5, 64.25), closure(3.5, 65.25))
-    graph.wait(lambda: door.ledger.balance().received == 4)
+    graph.wait(lambda: node.accounting.balance().received == 4)
     graph.pass_time(0.5)
-    assert door.ledger.balance().waiting == 3  # nobody listens yet
-    heard = stand_in(graph)
-    graph.wait(lambda: len(heard) == 3)
-    assert [data for _, data in heard] == [
+    assert node.accounting.balance().waiting == 3  # nobody listens yet
+    received = stand_in(graph)
+    graph.wait(lambda: len(received) == 3)
+    assert [data for _, data in received] == [
         pytest.approx(pair, abs=1e-9) for pair in ([63.25, 1.5], [64.25, 2.5], [65.25, 3.5])
     ]
-    assert heard[2][0] - heard[0][0] > 0.75
-    balance = door.ledger.balance()
+    assert received[2][0] - received[0][0] > 0.75
+    balance = node.accounting.balance()
     assert (balance.published, balance.dropped) == (3, {"too_near": 1})

@@ -8,7 +8,7 @@ from typing import Any
 
 from objreg_ros.adapters.odometry_in import OdometryIn
 from objreg_ros.bridge.messages import to_msg
-from objreg_ros.bridge.node.door import Door
+from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.data import Odometry
 from objreg_ros.mapper.restart import Anew
 
@@ -19,12 +19,12 @@ def test_what_goes_on_is_followed_what_leaps_once_is_passed_over_and_time_that_j
     around: Callable[..., Any],
 ) -> None:
     graph = around()
-    door = Door("follower")
-    graph.doors.append(door)
-    graph.executor.add_node(door)
+    node = NodeBase("follower")
+    graph.nodes.append(node)
+    graph.executor.add_node(node)
     followed: list[int] = []
     anew: list[Anew] = []
-    odom = OdometryIn(door, lambda word: followed.append(word.stamp_ns), anew.append)
+    odom = OdometryIn(node, lambda word: followed.append(word.stamp_ns), anew.append)
     graph.wait(graph.odom.get_subscription_count)
     graph.pass_time(0.3)
     for stamp, place in ((50, 50), (51, 51), (52, 900), (53, 53), (1, 1), (2, 2), (3, 3), (4, 4)):

@@ -64,12 +64,12 @@ class StandIn:
 @needs_messages
 def test_a_link_between_the_nodes_of_both_moments_arrives_field_by_field(around: Callable[..., Any]) -> None:
     graph = around(f"T_base_camera:={AHEAD_TEXT}")
-    door = graph.start(ToRtabmap)
+    node = graph.start(ToRtabmap)
     graph.send(closure())
-    graph.wait(lambda: door.ledger.balance().waiting == 1)
+    graph.wait(lambda: node.accounting.balance().waiting == 1)
     graph.pass_time(0.5)
     stand_in = StandIn(graph)
-    graph.wait(lambda: door.ledger.balance().published == 1)
+    graph.wait(lambda: node.accounting.balance().published == 1)
     (link,) = stand_in.links
     assert (link.from_id, link.to_id, link.type) == (1, 4, 4)
     expected = compensated(Constraint(MEASURED, COVARIANCE), AHEAD, inverse(AHEAD))
@@ -82,11 +82,11 @@ def test_a_link_between_the_nodes_of_both_moments_arrives_field_by_field(around:
 @needs_messages
 def test_moments_between_nodes_are_carried_to_them_by_odometry(around: Callable[..., Any]) -> None:
     graph = around(f"T_base_camera:={AHEAD_TEXT}")
-    door = graph.start(ToRtabmap)
-    graph.drive(door, 0.0, 64.0)
+    node = graph.start(ToRtabmap)
+    graph.drive(node, 0.0, 64.0)
     stand_in = StandIn(graph)
     graph.send(closure(2.0, 63.0))
-    graph.wait(lambda: door.ledger.balance().published == 1)
+    graph.wait(lambda: node.accounting.balance().published == 1)
     (link,) = stand_in.links
     assert (link.from_id, link.to_id) in {(1, 4), (2, 4)}
     at = {1: 1.5, 2: 2.5, 4: 63.25}[link.from_id]
@@ -99,30 +99,30 @@ def test_moments_between_nodes_are_carried_to_them_by_odometry(around: Callable[
 @needs_messages
 def test_it_outlives_rtabmap_and_forgets_the_nodes_of_a_database_that_is_gone(around: Callable[..., Any]) -> None:
     graph = around(f"T_base_camera:={AHEAD_TEXT}", "patience:=0.3")
-    door = graph.start(ToRtabmap)
+    node = graph.start(ToRtabmap)
     first = StandIn(graph)
     graph.send(closure())
-    graph.wait(lambda: door.ledger.balance().published == 1)
+    graph.wait(lambda: node.accounting.balance().published == 1)
     first.end()
-    graph.wait(lambda: not door.extra_diagnostics()["add_link"])
+    graph.wait(lambda: not node.extra_diagnostics()["add_link"])
     graph.send(closure(1.5, 62.25))
     graph.pass_time(0.5)
-    assert door.ledger.balance().waiting == 1
+    assert node.accounting.balance().waiting == 1
     second = StandIn(graph, stamps=(101.5, 163.25))
     graph.send(closure(101.5, 163.25))
-    graph.wait(lambda: door.ledger.balance().waiting == 0)
+    graph.wait(lambda: node.accounting.balance().waiting == 0)
     assert [(link.from_id, link.to_id) for link in second.links] == [(1, 2)]
-    assert door.ledger.balance().dropped == {"no_node": 1}
+    assert node.accounting.balance().dropped == {"no_node": 1}
     second.end()
 
 
 @needs_messages
 def test_a_moment_far_from_every_node_is_dropped_after_its_patience(around: Callable[..., Any]) -> None:
     graph = around(f"T_base_camera:={AHEAD_TEXT}", "patience:=0.3")
-    door = graph.start(ToRtabmap)
+    node = graph.start(ToRtabmap)
     stand_in = StandIn(graph)
     graph.send(closure(30.0, 63.25), closure(1.5, 1.6))
-    graph.wait(lambda: door.ledger.balance().dropped == {"no_node": 1, "same_node": 1})
+    graph.wait(lambda: node.accounting.balance().dropped == {"no_node": 1, "same_node": 1})
     assert not stand_in.links
     stand_in.end()
 
@@ -132,17 +132,17 @@ def test_a_link_that_nobody_answers_is_asked_again_and_then_given_up(
     around: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     graph = around(f"T_base_camera:={AHEAD_TEXT}", "answer_within:=0.2", "most_attempts:=3")
-    door = graph.start(ToRtabmap)
+    node = graph.start(ToRtabmap)
     asked: list[Any] = []
 
     def ask(request: Any) -> Future:
         asked.append(request)
         return Future()  # as of a process that is gone by now
 
-    monkeypatch.setattr(door._add, "call_async", ask)
+    monkeypatch.setattr(node._add, "call_async", ask)
     stand_in = StandIn(graph)
     graph.send(closure())
-    graph.wait(lambda: door.ledger.balance().dropped == {"unanswered": 1})
+    graph.wait(lambda: node.accounting.balance().dropped == {"unanswered": 1})
     assert len(asked) == 3 and asked[0] == asked[2]
     stand_in.end()
 
@@ -152,7 +152,7 @@ def test_a_link_whose_answer_is_an_error_is_given_up_too(
     around: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     graph = around(f"T_base_camera:={AHEAD_TEXT}", "most_attempts:=3")
-    door = graph.start(ToRtabmap)
+    node = graph.start(ToRtabmap)
     asked: list[Any] = []
 
     def ask(request: Any) -> Future:
@@ -161,10 +161,10 @@ def test_a_link_whose_answer_is_an_error_is_given_up_too(
         future.set_exception(RuntimeError("no answer that can be read"))
         return future
 
-    monkeypatch.setattr(door._add, "call_async", ask)
+    monkeypatch.setattr(node._add, "call_async", ask)
     stand_in = StandIn(graph)
     graph.send(closure())
-    graph.wait(lambda: door.ledger.balance().dropped == {"unanswered": 1})
+    graph.wait(lambda: node.accounting.balance().dropped == {"unanswered": 1})
     graph.pass_time(0.3)
     assert len(asked) == 3
     stand_in.end()
@@ -175,20 +175,20 @@ def test_a_link_that_is_withdrawn_on_its_way_is_counted_once_rtabmap_has_it(
     around: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     graph = around(f"T_base_camera:={AHEAD_TEXT}", "most_waiting:=1")
-    door = graph.start(ToRtabmap)
+    node = graph.start(ToRtabmap)
     answer = Future(executor=graph.executor)
-    monkeypatch.setattr(door._add, "call_async", lambda _request: answer)
+    monkeypatch.setattr(node._add, "call_async", lambda _request: answer)
     stand_in = StandIn(graph)
     graph.send(closure())
-    graph.wait(lambda: door._asked is not None)
+    graph.wait(lambda: node._asked is not None)
     graph.send(closure(1.5, 62.25))
-    graph.wait(lambda: door.ledger.balance().dropped == {"queue_full": 1})
-    assert list(door.waiting) == [closure().moments]
-    door._keys["its id"] = closure().moments
-    door._retract("its id")
+    graph.wait(lambda: node.accounting.balance().dropped == {"queue_full": 1})
+    assert list(node.waiting) == [closure().moments]
+    node._keys["its id"] = closure().moments
+    node._retract("its id")
     answer.set_result(rtabmap.AddLink.Response())
-    graph.wait(lambda: door.extra_diagnostics()["retracted too late"] == 1)
-    assert door.ledger.balance().dropped == {"queue_full": 1, "retracted": 1}
+    graph.wait(lambda: node.extra_diagnostics()["retracted too late"] == 1)
+    assert node.accounting.balance().dropped == {"queue_full": 1, "retracted": 1}
     stand_in.end()
 
 
@@ -197,41 +197,41 @@ def test_a_graph_that_nobody_answers_with_is_asked_for_again(
     around: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     graph = around(f"T_base_camera:={AHEAD_TEXT}", "answer_within:=0.2")
-    door = graph.start(ToRtabmap)
-    silent, ask = [Future()], door._get.call_async
-    monkeypatch.setattr(door._get, "call_async", lambda request: silent.pop() if silent else ask(request))
+    node = graph.start(ToRtabmap)
+    silent, ask = [Future()], node._get.call_async
+    monkeypatch.setattr(node._get, "call_async", lambda request: silent.pop() if silent else ask(request))
     stand_in = StandIn(graph)
-    graph.wait(lambda: door.extra_diagnostics()["nodes of rtabmap"] == len(STAMPS))
-    assert not silent and not door._wants_graph
+    graph.wait(lambda: node.extra_diagnostics()["nodes of rtabmap"] == len(STAMPS))
+    assert not silent and not node._wants_graph
     stand_in.end()
 
 
 @needs_messages
 def test_news_of_another_database_in_map_data_alone_is_seen(around: Callable[..., Any]) -> None:
     graph = around(f"T_base_camera:={AHEAD_TEXT}")
-    door = graph.start(ToRtabmap)
+    node = graph.start(ToRtabmap)
     stand_in = StandIn(graph)
-    graph.wait(lambda: door.extra_diagnostics()["nodes of rtabmap"] == len(STAMPS))
+    graph.wait(lambda: node.extra_diagnostics()["nodes of rtabmap"] == len(STAMPS))
     graph.wait(stand_in.maps.get_subscription_count)
     stand_in.stamps = (101.5, 163.25)
     stand_in.maps.publish(stand_in.map())
-    graph.wait(lambda: door.extra_diagnostics()["other databases"] == 1)
-    graph.wait(lambda: door.extra_diagnostics()["nodes of rtabmap"] == 2)
+    graph.wait(lambda: node.extra_diagnostics()["other databases"] == 1)
+    graph.wait(lambda: node.extra_diagnostics()["nodes of rtabmap"] == 2)
     stand_in.end()
 
 
 @needs_messages
 def test_a_map_that_is_none_is_counted_and_ends_nothing(around: Callable[..., Any]) -> None:
     graph = around(f"T_base_camera:={AHEAD_TEXT}")
-    door = graph.start(ToRtabmap)
+    node = graph.start(ToRtabmap)
     stand_in = StandIn(graph)
-    graph.wait(lambda: door.extra_diagnostics()["nodes of rtabmap"] == len(STAMPS))
+    graph.wait(lambda: node.extra_diagnostics()["nodes of rtabmap"] == len(STAMPS))
     graph.wait(stand_in.maps.get_subscription_count)
     stand_in.stamps = (-5.0,)
     stand_in.maps.publish(stand_in.map(first=9))
-    graph.wait(lambda: door._ignored["malformed mapData"] == 1)
+    graph.wait(lambda: node._ignored["malformed mapData"] == 1)
     graph.send(closure())
-    graph.wait(lambda: door.ledger.balance().published == 1)
+    graph.wait(lambda: node.accounting.balance().published == 1)
     stand_in.end()
 
 

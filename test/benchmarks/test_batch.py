@@ -40,9 +40,9 @@ def test_one_worker_is_killed_when_so_many_have_ended(batch: ModuleType, monkeyp
     killed: list[tuple[int, int]] = []
     monkeypatch.setattr(multiprocessing, "active_children", lambda: processes)
     monkeypatch.setattr(os, "kill", lambda pid, number: killed.append((pid, number)))
-    hear = batch.Killer(2)
+    receive = batch.Killer(2)
     for ended in (1, 2, 3):
-        hear(ended)
+        receive(ended)
     assert killed == [(2, signal.SIGKILL)]
 
 

@@ -138,5 +138,7 @@ def test_a_witness_that_heard_nothing_says_so(benchmark: Benchmark) -> None:
     pytest.importorskip("rclpy", reason="the witness listens with ROS 2")
     deaf = object.__new__(benchmark("latency").Witness)
     deaf.seen, deaf.done = {}, {}
-    with pytest.raises(click.ClickException, match="expected images on image/compressed and receipts on finished"):
+    with pytest.raises(
+        click.ClickException, match="expected images on image/compressed and acknowledgements on finished"
+    ):
         _ = deaf.span

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hosts of one machine: what they lack where they cannot be had, and that they hear each other where they can."""
+"""Hosts of one machine: what they lack where they cannot be had, and that they receive each other where they can."""
 
 from __future__ import annotations
 

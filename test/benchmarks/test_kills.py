@@ -32,7 +32,7 @@ class Registrar:
 
 
 class Robot:
-    """Hears two keyframes announced."""
+    """Receives two keyframes announced."""
 
     def __init__(self) -> None:
         self.announced: set[int] = set()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the benchmark of a bad link asks of its nodes, and how it counts what they hear."""
+"""What the benchmark of a bad link asks of its nodes, and how it counts what they receive."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ def panning(*degrees: float, step_ns: int = SECOND // 10, start_ns: int = SECOND
     """A head on a base that turns from moment to moment, and a camera on the head."""
     tree = FrameTree()
     tree.follow("eye")
-    tree.hear(said(transform("head", "eye", moved(1))))
+    tree.receive(said(transform("head", "eye", moved(1))))
     for k, angle in enumerate(degrees):
-        tree.hear_moving(said(transform("base", "head", turned(angle), start_ns + k * step_ns)))
+        tree.receive_moving(said(transform("base", "head", turned(angle), start_ns + k * step_ns)))
     return tree

@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 import pytest
 
-from objreg_ros.bridge.node.ledger import Balance
+from objreg_ros.bridge.node.accounting import Balance
 from objreg_ros.cli.live import ROOMS, Live, Setup, private_environment, run_live
 from objreg_ros.data import LoopClosure, Reason, Rejected
 
@@ -20,7 +20,7 @@ CLOSURE = LoopClosure(from_ns=1, to_ns=2, T_from_to=np.eye(4), covariance=np.eye
 REFUSAL = Rejected(reason=Reason.NO_CANDIDATE, from_ns=7, to_ns=7, detail="none of 3")
 
 
-def books(published: int, waiting: int = 0) -> Balance:
+def counters(published: int, waiting: int = 0) -> Balance:
     return Balance(published + waiting, published, waiting, {}, {})
 
 
@@ -37,7 +37,7 @@ class Stage:
         self.called: list[str] = []
         self.saved: Callable[[], object] = lambda: None
         self.closed = self.shut_down = self.left = False
-        self.books: dict[str, Balance] = {}
+        self.counters: dict[str, Balance] = {}
         self.rejected = {"no_candidate": 1}
         self.closures: list[LoopClosure] = []
         self.refusals: list[Rejected] = []
@@ -96,7 +96,7 @@ class Stage:
     # What happens
 
     def reports(self, **told: Balance) -> Callable[[], object]:
-        return lambda: self.books.update({f"/{room}": balance for room, balance in told.items()})
+        return lambda: self.counters.update({f"/{room}": balance for room, balance in told.items()})
 
     def ends(self) -> None:
         """The player has played all."""
@@ -114,7 +114,7 @@ class Stage:
 def stage(monkeypatch: pytest.MonkeyPatch) -> Stage:
     """A stage on which all nodes report after a second, and whose player ends at once."""
     made = Stage()
-    made.events = [(1.0, made.reports(**dict.fromkeys(ROOMS, books(0)))), (1.0, made.ends)]
+    made.events = [(1.0, made.reports(**dict.fromkeys(ROOMS, counters(0)))), (1.0, made.ends)]
     monkeypatch.setattr("objreg_ros.cli.live.Processes", made.processes)
     monkeypatch.setattr("rclpy.context.Context", lambda: made)
     monkeypatch.setattr("objreg_ros.bridge.streams.collector.Collector", lambda context: made)
@@ -137,7 +137,7 @@ def test_what_was_collected_comes_back_with_bare_names_and_in_order_of_time(stag
     stage.glimpses = {k: {"stamp_ns": k} for k in (9, 4, 6)}
     stage.closures, stage.refusals = [CLOSURE], [REFUSAL]
     live = stage.run()
-    assert live.books == dict.fromkeys(ROOMS, books(0)) and live.rejected == {"no_candidate": 1}
+    assert live.counters == dict.fromkeys(ROOMS, counters(0)) and live.rejected == {"no_candidate": 1}
     assert [glimpse["stamp_ns"] for glimpse in live.glimpses] == [4, 6, 9]
     assert (live.closures, live.refusals, live.sight) == ((CLOSURE,), (REFUSAL,), None)
 
@@ -151,24 +151,30 @@ def test_the_listener_and_the_processes_are_on_one_domain(stage: Stage) -> None:
 def test_the_keyframe_in_hand_is_ended_when_all_is_through_and_what_comes_of_it_counts(stage: Stage) -> None:
     def last() -> None:
         assert not stage.called
-        stage.reports(registrar=books(8))()
+        stage.reports(registrar=counters(8))()
 
-    stage.events += [(2.0, stage.reports(detector=books(8))), (2.0, last)]
+    stage.events += [(2.0, stage.reports(detector=counters(8))), (2.0, last)]
     stage.saved = lambda: stage.closures.append(CLOSURE)
     live = stage.run()
     assert stage.called == ["registrar/save"] and not stage.events
-    assert live.closures == (CLOSURE,) and live.books["registrar"].published == 8
+    assert live.closures == (CLOSURE,) and live.counters["registrar"].published == 8
 
 
 @pytest.mark.parametrize("room", ["detector", "registrar"])
 def test_a_frame_that_is_worked_on_may_take_long(stage: Stage, room: str) -> None:
-    stage.events += [(1.0, stage.reports(**{room: books(7, waiting=1)})), (100.0, stage.reports(**{room: books(8)}))]
-    assert stage.run().books[room] == books(8)
+    stage.events += [
+        (1.0, stage.reports(**{room: counters(7, waiting=1)})),
+        (100.0, stage.reports(**{room: counters(8)})),
+    ]
+    assert stage.run().counters[room] == counters(8)
 
 
 def test_a_frame_that_waits_for_a_partner_is_not_waited_for(stage: Stage) -> None:
-    stage.events += [(1.0, stage.reports(segmenter=books(7, waiting=1))), (100.0, stage.reports(segmenter=books(8)))]
-    assert stage.run().books["segmenter"] == books(7, waiting=1) and stage.called
+    stage.events += [
+        (1.0, stage.reports(segmenter=counters(7, waiting=1))),
+        (100.0, stage.reports(segmenter=counters(8))),
+    ]
+    assert stage.run().counters["segmenter"] == counters(7, waiting=1) and stage.called
 
 
 def test_a_node_that_ends_before_it_reports_is_told(stage: Stage) -> None:
@@ -179,7 +185,7 @@ def test_a_node_that_ends_before_it_reports_is_told(stage: Stage) -> None:
 
 
 def test_nodes_that_never_report_are_told_from_those_that_do(stage: Stage) -> None:
-    stage.events = [(1.0, stage.reports(detector=books(0)))]
+    stage.events = [(1.0, stage.reports(detector=counters(0)))]
     with pytest.raises(ValueError, match=r"expected detector, .* to report within 600 s, got \['/detector'\]"):
         stage.run()
 

@@ -13,8 +13,8 @@ from click.testing import CliRunner, Result
 from rclpy.executors import ExternalShutdownException
 from recording.folders import STEP_NS, humble_bag, noetic_bag, records, robot_bag, tum_folder
 
+from objreg_ros.bridge.streams.acknowledgements import DEPTH, IMAGE, ORDER, Acknowledgements
 from objreg_ros.bridge.streams.player import Item
-from objreg_ros.bridge.streams.receipts import DEPTH, IMAGE, ORDER, Receipts
 from objreg_ros.cli.replay import command, playable_names
 from objreg_ros.recording import open_recording, write_rosbag2
 from objreg_ros.recording.bags import latched_qos
@@ -55,10 +55,10 @@ class Stage:
         self.asked.append((list(topics), seconds))
         return self.deaf
 
-    def listen_to_receipts(self, seconds: float) -> Receipts:
+    def subscribe_to_acknowledgements(self, seconds: float) -> Acknowledgements:
         self.asked.append((["finished"], seconds))
-        self.receipts = Receipts(ORDER)
-        return self.receipts
+        self.acknowledgements = Acknowledgements(ORDER)
+        return self.acknowledgements
 
     def play(self, items: Iterable[Item], rate: float | None, on_item: Callable[[Item], None]) -> None:
         self._take("paced", rate, items, on_item)
@@ -67,8 +67,8 @@ class Stage:
         self._take("lossless", patience, items, on_item)
         for item in self.plays[-1][2]:
             if item.kind == IMAGE:
-                self.receipts.hear("detector published", item.header_ns)
-        self.receipts.hear("segmenter dropped unmatched", 0)
+                self.acknowledgements.receive("detector published", item.header_ns)
+        self.acknowledgements.receive("segmenter dropped unmatched", 0)
 
     def _take(self, how: str, number: float | None, items: Iterable[Item], on_item: Callable[[Item], None]) -> None:
         if len(self.plays) == self.most:
@@ -140,8 +140,10 @@ def test_a_lossless_replay_keeps_no_pace_and_tells_what_became_of_every_frame(st
     assert [play[:2] for play in stage.plays] == [("lossless", 4.0)] and stage.asked[1] == (["finished"], 3.0)
     assert output[-1].startswith("! no frame got through the registrar")
     assert output[-4:-1] == [
-        "detector: 6 published", "segmenter: 1 dropped unmatched", "2 frames without a receipt, the first of 7 ns",
-    ]  # fmt: skip
+        "detector: 6 published",
+        "segmenter: 1 dropped unmatched",
+        "2 frames without an acknowledgement, the first of 7 ns",
+    ]
 
 
 def test_it_waits_for_those_who_hear_colour_and_depth_and_names_what_nobody_hears(stage: Stage, folder: Path) -> None:

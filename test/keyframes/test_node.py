@@ -36,7 +36,7 @@ def make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Making]:
     rclpy.try_shutdown()
 
 
-def heard(node: KeyframerNode, monkeypatch: pytest.MonkeyPatch) -> list[SentKeyframe]:
+def received(node: KeyframerNode, monkeypatch: pytest.MonkeyPatch) -> list[SentKeyframe]:
     """What is published from now on."""
     sent = list[SentKeyframe]()
     monkeypatch.setattr(node._keyframes, "publish", lambda message: sent.append(read_keyframe(message)))
@@ -48,7 +48,7 @@ def see(node: KeyframerNode, seconds: int, metres: float) -> bool:
     seen: Any = frame(seconds, CUP, pose(np.eye(3), np.array([metres, 0.0, 0.0])))
     done = node.compute(seconds * SECOND, seen)
     if done:
-        node.ledger.publish(seconds * SECOND)
+        node.accounting.publish(seconds * SECOND)
     return done
 
 
@@ -56,7 +56,7 @@ def test_what_becomes_a_keyframe_is_sent_packed_with_the_run_of_its_clock(
     make: Making, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     node = make()
-    sent = heard(node, monkeypatch)
+    sent = received(node, monkeypatch)
     assert [see(node, k, 0.3 * k) for k in range(3)] == [True, False, False]
     node._sender.drain()
     assert [keyframe.stamp_ns for keyframe in sent] == [0, SECOND]
@@ -66,13 +66,13 @@ def test_what_becomes_a_keyframe_is_sent_packed_with_the_run_of_its_clock(
     assert np.allclose(back.T_odom_camera, pose(np.eye(3), np.array([0.3, 0.0, 0.0])))
     told = node.extra_diagnostics()
     assert told["keyframes sent"] == 2 and told["kilobytes a keyframe"] > 0
-    assert node.ledger.balance().published == 3
+    assert node.accounting.balance().published == 3
     node.close()
 
 
 def test_the_keyframe_in_hand_is_sent_at_the_end(make: Making, monkeypatch: pytest.MonkeyPatch) -> None:
     node = make()
-    sent = heard(node, monkeypatch)
+    sent = received(node, monkeypatch)
     see(node, 1, 0.0)
     node.close()
     assert [keyframe.stamp_ns for keyframe in sent] == [SECOND]
@@ -87,7 +87,7 @@ def test_a_keyframe_is_thinned_for_the_sake_of_its_size(make: Making, monkeypatc
         return b""
 
     monkeypatch.setattr("objreg_ros.keyframes.node.pack_keyframe", pack)
-    heard(node, monkeypatch)
+    received(node, monkeypatch)
     see(node, 1, 0.0)
     node.close()
     assert asked == [10_000]
@@ -98,12 +98,12 @@ def test_the_keyframe_in_hand_is_sent_once_no_frame_came_for_a_while(
 ) -> None:
     node, now = make(), [100.0]
     monkeypatch.setattr("objreg_ros.keyframes.node.time.monotonic", lambda: now[0])
-    sent = heard(node, monkeypatch)
+    sent = received(node, monkeypatch)
     see(node, 1, 0.0)
     for seconds in (101.0, 104.9, 105.1, 120.0):
         now[0] = seconds
         node._end_what_rests()
         node._sender.drain()
         assert len(sent) == (seconds > 105.0)
-    assert node.ledger.balance().published == 2 and not node.ledger.balance().waiting
+    assert node.accounting.balance().published == 2 and not node.accounting.balance().waiting
     node.close()

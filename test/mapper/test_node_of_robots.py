@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The mapper's node behind its door, with two robots that drive at the same time."""
+"""The mapper's node behind its node, with two robots that drive at the same time."""
 
 from __future__ import annotations
 
@@ -44,32 +44,32 @@ class Fleet:
     """Two robots in the namespace of the mapper, each with its topics in one of its own."""
 
     def __init__(self) -> None:
-        self.door = MapperNode()
-        self.node = rclpy.create_node("outside")
+        self.node = MapperNode()
+        self.peer = rclpy.create_node("outside")
         self.paths: dict[str, list[Any]] = {"a": [], "b": []}
         self.corrections: dict[str, list[Any]] = {"a": [], "b": []}
         self.odom = {}
         for robot in "ab":
-            self.odom[robot] = self.node.create_publisher(OdometryMsg, f"{robot}/odom", qos.room(1000))
-            self.node.create_subscription(PathMsg, f"{robot}/path", self.paths[robot].append, qos.latched())
-            heard = self.corrections[robot].append
-            self.node.create_subscription(TransformStamped, f"{robot}/correction", heard, qos.latched())
+            self.odom[robot] = self.peer.create_publisher(OdometryMsg, f"{robot}/odom", qos.room(1000))
+            self.peer.create_subscription(PathMsg, f"{robot}/path", self.paths[robot].append, qos.latched())
+            received = self.corrections[robot].append
+            self.peer.create_subscription(TransformStamped, f"{robot}/correction", received, qos.latched())
         self.executor = SingleThreadedExecutor()
-        self.executor.add_node(self.door)
         self.executor.add_node(self.node)
+        self.executor.add_node(self.peer)
         topics = {publisher.topic_name for publisher in self.odom.values()}
-        heard_of = [one for one in self.door.subscriptions if one.topic_name in topics]
+        heard_of = [one for one in self.node.subscriptions if one.topic_name in topics]
         self.wait(lambda: len(heard_of) == 2 and all(one.get_publisher_count() for one in heard_of))
         self.wait(lambda: all(publisher.get_subscription_count() for publisher in self.odom.values()))
 
     def wait(self, done: Callable[[], Any], seconds: float = 20.0) -> None:
         end = time.monotonic() + seconds
         while not done():
-            assert time.monotonic() < end, f"nothing came; known is {self.door.extra_diagnostics()}"
+            assert time.monotonic() < end, f"nothing came; known is {self.node.extra_diagnostics()}"
             self.executor.spin_once(timeout_sec=0.05)
 
     def told(self, robot: str, key: str) -> Any:
-        return self.door.extra_diagnostics()[f"fleet/{robot}: {key}"]
+        return self.node.extra_diagnostics()[f"fleet/{robot}: {key}"]
 
     def drive(self, steps: range) -> None:
         """Odometry of both, pose by pose in turn."""
@@ -80,8 +80,8 @@ class Fleet:
 
     def close(self, word: LoopClosure) -> None:
         """As a closure that objreg_msgs tells, which need not be installed."""
-        self.door.accept(word.to_ns)
-        self.door._take(word)
+        self.node.accept(word.to_ns)
+        self.node._take(word)
 
 
 @pytest.fixture
@@ -92,8 +92,8 @@ def fleet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Fleet]:
     around = Fleet()
     yield around
     around.executor.shutdown()
-    around.door.close()
-    around.node.destroy_node()
+    around.node.close()
+    around.peer.destroy_node()
     rclpy.try_shutdown()
 
 
@@ -105,8 +105,8 @@ def test_each_robot_has_its_path_and_correction_once_closures_tie_it_to_the_firs
     for a, b in ((40, 10), (20, 20), (70, 72)):
         fleet.close(met(a, b))
     fleet.wait(lambda: fleet.corrections["b"] and fleet.paths["b"] and fleet.paths["b"][-1].poses)
-    fleet.wait(lambda: fleet.door.extra_diagnostics()["constraints kept"] == 3)
-    fleet.wait(lambda: fleet.door.ledger.balance().waiting == 0)
+    fleet.wait(lambda: fleet.node.extra_diagnostics()["constraints kept"] == 3)
+    fleet.wait(lambda: fleet.node.accounting.balance().waiting == 0)
     frames = {robot: (told[-1].header.frame_id, told[-1].child_frame_id) for robot, told in fleet.corrections.items()}
     assert frames == {"a": ("map", "a/odom"), "b": ("map", "b/odom")}
 
@@ -120,28 +120,28 @@ def test_a_robot_whose_time_jumps_back_begins_a_session_and_leaves_the_other_alo
     fleet.drive(range(40))
     keyframes = fleet.told("a", "keyframes")
     for word in WALKS["b"][:3]:
-        fleet.door._hear_odometry(to_msg.odometry(word), "fleet/b")
+        fleet.node._on_odometry(to_msg.odometry(word), "fleet/b")
     assert (fleet.told("b", "keyframes"), fleet.told("a", "keyframes")) == (1, keyframes)
-    assert fleet.door.extra_diagnostics()["sessions"] == 3 and fleet.told("a", "odometry passed over") == 0
+    assert fleet.node.extra_diagnostics()["sessions"] == 3 and fleet.told("a", "odometry passed over") == 0
 
 
 def test_a_closure_of_a_robot_that_is_not_named_is_dropped(fleet: Fleet) -> None:
     fleet.drive(range(5))
     fleet.close(replace(met(3, 4), to_robot="fleet/c"))
-    assert fleet.door.ledger.balance().dropped == {"unknown_robot": 1}
+    assert fleet.node.accounting.balance().dropped == {"unknown_robot": 1}
 
 
 def test_frames_of_one_name_are_not_broadcast_and_that_is_said_once(
     fleet: Fleet, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("objreg_ros.bridge.streams.map_announcements.TransformBroadcaster", Broadcaster)
-    broadcaster = fleet.door._out._broadcaster = Broadcaster(fleet.door)
+    broadcaster = fleet.node._out._broadcaster = Broadcaster(fleet.node)
     said: list[str] = []
-    monkeypatch.setattr(fleet.door, "get_logger", lambda: SimpleNamespace(warning=said.append))
+    monkeypatch.setattr(fleet.node, "get_logger", lambda: SimpleNamespace(warning=said.append))
     for k in range(4):
         for robot, frame in (("a", "odom"), ("b", "odom" if k else "b/odom")):
             word = replace(WALKS[robot][k], frame_id=frame)
-            fleet.door._hear_odometry(to_msg.odometry(word), f"fleet/{robot}")
+            fleet.node._on_odometry(to_msg.odometry(word), f"fleet/{robot}")
     assert [message.child_frame_id for message in broadcaster.sent] == ["odom", "odom"]  # until b tells the same
     assert len(said) == 1 and "two robots tell their odometry in 'odom'" in said[0]
 
@@ -151,13 +151,13 @@ def test_a_saved_map_is_gone_on_with_by_both(fleet: Fleet) -> None:
     for a, b in ((40, 10), (20, 20)):
         fleet.close(met(a, b))
     fleet.wait(lambda: fleet.told("b", "placed in the map"))
-    assert fleet.door._save()[0]
-    fleet.door._inputs = fleet.door._inputs.replaced(resume=True)
-    fleet.door._begin(fleet.door._resumed())
-    assert [one.robot for one in fleet.door._graph.sessions] == ["fleet/a", "fleet/b"]
+    assert fleet.node._save()[0]
+    fleet.node._inputs = fleet.node._inputs.replaced(resume=True)
+    fleet.node._begin(fleet.node._resumed())
+    assert [one.robot for one in fleet.node._graph.sessions] == ["fleet/a", "fleet/b"]
     assert (fleet.told("a", "placed in the map"), fleet.told("b", "placed in the map")) == (False, False)
     for robot in "ab":
         later = replace(WALKS[robot][0], stamp_ns=1000 * SECOND)
-        fleet.door._followers[f"fleet/{robot}"].forget(5.0)
-        fleet.door._hear_odometry(to_msg.odometry(later), f"fleet/{robot}")
-    assert [one.robot for one in fleet.door._graph.sessions] == ["fleet/a", "fleet/b"] * 2
+        fleet.node._followers[f"fleet/{robot}"].forget(5.0)
+        fleet.node._on_odometry(to_msg.odometry(later), f"fleet/{robot}")
+    assert [one.robot for one in fleet.node._graph.sessions] == ["fleet/a", "fleet/b"] * 2

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from objreg_ros.memory import migration as renewal
-from objreg_ros.memory.books import MOST_IDS, read_books
+from objreg_ros.memory.counters import MOST_IDS, read_counters
 from objreg_ros.memory.store import Store
 from objreg_ros.memory.store_file import SCHEMA_VERSION, StoreError
 
@@ -102,8 +102,8 @@ def test_an_older_store_whose_log_was_left_is_renewed_with_it(tmp_path: Path) ->
 
 
 STRANGE = {
-    "DELETE FROM books": "expected one row of books",
-    "UPDATE books SET landmark = 9223372036854775807": "the books: expected the checksum",
+    "DELETE FROM books": "expected one row of counters",
+    "UPDATE books SET landmark = 9223372036854775807": "the counters: expected the checksum",
     "UPDATE keyframe SET session = 9223372036854775807": "session: expected less than",
     "UPDATE object SET id = 9223372036854775807 WHERE id = 1": "id: expected less than",
     "UPDATE keyframe SET stamp_ns = 'soon'": "stamp_ns: expected INTEGER, got 'soon'",
@@ -132,10 +132,10 @@ def test_an_older_store_whose_ids_are_used_up_is_refused_and_left(tmp_path: Path
     path = _old(tmp_path)
     with closing(sqlite3.connect(path)) as connection:
         connection.row_factory = sqlite3.Row
-        books = read_books(connection)
-        books.landmark = MOST_IDS["landmark"]
+        counters = read_counters(connection)
+        counters.landmark = MOST_IDS["landmark"]
         with connection as transaction:
-            books.write(transaction)
+            counters.write(transaction)
     before = path.read_bytes()
     with pytest.raises(StoreError, match=r"place\.db: .* they are used up"):
         Store(path)

@@ -23,8 +23,8 @@ from registration.samples import box, keyframe, moved
 
 from objreg_ros.data import LoopClosure
 from objreg_ros.geometry import rotation_from_vector
-from objreg_ros.memory.books import MOST_IDS
 from objreg_ros.memory.codec import pack
+from objreg_ros.memory.counters import MOST_IDS
 from objreg_ros.memory.landmarks import Merge
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store, StoreError
@@ -497,8 +497,8 @@ CHANGES = {
     "no keyframe": "DELETE FROM object WHERE keyframe = 1; DELETE FROM keyframe WHERE id = 1",
     "an object twice": "INSERT INTO object SELECT 9, keyframe, instance, landmark, label, score, extent, sightings,"
     " density, position, camera, R_landmark_session, descriptor, cloud_crc, seal, cloud FROM object WHERE id = 1",
-    "no books": "DELETE FROM books",
-    "other books": "UPDATE books SET landmark = 0, keyframe = 'many'",
+    "no counters": "DELETE FROM books",
+    "other counters": "UPDATE books SET landmark = 0, keyframe = 'many'",
     "a trigger": "CREATE TRIGGER t AFTER INSERT ON keyframe BEGIN DELETE FROM object; END",
     "a view": "CREATE VIEW v AS SELECT * FROM keyframe",
     "a table": "CREATE TABLE t (a)",
@@ -524,7 +524,7 @@ def test_what_no_registrar_wrote_is_refused_in_one_line_and_left_untouched(tmp_p
 @pytest.mark.parametrize("what", ["keyframe", "landmark", "object", "closure"])
 def test_ids_that_are_used_up_are_a_store_error(what: str) -> None:
     store = Store()
-    setattr(store._books, what, MOST_IDS[what])
+    setattr(store._counters, what, MOST_IDS[what])
     written = keyframe(1)
     with pytest.raises(StoreError, match=f"expected ids of {what}s up to .*: they are used up"):
         if what in ("keyframe", "landmark"):

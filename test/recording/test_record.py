@@ -21,7 +21,7 @@ INFO = messages.camera_info(CAMERA, 5, "camera")
 T_ORIGIN = np.eye(4)
 
 
-class Shelf(Recording):
+class MessagesByStamp(Recording):
     """A recording of so many topics, that knows when it is closed; its types are those of a ROS 1 if it is told so."""
 
     def __init__(self, *msgtypes: str, span: tuple[int, int] = (0, 0), types: Typestore | None = None) -> None:
@@ -86,17 +86,17 @@ def test_what_does_not_decode_reads_as_nothing() -> None:
 
 
 def test_topics_that_ros_2_cannot_have_are_told_with_the_reason_and_no_others() -> None:
-    shelf = Shelf("sensor_msgs/msg/Image", "my_msgs/msg/Odd", "rosgraph_msgs/msg/Log")
+    shelf = MessagesByStamp("sensor_msgs/msg/Image", "my_msgs/msg/Odd", "rosgraph_msgs/msg/Log")
     assert shelf.obstacles() == {
         "/t1": "ROS 2 does not ship my_msgs/msg/Odd",
         "/t2": "ROS 2 does not ship rosgraph_msgs/msg/Log",
     }
-    assert Shelf().obstacles() == {}
+    assert MessagesByStamp().obstacles() == {}
 
 
 @pytest.mark.parametrize("name", ["/camera/0/info", "/a/", "/a-b", "/a//b", "/é", "/" + "a" * 250, "/", ""])
 def test_a_name_that_ros_2_does_not_allow_is_an_obstacle(name: str) -> None:
-    shelf = Shelf()
+    shelf = MessagesByStamp()
     shelf.topics = {name: Topic(name, "sensor_msgs/msg/Image", 1)}
     assert shelf.obstacles() == shelf.obstacles(shipped_only=False) == {name: "no valid name in ROS 2"}
 
@@ -108,8 +108,8 @@ def test_a_name_that_ros_2_allows_is_none(name: str) -> None:
 
 def test_types_are_as_the_recording_knows_them() -> None:
     markers = "visualization_msgs/msg/MarkerArray"
-    assert Shelf(markers).obstacles() == {}
-    old = Shelf(markers, types=get_typestore(Stores.ROS1_NOETIC)).obstacles()
+    assert MessagesByStamp(markers).obstacles() == {}
+    old = MessagesByStamp(markers, types=get_typestore(Stores.ROS1_NOETIC)).obstacles()
     assert list(old) == ["/t0"] and "has no texture_resource" in old["/t0"]
 
 
@@ -119,12 +119,12 @@ def test_types_are_as_the_recording_knows_them() -> None:
 def test_a_recording_lasts_from_its_first_record_to_its_last_and_never_less_than_nothing(
     span: tuple[int, int], seconds: float
 ) -> None:
-    assert Shelf(span=span).seconds == pytest.approx(seconds, abs=1e-12)
+    assert MessagesByStamp(span=span).seconds == pytest.approx(seconds, abs=1e-12)
 
 
 def test_a_recording_is_closed_when_it_is_left_even_by_an_error() -> None:
-    with Shelf() as shelf:
-        assert isinstance(shelf, Shelf) and shelf.closed == 0
+    with MessagesByStamp() as shelf:
+        assert isinstance(shelf, MessagesByStamp) and shelf.closed == 0
     assert shelf.closed == 1
     with pytest.raises(OSError, match="gone"), shelf:
         raise OSError("gone")

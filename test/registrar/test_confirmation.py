@@ -49,18 +49,18 @@ def hold(confirmation: Confirmation, one: Tried, held: object) -> Waiting:
 
 def test_an_accepted_pose_is_of_the_stored_keyframe_and_does_not_wait() -> None:
     one = tried(0.0)
-    verdict = Confirmation(PARAMS).hear(one)
+    verdict = Confirmation(PARAMS).receive(one)
     assert isinstance(verdict, Accepted)
     assert verdict.target is one.target and verdict.candidate is one.registration.candidate
 
 
 def test_a_doubtful_pose_waits_until_three_sure_ones_agree_and_keeps_its_own_stamps() -> None:
     confirmation, first = Confirmation(PARAMS), tried(0.0, **DOUBTFUL)
-    hold(confirmation, first, confirmation.hear(first))
+    hold(confirmation, first, confirmation.receive(first))
     for at_m in (0.1, 0.2):
-        confirmation.hear(tried(at_m))
+        confirmation.receive(tried(at_m))
     assert confirmation.settle(first.source.stamp_ns) == ([], []) and len(confirmation) == 1
-    confirmation.hear(tried(0.4))
+    confirmation.receive(tried(0.4))
     (late,), refused = confirmation.settle(first.source.stamp_ns)
     assert refused == [] and len(confirmation) == 0
     assert (late.closure.from_ns, late.closure.to_ns) == (first.target.stamp_ns, first.source.stamp_ns)
@@ -70,16 +70,16 @@ def test_a_doubtful_pose_waits_until_three_sure_ones_agree_and_keeps_its_own_sta
 def test_a_doubtful_pose_that_others_confirmed_before_does_not_wait() -> None:
     confirmation = Confirmation(PARAMS)
     for at_m in (0.0, 0.2, 0.3):
-        confirmation.hear(tried(at_m))
-    verdict = confirmation.hear(tried(0.4, **DOUBTFUL))
+        confirmation.receive(tried(at_m))
+    verdict = confirmation.receive(tried(0.4, **DOUBTFUL))
     assert isinstance(verdict, Accepted) and verdict.support is not None and verdict.support.agreeing == 3
 
 
 def test_a_doubtful_pose_that_slides_is_refused_in_the_end_with_the_gate_s_reason() -> None:
     confirmation, slid = Confirmation(PARAMS), tried(0.1, ASIDE, **DOUBTFUL)
-    waiting = hold(confirmation, slid, confirmation.hear(slid))
+    waiting = hold(confirmation, slid, confirmation.receive(slid))
     for at_m in (0.2, 0.4, 0.6):
-        confirmation.hear(tried(at_m))
+        confirmation.receive(tried(at_m))
     assert confirmation.settle(slid.source.stamp_ns + 10 * 10**9) == ([], [])
     accepted, (refused,) = confirmation.settle(slid.source.stamp_ns + 10 * 10**9 + 1)
     assert accepted == [] and (refused.reason, refused.detail) == waiting.refusal
@@ -90,10 +90,10 @@ def test_a_doubtful_pose_that_slides_is_refused_in_the_end_with_the_gate_s_reaso
 def test_an_accepted_pose_that_its_neighbours_contradict_is_not_published() -> None:
     confirmation = Confirmation(PARAMS)
     for at_m in (0.0, 0.2, 0.4):
-        confirmation.hear(tried(at_m))
+        confirmation.receive(tried(at_m))
     false = tried(0.6, ASIDE)
     assert false.registration.accepted
-    hold(confirmation, false, confirmation.hear(false))
+    hold(confirmation, false, confirmation.receive(false))
     confirmed, (refused,) = confirmation.settle(None)
     assert confirmed == [] and refused.reason is Reason.NEIGHBOURS and "0.00 < 0.5" in refused.detail
 
@@ -103,26 +103,26 @@ def test_an_accepted_pose_that_jitter_excuses_is_published_and_a_moved_one_is_no
         confirmation = Confirmation(PARAMS)
         confirmation._consistency = passes(Jitter(3.0, 0.04))
         for at_m in (10.0, 10.2, 10.4):
-            confirmation.hear(tried(at_m))
-        assert isinstance(confirmation.hear(tried(10.5, T)), kind)
+            confirmation.receive(tried(at_m))
+        assert isinstance(confirmation.receive(tried(10.5, T)), kind)
 
 
 def test_our_own_tracking_confirms_and_contradicts_nothing() -> None:
     confirmation = Confirmation(PARAMS)
     for at_m in (0.0, 0.2, 0.4):
-        confirmation.hear(tried(at_m, by_odometry=False))
-    assert isinstance(confirmation.hear(tried(0.5, by_odometry=False, **DOUBTFUL)), Accepted)
-    assert isinstance(confirmation.hear(tried(0.6, ASIDE, by_odometry=False)), Accepted)
+        confirmation.receive(tried(at_m, by_odometry=False))
+    assert isinstance(confirmation.receive(tried(0.5, by_odometry=False, **DOUBTFUL)), Accepted)
+    assert isinstance(confirmation.receive(tried(0.6, ASIDE, by_odometry=False)), Accepted)
 
 
 def test_an_accepted_pose_that_was_contradicted_by_false_ones_is_published_when_others_come() -> None:
     confirmation = Confirmation(PARAMS)
     for at_m in (0.0, 0.2):
-        confirmation.hear(tried(at_m, ASIDE))
+        confirmation.receive(tried(at_m, ASIDE))
     right = tried(0.4)
-    hold(confirmation, right, confirmation.hear(right))
+    hold(confirmation, right, confirmation.receive(right))
     for at_m in (0.5, 0.6, 0.7):
-        confirmation.hear(tried(at_m))
+        confirmation.receive(tried(at_m))
     (late,), _ = confirmation.settle(right.source.stamp_ns)
     assert late.closure.to_ns == right.source.stamp_ns
 
@@ -133,28 +133,28 @@ def test_an_accepted_pose_that_was_contradicted_by_false_ones_is_published_when_
 def test_what_is_impossible_or_unlikely_never_waits(evidence: dict[str, object]) -> None:
     confirmation = Confirmation(PARAMS)
     for at_m in (0.0, 0.2, 0.3):
-        confirmation.hear(tried(at_m))
+        confirmation.receive(tried(at_m))
     poor = {"perturbation_margin": 0.0, "information": np.diag([1e2] * 6), **evidence}
-    assert isinstance(confirmation.hear(tried(0.4, **poor)), Rejected)
+    assert isinstance(confirmation.receive(tried(0.4, **poor)), Rejected)
 
 
 @pytest.mark.parametrize(("margin", "kind"), [(0.01, Rejected), (0.03, Held)])
 def test_what_nothing_holds_is_not_confirmed_by_neighbours_that_slide_alike(margin: float, kind: type) -> None:
     loose = {**DOUBTFUL, "texture": 0.3, "perturbation_margin": margin}
-    assert isinstance(Confirmation(PARAMS).hear(tried(0.4, **loose)), kind)
+    assert isinstance(Confirmation(PARAMS).receive(tried(0.4, **loose)), kind)
 
 
 def test_nothing_waits_where_no_time_is_given() -> None:
     confirmation = Confirmation(PARAMS.replaced(confirm_seconds=0.0))
     for at_m in (0.0, 0.2, 0.3):
-        confirmation.hear(tried(at_m))
-    assert isinstance(confirmation.hear(tried(0.4, **DOUBTFUL)), Rejected)
-    assert isinstance(confirmation.hear(tried(0.6, ASIDE)), Accepted)
+        confirmation.receive(tried(at_m))
+    assert isinstance(confirmation.receive(tried(0.4, **DOUBTFUL)), Rejected)
+    assert isinstance(confirmation.receive(tried(0.6, ASIDE)), Accepted)
 
 
 def test_a_refusal_tells_its_reason_its_moments_and_the_pose_that_was_refused() -> None:
     one = tried(0.0, certain_violations=0.2)
-    verdict = Confirmation(PARAMS).hear(one)
+    verdict = Confirmation(PARAMS).receive(one)
     assert isinstance(verdict, Rejected) and verdict.reason is Reason.FREE_SPACE
     assert (verdict.from_ns, verdict.to_ns) == (one.target.stamp_ns, one.source.stamp_ns)
     assert np.array_equal(verdict.T_from_to, TRUE) and verdict.evidence == one.registration.evidence
@@ -164,4 +164,4 @@ def test_a_refusal_tells_its_reason_its_moments_and_the_pose_that_was_refused() 
 
 def test_a_gate_that_refuses_without_a_reason_is_an_error() -> None:
     with pytest.raises(ValueError, match="expected a reason with each refusal, got None"):
-        Confirmation(PARAMS).hear(tried(0.0)._replace(registration=Registration(accepted=False)))
+        Confirmation(PARAMS).receive(tried(0.0)._replace(registration=Registration(accepted=False)))

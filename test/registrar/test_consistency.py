@@ -29,51 +29,51 @@ def statement(
     return Statement(second, first, at, odds, sure)
 
 
-def heard(*statements: Statement) -> tuple[Consistency, list[int]]:
+def received(*statements: Statement) -> tuple[Consistency, list[int]]:
     consistency = Consistency()
     return consistency, [consistency.add(one) for one in statements]
 
 
 def test_true_poses_of_neighbours_agree_and_support_each_other() -> None:
-    consistency, numbers = heard(*(statement(x, x + 0.1) for x in (0.0, 0.2, 0.4)))
+    consistency, numbers = received(*(statement(x, x + 0.1) for x in (0.0, 0.2, 0.4)))
     for number in numbers:
         assert consistency.support(number).agreeing == 2
         assert consistency.support(number).share == pytest.approx(1.0)
 
 
 def test_a_pose_that_slides_along_the_wall_has_no_share_among_true_ones() -> None:
-    consistency, numbers = heard(*(statement(x, x + 0.1) for x in (0.0, 0.2, 0.4)), statement(0.6, 0.7, ASIDE))
+    consistency, numbers = received(*(statement(x, x + 0.1) for x in (0.0, 0.2, 0.4)), statement(0.6, 0.7, ASIDE))
     assert consistency.support(numbers[-1]).agreeing == 0 and consistency.support(numbers[-1]).share == 0.0
     assert consistency.support(numbers[0]).share == pytest.approx(2 / 3)
 
 
 def test_what_is_unlikely_neither_supports_nor_weighs_much() -> None:
     doubtful = [statement(x, x + 0.1, odds=0.05, sure=False) for x in (0.2, 0.4)]
-    consistency, numbers = heard(statement(0.0, 0.1), *doubtful)
+    consistency, numbers = received(statement(0.0, 0.1), *doubtful)
     support = consistency.support(numbers[0])
-    assert support.agreeing == 0 and support.heard < 0.1
+    assert support.agreeing == 0 and support.received < 0.1
 
 
 def test_poses_of_one_keyframe_count_once() -> None:
-    consistency, numbers = heard(statement(0.0, 0.1), statement(0.0, 0.3), statement(0.2, 0.1), statement(0.2, 0.3))
+    consistency, numbers = received(statement(0.0, 0.1), statement(0.0, 0.3), statement(0.2, 0.1), statement(0.2, 0.3))
     assert [consistency.support(n).agreeing for n in numbers] == [1] * 4
 
 
 def test_a_cluster_without_one_that_is_sure_supports_nothing() -> None:
     unsure = [statement(x, x + 0.1, odds=5.0, sure=False) for x in (0.0, 0.2, 0.4)]
-    consistency, numbers = heard(*unsure)
+    consistency, numbers = received(*unsure)
     assert consistency.support(numbers[0]).agreeing == 0
     consistency.add(statement(0.6, 0.7))
     assert consistency.support(numbers[0]).agreeing == 3
 
 
 def test_other_sessions_say_nothing_of_each_other() -> None:
-    consistency, numbers = heard(statement(0.0, 0.1, session=1), statement(0.2, 0.3, session=2))
-    assert numbers[0] not in consistency and consistency.support(numbers[1]).heard == 0.0
+    consistency, numbers = received(statement(0.0, 0.1, session=1), statement(0.2, 0.3, session=2))
+    assert numbers[0] not in consistency and consistency.support(numbers[1]).received == 0.0
 
 
 def test_what_is_beyond_reach_is_forgotten() -> None:
-    consistency, (first, _) = heard(statement(0.0, 0.1), statement(REACH_M + 0.1, REACH_M + 0.2))
+    consistency, (first, _) = received(statement(0.0, 0.1), statement(REACH_M + 0.1, REACH_M + 0.2))
     assert first not in consistency and len(consistency) == 1
 
 
@@ -89,7 +89,7 @@ def test_odometry_may_drift_by_some_degrees_over_a_metre(degrees: float, agrees:
     turned = pose(rotation_from_vector(np.radians([0.0, degrees, 0.0])), np.zeros(3))
     one, other = statement(0.0, 0.0), statement(0.3, 0.3)
     other = other._replace(T_target_source=other.T_target_source @ turned)
-    consistency, numbers = heard(one, other)
+    consistency, numbers = received(one, other)
     assert (consistency.support(numbers[0]).share == 1.0) is agrees
 
 
@@ -135,7 +135,7 @@ def test_false_poses_do_not_move_the_measurement(false: int) -> None:
 def test_what_is_not_sure_or_by_our_own_tracking_measures_no_jitter() -> None:
     assert passes(Jitter(3.0, 0.04), by_odometry=False).jitter == (0.0, 0.0)
     unsure = [statement(0.05 * k, 0.05 * k, TRUE @ turned(5.0 * k), sure=False) for k in range(20)]
-    assert heard(*unsure)[0].jitter == (0.0, 0.0)
+    assert received(*unsure)[0].jitter == (0.0, 0.0)
 
 
 def support_of(T: Array, jitter: Jitter) -> Support:
@@ -156,7 +156,7 @@ def test_with_jitter_a_neighbour_2_degrees_beyond_the_tolerance_no_longer_oppose
 def test_with_jitter_what_moved_or_has_a_twin_40_cm_off_is_still_opposed(metres: float) -> None:
     for jitter in (Jitter(0.0, 0.0), Jitter(3.0, 0.04), Jitter(10.0, 0.3)):
         support = support_of(moved(metres) @ TRUE, jitter)
-        assert support.heard > 2.9 and support.share == 0.0
+        assert support.received > 2.9 and support.share == 0.0
 
 
 def test_jitter_lets_no_more_poses_agree() -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The door of the registrar where keyframes wait, cameras change and its store does not let it."""
+"""The node of the registrar where keyframes wait, cameras change and its store does not let it."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def held(path: Path) -> Iterator[None]:
 
 
 def call(node: RegistrarNode, service: str) -> Any:
-    """The answer of a service of the node once that has rested, and how often its timer came to be heard meanwhile."""
+    """The answer of a service of the node once that has rested, and how often its timer was called meanwhile."""
     while (answered := called(node, service))[0].message.startswith(f"~/{service}: call again"):
         time.sleep(0.1)
     return answered
@@ -69,11 +69,11 @@ def called(node: RegistrarNode, service: str) -> Any:
     client = node.create_client(Trigger, f"~/{service}", callback_group=node.apart)
     assert client.wait_for_service(10.0)
     answer = client.call_async(Trigger.Request())
-    heard: list[float] = []
-    timer = node.create_timer(0.05, lambda: heard.append(time.monotonic()))
+    received: list[float] = []
+    timer = node.create_timer(0.05, lambda: received.append(time.monotonic()))
     rclpy.spin_until_future_complete(node, answer, timeout_sec=300.0)
     node.destroy_timer(timer)
-    return answer.result(), len(heard)
+    return answer.result(), len(received)
 
 
 def test_a_store_that_is_locked_refuses_a_reset_and_keeps_what_waits(make: Making, tmp_path: Path) -> None:
@@ -140,9 +140,9 @@ def test_messages_are_heard_while_a_reset_waits_for_the_search_in_hand(make: Mak
     searching = threading.Thread(target=search)
     searching.start()
     busy.wait()
-    answer, heard = call(node, "reset")
+    answer, received = call(node, "reset")
     searching.join()
-    assert answer.success and heard >= 5
+    assert answer.success and received >= 5
     node.close()
 
 

@@ -54,7 +54,7 @@ class Pass:
         source = place(NOW, 100.0 + metres, moved(metres), metres)
         target = place(earlier, 10.0 + metres, T_MAP_ODOM @ moved(metres + 0.2), metres)
         T_target_source = moved(-0.2) @ (np.eye(4) if wrong is None else wrong)
-        self.relocalisation.hear(closure(source, target, T_target_source, odds), source, target)
+        self.relocalisation.receive(closure(source, target, T_target_source, odds), source, target)
 
 
 def closure(source: Keyframe, target: Keyframe, T: Array, odds: float) -> LoopClosure:
@@ -103,7 +103,7 @@ def test_one_that_is_very_likely_or_that_others_confirmed_is_enough(walk: Pass) 
     other.go(0.0)
     source, target = place(NOW, 100.0, np.eye(4), 0.0), place(EARLIER, 10.0, np.eye(4), 0.0)
     one = closure(source, target, np.eye(4), 10.0)
-    other.relocalisation.hear(replace(one, evidence={"odds": 10.0, "agreeing": 3.0}), source, target)
+    other.relocalisation.receive(replace(one, evidence={"odds": 10.0, "agreeing": 3.0}), source, target)
     assert other.relocalisation.relocalised is not None
 
 
@@ -161,7 +161,7 @@ def test_a_search_that_ends_after_a_silence_tells_of_odometry_that_is_over(walk:
     walk.go(0.0)
     walk.go(0.0, seconds=101.0 + SILENCE_S)
     source, target = place(NOW, 100.0, np.eye(4), 0.0), place(EARLIER, 10.0, np.eye(4), 0.0)
-    walk.relocalisation.hear(closure(source, target, np.eye(4), ALONE_ODDS), source, target)
+    walk.relocalisation.receive(closure(source, target, np.eye(4), ALONE_ODDS), source, target)
     assert walk.relocalisation.relocalised is None
 
 
@@ -169,7 +169,7 @@ def test_the_way_since_the_keyframe_counts_when_its_search_ends_later(walk: Pass
     for step, metres in enumerate((0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 4.0, 3.0, 2.0, 1.0, 1.0)):
         walk.go(metres, seconds=100.0 + step)
     source, target = place(NOW, 101.0, moved(1.0), 1.0), place(EARLIER, 10.0, T_MAP_ODOM @ moved(1.0), 1.0)
-    walk.relocalisation.hear(closure(source, target, np.eye(4), ALONE_ODDS), source, target)
+    walk.relocalisation.receive(closure(source, target, np.eye(4), ALONE_ODDS), source, target)
     found = walk.relocalisation.relocalised
     assert found is not None and np.allclose(np.diag(found.covariance), np.diag(TIGHT + drift(8.0)))
     for step in range(1, 6):
@@ -183,7 +183,7 @@ def test_without_odometry_the_newest_keyframe_is_told() -> None:
     relocalisation.follow(frame(100.0, None), NOW)
     source = replace(place(NOW, 100.0, moved(0.3), 0.3), by_odometry=False)
     target = place(EARLIER, 10.0, T_MAP_ODOM, 0.0)
-    relocalisation.hear(closure(source, target, moved(0.1), ALONE_ODDS), source, target)
+    relocalisation.receive(closure(source, target, moved(0.1), ALONE_ODDS), source, target)
     found = relocalisation.relocalised
     assert found is not None and found.stamp_ns == source.stamp_ns
     assert np.allclose(found.T_map_camera, T_MAP_ODOM @ moved(0.1))

@@ -41,7 +41,11 @@ from objreg_ros.registration.keyframe import Keyframe
 THINGS = tuple(box(label, (0.3 * k, 0.0, 1.0), instance=k) for k, label in enumerate(("cup", "tasse à thé", "book")))
 PLACE: Keyframe = replace(keyframe(7, 12.5, THINGS, session=3), robot="robot2", by_odometry=True, travelled=4.25)
 TOLD = Summary(
-    name=Name("abc", 7), frame_id="front", clock=Clock(5, 2), sightings=sightings_of(PLACE), heard={"xyz": 41, "uvw": 1}
+    name=Name("abc", 7),
+    frame_id="front",
+    clock=Clock(5, 2),
+    sightings=sightings_of(PLACE),
+    received={"xyz": 41, "uvw": 1},
 )
 PACKED = pack_summary(TOLD)
 READERS: dict[bytes, Callable[[bytes], Any]] = {
@@ -64,7 +68,7 @@ def body_of(packed: bytes) -> bytes:
 
 def test_a_summary_comes_back_with_what_retrieval_needs() -> None:
     back = unpack_summary(PACKED)
-    assert (back.name, back.frame_id, back.clock, back.heard) == (TOLD.name, "front", TOLD.clock, TOLD.heard)
+    assert (back.name, back.frame_id, back.clock, back.received) == (TOLD.name, "front", TOLD.clock, TOLD.received)
     assert back.robot == "robot2" and len(back.sightings) == 3
     for before, after in zip(TOLD.sightings, back.sightings, strict=True):
         for name in ("keyframe_id", "session", "stamp_ns", "label", "travelled", "by_odometry", "robot"):
@@ -137,9 +141,9 @@ def test_anything_under_a_checksum_that_holds_is_refused_or_read(noise: bytes, a
         (lambda head: head.update(travelled=float("nan")), "travelled: expected a number"),
         (lambda head: head.update(clock=[1]), "not enough values"),
         (lambda head: head.update(clock=[1, -1]), "expected clock of 0"),
-        (lambda head: head.update(heard={str(k): 1 for k in range(65)}), "expected runs that were heard of 0 to 64"),
-        (lambda head: head.update(heard=[1]), "has no attribute"),
-        (lambda head: head.update(heard={"a": True}), "expected heard of 0"),
+        (lambda head: head.update(received={str(k): 1 for k in range(65)}), "expected runs that were known 0 to 64"),
+        (lambda head: head.update(received=[1]), "has no attribute"),
+        (lambda head: head.update(received={"a": True}), "expected known 0"),
         (lambda head: head.pop("robot"), "robot"),
     ],
 )

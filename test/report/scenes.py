@@ -9,7 +9,7 @@ import numpy as np
 
 from objreg_ros.data import DepthImage, Intrinsics
 from objreg_ros.report.exports.run_scene import RunScene, scene_of
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_summary import RunSummary
 
 from .runs import STEP_NS, TRUTH, summary
 
@@ -33,4 +33,4 @@ class FewPictures:
 @cache
 def walk(false: bool = True) -> RunScene:
     """The camera that walks a circle twice."""
-    return scene_of(Story.of("walk", summary(false), TRUTH), FewPictures())  # type: ignore[arg-type]
+    return scene_of(RunSummary.of("walk", summary(false), TRUTH), FewPictures())  # type: ignore[arg-type]

@@ -11,7 +11,7 @@ import pytest
 
 from objreg_ros.report.bundle import plotly_bundle
 from objreg_ros.report.page import page
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_summary import RunSummary
 from report.run.test_thumbnails import Wall
 
 from .chromium import chromium
@@ -31,7 +31,10 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 
 
 def _written(folder: Path) -> Path:
-    runs = [(Story.of("walk", summary(false=True), TRUTH), Wall()), (Story.of("again", summary(), TRUTH), None)]
+    runs = [
+        (RunSummary.of("walk", summary(false=True), TRUTH), Wall()),
+        (RunSummary.of("again", summary(), TRUTH), None),
+    ]
     (folder / "report.html").write_text(page(runs), encoding="utf-8")
     return folder / "report.html"
 

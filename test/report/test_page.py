@@ -12,7 +12,7 @@ from objreg_ros.report import page as pages
 from objreg_ros.report.bundle import plotly_bundle
 from objreg_ros.report.page import page
 from objreg_ros.report.run import clouds, thumbnails
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_summary import RunSummary
 from objreg_ros.truth import Truth
 
 from .runs import TRUTH, closure, summary, with_a_stray
@@ -36,7 +36,7 @@ class Balance(HTMLParser):
 
 
 def test_the_page_is_well_formed_and_loads_nothing() -> None:
-    text = page([(Story.of("walk", summary(), TRUTH), None)])
+    text = page([(RunSummary.of("walk", summary(), TRUTH), None)])
     parser = Balance()
     parser.feed(text)
     assert parser.open == []
@@ -46,7 +46,7 @@ def test_the_page_is_well_formed_and_loads_nothing() -> None:
 
 def test_without_plotly_the_page_says_what_3d_needs_and_keeps_its_drawings(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pages, "plotly_bundle", lambda: "")
-    text = page([(Story.of("walk", summary(), TRUTH), None)])
+    text = page([(RunSummary.of("walk", summary(), TRUTH), None)])
     assert text.count("pip install plotly") == 1 and 'class="plot"' not in text and 'class="line corrected"' in text
 
 
@@ -55,48 +55,48 @@ def test_what_a_page_may_hold_leaves_2_mb_of_15_for_its_drawings() -> None:
 
 
 def test_a_run_with_nothing_in_space_does_not_carry_what_draws_it() -> None:
-    assert len(page([(Story.of("empty", {"frames": 3, "constraints": []}, Truth([])), None)])) < 100_000
+    assert len(page([(RunSummary.of("empty", {"frames": 3, "constraints": []}, Truth([])), None)])) < 100_000
 
 
 def test_the_head_tells_of_false_constraints_and_of_the_error() -> None:
-    text = page([(Story.of("walk", summary(false=True), TRUTH), None)])
+    text = page([(RunSummary.of("walk", summary(false=True), TRUTH), None)])
     assert "truth finds 1 of them false" in text and "less than odometry" in text
-    assert "no truth to judge" in page([(Story.of("walk", summary(), Truth([])), None)])
+    assert "no truth to judge" in page([(RunSummary.of("walk", summary(), Truth([])), None)])
 
 
 def test_the_head_counts_what_was_tried_apart_from_what_was_not() -> None:
-    assert "2 candidates refused, 1 more not tried" in page([(Story.of("walk", summary(), TRUTH), None)])
+    assert "2 candidates refused, 1 more not tried" in page([(RunSummary.of("walk", summary(), TRUTH), None)])
     told = {**summary(), "rejected": {"texture_disagrees": 2}}
-    assert "2 candidates refused<" in page([(Story.of("walk", told, TRUTH), None)])
+    assert "2 candidates refused<" in page([(RunSummary.of("walk", told, TRUTH), None)])
 
 
 def test_a_run_that_closed_nothing_says_so() -> None:
     told = {"frames": 3, "constraints": []}
-    assert "No loop was closed" in page([(Story.of("empty", told, Truth([])), None)])
+    assert "No loop was closed" in page([(RunSummary.of("empty", told, Truth([])), None)])
 
 
 def test_frames_that_are_left_out_are_counted() -> None:
     told = summary()
-    assert "left out" not in page([(Story.of("walk", told, TRUTH), None)])
+    assert "left out" not in page([(RunSummary.of("walk", told, TRUTH), None)])
     told["glimpses"] += told["glimpses"][-2:]
-    assert " 2 frames are left out: their time is not later" in page([(Story.of("walk", told, TRUTH), None)])
+    assert " 2 frames are left out: their time is not later" in page([(RunSummary.of("walk", told, TRUTH), None)])
 
 
 def test_closures_of_two_runs_of_the_clock_are_left_out_of_the_map_and_counted() -> None:
     told = summary()
     told["constraints"] += [closure(90, 30), closure(95, 35)]
-    text = page([(Story.of("walk", told, TRUTH), None)])
+    text = page([(RunSummary.of("walk", told, TRUTH), None)])
     assert "6 loops closed" in text and " 2 closures are left out: they tie two runs of the clock" in text
-    assert "two runs of the clock" not in page([(Story.of("walk", summary(), TRUTH), None)])
+    assert "two runs of the clock" not in page([(RunSummary.of("walk", summary(), TRUTH), None)])
 
 
 def test_names_are_escaped() -> None:
-    assert "<b>" not in page([(Story.of("<b>", summary(), TRUTH), None)])
+    assert "<b>" not in page([(RunSummary.of("<b>", summary(), TRUTH), None)])
 
 
 def test_what_is_of_another_time_is_counted_beside_the_timeline() -> None:
-    assert "Left out:" not in page([(Story.of("walk", summary(), TRUTH), None)])
-    text = page([(Story.of("walk", with_a_stray(-1_700_000_000 * 10**9), TRUTH), None)])
+    assert "Left out:" not in page([(RunSummary.of("walk", summary(), TRUTH), None)])
+    text = page([(RunSummary.of("walk", with_a_stray(-1_700_000_000 * 10**9), TRUTH), None)])
     assert "Left out: 1 frames, 1 refusals, more than an hour from the longest part of the run" in text
 
 
@@ -111,12 +111,12 @@ class Blank:
 
 
 def test_what_has_no_picture_is_counted_with_the_reason() -> None:
-    text = page([(Story.of("walk", summary(), TRUTH), Blank())])
+    text = page([(RunSummary.of("walk", summary(), TRUTH), Blank())])
     assert "Accepted registrations" in text and "No picture of 4 of these 4: nothing is near (4 times)." in text
     assert "No picture of 2 of these 2: nothing is near (2 times)." in text
 
 
 def test_the_head_says_what_was_assumed_of_the_lens() -> None:
     told = {**summary(), "lens": "plumb_bob, moves a pixel by 4.8 px (median), 36.8 at most; rectified"}
-    assert "Lens: plumb_bob, moves a pixel by 4.8 px" in page([(Story.of("walk", told, TRUTH), None)])
-    assert "Lens:" not in page([(Story.of("walk", summary(), TRUTH), None)])
+    assert "Lens: plumb_bob, moves a pixel by 4.8 px" in page([(RunSummary.of("walk", told, TRUTH), None)])
+    assert "Lens:" not in page([(RunSummary.of("walk", summary(), TRUTH), None)])

@@ -9,7 +9,7 @@ import pytest
 
 from objreg_ros.report.page import TEMPLATES, page
 from objreg_ros.report.run.figures import SERIES
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_summary import RunSummary
 
 from .runs import TRUTH, summary
 
@@ -33,7 +33,7 @@ def contrast(one: str, other: str) -> float:
 
 
 def test_every_mark_of_a_page_has_a_rule_of_its_own() -> None:
-    text = page([(Story.of("walk", summary(false=True), TRUTH), None)])
+    text = page([(RunSummary.of("walk", summary(false=True), TRUTH), None)])
     drawn = {tuple(name.split()) for name in re.findall(r'class="([^"]+)"', text)}
     marks = {(base, style) for base, *styles in drawn if base in MARKS for style in styles}
     assert {base for base, _ in marks} == MARKS

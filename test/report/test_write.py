@@ -13,7 +13,7 @@ from recording.folders import lost, records
 
 from objreg_ros.recording import write_rosbag2
 from objreg_ros.recording.inputs import Inputs
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_summary import RunSummary
 from objreg_ros.report.write import write_report
 
 from .runs import summary
@@ -36,8 +36,8 @@ def test_the_recording_of_a_run_gives_truth_and_pictures(tmp_path: Path, shared:
 
 def test_the_json_of_a_live_run_is_told_by_the_odometry_of_its_recording(tmp_path: Path) -> None:
     write_rosbag2(tmp_path / "bag", records(30))
-    books = {"published": 29, "stage_ms": {"segment": [3.0, 5.0]}}
-    told = {"recording": str(tmp_path / "bag"), "constraints": [], "rejected": {}, "nodes": {"segmenter": books}}
+    counters = {"published": 29, "stage_ms": {"segment": [3.0, 5.0]}}
+    told = {"recording": str(tmp_path / "bag"), "constraints": [], "rejected": {}, "nodes": {"segmenter": counters}}
     (tmp_path / "demo.json").write_text(json.dumps(told))
     write_report(tmp_path / "out.html", [tmp_path / "demo.json"])
     text = (tmp_path / "out.html").read_text()
@@ -68,7 +68,7 @@ def test_odometry_that_is_no_pose_is_passed_over(tmp_path: Path) -> None:
 def test_a_camera_that_is_mounted_on_the_body_of_the_odometry_is_placed_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    told: list[Story] = []
+    told: list[RunSummary] = []
     monkeypatch.setattr("objreg_ros.report.write.page", lambda chapters: told.append(chapters[0][0]) or "")
     write_rosbag2(tmp_path / "bag", records(3))
     rows = [{"stamp_ns": record.stamp_ns, "labels": [], "objects": []} for record in records(3)][::4]

@@ -21,8 +21,8 @@ from std_msgs.msg import Header
 
 from objreg_ros.bridge.messages import from_msg
 from objreg_ros.bridge.node import profile, qos
+from objreg_ros.bridge.node.accounting import Balance
 from objreg_ros.bridge.node.diagnostics import CONNECTED, balance_of
-from objreg_ros.bridge.node.ledger import Balance
 
 START_S = 600.0  # a first start compiles kernels, on a machine that may be busy
 ANSWER_S = 60.0
@@ -43,8 +43,8 @@ class Graph:
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)
         self.publishers: dict[str, Any] = {}
-        self.heard: defaultdict[str, list[Any]] = defaultdict(list)
-        self.books: dict[str, Balance] = {}
+        self.received: defaultdict[str, list[Any]] = defaultdict(list)
+        self.counters: dict[str, Balance] = {}
         self.connected: dict[str, dict[str, int]] = {}
         self.status: dict[str, DiagnosticStatus] = {}  # of each node, the last
         self.node.create_subscription(DiagnosticArray, "/diagnostics", self._take_books, qos.room())
@@ -113,9 +113,9 @@ class Graph:
             assert all(map(self.alive, self.processes)), f"a node ended while waiting for {what}\n{self._logs()}"
             self.executor.spin_once(timeout_sec=0.05)
 
-    def hear(self, kind: type, topic: str, profile: Any = None) -> None:
-        """Collect the messages of a topic in ``heard``."""
-        self.node.create_subscription(kind, topic, self.heard[topic].append, profile or qos.room(depth=1000))
+    def receive(self, kind: type, topic: str, profile: Any = None) -> None:
+        """Collect the messages of a topic in ``received``."""
+        self.node.create_subscription(kind, topic, self.received[topic].append, profile or qos.room(depth=1000))
 
     def publish(self, topic: str, message: Any, listeners: int = 1) -> None:
         """Publish once the nodes listen: each end of a connection has to know of the other."""
@@ -124,8 +124,8 @@ class Graph:
             publisher = self.publishers[topic] = self.node.create_publisher(type(message), topic, reliable)
 
             def there() -> bool:
-                heard_by = sum(known.get(publisher.topic_name, 0) for known in self.connected.values())
-                return min(heard_by, publisher.get_subscription_count()) >= listeners
+                received_by = sum(known.get(publisher.topic_name, 0) for known in self.connected.values())
+                return min(received_by, publisher.get_subscription_count()) >= listeners
 
             self.wait_for(there, START_S, f"{listeners} nodes that are connected to {topic}")
         self.publishers[topic].publish(message)
@@ -135,7 +135,7 @@ class Graph:
         found: list[Header] = []
 
         def there() -> bool:
-            found[:] = [m for m in self.heard[topic] if self._is_of(m, node, stamp_ns)]
+            found[:] = [m for m in self.received[topic] if self._is_of(m, node, stamp_ns)]
             return bool(found)
 
         self.wait_for(there, what=f"{node} to finish {stamp_ns} ns")
@@ -146,18 +146,20 @@ class Graph:
         return message.frame_id.startswith(f"{node} ") and from_msg.stamp_ns(message) == stamp_ns
 
     def balance(self, name: str, received: int) -> Balance:
-        """The books of a node once it has told that it received so many."""
+        """The counters of a node once it has told that it received so many."""
         self.wait_for(
-            lambda: name in self.books and self.books[name].received == received and not self.books[name].waiting,
-            what=f"{name} to report {received} frames, got {self.books.get(name)}",
+            lambda: (
+                name in self.counters and self.counters[name].received == received and not self.counters[name].waiting
+            ),
+            what=f"{name} to report {received} frames, got {self.counters.get(name)}",
         )
-        return self.books[name]
+        return self.counters[name]
 
     def _take_books(self, message: DiagnosticArray) -> None:
         for status in message.status:
             name = status.name.removesuffix(": frames")
             self.status[name] = status
-            self.books[name], self.connected[name] = balance_of(status), _connected_of(status)
+            self.counters[name], self.connected[name] = balance_of(status), _connected_of(status)
 
     def _logs(self) -> str:
         return "\n".join(f"--- {name}\n{self.log(name)}" for name in self.processes)

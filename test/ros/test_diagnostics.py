@@ -40,14 +40,14 @@ def see_until(graph: Graph, encoding: str, level: bytes, stamp_ns: int) -> int:
 
     def there() -> bool:
         nonlocal stamp_ns
-        if graph.books["/detector"].received > before and graph.status["/detector"].level == level:
+        if graph.counters["/detector"].received > before and graph.status["/detector"].level == level:
             return True
         graph.publish("image", image(stamp_ns, encoding))
         stamp_ns += SECOND // 10
         time.sleep(0.1)
         return False
 
-    before = graph.books["/detector"].received
+    before = graph.counters["/detector"].received
     graph.wait_for(there, what=f"level {level!r}, got {graph.status['/detector']}")
     return stamp_ns
 
@@ -67,7 +67,7 @@ def test_a_node_warns_where_every_picture_is_malformed_and_no_more_once_they_are
         said = running.status["/detector"].message
     assert "as malformed image (" in said and "got 'yuv9'" in said
     see_until(running, "mono8", DiagnosticStatus.OK, later)
-    assert running.books["/detector"].published > 0
+    assert running.counters["/detector"].published > 0
 
 
 def test_an_override_that_is_no_qos_ends_a_node_with_one_line(running: Graph, tiny_model: Path) -> None:

@@ -54,7 +54,7 @@ def test_a_signal_during_a_search_ends_with_status_0_says_nothing_and_loses_noth
 ) -> None:
     store = tmp_path / "place.db"
     words = fresh.command("registrar", f"-p store:={store}", "-p reliable:=true", MOUNT)
-    fresh.hear(Header, "finished")
+    fresh.receive(Header, "finished")
     fresh._start("registrar", [sys.executable, "-c", LONG, *words[words.index("--ros-args") :]])
     frames = [frame(10 + 3 * k, T, T) for k, T in enumerate((HERE, BESIDE, HERE))]
     names = dict(enumerate(sorted({cloud.label for one in frames for cloud in one.objects})))
@@ -73,7 +73,7 @@ def test_a_signal_during_a_search_ends_with_status_0_says_nothing_and_loses_noth
 
 def test_frames_of_hundreds_of_objects_hold_up_neither_a_registrar_nor_its_end(fresh: Graph, tmp_path: Path) -> None:
     store = tmp_path / "place.db"
-    fresh.hear(Header, "finished")
+    fresh.receive(Header, "finished")
     fresh.start("registrar", "registrar", f"-p store:={store}", "-p reliable:=true", MOUNT)
     crowds = [crowded(10 + 3 * k, T) for k, T in enumerate((HERE, BESIDE, HERE, BESIDE))]
     for one in crowds[:3]:

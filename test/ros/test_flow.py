@@ -41,12 +41,12 @@ def running(graph: Graph, tiny_model: Path) -> Graph:
     graph.start("/detector", "detector", f"-p model:={model}", "-p threshold:=0.4", "-p reliable:=true")
     graph.start("/segmenter", "segmenter", "-p reliable:=true")
     graph.start("/registrar", "registrar", "-p reliable:=true")
-    graph.hear(Header, "finished")
+    graph.receive(Header, "finished")
     for topic, kind in WIRE.items():
-        graph.hear(kind, topic)
+        graph.receive(kind, topic)
     for topic in ("detections_table", "landmarks"):
-        graph.hear(PointCloud2, topic)
-    graph.hear(DiagnosticArray, "refusals")
+        graph.receive(PointCloud2, topic)
+    graph.receive(DiagnosticArray, "refusals")
     return graph
 
 
@@ -80,21 +80,21 @@ def test_every_frame_passes_three_nodes_and_every_node_balances_its_books(
         feed(running, moment)
         assert [running.answer(room, moment.stamp_ns) for room in ROOMS] == ["published"] * 3, running.log("/registrar")
     for room in ROOMS:
-        books = running.balance(f"/{room}", received=len(moments))
-        assert (books.published, books.dropped, books.lost) == (len(moments), {}, {}), room
+        counters = running.balance(f"/{room}", received=len(moments))
+        assert (counters.published, counters.dropped, counters.lost) == (len(moments), {}, {}), room
     stamps = [moment.stamp_ns for moment in moments]
     for topic in WIRE:
-        assert [from_msg.stamp_ns(message) for message in running.heard[topic]] == stamps, topic
-    assert sum(message.width for message in running.heard["objects"]) > 0
+        assert [from_msg.stamp_ns(message) for message in running.received[topic]] == stamps, topic
+    assert sum(message.width for message in running.received["objects"]) > 0
 
 
 def test_a_jump_back_in_time_goes_on_like_a_looped_bag(running: Graph, moments: list[Moment]) -> None:
-    before = len(running.heard["objects"])
+    before = len(running.received["objects"])
     for moment in moments[:3]:
-        running.heard["finished"].clear()
+        running.received["finished"].clear()
         feed(running, moment)
         assert [running.answer(room, moment.stamp_ns) for room in ROOMS] == ["published"] * 3
-    assert len(running.heard["objects"]) == before + 3
+    assert len(running.received["objects"]) == before + 3
 
 
 def test_a_disabled_registrar_drops_its_frames_as_disabled_until_it_is_enabled(
@@ -102,7 +102,7 @@ def test_a_disabled_registrar_drops_its_frames_as_disabled_until_it_is_enabled(
 ) -> None:
     for on, expected in ((False, "dropped disabled"), (True, "published")):
         assert call(running, SetBool, "registrar/enable", data=on)[0]
-        running.heard["finished"].clear()
+        running.received["finished"].clear()
         feed(running, moments[3])
         assert running.answer("registrar", moments[3].stamp_ns) == expected
 
@@ -110,19 +110,19 @@ def test_a_disabled_registrar_drops_its_frames_as_disabled_until_it_is_enabled(
 def test_the_registrar_ends_its_keyframe_to_save_and_forgets_on_demand(running: Graph) -> None:
     saved, why = call(running, Trigger, "registrar/save")
     assert not saved and "got one in memory only" in why
-    running.wait_for(lambda: bool(running.heard["landmarks"]), what="the objects of the keyframe that was saved")
-    assert all((table(message, "object_id")["object_id"] >= 1).all() for message in running.heard["landmarks"])
-    running.wait_for(lambda: bool(running.heard["refusals"]), what="why the two runs of the clock are not tied")
-    assert all(refusal_of(status).detail for message in running.heard["refusals"] for status in message.status)
+    running.wait_for(lambda: bool(running.received["landmarks"]), what="the objects of the keyframe that was saved")
+    assert all((table(message, "object_id")["object_id"] >= 1).all() for message in running.received["landmarks"])
+    running.wait_for(lambda: bool(running.received["refusals"]), what="why the two runs of the clock are not tied")
+    assert all(refusal_of(status).detail for message in running.received["refusals"] for status in message.status)
     assert call(running, Trigger, "registrar/reset") == (True, "forgot every keyframe")
 
 
 def test_a_late_subscriber_still_gets_the_labels(running: Graph) -> None:
     from std_msgs.msg import String
 
-    running.hear(String, "labels", qos.latched())
-    running.wait_for(lambda: bool(running.heard["labels"]), what="labels")
-    assert "cup" in from_msg.labels(running.heard["labels"][0]).values()
+    running.receive(String, "labels", qos.latched())
+    running.wait_for(lambda: bool(running.received["labels"]), what="labels")
+    assert "cup" in from_msg.labels(running.received["labels"][0]).values()
 
 
 def test_an_interrupt_ends_every_node_with_status_0(running: Graph) -> None:

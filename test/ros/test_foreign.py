@@ -85,10 +85,10 @@ def as_masks(truth: Truth, frame: TrueFrame) -> dict[str, Any]:
 
 
 def closures(graph: Graph, path: Path, told: Told, **first: Any) -> list[LoopClosure]:
-    """The constraints of segmenter and registrar that hear a camera, odometry, and whoever says where objects are."""
+    """The constraints of segmenter and registrar that get a camera, odometry, and the objects of another node."""
     truth = read_truth(path)
-    graph.hear(Header, "finished")
-    graph.hear(OdometryMessage, "constraints", qos.latched(qos.KEPT_CONSTRAINTS))
+    graph.receive(Header, "finished")
+    graph.receive(OdometryMessage, "constraints", qos.latched(qos.KEPT_CONSTRAINTS))
     graph.start("segmenter", "segmenter", "-p reliable:=true")
     graph.start("registrar", "registrar", "-p reliable:=true", "-p threads:=1")
     graph.wait_for(lambda: bool(graph.connected.get("/registrar", {}).get("/objects")), START_S, "the rooms to meet")
@@ -103,7 +103,7 @@ def closures(graph: Graph, path: Path, told: Told, **first: Any) -> list[LoopClo
     graph.wait_for(client.service_is_ready, START_S, "the registrar's service")
     saved = client.call_async(Trigger.Request())
     graph.wait_for(saved.done, START_S, "the last keyframe")
-    return [from_msg.loop_closure(message) for message in graph.heard["constraints"]]
+    return [from_msg.loop_closure(message) for message in graph.received["constraints"]]
 
 
 def odometry(frame: TrueFrame) -> OdometryMessage:
@@ -148,12 +148,12 @@ def test_names_of_masks_are_known_to_everybody_before_their_objects_are(fresh: G
 
     objects = read_truth(room).objects[0].values()
     told = LabelInfo(class_map=[VisionClass(class_id=one.instance, class_name=one.label) for one in objects])
-    fresh.hear(String, "labels", qos.latched())
-    fresh.hear(Detection3DArray, "detections_3d")
+    fresh.receive(String, "labels", qos.latched())
+    fresh.receive(Detection3DArray, "detections_3d")
     closures(fresh, room, as_masks, label_info=told)
-    names = set(from_msg.labels(fresh.heard["labels"][-1]).values())
+    names = set(from_msg.labels(fresh.received["labels"][-1]).values())
     assert names and names <= {one.label for one in objects}
-    fresh.wait_for(lambda: len(fresh.heard["detections_3d"]) == FRAMES, what="solids")
-    solids = [one for message in fresh.heard["detections_3d"] for one in message.detections]
+    fresh.wait_for(lambda: len(fresh.received["detections_3d"]) == FRAMES, what="solids")
+    solids = [one for message in fresh.received["detections_3d"] for one in message.detections]
     shown = {one.results[0].hypothesis.class_id for one in solids} - {"thing"}
     assert shown and shown <= names

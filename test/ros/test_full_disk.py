@@ -57,7 +57,7 @@ def ids(store: Path) -> list[int]:
 
 def test_a_full_disk_is_named_keeps_what_is_stored_and_ends_nothing(fresh: Graph, disk: Path) -> None:
     store = disk / "place.db"
-    fresh.hear(Header, "finished")
+    fresh.receive(Header, "finished")
     fresh.start("registrar", "registrar", f"-p store:={store}", "-p reliable:=true", MOUNT)
     answers = feed(fresh, 0, 14)
     assert "dropped refused" in answers and fresh.alive("registrar")

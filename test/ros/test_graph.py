@@ -45,8 +45,8 @@ def test_a_lossless_replay_brings_every_frame_through_one_process(
     output = objreg(fresh, "replay", str(folder), *LOSSLESS)
     for room in ROOMS:
         assert f"{room}: 12 published\n" in output
-        books = fresh.balance(f"/{room}", received=12)
-        assert (books.published, books.dropped, books.lost) == (12, {}, {})
+        counters = fresh.balance(f"/{room}", received=12)
+        assert (counters.published, counters.dropped, counters.lost) == (12, {}, {})
     assert fresh.stop("graph") == 0
 
 
@@ -62,11 +62,11 @@ def test_pictures_that_a_pace_leaves_out_are_handed_on_as_surplus_whatever_the_s
 def test_who_listens_from_outside_hears_what_the_rooms_say(fresh: Graph, tiny_model: Path, tmp_path: Path) -> None:
     topics = "detections_table", "objects", "view"
     for topic in topics:
-        fresh.hear(PointCloud2, topic)
+        fresh.receive(PointCloud2, topic)
     compose(fresh, tiny_model)
     objreg(fresh, "replay", str(tum_folder(tmp_path / "tum", frames=3)), *LOSSLESS)
     for topic in topics:
-        fresh.wait_for(lambda: len(fresh.heard[topic]) == 3, what=topic)  # noqa: B023
+        fresh.wait_for(lambda: len(fresh.received[topic]) == 3, what=topic)  # noqa: B023
 
 
 @pytest.mark.parametrize("composed", [False, True], ids=["three", "one"])
@@ -74,14 +74,14 @@ def test_the_masks_of_our_detector_cut_the_objects_in_three_processes_and_in_one
     composed: bool, fresh: Graph, tmp_path: Path
 ) -> None:
     model = save_disc_model(tmp_path / "discs.onnx", (CAMERA.height, CAMERA.width))
-    fresh.hear(PointCloud2, "objects")
-    fresh.hear(PointCloud2, "detections_table")
+    fresh.receive(PointCloud2, "objects")
+    fresh.receive(PointCloud2, "detections_table")
     (compose if composed else start)(fresh, model)
     objreg(fresh, "replay", str(tum_folder(tmp_path / "tum", frames=3)), *LOSSLESS)
-    fresh.wait_for(lambda: all(len(fresh.heard[name]) == 3 for name in ("objects", "detections_table")), what="all")
+    fresh.wait_for(lambda: all(len(fresh.received[name]) == 3 for name in ("objects", "detections_table")), what="all")
     names = {0: "cup", 1: "pot", 2: "book"}
     expected, known = instances((CAMERA.height, CAMERA.width))
-    for objects, table in zip(fresh.heard["objects"], fresh.heard["detections_table"], strict=True):
+    for objects, table in zip(fresh.received["objects"], fresh.received["detections_table"], strict=True):
         require_objects(CAMERA, from_msg.objects(objects, names)[0])
         found = from_msg.detections(table, names).instances
         assert found is not None and np.array_equal(found[known], expected[known])
@@ -98,7 +98,7 @@ def test_a_node_that_is_refused_ends_the_process_with_one_line(fresh: Graph, tmp
 def test_one_process_gives_the_constraints_of_three(fresh: Graph, shared: Path) -> None:
     kitchen, model = shared / "data/redkitchen_a", shared / "models/ssd_mobilenet_v1_coco_int8.onnx"
     words = "replay", str(kitchen), "--lossless", "--end", "4", "--wait", str(START_S)
-    fresh.hear(Odometry, "constraints", qos.latched(qos.KEPT_CONSTRAINTS))
+    fresh.receive(Odometry, "constraints", qos.latched(qos.KEPT_CONSTRAINTS))
     found = []
     for composed in (False, True):
         if composed:
@@ -108,8 +108,8 @@ def test_one_process_gives_the_constraints_of_three(fresh: Graph, shared: Path) 
         objreg(fresh, *words)
         end_keyframe(fresh)
         await_release(fresh)
-        found.append(list(map(from_msg.loop_closure, fresh.heard["constraints"])))
-        fresh.heard["constraints"].clear()
+        found.append(list(map(from_msg.loop_closure, fresh.received["constraints"])))
+        fresh.received["constraints"].clear()
         for name in list(fresh.processes):
             assert fresh.stop(name, signal.SIGTERM) == 0
     three, one = found

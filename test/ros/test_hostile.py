@@ -38,7 +38,7 @@ def running(graph: Graph, tiny_model: Path) -> Graph:
     graph.start("/lay/registrar", "registrar", "-r __ns:=/lay", "-p reliable:=true")
     graph.start("/map/mapper", "mapper", "-r __ns:=/map", "-p reliable:=true")
     for room in ("eye", "cut", "lay", "map"):
-        graph.hear(Header, f"{room}/finished")
+        graph.receive(Header, f"{room}/finished")
     return graph
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A segmenter that hears an IMU."""
+"""A segmenter that receives an IMU."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def running(graph: Graph) -> Graph:
     """A segmenter of depth images whose camera has an IMU with x ahead and z up."""
     mounting = "T_camera_imu:=[0.0,0.0,0.0,0.5,-0.5,0.5,0.5]"
     graph.start("/segmenter", "segmenter", "-p reliable:=true", "-p colour:=false", f"-p {mounting}")
-    graph.hear(Vector3Stamped, "gravity")
-    graph.hear(Header, "finished")
+    graph.receive(Vector3Stamped, "gravity")
+    graph.receive(Header, "finished")
     graph.publish("labels", to_msg.labels(NAMES))
     graph.publish("camera_info", to_msg.camera_info(CAMERA, SECOND, "eye"))
     return graph
@@ -70,8 +70,8 @@ def test_a_segmenter_tells_the_gravity_that_an_imu_feels_whatever_else_the_imu_s
         if k == 80:
             running.publish("imu", imu(start, (0.0, 0.0, -9.81)))  # late
     assert see(running, start + SECOND) == "published"
-    running.wait_for(lambda: len(running.heard["gravity"]) == 2, what="gravity")
-    vector = running.heard["gravity"][-1].vector
+    running.wait_for(lambda: len(running.received["gravity"]) == 2, what="gravity")
+    vector = running.received["gravity"][-1].vector
     falls = np.array([vector.x, vector.y, vector.z])
     confidence = float(np.linalg.norm(falls))
     assert falls / confidence == pytest.approx([0.0, np.cos(tilt), -np.sin(tilt)], abs=1e-3)

@@ -226,7 +226,7 @@ def test_the_nodes_of_a_launch_live_in_its_namespace_and_end_with_it(
         )  # fmt: skip
     try:
         names = {f"/robot/{room}" for room in ("detector", "segmenter", "registrar", "mapper")}
-        graph.wait_for(lambda: names <= set(graph.books), START_S, f"diagnostics of {names}")
+        graph.wait_for(lambda: names <= set(graph.counters), START_S, f"diagnostics of {names}")
     finally:
         launched.send_signal(signal.SIGINT)
         launched.wait(START_S)
@@ -248,7 +248,7 @@ def test_one_process_is_launched_in_a_namespace_with_the_parameters_of_each_node
         )  # fmt: skip
     try:
         names = {f"/house/{room}" for room in ("detector", "segmenter", "registrar", "mapper")}
-        graph.wait_for(lambda: names <= set(graph.books), START_S, f"diagnostics of {names}")
+        graph.wait_for(lambda: names <= set(graph.counters), START_S, f"diagnostics of {names}")
         assert list(passing.glob("objreg_*.yaml"))
     finally:
         launched.send_signal(signal.SIGINT)

@@ -35,9 +35,9 @@ def running(graph: Graph, tiny_model: Path) -> Graph:
     graph.start("/clouds/segmenter", "segmenter", "-r __ns:=/clouds", "-p reliable:=true")
     of_depths = ("-r __ns:=/depths", "-p reliable:=true", "-p colour:=false", "-p level_odom:=true")
     graph.start("/depths/segmenter", "segmenter", *of_depths)
-    graph.hear(Vector3Stamped, "depths/gravity")
+    graph.receive(Vector3Stamped, "depths/gravity")
     for topic in ("finished", "clouds/finished", "depths/finished"):
-        graph.hear(Header, topic)
+        graph.receive(Header, topic)
     return graph
 
 
@@ -167,8 +167,8 @@ def test_the_segmenter_drops_bad_depth_and_detections_passes_over_bad_odometry_a
         running.publish("depths/depth/image", picture)
         running.publish("depths/detections_table", detections)
         assert running.answer("segmenter", stamp, "depths/finished") == expected
-    running.wait_for(lambda: bool(running.heard["depths/gravity"]), what="gravity")
-    falls = running.heard["depths/gravity"][-1].vector
+    running.wait_for(lambda: bool(running.received["depths/gravity"]), what="gravity")
+    falls = running.received["depths/gravity"][-1].vector
     assert (falls.x, falls.y, falls.z) == (0.0, 0.0, -1.0)
     assert "odom ignored: " in running.log("/depths/segmenter")
 
@@ -184,10 +184,10 @@ def test_depth_without_detections_is_dropped_as_unmatched_once_newer_ones_came(r
 def test_every_node_is_still_there_and_its_books_balance(running: Graph) -> None:
     for name in running.processes:
         assert running.alive(name), running.log(name)
-    books = running.balance("/detector", received=2 * len(IMAGES))
-    assert books.published == len(IMAGES) and books.dropped == {"malformed_image": len(IMAGES)}
-    books = running.balance("/clouds/segmenter", received=2 * len(CLOUDS) + 2)
-    assert books.dropped == {"malformed_points": 3, "refused": 2, "unmatched": 1}
+    counters = running.balance("/detector", received=2 * len(IMAGES))
+    assert counters.published == len(IMAGES) and counters.dropped == {"malformed_image": len(IMAGES)}
+    counters = running.balance("/clouds/segmenter", received=2 * len(CLOUDS) + 2)
+    assert counters.dropped == {"malformed_points": 3, "refused": 2, "unmatched": 1}
 
 
 def test_a_camera_that_is_not_calibrated_stops_only_clouds_that_need_one(running: Graph, stamp_ns: int) -> None:

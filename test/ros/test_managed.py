@@ -29,7 +29,7 @@ MANAGED = ("-p managed:=true", "-p autostart:=false")
 def alone(domain: int, tmp_path: Path) -> Iterator[Graph]:
     """A graph without nodes, for one test."""
     made = Graph(domain, tmp_path)
-    made.hear(Header, "finished")
+    made.receive(Header, "finished")
     yield made
     made.close()
 

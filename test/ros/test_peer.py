@@ -38,7 +38,7 @@ def asked(graph: Graph, home: Path) -> Iterator[Graph]:
     graph.start("mapper", "mapper", f"-p graph_path:={home}/map.g2o")
     graph.start("registrar", "registrar", f"-p store:={home}/place.db")
     graph.start_module("objreg_to_g2o", "objreg_ros.adapters.g2o", f"-p graph_path:={home}/out.g2o")
-    graph.wait_for(lambda: {f"/{name}" for name in NODES} <= set(graph.books), START_S, "the nodes")
+    graph.wait_for(lambda: {f"/{name}" for name in NODES} <= set(graph.counters), START_S, "the nodes")
     yield graph
     assert [graph.stop(name) for name in NODES] == [0] * len(NODES)
 

@@ -42,7 +42,9 @@ def open_nodes(graph: Graph, tiny_model: Path) -> Iterator[Graph]:
     rooms = ["detector", "segmenter", "registrar", "keyframer", *(["mapper"] if find_spec("gtsam") else [])]
     for room in rooms:
         graph.start(room, "keyframes" if room == "keyframer" else room, *MANAGED, *more.get(room, ()))
-    graph.wait_for(lambda: {f"{SPACE}/{room}" for room in rooms} <= set(graph.books), START_S, "the books of all nodes")
+    graph.wait_for(
+        lambda: {f"{SPACE}/{room}" for room in rooms} <= set(graph.counters), START_S, "the counters of all nodes"
+    )
     graph.wait_for(lambda: all(is_active(graph, room) for room in rooms), START_S, "active nodes")
     yield graph
     for room in rooms:

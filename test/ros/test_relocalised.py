@@ -90,9 +90,9 @@ def test_a_registrar_with_the_store_of_an_earlier_session_tells_where_it_woke_up
     store = tmp_path / "place.db"
     remember(store)
     asking = relocalised.Relocalise or Trigger
-    fresh.hear(Header, "finished")
-    fresh.hear(PoseWithCovarianceStamped, "relocalised", qos.latched())
-    fresh.hear(PoseWithCovarianceStamped, "initialpose")
+    fresh.receive(Header, "finished")
+    fresh.receive(PoseWithCovarianceStamped, "relocalised", qos.latched())
+    fresh.receive(PoseWithCovarianceStamped, "initialpose")
     parameters = (f"-p store:={store}", "-p map_frame:=map", "-p initialpose:=true", "-p reliable:=true", MOUNT)
     fresh.start("registrar", "registrar", *parameters)
     answer = ask(fresh, asking, "registrar/relocalise")
@@ -104,13 +104,13 @@ def test_a_registrar_with_the_store_of_an_earlier_session_tells_where_it_woke_up
         tell(fresh, one, names)
         fresh.answer("registrar", one.stamp_ns)
     ask(fresh, Trigger, "registrar/save")
-    fresh.wait_for(lambda: bool(fresh.heard["relocalised"] and fresh.heard["initialpose"]), what="where it is")
-    (told,) = fresh.heard["relocalised"]
+    fresh.wait_for(lambda: bool(fresh.received["relocalised"] and fresh.received["initialpose"]), what="where it is")
+    (told,) = fresh.received["relocalised"]
     at = told.pose.pose.position
     assert told.header.frame_id == "map" and np.abs(np.array([at.x, at.y, at.z]) - HERE[:3, 3]).max() < 0.05
-    assert fresh.heard["initialpose"][0].pose.pose.position.z == 0.0
+    assert fresh.received["initialpose"][0].pose.pose.position.z == 0.0
     answer = ask(fresh, asking, "registrar/relocalise")
     assert answer.success, answer.message
     if relocalised.Relocalise is not None:
         assert answer.session == "0"
-    fresh.wait_for(lambda: len(fresh.heard["relocalised"]) == 2, what="the answer on the topic")
+    fresh.wait_for(lambda: len(fresh.received["relocalised"]) == 2, what="the answer on the topic")

@@ -64,8 +64,8 @@ def test_a_lossless_replay_brings_every_frame_through_every_node(
     assert "12 image" in output
     for room in ROOMS:
         assert f"{room}: 12 published\n" in output
-        books = fresh.balance(f"/{room}", received=12)
-        assert (books.published, books.dropped, books.lost) == (12, {}, {})
+        counters = fresh.balance(f"/{room}", received=12)
+        assert (counters.published, counters.dropped, counters.lost) == (12, {}, {})
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.004])
@@ -88,23 +88,23 @@ def test_depth_with_stamps_of_its_own_goes_through_but_for_the_last(
     folder = tum_folder(tmp_path / "tum", frames=6, lag=0.004)
     output = objreg(fresh, "replay", str(folder), "--lossless", "--wait", str(START_S), "--patience", "60")
     assert "registrar: 5 published\n" in output  # the last depth is newer than any image, so another may come
-    assert "1 frames without a receipt, the first of 504000000 ns" in output
+    assert "1 frames without an acknowledgement, the first of 504000000 ns" in output
 
 
 def test_a_paced_replay_keeps_its_pace_and_tells_the_time(fresh: Graph, tmp_path: Path) -> None:
-    fresh.hear(Clock, "/clock")
-    fresh.hear(Image, "image")
-    fresh.hear(Image, "depth/image")
+    fresh.receive(Clock, "/clock")
+    fresh.receive(Image, "image")
+    fresh.receive(Image, "depth/image")
     folder = tum_folder(tmp_path / "tum", frames=11)
     output = objreg(fresh, "replay", str(folder), "--clock", "--rate", "2", "--start", "0.2", "--wait", str(START_S))
     assert "9 image" in output and "9 depth/image" in output
-    times = [from_msg.stamp_ns(m.clock) for m in fresh.heard["/clock"]]
+    times = [from_msg.stamp_ns(m.clock) for m in fresh.received["/clock"]]
     assert times == sorted(times) and times[-1] == 10**9
 
 
 def test_everything_is_played_but_for_types_that_are_not_installed(fresh: Graph, tmp_path: Path) -> None:
     bag = robot_bag(tmp_path / "bag")
-    fresh.hear(Odometry, "/odom")
+    fresh.receive(Odometry, "/odom")
     output = objreg(fresh, "replay", str(bag), "--all", "--wait", "0")
     assert "3 /odom\n" in output and "/meta" not in output
 
@@ -141,7 +141,7 @@ def end_keyframe(graph: Graph) -> None:
 
 def await_release(graph: Graph, constraints: int = 1) -> None:
     """Let the registrar publish what waited for its camera to be believed, as it does once no frame comes."""
-    published = graph.heard["constraints"]
+    published = graph.received["constraints"]
     graph.wait_for(lambda: len(published) >= constraints, START_S, "constraints of a camera that is silent")
     ends, count = time.monotonic() + QUIET_S, len(published)
     graph.wait_for(lambda: len(published) != count or time.monotonic() > ends)
@@ -152,14 +152,14 @@ def await_release(graph: Graph, constraints: int = 1) -> None:
 @pytest.mark.slow
 def test_a_recording_gives_the_same_constraints_live_and_offline(fresh: Graph, shared: Path, tmp_path: Path) -> None:
     kitchen, model = shared / "data/redkitchen_a", shared / "models/ssd_mobilenet_v1_coco_int8.onnx"
-    fresh.hear(Odometry, "constraints", qos.latched(qos.KEPT_CONSTRAINTS))
+    fresh.receive(Odometry, "constraints", qos.latched(qos.KEPT_CONSTRAINTS))
     start(fresh, model, "-p threshold:=0.4")
     objreg(fresh, "replay", str(kitchen), "--lossless", "--end", "4", "--wait", str(START_S))
     end_keyframe(fresh)
     words = ("offline", str(kitchen), "--model", str(model), "--set", "detector.threshold=0.4", "--max-frames", "60")
     objreg(fresh, *words, "--json", str(tmp_path / "out.json"))
     offline = json.loads((tmp_path / "out.json").read_text())["constraints"]
-    live = [from_msg.loop_closure(message) for message in fresh.heard["constraints"]]
+    live = [from_msg.loop_closure(message) for message in fresh.received["constraints"]]
     expected = [(c["from_ns"], c["to_ns"]) for c in offline]
     assert expected and [(c.from_ns, c.to_ns) for c in live] == expected
     for mine, theirs in zip(live, offline, strict=True):
@@ -173,16 +173,16 @@ def test_objreg_msgs_tell_the_same_as_the_topics_of_common_interfaces_and_more(f
         pytest.skip("objreg_msgs is not installed: colcon builds it from this repository")
     kitchen, model = shared / "data/redkitchen_a", shared / "models/ssd_mobilenet_v1_coco_int8.onnx"
     kept = qos.latched(qos.KEPT_CONSTRAINTS)
-    fresh.hear(Odometry, "constraints", kept)
-    fresh.hear(DiagnosticArray, "refusals")
-    fresh.hear(closures_msg.Refusal, "closure_refusals")
-    fresh.hear(closures_msg.ObjectLandmarks, "object_landmarks")
+    fresh.receive(Odometry, "constraints", kept)
+    fresh.receive(DiagnosticArray, "refusals")
+    fresh.receive(closures_msg.Refusal, "closure_refusals")
+    fresh.receive(closures_msg.ObjectLandmarks, "object_landmarks")
     start(fresh, model, "-p threshold:=0.4")
     objreg(fresh, "replay", str(kitchen), "--lossless", "--end", "4", "--wait", str(START_S))
     end_keyframe(fresh)
-    fresh.hear(closures_msg.LoopClosureMsg, "loop_closures", kept)  # it comes late
-    constraints = [from_msg.loop_closure(message) for message in fresh.heard["constraints"]]
-    messages = fresh.heard["loop_closures"]
+    fresh.receive(closures_msg.LoopClosureMsg, "loop_closures", kept)  # it comes late
+    constraints = [from_msg.loop_closure(message) for message in fresh.received["constraints"]]
+    messages = fresh.received["loop_closures"]
     fresh.wait_for(lambda: len(messages) == len(constraints) > 0, what="the closures that were kept")
     assert len({message.id for message in messages}) == len(messages)
     for mine, theirs in zip(map(closures_msg.read_loop_closure, messages), constraints, strict=True):
@@ -190,7 +190,7 @@ def test_objreg_msgs_tell_the_same_as_the_topics_of_common_interfaces_and_more(f
         assert (mine.from_frame_id, mine.to_frame_id) == (theirs.from_frame_id, theirs.to_frame_id)
         assert np.array_equal(mine.T_from_to, theirs.T_from_to) and np.array_equal(mine.covariance, theirs.covariance)
         assert mine.evidence["odds"] > 1 and mine.matches and (mine.from_session, mine.to_session) == (0, 0)
-    told = [refusal_of(status) for message in fresh.heard["refusals"] for status in message.status]
-    whole = [closures_msg.read_refusal(message) for message in fresh.heard["closure_refusals"]]
+    told = [refusal_of(status) for message in fresh.received["refusals"] for status in message.status]
+    whole = [closures_msg.read_refusal(message) for message in fresh.received["closure_refusals"]]
     assert [(w.reason, w.to_ns, w.detail) for w in whole] == [(t.reason, t.to_ns, t.detail) for t in told]
-    assert fresh.heard["object_landmarks"][0].session == "0" and fresh.heard["object_landmarks"][0].landmarks
+    assert fresh.received["object_landmarks"][0].session == "0" and fresh.received["object_landmarks"][0].landmarks

@@ -81,7 +81,7 @@ def drive(graph: Graph, robot: str, begin_s: int, node: str = "keyframer", sent:
         names = names | dict(enumerate(sorted({cloud.label for cloud in seen.objects})))
         tell(graph, robot, seen, names)
         graph.answer(node, seen.stamp_ns, f"{robot}/finished")
-    graph.wait_for(lambda: len(graph.heard[f"{robot}/keyframes"]) == sent, what=f"keyframes of {robot}")
+    graph.wait_for(lambda: len(graph.received[f"{robot}/keyframes"]) == sent, what=f"keyframes of {robot}")
 
 
 def place(robot: str, since_ns: int) -> Array:
@@ -94,29 +94,29 @@ def test_keyframes_of_two_robots_close_loops_in_one_registrar_and_tie_them_in_on
 ) -> None:
     store = tmp_path / "fleet.db"
     for topic in ("r1/finished", "r2/finished", "finished"):
-        fleet.hear(Header, topic)
+        fleet.receive(Header, topic)
     for robot in SEEN:
-        fleet.hear(CompressedImage, f"{robot}/keyframes", qos.latched(qos.KEPT_KEYFRAMES))
-        fleet.hear(TransformStamped, f"{robot}/correction", qos.latched())
+        fleet.receive(CompressedImage, f"{robot}/keyframes", qos.latched(qos.KEPT_KEYFRAMES))
+        fleet.receive(TransformStamped, f"{robot}/correction", qos.latched())
         fleet.start(f"{robot}/keyframer", "keyframes", f"-r __ns:=/{robot}", "-p reliable:=true", MOUNT)
-    fleet.hear(OdometryMsg, "constraints", qos.latched(qos.KEPT_CONSTRAINTS))
-    fleet.hear(DiagnosticArray, "refusals", qos.room(depth=100))
+    fleet.receive(OdometryMsg, "constraints", qos.latched(qos.KEPT_CONSTRAINTS))
+    fleet.receive(DiagnosticArray, "refusals", qos.room(depth=100))
     fleet.start("registrar", "registrar", "-p robots:=[r1, r2]", f"-p store:={store}")
     fleet.start("mapper", "mapper", "-p robots:=[r1, r2]", "-p publish_tf:=false", MOUNT)
     drive(fleet, "r1", 100)
     drive(fleet, "r2", 101)  # at the same time, by the same clock
-    keyframes = {robot: [read_keyframe(m) for m in fleet.heard[f"{robot}/keyframes"]] for robot in SEEN}
+    keyframes = {robot: [read_keyframe(m) for m in fleet.received[f"{robot}/keyframes"]] for robot in SEEN}
     assert all(max(len(s.packed) for s in sent) < 100_000 for sent in keyframes.values())
     for sent in (s for of in keyframes.values() for s in of):
         assert fleet.answer("registrar", sent.stamp_ns) == "published"
-    closures = [from_msg.loop_closure(message) for message in fleet.heard["constraints"]]
+    closures = [from_msg.loop_closure(message) for message in fleet.received["constraints"]]
     between = [c for c in closures if (c.from_frame_id, c.to_frame_id) == ("r1/camera", "r2/camera")]
     assert between
     for closure in between:
         there, here = place("r1", closure.from_ns - 100 * SECOND), place("r2", closure.to_ns - 101 * SECOND)
         degrees, centimetres = pose_error(closure.T_from_to, inverse(there) @ here)
         assert degrees < 2.0 and centimetres < 3.0
-    fleet.wait_for(lambda: bool(fleet.heard["r2/correction"]), what="the second robot in the map")
+    fleet.wait_for(lambda: bool(fleet.received["r2/correction"]), what="the second robot in the map")
     fleet.stop("registrar")
     stored = Store(store, read_only=True)
     assert {stored.keyframe(k).robot for k in stored.keyframe_ids()} == {"r1", "r2"}
@@ -128,22 +128,22 @@ def test_a_registrar_that_starts_anew_takes_what_was_sent_meanwhile_and_nothing_
     fleet: Graph, tmp_path: Path
 ) -> None:
     store = tmp_path / "fleet.db"
-    fleet.hear(Header, "r1/finished")
-    fleet.hear(Header, "finished")
-    fleet.hear(CompressedImage, "r1/keyframes", qos.latched(qos.KEPT_KEYFRAMES))
+    fleet.receive(Header, "r1/finished")
+    fleet.receive(Header, "finished")
+    fleet.receive(CompressedImage, "r1/keyframes", qos.latched(qos.KEPT_KEYFRAMES))
     fleet.start("r1/keyframer", "keyframes", "-r __ns:=/r1", "-p reliable:=true", MOUNT)
     started = "-p robots:=[r1]", f"-p store:={store}"
     fleet.start("registrar", "registrar", *started)
     fleet.start("mapper", "mapper", "-p robots:=[r1]", "-p publish_tf:=false", MOUNT)
     drive(fleet, "r1", 100)
-    stamps = [read_keyframe(message).stamp_ns for message in fleet.heard["r1/keyframes"]]
+    stamps = [read_keyframe(message).stamp_ns for message in fleet.received["r1/keyframes"]]
     assert [fleet.answer("registrar", stamp) for stamp in stamps] == ["published"] * 4
     fleet.stop("registrar")
-    fleet.books.clear()
+    fleet.counters.clear()
     fleet.start("registrar", "registrar", *started)
-    fleet.wait_for(lambda: "/registrar" in fleet.books, START_S, "the registrar")
+    fleet.wait_for(lambda: "/registrar" in fleet.counters, START_S, "the registrar")
     fleet.wait_for(
-        lambda: fleet.books["/registrar"].dropped.get("known", 0) >= 4, what="the registrar to know all four"
+        lambda: fleet.counters["/registrar"].dropped.get("known", 0) >= 4, what="the registrar to know all four"
     )
     fleet.stop("registrar")
     stored = Store(store, read_only=True)
@@ -158,8 +158,8 @@ def test_two_registrars_that_each_keep_a_store_close_loops_between_their_robots(
     (tmp_path / "key").write_text("a key of the whole fleet")
     key = [f"-p key_file:={tmp_path / 'key'}"] if is_signed else []
     for robot in SEEN:
-        fleet.hear(Header, f"{robot}/finished")
-        fleet.hear(OdometryMsg, f"{robot}/constraints", qos.latched(qos.KEPT_CONSTRAINTS))
+        fleet.receive(Header, f"{robot}/finished")
+        fleet.receive(OdometryMsg, f"{robot}/constraints", qos.latched(qos.KEPT_CONSTRAINTS))
         own = "-p exchange:=/fleet", f"-p store:={tmp_path / robot}.db", "-p reliable:=true", MOUNT, *key
         fleet.start(f"/{robot}/registrar", "registrar", f"-r __ns:=/{robot}", *own)
     fleet.start("mapper", "mapper", "-p robots:=[r1, r2]", "-p publish_tf:=false", MOUNT)
@@ -167,7 +167,7 @@ def test_two_registrars_that_each_keep_a_store_close_loops_between_their_robots(
     drive(fleet, "r2", 101, "registrar", 0)
 
     def between() -> list[LoopClosure]:
-        told = [from_msg.loop_closure(m) for robot in SEEN for m in fleet.heard[f"{robot}/constraints"]]
+        told = [from_msg.loop_closure(m) for robot in SEEN for m in fleet.received[f"{robot}/constraints"]]
         return [one for one in told if one.from_frame_id.split("/")[0] != one.to_frame_id.split("/")[0]]
 
     fleet.wait_for(lambda: bool(between()), what="a closure between the robots")

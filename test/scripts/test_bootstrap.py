@@ -46,10 +46,10 @@ def locks(repository: Path) -> list[str]:
 
 def bootstrap(checkout: Path, *words: str, **variables: str) -> list[str]:
     """What pip is asked to install."""
-    return heard(checkout, *words, **variables)[0]
+    return received(checkout, *words, **variables)[0]
 
 
-def heard(checkout: Path, *words: str, **variables: str) -> tuple[list[str], str]:
+def received(checkout: Path, *words: str, **variables: str) -> tuple[list[str], str]:
     """What pip is asked to install, and what the script says."""
     notes = checkout / "notes"
     notes.write_text("")
@@ -100,7 +100,7 @@ def test_what_another_setup_or_lock_asked_for_is_not_taken_as_installed(checkout
 def test_where_no_lock_fits_pip_chooses_and_the_script_says_so(
     checkout: Path, variables: dict[str, str], wanted: str, reason: str
 ) -> None:
-    asked, said = heard(checkout, **variables)
+    asked, said = received(checkout, **variables)
     assert asked == [wanted] and reason in said
 
 
@@ -141,7 +141,7 @@ def test_what_cannot_complete_is_no_obstacle(checkout: Path) -> None:
     objreg = checkout / ".venv/bin/objreg"
     objreg.write_text("#!/bin/bash\nexit 1\n")
     objreg.chmod(0o755)
-    asked, said = heard(checkout)
+    asked, said = received(checkout)
     assert asked and "objreg works without" in said
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The segmenter behind its door: messages in, a frame and words of warning out."""
+"""The segmenter behind its node: messages in, a frame and words of warning out."""
 
 from __future__ import annotations
 
@@ -32,29 +32,29 @@ class Camera:
     """A camera whose info was published before the segmenter came, and that is kept for it or published again."""
 
     def __init__(self, kept: bool, distortion: tuple[float, ...] = (), model: str = "plumb_bob") -> None:
-        self.node = rclpy.create_node("camera")
-        self.info = self.node.create_publisher(CameraInfo, "camera_info", qos.latched() if kept else qos.room())
+        self.peer = rclpy.create_node("camera")
+        self.info = self.peer.create_publisher(CameraInfo, "camera_info", qos.latched() if kept else qos.room())
         told = to_msg.camera_info(CAMERA, 1, "eye")
         if distortion:
             told.d, told.distortion_model = list(distortion), model
         self.info.publish(told)
-        self.depth = self.node.create_publisher(Image, "depth/image", qos.room())
-        self.table = self.node.create_publisher(PointCloud2, "detections_table", qos.room())
-        self.labels = self.node.create_publisher(String, "labels", qos.latched())
+        self.depth = self.peer.create_publisher(Image, "depth/image", qos.room())
+        self.table = self.peer.create_publisher(PointCloud2, "detections_table", qos.room())
+        self.labels = self.peer.create_publisher(String, "labels", qos.latched())
         self.labels.publish(to_msg.labels(NAMES))
         self.said: list[str] = []
-        self.door = SegmenterNode()
-        self.door.throttled._write = self.said.append
+        self.node = SegmenterNode()
+        self.node.throttled._write = self.said.append
         self.executor = SingleThreadedExecutor()
-        self.executor.add_node(self.door)
         self.executor.add_node(self.node)
+        self.executor.add_node(self.peer)
         self.wait(lambda: min(p.get_subscription_count() for p in (self.depth, self.table, self.labels)) > 0)
-        self.wait(lambda: len(self.door.connected) >= (3 if self.door._inputs.camera else 4))
+        self.wait(lambda: len(self.node.connected) >= (3 if self.node._inputs.camera else 4))
 
     def wait(self, done: Callable[[], Any], seconds: float = 300.0) -> None:
         end = time.monotonic() + seconds
         while not done():
-            assert time.monotonic() < end, f"nothing came; the books say {self.door.ledger.balance()}"
+            assert time.monotonic() < end, f"nothing came; the books say {self.node.accounting.balance()}"
             self.executor.spin_once(timeout_sec=0.05)
 
     def see(self, metres: float, frame_id: str, picture_frame_id: str) -> None:
@@ -72,7 +72,9 @@ class Camera:
         )  # fmt: skip
         self.table.publish(to_msg.detections_table(seen, NAMES))
         self.depth.publish(message)
-        self.wait(lambda: self.door.ledger.balance().published + sum(self.door.ledger.balance().dropped.values()) == 1)
+        self.wait(
+            lambda: self.node.accounting.balance().published + sum(self.node.accounting.balance().dropped.values()) == 1
+        )
 
 
 @pytest.fixture
@@ -88,9 +90,9 @@ def made(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Ite
 
     yield make
     for camera in cameras:
-        camera.door.close()
+        camera.node.close()
         camera.executor.shutdown()
-        camera.node.destroy_node()
+        camera.peer.destroy_node()
     rclpy.try_shutdown()
 
 
@@ -99,14 +101,14 @@ def test_a_camera_info_that_was_published_once_and_kept_serves_a_segmenter_that_
 ) -> None:
     camera = made()
     camera.see(1.2, "eye", "eye")
-    assert camera.said == [] and not camera.door.watch.silent()
+    assert camera.said == [] and not camera.node.watch.silent()
 
 
 def test_a_camera_that_keeps_nothing_is_heard_without_a_word_of_qos(
     made: Callable[..., Camera], capfd: pytest.CaptureFixture[str]
 ) -> None:
     camera = made(kept=False)
-    camera.wait(lambda: camera.door.connected.get("/camera_info"))
+    camera.wait(lambda: camera.node.connected.get("/camera_info"))
     later = time.monotonic() + 2 * LOOK_S
     camera.wait(lambda: time.monotonic() > later)
     camera.info.publish(to_msg.camera_info(CAMERA, 1, "eye"))
@@ -128,22 +130,22 @@ def test_depth_of_another_sensor_is_brought_into_the_picture_of_colour(
     met = spied(camera, monkeypatch)
     T_colour_depth = np.eye(4)
     T_colour_depth[0, 3] = -0.12
-    camera.door._find_pose = lambda a, b: T_colour_depth if (a, b) == ("colour_eye", "depth_eye") else None
+    camera.node._find_pose = lambda a, b: T_colour_depth if (a, b) == ("colour_eye", "depth_eye") else None
     of_colour = replace(CAMERA, fx=600.0, fy=600.0, cx=319.5, cy=239.5, width=640, height=480)
-    info = camera.node.create_publisher(CameraInfo, "colour/camera_info", qos.room())
+    info = camera.peer.create_publisher(CameraInfo, "colour/camera_info", qos.room())
     camera.wait(lambda: info.get_subscription_count() > 0)
     info.publish(to_msg.camera_info(of_colour, 1, "colour_eye"))
-    camera.wait(lambda: camera.door._colour_info is not None)
+    camera.wait(lambda: camera.node._colour_info is not None)
     camera.see(1.2, "depth_eye", "colour_eye")
     ((_, depth),) = met
     assert depth.frame_id == "colour_eye" and (depth.intrinsics.width, depth.intrinsics.fx) == (320, 300.0)
     assert (depth.depth[120, :289] > 0).all() and not depth.depth[120, 291:].any()  # 30 px at 1.2 m
-    assert "is registered here" in camera.door._registered
+    assert "is registered here" in camera.node._registered
 
 
 def test_frames_without_a_level_odometry_that_is_asked_for_are_told(made: Callable[..., Camera]) -> None:
     camera = made()
-    camera.door._inputs = replace(camera.door._inputs, level_odom=True)
+    camera.node._inputs = replace(camera.node._inputs, level_odom=True)
     camera.see(1.2, "eye", "eye")
     (line,) = camera.said
     assert "as level_odom is on, got none: gravity is estimated" in line
@@ -159,11 +161,11 @@ def test_millimetres_as_floats_are_told_with_what_to_do(made: Callable[..., Came
 def spied(camera: Camera, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """The boxes and the depth image of each frame that its segmenter gets."""
     met: list[Any] = []
-    segment = camera.door._segmenter.segment
+    segment = camera.node._segmenter.segment
     spy = lambda boxes, depth, *more, **named: (  # noqa: E731
         met.append((boxes.xyxy, depth)) or segment(boxes, depth, *more, **named)
     )
-    monkeypatch.setattr(camera.door._segmenter, "segment", spy)
+    monkeypatch.setattr(camera.node._segmenter, "segment", spy)
     return met
 
 
@@ -185,38 +187,38 @@ def test_depth_and_boxes_of_a_lens_are_rectified_before_they_are_segmented(
     of = Lens(model, distortion, CAMERA, CAMERA)
     assert np.array_equal(depth.shown, of.shown) and np.array_equal(depth.depth > 0, of.shown)
     assert np.abs(xyxy - of.rectify_xyxy(np.array([[100, 70, 220, 170]]))).max() < 1e-3
-    assert camera.door._lens == f"{of}; rectified"
+    assert camera.node._lens == f"{of}; rectified"
 
 
 def test_pictures_that_are_said_to_be_rectified_are_segmented_as_they_come(
     made: Callable[..., Camera], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     camera = made(distortion=(-0.3, 0.1, 0.0, 0.0, 0.0))
-    camera.door._inputs = replace(camera.door._inputs, rectified="all")
+    camera.node._inputs = replace(camera.node._inputs, rectified="all")
     met = spied(camera, monkeypatch)
     camera.see(1.2, "eye", "eye")
     ((xyxy, depth),) = met
     assert xyxy.tolist() == [[100, 70, 220, 170]] and depth.shown is None and (depth.depth > 0).all()
-    assert "taken as rectified" in camera.door._lens
+    assert "taken as rectified" in camera.node._lens
 
 
 def test_the_name_of_a_topic_behind_its_remap_tells_what_is_rectified(
     made: Callable[..., Camera], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     camera = made(distortion=(-0.3, 0.1, 0.0, 0.0, 0.0))
-    monkeypatch.setattr(camera.door, "resolve_topic_name", lambda name: {"depth/image": "/cam/image_rect"}[name])
-    camera.door._source = "depth/image"
+    monkeypatch.setattr(camera.node, "resolve_topic_name", lambda name: {"depth/image": "/cam/image_rect"}[name])
+    camera.node._source = "depth/image"
     with pytest.raises(KeyError, match="image"):
-        camera.door._raw_pictures()  # it asks for the name of the colour too
+        camera.node._raw_pictures()  # it asks for the name of the colour too
     names = {"depth/image": "/cam/depth/image_rect", "image": "/cam/rgb/image_raw"}
-    monkeypatch.setattr(camera.door, "resolve_topic_name", names.__getitem__)
-    assert camera.door._raw_pictures() == lenses.Raw(depth=False, colour=True)
+    monkeypatch.setattr(camera.node, "resolve_topic_name", names.__getitem__)
+    assert camera.node._raw_pictures() == lenses.Raw(depth=False, colour=True)
 
 
 def test_a_frame_of_a_lens_that_nobody_knows_is_dropped_and_counted(made: Callable[..., Camera]) -> None:
     camera = made(distortion=(0.1, 0.2, 0.3, 0.4, 0.5), model="nobody's")
     camera.see(1.2, "eye", "eye")
-    assert camera.door.ledger.balance().dropped == {"malformed_depth": 1}
+    assert camera.node.accounting.balance().dropped == {"malformed_depth": 1}
     (line,) = camera.said
     assert 'expected a distortion model of plumb_bob, rational_polynomial, equidistant, got "nobody\'s"' in line
     assert "set segmenter.rectified to all" in line
@@ -233,7 +235,7 @@ def test_the_camera_of_the_parameter_holds_and_no_camera_info_is_heard(
     assert camera.said == []
     told = depth.intrinsics
     assert (told.fx, told.fy, told.cx, told.cy, told.width) == (300, 300, 159.75, 119.75, 320)
-    assert "/camera_info" not in camera.door.connected and not camera.door.watch.silent()
+    assert "/camera_info" not in camera.node.connected and not camera.node.watch.silent()
 
 
 @pytest.mark.parametrize(("z_min", "seen"), [(0.2, True), (1.5, False)])
@@ -242,8 +244,8 @@ def test_a_live_parameter_holds_from_the_next_frame_on(
 ) -> None:
     camera = made()
     frames: list[Any] = []
-    monkeypatch.setattr(camera.door, "_publish", lambda frame, names: frames.append(frame))
-    (result,) = camera.door.set_parameters([Parameter("z_min", value=z_min)])
+    monkeypatch.setattr(camera.node, "_publish", lambda frame, names: frames.append(frame))
+    (result,) = camera.node.set_parameters([Parameter("z_min", value=z_min)])
     assert result.successful, result.reason
     camera.see(1.2, "eye", "eye")
     (frame,) = frames
@@ -251,5 +253,5 @@ def test_a_live_parameter_holds_from_the_next_frame_on(
 
 
 def test_a_live_parameter_that_contradicts_another_is_refused(made: Callable[..., Camera]) -> None:
-    (result,) = made().door.set_parameters([Parameter("z_min", value=9.0)])
+    (result,) = made().node.set_parameters([Parameter("z_min", value=9.0)])
     assert not result.successful and "z_max: expected more than z_min" in result.reason

@@ -24,23 +24,23 @@ BEHIND = ["--", "--ros-args", *(word for rule in RULES for word in rule.split(" 
 
 
 def walk(graph: Graph, folder: Path, room: Path) -> None:
-    """Start, play, hear: constraints, refusals, and books that balance."""
+    """Start, play, receive: constraints, refusals, and counters that balance."""
     for name in ROOMS:
         graph.start(f"{ROBOT}/{name}", name, *RULES, *(["-p reliable:=true"] if name != "registrar" else []))
-    graph.hear(Odometry, f"{ROBOT}/constraints", qos.latched(depth=1000))
-    graph.hear(DiagnosticArray, f"{ROBOT}/refusals")
-    graph.wait_for(lambda: len(graph.books) == 3, PATIENCE_S, "three nodes")
+    graph.receive(Odometry, f"{ROBOT}/constraints", qos.latched(depth=1000))
+    graph.receive(DiagnosticArray, f"{ROBOT}/refusals")
+    graph.wait_for(lambda: len(graph.counters) == 3, PATIENCE_S, "three nodes")
 
     engineer = Walk(folder)
     _play_where_nobody_listens(engineer, room)
     played = engineer.type("replay", str(room), "--lossless", "--end", "15", "--wait", str(PATIENCE_S), *BEHIND)
     assert all(f"{room}: {FRAMES} published" in played.text for room in ROOMS), played.text
 
-    graph.wait_for(lambda: bool(graph.heard[f"{ROBOT}/constraints"]), what="a constraint")
-    closure = from_msg.loop_closure(graph.heard[f"{ROBOT}/constraints"][0])
+    graph.wait_for(lambda: bool(graph.received[f"{ROBOT}/constraints"]), what="a constraint")
+    closure = from_msg.loop_closure(graph.received[f"{ROBOT}/constraints"][0])
     assert closure.covariance.shape == (6, 6) and closure.from_ns != closure.to_ns
-    graph.wait_for(lambda: bool(graph.heard[f"{ROBOT}/refusals"]), what="a refusal")
-    assert refusal_of(graph.heard[f"{ROBOT}/refusals"][0].status[0])
+    graph.wait_for(lambda: bool(graph.received[f"{ROBOT}/refusals"]), what="a refusal")
+    assert refusal_of(graph.received[f"{ROBOT}/refusals"][0].status[0])
     _read_the_books(graph)
 
 
@@ -53,6 +53,8 @@ def _play_where_nobody_listens(engineer: Walk, room: Path) -> None:
 
 def _read_the_books(graph: Graph) -> None:
     """Every node soon tells that all frames are through, and each was published or dropped."""
-    graph.wait_for(lambda: all(books.published == FRAMES for books in graph.books.values()), what="the books")
-    for books in graph.books.values():
-        assert books.received == books.published + books.waiting + sum(books.dropped.values())
+    graph.wait_for(
+        lambda: all(counters.published == FRAMES for counters in graph.counters.values()), what="the counters"
+    )
+    for counters in graph.counters.values():
+        assert counters.received == counters.published + counters.waiting + sum(counters.dropped.values())

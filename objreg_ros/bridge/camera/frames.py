@@ -125,15 +125,15 @@ class FrameTree:
         self._followed: set[str] = set()  # children whose edges have a history
         self._lock = Lock()
 
-    def hear(self, message: Any) -> None:
+    def receive(self, message: Any) -> None:
         """Take a TFMessage of /tf_static in: the last word on a frame counts.
 
         ValueError for a transform without a rotation, or beyond all measure; the others are taken.
         """
         self._take(message, self._take_static)
 
-    def hear_moving(self, message: Any) -> None:
-        """Take a TFMessage of /tf in, as `hear`. What /tf_static said of a frame and its parent stays."""
+    def receive_moving(self, message: Any) -> None:
+        """Take a TFMessage of /tf in, as `receive`. What /tf_static said of a frame and its parent stays."""
         self._take(message, self._take_moving)
 
     def _take(self, message: Any, take: Any) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of a lens, rectified at the door: what a camera_info says of it, and which pictures are as it made them.
+"""Pictures of a lens, rectified at the node: what a camera_info says of it, and which pictures are as it made them.
 
 ROS's image_proc gives a rectified picture the camera_info of the raw one, distortion and all. So D alone does not tell.
 The names of topics do, by convention: image_rect, image_rect_color, hw_registered/image_rect_raw. A parameter of the

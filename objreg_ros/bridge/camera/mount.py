@@ -55,8 +55,8 @@ class Seated(NamedTuple):
 class Mount:
     """Where the camera sits on the body that odometry speaks of.
 
-    ``told`` is what a parameter says, which wins; ``tree`` is asked without one. ``say`` hears what is assumed, and
-    hears it again only where that changes. ``nameless`` is whose pose an odometry is that names no body.
+    ``told`` is what a parameter says, which wins; ``tree`` is asked without one. ``say`` receives what is assumed, and
+    receives it again only where that changes. ``nameless`` is whose pose an odometry is that names no body.
     """
 
     def __init__(

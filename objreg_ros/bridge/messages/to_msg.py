@@ -81,7 +81,7 @@ def clock(stamp_ns: int) -> Clock:
 
 
 def finished(node: str, stamp_ns: int, reason: str = "") -> Header:
-    """The receipt of one input frame: what became of it at ``node``, dropped if there is a ``reason``."""
+    """The acknowledgement of one input frame: what became of it at ``node``, dropped if there is a ``reason``."""
     return header(stamp_ns, f"{node} dropped {reason}" if reason else f"{node} published")
 
 

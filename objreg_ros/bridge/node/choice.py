@@ -30,23 +30,23 @@ class Choice(Generic[Subscription]):
         self.taken: str | None = None
         self._subscribe, self._unsubscribe, self._is_valid = subscribe, unsubscribe, is_valid
         self._silence_s, self._clock = silence_s, clock
-        self._heard_at = 0.0
+        self._received_at = 0.0
         self._open: dict[str, Subscription] = {}
         self._open_all()
 
-    def hear(self, topic: str, message: Any) -> bool:
+    def receive(self, topic: str, message: Any) -> bool:
         """Whether a message is of a topic that is open still; the first valid one decides."""
         if topic not in self._open:
             return False
         if self.taken is None and self._is_valid(topic, message):
             self._take(topic)
         if topic == self.taken:
-            self._heard_at = self._clock()
+            self._received_at = self._clock()
         return True
 
     def look(self) -> None:
         """Open the others again where the one that was taken is silent; to be called now and again."""
-        if self.taken is not None and self._clock() - self._heard_at >= self._silence_s:
+        if self.taken is not None and self._clock() - self._received_at >= self._silence_s:
             self.taken = None
             self._open_all()
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The books of a node as diagnostic_msgs, and back for those who read them."""
+"""The counters of a node as diagnostic_msgs, and back for those who read them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
 
-from objreg_ros.bridge.node.ledger import Balance
+from objreg_ros.bridge.node.accounting import Balance
 from objreg_ros.data import Reason, Rejected
 
 DROPPED = "dropped: "
@@ -90,7 +90,7 @@ def _counts(balance: Balance, rate_hz: float) -> dict[str, object]:
 
 
 def balance_of(status: DiagnosticStatus) -> Balance:
-    """The books that a status of `diagnostic` tells."""
+    """The counters that a status of `diagnostic` tells."""
     values = {pair.key: pair.value for pair in status.values}
     stages = sorted({key.split(" ")[1] for key in values if key.startswith(LATENCY)})
     return Balance(

@@ -22,7 +22,7 @@ REFUSED = rclpy_implementation.RCLError, rclpy_implementation.UnknownROSArgsErro
 SOURCE_LINE = re.compile(r",? at /\S+:\d+")  # of rcl's own code, in what it says
 SIGNALS = signal.SIGINT, signal.SIGTERM
 TELL_S = 5.0  # between two lines of a work that goes on
-LOOK_S = 0.1  # a signal is heard by then
+LOOK_S = 0.1  # a signal is received by then
 
 
 M_ARENA_MAX, ARENAS = -8, 2  # mallopt(3): of the GNU C library, which else has eight for each core
@@ -51,19 +51,19 @@ class FirstSignal:
     """
 
     def __init__(self) -> None:
-        self._is_heard = False
+        self._is_received = False
 
     def __call__(self, *_: object) -> None:
-        if not self._is_heard:
-            self._is_heard = True
+        if not self._is_received:
+            self._is_received = True
             raise KeyboardInterrupt
 
     def deafen(self) -> None:
         """From now on no signal interrupts."""
-        self._is_heard = True
+        self._is_received = True
 
 
-def hear_first_signal() -> FirstSignal:
+def receive_first_signal() -> FirstSignal:
     """Let the first SIGINT or SIGTERM interrupt the main thread, from which this has to be called, before `begin`."""
     handler = FirstSignal()
     for number in SIGNALS:
@@ -103,7 +103,7 @@ class Abandoned(KeyboardInterrupt):
 def await_kernels(prepare: Callable[[], object], say: Callable[[str], object], tell_s: float = TELL_S) -> None:
     """Let ``prepare`` load the kernels of a room, or compile them, in a thread of its own; say so, and that it goes on.
 
-    A signal is heard at once: what it interrupts raises `Abandoned`. What ``prepare`` raises is raised.
+    A signal is received at once: what it interrupts raises `Abandoned`. What ``prepare`` raises is raised.
     """
     done: Future[None] = Future()
 

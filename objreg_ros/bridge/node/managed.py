@@ -37,7 +37,7 @@ class ManagedNode(LifecycleNodeMixin, OverridableNode):
     # What a subclass fills in
 
     def prepare(self) -> None:
-        """Empty books; at the start, and whenever the node is configured or was cleaned up."""
+        """Empty counters; at the start, and whenever the node is configured or was cleaned up."""
 
     def open(self) -> None:
         """Load what the room needs, publish and listen. ValueError or OSError if it cannot be, and nothing is held."""
@@ -125,7 +125,7 @@ class ManagedNode(LifecycleNodeMixin, OverridableNode):
         return DONE
 
     def _clear(self) -> None:
-        """Take down all that was made since the life began, and begin the books anew."""
+        """Take down all that was made since the life began, and begin the counters anew."""
         for thing, destroy in list(self._entities()):
             if not any(thing is lasting for lasting in self._lasting):
                 destroy(thing)

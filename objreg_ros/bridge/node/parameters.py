@@ -122,7 +122,9 @@ def _declare(node: Node, declaration: Declaration) -> Any:
     loose = ParameterDescriptor(dynamic_typing=True)
     given = node.declare_parameter(declaration.name, list(declared) if declaration.many else declared, loose).value
     value = declaration.check(given) if given is not None else () if declaration.many else declared
-    Node.set_parameters(node, [_parameter(declaration, value)])  # rclpy's own: a Door's asks what we are making here
+    Node.set_parameters(
+        node, [_parameter(declaration, value)]
+    )  # rclpy's own: a NodeBase's asks what we are making here
     return value
 
 

@@ -10,7 +10,7 @@ from objreg_ros.params import Params, param
 
 
 @dataclass(frozen=True)
-class DoorParams(Params):
+class NodeBaseParams(Params):
     """How a node listens."""
 
     reliable: bool = param(

@@ -8,7 +8,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 ODOMETRY = 1000  # words of odometry, some seconds of the fastest
 KEPT_CONSTRAINTS = 1000  # of the latched constraints: what a mapper that comes late still gets
 KEPT_KEYFRAMES = 128  # packed ones of a camera: a minute of a link that is away, at two a second
-KEPT_SUMMARIES = 2000  # half a kilobyte each: what a robot that comes late hears of the others
+KEPT_SUMMARIES = 2000  # half a kilobyte each: what a robot that comes late receives the others
 REFUSALS = 100  # messages, one a searched keyframe
 SINGLE_REFUSALS = 1000  # messages, one a refusal
 

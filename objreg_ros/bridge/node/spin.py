@@ -12,20 +12,20 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
 from objreg_ros.bridge.node import profile, shared_memory
-from objreg_ros.bridge.node.door import Door
 from objreg_ros.bridge.node.lifetime import (
     Abandoned,
     FirstSignal,
     begin,
-    hear_first_signal,
+    receive_first_signal,
     settle,
     share_arenas,
     shutdown_as_interrupt,
 )
+from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.terminal import protect_terminal
 
 
-def run(make: Callable[[], Door], args: Sequence[str] | None = None) -> int:
+def run(make: Callable[[], NodeBase], args: Sequence[str] | None = None) -> int:
     """Run one node until SIGINT or SIGTERM; the exit status.
 
     What ROS or the node refuses at start, and what cannot be written at the end (ValueError, OSError), is one line on
@@ -35,10 +35,10 @@ def run(make: Callable[[], Door], args: Sequence[str] | None = None) -> int:
     return run_together((make,), args)
 
 
-def run_together(makes: Sequence[Callable[[], Door]], args: Sequence[str] | None = None) -> int:
+def run_together(makes: Sequence[Callable[[], NodeBase]], args: Sequence[str] | None = None) -> int:
     """Run nodes in one executor, as `run` does one; made and closed in this order, and ended together."""
     protect_terminal()
-    first_signal = hear_first_signal()
+    first_signal = receive_first_signal()
     share_arenas()
     transport = profile.apply()
     shared_memory.free_abandoned()
@@ -72,64 +72,64 @@ def _leave() -> int:
     os._exit(0)
 
 
-def _serve(makes: Sequence[Callable[[], Door]], transport: str, first_signal: FirstSignal) -> int:
-    executor, doors = SingleThreadedExecutor(), list[Door]()
+def _serve(makes: Sequence[Callable[[], NodeBase]], transport: str, first_signal: FirstSignal) -> int:
+    executor, nodes = SingleThreadedExecutor(), list[NodeBase]()
     try:
         try:
-            refused = _make(makes, doors)
+            refused = _make(makes, nodes)
             if refused is None:
-                _spin(doors, executor, transport)
+                _spin(nodes, executor, transport)
         except BaseException:
             first_signal.deafen()
-            _close(doors)
+            _close(nodes)
             raise
         first_signal.deafen()
-        return max(_close(doors), 0 if refused is None else _refuse(refused))
+        return max(_close(nodes), 0 if refused is None else _refuse(refused))
     finally:
-        executor.shutdown()  # last: the thread that heard the signal may still ring the bell that this takes down
+        executor.shutdown()  # last: the thread that received the signal may still ring the bell that this takes down
 
 
-def _make(makes: Sequence[Callable[[], Door]], doors: list[Door]) -> Exception | None:
-    """Make every node, into ``doors``; what one was refused for."""
+def _make(makes: Sequence[Callable[[], NodeBase]], nodes: list[NodeBase]) -> Exception | None:
+    """Make every node, into ``nodes``; what one was refused for."""
     try:
         for make in makes:
-            doors.append(make())
+            nodes.append(make())
     except (ValueError, OSError) as error:
         return error
     return None
 
 
-def _spin(doors: Sequence[Door], executor: SingleThreadedExecutor, transport: str) -> None:
+def _spin(nodes: Sequence[NodeBase], executor: SingleThreadedExecutor, transport: str) -> None:
     """Until a signal, or until a managed node was shut down; what ended a worker is raised."""
     try:
         with shutdown_as_interrupt():
-            doors[0].get_logger().info(transport)
+            nodes[0].get_logger().info(transport)
             settle()
-            for door in doors:
-                executor.add_node(door)
+            for node in nodes:
+                executor.add_node(node)
             # Not `spin_until_future_complete`: it keeps a callback of every round for ever, 100 MB an hour. What broke
             # a worker is seen with the next round, at the latest that of the diagnostics.
-            while rclpy.ok() and not any(door.failure.done() for door in doors):
+            while rclpy.ok() and not any(node.failure.done() for node in nodes):
                 executor.spin_once()
     except Abandoned:
         raise
     except KeyboardInterrupt:
         return
-    for door in doors:
-        if rclpy.ok() and door.failure.done():
-            door.failure.result()
+    for node in nodes:
+        if rclpy.ok() and node.failure.done():
+            node.failure.result()
 
 
-def _close(doors: Sequence[Door]) -> int:
-    """The exit status of all; who speaks ends before who hears it."""
-    return max([_close_one(door) for door in doors], default=0)
+def _close(nodes: Sequence[NodeBase]) -> int:
+    """The exit status of all; who speaks ends before who receives it."""
+    return max([_close_one(node) for node in nodes], default=0)
 
 
-def _close_one(door: Door) -> int:
+def _close_one(node: NodeBase) -> int:
     """The exit status; what cannot be written any more is said, since nobody else would."""
-    name = door.get_name()
+    name = node.get_name()
     try:
-        door.close()
+        node.close()
     except (ValueError, OSError) as error:
         return _refuse(OSError(f"{name}: its last work is lost: {error}"))
     return 0

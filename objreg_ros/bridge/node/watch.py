@@ -20,27 +20,27 @@ class Watch:
     ) -> None:
         self._publishers, self._period_s, self._clock = publishers, period_s, clock
         self._inputs: dict[str, dict[str, str]] = {}
-        self._heard_at: dict[str, float] = {}
+        self._received_at: dict[str, float] = {}
 
     def expect(self, name: str, topics: dict[str, str]) -> None:
         """Watch the input ``name``: ``topics`` by their name in the code → their full name."""
         self._inputs[name] = topics
-        self._heard_at[name] = self._clock()
+        self._received_at[name] = self._clock()
 
     def forget(self, name: str) -> None:
         """Watch the input no longer, if it was."""
         self._inputs.pop(name, None)
-        self._heard_at.pop(name, None)
+        self._received_at.pop(name, None)
 
-    def hear(self, name: str) -> None:
+    def receive(self, name: str) -> None:
         """The input has spoken; of an input that is not watched too."""
-        if name in self._heard_at:
-            self._heard_at[name] = self._clock()
+        if name in self._received_at:
+            self._received_at[name] = self._clock()
 
     def silent(self) -> dict[str, str]:
         """input → what is wrong and what to do, for each input that has been silent for a period."""
         now = self._clock()
-        late = {name: now - heard_at for name, heard_at in self._heard_at.items()}
+        late = {name: now - heard_at for name, heard_at in self._received_at.items()}
         return {name: self._advice(name, seconds) for name, seconds in late.items() if seconds >= self._period_s}
 
     def _advice(self, name: str, seconds: float) -> str:

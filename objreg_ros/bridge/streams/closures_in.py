@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a node hears closures: on `loop_closures` of objreg_msgs, on `constraints`, or on both and each once.
+"""How a node receives closures: on `loop_closures` of objreg_msgs, on `constraints`, or on both and each once.
 
 Those of one robot come on topics of its own too, whose name tells the robot where the message does not. On
 `constraints` the prefixes of frames tell it. On a robot's topic closures of others alone are refused.
@@ -17,14 +17,14 @@ from nav_msgs.msg import Odometry
 
 from objreg_ros.bridge.messages import closures_msg, from_msg
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.door import Door
+from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.data import LoopClosure, Moments, Robots, may_be_same, robot_of
 
 MOST_KNOWN = 100_000  # closures that are remembered, so that none is taken twice
 
 
 class ClosuresIn:
-    """The books of ``door`` count closures. ValueError for `loop_closures` where objreg_msgs is not installed.
+    """The counters of ``node`` count closures. ValueError for `loop_closures` where objreg_msgs is not installed.
 
     ``take`` is given what was accepted, ``again`` what is known and now names its sessions, ``withdraw`` the moments
     and robots of what is taken back. `forget` lets a closure come once more. ``prefixes`` has what stands before the
@@ -33,14 +33,14 @@ class ClosuresIn:
 
     def __init__(
         self,
-        door: Door,
+        node: NodeBase,
         topic: str,
         take: Callable[[LoopClosure], None],
         again: Callable[[LoopClosure], None],
         withdraw: Callable[[Moments, Robots], None],
         prefixes: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
-        self._door, self._take, self._again, self._withdraw = door, take, again, withdraw
+        self._node, self._take, self._again, self._withdraw = node, take, again, withdraw
         self._robots = [robot for robot in prefixes if robot]
         self._known: dict[Moments, set[Robots]] = {}  # the oldest first
         self._told: dict[str, tuple[Moments, Robots]] = {}  # by the id of objreg_msgs
@@ -49,9 +49,9 @@ class ClosuresIn:
             raise ValueError("input: expected objreg_msgs, got none: build it with colcon, or set input:=constraints")
         for robot, prefix in {"": "", **prefixes}.items():
             if topic != "constraints" and whole is not None:
-                door.listen(whole, f"{prefix}loop_closures", partial(self._hear_whole, robot=robot), kept)
+                node.listen(whole, f"{prefix}loop_closures", partial(self._on_whole, robot=robot), kept)
             if topic != "loop_closures":
-                door.listen(Odometry, f"{prefix}constraints", partial(self._hear_constraint, robot=robot), kept)
+                node.listen(Odometry, f"{prefix}constraints", partial(self._on_constraint, robot=robot), kept)
 
     def know(self, closures: Iterable[LoopClosure]) -> None:
         """These were taken before."""
@@ -68,8 +68,10 @@ class ClosuresIn:
         """What comes is of another map."""
         self._known.clear()
 
-    def _hear_constraint(self, message: Any, robot: str = "") -> None:
-        self._hear("constraints", message, lambda told: self._of(robot, self._by_frames(from_msg.loop_closure(told))))
+    def _on_constraint(self, message: Any, robot: str = "") -> None:
+        self._receive(
+            "constraints", message, lambda told: self._of(robot, self._by_frames(from_msg.loop_closure(told)))
+        )
 
     def _by_frames(self, closure: LoopClosure) -> LoopClosure:
         """The closure of the robots whose prefixes its frames have."""
@@ -90,13 +92,13 @@ class ClosuresIn:
                 raise ValueError(f"closure: expected a frame of {name!r}, got {frame_id!r}, which is of {owner!r}")
         return named
 
-    def _hear_whole(self, message: Any, robot: str = "") -> None:
+    def _on_whole(self, message: Any, robot: str = "") -> None:
         if message.retracted:
             told = self._told.get(message.id)
             if told is not None and (not robot or robot in told[1] or "" in told[1]):
                 self._withdraw(*told)
             return
-        closure = self._hear("loop_closures", message, lambda told: self._of(robot, _whole(told)))
+        closure = self._receive("loop_closures", message, lambda told: self._of(robot, _whole(told)))
         if closure is not None:
             self._told[message.id] = closure.moments, closure.robots
             while len(self._told) > MOST_KNOWN:
@@ -105,19 +107,19 @@ class ClosuresIn:
     def _is_known(self, closure: LoopClosure) -> bool:
         return any(may_be_same(closure.robots, robots) for robots in self._known.get(closure.moments, ()))
 
-    def _hear(self, topic: str, message: Any, decode: Callable[[Any], LoopClosure]) -> LoopClosure | None:
-        closure = self._door.read_aside(topic, decode, message)
+    def _receive(self, topic: str, message: Any, decode: Callable[[Any], LoopClosure]) -> LoopClosure | None:
+        closure = self._node.read_aside(topic, decode, message)
         if closure is None:
             stamp_ns = from_msg.stamp_ns(message)
-            self._door.accept(stamp_ns)
-            self._door.drop(stamp_ns, f"malformed_{topic}")
+            self._node.accept(stamp_ns)
+            self._node.drop(stamp_ns, f"malformed_{topic}")
         elif self._is_known(closure):
             self._again(closure)
         else:
             self.know([closure])
             while len(self._known) > MOST_KNOWN:
                 del self._known[next(iter(self._known))]
-            self._door.accept(closure.to_ns)
+            self._node.accept(closure.to_ns)
             self._take(closure)
         return closure
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A node that listens to the whole graph: what came out, the books of every node, the frame with most objects."""
+"""A node that listens to the whole graph: what came out, the counters of every node, the frame with most objects."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from std_srvs.srv import Trigger
 
 from objreg_ros.bridge.messages import from_msg
 from objreg_ros.bridge.node import qos
+from objreg_ros.bridge.node.accounting import Balance
 from objreg_ros.bridge.node.diagnostics import REJECTED, balance_of, refusal_of
-from objreg_ros.bridge.node.ledger import Balance
 from objreg_ros.data import Detections, LoopClosure, ObjectCloud, Rejected
 
 RECENT = 100  # detections that wait for their objects
@@ -41,7 +41,7 @@ class Collector(Node):
 
     def __init__(self, context: Context) -> None:
         super().__init__("collector", context=context)
-        self.books: dict[str, Balance] = {}
+        self.counters: dict[str, Balance] = {}
         self.rejected: dict[str, int] = {}
         self.closures: list[LoopClosure] = []
         self.refusals: list[Rejected] = []
@@ -54,12 +54,12 @@ class Collector(Node):
         self._listen()
 
     def _listen(self) -> None:
-        self.create_subscription(DiagnosticArray, "/diagnostics", self._hear_books, qos.room(depth=100))
-        self.create_subscription(DiagnosticArray, "refusals", self._hear_refusals, qos.room(depth=qos.REFUSALS))
-        self.create_subscription(Odometry, "constraints", self._hear_constraint, qos.latched(qos.KEPT_CONSTRAINTS))
-        self.create_subscription(String, "labels", self._hear_labels, qos.latched())
-        self.create_subscription(PointCloud2, "detections_table", self._hear_detections, qos.room())
-        self.create_subscription(PointCloud2, "objects", self._hear_objects, qos.room())
+        self.create_subscription(DiagnosticArray, "/diagnostics", self._on_counters, qos.room(depth=100))
+        self.create_subscription(DiagnosticArray, "refusals", self._on_refusals, qos.room(depth=qos.REFUSALS))
+        self.create_subscription(Odometry, "constraints", self._on_constraint, qos.latched(qos.KEPT_CONSTRAINTS))
+        self.create_subscription(String, "labels", self._on_labels, qos.latched())
+        self.create_subscription(PointCloud2, "detections_table", self._on_detections, qos.room())
+        self.create_subscription(PointCloud2, "objects", self._on_objects, qos.room())
 
     def spin_until(self, true: Callable[[], bool], seconds: float) -> bool:
         """Let messages come in until something is true or the time is over; whether it became true."""
@@ -81,29 +81,29 @@ class Collector(Node):
         self.destroy_node()
         self._executor.shutdown()  # last, as in `player`
 
-    def _hear_books(self, message: DiagnosticArray) -> None:
+    def _on_counters(self, message: DiagnosticArray) -> None:
         for status in message.status:
             if status.hardware_id == "objreg_ros":
-                self.books[status.name.removesuffix(": frames")] = balance_of(status)
+                self.counters[status.name.removesuffix(": frames")] = balance_of(status)
                 refused = {v.key: int(v.value) for v in status.values if v.key.startswith(REJECTED)}
                 self.rejected.update({key.removeprefix(REJECTED): count for key, count in refused.items()})
 
-    def _hear_refusals(self, message: DiagnosticArray) -> None:
+    def _on_refusals(self, message: DiagnosticArray) -> None:
         self.refusals += map(refusal_of, message.status)
 
-    def _hear_constraint(self, message: Any) -> None:
+    def _on_constraint(self, message: Any) -> None:
         self.closures.append(from_msg.loop_closure(message))
 
-    def _hear_labels(self, message: Any) -> None:
+    def _on_labels(self, message: Any) -> None:
         self._names = from_msg.labels(message)
 
-    def _hear_detections(self, message: Any) -> None:
+    def _on_detections(self, message: Any) -> None:
         if message.width:
             detections = from_msg.detections(message, self._names)
             self._recent.append(detections)
             self._glimpse(detections.stamp_ns)["labels"] = list(detections.label)
 
-    def _hear_objects(self, message: Any) -> None:
+    def _on_objects(self, message: Any) -> None:
         """Keep the frame with the most objects, and of those the latest."""
         stamp_ns = from_msg.stamp_ns(message)
         objects, _ = from_msg.objects(message, self._names)

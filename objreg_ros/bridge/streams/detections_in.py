@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a node hears of the objects in a picture: our detector's table, anyone's vision_msgs boxes, or masks."""
+"""What a node receives the objects in a picture: our detector's table, anyone's vision_msgs boxes, or masks."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from objreg_ros.bridge.messages.label_table import LabelTable
 from objreg_ros.bridge.messages.layout import table
 from objreg_ros.bridge.messages.vision_to_msg import Detection2DArray, LabelInfo
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.indoors import Surplus
-from objreg_ros.bridge.streams.matching import MatchingDoor
+from objreg_ros.bridge.node.intra_process import Surplus
 from objreg_ros.bridge.streams.sync import Drop, Match
+from objreg_ros.bridge.streams.synchronised_node import SynchronisedNode
 from objreg_ros.data import DepthImage, Detections, PointCloud
 
 TABLE, BOXES, MASKS = {"detections_table": PointCloud2}, {"detections_in": Detection2DArray}, {"masks": Image}
@@ -35,40 +35,42 @@ class Asked(NamedTuple):
 
 
 class DetectionsIn:
-    """Feeds the streams ``detections`` and ``labels`` of a door, and reads what it fed.
+    """Feeds the streams ``detections`` and ``labels`` of a node, and reads what it fed.
 
     The first topic that sends a valid message is taken. A foreign detector has no table of names: its names get
     numbers as they are met, and the table is published before anything is that needs it.
     """
 
-    def __init__(self, door: MatchingDoor, source: str) -> None:
+    def __init__(self, node: SynchronisedNode, source: str) -> None:
         topics = {topic: kind for topic, kind in SOURCES[source].items() if kind is not None}
         if not topics:
             raise ValueError(
                 f"detections: expected vision_msgs for {source!r}, got none; install ros-jazzy-vision-msgs, "
                 "or give masks or our own table"
             )
-        self._door, self._labels = door, LabelTable()
+        self._node, self._labels = node, LabelTable()
         self._out: Publisher | None = None
-        self._told: Mapping[int, str] = {}  # the table that was heard or published last: all that the next room knows
+        self._told: Mapping[
+            int, str
+        ] = {}  # the table that was received or published last: all that the next room knows
         self._names: dict[int, str] = {}  # of the numbers that a foreign detector tells
-        door.listen(String, "labels", self._hear_labels, qos.latched())
+        node.listen(String, "labels", self._on_labels, qos.latched())
         if LabelInfo is not None and topics.keys() - TABLE.keys():
-            door.listen(LabelInfo, "label_info", self._hear_names, qos.latched())
-        foreign = {topic: door.sensor() for topic in topics if topic not in TABLE}
-        door.listen_to_first("detections", topics, self._decode, self._hear, qos.room(), foreign)
+            node.listen(LabelInfo, "label_info", self._on_names, qos.latched())
+        foreign = {topic: node.sensor() for topic in topics if topic not in TABLE}
+        node.listen_to_first("detections", topics, self._decode, self._receive, qos.room(), foreign)
 
-    # Hear
+    # Receive
 
-    def _hear_labels(self, message: Any) -> None:
-        told = self._door.read_aside("labels", from_msg.labels, message)
+    def _on_labels(self, message: Any) -> None:
+        told = self._node.read_aside("labels", from_msg.labels, message)
         if told is not None:
             self._labels.adopt(told)
             self._told = told
-            self._door.feed("labels", 0, self._labels.names)
+            self._node.feed("labels", 0, self._labels.names)
 
-    def _hear_names(self, message: Any) -> None:
-        told = self._door.read_aside("label_info", vision_from_msg.label_info, message)
+    def _on_names(self, message: Any) -> None:
+        told = self._node.read_aside("label_info", vision_from_msg.label_info, message)
         if told is not None:
             self._names = told
 
@@ -77,11 +79,11 @@ class DetectionsIn:
             return isinstance(message, Detections | Surplus) or table(message)
         return self._foreign(message, (1, 1))
 
-    def _hear(self, topic: str, message: Any) -> None:
+    def _receive(self, topic: str, message: Any) -> None:
         if topic not in TABLE:
-            self._door.feed("labels", 0, self._labels.names)  # it needs no table, so nothing waits for one
+            self._node.feed("labels", 0, self._labels.names)  # it needs no table, so nothing waits for one
         surplus = isinstance(message, Surplus) or (topic in TABLE and _is_surplus(message))
-        self._door.feed("detections", from_msg.stamp_ns(message), Drop.SURPLUS if surplus else message)
+        self._node.feed("detections", from_msg.stamp_ns(message), Drop.SURPLUS if surplus else message)
 
     # Read
 
@@ -92,12 +94,12 @@ class DetectionsIn:
         message, lens = match["detections"], (camera_info, raw, cloud)
         if isinstance(message, Detections | PointCloud2):
             names = match["labels"]
-            seen = self._door.read("detections", from_msg.detections, message, names, depth.depth.shape)
-            return Asked(self._door.read("camera_info", lenses.detections, seen, *lens), names)
+            seen = self._node.read("detections", from_msg.detections, message, names, depth.depth.shape)
+            return Asked(self._node.read("camera_info", lenses.detections, seen, *lens), names)
         of_picture = match.payloads.get("image"), None if cloud is not None else camera_info
         size = vision_from_msg.picture_hw(*of_picture) or depth.depth.shape
-        seen = self._door.read("detections", self._foreign, message, size)
-        seen = self._door.read("camera_info", lenses.detections, seen, *lens)
+        seen = self._node.read("detections", self._foreign, message, size)
+        seen = self._node.read("camera_info", lenses.detections, seen, *lens)
         self._labels.include(seen.label)
         names = self._labels.names
         if names != self._told or self._out is None:  # the next room waits for a table, if of nothing
@@ -105,12 +107,12 @@ class DetectionsIn:
         return Asked(seen, names)
 
     def _foreign(self, message: Any, image_hw: tuple[int, int]) -> Detections:
-        return vision_from_msg.detections(message, self._names, image_hw, self._door.most_pixels)
+        return vision_from_msg.detections(message, self._names, image_hw, self._node.most_pixels)
 
     def _tell(self, names: to_msg.Labels) -> None:
         """Publish the table of names, and wait until it is there: what is sent next needs it."""
         if self._out is None:
-            self._out = self._door.create_publisher(String, "labels", qos.latched())
+            self._out = self._node.create_publisher(String, "labels", qos.latched())
         self._told = names
         self._out.publish(to_msg.labels(names))
         self._out.wait_for_all_acked(Duration(seconds=HEARD_S))

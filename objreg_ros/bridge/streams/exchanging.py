@@ -2,7 +2,7 @@
 """How a registrar speaks to those of other robots: summaries to all, requests, and the keyframes that were asked for.
 
 The bytes are those of `objreg_ros/registrar/summary.py`, in a sensor_msgs/CompressedImage that is no picture. What one
-says all hear, and know by the name of its keyframe whom it is for.
+says all receive, and know by the name of its keyframe whom it is for.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from sensor_msgs.msg import CompressedImage
 from objreg_ros import limits
 from objreg_ros.bridge.messages import from_msg, to_msg
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.door import Door
+from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.bridge.streams.fair_queue import FairQueue
 from objreg_ros.bridge.streams.key import Key
 
@@ -34,13 +34,13 @@ LOOK_S = 0.1  # between two looks at what may be answered
 class Exchanges(Protocol):
     """What `registrar.exchange.Exchange` does."""
 
-    books: Counter[str]
+    counters: Counter[str]
 
     @property
     def waiting(self) -> int: ...
     def sender(self, packed: bytes) -> str: ...
     def awaits(self, packed: bytes) -> bool: ...
-    def hear(self, packed: bytes, now: float) -> bytes | None: ...
+    def receive(self, packed: bytes, now: float) -> bytes | None: ...
     def note(self, packed: bytes, now: float) -> None: ...
     def answer(self, now: float) -> bytes | None: ...
 
@@ -59,67 +59,72 @@ class Delivered(NamedTuple):
 
 
 class Exchanging:
-    """``exchange`` on the topics below ``namespace``. The books of ``door`` count keyframes, which ``take`` is given.
+    """``exchange`` on the topics below ``namespace``. ``node`` counts keyframes, which ``take`` is given.
 
     Summaries are compared, and requests answered, in a thread of their own: that waits for a search that is under way.
     """
 
     def __init__(
-        self, door: Door, namespace: str, exchange: Exchanges, take: Callable[[Delivered], None], key: Key | None = None
+        self,
+        node: NodeBase,
+        namespace: str,
+        exchange: Exchanges,
+        take: Callable[[Delivered], None],
+        key: Key | None = None,
     ) -> None:
-        self._door, self._exchange, self._take, self._key = door, exchange, take, key or Key()
+        self._node, self._exchange, self._take, self._key = node, exchange, take, key or Key()
         self._reader, self._answering = ThreadPoolExecutor(1, "exchange"), False
         self._unread = FairQueue[tuple[int, bytes]](MOST_UNREAD)
         self._summaries = self._both(f"{namespace}/summaries", self._read_later, qos.latched(qos.KEPT_SUMMARIES))
         self._requests = self._both(f"{namespace}/requests", self._note, qos.room(depth=100))
         self._keyframes = self._both(f"{namespace}/keyframes", self._deliver, qos.room(depth=qos.KEPT_KEYFRAMES))
-        door.create_timer(LOOK_S, self._answer_later, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        node.create_timer(LOOK_S, self._answer_later, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def _both(self, topic: str, hear: Callable[[int, bytes], None], profile: QoSProfile) -> Publisher:
-        full = self._door.resolve_topic_name(topic)
+    def _both(self, topic: str, receive: Callable[[int, bytes], None], profile: QoSProfile) -> Publisher:
+        full = self._node.resolve_topic_name(topic)
 
-        def heard(message: Any) -> None:
-            packed = self._door.read_aside(topic, lambda sent: _bytes_of(self._key.check(full, sent)), message)
+        def received(message: Any) -> None:
+            packed = self._node.read_aside(topic, lambda sent: _bytes_of(self._key.check(full, sent)), message)
             if packed is not None:
-                hear(from_msg.stamp_ns(message), packed)
+                receive(from_msg.stamp_ns(message), packed)
 
-        self._door.listen(CompressedImage, topic, heard, profile)
-        return self._door.create_publisher(CompressedImage, topic, profile)
+        self._node.listen(CompressedImage, topic, received, profile)
+        return self._node.create_publisher(CompressedImage, topic, profile)
 
     def tell(self, stamp_ns: int, summary: bytes | None) -> None:
         """Tell all others of a keyframe."""
         self._publish(self._summaries, stamp_ns, summary)
 
     def _read_later(self, stamp_ns: int, packed: bytes) -> None:
-        sender = self._door.read_aside("summaries", self._exchange.sender, packed)
+        sender = self._node.read_aside("summaries", self._exchange.sender, packed)
         if sender is not None and self._unread.put(sender, (stamp_ns, packed)):
-            self._reader.submit(self._door.read_aside, "summaries", self._read, self._unread)
+            self._reader.submit(self._node.read_aside, "summaries", self._read, self._unread)
 
     def _read(self, unread: FairQueue[tuple[int, bytes]]) -> None:
         stamp_ns, packed = unread.take()
-        self._publish(self._requests, stamp_ns, self._exchange.hear(packed, time.monotonic()))
+        self._publish(self._requests, stamp_ns, self._exchange.receive(packed, time.monotonic()))
 
     def _note(self, _: int, packed: bytes) -> None:
         self._exchange.note(packed, time.monotonic())
 
     def _deliver(self, stamp_ns: int, packed: bytes) -> None:
         """What others asked for goes no further, and keeps nothing waiting that was asked for here."""
-        if self._door.read_aside("keyframes", self._exchange.awaits, packed):
-            self._door.accept(stamp_ns)
-            if self._door.let_in(stamp_ns):
+        if self._node.read_aside("keyframes", self._exchange.awaits, packed):
+            self._node.accept(stamp_ns)
+            if self._node.let_in(stamp_ns):
                 self._take(Delivered(stamp_ns, packed))
 
     def _answer_later(self) -> None:
         if self._exchange.waiting and not self._answering:
             self._answering = True
-            self._reader.submit(self._door.read_aside, "requests", self._answer, time.monotonic())
+            self._reader.submit(self._node.read_aside, "requests", self._answer, time.monotonic())
 
     def _answer(self, now: float) -> None:
         self._answering = False
         self._publish(self._keyframes, 0, self._exchange.answer(now))
 
     def _publish(self, publisher: Publisher, stamp_ns: int, packed: bytes | None) -> None:
-        if packed is None or not self._door.context.ok():
+        if packed is None or not self._node.context.ok():
             return
         data = array("B")
         data.frombytes(packed)
@@ -127,8 +132,8 @@ class Exchanging:
         publisher.publish(self._key.sign(publisher.topic_name, message))
 
     def told(self) -> dict[str, object]:
-        """For diagnostics: what was said and heard."""
-        return {f"exchange: {what}": count for what, count in sorted(self._exchange.books.items())}
+        """For diagnostics: what was said and received."""
+        return {f"exchange: {what}": count for what, count in sorted(self._exchange.counters.items())}
 
     def close(self) -> None:
         """Compare no more."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a node hears frames: what the segmenter says of a moment, by the parts that it comes in, with odometry."""
+"""How a node receives frames: what the segmenter says of a moment, by the parts that it comes in, with odometry."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from std_msgs.msg import String
 
 from objreg_ros.bridge.camera.camera_stream import CameraStream
 from objreg_ros.bridge.camera.mount import Body, Mount, nameless_body
-from objreg_ros.bridge.camera.transforms import hear_frames, is_installed
+from objreg_ros.bridge.camera.transforms import is_installed, receive_frames
 from objreg_ros.bridge.camera.travel import Travel
 from objreg_ros.bridge.messages import from_msg
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.streams.matching import MatchingDoor
 from objreg_ros.bridge.streams.sync import Match, Need, Stream
+from objreg_ros.bridge.streams.synchronised_node import SynchronisedNode
 from objreg_ros.data import Array, Frame
 from objreg_ros.plausibility.finding import Finding
 
@@ -32,11 +32,11 @@ ODOMETRY = {"odom": Odometry, "odom/pose": PoseStamped, "odom/pose_with_covarian
 LOOK_S, SILENT_S = 1.0, 5.0  # between two looks at whether frames still come, and without any
 
 
-class FramesDoor(MatchingDoor):
-    """Its books count the messages of ``objects``; `frame_of` is for `compute`."""
+class FramesNode(SynchronisedNode):
+    """Its counters count the messages of ``objects``; `frame_of` is for `compute`."""
 
     def prepare(self) -> None:
-        """As any door; nothing is known of labels and odometry."""
+        """As any node; nothing is known of labels and odometry."""
         super().prepare()
         self._stream = CameraStream(Mount(None))
         self._names = dict[str, dict[int, str]]()  # by robot
@@ -49,18 +49,18 @@ class FramesDoor(MatchingDoor):
 
         Odometry is that of a topic, and that of /tf while no topic of it has a publisher.
         """
-        tree = hear_frames(self, then=self._hear_tf)
+        tree = receive_frames(self, then=self._on_tf)
         self._mount = Mount(told, tree, self.get_logger().info)
         self._stream = CameraStream(self._mount, self.get_logger().info)
         self._travel = Travel(tree)
         self._by_topic = False
         room: dict[str, type] = {"objects": PointCloud2}
-        if not self.hears_words:  # which hold these too
+        if not self.receives_values:  # which hold these too
             room |= {"view": PointCloud2, "view/camera_info": CameraInfo, "gravity": Vector3Stamped}
-        self.listen(String, "labels", self.hear_labels, qos.latched())
+        self.listen(String, "labels", self.receive_labels, qos.latched())
         self._listen_to_odometry()
         for topic, kind in room.items():
-            self.listen(kind, topic, self._hear(topic), qos.room(), watched=topic)
+            self.listen(kind, topic, self._receive(topic), qos.room(), watched=topic)
         self.expect("objects", "objects")
         exact = [Stream(topic) for topic in room]
         names = "odom", *(["joints"] if is_installed() else [])
@@ -71,14 +71,14 @@ class FramesDoor(MatchingDoor):
         for topic, kind in ODOMETRY.items():
             has_child = kind is Odometry
             body = nameless_body(self.resolve_topic_name(topic), has_child)
-            self.listen(kind, topic, partial(self._hear_odom, body=body), self.sensor(qos.ODOMETRY))
+            self.listen(kind, topic, partial(self._on_odom, body=body), self.sensor(qos.ODOMETRY))
 
     @property
-    def hears_words(self) -> bool:
+    def receives_values(self) -> bool:
         """Whether the segmenter is in this process and hands its words over."""
-        return self.indoors.offers(self.resolve_topic_name("objects"))
+        return self.bus.offers(self.resolve_topic_name("objects"))
 
-    def hear_labels(self, message: Any, robot: str = "") -> None:
+    def receive_labels(self, message: Any, robot: str = "") -> None:
         """Learn what numbers are called; robots may call one otherwise."""
         names = self.read_aside("labels", from_msg.labels, message)
         if names is not None:
@@ -89,14 +89,14 @@ class FramesDoor(MatchingDoor):
         """What numbers are called by a robot, or by the only one there is."""
         return self._names.get(robot) or self._names.get("", {})
 
-    def _hear_odom(self, message: Any, body: Body = Body.BASE) -> None:
+    def _on_odom(self, message: Any, body: Body = Body.BASE) -> None:
         odometry = self.read_aside("odom", from_msg.odometry, message)
         if odometry is not None:
             self._by_topic, self._mount.nameless = True, body
             self._stream.take_odometry(odometry)
             self.feed("odom", odometry.stamp_ns, odometry)
 
-    def _hear_tf(self, message: Any) -> None:
+    def _on_tf(self, message: Any) -> None:
         """Odometry of /tf, unless it comes by a topic; frames wait for the joints that carry the camera."""
         if not self._by_topic and not any(map(self._is_published, ODOMETRY)):
             for odometry in self._travel.of(message):
@@ -109,12 +109,12 @@ class FramesDoor(MatchingDoor):
     def _is_published(self, topic: str) -> bool:
         return self.count_publishers(self.resolve_topic_name(topic)) > 0
 
-    def _hear(self, topic: str) -> Callable[[Any], None]:
-        def hear(message: Any) -> None:
+    def _receive(self, topic: str) -> Callable[[Any], None]:
+        def receive(message: Any) -> None:
             self._travel.camera = from_msg.frame_id(message).lstrip("/")
             self.feed(topic, from_msg.stamp_ns(message), message)
 
-        return hear if topic == "objects" else lambda message: self.feed(topic, from_msg.stamp_ns(message), message)
+        return receive if topic == "objects" else lambda message: self.feed(topic, from_msg.stamp_ns(message), message)
 
     def frame_of(self, match: Match) -> tuple[Frame, Array | None]:
         """A frame, and where the camera sits on the body of its odometry; `DroppedError` if it breaks its contract."""
@@ -126,7 +126,7 @@ class FramesDoor(MatchingDoor):
             topics = ("objects", "view", "view/camera_info", "gravity", "labels")
             frame = self.read("frame", from_msg.frame, *(match[topic] for topic in topics))
         self._seen_s = time.monotonic()
-        with self.ledger.timed("check"):
+        with self.accounting.timed("check"):
             frame = self.read("frame", self._stream.place, frame, odom)
         for finding in self._stream.findings:
             self.throttled.remind(finding.anchor, finding.text)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a registrar hears keyframers elsewhere: those of each camera of each robot on a topic of their own."""
+"""How a registrar receives keyframers elsewhere: those of each camera of each robot on a topic of their own."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from std_msgs.msg import String
 from objreg_ros.bridge.messages import from_msg
 from objreg_ros.bridge.messages.keyframes_msg import SentKeyframe, read_keyframe
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.streams.frames_in import FramesDoor
+from objreg_ros.bridge.streams.frames_in import FramesNode
 from objreg_ros.bridge.streams.key import Key
 from objreg_ros.data import framed
 
@@ -37,7 +37,7 @@ class FromRobot(NamedTuple):
 
 
 class KeyframesIn:
-    """The books of ``door`` count keyframes; ``take`` is given each that may come in.
+    """The counters of ``node`` count keyframes; ``take`` is given each that may come in.
 
     ``prefixes`` has what stands before the topics of each robot, ``cameras`` the namespaces of each one's keyframers
     behind that; none where it has one, in its own. Two cameras of a robot are told apart by their frames: of two that
@@ -46,13 +46,13 @@ class KeyframesIn:
 
     def __init__(
         self,
-        door: FramesDoor,
+        node: FramesNode,
         prefixes: Mapping[str, str],
         cameras: Sequence[Sequence[str]],
         take: Callable[[FromRobot], None],
         key: Key | None = None,
     ) -> None:
-        self._door, self._take, self._key = door, take, key or Key()
+        self._node, self._take, self._key = node, take, key or Key()
         self._counts = Counter[tuple[str, str]]()  # by robot, and what became of its keyframes
         self._frames = dict[tuple[str, str], str]()  # of the camera of each robot and topic
         for (robot, prefix), names in zip(prefixes.items(), cameras, strict=True):
@@ -60,22 +60,22 @@ class KeyframesIn:
                 self._listen(robot, f"{prefix}{camera}")
 
     def _listen(self, robot: str, prefix: str) -> None:
-        """Hear the keyframer of this namespace, and what its detector's numbers are called."""
+        """Receive the keyframer of this namespace, and what its detector's numbers are called."""
         topic, kept = f"{prefix}keyframes", qos.latched(qos.KEPT_KEYFRAMES)
-        self._door.listen(String, f"{prefix}labels", partial(self._door.hear_labels, robot=robot), qos.latched())
-        self._door.listen(CompressedImage, topic, partial(self._hear, robot, topic), kept, watched=topic)
-        self._door.expect(topic, topic)
+        self._node.listen(String, f"{prefix}labels", partial(self._node.receive_labels, robot=robot), qos.latched())
+        self._node.listen(CompressedImage, topic, partial(self._receive, robot, topic), kept, watched=topic)
+        self._node.expect(topic, topic)
 
-    def _hear(self, robot: str, topic: str, message: Any) -> None:
-        full, stamp_ns = self._door.resolve_topic_name(topic), from_msg.stamp_ns(message)
-        sent = self._door.read_aside("keyframes", lambda one: read_keyframe(self._key.check(full, one)), message)
-        self._door.accept(stamp_ns)
+    def _receive(self, robot: str, topic: str, message: Any) -> None:
+        full, stamp_ns = self._node.resolve_topic_name(topic), from_msg.stamp_ns(message)
+        sent = self._node.read_aside("keyframes", lambda one: read_keyframe(self._key.check(full, one)), message)
+        self._node.accept(stamp_ns)
         if sent is None:
-            self._door.drop(stamp_ns, "malformed_keyframes")
+            self._node.drop(stamp_ns, "malformed_keyframes")
         elif (other := self._other(robot, topic, sent.frame_id)) is not None:
             expected = f"expected each camera of a robot with a frame of its own, got {sent.frame_id!r} on {topic}"
-            self._door.drop(stamp_ns, "same_camera", f"{expected} and on {other}; name their frames apart")
-        elif self._door.let_in(stamp_ns):
+            self._node.drop(stamp_ns, "same_camera", f"{expected} and on {other}; name their frames apart")
+        elif self._node.let_in(stamp_ns):
             self.count(robot, "received")
             self._take(FromRobot(robot, sent))
 

@@ -20,14 +20,14 @@ from std_msgs.msg import Header
 
 from objreg_ros.bridge.messages import from_msg, to_msg
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.streams.receipts import DEPTH, IMAGE, ORDER, Receipts
+from objreg_ros.bridge.streams.acknowledgements import DEPTH, IMAGE, ORDER, Acknowledgements
 
 QUEUE = 20  # messages of a topic that wait in DDS for a slow reader
 LATCHED = 100  # messages of a latched topic that are kept: a recording has those of all its publishers in one
 ASK_AGAIN_S = 2.0  # how often a play that waits looks whether the nodes are still there
 START_S = 300.0  # how long the start of a node may take
 PARTICIPANT = 12  # bytes
-INPUTS = {  # what a node hears of the nodes before it
+INPUTS = {  # what a node receives the nodes before it
     "segmenter": ("detections_table", "labels"),
     "registrar": ("objects", "view", "view/camera_info", "gravity", "labels"),
 }
@@ -65,10 +65,10 @@ class Player(Node):
             for topic, kind in topics.items()
         }
         self._ticks = self.create_publisher(Clock, "/clock", qos.room()) if clock else None
-        self._receipts: Receipts | None = None
+        self._acknowledgements: Acknowledgements | None = None
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self)
-        self._heard = self._asked = 0.0
+        self._received = self._asked = 0.0
         self.published: Counter[str] = Counter()
         self.lost: list[int] = []
 
@@ -78,7 +78,7 @@ class Player(Node):
     # Who listens
 
     def wait_for_listeners(self, topics: Iterable[str], seconds: float) -> list[str]:
-        """Wait until somebody subscribes to each of ``topics``; those that nobody heard of within ``seconds``."""
+        """Wait until somebody subscribes to each of ``topics``; those that nobody knew of within ``seconds``."""
         wanted = [self._publishers_of[topic] for topic in topics]
         deadline = time.monotonic() + seconds
         while any(p.get_subscription_count() == 0 for p in wanted) and time.monotonic() < deadline:
@@ -86,12 +86,12 @@ class Player(Node):
         self._wait_until(time.monotonic() + SETTLE_S)
         return [p.topic_name for p in wanted if p.get_subscription_count() == 0]
 
-    def listen_to_receipts(self, seconds: float) -> Receipts:
-        """Wait for the nodes that receipt frames; ValueError if there are none within ``seconds``.
+    def subscribe_to_acknowledgements(self, seconds: float) -> Acknowledgements:
+        """Wait for the nodes that acknowledgement frames; ValueError if there are none within ``seconds``.
 
         A node that is there is waited for until it listens to its inputs: its first start compiles for a while.
         """
-        self.create_subscription(Header, "finished", self._hear, qos.room(depth=1000))
+        self.create_subscription(Header, "finished", self._receive, qos.room(depth=1000))
         self._spin_until(lambda: set(ORDER) <= self._receipting(), seconds)
         nodes = self._receipting() & set(ORDER)
         if not nodes:
@@ -99,8 +99,8 @@ class Player(Node):
         if not self._spin_until(lambda: not self._deaf(nodes), START_S):
             raise ValueError(f"lossless: expected listening nodes, got none on {', '.join(self._deaf(nodes))}")
         self._wait_until(time.monotonic() + SETTLE_S)
-        self._receipts = Receipts(nodes)
-        return self._receipts
+        self._acknowledgements = Acknowledgements(nodes)
+        return self._acknowledgements
 
     def _spin_until(self, true: Callable[[], bool], seconds: float) -> bool:
         deadline = time.monotonic() + seconds
@@ -113,24 +113,24 @@ class Player(Node):
 
     def _deaf(self, nodes: Iterable[str]) -> list[str]:
         """What the nodes should listen to and do not yet."""
-        return [topic for node in nodes for topic in INPUTS.get(node, ()) if not self._is_heard(topic, node)]
+        return [topic for node in nodes for topic in INPUTS.get(node, ()) if not self._is_received(topic, node)]
 
-    def _is_heard(self, topic: str, node: str) -> bool:
+    def _is_received(self, topic: str, node: str) -> bool:
         return node in self._listeners(topic) or self._at_home(node, topic)
 
     def _at_home(self, node: str, topic: str) -> bool:
         """Whether a topic comes from the very process of a node, which hands it over without DDS."""
-        receipts = self.get_publishers_info_by_topic(self.resolve_topic_name("finished"))
-        mine = {_process(info) for info in receipts if info.node_name == node}
+        acknowledgements = self.get_publishers_info_by_topic(self.resolve_topic_name("finished"))
+        mine = {_process(info) for info in acknowledgements if info.node_name == node}
         return any(_process(info) in mine for info in self.get_publishers_info_by_topic(self.resolve_topic_name(topic)))
 
     def _listeners(self, topic: str) -> set[str]:
         return {info.node_name for info in self.get_subscriptions_info_by_topic(self.resolve_topic_name(topic))}
 
-    def _hear(self, receipt: Header) -> None:
-        self._heard = time.monotonic()
-        if self._receipts is not None:
-            self._receipts.hear(receipt.frame_id, from_msg.stamp_ns(receipt))
+    def _receive(self, acknowledgement: Header) -> None:
+        self._received = time.monotonic()
+        if self._acknowledgements is not None:
+            self._acknowledgements.receive(acknowledgement.frame_id, from_msg.stamp_ns(acknowledgement))
 
     # Play
 
@@ -148,47 +148,47 @@ class Player(Node):
     def play_lossless(self, items: Iterable[Item], patience: float, on_item: Callable[[Item], None]) -> None:
         """Publish items in order, a frame only when the graph has room for it; returns when all are through.
 
-        When no receipt comes for ``patience`` seconds, what is on its way goes to ``lost`` and the play goes on.
-        ValueError when a node has ended.
+        When no acknowledgement comes for ``patience`` seconds, what is on its way goes to ``lost`` and the play goes
+        on. ValueError when a node has ended.
         """
-        receipts = self._receipts
-        if receipts is None:
-            raise ValueError("expected listen_to_receipts before a lossless play")
+        acknowledgements = self._acknowledgements
+        if acknowledgements is None:
+            raise ValueError("expected subscribe_to_acknowledgements before a lossless play")
         newest_image_ns = 0
         for item in items:
             if item.kind:
-                self._wait_for_room(receipts, item.kind, patience)
-                receipts.send(item.kind, item.header_ns)
+                self._wait_for_room(acknowledgements, item.kind, patience)
+                acknowledgements.send(item.kind, item.header_ns)
             if item.kind == IMAGE:
                 newest_image_ns = item.header_ns
             self._publish(item)
             on_item(item)
-        self._wait_for_end(receipts, newest_image_ns, patience)
+        self._wait_for_end(acknowledgements, newest_image_ns, patience)
 
-    def _wait_for_room(self, receipts: Receipts, kind: str, patience: float) -> None:
-        self._heard = time.monotonic()
-        while receipts.waiting(kind) > sum(self._silence > seconds for seconds in SILENCE_S):
-            self._attend(receipts, patience)
+    def _wait_for_room(self, acknowledgements: Acknowledgements, kind: str, patience: float) -> None:
+        self._received = time.monotonic()
+        while acknowledgements.waiting(kind) > sum(self._silence > seconds for seconds in SILENCE_S):
+            self._attend(acknowledgements, patience)
 
-    def _wait_for_end(self, receipts: Receipts, newest_image_ns: int, patience: float) -> None:
-        self._heard = time.monotonic()
-        while waiting := receipts.waiting(IMAGE) + receipts.waiting(DEPTH):
-            alone = receipts.waiting(DEPTH, after_ns=newest_image_ns) == waiting
-            self._attend(receipts, min(patience, LAST_S) if alone else patience)
+    def _wait_for_end(self, acknowledgements: Acknowledgements, newest_image_ns: int, patience: float) -> None:
+        self._received = time.monotonic()
+        while waiting := acknowledgements.waiting(IMAGE) + acknowledgements.waiting(DEPTH):
+            alone = acknowledgements.waiting(DEPTH, after_ns=newest_image_ns) == waiting
+            self._attend(acknowledgements, min(patience, LAST_S) if alone else patience)
 
     @property
     def _silence(self) -> float:
-        """Seconds without a receipt."""
-        return time.monotonic() - self._heard
+        """Seconds without an acknowledgement."""
+        return time.monotonic() - self._received
 
-    def _attend(self, receipts: Receipts, patience: float) -> None:
-        """Let receipts come in; see what is lost, and whether the nodes are still there."""
+    def _attend(self, acknowledgements: Acknowledgements, patience: float) -> None:
+        """Let acknowledgements come in; see what is lost, and whether the nodes are still there."""
         self._executor.spin_once(timeout_sec=0.05)
         if self._silence > patience:
-            self.lost += receipts.give_up()
+            self.lost += acknowledgements.give_up()
         if time.monotonic() - self._asked > ASK_AGAIN_S:
             self._asked = time.monotonic()
-            self._require(receipts.nodes)
+            self._require(acknowledgements.nodes)
 
     def _require(self, nodes: Iterable[str]) -> None:
         ended = set(nodes) - self._receipting()
@@ -208,7 +208,7 @@ class Player(Node):
     def close(self) -> None:
         """End the node."""
         self.destroy_node()
-        self._executor.shutdown()  # last: the thread that heard a signal may still ring the bell that this takes down
+        self._executor.shutdown()  # last: the thread that received a signal may still ring the bell that this destroys
 
 
 def _process(info: TopicEndpointInfo) -> tuple[int, ...]:

@@ -16,7 +16,7 @@ from std_srvs.srv import Trigger
 
 from objreg_ros.bridge.messages import to_msg
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.door import Door
+from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.bridge.node.params import RelocalisedParams
 from objreg_ros.data import Array, Relocalised
 from objreg_ros.geometry import inverse, pose, rotation_from_vector, turned_about
@@ -40,7 +40,7 @@ class Whereabouts:
     After the answer has become unknown nobody who comes late gets the old one, and the next is published once again.
     """
 
-    def __init__(self, door: Door, ask: Callable[[], Answer]) -> None:
+    def __init__(self, door: NodeBase, ask: Callable[[], Answer]) -> None:
         self._door, self._ask, self._lock = door, ask, threading.RLock()
         self._params = door.settings.of(RelocalisedParams)
         self._T_body_camera: Array | None = None

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
-from objreg_ros.bridge.streams.course import Course
+from objreg_ros.bridge.streams.clock_monitor import ClockMonitor
 from objreg_ros.data import JUMP_NS
 
 
@@ -105,10 +105,10 @@ class Queue:
     received: int = 0
     matched: int = 0
     dropped: Counter[str] = field(default_factory=Counter)
-    course: Course[Any] = field(init=False)
+    course: ClockMonitor[Any] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.course = Course(lambda stamp_ns, payload: self._let_go(Item(stamp_ns, payload), Drop.ODD_STAMP))
+        self.course = ClockMonitor(lambda stamp_ns, payload: self._let_go(Item(stamp_ns, payload), Drop.ODD_STAMP))
 
     @property
     def crowded(self) -> bool:
@@ -156,7 +156,7 @@ class Queue:
         """Whether an item of the reference at a time would have this one for its match, and no other may."""
         return self.stream.need is Need.REQUIRED and self.nearest(stamp_ns) is item
 
-    def hear(self, item: Item) -> None:
+    def receive(self, item: Item) -> None:
         """Take an item in."""
         self.period_ns = None if self.last_ns is None else item.stamp_ns - self.last_ns
         self.last_ns = item.stamp_ns
@@ -204,7 +204,7 @@ class Synchroniser:
 
     A stream whose stamps go back by `JUMP_NS`, two of them, has jumped in time (a looped bag): what waits with a later
     stamp is dropped as ``time_jump``, in every stream, and matching starts afresh. One alone is an ``odd_stamp``.
-    ``on_drop`` hears of every item that met no match: the stream's name, the stamp and the reason.
+    ``on_drop`` receives every item that met no match: the stream's name, the stamp and the reason.
     """
 
     def __init__(
@@ -234,11 +234,11 @@ class Synchroniser:
         if queue.last_ns is not None and stamp_ns < queue.last_ns:
             self._forget_after(stamp_ns)
         queue.drop_after(stamp_ns)  # another stream's jump may have left what lies in the future of this one's
-        queue.hear(Item(stamp_ns, payload))
+        queue.receive(Item(stamp_ns, payload))
         return [*self._matches(), *self._make_room(queue)]
 
     def believe(self, passed_ns: int) -> list[Match]:
-        """The matches by what has leapt in time alone and is believed: see `Course.believe`."""
+        """The matches by what has leapt in time alone and is believed: see `ClockMonitor.believe`."""
         found = [(queue, item) for queue in self._partners_first for item in queue.course.believe(passed_ns)]
         return [match for queue, item in found for match in self._take(queue, *item)]
 

@@ -45,8 +45,8 @@ class Asked(NamedTuple):
 class Pending:
     """The keyframes that we asked for. What waits is pushed out by none but its own run; not for two threads."""
 
-    def __init__(self, books: Counter[str]) -> None:
-        self._books = books
+    def __init__(self, counters: Counter[str]) -> None:
+        self._counters = counters
         self._asked: dict[tuple[Moment, bytes], Asked] = {}  # by moment and objects, the oldest first
 
     def __contains__(self, name: object) -> bool:
@@ -60,7 +60,7 @@ class Pending:
             counts = Counter(moment[0].run for moment, _ in self._asked)
             fullest, most = counts.most_common(1)[0]
             if counts[asked.summary.name.run] + 1 >= most:
-                self._books["dropped: too many asked for"] += 1
+                self._counters["dropped: too many asked for"] += 1
                 return False
             self._drop(next(key for key in reversed(self._asked) if key[0][0].run == fullest))
         self._asked[asked.key] = asked
@@ -77,4 +77,4 @@ class Pending:
 
     def _drop(self, key: tuple[Moment, bytes]) -> None:
         del self._asked[key]
-        self._books["dropped: not answered"] += 1
+        self._counters["dropped: not answered"] += 1

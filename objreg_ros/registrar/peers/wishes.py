@@ -22,11 +22,11 @@ class _Wish(NamedTuple):
 class Wishes:
     """Keyframes that others asked for, by asker. Askers take turns, each with the most promising of its own.
 
-    ``books`` counts what is given up, by reason.
+    ``counters`` counts what is given up, by reason.
     """
 
-    def __init__(self, books: Counter[str]) -> None:
-        self._books = books
+    def __init__(self, counters: Counter[str]) -> None:
+        self._counters = counters
         self._queues = OrderedDict[str, dict[int, _Wish]]()  # the asker whose turn it is comes first
         self._answered = OrderedDict[tuple[str, int], float]()  # when, by who asked and the keyframe
 
@@ -37,7 +37,7 @@ class Wishes:
     def add(self, asker: str, number: int, votes: float, now: float) -> None:
         """One more request; repeated, it counts once. Of too many goes the least promising of who has most."""
         if asker and now - self._answered.get((asker, number), -np.inf) < AGAIN_S:
-            self._books["dropped: answered before"] += 1
+            self._counters["dropped: answered before"] += 1
             return
         queue = self._queues.setdefault(asker, {})
         queue[number] = _Wish(votes, queue[number].since if number in queue else now)
@@ -72,7 +72,7 @@ class Wishes:
 
     def _give_up(self, asker: str, number: int, why: str) -> None:
         self._forget(asker, number)
-        self._books[f"dropped: {why}"] += 1
+        self._counters[f"dropped: {why}"] += 1
 
     def _forget(self, asker: str, number: int) -> None:
         del self._queues[asker][number]

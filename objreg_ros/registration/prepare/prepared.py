@@ -23,7 +23,7 @@ from objreg_ros.registration.prepare.normals import view_normals
 from objreg_ros.registration.prepare.views import DETAIL_SIGMA_PX, Sight, halved, own_pixels, prepare_sight
 from objreg_ros.registration.prepare.voxels import thin
 from objreg_ros.registration.shapes.shape import Shape, prepare_shape
-from objreg_ros.registration.shapes.symmetry import tells_yaw
+from objreg_ros.registration.shapes.symmetry import shows_yaw
 from objreg_ros.sensor import session_gravity_sigma_deg
 
 FEATURE_VOXEL_M = 0.07  # distance of the points that carry an FPFH feature
@@ -160,7 +160,7 @@ def prepare(keyframe: Keyframe, params: RegistrarParams) -> Prepared:
             up_weight=keyframe.gravity_confidence,
             up_sigma_deg=session_gravity_sigma_deg(keyframe.gravity_confidence),
             groups=tuple(groups.of(label) for label in keyframe.labels),
-            yaw_known=AtNeed(len(objects), lambda i: tells_yaw(objects[i].cloud, up, shapes[i])),
+            yaw_known=AtNeed(len(objects), lambda i: shows_yaw(objects[i].cloud, up, shapes[i])),
             shapes=shapes,
             own=AtNeed(len(objects), lambda i: own_pixels(objects[i], sight)),
             together=AtNeed(1, lambda _: prepare_shape(keyframe, range(len(objects)), SCENE_POINTS, *drawn)),

@@ -19,7 +19,7 @@ TURNS = np.radians(np.arange(30, 360, 30))  # that an object is looked at under
 LEAST = 10  # points that tell anything
 
 
-def tells_yaw(cloud: ObjectCloud, up: Array | None, shape: Shape | None) -> bool:
+def shows_yaw(cloud: ObjectCloud, up: Array | None, shape: Shape | None) -> bool:
     """Whether the surface of an object or its outline tells how it is turned; False where up is unknown."""
     if up is None:
         return False

@@ -33,7 +33,7 @@ def export(path: str | Path, folder: str | Path, tell: Callable[[str], None] = l
     ``contexts/keyframe_<id>.ply`` what was around it, both in m in the frame of the session. Their points are doubles,
     since that frame may be UTM's, where a float steps by half a metre. ``map.json`` holds keyframes with their objects
     (``frames`` is how many showed one, ``density`` in points per square metre of it), the landmarks that those are of,
-    closures, and the ids of the keyframes that are ``damaged``: they are left out, and ``tell`` hears why.
+    closures, and the ids of the keyframes that are ``damaged``: they are left out, and ``tell`` receives why.
     StoreError (an OSError) if it is no store, OSError if there is anything in the folder already or it cannot be
     written: then nothing of the export stays.
     """

@@ -16,7 +16,7 @@ from objreg_ros.memory.store_file import StoreError
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.report.exports.ply import write_ply
 from objreg_ros.report.exports.voxel_cloud import VoxelCloud, require_voxel
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_summary import RunSummary
 from objreg_ros.whole_file import write_whole
 
 VOXEL_M = 0.02  # finer than what a depth camera errs by at 2 m
@@ -48,11 +48,11 @@ class MapFiles:
         files = {"--tum": self.tum, "--kitti": self.kitti, "--g2o": self.g2o, "--map": self.cloud}
         return {option: file for option, file in files.items() if file is not None}
 
-    def write(self, story: Story, store: Path, tell: Callable[[str], None] = lambda line: None) -> None:
+    def write(self, story: RunSummary, store: Path, tell: Callable[[str], None] = lambda line: None) -> None:
         """Write what is asked for; ``store`` is the registrar's, which is read for the cloud alone.
 
-        ``tell`` hears what was written and what was left out. ValueError for a run without a trajectory: it has no map.
-        OSError where a file cannot be written, StoreError (one of them) where the store cannot be read.
+        ``tell`` receives what was written and what was left out. ValueError for a run without a trajectory: it has no
+        map. OSError where a file cannot be written, StoreError (one of them) where the store cannot be read.
         """
         stamps, _, corrected = story.poses_before_and_after()
         if not stamps:
@@ -113,7 +113,7 @@ def _corrected(keyframe: Keyframe, poses: dict[int, tuple[Array, Array]]) -> Arr
     return T_map_camera if np.allclose(keyframe.T_odom_camera, T_session_camera, rtol=0.0, atol=SAME_POSE) else None
 
 
-def _why_no_map(story: Story) -> str:
+def _why_no_map(story: RunSummary) -> str:
     if story.by_tracking:
         return f"expected frames that were tracked, got none of {len(story.glimpses)}: there is no map"
     return (

@@ -12,7 +12,7 @@ import numpy as np
 from objreg_ros.data import Array, DepthImage, Intrinsics, LoopClosure
 from objreg_ros.geometry import back_project, rigid_fit
 from objreg_ros.report.run.pictures import Album
-from objreg_ros.report.run.story import Story, positions
+from objreg_ros.report.run.run_summary import RunSummary, positions
 
 WIDTH = 320  # px of a picture
 MOST_POINTS = 6000  # of a cloud
@@ -88,7 +88,7 @@ class RunScene:
                 yield _moment(image, image.rgb, way.stamps_ns[k], way.poses[k])
 
 
-def scene_of(story: Story, album: Album) -> RunScene:
+def scene_of(story: RunSummary, album: Album) -> RunScene:
     """The scene of a run; ValueError where neither odometry nor truth tells where the camera was."""
     ways = _ways(story)
     if not ways:
@@ -97,7 +97,7 @@ def scene_of(story: Story, album: Album) -> RunScene:
     return RunScene(story.name, ways, _edges(story, scene.main), scene.objects, album)
 
 
-def _ways(story: Story) -> dict[str, Way]:
+def _ways(story: RunSummary) -> dict[str, Way]:
     stamps, odometry, corrected = story.poses_before_and_after()
     if not story.has_way:
         return _true_way(story, [glimpse.stamp_ns for glimpse in story.glimpses] or story.truth.stamps_ns)
@@ -111,12 +111,12 @@ def _ways(story: Story) -> dict[str, Way]:
     return ways
 
 
-def _true_way(story: Story, stamps_ns: list[int]) -> dict[str, Way]:
+def _true_way(story: RunSummary, stamps_ns: list[int]) -> dict[str, Way]:
     known = {stamp: T for stamp in sorted(set(stamps_ns)) if (T := story.truth.at(stamp)) is not None}
     return {"true": Way(tuple(known), np.array(list(known.values())))} if known else {}
 
 
-def _edges(story: Story, way: Way) -> tuple[Edge, ...]:
+def _edges(story: RunSummary, way: Way) -> tuple[Edge, ...]:
     """The closures whose two moments are both on the way, at the nearest of its poses."""
     stamps, places = np.array(way.stamps_ns), way.positions
     pruned = set(map(id, story.pruned))
@@ -130,7 +130,7 @@ def _edges(story: Story, way: Way) -> tuple[Edge, ...]:
     return tuple(edges)
 
 
-def _words(story: Story, closure: LoopClosure) -> str:
+def _words(story: RunSummary, closure: LoopClosure) -> str:
     error = story.error(closure)
     off = "" if error is None else f": off by {error[0]:.1f}°, {error[1]:.1f} cm"
     return f"{', '.join(closure.labels)}{off}"

@@ -41,7 +41,7 @@ class SceneFiles:
             )
 
     def write(self, scene: RunScene, tell: Callable[[str], object] = lambda line: None) -> None:
-        """Write what is asked for; ``tell`` hears what. OSError where a file cannot be written."""
+        """Write what is asked for; ``tell`` receives what. OSError where a file cannot be written."""
         if self.rerun is not None:
             tell(f"  {self.rerun}: {_said(scene, write_rerun(self.rerun, scene))}; open it with: rerun {self.rerun}")
         if self.mcap is not None:

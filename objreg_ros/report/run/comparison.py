@@ -9,16 +9,16 @@ from typing import Any
 
 from objreg_ros.data import LoopClosure, Rejected
 from objreg_ros.registration.params import RegistrarParams
-from objreg_ros.report.run.chapter import View, judged, spaced
 from objreg_ros.report.run.pairs import Pair, pairs_of
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_summary import RunSummary
+from objreg_ros.report.run.sections import View, judged, spaced
 from objreg_ros.report.run.trajectory_error import root_mean_square
 
 DEFAULT = "default"
 KEYFRAME_NS = round(RegistrarParams().keyframe_seconds * 1e9)  # moments so near are of one keyframe
 
 
-def comparison(stories: Sequence[Story]) -> View:
+def comparison(stories: Sequence[RunSummary]) -> View:
     """The section of two runs or more; each after the first is held against the first."""
     names = names_of(stories)
     recordings = {story.summary.get("recording", "") for story in stories}
@@ -27,7 +27,7 @@ def comparison(stories: Sequence[Story]) -> View:
     return {"names": names, "table": _table(stories), "changes": changes, "same": same}
 
 
-def names_of(stories: Sequence[Story]) -> list[str]:
+def names_of(stories: Sequence[RunSummary]) -> list[str]:
     """A letter for each run, and what differs from the others: parameters, model, version, recording."""
     told = [_flat(story) for story in stories]
     keys = dict.fromkeys(key for made in told for key in made)
@@ -40,7 +40,7 @@ def names_of(stories: Sequence[Story]) -> list[str]:
     return names
 
 
-def _flat(story: Story) -> dict[str, Any]:
+def _flat(story: RunSummary) -> dict[str, Any]:
     """What a run was made with, by one name each; without what differs always."""
     about: Mapping[str, Any] = story.summary.get("about", {})
     model = about.get("model") or {}
@@ -56,7 +56,7 @@ def _flat(story: Story) -> dict[str, Any]:
     return {key: value for key, value in told.items() if value is not None}
 
 
-def _table(stories: Sequence[Story]) -> list[tuple[str, list[str]]]:
+def _table(stories: Sequence[RunSummary]) -> list[tuple[str, list[str]]]:
     """Rows of a measure and its value in each run."""
     rows = [
         ("frames", [_count(story, "frames") for story in stories]),
@@ -73,30 +73,30 @@ def _table(stories: Sequence[Story]) -> list[tuple[str, list[str]]]:
     return [*rows, *refused, *((f"{stage}, median", [_time(story, stage) for story in stories]) for stage in stages)]
 
 
-def _count(story: Story, key: str) -> str:
+def _count(story: RunSummary, key: str) -> str:
     return f"{story.summary[key]:,}" if key in story.summary else "–"
 
 
-def _false(story: Story) -> str:
+def _false(story: RunSummary) -> str:
     false, of = judged(story)
     return f"{false} of {of}" if of else "–"
 
 
-def _trajectory_error(story: Story, which: str) -> str:
+def _trajectory_error(story: RunSummary, which: str) -> str:
     errors = getattr(story.tracks(), which, None)
     return "–" if errors is None else f"{100 * root_mean_square(errors):.1f} cm"
 
 
-def _refused(story: Story, reason: str) -> str:
+def _refused(story: RunSummary, reason: str) -> str:
     return str(story.summary.get("rejected", {}).get(reason, 0))
 
 
-def _time(story: Story, stage: str) -> str:
+def _time(story: RunSummary, stage: str) -> str:
     ms = story.summary.get("stage_ms", {}).get(stage)
     return "–" if ms is None else f"{ms['p50']:.1f} ms"
 
 
-def _change(stories: Sequence[Story], k: int, names: Sequence[str]) -> View:
+def _change(stories: Sequence[RunSummary], k: int, names: Sequence[str]) -> View:
     """What a run gained and lost against the first."""
     before, after = stories[0], stories[k]
     kept = matched(before.closures, after.closures)
@@ -131,7 +131,7 @@ def _apart_ns(one: LoopClosure, other: LoopClosure | Rejected) -> int:
     return max(abs(one.from_ns - other.from_ns), abs(one.to_ns - other.to_ns))
 
 
-def _told(pair: Pair, run: int, other: Story) -> View:
+def _told(pair: Pair, run: int, other: RunSummary) -> View:
     """A closure that only one run has, and what became of it in the other."""
     error = "" if pair.error is None else f"{pair.error[0]:.1f}° and {pair.error[1]:.1f} cm"
     times = f"{pair.seconds[0]:.1f} s ↔ {pair.seconds[1]:.1f} s"
@@ -140,7 +140,7 @@ def _told(pair: Pair, run: int, other: Story) -> View:
             "instead": _instead(pair, other)}  # fmt: skip
 
 
-def _instead(pair: Pair, other: Story) -> str:
+def _instead(pair: Pair, other: RunSummary) -> str:
     """Why the other run refused the same moments; that it did not try them where it did not."""
     if not isinstance(pair.told, LoopClosure):
         return ""

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from objreg_ros.data import Array, LoopClosure
 from objreg_ros.report.drawing import Plot
-from objreg_ros.report.run.story import Story, Tracks
+from objreg_ros.report.run.run_summary import RunSummary, Tracks
 
 WIDE, HALF, NARROW = 1040, 510, 400  # px of a drawing across the page, across half of it, and on a telephone
 LANE = 18  # px of one row of the timeline
@@ -35,7 +35,7 @@ class Ground:
         return (xyz - self.middle) @ self.axes.T
 
 
-def way(story: Story, stamps_ns: Array, lines: Mapping[str, Array], width: int = WIDE) -> str:
+def way(story: RunSummary, stamps_ns: Array, lines: Mapping[str, Array], width: int = WIDE) -> str:
     """Ways (N, 3) by their CSS class from above, at stamps (N,), and the closures as links on the last of them."""
     ground = Ground(next(iter(lines.values())) if "true" in lines else list(lines.values())[-1])
     flat = {name: ground.flat(xyz) for name, xyz in lines.items()}
@@ -55,7 +55,7 @@ def way(story: Story, stamps_ns: Array, lines: Mapping[str, Array], width: int =
     return plot.svg("the way of the camera from above: " + ", ".join(lines))
 
 
-def error_over_time(story: Story, tracks: Tracks, width: int = WIDE) -> str:
+def error_over_time(story: RunSummary, tracks: Tracks, width: int = WIDE) -> str:
     """The distance from the truth, before and after."""
     if tracks.odometry_error is None or tracks.corrected_error is None:
         return ""
@@ -73,7 +73,7 @@ def error_over_time(story: Story, tracks: Tracks, width: int = WIDE) -> str:
     return plot.svg("the distance from the truth over time, before and after")
 
 
-def timeline(story: Story, width: int = WIDE) -> str:
+def timeline(story: RunSummary, width: int = WIDE) -> str:
     """Rows over time: detections by label, closures as bows, refusals by reason; without what is `out_of_time`."""
     names = [label for label, _ in Counter(label for g in story.glimpses for label in g.labels).most_common()]
     labels, rare = names[:MOST_LABELS], names[MOST_LABELS:]
@@ -98,7 +98,7 @@ def timeline(story: Story, width: int = WIDE) -> str:
     return plot.svg("detections, closures and refusals over time")
 
 
-def object_map(story: Story, corrected: bool, width: int = HALF) -> str:
+def object_map(story: RunSummary, corrected: bool, width: int = HALF) -> str:
     """Every sighting of an object from above, before or in the corrected map, and the camera's way."""
     seen = story.objects()
     places = [row[2] for row in seen]
@@ -151,7 +151,7 @@ def apart(names: Sequence[tuple[str, tuple[float, float]]]) -> list[tuple[str, t
     return placed
 
 
-def verdict(story: Story, closure: LoopClosure) -> str:
+def verdict(story: RunSummary, closure: LoopClosure) -> str:
     """The CSS class of a closure."""
     return "false" if story.is_false(closure) else "accepted"
 
@@ -161,7 +161,7 @@ def ends(closure: LoopClosure, stamps_ns: Array, way: Array) -> Array:
     return np.array([way[np.abs(stamps_ns - stamp).argmin()] for stamp in (closure.from_ns, closure.to_ns)])
 
 
-def closure_words(story: Story, closure: LoopClosure) -> str:
+def closure_words(story: RunSummary, closure: LoopClosure) -> str:
     """A closure in one line."""
     times = f"{story.seconds(closure.from_ns):.1f} s ↔ {story.seconds(closure.to_ns):.1f} s"
     error = story.error(closure)
@@ -170,13 +170,13 @@ def closure_words(story: Story, closure: LoopClosure) -> str:
     return ", ".join([times, *closure.labels, *moved, *truth])
 
 
-def _moments(story: Story) -> list[int]:
+def _moments(story: RunSummary) -> list[int]:
     moments = [glimpse.stamp_ns for glimpse in story.glimpses]
     moments += [c.to_ns for c in story.closures] + [r.to_ns for r in story.refusals]
     return [moment for moment in moments if story.in_time(moment)]
 
 
-def _draw_detections(plot: Plot, story: Story, level: dict[str, float]) -> None:
+def _draw_detections(plot: Plot, story: RunSummary, level: dict[str, float]) -> None:
     """A bar for every stretch of frames in which a label was detected."""
     glimpses = [glimpse for glimpse in story.glimpses if story.in_time(glimpse.stamp_ns)]
     stamps = [glimpse.stamp_ns for glimpse in glimpses]
@@ -188,7 +188,7 @@ def _draw_detections(plot: Plot, story: Story, level: dict[str, float]) -> None:
             plot.bar(times[0], times[1], -row, "seen", f"{label}, {times[0]:.1f} to {times[1]:.1f} s")
 
 
-def _draw_closures(plot: Plot, story: Story, row: float) -> None:
+def _draw_closures(plot: Plot, story: RunSummary, row: float) -> None:
     closures = [(k, closure) for k, closure in enumerate(story.closures) if story.in_time(closure.to_ns)]
     longest = max((abs(c.to_ns - c.from_ns) for _, c in closures if story.in_time(c.from_ns)), default=1)
     for k, closure in closures:

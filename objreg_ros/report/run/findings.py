@@ -64,8 +64,8 @@ class Counts:
         """The counts of a run's JSON; what the live graph's does not tell is counted from its frames."""
         nodes, glimpses = summary.get("nodes", {}), summary.get("glimpses", ())
         dropped = Counter(summary.get("dropped", {}))
-        for books in nodes.values():
-            dropped.update(books.get("dropped", {}))
+        for counters in nodes.values():
+            dropped.update(counters.get("dropped", {}))
         through = nodes["segmenter"]["published"] if "segmenter" in nodes else len(glimpses)
         untried = {reason.value for reason in UNTRIED}
         return cls(
@@ -229,9 +229,9 @@ def _simulated_model(counts: Counts, summary: Mapping[str, Any]) -> Finding | No
 
 def _overtaken(summary: Mapping[str, Any]) -> Finding | None:
     late = {
-        room: f"{books['dropped'][OVERTAKEN]} of {books['received']}"
-        for room, books in summary.get("nodes", {}).items()
-        if books.get("dropped", {}).get(OVERTAKEN, 0) > MANY * books.get("received", 0)
+        room: f"{counters['dropped'][OVERTAKEN]} of {counters['received']}"
+        for room, counters in summary.get("nodes", {}).items()
+        if counters.get("dropped", {}).get(OVERTAKEN, 0) > MANY * counters.get("received", 0)
     }
     if not late:
         return None

@@ -11,7 +11,7 @@ import numpy as np
 
 from objreg_ros.data import UNTRIED, LoopClosure, Rejected
 from objreg_ros.geometry import rotation_angle
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_summary import RunSummary
 from objreg_ros.truth import Error
 
 ACCEPTED = "accepted"
@@ -23,7 +23,7 @@ class Pair:
 
     key: str
     told: LoopClosure | Rejected
-    story: Story
+    story: RunSummary
 
     @property
     def verdict(self) -> str:
@@ -80,7 +80,7 @@ class Pair:
         return f"{apart}{off}."
 
 
-def pairs_of(story: Story) -> list[Pair]:
+def pairs_of(story: RunSummary) -> list[Pair]:
     """All constraints (keys c0, c1, …) and then all refusals (r0, r1, …) of a run, in the order of its JSON."""
     told: Iterable[tuple[str, LoopClosure | Rejected]] = (
         *((f"c{k}", closure) for k, closure in enumerate(story.closures)),

@@ -17,8 +17,8 @@ from objreg_ros.geometry import back_project, transform
 from objreg_ros.recording.inputs import Inputs
 from objreg_ros.recording.mounts import first_readable, frame_of, frame_tree
 from objreg_ros.recording.record import Recording
-from objreg_ros.report.run.shelf import SLOP_NS, Cameras, Shelf
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.messages_by_stamp import SLOP_NS, Cameras, MessagesByStamp
+from objreg_ros.report.run.run_summary import RunSummary
 from objreg_ros.segmenter.sensor.organise import organise
 
 WIDTH = 320  # px of one picture
@@ -36,7 +36,7 @@ class Album:
         source = inputs.depth or inputs.points
         self._is_cloud = inputs.depth is None
         image = None if self._is_cloud else inputs.image  # a cloud has its colour in it
-        self._source, self._image = (Shelf(recording, topic) if topic else None for topic in (source, image))
+        self._source, self._image = (MessagesByStamp(recording, topic) if topic else None for topic in (source, image))
         self._cameras, self._of_colour = (Cameras(recording, t) for t in (inputs.camera_info, inputs.colour_info))
         self._raw = lenses.raw_pictures(rectified, source, inputs.image)
         self._named = colour_frame.named_registered(inputs.depth, inputs.image)
@@ -120,14 +120,14 @@ def overlay(target: DepthImage, source: DepthImage, T_target_source: Array) -> A
     return np.dstack([np.where(mask, seen, faint), np.where(mask, ground, faint), np.where(mask, seen, faint)])
 
 
-def chosen_closures(story: Story, most: int = 6) -> list[LoopClosure]:
+def chosen_closures(story: RunSummary, most: int = 6) -> list[LoopClosure]:
     """The false ones first, then right ones spread over the run."""
     false = [closure for closure in story.closures if story.is_false(closure)]
     right = [closure for closure in story.closures if not story.is_false(closure)]
     return [*false, *_spread(right, most - len(false))][:most]
 
 
-def chosen_refusals(story: Story, most: int = 6) -> list[Rejected]:
+def chosen_refusals(story: RunSummary, most: int = 6) -> list[Rejected]:
     """Refusals of something that was tried, as many kinds as there are."""
     tried = [refusal for refusal in story.refusals if refusal.reason not in UNTRIED]
     by_reason = [[r for r in tried if r.reason is reason] for reason in dict.fromkeys(r.reason for r in tried)]
@@ -149,7 +149,7 @@ def picture_uri(rgb: Array, quality: int = QUALITY) -> str:
     return "data:image/jpeg;base64," + base64.b64encode(jpeg.tobytes()).decode("ascii")
 
 
-def _nothing_near(shelf: Shelf, what: str) -> str:
+def _nothing_near(shelf: MessagesByStamp, what: str) -> str:
     passed = f", and {shelf.unreadable} messages of it cannot be read" if shelf.unreadable else ""
     return f"nothing on {shelf.topic} is within {SLOP_NS * 1e-6:.0f} ms of {what}{passed}"
 

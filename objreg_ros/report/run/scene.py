@@ -13,7 +13,7 @@ from objreg_ros.data import UNNAMED, Array
 from objreg_ros.geometry import pose, transform
 from objreg_ros.report.packed import packed
 from objreg_ros.report.run import figures
-from objreg_ros.report.run.story import Story, Tracks
+from objreg_ros.report.run.run_summary import RunSummary, Tracks
 
 MOST_POSES = 5000  # of one way
 MOST_SIGHTINGS = 20_000  # of all objects
@@ -22,7 +22,7 @@ NAMES = {"true": "truth", "tracked": "our own tracking"}
 APART_M = 0.4  # names nearer than this would cover each other
 
 
-def scene(story: Story, stamps_ns: Array, lines: Mapping[str, Array], tracks: Tracks | None) -> dict[str, Any]:
+def scene(story: RunSummary, stamps_ns: Array, lines: Mapping[str, Array], tracks: Tracks | None) -> dict[str, Any]:
     """Ways (N, 3) by name, the closures on the last of them, and objects of the map: packed points, z is up."""
     T_level_drawn = _levelling(story, stamps_ns, tracks)
     flat = {name: transform(T_level_drawn, xyz) for name, xyz in lines.items()}
@@ -40,7 +40,7 @@ def scene(story: Story, stamps_ns: Array, lines: Mapping[str, Array], tracks: Tr
     }
 
 
-def _levelling(story: Story, stamps_ns: Array, tracks: Tracks | None) -> Array:
+def _levelling(story: RunSummary, stamps_ns: Array, tracks: Tracks | None) -> Array:
     """The rotation (4, 4) that turns the frame of the drawing until z is up, by some of the poses."""
     stamps_ns = stamps_ns[:: len(stamps_ns) // 100 or 1]
     if tracks is None:
@@ -71,7 +71,7 @@ def levelling(poses: Array) -> Array:
     return pose(np.array([right, np.cross(up, right), up]), np.zeros(3))
 
 
-def _closures(story: Story, stamps_ns: Array, way: Array) -> list[dict[str, Any]]:
+def _closures(story: RunSummary, stamps_ns: Array, way: Array) -> list[dict[str, Any]]:
     """The closures by verdict and by whether the mapper pruned them, with the key and the words of each."""
     pruned = {id(closure) for closure in story.pruned}
     groups: dict[tuple[str, bool], list[int]] = {}

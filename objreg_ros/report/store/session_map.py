@@ -10,7 +10,7 @@ import numpy as np
 
 from objreg_ros.data import Array
 from objreg_ros.memory.sighting import Sighting
-from objreg_ros.report.store.store_survey import Survey
+from objreg_ros.report.store.store_summary import StoreSummary
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,13 +43,13 @@ class SessionMap:
         return np.array([*self.way, *(place.xy for place in self.places), *ends])
 
 
-def session_maps(found: Survey) -> list[SessionMap]:
+def session_maps(found: StoreSummary) -> list[SessionMap]:
     """All sessions that saw an object, the oldest first."""
     labels = {landmark.landmark: landmark.label for landmark in found.landmarks}
     return [_mapped(found, session, rows, labels) for session, rows in found.by_session.items()]
 
 
-def _mapped(found: Survey, session: int, rows: Sequence[Sighting], labels: dict[int, str]) -> SessionMap:
+def _mapped(found: StoreSummary, session: int, rows: Sequence[Sighting], labels: dict[int, str]) -> SessionMap:
     way = np.array([row.camera for row in rows])
     spread = np.ptp(np.concatenate([way, [row.position for row in rows]]), axis=0)
     plane = sorted(np.argsort(spread, kind="stable")[1:].tolist())

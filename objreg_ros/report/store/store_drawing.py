@@ -13,7 +13,7 @@ from objreg_ros.memory.landmarks import Landmark
 from objreg_ros.report.drawing import ticks
 from objreg_ros.report.store.portraits import TILE
 from objreg_ros.report.store.session_map import Place, SessionMap, session_maps
-from objreg_ros.report.store.store_survey import Survey
+from objreg_ros.report.store.store_summary import StoreSummary
 
 PANEL = 640  # px of a session
 LEAST_PANEL = 320  # where there are many
@@ -30,7 +30,7 @@ FONT, SMALL, PLAIN = cv2.FONT_HERSHEY_SIMPLEX, 0.4, 0.45
 Colour = tuple[int, int, int]
 
 
-def draw(found: Survey, pictures: Mapping[int, Array]) -> Array:
+def draw(found: StoreSummary, pictures: Mapping[int, Array]) -> Array:
     """A picture (H, W, 3) uint8 RGB of a store: every session from above, in m, then a contact sheet of its objects.
 
     ``pictures`` are the portraits by landmark; a landmark without one is not on the sheet. Dots are landmarks, as large

@@ -14,14 +14,14 @@ from objreg_ros.report.drawing import Plot
 from objreg_ros.report.page import environment
 from objreg_ros.report.run.pictures import picture_uri
 from objreg_ros.report.store.session_map import SessionMap, session_maps
-from objreg_ros.report.store.store_survey import Survey, told_moves
+from objreg_ros.report.store.store_summary import StoreSummary, told_moves
 
 SERIES = 7  # colours of the page before grey
 WIDTHS = {"wide": 540, "narrow": 380}  # px
 SIDES = {"wide": (300, 480), "narrow": (240, 380)}  # px, the least and the greatest height
 
 
-def store_page(found: Survey, pictures: Mapping[int, Array]) -> str:
+def store_page(found: StoreSummary, pictures: Mapping[int, Array]) -> str:
     """The HTML of a store; ``pictures`` are the portraits by landmark, and a landmark may lack one."""
     styles = {label: f"series-{min(k, SERIES)}" for k, label in enumerate(found.labels)}
     maps = session_maps(found)
@@ -53,7 +53,7 @@ def _drawn(one: SessionMap, styles: Mapping[str, str], width: str) -> str:
     return plot.svg(f"session {one.session} from above")
 
 
-def _object(found: Survey, mark: Landmark, pictures: Mapping[int, Array]) -> dict[str, Any]:
+def _object(found: StoreSummary, mark: Landmark, pictures: Mapping[int, Array]) -> dict[str, Any]:
     rows = found.by_landmark[mark.landmark]
     return {
         "landmark": mark.landmark,

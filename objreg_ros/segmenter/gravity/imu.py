@@ -26,7 +26,7 @@ class Imu(AttitudeFilter):
         self._T_camera_imu, self._find = T_camera_imu, find
 
     def in_camera(self, felt: FeltGravity, camera_frame: str) -> FeltGravity | None:
-        """A direction of `hear` in the axes of the camera; counted as ``unknown_frame``, and None, where none is told.
+        """A direction of `receive` in the axes of the camera; None, counted as ``unknown_frame``, where it has none.
 
         The deviation is the same.
         """

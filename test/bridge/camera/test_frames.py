@@ -13,8 +13,8 @@ from objreg_ros.bridge.camera.frames import FrameTree, Tie, is_world
 
 def test_two_frames_of_one_tree_are_tied_up_and_down() -> None:
     frames = FrameTree()
-    frames.hear(said(transform("base", "camera", moved(1)), transform("camera", "camera_optical", moved(2))))
-    frames.hear(said(transform("/base", "/imu", moved(3))))
+    frames.receive(said(transform("base", "camera", moved(1)), transform("camera", "camera_optical", moved(2))))
+    frames.receive(said(transform("/base", "/imu", moved(3))))
     expected = np.linalg.inv(moved(1) @ moved(2)) @ moved(3)
     T = frames.between("camera_optical", "imu")
     assert T is not None and pytest.approx(expected, abs=1e-9) == T
@@ -24,16 +24,16 @@ def test_two_frames_of_one_tree_are_tied_up_and_down() -> None:
 
 def test_frames_that_nothing_ties_are_not_guessed() -> None:
     frames = FrameTree()
-    frames.hear(said(transform("base", "camera", moved(1)), transform("map", "imu", moved(2))))
+    frames.receive(said(transform("base", "camera", moved(1)), transform("map", "imu", moved(2))))
     assert frames.between("camera", "imu") is None and frames.between("nowhere", "camera") is None
 
 
 def test_the_last_word_on_a_frame_counts_and_a_ring_is_no_end() -> None:
     ring = FrameTree()
-    ring.hear(said(transform("a", "b", moved(1)), transform("b", "a", moved(2))))
+    ring.receive(said(transform("a", "b", moved(1)), transform("b", "a", moved(2))))
     assert ring.between("c", "a") is None and ring.between("a", "b") is not None
     frames = FrameTree()
-    frames.hear(said(transform("a", "b", moved(1)), transform("a", "b", moved(3))))
+    frames.receive(said(transform("a", "b", moved(1)), transform("a", "b", moved(3))))
     assert frames.between("a", "b") == pytest.approx(moved(3), abs=1e-9)
 
 
@@ -46,7 +46,7 @@ def test_a_transform_that_is_none_is_refused(wrong: str) -> None:
         one.transform.translation.x = float("nan")
     frames = FrameTree()
     with pytest.raises(ValueError, match="expected"):
-        frames.hear(said(one))
+        frames.receive(said(one))
     assert frames.between("a", "b") is None
 
 
@@ -54,7 +54,7 @@ def test_a_transform_that_is_none_is_refused(wrong: str) -> None:
 def test_a_name_that_is_too_long_is_refused(names: tuple[str, str]) -> None:
     frames = FrameTree()
     with pytest.raises(ValueError, match="tf: expected at most 1000 characters, got 1001"):
-        frames.hear(said(transform(*names, moved(1))))
+        frames.receive(said(transform(*names, moved(1))))
     assert frames.between(*names) is None
 
 
@@ -88,7 +88,7 @@ def test_what_tf_repeats_is_as_good_as_static_at_any_moment() -> None:
 
 def test_what_tf_static_says_stays_whatever_tf_says_of_the_same_frames() -> None:
     tree = panning(0.0, 10.0)
-    tree.hear_moving(said(transform("head", "eye", moved(5), SECOND)))
+    tree.receive_moving(said(transform("head", "eye", moved(5), SECOND)))
     assert tree.tie("head", "eye") is Tie.STATIC and tree.between("head", "eye") == pytest.approx(moved(1), abs=1e-9)
 
 
@@ -99,14 +99,16 @@ def test_two_bodies_in_one_world_do_not_sit_on_each_other(world: str) -> None:
     tree = FrameTree()
     tree.follow("eye", "base")
     for k in range(3):
-        tree.hear_moving(said(transform(world, "base", moved(k), k * SECOND), transform(world, "eye", moved(9 + k), k)))
+        tree.receive_moving(
+            said(transform(world, "base", moved(k), k * SECOND), transform(world, "eye", moved(9 + k), k))
+        )
     assert is_world(world) and tree.between("base", "eye", SECOND) is None and tree.tie("base", "eye") is None
     assert tree.between(world, "eye", 0) is not None
 
 
 def test_a_frame_that_is_named_as_the_odometrys_carries_nothing_either() -> None:
     tree = FrameTree()
-    tree.hear(said(transform("start", "base", moved(1)), transform("start", "eye", moved(2))))
+    tree.receive(said(transform("start", "base", moved(1)), transform("start", "eye", moved(2))))
     assert tree.between("base", "eye") is not None
     assert tree.between("base", "eye", None, "start") is None and tree.tie("base", "eye", "start") is None
 
@@ -118,9 +120,9 @@ def test_parts_of_a_robot_are_no_worlds(name: str) -> None:
 
 def test_time_that_jumps_back_begins_a_history_anew_and_a_late_sample_is_left_out() -> None:
     tree = panning(0.0, 10.0, start_ns=100 * SECOND)
-    tree.hear_moving(said(transform("base", "head", turned(80.0), 100 * SECOND + 1)))
+    tree.receive_moving(said(transform("base", "head", turned(80.0), 100 * SECOND + 1)))
     assert tree.between("base", "eye", 100 * SECOND + 1) == pytest.approx(turned(0.0) @ moved(1), abs=1e-3)
-    tree.hear_moving(said(transform("base", "head", turned(40.0), 5 * SECOND)))
+    tree.receive_moving(said(transform("base", "head", turned(40.0), 5 * SECOND)))
     assert tree.between("base", "eye", 5 * SECOND) == pytest.approx(turned(40.0) @ moved(1), abs=1e-9)
     assert tree.between("base", "eye", 100 * SECOND) is None
 
@@ -139,20 +141,20 @@ def test_of_frames_that_nobody_asked_for_no_history_is_kept_and_their_number_is_
 ) -> None:
     tree = panning(0.0, 10.0)
     for k in range(5):
-        tree.hear_moving(said(transform("base", "wheel", turned(k), k * SECOND)))
+        tree.receive_moving(said(transform("base", "wheel", turned(k), k * SECOND)))
     ((edge,),) = tree.above("wheel")
     assert len(edge.stamps_ns) == 1
     monkeypatch.setattr(module, "MOST_FRAMES", 4)
-    tree.hear_moving(said(transform("base", "arm", moved(1))))
+    tree.receive_moving(said(transform("base", "arm", moved(1))))
     with pytest.raises(ValueError, match="expected at most 4 frames"):
-        tree.hear_moving(said(transform("base", "leg", moved(1))))
+        tree.receive_moving(said(transform("base", "leg", moved(1))))
 
 
 def test_one_transform_that_is_none_leaves_the_others_of_its_message() -> None:
     tree, wrong = FrameTree(), transform("a", "b", moved(1))
     wrong.transform.translation.x = float("nan")
     with pytest.raises(ValueError, match="expected b within"):
-        tree.hear_moving(said(wrong, transform("a", "c", moved(2))))
+        tree.receive_moving(said(wrong, transform("a", "c", moved(2))))
     assert tree.between("a", "b") is None and tree.between("a", "c") is not None
 
 
@@ -160,7 +162,7 @@ def test_a_ring_on_tf_is_no_end() -> None:
     tree = FrameTree()
     tree.follow("a")
     for k in range(3):
-        tree.hear_moving(
+        tree.receive_moving(
             said(transform("a", "b", moved(k), k), transform("b", "c", moved(k)), transform("c", "a", moved(k)))
         )
     assert tree.between("x", "a", 0) is None and len(tree.above("a")) == 3

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.bridge.camera import transforms
-from objreg_ros.bridge.camera.transforms import hear_frames, hear_mount
+from objreg_ros.bridge.camera.transforms import receive_frames, receive_mount
 from objreg_ros.data import Odometry
 
 
@@ -16,11 +16,11 @@ class Listener:
     """Stands in for a node, and remembers to what it listens and what it says."""
 
     def __init__(self) -> None:
-        self.heard: dict[str, Any] = {}
+        self.received: dict[str, Any] = {}
         self.said: list[str] = []
 
-    def listen(self, kind: Any, topic: str, heard: Any, profile: Any) -> None:
-        self.heard[topic] = heard
+    def listen(self, kind: Any, topic: str, received: Any, profile: Any) -> None:
+        self.received[topic] = received
 
     def get_logger(self) -> Any:
         return SimpleNamespace(info=self.said.append)
@@ -41,8 +41,8 @@ def test_where_the_type_is_installed_tf_static_is_heard_and_says_where_the_camer
 ) -> None:
     monkeypatch.setattr(transforms, "TFMessage", object)
     node: Any = Listener()
-    mount = hear_mount(node, None)
-    node.heard["/tf_static"](eye_on_base())
+    mount = receive_mount(node, None)
+    node.received["/tf_static"](eye_on_base())
     T = mount.T_body_camera(ODOMETRY, "eye")
     assert T is not None and T[:3, 3].tolist() == [0.1, 0.0, 0.4] and "at 0.100 0.000 0.400 m" in node.said[0]
 
@@ -51,10 +51,10 @@ def test_where_the_type_is_missing_or_a_parameter_tells_nothing_is_heard(monkeyp
     monkeypatch.setattr(transforms, "TFMessage", object)
     node: Any = Listener()
     told = np.eye(4)
-    assert hear_mount(node, told).T_body_camera(ODOMETRY, "eye") is told
+    assert receive_mount(node, told).T_body_camera(ODOMETRY, "eye") is told
     monkeypatch.setattr(transforms, "TFMessage", None)
-    assert hear_frames(node).between("base", "eye") is None
-    assert node.heard == {} and node.said == []
+    assert receive_frames(node).between("base", "eye") is None
+    assert node.received == {} and node.said == []
 
 
 def test_the_real_message_fits(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -63,7 +63,7 @@ def test_the_real_message_fits(monkeypatch: pytest.MonkeyPatch) -> None:
     one = stamped(child_frame_id="eye")
     one.header.frame_id, one.transform.translation.x = "base", 0.5
     node: Any = Listener()
-    frames = hear_frames(node)
-    node.heard["/tf_static"](kinds.TFMessage(transforms=[one]))
+    frames = receive_frames(node)
+    node.received["/tf_static"](kinds.TFMessage(transforms=[one]))
     T = frames.between("base", "eye")
     assert T is not None and T[0, 3] == 0.5

@@ -11,12 +11,12 @@ from objreg_ros.geometry import pose
 
 def test_the_odometry_of_tf_comes_at_its_own_stamps_once_the_camera_is_known() -> None:
     tree = FrameTree()
-    tree.hear(said(transform("base", "eye", moved(1))))
+    tree.receive(said(transform("base", "eye", moved(1))))
     travel, samples = Travel(tree), []
     for k in range(4):
         T = pose(np.eye(3), np.array([0.3 * k, 0.0, 0.0]))
         message = said(transform("odom", "base", T, (k + 1) * SECOND), transform("base", "wheel", moved(k), k * SECOND))
-        tree.hear_moving(message)
+        tree.receive_moving(message)
         samples += list(travel.of(message))
         travel.camera = "eye" if k == 1 else travel.camera
     assert [(s.stamp_ns // SECOND, s.frame_id, s.child_frame_id) for s in samples] == [

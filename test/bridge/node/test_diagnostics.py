@@ -5,8 +5,8 @@ import numpy as np
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 
+from objreg_ros.bridge.node.accounting import Balance
 from objreg_ros.bridge.node.diagnostics import balance_of, diagnostic, refusal_of, refusals
-from objreg_ros.bridge.node.ledger import Balance
 from objreg_ros.data import Reason, Rejected
 
 BOOKS = Balance(

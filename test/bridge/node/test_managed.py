@@ -11,22 +11,22 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from std_msgs.msg import String
 
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.door import Door
-from objreg_ros.bridge.node.indoors import Indoors
-from objreg_ros.bridge.node.params import DoorParams, ManagedParams
+from objreg_ros.bridge.node.intra_process import IntraProcessBus
+from objreg_ros.bridge.node.node_base import NodeBase
+from objreg_ros.bridge.node.params import ManagedParams, NodeBaseParams
 
 DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
 
-class Shop(Door):
+class Shop(NodeBase):
     """Opens unless it is told otherwise, and notes what becomes of it."""
 
     trouble: Exception | None = None
     at_the_end: Exception | None = None
 
-    def __init__(self, indoors: Indoors | None = None) -> None:
+    def __init__(self, bus: IntraProcessBus | None = None) -> None:
         self.notes: list[str] = []
-        super().__init__("shop", ManagedParams, indoors=indoors)
+        super().__init__("shop", ManagedParams, bus=bus)
 
     def open(self) -> None:
         self.listen(String, "bell", self.notes.append, qos.room())
@@ -90,7 +90,7 @@ def test_it_opens_when_it_is_configured_and_lets_frames_in_while_it_is_active(sh
             change()
         shop.accept(stamp_ns)
         assert shop.let_in(stamp_ns) == (shop.state == "active")
-    balance = shop.ledger.balance()
+    balance = shop.accounting.balance()
     assert balance.dropped == {"inactive": 2} and balance.waiting == 2
 
 
@@ -101,7 +101,7 @@ def test_what_was_opened_is_taken_down_as_often_as_it_is_cleaned_up_and_the_book
         shop.accept(5)
         assert shop.trigger_cleanup() == DONE
         after = [thing for thing, _ in shop._entities()]
-        assert all(a is b for a, b in zip(after, before, strict=True)) and shop.ledger.balance().received == 0
+        assert all(a is b for a, b in zip(after, before, strict=True)) and shop.accounting.balance().received == 0
     assert shop.notes == ["opened", "shut"] * 3 and shop.state == "unconfigured"
 
 
@@ -149,10 +149,10 @@ def test_parameters_that_are_not_live_hold_from_the_next_time_that_it_is_configu
     )
     assert put("managed", False) != "" and "adopted" not in shop.notes
     assert shop.trigger_cleanup() == DONE and put("max_megapixels", 3.0) == ""
-    assert shop.settings.of(DoorParams).most_pixels == 3_000_000
+    assert shop.settings.of(NodeBaseParams).most_pixels == 3_000_000
 
 
 def test_nodes_of_one_process_cannot_be_managed(made: Callable[..., Shop]) -> None:
     made("managed:=true", "autostart:=false")
     with pytest.raises(ValueError, match="managed: expected false where all nodes are in one process"):
-        Shop(Indoors())
+        Shop(IntraProcessBus())

@@ -10,58 +10,58 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.door import Door
+from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.bridge.node.overridable import FIXED
 
-Made = Callable[..., Door]
+Made = Callable[..., NodeBase]
 
 
 @pytest.fixture
 def made() -> Iterator[Made]:
-    doors: list[Door] = []
+    nodes: list[NodeBase] = []
 
-    def make(*arguments: str) -> Door:
+    def make(*arguments: str) -> NodeBase:
         rclpy.init(args=["--ros-args", *(word for given in arguments for word in given.split(" ", 1))])
-        doors.append(Door("door"))
-        return doors[-1]
+        nodes.append(NodeBase("node"))
+        return nodes[-1]
 
     yield make
-    for door in doors:
-        door.close()
+    for node in nodes:
+        node.close()
     rclpy.try_shutdown()
 
 
-def heard_with(door: Door, topic: str) -> QoSProfile:
+def heard_with(node: NodeBase, topic: str) -> QoSProfile:
     """The QoS with which a topic is listened to, as every other node sees it."""
-    (info,) = door.get_subscriptions_info_by_topic(topic)
+    (info,) = node.get_subscriptions_info_by_topic(topic)
     return info.qos_profile
 
 
-def sent_with(door: Door, topic: str) -> QoSProfile:
-    (info,) = door.get_publishers_info_by_topic(topic)
+def sent_with(node: NodeBase, topic: str) -> QoSProfile:
+    (info,) = node.get_publishers_info_by_topic(topic)
     return info.qos_profile
 
 
 def test_a_subscription_is_as_reliable_as_its_override_says(made: Made) -> None:
-    door = made("-p qos_overrides./image.subscription.reliability:=reliable")
-    door.listen(String, "image", print, qos.sensor(False))
-    assert heard_with(door, "/image").reliability == qos.room().reliability
+    node = made("-p qos_overrides./image.subscription.reliability:=reliable")
+    node.listen(String, "image", print, qos.sensor(False))
+    assert heard_with(node, "/image").reliability == qos.room().reliability
 
 
 def test_a_publisher_is_as_reliable_as_its_override_says(made: Made) -> None:
-    door = made("-p qos_overrides./word.publisher.reliability:=best_effort")
-    door.create_publisher(String, "word", qos.room())
-    assert sent_with(door, "/word").reliability == qos.sensor(False).reliability
+    node = made("-p qos_overrides./word.publisher.reliability:=best_effort")
+    node.create_publisher(String, "word", qos.room())
+    assert sent_with(node, "/word").reliability == qos.sensor(False).reliability
 
 
 def test_without_an_override_a_topic_is_as_it_was_asked_for_and_its_parameters_say_so(made: Made) -> None:
-    door = made()
-    door.listen(String, "image", print, qos.sensor(False, depth=7))
-    assert heard_with(door, "/image").reliability == qos.sensor(False).reliability
+    node = made()
+    node.listen(String, "image", print, qos.sensor(False, depth=7))
+    assert heard_with(node, "/image").reliability == qos.sensor(False).reliability
     start = "qos_overrides./image.subscription."
-    found = {name: door.get_parameter(start + name).value for name in ("history", "depth", "reliability")}
+    found = {name: node.get_parameter(start + name).value for name in ("history", "depth", "reliability")}
     assert found == {"history": "keep_last", "depth": 7, "reliability": "best_effort"}
-    assert door.describe_parameter(f"{start}depth").read_only
+    assert node.describe_parameter(f"{start}depth").read_only
 
 
 def test_an_override_is_of_the_full_name_after_remapping_in_a_file_too(made: Made, tmp_path: Path) -> None:
@@ -70,38 +70,38 @@ def test_an_override_is_of_the_full_name_after_remapping_in_a_file_too(made: Mad
         "/**:\n  ros__parameters:\n    qos_overrides:\n      /robot/eye:\n"
         "        subscription: {reliability: reliable, depth: 3}\n"
     )
-    door = made(f"--params-file {file}", "-r __ns:=/robot", "-r image:=eye")
-    door.listen(String, "image", print, qos.sensor(False))
-    assert heard_with(door, "/robot/eye").reliability == qos.room().reliability
-    assert door.get_parameter("qos_overrides./robot/eye.subscription.depth").value == 3
+    node = made(f"--params-file {file}", "-r __ns:=/robot", "-r image:=eye")
+    node.listen(String, "image", print, qos.sensor(False))
+    assert heard_with(node, "/robot/eye").reliability == qos.room().reliability
+    assert node.get_parameter("qos_overrides./robot/eye.subscription.depth").value == 3
 
 
 def test_of_topics_that_are_opened_together_an_override_changes_one(made: Made) -> None:
-    door = made("-p qos_overrides./image.subscription.reliability:=reliable")
+    node = made("-p qos_overrides./image.subscription.reliability:=reliable")
     profile = qos.sensor(False)
-    door.listen_to_first("image", {"image": String, "image/compressed": String}, print, print, profile)
-    assert heard_with(door, "/image").reliability == qos.room().reliability
-    assert heard_with(door, "/image/compressed").reliability == qos.sensor(False).reliability
+    node.listen_to_first("image", {"image": String, "image/compressed": String}, print, print, profile)
+    assert heard_with(node, "/image").reliability == qos.room().reliability
+    assert heard_with(node, "/image/compressed").reliability == qos.sensor(False).reliability
     assert profile == qos.sensor(False)
 
 
 def test_a_topic_that_is_opened_again_has_the_same_override(made: Made) -> None:
-    door = made("-p qos_overrides./image.subscription.reliability:=reliable")
+    node = made("-p qos_overrides./image.subscription.reliability:=reliable")
     for _ in range(2):
-        door.listen_to_first("image", {"image": String}, print, print, qos.sensor(False))
-        assert heard_with(door, "/image").reliability == qos.room().reliability
-        door.hang_up("image")
+        node.listen_to_first("image", {"image": String}, print, print, qos.sensor(False))
+        assert heard_with(node, "/image").reliability == qos.room().reliability
+        node.hang_up("image")
 
 
 def test_a_second_subscription_with_a_qos_of_its_own_is_left_as_it_is(made: Made) -> None:
-    door = made("-p qos_overrides./word.subscription.reliability:=best_effort")
-    door.create_subscription(String, "word", print, qos.latched(), qos_overriding_options=FIXED)
-    assert heard_with(door, "/word").reliability == qos.latched().reliability
+    node = made("-p qos_overrides./word.subscription.reliability:=best_effort")
+    node.create_subscription(String, "word", print, qos.latched(), qos_overriding_options=FIXED)
+    assert heard_with(node, "/word").reliability == qos.latched().reliability
 
 
 def test_the_clock_may_be_overridden_as_in_rclcpp(made: Made) -> None:
-    door = made("-p use_sim_time:=true", "-p qos_overrides./clock.subscription.reliability:=reliable")
-    assert heard_with(door, "/clock").reliability == qos.room().reliability
+    node = made("-p use_sim_time:=true", "-p qos_overrides./clock.subscription.reliability:=reliable")
+    assert heard_with(node, "/clock").reliability == qos.room().reliability
 
 
 @pytest.mark.parametrize(
@@ -116,15 +116,15 @@ def test_the_clock_may_be_overridden_as_in_rclcpp(made: Made) -> None:
     ],
 )
 def test_an_override_that_is_no_qos_is_refused_in_one_line(made: Made, override: str, got: str) -> None:
-    door = made(f"-p qos_overrides./image.subscription.{override}")
+    node = made(f"-p qos_overrides./image.subscription.{override}")
     with pytest.raises(ValueError, match="qos_overrides of image") as refused:
-        door.listen(String, "image", print, qos.sensor(False))
+        node.listen(String, "image", print, qos.sensor(False))
     assert got in str(refused.value) and "\n" not in str(refused.value)
 
 
 def test_once_ros_is_shut_down_a_publisher_has_no_reader_and_publishes_nothing(made: Made) -> None:
-    door = made()
-    sent = door.create_publisher(String, "words", qos.room())
+    node = made()
+    sent = node.create_publisher(String, "words", qos.room())
     sent.publish(String(data="before"))
     rclpy.shutdown()
     sent.publish(String(data="after"))

@@ -10,7 +10,7 @@ import rclpy
 from rcl_interfaces.msg import ParameterType
 from rclpy.parameter import Parameter
 
-from objreg_ros.bridge.node.door import Door
+from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.params import Params, param
 
 
@@ -29,27 +29,27 @@ class PotParams(Params):
     on: bool = param(True, "whether")
 
 
-Made = Callable[..., Door]
+Made = Callable[..., NodeBase]
 
 
 @pytest.fixture
 def made() -> Iterator[Made]:
-    context_args: list[Door] = []
+    context_args: list[NodeBase] = []
 
-    def make(*overrides: str) -> Door:
+    def make(*overrides: str) -> NodeBase:
         arguments = [word for override in overrides for word in ("-p", override)]
         rclpy.init(args=["--ros-args", *arguments] if arguments else [])
-        context_args.append(Door("pot", PotParams))
+        context_args.append(NodeBase("pot", PotParams))
         return context_args[-1]
 
     yield make
-    for door in context_args:
-        door.close()
+    for node in context_args:
+        node.close()
     rclpy.try_shutdown()
 
 
-def set_one(door: Door, name: str, value: object, kind: Parameter.Type | None = None) -> str:
-    result = door.set_parameters_atomically([Parameter(name, kind, value)])
+def set_one(node: NodeBase, name: str, value: object, kind: Parameter.Type | None = None) -> str:
+    result = node.set_parameters_atomically([Parameter(name, kind, value)])
     return "" if result.successful else result.reason
 
 
@@ -58,11 +58,11 @@ def test_what_is_declared_are_the_defaults(made: Made) -> None:
 
 
 def test_a_description_a_range_and_read_only_reach_ros(made: Made) -> None:
-    door = made()
-    threshold, count = door.describe_parameters(["threshold", "count"])
+    node = made()
+    threshold, count = node.describe_parameters(["threshold", "count"])
     assert threshold.description == "least score [1]" and not threshold.read_only and count.read_only
     assert threshold.floating_point_range[0].to_value == 1.0 and count.integer_range[0].from_value == 1
-    assert door.describe_parameter("method").additional_constraints == "fast | paper"
+    assert node.describe_parameter("method").additional_constraints == "fast | paper"
 
 
 def test_an_empty_list_keeps_its_declared_type(made: Made) -> None:
@@ -72,15 +72,15 @@ def test_an_empty_list_keeps_its_declared_type(made: Made) -> None:
 
 
 def test_a_list_can_be_emptied_at_the_start(made: Made) -> None:
-    door = made("fruits:=[]", "names:=[]")
-    assert (door.settings.of(PotParams).fruits, door.settings.of(PotParams).names) == ((), ())
-    assert door.describe_parameter("fruits").type == ParameterType.PARAMETER_STRING_ARRAY
+    node = made("fruits:=[]", "names:=[]")
+    assert (node.settings.of(PotParams).fruits, node.settings.of(PotParams).names) == ((), ())
+    assert node.describe_parameter("fruits").type == ParameterType.PARAMETER_STRING_ARRAY
 
 
 def test_start_values_are_taken_and_a_float_accepts_1(made: Made) -> None:
-    door = made("threshold:=1", "names:=[cup, tv]", "offsets:=[1, 2]")
-    assert door.settings.of(PotParams) == PotParams(threshold=1.0, names=("cup", "tv"), offsets=(1.0, 2.0))
-    assert door.get_parameter("threshold").type_ is Parameter.Type.DOUBLE
+    node = made("threshold:=1", "names:=[cup, tv]", "offsets:=[1, 2]")
+    assert node.settings.of(PotParams) == PotParams(threshold=1.0, names=("cup", "tv"), offsets=(1.0, 2.0))
+    assert node.get_parameter("threshold").type_ is Parameter.Type.DOUBLE
 
 
 @pytest.mark.parametrize(
@@ -108,22 +108,22 @@ def test_a_start_value_that_nobody_asked_for_is_warned_of(made: Made, capfd: pyt
 
 
 def test_a_live_change_is_taken_and_told(made: Made) -> None:
-    door, told = made(), []
-    door.settings.changed = lambda: told.append(door.settings.of(PotParams))
-    assert set_one(door, "threshold", 1) == "" and set_one(door, "offsets", [], Parameter.Type.DOUBLE_ARRAY) == ""
-    assert told[0].threshold == 1.0 and door.get_parameter("threshold").value == 1.0
+    node, told = made(), []
+    node.settings.changed = lambda: told.append(node.settings.of(PotParams))
+    assert set_one(node, "threshold", 1) == "" and set_one(node, "offsets", [], Parameter.Type.DOUBLE_ARRAY) == ""
+    assert told[0].threshold == 1.0 and node.get_parameter("threshold").value == 1.0
 
 
 @pytest.mark.parametrize(("name", "value"), [("threshold", 7.0), ("threshold", "x"), ("method", "slow"), ("names", 3)])
 def test_a_live_change_is_refused_in_the_words_of_params(made: Made, name: str, value: object) -> None:
-    door = made()
+    node = made()
     with pytest.raises(ValueError) as expected:
         PotParams().replaced(**{name: value})
-    assert set_one(door, name, value) == str(expected.value)
-    assert door.settings.of(PotParams) == PotParams()
+    assert set_one(node, name, value) == str(expected.value)
+    assert node.settings.of(PotParams) == PotParams()
 
 
 def test_a_read_only_parameter_stays(made: Made) -> None:
-    door = made()
-    assert "read-only" in set_one(door, "count", 4)
-    assert door.settings.of(PotParams).count == 3
+    node = made()
+    assert "read-only" in set_one(node, "count", 4)
+    assert node.settings.of(PotParams).count == 3

@@ -10,16 +10,16 @@ import rclpy
 from std_msgs.msg import String
 
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.door import Door
+from objreg_ros.bridge.node.node_base import NodeBase
 
 HOSTILE = "cup\x1b[2J\x00\u202e\n[ERROR] [1.0] [registrar]: all is lost"
 SHOWN = r"cup\x1b[2J\x00\u202e"
 
 
 @pytest.fixture
-def door() -> Iterator[Door]:
+def node() -> Iterator[NodeBase]:
     rclpy.init(args=[])
-    made = Door("door")
+    made = NodeBase("node")
     yield made
     made.close()
     rclpy.try_shutdown()
@@ -35,30 +35,32 @@ def require_plain(said: str) -> None:
 
 
 @pytest.mark.parametrize("severity", ["info", "warning", "warn", "error", "fatal"])
-def test_every_severity_is_logged_as_plain_text(severity: str, door: Door, capfd: pytest.CaptureFixture[str]) -> None:
+def test_every_severity_is_logged_as_plain_text(
+    severity: str, node: NodeBase, capfd: pytest.CaptureFixture[str]
+) -> None:
     for text in (HOSTILE, ValueError(HOSTILE)):
-        getattr(door.get_logger(), severity)(text)
+        getattr(node.get_logger(), severity)(text)
     said = "".join(capfd.readouterr())
     require_plain(said)
     assert said.count(SHOWN) == 2 and said.count("all is lost") == 2
 
 
-def test_severities_may_come_in_turn(door: Door, capfd: pytest.CaptureFixture[str]) -> None:
+def test_severities_may_come_in_turn(node: NodeBase, capfd: pytest.CaptureFixture[str]) -> None:
     for _ in range(2):
-        door.get_logger().info("one")
-        door.get_logger().warning("two")
-        door.get_logger().error("three")
+        node.get_logger().info("one")
+        node.get_logger().warning("two")
+        node.get_logger().error("three")
     assert "".join(capfd.readouterr()).count("\n") == 6
 
 
-def test_what_a_peer_sends_is_logged_as_plain_text(door: Door, capfd: pytest.CaptureFixture[str]) -> None:
+def test_what_a_peer_sends_is_logged_as_plain_text(node: NodeBase, capfd: pytest.CaptureFixture[str]) -> None:
     peer = rclpy.create_node("peer")
     publisher = peer.create_publisher(String, "labels", qos.room())
-    door.listen(String, "labels", refuse, qos.room())
+    node.listen(String, "labels", refuse, qos.room())
     sent = HOSTILE.replace("\x00", "")  # which DDS would end the text at
     for _ in range(200):
         publisher.publish(String(data=sent))
-        rclpy.spin_once(door, timeout_sec=0.05)
+        rclpy.spin_once(node, timeout_sec=0.05)
         said = "".join(capfd.readouterr())
         if "labels ignored" in said:
             break

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Who hears whom, by the rules of DDS."""
+"""Who receives whom, by the rules of DDS."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rclpy.qos import (
 from objreg_ros.bridge.node import qos
 
 
-def heard(publisher: QoSProfile, subscriber: QoSProfile) -> bool:
+def received(publisher: QoSProfile, subscriber: QoSProfile) -> bool:
     """Whether they match; that they leave their liveliness to the system is a warning and no more."""
     return qos_check_compatible(publisher, subscriber)[0] != QoSCompatibility.ERROR
 
@@ -25,8 +25,8 @@ def heard(publisher: QoSProfile, subscriber: QoSProfile) -> bool:
 def test_best_effort_hears_every_camera_and_reliable_only_reliable_ones() -> None:
     best_effort, reliable = qos.sensor(reliable=False), qos.sensor(reliable=True)
     for camera in (qos_profile_sensor_data, qos.room()):
-        assert heard(camera, best_effort)
-    assert heard(qos.room(), reliable) and not heard(qos_profile_sensor_data, reliable)
+        assert received(camera, best_effort)
+    assert received(qos.room(), reliable) and not received(qos_profile_sensor_data, reliable)
     assert (best_effort.reliability, reliable.reliability) == (
         ReliabilityPolicy.BEST_EFFORT, ReliabilityPolicy.RELIABLE,
     )  # fmt: skip
@@ -40,7 +40,7 @@ def test_a_camera_may_be_ten_messages_ahead(reliable: bool) -> None:
 
 def test_rooms_lose_nothing_to_each_other_and_keep_nothing_for_those_who_come_late() -> None:
     profile = qos.room()
-    assert heard(profile, profile) and not heard(profile, qos.latched())
+    assert received(profile, profile) and not received(profile, qos.latched())
     assert profile.reliability == ReliabilityPolicy.RELIABLE and profile.durability != DurabilityPolicy.TRANSIENT_LOCAL
     assert profile.depth == 20
 
@@ -51,7 +51,7 @@ def test_as_many_messages_are_kept_as_asked_for(made: QoSProfile, depth: int) ->
 
 
 def test_what_is_latched_reaches_those_who_come_late_and_those_who_do_not_care() -> None:
-    assert heard(qos.latched(), qos.latched()) and heard(qos.latched(), qos.room())
+    assert received(qos.latched(), qos.latched()) and received(qos.latched(), qos.room())
     assert qos.latched().durability == DurabilityPolicy.TRANSIENT_LOCAL
     assert qos.latched().reliability == ReliabilityPolicy.RELIABLE
 

@@ -19,7 +19,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
-from objreg_ros.bridge.node.door import Door
+from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.bridge.node.spin import run
 
 
@@ -36,7 +36,7 @@ def on_its_own(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     rclpy.try_shutdown()
 
 
-class Short(Door):
+class Short(NodeBase):
     """A node that soon meets its end, and remembers that it was closed."""
 
     made: Short | None = None
@@ -65,7 +65,7 @@ def test_a_node_that_is_told_to_end_is_closed_with_status_0() -> None:
     class Terminated(Short):
         def end(self) -> None:
             os.kill(os.getpid(), signal.SIGTERM)
-            while rclpy.ok():  # it is heard in another thread
+            while rclpy.ok():  # it is received in another thread
                 time.sleep(0.001)
 
     assert run(Terminated, []) == 0 and ended_well()
@@ -75,7 +75,7 @@ def test_a_node_that_is_told_to_end_is_closed_with_status_0() -> None:
 def test_a_signal_while_a_node_is_made_ends_it_at_once_with_status_0(number: signal.Signals) -> None:
     went_on = []
 
-    def make() -> Door:
+    def make() -> NodeBase:
         os.kill(os.getpid(), number)
         deadline = time.monotonic() + 10.0
         while time.monotonic() < deadline:
@@ -112,7 +112,7 @@ def test_a_signal_while_kernels_compile_ends_the_process_at_once_with_status_0(n
 
 
 def test_what_ros_says_of_a_node_that_a_signal_caught_half_made_is_no_bug() -> None:
-    def make() -> Door:
+    def make() -> NodeBase:
         rclpy.shutdown()
         return Short()
 
@@ -238,10 +238,10 @@ def test_what_a_node_hears_leaves_nothing_behind() -> None:
 def test_the_arguments_reach_ros() -> None:
     names: list[str] = []
 
-    def make() -> Door:
-        door = Short()
-        names.append(door.get_fully_qualified_name())
-        return door
+    def make() -> NodeBase:
+        node = Short()
+        names.append(node.get_fully_qualified_name())
+        return node
 
     run(make, ["--ros-args", "-r", "__ns:=/robot", "-r", "__node:=cell"])
     assert names == ["/robot/cell"]

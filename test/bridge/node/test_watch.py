@@ -24,7 +24,7 @@ def test_an_input_that_speaks_in_time_is_not_reported() -> None:
     watch, clock = watched({})
     clock.now = 4.9
     assert watch.silent() == {}
-    watch.hear("depth")
+    watch.receive("depth")
     clock.now = 9.8
     assert watch.silent() == {}
 
@@ -45,7 +45,7 @@ def test_a_silent_input_with_a_publisher_is_told_to_look_at_its_qos() -> None:
 
 def test_an_input_that_is_not_watched_may_speak() -> None:
     watch, clock = watched({})
-    watch.hear("odom")
+    watch.receive("odom")
     clock.now = 7.0
     assert set(watch.silent()) == {"depth"}
 

@@ -40,7 +40,7 @@ def topics(node: Node) -> set[str]:
     return {name.rpartition("/")[2] for name, _ in told} & (COMMON | WHOLE)
 
 
-def heard(node: Node, kind: type, topic: str, profile: Any) -> list[Any]:
+def received(node: Node, kind: type, topic: str, profile: Any) -> list[Any]:
     """Collects the messages of a topic."""
     messages: list[Any] = []
     node.create_subscription(kind, topic, messages.append, profile)
@@ -69,10 +69,10 @@ def test_with_objreg_msgs_all_that_is_known_is_told_under_the_name_of_the_namesp
         pytest.skip("objreg_msgs is not installed: colcon builds it from this repository")
     telling = Announcements(node)
     assert topics(node) == COMMON | WHOLE
-    refusals = heard(node, closures_msg.Refusal, "closure_refusals", qos.room())
-    landmarks = heard(node, closures_msg.ObjectLandmarks, "object_landmarks", qos.room())
+    refusals = received(node, closures_msg.Refusal, "closure_refusals", qos.room())
+    landmarks = received(node, closures_msg.ObjectLandmarks, "object_landmarks", qos.room())
     telling.closures([CLOSURE])
-    closures = heard(node, closures_msg.LoopClosureMsg, "loop_closures", qos.latched())  # it comes late
+    closures = received(node, closures_msg.LoopClosureMsg, "loop_closures", qos.latched())  # it comes late
     deadline = time.monotonic() + 20.0
     while node.count_subscribers("closure_refusals") == 0 and time.monotonic() < deadline:
         time.sleep(0.05)

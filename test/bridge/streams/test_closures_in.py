@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Closures are heard once each, whatever topics they come on."""
+"""Closures are received once each, whatever topics they come on."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ CLOSURE = LoopClosure(from_ns=5, to_ns=9, T_from_to=np.eye(4), covariance=np.eye
 
 
 class Hearer:
-    """Stands in for a door, keeps what it is told, and is given messages by topic."""
+    """Stands in for a node, keeps what it is told, and is given messages by topic."""
 
     def __init__(self, topic: str = "auto", robots: tuple[str, ...] = ()) -> None:
-        self.heard: dict[str, Callable[[Any], None]] = {}
+        self.received: dict[str, Callable[[Any], None]] = {}
         self.taken: list[LoopClosure] = []
         self.again: list[LoopClosure] = []
         self.withdrawn: list[Any] = []
@@ -31,8 +31,8 @@ class Hearer:
         told = self.taken.append, self.again.append, lambda *told: self.withdrawn.append(told)
         self.closures = ClosuresIn(self, topic, *told, prefixes)  # type: ignore[arg-type]
 
-    def listen(self, kind: type, topic: str, heard: Callable[[Any], None], profile: Any) -> None:
-        self.heard[topic] = heard
+    def listen(self, kind: type, topic: str, received: Callable[[Any], None], profile: Any) -> None:
+        self.received[topic] = received
 
     def read_aside(self, topic: str, decode: Callable[[Any], LoopClosure], message: Any) -> LoopClosure | None:
         try:
@@ -71,7 +71,7 @@ def test_what_comes_on_both_topics_is_taken_once_whichever_names_the_robot() -> 
         hearer = Hearer()
         told = [("loop_closures", whole(CLOSURE, "x")), ("constraints", to_msg.constraint(CLOSURE))]
         for topic, message in told if whole_first else told[::-1]:
-            hearer.heard[topic](message)
+            hearer.received[topic](message)
         assert (len(hearer.taken), len(hearer.again)) == (1, 1)
 
 
@@ -79,28 +79,28 @@ def test_equal_moments_of_two_robots_are_two_closures_and_one_is_taken_back() ->
     hearer = Hearer()
     messages = [whole(CLOSURE, robot) for robot in ("a", "b", "a")]
     for message in messages:
-        hearer.heard["loop_closures"](message)
+        hearer.received["loop_closures"](message)
     assert [told.robots for told in hearer.taken] == [("a", "a"), ("b", "b")] and len(hearer.again) == 1
     messages[1].retracted = True
-    hearer.heard["loop_closures"](messages[1])
+    hearer.received["loop_closures"](messages[1])
     assert hearer.withdrawn == [(CLOSURE.moments, ("b", "b"))]
     hearer.closures.forget(hearer.taken[0])
-    hearer.heard["loop_closures"](messages[0])
+    hearer.received["loop_closures"](messages[0])
     assert [told.robots for told in hearer.taken[2:]] == [("a", "a")]
 
 
 def test_the_topic_of_a_robot_names_it() -> None:
     hearer = Hearer("constraints", ("a", "b"))
-    assert set(hearer.heard) == {"constraints", "a/constraints", "b/constraints"}
-    for topic in hearer.heard:
-        hearer.heard[topic](to_msg.constraint(replace(CLOSURE, to_ns=len(topic))))
+    assert set(hearer.received) == {"constraints", "a/constraints", "b/constraints"}
+    for topic in hearer.received:
+        hearer.received[topic](to_msg.constraint(replace(CLOSURE, to_ns=len(topic))))
     assert [told.robots for told in hearer.taken] == [("", ""), ("a", "a"), ("b", "b")]
 
 
 def test_what_is_no_constraint_is_dropped_as_malformed() -> None:
     hearer, message = Hearer("constraints"), to_msg.constraint(CLOSURE)
     message.header.frame_id = "camera"
-    hearer.heard["constraints"](message)
+    hearer.received["constraints"](message)
     assert hearer.dropped == ["malformed_constraints"] and not hearer.taken
 
 
@@ -109,19 +109,19 @@ def test_on_constraints_the_prefixes_of_frames_name_the_robots_and_both_topics_t
         CLOSURE, from_robot="r1", to_robot="r2", from_frame_id="r1/camera", to_frame_id="r2/camera", to_session=None
     )
     hearer = Hearer(robots=("r1", "r2"))
-    hearer.heard["constraints"](to_msg.constraint(between))
+    hearer.received["constraints"](to_msg.constraint(between))
     (told,) = hearer.taken
     assert told.robots == ("r1", "r2") and told.moments == between.moments
     message = whole(between, "")
     for end, robot in ((message.from_moment, "r1"), (message.to_moment, "r2")):
         end.robot, end.frame_id = robot, f"{robot}/camera"
-    hearer.heard["loop_closures"](message)
+    hearer.received["loop_closures"](message)
     assert len(hearer.taken) == 1 and len(hearer.again) == 1
 
 
 def test_a_frame_without_a_prefix_is_of_the_robot_whose_topic_tells_it() -> None:
     hearer = Hearer(robots=("r1", "r2"))
-    hearer.heard["r2/constraints"](to_msg.constraint(CLOSURE))
+    hearer.received["r2/constraints"](to_msg.constraint(CLOSURE))
     assert hearer.taken[0].robots == ("r2", "r2")
 
 
@@ -133,7 +133,7 @@ def test_nobody_speaks_for_others_on_a_topic_of_its_own(topic: str) -> None:
     if topic.endswith("loop_closures"):
         message = whole(forged, "")
         message.from_moment.robot, message.to_moment.robot = "a", "b"
-    hearer.heard[topic](message)
+    hearer.received[topic](message)
     assert hearer.dropped == [f"malformed_{topic[2:]}"] and not hearer.taken
 
 
@@ -143,7 +143,7 @@ def test_a_closure_whose_frame_has_the_prefix_of_another_robot_is_refused() -> N
     for end in (message.from_moment, message.to_moment):
         end.frame_id = "b/camera"
     for topic in ("loop_closures", "e/loop_closures"):
-        hearer.heard[topic](message)
+        hearer.received[topic](message)
     assert hearer.dropped == ["malformed_loop_closures"] * 2 and not hearer.taken
 
 
@@ -151,16 +151,16 @@ def test_a_closure_of_a_robot_and_another_is_taken_on_the_topic_of_either() -> N
     hearer = Hearer("constraints", ("a", "b"))
     for to_ns, topic in ((9, "a/constraints"), (10, "b/constraints"), (11, "constraints")):
         between = replace(CLOSURE, to_ns=to_ns, from_frame_id="a/camera", to_frame_id="b/camera")
-        hearer.heard[topic](to_msg.constraint(between))
+        hearer.received[topic](to_msg.constraint(between))
     assert [told.robots for told in hearer.taken] == [("a", "b")] * 3
 
 
 def test_a_robot_takes_back_on_its_topic_no_closure_of_others() -> None:
     hearer = Hearer(robots=("a", "e"))
     message = whole(CLOSURE, "a")
-    hearer.heard["loop_closures"](message)
+    hearer.received["loop_closures"](message)
     message.retracted = True
-    hearer.heard["e/loop_closures"](message)
+    hearer.received["e/loop_closures"](message)
     assert hearer.withdrawn == []
-    hearer.heard["a/loop_closures"](message)
+    hearer.received["a/loop_closures"](message)
     assert hearer.withdrawn == [(CLOSURE.moments, ("a", "a"))]

@@ -14,8 +14,8 @@ from rclpy.context import Context
 from std_srvs.srv import Trigger
 
 from objreg_ros.bridge.messages import to_msg
+from objreg_ros.bridge.node.accounting import Balance
 from objreg_ros.bridge.node.diagnostics import diagnostic, refusals
-from objreg_ros.bridge.node.ledger import Balance
 from objreg_ros.bridge.streams import collector as collector_module
 from objreg_ros.bridge.streams.collector import Collector
 from objreg_ros.data import Detections, Frame, Intrinsics, LoopClosure, ObjectCloud, Reason, Rejected, View
@@ -35,7 +35,7 @@ def collector(monkeypatch: pytest.MonkeyPatch) -> Iterator[Collector]:
     context.try_shutdown()
 
 
-def hear(collector: Collector, topic: str, message: Any) -> None:
+def receive(collector: Collector, topic: str, message: Any) -> None:
     """Hand a message to the subscription of a topic, as ROS does."""
     (subscription,) = (s for s in collector.subscriptions if s.topic_name == topic)
     assert isinstance(message, subscription.msg_type)
@@ -78,17 +78,17 @@ def status(node: str, **extra: object) -> DiagnosticArray:
 
 
 def test_the_books_of_every_node_are_kept_as_they_were_told_last(collector: Collector) -> None:
-    hear(collector, "/diagnostics", diagnostic("/detector", Time(), Balance(1, 1, 0, {}, {}), 30.0, (), {}))
-    hear(collector, "/diagnostics", status("/detector"))
-    hear(collector, "/diagnostics", status("/robot/segmenter"))
-    assert collector.books == {"/detector": BOOKS, "/robot/segmenter": BOOKS} and collector.rejected == {}
+    receive(collector, "/diagnostics", diagnostic("/detector", Time(), Balance(1, 1, 0, {}, {}), 30.0, (), {}))
+    receive(collector, "/diagnostics", status("/detector"))
+    receive(collector, "/diagnostics", status("/robot/segmenter"))
+    assert collector.counters == {"/detector": BOOKS, "/robot/segmenter": BOOKS} and collector.rejected == {}
 
 
 def test_refusals_are_counted_by_reason_and_kept_with_their_numbers(collector: Collector) -> None:
-    hear(collector, "/diagnostics", diagnostic("/registrar", Time(), BOOKS, 1.0, (), {"rejected: no_candidate": 3}))
+    receive(collector, "/diagnostics", diagnostic("/registrar", Time(), BOOKS, 1.0, (), {"rejected: no_candidate": 3}))
     turned_down = Rejected(reason=Reason.NO_CANDIDATE, from_ns=5, to_ns=9, detail="none of 3")
-    hear(collector, "/refusals", refusals("/registrar", Time(), [turned_down]))
-    assert collector.rejected == {"no_candidate": 3} and collector.books.keys() == {"/registrar"}
+    receive(collector, "/refusals", refusals("/registrar", Time(), [turned_down]))
+    assert collector.rejected == {"no_candidate": 3} and collector.counters.keys() == {"/registrar"}
     assert [(r.reason, r.from_ns, r.detail) for r in collector.refusals] == [(Reason.NO_CANDIDATE, 5, "none of 3")]
 
 
@@ -96,22 +96,22 @@ def test_the_books_of_strangers_are_left_aside(collector: Collector) -> None:
     strange = DiagnosticStatus(
         name="motor: temperature", hardware_id="motor", values=[KeyValue(key="hot", value="yes")]
     )
-    hear(collector, "/diagnostics", DiagnosticArray(status=[strange, *status("/detector").status]))
-    assert collector.books.keys() == {"/detector"}
+    receive(collector, "/diagnostics", DiagnosticArray(status=[strange, *status("/detector").status]))
+    assert collector.counters.keys() == {"/detector"}
 
 
 def test_constraints_are_kept_in_their_order(collector: Collector) -> None:
     for to_ns in (9, 7):
         closure = LoopClosure(from_ns=5, to_ns=to_ns, T_from_to=np.eye(4), covariance=np.eye(6), labels=())
-        hear(collector, "/constraints", to_msg.constraint(closure))
+        receive(collector, "/constraints", to_msg.constraint(closure))
     assert [(closure.from_ns, closure.to_ns) for closure in collector.closures] == [(5, 9), (5, 7)]
 
 
 def test_a_glimpse_holds_what_was_detected_and_where_the_objects_were(collector: Collector) -> None:
-    hear(collector, "/labels", to_msg.labels(NAMES))
-    hear(collector, "/detections_table", detections(5, "tv", "cup"))
-    hear(collector, "/objects", objects(5, "cup", "tv"))
-    hear(collector, "/objects", objects(6))
+    receive(collector, "/labels", to_msg.labels(NAMES))
+    receive(collector, "/detections_table", detections(5, "tv", "cup"))
+    receive(collector, "/objects", objects(5, "cup", "tv"))
+    receive(collector, "/objects", objects(6))
     assert collector.glimpses == {
         5: {"stamp_ns": 5, "labels": ["tv", "cup"], "objects": [["cup", [1.0, 0.0, 2.0]], ["tv", [2.0, 0.0, 2.0]]]},
         6: {"stamp_ns": 6, "labels": [], "objects": []},
@@ -119,24 +119,24 @@ def test_a_glimpse_holds_what_was_detected_and_where_the_objects_were(collector:
 
 
 def test_before_the_labels_come_classes_are_called_by_their_numbers(collector: Collector) -> None:
-    hear(collector, "/detections_table", detections(5, "tv"))
+    receive(collector, "/detections_table", detections(5, "tv"))
     assert collector.glimpses[5]["labels"] == ["7"]
 
 
 def test_an_image_without_an_object_leaves_no_trace(collector: Collector) -> None:
-    hear(collector, "/detections_table", detections(5))
-    hear(collector, "/objects", objects(5, "cup"))
+    receive(collector, "/detections_table", detections(5))
+    receive(collector, "/objects", objects(5, "cup"))
     assert collector.glimpses[5]["labels"] == [] and collector.sight is None
 
 
 def test_the_sight_is_the_latest_of_the_frames_with_most_objects_with_the_detections_next_to_it(
     collector: Collector,
 ) -> None:
-    hear(collector, "/labels", to_msg.labels(NAMES))
+    receive(collector, "/labels", to_msg.labels(NAMES))
     for stamp_ns, seen in ((10, ("cup",)), (20, ("cup", "tv")), (30, ("tv", "cup")), (40, ("tv",))):
-        hear(collector, "/detections_table", detections(stamp_ns, *seen))
+        receive(collector, "/detections_table", detections(stamp_ns, *seen))
     for stamp_ns, seen in ((11, ("cup",)), (21, ("cup", "tv")), (31, ("tv", "cup")), (41, ("tv",))):
-        hear(collector, "/objects", objects(stamp_ns, *seen))
+        receive(collector, "/objects", objects(stamp_ns, *seen))
     sight = collector.sight
     assert sight is not None and sight.detections.stamp_ns == 30
     assert [item.label for item in sight.objects] == ["tv", "cup"]
@@ -144,8 +144,8 @@ def test_the_sight_is_the_latest_of_the_frames_with_most_objects_with_the_detect
 
 def test_no_more_detections_wait_for_their_objects_than_are_recent(collector: Collector) -> None:
     for stamp_ns in range(collector_module.RECENT + 1):
-        hear(collector, "/detections_table", detections(stamp_ns, "tv"))
-    hear(collector, "/objects", objects(0, "tv"))
+        receive(collector, "/detections_table", detections(stamp_ns, "tv"))
+    receive(collector, "/objects", objects(0, "tv"))
     assert collector.sight is not None and collector.sight.detections.stamp_ns == 1
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Detections by whichever topic they come, behind a door that only notes what is asked of it."""
+"""Detections by whichever topic they come, behind a node that only notes what is asked of it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DEPTH = DepthImage(depth=np.ones((60, 80), np.float32), rgb=None, intrinsics=CAM
 NAMES = {0: "cup", 1: "tv"}
 
 
-class Door:
+class NodeBase:
     """Notes what it is fed and what is published."""
 
     most_pixels = 10_000
@@ -34,13 +34,13 @@ class Door:
         self.published: list[Any] = []
         self.acknowledged: list[int] = []
         self.topics: dict[str, type] = {}
-        self.heard: dict[str, Callable[[Any], None]] = {}
+        self.received: dict[str, Callable[[Any], None]] = {}
 
-    def listen(self, _kind: type, topic: str, heard: Callable[[Any], None], _profile: Any) -> None:
-        self.heard[topic] = heard
+    def listen(self, _kind: type, topic: str, received: Callable[[Any], None], _profile: Any) -> None:
+        self.received[topic] = received
 
-    def listen_to_first(self, _name: str, topics: dict[str, type], decode: Any, heard: Any, *_profiles: Any) -> None:
-        self.topics, self.decode, self.hear = topics, decode, heard
+    def listen_to_first(self, _name: str, topics: dict[str, type], decode: Any, received: Any, *_profiles: Any) -> None:
+        self.topics, self.decode, self.receive = topics, decode, received
 
     def sensor(self) -> None: ...
 
@@ -84,15 +84,15 @@ def boxes(count: int) -> Detections:
 
 
 def test_our_table_is_read_with_the_names_that_were_told() -> None:
-    door = Door()
-    inputs = DetectionsIn(door, "table")  # type: ignore[arg-type]
-    door.heard["labels"](to_msg.labels(NAMES))
+    node = NodeBase()
+    inputs = DetectionsIn(node, "table")  # type: ignore[arg-type]
+    node.received["labels"](to_msg.labels(NAMES))
     message = to_msg.detections_table(boxes(2), NAMES)
-    door.hear("detections_table", message)
-    assert door.fed == [("labels", 0, NAMES), ("detections", 5, message)]
+    node.receive("detections_table", message)
+    assert node.fed == [("labels", 0, NAMES), ("detections", 5, message)]
     asked = read(inputs, message, labels=NAMES)
     assert asked.detections.label == ("cup", "cup") and asked.detections.instances is None and asked.names == NAMES
-    assert door.published == []
+    assert node.published == []
 
 
 def test_masks_of_our_table_reach_the_segmenter_as_a_message_and_as_a_word() -> None:
@@ -100,36 +100,36 @@ def test_masks_of_our_table_reach_the_segmenter_as_a_message_and_as_a_word() -> 
     instances[12:18, 11:15] = 1
     word = replace(boxes(1), instances=instances)
     for told in (word, to_msg.detections_table(word, NAMES)):
-        seen = read(DetectionsIn(Door(), "table"), told, labels=NAMES).detections  # type: ignore[arg-type]
+        seen = read(DetectionsIn(NodeBase(), "table"), told, labels=NAMES).detections  # type: ignore[arg-type]
         np.testing.assert_array_equal(seen.instances, instances)
 
 
 def test_a_surplus_picture_is_fed_as_one() -> None:
-    door = Door()
-    DetectionsIn(door, "table")  # type: ignore[arg-type]
-    door.hear("detections_table", to_msg.surplus(5, "camera"))
-    assert door.fed == [("detections", 5, Drop.SURPLUS)]
+    node = NodeBase()
+    DetectionsIn(node, "table")  # type: ignore[arg-type]
+    node.receive("detections_table", to_msg.surplus(5, "camera"))
+    assert node.fed == [("detections", 5, Drop.SURPLUS)]
 
 
 def test_masks_bring_a_table_of_names_that_is_everywhere_before_their_objects() -> None:
-    door = Door()
-    inputs = DetectionsIn(door, "masks")  # type: ignore[arg-type]
-    door.hear("masks", masks())
-    assert [name for name, *_ in door.fed] == ["labels", "detections"]
+    node = NodeBase()
+    inputs = DetectionsIn(node, "masks")  # type: ignore[arg-type]
+    node.receive("masks", masks())
+    assert [name for name, *_ in node.fed] == ["labels", "detections"]
     asked = read(inputs, masks())
     assert asked.detections.label == (UNNAMED,) and asked.detections.instances is not None
     assert np.bincount(asked.detections.instances.ravel())[1:].tolist() == [200]
-    assert [from_msg.labels(message) for message in door.published] == [{}] and door.acknowledged == [1]
+    assert [from_msg.labels(message) for message in node.published] == [{}] and node.acknowledged == [1]
     inputs._names = {4: "cup"}
     for _ in range(2):
         assert read(inputs, masks()).names == {0: "cup"}
-    assert [from_msg.labels(message) for message in door.published] == [{}, {0: "cup"}] and door.acknowledged == [1, 2]
+    assert [from_msg.labels(message) for message in node.published] == [{}, {0: "cup"}] and node.acknowledged == [1, 2]
 
 
 def test_boxes_are_of_the_size_of_the_raw_picture_where_there_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
     met: list[tuple[int, int]] = []
     monkeypatch.setattr(vision_from_msg, "boxes", lambda _message, _names, image_hw: met.append(image_hw) or boxes(1))
-    inputs = DetectionsIn(Door(), "auto")  # type: ignore[arg-type]
+    inputs = DetectionsIn(NodeBase(), "auto")  # type: ignore[arg-type]
     read(inputs, SimpleNamespace())
     read(inputs, SimpleNamespace(), image=Image(height=120, width=160))
     read(inputs, SimpleNamespace(), image=ColourImage(rgb=np.zeros((90, 120, 3), np.uint8), stamp_ns=5))
@@ -139,41 +139,41 @@ def test_boxes_are_of_the_size_of_the_raw_picture_where_there_is_one(monkeypatch
 def test_boxes_of_a_compressed_picture_are_of_the_size_of_its_camera(monkeypatch: pytest.MonkeyPatch) -> None:
     met: list[tuple[int, int]] = []
     monkeypatch.setattr(vision_from_msg, "boxes", lambda _message, _names, image_hw: met.append(image_hw) or boxes(1))
-    inputs = DetectionsIn(Door(), "auto")  # type: ignore[arg-type]
+    inputs = DetectionsIn(NodeBase(), "auto")  # type: ignore[arg-type]
     of_colour = to_msg.camera_info(replace(CAMERA, width=160, height=120), 5, "colour")
     inputs.read(match(SimpleNamespace()), DEPTH, of_colour, lenses.Raw(), None)
     assert met == [(120, 160)]
 
 
 def test_a_table_that_another_tells_meanwhile_is_told_again_with_the_names_that_were_met() -> None:
-    door = Door()
-    inputs = DetectionsIn(door, "auto")  # type: ignore[arg-type]
+    node = NodeBase()
+    inputs = DetectionsIn(node, "auto")  # type: ignore[arg-type]
     inputs._names = {4: "sofa"}
     assert read(inputs, masks()).names == {0: "sofa"}
-    door.heard["labels"](to_msg.labels(NAMES))  # our own detector was started beside
+    node.received["labels"](to_msg.labels(NAMES))  # our own detector was started beside
     assert read(inputs, masks()).names == {**NAMES, 2: "sofa"}
-    assert from_msg.labels(door.published[-1]) == {**NAMES, 2: "sofa"} and len(door.published) == 2
-    door.heard["labels"](door.published[-1])  # its own word
+    assert from_msg.labels(node.published[-1]) == {**NAMES, 2: "sofa"} and len(node.published) == 2
+    node.received["labels"](node.published[-1])  # its own word
     read(inputs, masks())
-    assert len(door.published) == 2
+    assert len(node.published) == 2
 
 
 def test_boxes_without_vision_msgs_are_refused_with_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(detections_in.SOURCES, "vision_msgs", {"detections_in": None})
     with pytest.raises(ValueError, match="install ros-jazzy-vision-msgs"):
-        DetectionsIn(Door(), "vision_msgs")  # type: ignore[arg-type]
+        DetectionsIn(NodeBase(), "vision_msgs")  # type: ignore[arg-type]
 
 
 def test_a_picture_that_is_no_mask_is_not_taken() -> None:
-    door = Door()
-    DetectionsIn(door, "masks")  # type: ignore[arg-type]
+    node = NodeBase()
+    DetectionsIn(node, "masks")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="expected an encoding of mono8"):
-        door.decode("masks", Image(height=1, width=1, step=3, encoding="rgb8", data=b"abc"))
+        node.decode("masks", Image(height=1, width=1, step=3, encoding="rgb8", data=b"abc"))
 
 
 def test_names_that_a_foreign_detector_takes_back_are_gone() -> None:
-    inputs = DetectionsIn(Door(), "auto")  # type: ignore[arg-type]
-    inputs._hear_names(SimpleNamespace(class_map=[SimpleNamespace(class_id=4, class_name="cup")]))
+    inputs = DetectionsIn(NodeBase(), "auto")  # type: ignore[arg-type]
+    inputs._on_names(SimpleNamespace(class_map=[SimpleNamespace(class_id=4, class_name="cup")]))
     assert read(inputs, masks()).detections.label == ("cup",)
-    inputs._hear_names(SimpleNamespace(class_map=[]))
+    inputs._on_names(SimpleNamespace(class_map=[]))
     assert read(inputs, masks()).detections.label == (UNNAMED,)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How registrars speak to each other: what is heard goes to the exchange, and what it says goes out."""
+"""How registrars speak to each other: what is received goes to the exchange, and what it says goes out."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sensor_msgs.msg import CompressedImage
 
 from objreg_ros import limits
 from objreg_ros.bridge.messages import to_msg
-from objreg_ros.bridge.node.door import Door
+from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.bridge.streams.exchanging import FORMAT, Delivered, Exchanging
 from objreg_ros.bridge.streams.key import Key
 
@@ -24,7 +24,7 @@ class Spoken:
     """An exchange that asks for everything, and answers what it was asked for."""
 
     def __init__(self) -> None:
-        self.books = Counter({"summaries heard": 2})
+        self.counters = Counter({"summaries received": 2})
         self.notes = list[bytes]()
 
     @property
@@ -37,7 +37,7 @@ class Spoken:
     def awaits(self, packed: bytes) -> bool:
         return packed != b"of others"
 
-    def hear(self, packed: bytes, now: float) -> bytes | None:
+    def receive(self, packed: bytes, now: float) -> bytes | None:
         if packed == b"bad":
             raise ValueError("expected a summary, got none")
         return b"ask " + packed if packed != b"unlike" else None
@@ -50,10 +50,10 @@ class Spoken:
 
 
 @pytest.fixture
-def door(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Door]:
+def node(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[NodeBase]:
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
     rclpy.init(args=["registrar", "--ros-args", "-r", "__ns:=/r1"])
-    made = Door("registrar")
+    made = NodeBase("registrar")
     made.throttled._write = lambda line: None
     yield made
     made.close()
@@ -74,19 +74,19 @@ def said(made: Exchanging, monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, b
 
 
 def test_a_summary_that_looks_alike_is_answered_by_a_request_and_one_that_does_not_by_nothing(
-    door: Door, monkeypatch: pytest.MonkeyPatch
+    node: NodeBase, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    made = Exchanging(door, "/fleet", Spoken(), lambda seen: None)
+    made = Exchanging(node, "/fleet", Spoken(), lambda seen: None)
     out = said(made, monkeypatch)
     for packed in (b"alike", b"unlike", b"bad"):
         made._read_later(7, packed)
     made._reader.shutdown()
     assert out == [("/fleet/requests", b"ask alike")] and len(made._unread) == 0
-    assert door._ignored == {"malformed summaries": 1}
+    assert node._ignored == {"malformed summaries": 1}
 
 
-def test_a_request_is_answered_by_the_keyframe(door: Door, monkeypatch: pytest.MonkeyPatch) -> None:
-    made = Exchanging(door, "/fleet", Spoken(), lambda seen: None)
+def test_a_request_is_answered_by_the_keyframe(node: NodeBase, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = Exchanging(node, "/fleet", Spoken(), lambda seen: None)
     out = said(made, monkeypatch)
     made._answer_later()
     made._note(7, b"k")
@@ -95,12 +95,12 @@ def test_a_request_is_answered_by_the_keyframe(door: Door, monkeypatch: pytest.M
     made.tell(7, None)
     made.tell(7, b"summary")
     assert out == [("/fleet/keyframes", b"keyframe k"), ("/fleet/summaries", b"summary")]
-    assert made.told() == {"exchange: summaries heard": 2}
+    assert made.told() == {"exchange: summaries received": 2}
     made.close()
 
 
 def test_an_answer_that_waits_for_a_search_keeps_no_subscription_waiting_and_one_at_most_waits_behind(
-    door: Door,
+    node: NodeBase,
 ) -> None:
     ended, asked = threading.Event(), list[float]()
 
@@ -110,7 +110,7 @@ def test_an_answer_that_waits_for_a_search_keeps_no_subscription_waiting_and_one
             assert ended.wait(10.0)
             return None
 
-    made = Exchanging(door, "/fleet", Searching(), lambda seen: None)
+    made = Exchanging(node, "/fleet", Searching(), lambda seen: None)
     made._note(7, b"k")
     made._answer_later()
     while not asked:
@@ -123,40 +123,42 @@ def test_an_answer_that_waits_for_a_search_keeps_no_subscription_waiting_and_one
     assert len(asked) == 2
 
 
-def test_a_keyframe_that_comes_is_in_the_books_and_handed_on(door: Door) -> None:
+def test_a_keyframe_that_comes_is_in_the_books_and_handed_on(node: NodeBase) -> None:
     taken = list[Delivered]()
-    made = Exchanging(door, "/fleet", Spoken(), taken.append)
+    made = Exchanging(node, "/fleet", Spoken(), taken.append)
     made._deliver(7, b"of others")
     made._deliver(7, b"keyframe")
-    assert taken == [Delivered(7, b"keyframe")] and taken[0].nbytes == 8 and door.ledger.balance().waiting == 1
+    assert taken == [Delivered(7, b"keyframe")] and taken[0].nbytes == 8 and node.accounting.balance().waiting == 1
     made.close()
 
 
 @pytest.mark.parametrize(("packed", "form"), [(b"x", "jpeg"), (bytes(limits.MOST_PACKED_KEYFRAME + 1), FORMAT)])
-def test_pictures_and_what_is_too_large_are_counted_and_left_out(door: Door, packed: bytes, form: str) -> None:
+def test_pictures_and_what_is_too_large_are_counted_and_left_out(node: NodeBase, packed: bytes, form: str) -> None:
     taken = list[Delivered]()
-    made = Exchanging(door, "/fleet", Spoken(), taken.append)
-    (subscription,) = [s for s in door.subscriptions if s.topic_name == "/fleet/keyframes"]
+    made = Exchanging(node, "/fleet", Spoken(), taken.append)
+    (subscription,) = [s for s in node.subscriptions if s.topic_name == "/fleet/keyframes"]
     subscription.callback(message(packed, form), {"publication_sequence_number": 1})
-    assert taken == [] and door._ignored == {"malformed /fleet/keyframes": 1}
+    assert taken == [] and node._ignored == {"malformed /fleet/keyframes": 1}
     made.close()
 
 
-def test_a_flood_of_summaries_of_one_keeps_none_of_another_unread(door: Door, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_flood_of_summaries_of_one_keeps_none_of_another_unread(
+    node: NodeBase, monkeypatch: pytest.MonkeyPatch
+) -> None:
     begun, ended, compared = threading.Event(), threading.Event(), list[bytes]()
 
     class Searching(Spoken):
         def sender(self, packed: bytes) -> str:
             return packed.decode()[0]
 
-        def hear(self, packed: bytes, now: float) -> bytes | None:
+        def receive(self, packed: bytes, now: float) -> bytes | None:
             begun.set()
             assert ended.wait(10.0)
             compared.append(packed)
             return None
 
     monkeypatch.setattr("objreg_ros.bridge.streams.exchanging.MOST_UNREAD", 10)
-    made = Exchanging(door, "/fleet", Searching(), lambda seen: None)
+    made = Exchanging(node, "/fleet", Searching(), lambda seen: None)
     made._read_later(7, b"e")
     assert begun.wait(10.0)
     for k in range(100):
@@ -164,20 +166,20 @@ def test_a_flood_of_summaries_of_one_keeps_none_of_another_unread(door: Door, mo
     made._read_later(7, b"honest")
     ended.set()
     made._reader.shutdown()
-    assert compared.index(b"honest") <= 2 and len(compared) == 11 and not door._ignored
+    assert compared.index(b"honest") <= 2 and len(compared) == 11 and not node._ignored
 
 
-def test_with_a_key_only_what_it_signed_is_read(door: Door, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_with_a_key_only_what_it_signed_is_read(node: NodeBase, monkeypatch: pytest.MonkeyPatch) -> None:
     taken, key = list[Delivered](), Key(b"0123456789abcdef")
-    made = Exchanging(door, "/fleet", Spoken(), taken.append, key)
-    (subscription,) = [s for s in door.subscriptions if s.topic_name == "/fleet/keyframes"]
+    made = Exchanging(node, "/fleet", Spoken(), taken.append, key)
+    (subscription,) = [s for s in node.subscriptions if s.topic_name == "/fleet/keyframes"]
     for sent in (
         message(b"forged"),
         key.sign("/fleet/requests", message(b"moved")),
         key.sign("/fleet/keyframes", message(b"k")),
     ):
         subscription.callback(sent, {"publication_sequence_number": 1})
-    assert [one.packed for one in taken] == [b"k"] and door._ignored == {"malformed /fleet/keyframes": 2}
+    assert [one.packed for one in taken] == [b"k"] and node._ignored == {"malformed /fleet/keyframes": 2}
     out = list[CompressedImage]()
     monkeypatch.setattr(made._summaries, "publish", out.append)
     made.tell(7, b"summary")

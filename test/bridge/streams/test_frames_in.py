@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a segmenter says, heard by its parts: frames with odometry and names."""
+"""What a segmenter says, received by its parts: frames with odometry and names."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import rclpy
 from registration.samples import SECOND, box, frame
 
 from objreg_ros.bridge.messages import to_msg
-from objreg_ros.bridge.streams.frames_in import FramesDoor
+from objreg_ros.bridge.streams.frames_in import FramesNode
 from objreg_ros.bridge.streams.sync import Match
 from objreg_ros.data import Array, Frame, Odometry
 from objreg_ros.geometry import pose
@@ -24,8 +24,8 @@ T_ODOM_BODY = pose(np.eye(3), np.array([1.0, 2.0, 3.0]))
 T_BODY_CAMERA = pose(np.eye(3), np.array([0.1, 0.0, 0.0]))
 
 
-class Frames(FramesDoor):
-    """Keeps the frames that it hears."""
+class Frames(FramesNode):
+    """Keeps the frames that it receives."""
 
     def __init__(self) -> None:
         super().__init__("frames")
@@ -44,7 +44,7 @@ class Frames(FramesDoor):
 
 
 @pytest.fixture
-def door(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Frames]:
+def node(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Frames]:
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
     rclpy.init(args=[])
     made = Frames()
@@ -53,41 +53,41 @@ def door(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Frames]:
     rclpy.try_shutdown()
 
 
-def tell(door: Frames, seen: Frame, names: dict[int, str]) -> None:
-    door._hear("objects")(to_msg.objects(seen, names))
-    door._hear("view")(to_msg.view(seen))
-    door._hear("view/camera_info")(to_msg.view_camera_info(seen))
-    door._hear("gravity")(to_msg.gravity(seen))
-    assert door.done.acquire(timeout=PATIENCE)
+def tell(node: Frames, seen: Frame, names: dict[int, str]) -> None:
+    node._receive("objects")(to_msg.objects(seen, names))
+    node._receive("view")(to_msg.view(seen))
+    node._receive("view/camera_info")(to_msg.view_camera_info(seen))
+    node._receive("gravity")(to_msg.gravity(seen))
+    assert node.done.acquire(timeout=PATIENCE)
 
 
-def test_a_frame_comes_with_its_names_and_the_pose_that_odometry_has_of_its_camera(door: Frames) -> None:
-    door.hear_labels(to_msg.labels({3: "cup"}))
+def test_a_frame_comes_with_its_names_and_the_pose_that_odometry_has_of_its_camera(node: Frames) -> None:
+    node.receive_labels(to_msg.labels({3: "cup"}))
     word = Odometry(T_odom_body=T_ODOM_BODY, stamp_ns=5 * SECOND, frame_id="r1/odom")
-    door._hear_odom(to_msg.odometry(word))
-    tell(door, frame(5, CUP), {3: "cup"})
-    ((seen, T_body_camera),) = door.taken
-    assert [item.label for item in seen.objects] == ["cup"] and door.odom_frame == "r1/odom"
+    node._on_odom(to_msg.odometry(word))
+    tell(node, frame(5, CUP), {3: "cup"})
+    ((seen, T_body_camera),) = node.taken
+    assert [item.label for item in seen.objects] == ["cup"] and node.odom_frame == "r1/odom"
     assert np.allclose(seen.T_odom_camera, T_ODOM_BODY @ T_BODY_CAMERA)
     assert T_body_camera is not None and np.allclose(T_body_camera, T_BODY_CAMERA)
-    assert door.without_odometry == 0 and door.names_of("") == {3: "cup"}
+    assert node.without_odometry == 0 and node.names_of("") == {3: "cup"}
 
 
-def test_names_that_come_later_are_added_to_those_that_are_known(door: Frames) -> None:
+def test_names_that_come_later_are_added_to_those_that_are_known(node: Frames) -> None:
     for names in ({3: "cup"}, {4: "book"}, {3: "mug"}):
-        door.hear_labels(to_msg.labels(names))
-    assert door.names_of("") == {3: "mug", 4: "book"}
+        node.receive_labels(to_msg.labels(names))
+    assert node.names_of("") == {3: "mug", 4: "book"}
 
 
-def test_frames_of_two_cameras_are_told_with_what_to_do(door: Frames) -> None:
+def test_frames_of_two_cameras_are_told_with_what_to_do(node: Frames) -> None:
     for frame_id in ("front", "front", "rear", "front"):
-        door._watch_camera(frame_id)
-    (line,) = door.said
+        node._watch_camera(frame_id)
+    (line,) = node.said
     assert "got one of 'rear' after one of 'front'" in line and "give each camera a keyframer" in line
 
 
-def test_a_frame_that_breaks_its_contract_is_dropped_and_counted(door: Frames) -> None:
-    door.hear_labels(to_msg.labels({3: "cup"}))
+def test_a_frame_that_breaks_its_contract_is_dropped_and_counted(node: Frames) -> None:
+    node.receive_labels(to_msg.labels({3: "cup"}))
     seen = frame(5, CUP)
     message = to_msg.objects(seen, {3: "cup"})
     message.fields = message.fields[:-1]
@@ -97,7 +97,7 @@ def test_a_frame_that_breaks_its_contract_is_dropped_and_counted(door: Frames) -
         "gravity": to_msg.gravity(seen),
     }
     for topic, part in {"objects": message, **parts}.items():
-        door._hear(topic)(part)
-    assert door.done.acquire(timeout=PATIENCE)
-    door.worker.close()
-    assert door.ledger.balance().dropped == {"malformed_frame": 1}
+        node._receive(topic)(part)
+    assert node.done.acquire(timeout=PATIENCE)
+    node.worker.close()
+    assert node.accounting.balance().dropped == {"malformed_frame": 1}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keyframes of robots, each heard on a topic of its own, and counted by robot."""
+"""Keyframes of robots, each received on a topic of its own, and counted by robot."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import rclpy
 from std_msgs.msg import String
 
 from objreg_ros.bridge.messages.keyframes_msg import SentKeyframe, keyframe
-from objreg_ros.bridge.streams.frames_in import FramesDoor
+from objreg_ros.bridge.streams.frames_in import FramesNode
 from objreg_ros.bridge.streams.key import Key
 from objreg_ros.bridge.streams.keyframes_in import FromRobot, KeyframesIn
 
@@ -20,63 +20,63 @@ PREFIXES = {"fleet/r1": "r1/", "fleet/r2": "r2/"}
 
 
 @pytest.fixture
-def door(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[FramesDoor]:
+def node(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[FramesNode]:
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
     rclpy.init(args=["registrar", "--ros-args", "-r", "__ns:=/fleet"])
-    made = FramesDoor("registrar")
+    made = FramesNode("registrar")
     made.throttled._write = lambda line: None
     yield made
     made.close()
     rclpy.try_shutdown()
 
 
-def test_each_camera_of_each_robot_has_a_topic(door: FramesDoor) -> None:
-    KeyframesIn(door, PREFIXES, [("front", "rear"), ()], lambda seen: None)
-    heard = {s.topic_name for s in door.subscriptions}
-    keyframes = {topic for topic in heard if topic.endswith("keyframes")}
+def test_each_camera_of_each_robot_has_a_topic(node: FramesNode) -> None:
+    KeyframesIn(node, PREFIXES, [("front", "rear"), ()], lambda seen: None)
+    received = {s.topic_name for s in node.subscriptions}
+    keyframes = {topic for topic in received if topic.endswith("keyframes")}
     assert keyframes == {"/fleet/r1/front/keyframes", "/fleet/r1/rear/keyframes", "/fleet/r2/keyframes"}
-    assert {"/fleet/r1/front/labels", "/fleet/r1/rear/labels", "/fleet/r2/labels"} <= heard
+    assert {"/fleet/r1/front/labels", "/fleet/r1/rear/labels", "/fleet/r2/labels"} <= received
 
 
-def test_a_keyframe_is_handed_on_with_its_robot_and_is_in_the_books(door: FramesDoor) -> None:
+def test_a_keyframe_is_handed_on_with_its_robot_and_is_in_the_books(node: FramesNode) -> None:
     taken = list[FromRobot]()
-    heard = KeyframesIn(door, PREFIXES, [(), ()], taken.append)
-    heard._hear("fleet/r1", "r1/keyframes", keyframe(SENT))
-    heard.count("fleet/r1", "searched")
+    received = KeyframesIn(node, PREFIXES, [(), ()], taken.append)
+    received._receive("fleet/r1", "r1/keyframes", keyframe(SENT))
+    received.count("fleet/r1", "searched")
     assert taken == [FromRobot("fleet/r1", SENT)] and taken[0].nbytes == len(b"packed")
-    assert door.ledger.balance().waiting == 1
-    assert heard.told() == {"fleet/r1: keyframes received": 1, "fleet/r1: keyframes searched": 1}
+    assert node.accounting.balance().waiting == 1
+    assert received.told() == {"fleet/r1: keyframes received": 1, "fleet/r1: keyframes searched": 1}
 
 
-def test_a_picture_is_dropped_and_counted_and_ends_nothing(door: FramesDoor) -> None:
+def test_a_picture_is_dropped_and_counted_and_ends_nothing(node: FramesNode) -> None:
     taken = list[FromRobot]()
-    heard = KeyframesIn(door, PREFIXES, [(), ()], taken.append)
+    received = KeyframesIn(node, PREFIXES, [(), ()], taken.append)
     message = keyframe(SENT)
     message.format = "jpeg"
-    heard._hear("fleet/r2", "r2/keyframes", message)
-    balance = door.ledger.balance()
+    received._receive("fleet/r2", "r2/keyframes", message)
+    balance = node.accounting.balance()
     assert taken == [] and balance.dropped == {"malformed_keyframes": 1} and balance.waiting == 0
 
 
-def test_robots_may_call_one_number_otherwise(door: FramesDoor) -> None:
-    KeyframesIn(door, PREFIXES, [(), ()], lambda seen: None)
-    for subscription in door.subscriptions:
+def test_robots_may_call_one_number_otherwise(node: FramesNode) -> None:
+    KeyframesIn(node, PREFIXES, [(), ()], lambda seen: None)
+    for subscription in node.subscriptions:
         if subscription.topic_name.endswith("labels"):
             name = "cup" if "r1" in subscription.topic_name else "chair"
             subscription.callback(String(data=f'{{"1": "{name}"}}'), {"publication_sequence_number": 1})
-    assert [door.names_of(robot) for robot in (*PREFIXES, "r3")] == [{1: "cup"}, {1: "chair"}, {}]
+    assert [node.names_of(robot) for robot in (*PREFIXES, "r3")] == [{1: "cup"}, {1: "chair"}, {}]
 
 
 def test_of_two_cameras_of_a_robot_under_one_frame_the_first_is_taken_and_robots_may_share_frames(
-    door: FramesDoor,
+    node: FramesNode,
 ) -> None:
     taken = list[FromRobot]()
-    heard = KeyframesIn(door, PREFIXES, [("front", "rear"), ()], taken.append)
+    received = KeyframesIn(node, PREFIXES, [("front", "rear"), ()], taken.append)
     said = [("fleet/r1", "r1/front/keyframes", "camera"), ("fleet/r1", "r1/rear/keyframes", "fleet/r1/camera")]
     said += [("fleet/r2", "r2/keyframes", "camera"), ("fleet/r1", "r1/rear/keyframes", "rear_camera")]
     said += [("fleet/r1", "r1/front/keyframes", "camera")]
     for robot, topic, frame_id in said:
-        heard._hear(robot, topic, keyframe(SENT._replace(frame_id=frame_id)))
+        received._receive(robot, topic, keyframe(SENT._replace(frame_id=frame_id)))
     frames = [(one.robot, one.sent.frame_id) for one in taken]
     assert frames == [
         ("fleet/r1", "camera"),
@@ -84,15 +84,15 @@ def test_of_two_cameras_of_a_robot_under_one_frame_the_first_is_taken_and_robots
         ("fleet/r1", "rear_camera"),
         ("fleet/r1", "camera"),
     ]
-    assert door.ledger.balance().dropped == {"same_camera": 1}
+    assert node.accounting.balance().dropped == {"same_camera": 1}
 
 
-def test_with_a_key_a_keyframe_is_of_the_robot_on_whose_topic_it_was_signed(door: FramesDoor) -> None:
+def test_with_a_key_a_keyframe_is_of_the_robot_on_whose_topic_it_was_signed(node: FramesNode) -> None:
     taken, key = list[FromRobot](), Key(b"0123456789abcdef")
-    heard = KeyframesIn(door, PREFIXES, [(), ()], taken.append, key)
+    received = KeyframesIn(node, PREFIXES, [(), ()], taken.append, key)
     signed = key.sign("/fleet/r1/keyframes", keyframe(SENT))
-    heard._hear("fleet/r2", "r2/keyframes", signed)
-    heard._hear("fleet/r1", "r1/keyframes", keyframe(SENT))
-    assert taken == [] and door.ledger.balance().dropped == {"malformed_keyframes": 2}
-    heard._hear("fleet/r1", "r1/keyframes", signed)
+    received._receive("fleet/r2", "r2/keyframes", signed)
+    received._receive("fleet/r1", "r1/keyframes", keyframe(SENT))
+    assert taken == [] and node.accounting.balance().dropped == {"malformed_keyframes": 2}
+    received._receive("fleet/r1", "r1/keyframes", signed)
     assert taken == [FromRobot("fleet/r1", SENT)]

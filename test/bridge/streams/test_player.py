@@ -21,8 +21,8 @@ from std_msgs.msg import Header, String
 from objreg_ros.bridge.messages import from_msg, to_msg
 from objreg_ros.bridge.node import qos
 from objreg_ros.bridge.streams import player as player_module
+from objreg_ros.bridge.streams.acknowledgements import IMAGE, Acknowledgements
 from objreg_ros.bridge.streams.player import Item, Player, message_type
-from objreg_ros.bridge.streams.receipts import IMAGE, Receipts
 
 PATIENCE = 20.0  # seconds; a test that gets there has failed
 STRING, PICTURE = "std_msgs/msg/String", "sensor_msgs/msg/Image"
@@ -36,12 +36,12 @@ def until(true: Callable[[], bool]) -> None:
 
 
 class Graph:
-    """Nodes of this process, spun in a thread of their own, and what they heard."""
+    """Nodes of this process, spun in a thread of their own, and what they received."""
 
     def __init__(self) -> None:
         self.executor = SingleThreadedExecutor()
         self.nodes: dict[str, Node] = {}
-        self.heard: list[object] = []
+        self.received: list[object] = []
         self.thread = threading.Thread(target=self.spin)
         self.going = True
         self.thread.start()
@@ -56,20 +56,20 @@ class Graph:
             self.executor.add_node(self.nodes[name])
         return self.nodes[name]
 
-    def hear(self, kind: type, topic: str, take: Callable[[object], object]) -> None:
-        self.node("listener").create_subscription(kind, topic, lambda m: self.heard.append(take(m)), qos.room(100))
+    def receive(self, kind: type, topic: str, take: Callable[[object], object]) -> None:
+        self.node("listener").create_subscription(kind, topic, lambda m: self.received.append(take(m)), qos.room(100))
 
     def wait_for(self, count: int) -> list[object]:
-        until(lambda: len(self.heard) >= count)
-        return self.heard
+        until(lambda: len(self.received) >= count)
+        return self.received
 
     def detector(self, answers: bool = True) -> Publisher:
-        """A node that receipts every image as soon as it comes, or not at all."""
+        """A node that acknowledgements every image as soon as it comes, or not at all."""
         node = self.node("detector")
         finished = node.create_publisher(Header, "finished", qos.room(100))
 
         def answer(message: Image) -> None:
-            self.heard.append(from_msg.stamp_ns(message))
+            self.received.append(from_msg.stamp_ns(message))
             if answers:
                 finished.publish(to_msg.finished("detector", from_msg.stamp_ns(message)))
 
@@ -111,7 +111,7 @@ def picture(stamp_ns: int) -> Item:
 
 
 def test_items_are_published_in_their_order_counted_and_told(graph: Graph, player: Player) -> None:
-    graph.hear(String, "words", lambda m: m.data)
+    graph.receive(String, "words", lambda m: m.data)
     assert player.wait_for_listeners(["words"], PATIENCE) == []
     told: list[Item] = []
     items = [word(text) for text in "abc"]
@@ -120,7 +120,7 @@ def test_items_are_published_in_their_order_counted_and_told(graph: Graph, playe
 
 
 def test_a_topic_that_nobody_hears_is_named_and_the_others_are_not(graph: Graph, player: Player) -> None:
-    graph.hear(String, "words", lambda m: m.data)
+    graph.receive(String, "words", lambda m: m.data)
     player.wait_for_listeners(["words"], PATIENCE)
     assert player.wait_for_listeners(["words", "image"], 0.05) == ["/image"]
 
@@ -142,7 +142,7 @@ def test_without_a_rate_nothing_is_waited_for(player: Player) -> None:
 
 
 def test_the_clock_shows_when_an_item_was_recorded(graph: Graph, player: Player) -> None:
-    graph.hear(Clock, "/clock", lambda m: from_msg.stamp_ns(m.clock))
+    graph.receive(Clock, "/clock", lambda m: from_msg.stamp_ns(m.clock))
     (ticks,) = (publisher for publisher in player.publishers if publisher.topic_name == "/clock")
     until(lambda: ticks.get_subscription_count() == 1)
     player.play([word("a", 1_700_000_000_000_000_001), word("b", 1_700_000_000_000_000_009)], None, lambda _: None)
@@ -156,30 +156,30 @@ def test_without_a_clock_the_time_is_left_alone(graph: Graph) -> None:
     player.close()
 
 
-def followed(graph: Graph, player: Player, finished: Publisher) -> Receipts:
-    """The receipts of the detector, once both sides are connected."""
+def followed(graph: Graph, player: Player, finished: Publisher) -> Acknowledgements:
+    """The acknowledgements of the detector, once both sides are connected."""
     until(lambda: player.count_publishers("finished") == 1)
-    receipts = player.listen_to_receipts(0.0)
+    acknowledgements = player.subscribe_to_acknowledgements(0.0)
     until(lambda: finished.get_subscription_count() == 1)
     assert player.wait_for_listeners(["image"], PATIENCE) == []
-    return receipts
+    return acknowledgements
 
 
 def test_a_lossless_play_has_one_image_on_its_way_at_a_time(graph: Graph, player: Player) -> None:
-    receipts = followed(graph, player, graph.detector())
+    acknowledgements = followed(graph, player, graph.detector())
     ahead: list[int] = []
-    player.play_lossless(map(picture, range(1, 6)), PATIENCE, lambda _: ahead.append(receipts.waiting(IMAGE)))
-    assert ahead == [1] * 5 and graph.heard == [1, 2, 3, 4, 5]
-    assert receipts.outcomes == {"detector": {"published": 5}} and player.lost == []
+    player.play_lossless(map(picture, range(1, 6)), PATIENCE, lambda _: ahead.append(acknowledgements.waiting(IMAGE)))
+    assert ahead == [1] * 5 and graph.received == [1, 2, 3, 4, 5]
+    assert acknowledgements.outcomes == {"detector": {"published": 5}} and player.lost == []
 
 
 def test_where_the_graph_is_silent_a_second_image_goes_and_what_never_ends_is_lost(
     graph: Graph, player: Player, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(player_module, "SILENCE_S", (0.05, 99.0))
-    receipts = followed(graph, player, graph.detector(answers=False))
+    acknowledgements = followed(graph, player, graph.detector(answers=False))
     ahead: list[int] = []
-    player.play_lossless(map(picture, (1, 2, 3)), 0.2, lambda _: ahead.append(receipts.waiting(IMAGE)))
+    player.play_lossless(map(picture, (1, 2, 3)), 0.2, lambda _: ahead.append(acknowledgements.waiting(IMAGE)))
     assert ahead == [1, 2, 1] and player.lost == [1, 2, 3]
 
 
@@ -196,7 +196,7 @@ def test_a_node_that_ends_during_a_lossless_play_is_named(
 
 def test_a_lossless_play_without_nodes_is_refused(player: Player) -> None:
     with pytest.raises(ValueError, match="expected the nodes to publish `finished`, got none"):
-        player.listen_to_receipts(0.0)
+        player.subscribe_to_acknowledgements(0.0)
 
 
 def test_a_node_that_does_not_hear_its_inputs_is_told(
@@ -207,11 +207,11 @@ def test_a_node_that_does_not_hear_its_inputs_is_told(
     graph.node("segmenter").create_subscription(String, "labels", print, qos.room())
     until(lambda: player.count_publishers("finished") == player.count_subscribers("labels") == 1)
     with pytest.raises(ValueError, match=r"expected listening nodes, got none on detections_table$"):
-        player.listen_to_receipts(0.0)
+        player.subscribe_to_acknowledgements(0.0)
 
 
 def test_a_lossless_play_without_receipts_is_refused(player: Player) -> None:
-    with pytest.raises(ValueError, match="expected listen_to_receipts before a lossless play"):
+    with pytest.raises(ValueError, match="expected subscribe_to_acknowledgements before a lossless play"):
         player.play_lossless([], 1.0, print)
 
 
@@ -220,16 +220,16 @@ def test_who_comes_late_still_gets_what_was_latched(graph: Graph) -> None:
     try:
         for topic in ("words", "static"):
             player.play([Item(topic, 0, serialize_message(String(data=topic)))], None, print)
-        heard: list[str] = []
+        received: list[str] = []
         for topic in ("words", "static"):
-            player.create_subscription(String, topic, lambda m: heard.append(m.data), qos.latched(5))
-            player.create_subscription(String, topic, lambda m: heard.append(m.data), qos.room())
+            player.create_subscription(String, topic, lambda m: received.append(m.data), qos.latched(5))
+            player.create_subscription(String, topic, lambda m: received.append(m.data), qos.room())
         deadline = time.monotonic() + 5.0
-        while not heard and time.monotonic() < deadline:
+        while not received and time.monotonic() < deadline:
             rclpy.spin_once(player, timeout_sec=0.05)
         for _ in range(10):
             rclpy.spin_once(player, timeout_sec=0.02)
-        assert heard == ["static"]
+        assert received == ["static"]
     finally:
         player.close()
 

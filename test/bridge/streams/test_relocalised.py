@@ -18,7 +18,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from std_srvs.srv import Trigger
 
 from objreg_ros.bridge.node import qos
-from objreg_ros.bridge.node.door import Door
+from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.bridge.node.params import RelocalisedParams
 from objreg_ros.bridge.streams import relocalised
 from objreg_ros.bridge.streams.relocalised import Answer, Whereabouts, on_plane, with_covariance
@@ -39,88 +39,88 @@ ON_BODY = pose(np.eye(3), np.array([0.5, 0.0, 0.0]))
 UNKNOWN: Answer = None, "no closure to an earlier session yet"
 KNOWN: Answer = FOUND, "2 closures that agree"
 
-Making = Callable[..., Door]
+Making = Callable[..., NodeBase]
 
 
 @pytest.fixture
 def make(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Making]:
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path))
-    made: list[Door] = []
+    made: list[NodeBase] = []
 
-    def door(*parameters: str) -> Door:
+    def node(*parameters: str) -> NodeBase:
         told = [word for one in parameters for word in ("-p", one)]
         rclpy.init(args=["asked", "--ros-args", *told, "-r", "__ns:=/test_relocalised"])
-        made.append(Door("asked", RelocalisedParams))
+        made.append(NodeBase("asked", RelocalisedParams))
         return made[-1]
 
-    yield door
+    yield node
     for one in made:
         one.close()
     rclpy.try_shutdown()
 
 
-def hear(door: Door, topic: str) -> list[Any]:
+def receive(node: NodeBase, topic: str) -> list[Any]:
     messages: list[Any] = []
-    door.create_subscription(PoseWithCovarianceStamped, topic, messages.append, qos.latched())
+    node.create_subscription(PoseWithCovarianceStamped, topic, messages.append, qos.latched())
     return messages
 
 
-def wait_for(door: Door, true: Callable[[], bool], seconds: float = 20.0) -> bool:
+def wait_for(node: NodeBase, true: Callable[[], bool], seconds: float = 20.0) -> bool:
     deadline = time.monotonic() + seconds
     while not true() and time.monotonic() < deadline:
-        rclpy.spin_once(door, timeout_sec=0.05)
+        rclpy.spin_once(node, timeout_sec=0.05)
     return true()
 
 
-def call(door: Door, kind: type, **fields: float) -> Any:
-    client = door.create_client(kind, "~/relocalise", callback_group=door.apart)
+def call(node: NodeBase, kind: type, **fields: float) -> Any:
+    client = node.create_client(kind, "~/relocalise", callback_group=node.apart)
     assert client.wait_for_service(10.0)
     answer = client.call_async(kind.Request(**fields))
-    rclpy.spin_until_future_complete(door, answer, timeout_sec=30.0)
+    rclpy.spin_until_future_complete(node, answer, timeout_sec=30.0)
     return answer.result()
 
 
 def test_what_becomes_known_is_published_once_and_again_after_it_was_forgotten(make: Making) -> None:
-    door, answers = make("map_frame:=hall"), [UNKNOWN]
-    telling = Whereabouts(door, lambda: answers[-1])
-    heard = hear(door, "relocalised")
+    node, answers = make("map_frame:=hall"), [UNKNOWN]
+    telling = Whereabouts(node, lambda: answers[-1])
+    received = receive(node, "relocalised")
     telling.mounted(ON_BODY)
     for answer in (UNKNOWN, KNOWN, KNOWN, UNKNOWN, KNOWN):
         answers.append(answer)
         telling.look()
-        wait_for(door, lambda: False, 0.2)
-    assert len(heard) == 2 and heard[0].header.frame_id == "hall" and heard[0].header.stamp.nanosec == 7
-    at = heard[0].pose.pose.position
+        wait_for(node, lambda: False, 0.2)
+    assert len(received) == 2 and received[0].header.frame_id == "hall" and received[0].header.stamp.nanosec == 7
+    at = received[0].pose.pose.position
     assert (at.x, at.y, at.z) == pytest.approx((1.0 - 0.5 * np.cos(0.5), 2.0 - 0.5 * np.sin(0.5), 3.0))
-    assert heard[0].pose.covariance[0] > 1.0 and heard[0].pose.covariance[35] == 6.0
-    assert door.count_publishers("initialpose") == 0
+    assert received[0].pose.covariance[0] > 1.0 and received[0].pose.covariance[35] == 6.0
+    assert node.count_publishers("initialpose") == 0
 
 
 def test_initialpose_is_told_where_it_is_asked_for_and_lies_on_the_plane(make: Making) -> None:
-    door = make("initialpose:=true")
-    heard = []
-    door.create_subscription(PoseWithCovarianceStamped, "initialpose", heard.append, qos.room())
-    telling = Whereabouts(door, lambda: KNOWN)
+    node = make("initialpose:=true")
+    received = []
+    node.create_subscription(PoseWithCovarianceStamped, "initialpose", received.append, qos.room())
+    telling = Whereabouts(node, lambda: KNOWN)
     telling.mounted(ON_BODY)
-    assert wait_for(door, lambda: door.count_subscribers("initialpose") == 1)
-    wait_for(door, lambda: False, 0.5)
+    assert wait_for(node, lambda: node.count_subscribers("initialpose") == 1)
+    wait_for(node, lambda: False, 0.5)
     telling.look()
-    assert wait_for(door, lambda: bool(heard))
-    assert heard[0].pose.pose.position.z == 0.0 and heard[0].header.frame_id == "earlier_map"
+    assert wait_for(node, lambda: bool(received))
+    assert received[0].pose.pose.position.z == 0.0 and received[0].header.frame_id == "earlier_map"
 
 
 @pytest.mark.parametrize(("by_odometry", "mount"), [(False, ON_BODY), (True, None)])
 def test_no_initialpose_is_told_of_a_map_that_may_be_tilted_or_of_a_camera(
     by_odometry: bool, mount: np.ndarray | None, make: Making
 ) -> None:
-    door, said, heard = make("initialpose:=true"), list[str](), list[object]()
-    door.throttled._write = said.append
-    door.create_subscription(PoseWithCovarianceStamped, "initialpose", heard.append, qos.room())
-    telling = Whereabouts(door, lambda: (replace(FOUND, by_odometry=by_odometry), "known"))
+    node, said, received = make("initialpose:=true"), list[str](), list[object]()
+    node.throttled._write = said.append
+    node.create_subscription(PoseWithCovarianceStamped, "initialpose", received.append, qos.room())
+    telling = Whereabouts(node, lambda: (replace(FOUND, by_odometry=by_odometry), "known"))
     telling.mounted(mount)
-    assert wait_for(door, lambda: door.count_subscribers("initialpose") == 1)
+    assert wait_for(node, lambda: node.count_subscribers("initialpose") == 1)
     telling.look()
-    assert not wait_for(door, lambda: bool(heard), 0.5)
+    assert not wait_for(node, lambda: bool(received), 0.5)
     assert "expected odometry in both sessions" in said[0] and "set T_base_camera" in said[0]
 
 
@@ -128,27 +128,27 @@ def test_without_objreg_msgs_the_service_is_a_trigger_that_says_where_or_why_not
     make: Making, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(relocalised, "Relocalise", None)
-    door, answers = make(), [UNKNOWN]
-    heard = hear(door, "relocalised")
-    Whereabouts(door, lambda: answers[-1])
-    answer = call(door, Trigger)
+    node, answers = make(), [UNKNOWN]
+    received = receive(node, "relocalised")
+    Whereabouts(node, lambda: answers[-1])
+    answer = call(node, Trigger)
     assert not answer.success and answer.message == UNKNOWN[1]
     answers.append(KNOWN)
-    answer = call(door, Trigger)
+    answer = call(node, Trigger)
     assert answer.success and answer.message == "session 4 at 1.000 2.000 3.000 m: 2 closures that agree"
-    assert wait_for(door, lambda: bool(heard))
+    assert wait_for(node, lambda: bool(received))
 
 
 @pytest.mark.skipif(relocalised.Relocalise is None, reason="objreg_msgs is not installed")
 def test_the_service_of_objreg_msgs_waits_as_long_as_it_is_asked_to(make: Making) -> None:
-    door, begun = make(), time.monotonic()
-    Whereabouts(door, lambda: KNOWN if time.monotonic() - begun > 2.0 else UNKNOWN)
-    answer = call(door, relocalised.Relocalise, wait_seconds=0.0)
+    node, begun = make(), time.monotonic()
+    Whereabouts(node, lambda: KNOWN if time.monotonic() - begun > 2.0 else UNKNOWN)
+    answer = call(node, relocalised.Relocalise, wait_seconds=0.0)
     assert not answer.success and answer.message == UNKNOWN[1] and not answer.session
-    answer = call(door, relocalised.Relocalise, wait_seconds=20.0)
+    answer = call(node, relocalised.Relocalise, wait_seconds=20.0)
     assert answer.success and answer.session == "4" and answer.pose.pose.pose.position.z == 3.0
     for seconds in (-1.0, float("nan"), 1e9):
-        answer = call(door, relocalised.Relocalise, wait_seconds=seconds)
+        answer = call(node, relocalised.Relocalise, wait_seconds=seconds)
         assert not answer.success and answer.message.startswith("wait_seconds: expected 0 to 60, got")
 
 
@@ -173,8 +173,8 @@ def test_a_body_that_looks_straight_up_has_the_yaw_of_its_left() -> None:
 
 
 def test_who_finds_too_many_waiting_is_answered_at_once_and_costs_no_thread(make: Making) -> None:
-    door = make()
-    where, before = Whereabouts(door, lambda: UNKNOWN), threading.active_count()
+    node = make()
+    where, before = Whereabouts(node, lambda: UNKNOWN), threading.active_count()
     answered = []
     asked = [where._relocalise(SimpleNamespace(wait_seconds=0.5), SimpleNamespace()) for _ in range(19)]
     for one in asked:
@@ -186,15 +186,15 @@ def test_who_finds_too_many_waiting_is_answered_at_once_and_costs_no_thread(make
 
 
 def test_who_comes_after_it_has_become_unknown_gets_no_pose_of_before(make: Making) -> None:
-    door, answers = make(), [KNOWN]
-    where = Whereabouts(door, lambda: answers[-1])
-    before = hear(door, "relocalised")
+    node, answers = make(), [KNOWN]
+    where = Whereabouts(node, lambda: answers[-1])
+    before = receive(node, "relocalised")
     where.look()
-    assert wait_for(door, lambda: len(before) == 1)
+    assert wait_for(node, lambda: len(before) == 1)
     answers.append(UNKNOWN)
     where.look()
-    late = hear(door, "relocalised")
-    assert not wait_for(door, lambda: bool(late), 1.0)
+    late = receive(node, "relocalised")
+    assert not wait_for(node, lambda: bool(late), 1.0)
     answers.append(KNOWN)
     where.look()
-    assert wait_for(door, lambda: len(late) == 1 and len(before) == 2)
+    assert wait_for(node, lambda: len(late) == 1 and len(before) == 2)

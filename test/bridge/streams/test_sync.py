@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from objreg_ros.bridge.streams.course import AHEAD_NS
+from objreg_ros.bridge.streams.clock_monitor import AHEAD_NS
 from objreg_ros.bridge.streams.sync import (
     ENCLOSING,
     JUMP_NS,

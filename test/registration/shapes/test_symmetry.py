@@ -10,7 +10,7 @@ from objreg_ros.data import ObjectCloud
 from objreg_ros.registration.prepare.prepared import SHAPE_POINTS
 from objreg_ros.registration.shapes import symmetry
 from objreg_ros.registration.shapes.shape import prepare_shape
-from objreg_ros.registration.shapes.symmetry import tells_yaw, turned_violations, yaw_share
+from objreg_ros.registration.shapes.symmetry import shows_yaw, turned_violations, yaw_share
 from registration.drawn_shapes import ELL, from_side, keyframe
 
 UP = np.array([0.0, -1.0, 0.0])  # a level camera: y down
@@ -62,9 +62,9 @@ def test_what_is_not_round_would_stand_in_seen_free_space_if_it_were_turned(monk
             seen = keyframe(from_side(angle), {"thing": thing})
             shape = prepare_shape(seen, [0], SHAPE_POINTS)
             assert shape is not None and (turned_violations(shape) > 0.1) is told
-            assert tells_yaw(seen.objects[0].cloud, -np.asarray(seen.gravity), shape) is told
+            assert shows_yaw(seen.objects[0].cloud, -np.asarray(seen.gravity), shape) is told
 
 
 def test_where_up_is_unknown_no_yaw_is_told() -> None:
-    assert not tells_yaw(corner_of_a_box(), None, None)
-    assert tells_yaw(corner_of_a_box(), UP, None)
+    assert not shows_yaw(corner_of_a_box(), None, None)
+    assert shows_yaw(corner_of_a_box(), UP, None)

@@ -17,7 +17,7 @@ from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store
 from objreg_ros.registration.keyframe import Keyframe
 from objreg_ros.report.exports.map_files import MapFiles
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_summary import RunSummary
 from objreg_ros.truth import Truth
 from report.ply_reader import positions, read_ply
 from report.runs import COUNT, TRUE, TRUTH, summary
@@ -26,18 +26,18 @@ NOWHERE = Path("no_store")
 
 
 @pytest.fixture(scope="module")
-def walk() -> Story:
-    return Story.of("walk", summary(false=True), TRUTH)
+def walk() -> RunSummary:
+    return RunSummary.of("walk", summary(false=True), TRUTH)
 
 
 def rows_of(file: Path) -> np.ndarray:
     return np.array([line.split() for line in file.read_text().splitlines()], float)
 
 
-def straight(seconds: int) -> Story:
+def straight(seconds: int) -> RunSummary:
     """A camera that goes a metre a second along x, without closures."""
     glimpses = [{"stamp_ns": k * SECOND, "T_odom_camera": moved(k).tolist()} for k in range(seconds)]
-    return Story.of("straight", {"glimpses": glimpses, "constraints": []}, Truth([]))
+    return RunSummary.of("straight", {"glimpses": glimpses, "constraints": []}, Truth([]))
 
 
 def store_of(path: Path, *keyframes: Keyframe) -> Path:
@@ -53,7 +53,7 @@ def taken(number: int, seconds: float, *objects: object, x: float | None = None)
     return replace(made, by_odometry=True)
 
 
-def test_the_trajectories_are_the_corrected_way_at_every_frame(walk: Story, tmp_path: Path) -> None:
+def test_the_trajectories_are_the_corrected_way_at_every_frame(walk: RunSummary, tmp_path: Path) -> None:
     told: list[str] = []
     MapFiles(tum=tmp_path / "way.tum", kitti=tmp_path / "way.kitti").write(walk, NOWHERE, told.append)
     tum, kitti = rows_of(tmp_path / "way.tum"), rows_of(tmp_path / "way.kitti").reshape(-1, 3, 4)
@@ -67,7 +67,7 @@ def test_the_trajectories_are_the_corrected_way_at_every_frame(walk: Story, tmp_
     assert told == [f"{tmp_path / name}: {COUNT} poses" for name in ("way.tum", "way.kitti")]
 
 
-def test_the_graph_has_the_keyframes_and_what_ties_them_but_what_was_pruned(walk: Story, tmp_path: Path) -> None:
+def test_the_graph_has_the_keyframes_and_what_ties_them_but_what_was_pruned(walk: RunSummary, tmp_path: Path) -> None:
     MapFiles(g2o=tmp_path / "graph.g2o").write(walk, NOWHERE)
     lines = [line.split() for line in (tmp_path / "graph.g2o").read_text().splitlines()]
     vertices = [line for line in lines if line[0] == "VERTEX_SE3:QUAT"]
@@ -103,7 +103,7 @@ def test_a_map_that_is_bent_bends_its_cloud(tmp_path: Path) -> None:
         "covariance": np.diag([1e-6] * 6).tolist(),
         "labels": [],
     }
-    story = Story.of("back", {"glimpses": glimpses, "constraints": [closure]}, Truth([]))
+    story = RunSummary.of("back", {"glimpses": glimpses, "constraints": [closure]}, Truth([]))
     mark = cloud("cup", np.array([[0.0, 0.0, 1.0]]), rgb=np.uint8([[255, 0, 0]]))
     store = store_of(tmp_path / "place.db", taken(1, 0.0, mark), taken(2, last, mark, x=way[-1]))
     MapFiles(cloud=tmp_path / "map.ply").write(story, store)
@@ -137,7 +137,7 @@ def test_keyframes_of_our_own_tracking_are_on_its_map_and_those_of_odometry_are_
     rows = [
         {"stamp_ns": k * SECOND, "tracked": {"session": 4, "T_session_camera": moved(k).tolist()}} for k in range(3)
     ]
-    story = Story.of("straight", {"glimpses": rows, "constraints": [], "odometry": "tracked"}, Truth([]))
+    story = RunSummary.of("straight", {"glimpses": rows, "constraints": [], "odometry": "tracked"}, Truth([]))
     store = store_of(tmp_path / "a.db", replace(taken(1, 1.0), by_odometry=False), taken(2, 2.0))
     told: list[str] = []
     MapFiles(tum=tmp_path / "way.tum", cloud=tmp_path / "map.ply").write(story, store, told.append)
@@ -157,5 +157,5 @@ def test_a_damaged_keyframe_is_left_out_and_told(tmp_path: Path) -> None:
 def test_a_run_without_odometry_has_no_map(tmp_path: Path) -> None:
     told = {"glimpses": [{"stamp_ns": 0}, {"stamp_ns": 1}], "constraints": []}
     with pytest.raises(ValueError, match="--tum: expected frames with odometry, got none of 2: there is no map"):
-        MapFiles(tum=tmp_path / "way.tum").write(Story.of("blind", told, Truth([])), NOWHERE)
+        MapFiles(tum=tmp_path / "way.tum").write(RunSummary.of("blind", told, Truth([])), NOWHERE)
     assert not (tmp_path / "way.tum").exists()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.report.exports.run_scene import MOST_POINTS, WIDTH, scene_of
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_summary import RunSummary
 from objreg_ros.truth import Truth
 from report.runs import COUNT, STEP_NS, TRUE, TRUTH, summary
 from report.scenes import SEEN, FewPictures, walk
@@ -44,7 +44,7 @@ def test_moments_are_thinned_and_those_without_a_picture_are_passed_over() -> No
 def test_without_odometry_the_truth_is_shown() -> None:
     told = summary()
     told["glimpses"] = [{"stamp_ns": row["stamp_ns"]} for row in told["glimpses"]]
-    scene = scene_of(Story.of("walk", told, TRUTH), FewPictures())  # type: ignore[arg-type]
+    scene = scene_of(RunSummary.of("walk", told, TRUTH), FewPictures())  # type: ignore[arg-type]
     assert list(scene.ways) == ["true"] and scene.objects == () and len(scene.edges) == 4
     assert np.allclose(scene.main.poses[7], TRUE[7])
 
@@ -52,4 +52,4 @@ def test_without_odometry_the_truth_is_shown() -> None:
 def test_a_run_of_which_nobody_knows_where_it_was_is_refused() -> None:
     told = {"glimpses": [{"stamp_ns": 5}], "constraints": []}
     with pytest.raises(ValueError, match="walk: expected odometry or a ground truth"):
-        scene_of(Story.of("walk", told, Truth([])), FewPictures())  # type: ignore[arg-type]
+        scene_of(RunSummary.of("walk", told, Truth([])), FewPictures())  # type: ignore[arg-type]

@@ -11,12 +11,12 @@ import numpy as np
 from objreg_ros.data import DepthImage
 from objreg_ros.report.run.clouds import LEFT_OUT, MOST_POINTS, clouds, thinned
 from objreg_ros.report.run.pairs import pairs_of
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_summary import RunSummary
 from report.run.test_thumbnails import RGB, SEEN, Wall
 from report.runs import STEP_NS, TRUE, TRUTH, closure, refusal, summary
 from report.test_packed import unpacked
 
-PAIRS = pairs_of(Story.of("walk", summary(false=True), TRUTH))
+PAIRS = pairs_of(RunSummary.of("walk", summary(false=True), TRUTH))
 
 
 class Blind(Wall):
@@ -37,7 +37,7 @@ def test_a_cloud_is_what_the_camera_measured_in_its_colours() -> None:
 
 def test_a_pair_has_its_pose_and_a_moment_of_two_pairs_is_kept_once() -> None:
     told = {**summary(), "constraints": [closure(5, 65), closure(5, 66)]}
-    made = clouds(pairs_of(Story.of("walk", told, TRUTH)), Wall())
+    made = clouds(pairs_of(RunSummary.of("walk", told, TRUTH)), Wall())
     assert len(made.moments) == 3 and list(made.poses) == ["c0", "c1"] and made.lacking == ""
     expected = np.linalg.inv(TRUE[5]) @ TRUE[65]
     assert np.allclose(np.reshape(made.poses["c0"], (3, 4)), expected[:3], atol=1e-5)
@@ -46,7 +46,7 @@ def test_a_pair_has_its_pose_and_a_moment_of_two_pairs_is_kept_once() -> None:
 def test_a_refusal_has_clouds_where_it_has_a_pose() -> None:
     posed = {**refusal("texture_disagrees", 9, 99), "T_from_to": np.eye(4).tolist()}
     told = {**summary(), "refusals": [refusal("texture_disagrees", 3, 70), posed]}
-    assert list(clouds(pairs_of(Story.of("walk", told, TRUTH)), Wall()).poses) == ["c0", "c1", "c2", "c3", "r1"]
+    assert list(clouds(pairs_of(RunSummary.of("walk", told, TRUTH)), Wall()).poses) == ["c0", "c1", "c2", "c3", "r1"]
 
 
 def test_a_page_that_is_full_keeps_the_false_one_and_says_what_it_leaves_out() -> None:

@@ -7,13 +7,13 @@ from typing import Any
 
 from objreg_ros.report.page import page
 from objreg_ros.report.run.comparison import KEYFRAME_NS, comparison, matched, names_of
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_summary import RunSummary
 from report.runs import TRUTH, closure, refusal, summary
 
 
-def told(params: dict[str, Any], **others: Any) -> Story:
+def told(params: dict[str, Any], **others: Any) -> RunSummary:
     made = {"version": "0.1.0", "commit": "abc", "params": params, "date": "now", "model": {"name": "m", "sha256": "1"}}
-    return Story.of("walk", {**summary(), "about": made, **others}, TRUTH)
+    return RunSummary.of("walk", {**summary(), "about": made, **others}, TRUTH)
 
 
 def test_runs_are_named_by_what_differs_between_them() -> None:
@@ -26,7 +26,7 @@ def test_runs_are_named_by_what_differs_between_them() -> None:
 
 
 def test_constraints_are_the_same_within_the_time_of_a_keyframe() -> None:
-    stories = [Story.of("walk", {**summary(), "constraints": rows}, TRUTH) for rows in (
+    stories = [RunSummary.of("walk", {**summary(), "constraints": rows}, TRUTH) for rows in (
         [closure(5, 65), closure(20, 80), closure(40, 100)],
         [closure(20 + KEYFRAME_NS // 10**8, 80), closure(40, 112), closure(6, 64)],
     )]  # fmt: skip
@@ -34,7 +34,7 @@ def test_constraints_are_the_same_within_the_time_of_a_keyframe() -> None:
 
 
 def test_a_constraint_is_matched_once_with_the_nearest() -> None:
-    story = Story.of("walk", {**summary(), "constraints": [closure(20, 80), closure(21, 81)]}, TRUTH)
+    story = RunSummary.of("walk", {**summary(), "constraints": [closure(20, 80), closure(21, 81)]}, TRUTH)
     assert matched(story.closures, story.closures[1:]) == {1: 0}
 
 

@@ -10,11 +10,11 @@ from xml.etree import ElementTree
 import numpy as np
 
 from objreg_ros.report.run import figures
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_summary import RunSummary
 from objreg_ros.truth import Truth
 from report.runs import STEP_NS, TRUE, TRUTH, closure, summary, with_a_stray
 
-STORY = Story.of("walk", summary(false=True), TRUTH)
+STORY = RunSummary.of("walk", summary(false=True), TRUTH)
 
 
 def count(svg: str, style: str) -> int:
@@ -28,7 +28,7 @@ def test_the_way_shows_three_lines_and_a_link_a_closure() -> None:
 
 
 def test_the_closures_of_a_run_without_odometry_are_drawn_on_the_true_way() -> None:
-    blind = Story.of("blind", {**summary(), "glimpses": []}, TRUTH)
+    blind = RunSummary.of("blind", {**summary(), "glimpses": []}, TRUTH)
     stamps_ns, true = blind.true_way()
     svg = figures.way(blind, stamps_ns, {"true": true})
     assert [count(svg, style) for style in ("true", "odometry", "link")] == [1, 0, 4]
@@ -42,7 +42,7 @@ def test_a_drawing_for_a_telephone_has_letters_of_the_same_size_in_less_width() 
 
 def test_a_closure_tells_what_had_moved() -> None:
     told = {**closure(0, 60), "evidence": {"score": 0.8, "moved soda_can [m]": 0.412}}
-    story = Story.of("walk", {**summary(), "constraints": [told]}, TRUTH)
+    story = RunSummary.of("walk", {**summary(), "constraints": [told]}, TRUTH)
     assert figures.closure_words(story, story.closures[0]).endswith(
         "cup, book, soda can moved by 0.41 m, off by 0.0° and 0.0 cm"
     )
@@ -63,7 +63,7 @@ def test_the_timeline_has_a_dot_a_refusal_and_a_row_a_reason() -> None:
 def test_the_timeline_and_the_error_are_of_the_run_without_what_is_of_another_time() -> None:
     stray_ns = -1_700_000_000 * 10**9
     known = Truth([(stray_ns, TRUE[0]), *((k * STEP_NS, T) for k, T in enumerate(TRUE))])
-    story = Story.of("walk", with_a_stray(stray_ns), known)
+    story = RunSummary.of("walk", with_a_stray(stray_ns), known)
     svg = figures.timeline(story)
     assert count(svg, "refused") == 3 and "ghost," not in svg
     bars = [child for child in ElementTree.fromstring(svg) if "seen" in (child.get("class") or "").split()]

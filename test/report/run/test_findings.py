@@ -56,15 +56,15 @@ def test_refusals_are_counted_without_what_was_never_tried() -> None:
 
 
 def test_the_live_graph_is_told_by_its_books_and_its_frames() -> None:
-    books = {"published": 0, "received": 100, "dropped": {"overtaken": 50}}
+    counters = {"published": 0, "received": 100, "dropped": {"overtaken": 50}}
     row = {"stamp_ns": 1, "labels": ["cup"], "objects": []}
-    told = {"nodes": {"segmenter": {**books, "published": 3}}, "glimpses": [row], "constraints": []}
+    told = {"nodes": {"segmenter": {**counters, "published": 3}}, "glimpses": [row], "constraints": []}
     assert [finding.anchor for finding in find(told)] == ["no-objects", "overtaken"]
 
 
 def test_few_overtaken_frames_are_usual_and_a_search_that_ended_early_is_not() -> None:
-    books = {"received": 100, "dropped": {"overtaken": 4}}
-    assert not find({**CLOSED, "nodes": {"detector": books}, "frames": 9})
+    counters = {"received": 100, "dropped": {"overtaken": 4}}
+    assert not find({**CLOSED, "nodes": {"detector": counters}, "frames": 9})
     assert [f.anchor for f in find({**CLOSED, "rejected": {"over_budget": 2}})] == ["over-budget"]
 
 

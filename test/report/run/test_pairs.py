@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from objreg_ros.report.run.pairs import by_interest, pairs_of
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_summary import RunSummary
 from objreg_ros.truth import Truth
 from report.runs import STEP_NS, TRUTH, closure, refusal, summary
 
-STORY = Story.of("walk", summary(false=True), TRUTH)
+STORY = RunSummary.of("walk", summary(false=True), TRUTH)
 
 
 def test_every_constraint_and_every_refusal_is_a_pair() -> None:
@@ -25,7 +25,7 @@ def test_a_pair_tells_its_error_where_truth_does() -> None:
     pair = pairs_of(STORY)[4]
     assert pair.error == pytest.approx((0.0, 50.0), abs=1e-4)
     assert "In truth 120° and 1.7 m apart; the pose is off by 0.0° and 50.0 cm." in pair.words
-    unjudged = pairs_of(Story.of("walk", summary(), Truth([])))[0]
+    unjudged = pairs_of(RunSummary.of("walk", summary(), Truth([])))[0]
     assert unjudged.error is None and unjudged.words == ""
 
 
@@ -34,12 +34,12 @@ def test_the_labels_of_a_refusal_are_those_detected_at_both_moments() -> None:
     labels = {0: ["cup", "book"], 70: ["book", "mug"]}
     told["glimpses"] = [{"stamp_ns": k * STEP_NS, "labels": names} for k, names in labels.items()]
     told["refusals"] = [refusal("texture_disagrees", 0, 70), refusal("texture_disagrees", 0, 71)]
-    assert [pair.labels for pair in pairs_of(Story.of("walk", told, TRUTH))[-2:]] == [("book",), ()]
+    assert [pair.labels for pair in pairs_of(RunSummary.of("walk", told, TRUTH))[-2:]] == [("book",), ()]
 
 
 def test_what_was_refused_says_why_and_what_moved_says_so() -> None:
     moved = {**closure(5, 65), "evidence": {"moved cup [m]": 0.4}}
-    pairs = pairs_of(Story.of("walk", {**summary(), "constraints": [moved]}, TRUTH))
+    pairs = pairs_of(RunSummary.of("walk", {**summary(), "constraints": [moved]}, TRUTH))
     assert pairs[0].words.startswith("cup moved by 0.40 m. In truth")
     assert pairs[2].words.startswith("0.3 < 0.5 & texture_disagrees. In truth")
 
@@ -47,5 +47,5 @@ def test_what_was_refused_says_why_and_what_moved_says_so() -> None:
 def test_false_constraints_are_looked_at_first_and_what_was_not_tried_last() -> None:
     told = summary(false=True)
     told["refusals"][1]["T_from_to"] = np.eye(4).tolist()
-    order = [pair.key for pair in by_interest(pairs_of(Story.of("walk", told, TRUTH)))]
+    order = [pair.key for pair in by_interest(pairs_of(RunSummary.of("walk", told, TRUTH)))]
     assert order == ["c4", "c0", "c1", "c2", "c3", "r1", "r2", "r0"]

@@ -17,7 +17,7 @@ from objreg_ros.recording import Record, messages, write_rosbag2
 from objreg_ros.recording.inputs import Inputs, choose_inputs
 from objreg_ros.recording.opening import open_recording
 from objreg_ros.report.run.pictures import WIDTH, Album, chosen_closures, chosen_refusals, data_uri, overlay
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_summary import RunSummary
 from report.runs import TRUTH, summary
 
 CAMERA = Intrinsics(fx=300.0, fy=300.0, cx=159.5, cy=119.5, width=WIDTH, height=240)
@@ -49,14 +49,14 @@ def test_what_only_one_saw_stays_dark() -> None:
 
 
 def test_false_closures_are_shown_first() -> None:
-    story = Story.of("walk", summary(false=True), TRUTH)
+    story = RunSummary.of("walk", summary(false=True), TRUTH)
     shown = chosen_closures(story, most=3)
     assert story.is_false(shown[0]) and len(shown) == 3
     assert not any(story.is_false(closure) for closure in shown[1:])
 
 
 def test_only_what_was_tried_is_shown_as_refused() -> None:
-    shown = chosen_refusals(Story.of("walk", summary(), TRUTH))
+    shown = chosen_refusals(RunSummary.of("walk", summary(), TRUTH))
     assert [refusal.reason.value for refusal in shown] == ["texture_disagrees"] * 2
 
 
@@ -86,7 +86,7 @@ def test_an_album_says_that_a_picture_does_not_decode_and_has_those_beside_it(tm
 @pytest.mark.parametrize("count", [0, 1])
 def test_a_story_of_few_closures_shows_them_all(count: int) -> None:
     told = {**summary(), "constraints": summary()["constraints"][:count]}
-    assert len(chosen_closures(Story.of("walk", told, TRUTH))) == count
+    assert len(chosen_closures(RunSummary.of("walk", told, TRUTH))) == count
 
 
 def test_an_album_says_why_it_has_no_picture_of_a_moment(tmp_path: Path) -> None:

@@ -9,28 +9,28 @@ import numpy as np
 import pytest
 
 from objreg_ros.geometry import pose, rotation_from_vector
+from objreg_ros.report.run.run_summary import RunSummary
 from objreg_ros.report.run.scene import levelling, scene
-from objreg_ros.report.run.story import Story
 from report.runs import OBJECTS, TRUTH, summary
 from report.test_packed import unpacked
 
 UPRIGHT = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # of a camera that looks along y while z is up
 
 
-def drawn(story: Story) -> dict:
+def drawn(story: RunSummary) -> dict:
     tracks = story.tracks()
     return scene(story, tracks.stamps_ns, tracks.lines, tracks)
 
 
 def test_the_ways_are_there_by_name() -> None:
-    story = Story.of("walk", summary(), TRUTH)
+    story = RunSummary.of("walk", summary(), TRUTH)
     ways = {way["name"]: unpacked(way) for way in drawn(story)["ways"]}
     assert {*ways} == {"truth", "odometry", "corrected"}
     assert np.allclose(ways["truth"], story.tracks().true, atol=1e-3)
 
 
 def test_closures_are_told_apart_by_verdict_and_by_what_the_mapper_pruned() -> None:
-    story = Story.of("walk", summary(false=True), TRUTH)
+    story = RunSummary.of("walk", summary(false=True), TRUTH)
     story = replace(story, pruned=(story.closures[1], story.closures[4]))
     groups = {group["name"]: group for group in drawn(story)["closures"]}
     assert {name: group["keys"] for name, group in groups.items()} == {
@@ -41,14 +41,14 @@ def test_closures_are_told_apart_by_verdict_and_by_what_the_mapper_pruned() -> N
 
 
 def test_objects_are_where_truth_has_them_and_named_once() -> None:
-    made = drawn(Story.of("walk", summary(), TRUTH))
+    made = drawn(RunSummary.of("walk", summary(), TRUTH))
     assert [heap["name"] for heap in made["objects"]] == ["cup", "book"]
     names = dict(zip(made["names"]["text"], unpacked(made["names"]), strict=True))
     assert made["names"]["text"].count("cup") == 2 and np.allclose(names["book"], OBJECTS[2][1], atol=0.1)
 
 
 def test_a_run_without_odometry_has_the_true_way_with_its_closures() -> None:
-    story = Story.of("blind", {**summary(), "glimpses": []}, TRUTH)
+    story = RunSummary.of("blind", {**summary(), "glimpses": []}, TRUTH)
     stamps_ns, true = story.true_way()
     made = scene(story, stamps_ns, {"true": true}, None)
     assert [way["name"] for way in made["ways"]] == ["truth"] and made["objects"] == []

@@ -7,7 +7,7 @@ import numpy as np
 
 from objreg_ros.data import DepthImage, Intrinsics
 from objreg_ros.report.run.pairs import pairs_of
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_summary import RunSummary
 from objreg_ros.report.run.thumbnails import thumbnails
 from report.runs import STEP_NS, TRUTH, refusal, summary
 
@@ -29,12 +29,12 @@ class Wall:
         return None if stamp_ns == self.dark_ns else SEEN
 
 
-PAIRS = pairs_of(Story.of("walk", summary(false=True), TRUTH))
+PAIRS = pairs_of(RunSummary.of("walk", summary(false=True), TRUTH))
 
 
 def test_a_moment_of_two_pairs_is_kept_once_and_a_pose_has_its_overlay() -> None:
     told = {**summary(), "refusals": [refusal("texture_disagrees", 5, 99)]}  # 5 is a moment of the first closure too
-    drawn = thumbnails(pairs_of(Story.of("walk", told, TRUTH)), Wall())
+    drawn = thumbnails(pairs_of(RunSummary.of("walk", told, TRUTH)), Wall())
     assert len(drawn.moments) == 9 and list(drawn.overlays) == ["c0", "c1", "c2", "c3"]
     assert all(uri.startswith("data:image/jpeg;base64,") for uri in (*drawn.moments.values(), *drawn.overlays.values()))
     assert drawn.left_out == 0 and not drawn.lacking

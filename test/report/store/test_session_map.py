@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from objreg_ros.report.store.session_map import session_maps
-from objreg_ros.report.store.store_survey import survey
+from objreg_ros.report.store.store_summary import survey
 from report.places import at, cup_and_book, store_of, told
 
 

@@ -12,7 +12,7 @@ from registration.samples import box
 from objreg_ros.memory.store import Store
 from objreg_ros.report.store.portraits import TILE, portraits
 from objreg_ros.report.store.store_drawing import CAPTION, MOVED, PANEL, draw
-from objreg_ros.report.store.store_survey import survey
+from objreg_ros.report.store.store_summary import survey
 from report.places import at, cup_and_book, store_of, told
 
 

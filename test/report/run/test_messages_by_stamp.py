@@ -12,7 +12,7 @@ from recording.folders import CAMERA, STEP_NS, records, uncalibrated
 
 from objreg_ros.bridge.messages import from_msg
 from objreg_ros.recording import Record, messages, open_recording, write_rosbag2
-from objreg_ros.report.run.shelf import SLOP_NS, Cameras, Shelf
+from objreg_ros.report.run.messages_by_stamp import SLOP_NS, Cameras, MessagesByStamp
 
 FIRST_NS = 10**9
 
@@ -27,7 +27,7 @@ def recorded(path: Path, late_ns: int, told: Iterable[Record] | None = None) -> 
 @pytest.mark.parametrize("late_ms", [0, 120, 200, 1000, -300, 3 * 365 * 86_400_000])
 def test_a_message_is_found_by_its_stamp_whenever_it_was_recorded(tmp_path: Path, late_ms: int) -> None:
     with open_recording(recorded(tmp_path / "bag", late_ms * 1_000_000)) as recording:
-        shelf = Shelf(recording, "/depth/image")
+        shelf = MessagesByStamp(recording, "/depth/image")
         for k in (0, 7, 29):
             found = shelf.nearest(FIRST_NS + k * STEP_NS + 1_000_000)
             assert found is not None and from_msg.stamp_ns(found) == FIRST_NS + k * STEP_NS
@@ -36,9 +36,9 @@ def test_a_message_is_found_by_its_stamp_whenever_it_was_recorded(tmp_path: Path
 @pytest.mark.parametrize("late_ms", [0, 200])
 def test_what_is_further_from_a_moment_than_the_slop_is_not_it(tmp_path: Path, late_ms: int) -> None:
     with open_recording(recorded(tmp_path / "bag", late_ms * 1_000_000)) as recording:
-        shelf = Shelf(recording, "/depth/image")
+        shelf = MessagesByStamp(recording, "/depth/image")
         assert shelf.nearest(FIRST_NS - SLOP_NS - 1) is None and shelf.nearest(FIRST_NS - SLOP_NS) is not None
-        assert shelf.nearest(10**15) is None and Shelf(recording, "/nothing").nearest(FIRST_NS) is None
+        assert shelf.nearest(10**15) is None and MessagesByStamp(recording, "/nothing").nearest(FIRST_NS) is None
 
 
 def test_messages_whose_stamp_cannot_be_read_are_passed_over_and_counted(tmp_path: Path) -> None:
@@ -49,7 +49,7 @@ def test_messages_whose_stamp_cannot_be_read_are_passed_over_and_counted(tmp_pat
             return iter(replace(r, encode=lambda: b"") if r.stamp_ns == FIRST_NS else r for r in whole(*asked))
 
         recording.records = broken
-        shelf = Shelf(recording, "/depth/image")
+        shelf = MessagesByStamp(recording, "/depth/image")
         assert shelf.nearest(FIRST_NS) is None and shelf.unreadable == 1
         assert shelf.nearest(FIRST_NS + STEP_NS) is not None
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 from typing import Any
 
 from objreg_ros.report.page import page
-from objreg_ros.report.run.chapter import chapter
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_summary import RunSummary
+from objreg_ros.report.run.sections import chapter
 from objreg_ros.truth import Truth
 from report.runs import TRUTH, summary, tracked
 
@@ -15,7 +15,7 @@ FINDING = {"what": "No image was read.", "cause": "All <malformed>.", "todo": "o
 
 
 def view(told: dict[str, Any], truth: Truth = TRUTH) -> dict[str, Any]:
-    return chapter(Story.of("walk", told, truth), None)
+    return chapter(RunSummary.of("walk", told, truth), None)
 
 
 def test_every_pair_has_a_row_with_its_numbers() -> None:
@@ -37,7 +37,7 @@ def test_a_run_tells_how_it_was_made() -> None:
 
 
 def test_findings_are_told_in_the_head_and_escaped() -> None:
-    text = page([(Story.of("walk", {**summary(), "findings": [FINDING]}, TRUTH), None)])
+    text = page([(RunSummary.of("walk", {**summary(), "findings": [FINDING]}, TRUTH), None)])
     head = text[: text.index('class="tiles"')]
     assert "No image was read." in head and "All &lt;malformed&gt;." in head
     assert "<code>objreg inspect x</code>" in head and "no-images" in head
@@ -87,4 +87,4 @@ def test_our_own_tracking_is_drawn_corrected_with_what_of_it_is_left_out() -> No
         assert ("tracked", "our own tracking") in way["legend"] and ("corrected", "corrected") in way["legend"]
         assert 'class="line tracked"' in way["drawing"]["wide"]
     assert "than our own tracking" in next(tile for tile in view(tracked())["tiles"] if "error" in tile["name"])["note"]
-    assert page([(Story.of("walk", tracked(), TRUTH), None)])
+    assert page([(RunSummary.of("walk", tracked(), TRUTH), None)])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The books of a node: where every input frame is, and how long it took. Knows no ROS.
+"""The counters of a node: where every input frame is, and how long it took. Knows no ROS.
 
 Every frame that is received ends as published or as dropped with a reason, exactly once, and waits until then:
 received = published + waiting + dropped, at every moment.
@@ -21,7 +21,7 @@ RECENT = 1000  # how many durations of a stage the percentiles look back on
 
 @dataclass(frozen=True)
 class Balance:
-    """The state of the books at one moment."""
+    """The state of the counters at one moment."""
 
     received: int
     published: int
@@ -31,7 +31,7 @@ class Balance:
     stage_ms: dict[str, tuple[float, float]] = field(default_factory=dict)  # stage → (p50, p95)
 
 
-class Ledger:
+class Accounting:
     """Counts frames by their stamps; safe to use from the executor and the worker at once."""
 
     def __init__(self) -> None:
@@ -78,7 +78,7 @@ class Ledger:
             self._stages[stage].append(seconds)
 
     def balance(self) -> Balance:
-        """The books now."""
+        """The counters now."""
         with self._lock:
             waiting = sum(map(len, self._arrived.values()))
             stage_ms = {stage: percentiles_ms(seconds) for stage, seconds in self._stages.items()}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A door with several inputs that belong together by their time."""
+"""A node with several inputs that belong together by their time."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 from rclpy.clock import Clock, ClockType
 
-from objreg_ros.bridge.node.door import Door
+from objreg_ros.bridge.node.node_base import NodeBase
 from objreg_ros.bridge.streams.sync import Drop, Match, Need, Stream, Synchroniser
 
 ALONE_S = 0.5  # after once to twice this a stamp that has leapt alone is believed, later where the stream is slow
@@ -22,21 +22,21 @@ SURPLUS_ADVICE = "each is of a picture that detector.max_rate leaves out; set th
 Early = tuple[int, str, int, Any]  # order of arrival, stream, stamp, payload
 
 
-class MatchingDoor(Door):
+class SynchronisedNode(NodeBase):
     """Hands a `Match` to the worker for every message of the first stream that found its partners.
 
-    That first stream is what the books count. `begin` says how streams are matched; the newest `EARLY` messages that
+    That first stream is what the counters count. `begin` says how streams are matched; the newest `EARLY` messages that
     each stream was fed before then wait.
     """
 
     def prepare(self) -> None:
-        """As any door; nothing is matched yet."""
+        """As any node; nothing is matched yet."""
         super().prepare()
         self._early: defaultdict[str, deque[Early]] = defaultdict(lambda: deque(maxlen=EARLY))
         self._order = count()
         self._sync: Synchroniser | None = None
         self._reference = ""
-        self._heard, self._quiet_s = 0, 0.0  # messages of all streams, and since when no more
+        self._received, self._quiet_s = 0, 0.0  # messages of all streams, and since when no more
         self.create_timer(ALONE_S, self._look_after, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def begin(self, streams: Sequence[Stream]) -> None:
@@ -78,9 +78,9 @@ class MatchingDoor(Door):
         if self._sync is None:
             return
         self._hand_over(self._sync.believe(round(1e9 * ALONE_S)))
-        heard = self._sync.received
-        self._quiet_s = self._quiet_s + ALONE_S if heard == self._heard else 0.0
-        self._heard = heard
+        received = self._sync.received
+        self._quiet_s = self._quiet_s + ALONE_S if received == self._received else 0.0
+        self._received = received
         if self._quiet_s >= QUIET_S:
             self._hand_over(self._sync.wait_no_longer())
 

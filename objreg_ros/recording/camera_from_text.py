@@ -21,7 +21,7 @@ from objreg_ros.recording.record import Record, Recording, Topic
 TOLD = "/told/camera_info"  # the topic that it comes by
 
 
-class ToldCamera(Recording):
+class CameraFromText(Recording):
     """The recording ``of``, with one camera_info on `TOLD` before everything else, which late subscribers get too."""
 
     def __init__(self, of: Recording, camera: Calibration, frame_id: str, notes: Sequence[str] = ()) -> None:
@@ -56,7 +56,7 @@ class ToldCamera(Recording):
         return {**{name: depth for name, depth in self._of.latched.items() if name in self.topics}, TOLD: 1}
 
     def _message(self) -> Any:
-        return messages.told_camera_info(self._camera, self.start_ns, self._frame_id)
+        return messages.camera_info_from_text(self._camera, self.start_ns, self._frame_id)
 
     def close(self) -> None:
         """Let go of the files."""
@@ -81,9 +81,9 @@ def with_camera(
     read = (record.read() for record in recording.records([picture])) if picture else iter(())
     first = next((message for message in read if message is not None), None)
     if first is None:
-        return ToldCamera(recording, camera, "", notes)
+        return CameraFromText(recording, camera, "", notes)
     try:
-        return ToldCamera(recording, fitted(camera, first), str(first.header.frame_id), notes)
+        return CameraFromText(recording, fitted(camera, first), str(first.header.frame_id), notes)
     except ValueError as error:
         raise ValueError(f"{recording.path}: {picture}: {error}") from error
 

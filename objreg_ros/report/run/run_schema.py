@@ -15,7 +15,7 @@ def require_form(name: str, summary: Mapping[str, Any]) -> None:
     """ValueError for the first field that is not as `objreg offline --json` or `objreg demo` writes it.
 
     Fields that are missing are those of an older version, and no error. What else is in constraints, refusals and
-    glimpses is for `Story.of` to say.
+    glimpses is for `RunSummary.of` to say.
     """
     for field, (words, fits) in FIELDS.items():
         if field in summary and not fits(summary[field]):

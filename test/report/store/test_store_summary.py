@@ -15,7 +15,7 @@ from objreg_ros.geometry import back_project
 from objreg_ros.memory.sighting import sightings_of
 from objreg_ros.memory.store import Store, StoreError
 from objreg_ros.memory.store_file import is_store
-from objreg_ros.report.store.store_survey import describe, survey
+from objreg_ros.report.store.store_summary import describe, survey
 from objreg_ros.sensor import KINECT, depth_sigma
 from report.places import cup_and_book
 

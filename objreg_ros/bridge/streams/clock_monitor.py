@@ -14,7 +14,7 @@ PERIODS = 2  # of a stream have to pass until its silence speaks for what is hel
 T = TypeVar("T")
 
 
-class Course(Generic[T]):
+class ClockMonitor(Generic[T]):
     """Holds an item whose stamp leaps until the next one of its stream tells whether time has leapt with it.
 
     A leap is back by `JUMP_NS` or ahead by `AHEAD_NS`: of a looped bag or a clock that was set, or of one message that

@@ -17,7 +17,7 @@ SLOP_NS = 50_000_000  # how far from a moment the stamp of its message may be
 WINDOW_NS = 150_000_000  # how far from its stamp a message is looked for before all of its topic are read
 
 
-class Shelf:
+class MessagesByStamp:
     """The messages of one topic; ``unreadable`` counts those that were met and whose stamp cannot be read."""
 
     def __init__(self, recording: Recording, topic: str) -> None:

@@ -48,7 +48,7 @@ class Tracks:
 
 
 @dataclass(frozen=True, eq=False)
-class Story:
+class RunSummary:
     """Everything that the sections of a report draw from."""
 
     name: str
@@ -61,7 +61,7 @@ class Story:
     pruned: tuple[LoopClosure, ...] = ()
 
     @classmethod
-    def of(cls, name: str, summary: Mapping[str, Any], truth: Truth) -> Story:
+    def of(cls, name: str, summary: Mapping[str, Any], truth: Truth) -> RunSummary:
         """The story of a run's JSON; the map is made here. Keys that are missing leave their section out.
 
         ValueError for what `objreg offline --json` would not write.

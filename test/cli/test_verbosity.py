@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is heard of a command with -q, with -v, and with neither."""
+"""What is known a command with -q, with -v, and with neither."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import click
 import pytest
 from click.testing import CliRunner, Result
 
-from objreg_ros.cli.loudness import aside, heard_by, is_quiet, is_verbose
+from objreg_ros.cli.verbosity import aside, is_quiet, is_verbose, received_by
 
 
 def said(*words: str) -> Result:
-    """What a command in a group says, both of which hear of the options."""
+    """What a command in a group says, both of which receive the options."""
 
     @click.group()
     def group() -> None:
@@ -29,9 +29,9 @@ def said(*words: str) -> Result:
             click.echo("a reason")
         click.echo("the result")
 
-    heard_by(heard_by(run))
+    received_by(received_by(run))
     apart = {"mix_stderr": False} if "mix_stderr" in signature(CliRunner).parameters else {}  # before click 8.2
-    return CliRunner(**apart).invoke(heard_by(group), words)
+    return CliRunner(**apart).invoke(received_by(group), words)
 
 
 def test_usually_all_but_the_reasons_is_heard() -> None:
@@ -60,8 +60,8 @@ def test_both_are_refused(words: tuple[str, ...]) -> None:
 
 def test_outside_of_a_command_line_nothing_is_hushed(capsys: pytest.CaptureFixture[str]) -> None:
     with aside():
-        click.echo("heard")
-    assert capsys.readouterr().out == "heard\n" and not is_quiet() and not is_verbose()
+        click.echo("received")
+    assert capsys.readouterr().out == "received\n" and not is_quiet() and not is_verbose()
 
 
 @pytest.mark.parametrize("words", [("run", "-q", "--nothing"), ("-q", "fly")])

@@ -8,20 +8,20 @@ import sys
 import numpy as np
 import pytest
 
-from objreg_ros.report.run.story import Story
+from objreg_ros.report.run.run_summary import RunSummary
 from objreg_ros.truth import Truth
 from report.runs import COUNT, TRUE, TRUTH, summary, tracked, with_a_stray
 
 
 def test_closures_bend_the_way_back_to_the_truth() -> None:
-    tracks = Story.of("walk", summary(), TRUTH).tracks()
+    tracks = RunSummary.of("walk", summary(), TRUTH).tracks()
     before, after = (np.sqrt(np.mean(error**2)) for error in (tracks.odometry_error, tracks.corrected_error))
     assert after < 0.5 * before
     np.testing.assert_allclose(np.linalg.norm(tracks.corrected - tracks.true, axis=1), tracks.corrected_error)
 
 
 def test_a_false_closure_is_known_by_the_truth_and_pruned_by_the_map() -> None:
-    story = Story.of("walk", summary(false=True), TRUTH)
+    story = RunSummary.of("walk", summary(false=True), TRUTH)
     assert [story.is_false(closure) for closure in story.closures] == [False] * 4 + [True]
     assert story.pruned == story.closures[-1:]
 
@@ -30,7 +30,7 @@ def test_every_frame_is_on_the_way_of_a_camera_at_rest_too() -> None:
     told = summary()
     for row in told["glimpses"]:
         row["T_odom_camera"] = TRUE[0].tolist()
-    tracks = Story.of("rest", told, TRUTH).tracks()
+    tracks = RunSummary.of("rest", told, TRUTH).tracks()
     assert list(tracks.stamps_ns) == TRUTH.stamps_ns
     assert tracks.odometry.shape == tracks.corrected.shape == (COUNT, 3)
 
@@ -39,7 +39,7 @@ def test_every_frame_is_on_the_way_of_a_camera_at_rest_too() -> None:
 @pytest.mark.parametrize("value", [3, [3], [{}], [{"stamp_ns": "x", "from_ns": 1}], "ab"])
 def test_json_of_another_form_is_refused_by_the_name_of_its_run(key: str, value: object) -> None:
     with pytest.raises(ValueError, match=f"^walk: expected {key} as `objreg offline --json` writes them, got "):
-        Story.of("walk", {**summary(), key: value}, TRUTH)
+        RunSummary.of("walk", {**summary(), key: value}, TRUTH)
 
 
 ODD = [
@@ -62,13 +62,13 @@ def test_a_number_that_no_run_has_is_refused_by_the_name_of_its_run(key: str, fi
     told = summary()
     told[key][1][field] = value
     with pytest.raises(ValueError, match=f"^walk: expected {key} as `objreg offline --json` writes them, got "):
-        Story.of("walk", told, TRUTH)
+        RunSummary.of("walk", told, TRUTH)
 
 
 def test_a_refused_pose_that_is_not_finite_is_none_to_look_at() -> None:
     told = summary()
     told["refusals"][1]["T_from_to"] = np.full((4, 4), np.inf).tolist()
-    assert Story.of("walk", told, TRUTH).refusals[1].T_from_to is None
+    assert RunSummary.of("walk", told, TRUTH).refusals[1].T_from_to is None
 
 
 @pytest.mark.parametrize("pose", [[[float("nan")] * 4] * 4, np.eye(3).tolist(), np.zeros((4, 4)).tolist()])
@@ -76,11 +76,11 @@ def test_a_frame_without_a_rigid_pose_is_refused_by_the_name_of_its_run(pose: li
     told = summary()
     told["glimpses"][3]["T_odom_camera"] = pose
     with pytest.raises(ValueError, match=r"^walk: expected glimpses as `objreg offline --json` writes them, got "):
-        Story.of("walk", told, TRUTH)
+        RunSummary.of("walk", told, TRUTH)
 
 
 def test_without_truth_nothing_is_false_and_there_are_no_errors() -> None:
-    story = Story.of("walk", summary(false=True), Truth([]))
+    story = RunSummary.of("walk", summary(false=True), Truth([]))
     assert not any(story.is_false(closure) for closure in story.closures)
     assert story.tracks().true is None and story.tracks().corrected_error is None
 
@@ -89,12 +89,12 @@ def test_without_odometry_there_are_no_tracks_and_no_object_map() -> None:
     told = summary()
     for row in told["glimpses"]:
         row["T_odom_camera"] = None
-    story = Story.of("walk", told, TRUTH)
+    story = RunSummary.of("walk", told, TRUTH)
     assert story.tracks() is None and story.objects() == []
 
 
 def test_one_object_is_one_place_in_the_map_and_several_by_odometry() -> None:
-    seen = [row for row in Story.of("walk", summary(), TRUTH).objects() if row[0] == "book"]
+    seen = [row for row in RunSummary.of("walk", summary(), TRUTH).objects() if row[0] == "book"]
     by_odometry, in_map = (np.linalg.norm(np.std([row[i] for row in seen], axis=0)) for i in (1, 2))
     assert in_map < 0.5 * by_odometry
 
@@ -103,8 +103,8 @@ def test_frames_whose_time_does_not_advance_are_left_out_and_counted() -> None:
     told = summary()
     again = [dict(told["glimpses"][k]) for k in (119, 7, 0)]
     early = {**again[0], "stamp_ns": -5}
-    story = Story.of("walk", {**told, "glimpses": [*told["glimpses"], *again, early]}, TRUTH)
-    once = Story.of("walk", told, TRUTH)
+    story = RunSummary.of("walk", {**told, "glimpses": [*told["glimpses"], *again, early]}, TRUTH)
+    once = RunSummary.of("walk", told, TRUTH)
     assert (once.left_out, story.left_out) == (0, 4)
     np.testing.assert_array_equal(story.tracks().corrected, once.tracks().corrected)
     assert len(story.objects()) == len(once.objects())
@@ -112,7 +112,7 @@ def test_frames_whose_time_does_not_advance_are_left_out_and_counted() -> None:
 
 def test_an_older_json_without_frames_is_told_all_the_same() -> None:
     told = {key: value for key, value in summary().items() if key not in ("glimpses", "refusals")}
-    story = Story.of("walk", told, TRUTH)
+    story = RunSummary.of("walk", told, TRUTH)
     assert len(story.closures) == 4 and story.tracks() is None
     assert story.seconds(story.closures[0].to_ns) == pytest.approx(6.0)
 
@@ -121,7 +121,7 @@ def test_labels_read_as_words() -> None:
     told = summary()
     told["constraints"][0]["labels"] = ["cereal_box"]
     told["glimpses"][0] |= {"labels": ["soda_can"], "objects": [["soda_can", [0.0, 0.0, 1.0]]]}
-    story = Story.of("walk", told, TRUTH)
+    story = RunSummary.of("walk", told, TRUTH)
     assert story.closures[0].labels == ("cereal box",) and story.glimpses[0].labels == ("soda can",)
     assert story.glimpses[0].objects[0][0] == "soda can"
 
@@ -129,14 +129,14 @@ def test_labels_read_as_words() -> None:
 def test_the_pose_that_was_refused_is_told_where_there_was_one() -> None:
     told = summary()
     told["refusals"][1]["T_from_to"] = np.eye(4).tolist()
-    refusals = Story.of("walk", told, TRUTH).refusals
+    refusals = RunSummary.of("walk", told, TRUTH).refusals
     assert refusals[0].T_from_to is None
     np.testing.assert_array_equal(refusals[1].T_from_to, np.eye(4))
 
 
 def test_without_the_solver_the_way_is_that_of_odometry_and_the_story_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "gtsam", None)
-    story = Story.of("walk", summary(), TRUTH)
+    story = RunSummary.of("walk", summary(), TRUTH)
     assert "expected gtsam" in story.map.unsolved and not story.pruned
     tracks = story.tracks()
     np.testing.assert_allclose(tracks.corrected, tracks.odometry, atol=1e-3)
@@ -144,22 +144,22 @@ def test_without_the_solver_the_way_is_that_of_odometry_and_the_story_says_why(m
 
 @pytest.mark.parametrize("years", [-54, 3])
 def test_a_frame_of_another_time_does_not_stretch_the_run_and_is_counted(years: int) -> None:
-    story = Story.of("walk", with_a_stray(years * 31_536_000 * 10**9), TRUTH)
+    story = RunSummary.of("walk", with_a_stray(years * 31_536_000 * 10**9), TRUTH)
     assert story.stretch_ns == (0, TRUTH.stamps_ns[-1]) and story.seconds(10**9) == 1.0
     assert story.out_of_time == {"frames": 1, "refusals": 1}
-    assert Story.of("walk", summary(), TRUTH).out_of_time == {}
+    assert RunSummary.of("walk", summary(), TRUTH).out_of_time == {}
 
 
 def test_a_run_with_a_short_rest_is_one_stretch() -> None:
     told = summary()
     for row in told["glimpses"][60:]:
         row["stamp_ns"] += 3000 * 10**9
-    story = Story.of("walk", told, TRUTH)
+    story = RunSummary.of("walk", told, TRUTH)
     assert story.out_of_time == {} and story.stretch_ns[1] > 3000 * 10**9
 
 
 def test_our_own_tracking_is_corrected_as_odometry_is_and_named_as_what_it_is() -> None:
-    story, usual = Story.of("walk", tracked(), TRUTH), Story.of("walk", summary(), TRUTH)
+    story, usual = RunSummary.of("walk", tracked(), TRUTH), RunSummary.of("walk", summary(), TRUTH)
     tracks, trajectory = story.tracks(), story.trajectory()
     assert list(tracks.lines) == ["true", "tracked", "corrected"]
     assert trajectory["of"] == "tracked" and (trajectory["frames"], trajectory["sessions"]) == (COUNT, 1)
@@ -171,14 +171,14 @@ def test_our_own_tracking_is_corrected_as_odometry_is_and_named_as_what_it_is() 
 def test_of_a_track_that_was_lost_the_largest_part_is_on_the_map() -> None:
     told = tracked(begins=45)  # closures tie 40 to 100, but one alone ties no session
     told["constraints"] = [row for row in told["constraints"] if row["from_ns"] == 40 * 100_000_000]
-    story = Story.of("walk", told, TRUTH)
+    story = RunSummary.of("walk", told, TRUTH)
     trajectory = story.trajectory()
     assert (trajectory["frames"], trajectory["frames_apart"], trajectory["sessions_apart"]) == (75, 45, 1)
     assert story.left_out == 0 and len(story.tracks().corrected) == 75
-    whole = Story.of("walk", tracked(begins=45), TRUTH).trajectory()
+    whole = RunSummary.of("walk", tracked(begins=45), TRUTH).trajectory()
     assert (whole["frames"], whole["sessions"], whole["frames_apart"]) == (COUNT, 2, 0)
 
 
 def test_without_an_order_to_track_the_track_is_no_map() -> None:
-    story = Story.of("walk", {**tracked(), "odometry": None}, TRUTH)
+    story = RunSummary.of("walk", {**tracked(), "odometry": None}, TRUTH)
     assert story.tracks() is None and story.trajectory() is None and len(story.tracked_way()[0]) == COUNT

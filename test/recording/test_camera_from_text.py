@@ -7,8 +7,8 @@ import pytest
 
 from objreg_ros.bridge.messages import from_msg
 from objreg_ros.recording import open_recording
+from objreg_ros.recording.camera_from_text import TOLD, with_camera
 from objreg_ros.recording.inputs import CAMERA_INFO, choose_inputs
-from objreg_ros.recording.told_camera import TOLD, with_camera
 
 from .folders import noetic_bag, robot_bag, tum_folder
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from objreg_ros.report.run.form import require_form
+from objreg_ros.report.run.run_schema import require_form
 from report.runs import summary
 
 BAD: list[tuple[str, Any]] = [
@@ -59,7 +59,7 @@ def test_long_values_are_cut() -> None:
 
 
 def test_the_json_of_runs_and_of_older_versions_has_the_form() -> None:
-    books = {"received": 3, "published": 2, "stage_ms": {"segment": [3.0, 5.0]}, "dropped": {}}
+    counters = {"received": 3, "published": 2, "stage_ms": {"segment": [3.0, 5.0]}, "dropped": {}}
     require_form("run", summary())
     require_form("run", {"constraints": []})
-    require_form("run", {**summary(), "nodes": {"segmenter": books}, "T_base_camera": [], "inputs": {"odom": ""}})
+    require_form("run", {**summary(), "nodes": {"segmenter": counters}, "T_base_camera": [], "inputs": {"odom": ""}})

@@ -18,38 +18,38 @@ class Surplus(NamedTuple):
     frame_id: str
 
 
-class Indoors:
+class IntraProcessBus:
     """The topics that nodes of this process pass to each other in memory, and the subscribers of each.
 
     A topic must be offered before a subscriber is added.
     """
 
     def __init__(self) -> None:
-        self._ears: dict[str, list[Ear]] = {}
+        self._subscriptions: dict[str, list[LocalSubscription]] = {}
 
     def offer(self, topic: str) -> None:
         """Announce that a node of this process will publish a topic."""
-        self._ears.setdefault(topic, [])
+        self._subscriptions.setdefault(topic, [])
 
     def offers(self, topic: str) -> bool:
         """Whether a node of this process publishes a topic."""
-        return topic in self._ears
+        return topic in self._subscriptions
 
-    def add(self, ear: Ear) -> None:
+    def add(self, subscription: LocalSubscription) -> None:
         """Add a subscriber of its topic; KeyError if no node of this process offers that topic."""
-        self._ears[ear.topic_name].append(ear)
+        self._subscriptions[subscription.topic_name].append(subscription)
 
-    def remove(self, ear: Ear) -> None:
+    def remove(self, subscription: LocalSubscription) -> None:
         """Remove a subscriber."""
-        self._ears[ear.topic_name].remove(ear)
+        self._subscriptions[subscription.topic_name].remove(subscription)
 
     def hand_over(self, topic: str, word: Any) -> None:
         """Pass a value to all subscribers of a topic. Any thread may call this; it never blocks."""
-        for ear in tuple(self._ears.get(topic, ())):
-            ear.inlet.put(ear.hear, word)
+        for subscription in tuple(self._subscriptions.get(topic, ())):
+            subscription.queue.put(subscription.receive, word)
 
 
-class Inlet:
+class ValueQueue:
     """Queues values for a node. The executor of the node takes them in order, as it takes messages.
 
     The queue needs no limit: each value was made from a message that the same executor took before.
@@ -59,34 +59,34 @@ class Inlet:
         self._waiting: deque[tuple[Callable[[Any], None], Any]] = deque()
         self._bell = node.create_guard_condition(self._bring)
 
-    def put(self, hear: Callable[[Any], None], word: Any) -> None:
-        """Let the executor call ``hear`` with a value."""
-        self._waiting.append((hear, word))
+    def put(self, receive: Callable[[Any], None], word: Any) -> None:
+        """Let the executor call ``receive`` with a value."""
+        self._waiting.append((receive, word))
         self._bell.trigger()
 
     def _bring(self) -> None:
         while self._waiting:
-            hear, word = self._waiting.popleft()
-            hear(word)
+            receive, word = self._waiting.popleft()
+            receive(word)
 
 
-class Ear(NamedTuple):
+class LocalSubscription(NamedTuple):
     """A subscriber, in the place of a subscription of ROS."""
 
     topic_name: str
-    inlet: Inlet
-    hear: Callable[[Any], None]
+    queue: ValueQueue
+    receive: Callable[[Any], None]
 
 
-class Outlet:
+class LocalPublisher:
     """Publishes a topic of a node: in memory to nodes of its process, as messages to the subscribers of ROS."""
 
-    def __init__(self, publisher: Publisher, indoors: Indoors) -> None:
-        self._publisher, self._indoors = publisher, indoors
-        indoors.offer(publisher.topic_name)
+    def __init__(self, publisher: Publisher, bus: IntraProcessBus) -> None:
+        self._publisher, self._bus = publisher, bus
+        bus.offer(publisher.topic_name)
 
-    def tell(self, word: Any, write: Callable[[], Any]) -> None:
+    def tell(self, value: Any, write: Callable[[], Any]) -> None:
         """Publish a value. ``write`` makes its message, and is called only if the topic has a subscriber of ROS."""
-        self._indoors.hand_over(self._publisher.topic_name, word)
+        self._bus.hand_over(self._publisher.topic_name, value)
         if self._publisher.get_subscription_count():
             self._publisher.publish(write())

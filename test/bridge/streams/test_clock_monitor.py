@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import pytest
 
-from objreg_ros.bridge.streams.course import AHEAD_NS, Course
+from objreg_ros.bridge.streams.clock_monitor import AHEAD_NS, ClockMonitor
 from objreg_ros.data import JUMP_NS
 
 NOW = 1000 * JUMP_NS
@@ -13,7 +13,7 @@ PASSED = JUMP_NS // 2  # between two calls of `believe`
 def passed(stamps: list[int]) -> tuple[list[int], list[int]]:
     """The stamps that were admitted, and those that were found alone."""
     alone: list[int] = []
-    course: Course[str] = Course(lambda stamp_ns, item: alone.append(stamp_ns))
+    course: ClockMonitor[str] = ClockMonitor(lambda stamp_ns, item: alone.append(stamp_ns))
     admitted = [stamp_ns for stamp in stamps for stamp_ns, _ in course.admit(stamp, "item")]
     admitted += [stamp_ns for stamp_ns, _ in course.end()]
     assert not course.holding
@@ -50,7 +50,7 @@ def test_of_two_that_leap_to_different_times_the_last_is_asked_for() -> None:
 
 
 def test_one_that_nothing_speaks_against_for_a_while_is_believed() -> None:
-    course: Course[str] = Course(lambda stamp_ns, item: pytest.fail("it was let go"))
+    course: ClockMonitor[str] = ClockMonitor(lambda stamp_ns, item: pytest.fail("it was let go"))
     assert course.admit(NOW, "old") == [(NOW, "old")] and course.believe(PASSED) == []
     assert course.admit(5, "new") == []
     assert course.believe(PASSED) == [] and course.believe(PASSED) == [(5, "new")] and course.believe(PASSED) == []
@@ -60,7 +60,7 @@ def test_one_that_nothing_speaks_against_for_a_while_is_believed() -> None:
 @pytest.mark.parametrize("period", [JUMP_NS, 3 * JUMP_NS])
 def test_one_that_leaps_alone_is_not_believed_before_the_next_of_a_slow_stream_can_come(period: int) -> None:
     alone: list[int] = []
-    course: Course[str] = Course(lambda stamp_ns, item: alone.append(stamp_ns))
+    course: ClockMonitor[str] = ClockMonitor(lambda stamp_ns, item: alone.append(stamp_ns))
     for stamp in (NOW, NOW + period, NOW + period, 0):
         course.admit(stamp, "item")
     assert all(course.believe(PASSED) == [] for _ in range(1 + period // PASSED))
@@ -69,7 +69,7 @@ def test_one_that_leaps_alone_is_not_believed_before_the_next_of_a_slow_stream_c
 
 def test_each_one_that_leaps_has_its_own_while() -> None:
     alone: list[int] = []
-    course: Course[str] = Course(lambda stamp_ns, item: alone.append(stamp_ns))
+    course: ClockMonitor[str] = ClockMonitor(lambda stamp_ns, item: alone.append(stamp_ns))
     for stamp in (NOW, 0):
         course.admit(stamp, "item")
     assert course.believe(PASSED) == []

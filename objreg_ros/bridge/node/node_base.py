@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every node is: a door. It reads messages, lets its room work, writes messages and keeps the books."""
+"""What every node is: a node. It reads messages, lets its room work, writes messages and keeps the counters."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from std_srvs.srv import SetBool, Trigger
 
 from objreg_ros.bridge.messages import to_msg
 from objreg_ros.bridge.node import qos
+from objreg_ros.bridge.node.accounting import Accounting
 from objreg_ros.bridge.node.choice import Choice
 from objreg_ros.bridge.node.diagnostics import CONNECTED, FOUND, diagnostic
 from objreg_ros.bridge.node.drops import Drops
-from objreg_ros.bridge.node.indoors import Ear, Indoors, Inlet, Outlet
-from objreg_ros.bridge.node.ledger import Ledger
+from objreg_ros.bridge.node.intra_process import IntraProcessBus, LocalPublisher, LocalSubscription, ValueQueue
 from objreg_ros.bridge.node.log import ThrottledLog
 from objreg_ros.bridge.node.managed import ManagedNode
 from objreg_ros.bridge.node.missed import Missed
 from objreg_ros.bridge.node.parameters import Parameters
-from objreg_ros.bridge.node.params import DoorParams, ManagedParams
+from objreg_ros.bridge.node.params import ManagedParams, NodeBaseParams
 from objreg_ros.bridge.node.watch import Watch
 from objreg_ros.bridge.node.worker import Worker
 from objreg_ros.params import Params
@@ -53,8 +53,8 @@ class DroppedError(Exception):
         self.reason = reason
 
 
-class Door(ManagedNode):
-    """A node with declared parameters, one worker, books, diagnostics at 1 Hz and a receipt for every frame.
+class NodeBase(ManagedNode):
+    """A node with declared parameters, one worker, counters, diagnostics at 1 Hz and an acknowledgement of each frame.
 
     A subclass listens in `open`, calls `accept` once for each frame, and hands it to ``worker`` as (stamp_ns, payload)
     when it is complete and was `let_in`. The worker calls `compute`; what that drops or refuses is counted, logged and
@@ -62,10 +62,10 @@ class Door(ManagedNode):
     ``indoors`` is what the nodes of this process hand over to each other; nothing if None.
     """
 
-    def __init__(self, name: str, *kinds: type[Params], indoors: Indoors | None = None) -> None:
+    def __init__(self, name: str, *kinds: type[Params], bus: IntraProcessBus | None = None) -> None:
         super().__init__(name)
-        self._shared_indoors, self._inlet = indoors, Inlet(self)
-        self.settings = Parameters(self, *kinds, DoorParams)
+        self._shared_bus, self._queue = bus, ValueQueue(self)
+        self.settings = Parameters(self, *kinds, NodeBaseParams)
         self.settings.changed, self.settings.are_open = self._adopt_if_open, lambda: not self.is_open
         self._bugs: set[str] = set()  # that the log has told of
         self.apart = ReentrantCallbackGroup()  # of services that wait for work that is done `aside`
@@ -75,17 +75,17 @@ class Door(ManagedNode):
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", qos.room())
         self.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
         life = self.settings.of(ManagedParams) if ManagedParams in kinds else ManagedParams()
-        if life.managed and indoors is not None:
+        if life.managed and bus is not None:
             raise ValueError(f"{name}: managed: expected false where all nodes are in one process, got true")
         self.begin_life(life)
 
     def prepare(self) -> None:
-        """Empty books, a new worker, and nothing that is listened to; by the parameters as they are now."""
-        params = self.settings.of(DoorParams)
-        self.indoors = Indoors() if self._shared_indoors is None else self._shared_indoors
-        self.ledger, self._last = Ledger(), (time.monotonic(), 0)
+        """Empty counters, a new worker, and nothing that is listened to; by the parameters as they are now."""
+        params = self.settings.of(NodeBaseParams)
+        self.bus = IntraProcessBus() if self._shared_bus is None else self._shared_bus
+        self.accounting, self._last = Accounting(), (time.monotonic(), 0)
         self.connected: dict[str, int] = {}  # full topic name → publishers that DDS has connected us to
-        self._choices: dict[str, Choice[Subscription | Ear]] = {}  # by the input of `listen_to_first`
+        self._choices: dict[str, Choice[Subscription | LocalSubscription]] = {}  # by the input of `listen_to_first`
         self._passed_on = set[str]()
         self._ignored: Counter[str] = Counter()  # messages that are no frame by themselves, by what is wrong with them
         self.most_pixels, self.is_enabled = params.most_pixels, True
@@ -119,49 +119,51 @@ class Door(ManagedNode):
     # Inputs
 
     def listen(
-        self, kind: type, topic: str, heard: Callable[[Any], None], profile: QoSProfile, watched: str = ""
-    ) -> Subscription | Ear:
+        self, kind: type, topic: str, received: Callable[[Any], None], profile: QoSProfile, watched: str = ""
+    ) -> Subscription | LocalSubscription:
         """Subscribe; ``watched`` is the input of `expect` that this topic belongs to.
 
-        Where a node of this process offers the topic, ``heard`` is given its words instead of messages.
+        Where a node of this process offers the topic, ``received`` is given its words instead of messages.
         """
         full = self.resolve_topic_name(topic)
-        if self.indoors.offers(full) and full not in self._passed_on:
-            return self._listen_indoors(full, topic, heard, watched)
+        if self.bus.offers(full) and full not in self._passed_on:
+            return self._subscribe_in_process(full, topic, received, watched)
         missed = Missed()
 
-        def hear(message: Any, info: Mapping[str, Any]) -> None:
+        def receive(message: Any, info: Mapping[str, Any]) -> None:
             self._note_loss(topic, missed.before(info["publication_sequence_number"]))
-            self.watch.hear(watched)
-            self._pass(topic, heard, message)
+            self.watch.receive(watched)
+            self._pass(topic, received, message)
 
         events = SubscriptionEventCallbacks(matched=partial(self._note_match, full))
-        return self.create_subscription(kind, topic, hear, profile, event_callbacks=events)  # type: ignore[arg-type]
+        return self.create_subscription(kind, topic, receive, profile, event_callbacks=events)  # type: ignore[arg-type]
 
-    def _listen_indoors(self, full: str, topic: str, heard: Callable[[Any], None], watched: str) -> Ear:
-        def hear(word: Any) -> None:
-            self.watch.hear(watched)
-            self._pass(topic, heard, word)
+    def _subscribe_in_process(
+        self, full: str, topic: str, received: Callable[[Any], None], watched: str
+    ) -> LocalSubscription:
+        def receive(word: Any) -> None:
+            self.watch.receive(watched)
+            self._pass(topic, received, word)
 
-        ear = Ear(full, self._inlet, hear)
-        self.indoors.add(ear)
+        subscription = LocalSubscription(full, self._queue, receive)
+        self.bus.add(subscription)
         self.connected[full] = 1
-        return ear
+        return subscription
 
-    def offer(self, kind: type, topic: str, profile: QoSProfile) -> Outlet:
+    def offer(self, kind: type, topic: str, profile: QoSProfile) -> LocalPublisher:
         """A topic of which the nodes of this process get the words themselves."""
-        return Outlet(self.create_publisher(kind, topic, profile), self.indoors)
+        return LocalPublisher(self.create_publisher(kind, topic, profile), self.bus)
 
     def pass_on(self, topic: str) -> None:
-        """Offer to the nodes of this process the words of a topic that this node itself hears from outside."""
+        """Offer to the nodes of this process the words of a topic that this node itself receives from outside."""
         self._passed_on.add(self.resolve_topic_name(topic))
-        self.indoors.offer(self.resolve_topic_name(topic))
+        self.bus.offer(self.resolve_topic_name(topic))
 
-    def _pass(self, topic: str, heard: Callable[[Any], None], message: Any) -> None:
+    def _pass(self, topic: str, received: Callable[[Any], None], message: Any) -> None:
         """Hand a message on. None ends the node: what breaks its contract already here is counted, and logged."""
         whole = f"messages of {topic}"
         try:
-            heard(message)
+            received(message)
         except Exception as error:
             self._ignore(topic, error, whole)
         else:
@@ -189,39 +191,42 @@ class Door(ManagedNode):
 
     def _note_loss(self, topic: str, count: int) -> None:
         if count and self.count_publishers(self.resolve_topic_name(topic)) == 1:  # several count each for itself
-            self.ledger.lose(topic, count)
+            self.accounting.lose(topic, count)
 
     def listen_to_first(
         self,
         name: str,
         topics: Mapping[str, type],
         decode: Callable[[str, Any], object],
-        heard: Callable[[str, Any], None],
+        received: Callable[[str, Any], None],
         profile: QoSProfile,
         profiles: Mapping[str, QoSProfile] = MappingProxyType({}),
     ) -> None:
         """Subscribe to topics that carry the same thing; the first is `taken` that sends a message that decodes.
 
-        The others are closed until that one has been silent for the parameter ``silence``. ``heard`` is given the topic
-        and the message, those too that come before one is taken. ``profiles`` are those of topics that have another.
+        The others are closed until that one has been silent for the parameter ``silence``. ``received`` is given the
+        topic and the message, those too that come before one is taken. ``profiles`` are those of topics that have
+        another.
         """
 
-        def hear(topic: str, message: Any) -> None:
-            if self._choices[name].hear(topic, message):
-                heard(topic, message)
+        def receive(topic: str, message: Any) -> None:
+            if self._choices[name].receive(topic, message):
+                received(topic, message)
 
-        def subscribe(topic: str) -> Subscription | Ear:
-            return self.listen(topics[topic], topic, partial(hear, topic), profiles.get(topic, profile), watched=name)
+        def subscribe(topic: str) -> Subscription | LocalSubscription:
+            return self.listen(
+                topics[topic], topic, partial(receive, topic), profiles.get(topic, profile), watched=name
+            )
 
-        silence_s = self.settings.of(DoorParams).silence
+        silence_s = self.settings.of(NodeBaseParams).silence
         is_valid = partial(_decodes, decode)
         self._choices[name] = Choice(topics, subscribe, self._unsubscribe, is_valid, silence_s)
         self.expect(name, *topics)
 
-    def _unsubscribe(self, subscription: Subscription | Ear) -> None:
+    def _unsubscribe(self, subscription: Subscription | LocalSubscription) -> None:
         self.connected.pop(subscription.topic_name, None)
-        if isinstance(subscription, Ear):
-            self.indoors.remove(subscription)
+        if isinstance(subscription, LocalSubscription):
+            self.bus.remove(subscription)
         else:
             self.destroy_subscription(subscription)
 
@@ -241,13 +246,13 @@ class Door(ManagedNode):
 
     def sensor(self, depth: int = 10) -> QoSProfile:
         """The QoS of what a camera or an odometry sends."""
-        return qos.sensor(self.settings.of(DoorParams).reliable, depth)
+        return qos.sensor(self.settings.of(NodeBaseParams).reliable, depth)
 
     # The life of a frame
 
     def accept(self, stamp_ns: int) -> None:
-        """A frame came in; from now on it is in the books."""
-        self.ledger.receive(stamp_ns)
+        """A frame came in; from now on it is in the counters."""
+        self.accounting.receive(stamp_ns)
 
     def let_in(self, stamp_ns: int) -> bool:
         """Whether a frame that was accepted goes on; else it ends here: a managed node lets none in while inactive."""
@@ -264,7 +269,7 @@ class Door(ManagedNode):
 
     def leave_out(self, stamp_ns: int, reason: str) -> None:
         """The frame ends here on purpose: counted by reason and receipted, and no trouble."""
-        self.ledger.drop(stamp_ns, reason)
+        self.accounting.drop(stamp_ns, reason)
         self._finished.publish(to_msg.finished(self.get_name(), stamp_ns, reason))
 
     def read(self, topic: str, decode: Callable[..., Any], *messages: Any) -> Any:
@@ -273,7 +278,7 @@ class Door(ManagedNode):
         With the name of the exception behind that if it is one that no decoder should raise.
         """
         try:
-            with self.ledger.timed("decode"):
+            with self.accounting.timed("decode"):
                 return decode(*messages)
         except Exception as error:
             raise DroppedError(self._named(f"malformed_{topic}", error), str(error)) from error
@@ -289,7 +294,7 @@ class Door(ManagedNode):
         return word
 
     def conclude(self, stamp_ns: int, work: Callable[[], bool]) -> None:
-        """Do the last work on a frame and settle it in the books; what nobody expected drops it as a ``bug``."""
+        """Do the last work on a frame and settle it in the counters; what nobody expected drops it as a ``bug``."""
         try:
             done = work()
         except DroppedError as dropped:
@@ -300,7 +305,7 @@ class Door(ManagedNode):
             self.drop(stamp_ns, self._named("bug", error), str(error))
         else:
             if done:
-                self.ledger.publish(stamp_ns)
+                self.accounting.publish(stamp_ns)
                 self._drops.let_through("frames")
                 self._finished.publish(to_msg.finished(self.get_name(), stamp_ns))
 
@@ -385,7 +390,7 @@ class Door(ManagedNode):
         silent = self.watch.silent() if self.is_active else {}
         for name, advice in silent.items():
             self.throttled.remind(name, advice)
-        balance = self.ledger.balance()
+        balance = self.accounting.balance()
         (then, before), now = self._last, time.monotonic()
         self._last = (now, balance.received)
         rate = (balance.received - before) / (now - then)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which frames are still on their way through the graph, by the `finished` receipts of its nodes. Knows no ROS.
+"""Which frames are still on their way through the graph, by the `finished` acknowledgements of its nodes. Knows no ROS.
 
-A receipt is a Header: the stamp of the frame, and ``"<node> published"`` or ``"<node> dropped <reason>"``. Colour and
-depth of a frame may have stamps of their own, so they are followed apart: an image until the detector is done with it,
-depth until the last node is.
+An acknowledgement is a Header: the stamp of the frame, and ``"<node> published"`` or ``"<node> dropped <reason>"``.
+Colour and depth of a frame may have stamps of their own, so they are followed apart: an image until the detector is
+done with it, depth until the last node is.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ DETECTOR = ORDER[0]
 IMAGE, DEPTH = "image", "depth"
 
 
-class Receipts:
+class Acknowledgements:
     """The images and depths that were sent and have not come to their end.
 
     ``nodes`` are those that are there. Depth is through when the last of them published or dropped it, or when one
-    before it dropped it. What no node receipts is never waited for.
+    before it dropped it. What no node acknowledgements is never waited for.
     """
 
     def __init__(self, nodes: Collection[str]) -> None:
@@ -41,8 +41,8 @@ class Receipts:
         if self._followed[kind]:
             self._on_their_way[kind][stamp_ns] += 1
 
-    def hear(self, text: str, stamp_ns: int) -> None:
-        """A receipt came; one that says nothing we know is left aside."""
+    def receive(self, text: str, stamp_ns: int) -> None:
+        """An acknowledgement came; one that says nothing we know is left aside."""
         node, _, verdict = text.partition(" ")
         if node not in ORDER or not verdict:
             return

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The books of a store: one row that says how much there is of everything, and which ids were given.
+"""The counters of a store: one row that says how much there is of everything, and which ids were given.
 
-A row that is missing has no checksum that could be wrong. So the books hold, of each table, how many rows it has and
+A row that is missing has no checksum that could be wrong. So the counters hold, of each table, how many rows it has and
 the sum of their checksums, and are written with every change.
 """
 
@@ -19,7 +19,7 @@ MOST_IDS = {"keyframe": 2**53, "object": 2**53, "closure": 2**53, "landmark": 2*
 
 
 @dataclass(slots=True)
-class Books:
+class Counters:
     """The highest ids that were given, the rows there are and the sums of their seals, and what was forgotten."""
 
     keyframe: int = 0
@@ -47,9 +47,9 @@ class Books:
             raise ValueError(f"expected ids of landmarks up to {MOST_IDS['landmark']}, got {given}: they are used up")
         self.landmark = max(self.landmark, given)
 
-    def emptied(self) -> Books:
+    def emptied(self) -> Counters:
         """Those of a store in which nothing is, but where the same ids were given."""
-        return Books(keyframe=self.keyframe, object=self.object, closure=self.closure, landmark=self.landmark)
+        return Counters(keyframe=self.keyframe, object=self.object, closure=self.closure, landmark=self.landmark)
 
     def enter(self, table: str, row: Mapping[str, Any]) -> None:
         """Book a row that is written."""
@@ -68,21 +68,24 @@ class Books:
         transaction.execute(f"REPLACE INTO books ({names}) VALUES ({', '.join('?' * len(row))})", tuple(row.values()))
 
 
-def read_books(connection: sqlite3.Connection) -> Books:
-    """The books of a store. ValueError if they are not there, damaged, or do not agree with what there is."""
+def read_counters(connection: sqlite3.Connection) -> Counters:
+    """The counters of a store. ValueError if they are not there, damaged, or do not agree with what there is."""
     rows = connection.execute("SELECT * FROM books").fetchall()
     if len(rows) != 1:
-        raise ValueError(f"expected one row of books, got {len(rows)}: the store is damaged")
-    require_sealed("the books", "books", rows[0])
-    books = Books(**{field.name: rows[0][field.name] for field in fields(Books)})
+        raise ValueError(f"expected one row of counters, got {len(rows)}: the store is damaged")
+    require_sealed("the counters", "books", rows[0])
+    counters = Counters(**{field.name: rows[0][field.name] for field in fields(Counters)})
     for table in TABLES:
-        booked, found = (getattr(books, f"{table}_rows"), getattr(books, f"{table}_seals")), count(connection, table)
+        booked, found = (
+            (getattr(counters, f"{table}_rows"), getattr(counters, f"{table}_seals")),
+            count(connection, table),
+        )
         if booked != found:
             raise ValueError(
                 f"expected {booked[0]} {table}s with checksums of {booked[1]} in all, got {found[0]} with {found[1]}: "
                 "the store is damaged"
             )
-    return books
+    return counters
 
 
 def count(connection: sqlite3.Connection, table: str, where: str = "", values: Iterable[Any] = ()) -> tuple[int, int]:

@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import threading
 
-from objreg_ros.bridge.streams.turns import Turns
+from objreg_ros.bridge.streams.frame_order import Turns
 
 
 def test_a_frame_that_is_put_off_is_due_at_once_where_none_is_at_work() -> None:

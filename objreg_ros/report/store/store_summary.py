@@ -22,7 +22,7 @@ MOST_VIEWS = 100  # are read for the noise of their depth
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Survey:
+class StoreSummary:
     """The whole of a store without its points."""
 
     path: str
@@ -78,13 +78,13 @@ class Survey:
         return {session: min(s.stamp_ns for s in rows) for session, rows in self.by_session.items()}
 
 
-def survey(path: str | Path) -> Survey:
+def survey(path: str | Path) -> StoreSummary:
     """Look through the store at ``path`` without changing it; StoreError (an OSError) if it is none or damaged."""
     store = Store(path, read_only=True)
     try:
         sightings = tuple(store.sightings())
         landmarks = Landmarks(RegistrarParams(), sightings)
-        return Survey(
+        return StoreSummary(
             path=str(path),
             bytes=Path(path).stat().st_size,
             counts=store.counts(),
@@ -114,7 +114,7 @@ def _noise_of(store: Store, keyframe_id: int) -> float | None:
     return measured_noise(np.nan_to_num(view.xyz[..., 2], nan=0.0))
 
 
-def describe(found: Survey) -> str:
+def describe(found: StoreSummary) -> str:
     """A store in a few lines for a reader."""
     lines = [f"{found.path}: a store of objreg_ros, {found.bytes / 1e6:.1f} MB"]
     lines += ["  " + ", ".join(f"{count} {name}" for name, count in found.counts.items())]
@@ -131,7 +131,7 @@ def describe(found: Survey) -> str:
     return "\n".join(lines)
 
 
-def told_moves(found: Survey) -> list[str]:
+def told_moves(found: StoreSummary) -> list[str]:
     """What closures tell of objects that were moved, a sentence each; what cannot be followed up is said too."""
     told = [_told_move(found, move) for move in found.moves.known]
     if found.moves.untold:
@@ -139,7 +139,7 @@ def told_moves(found: Survey) -> list[str]:
     return told
 
 
-def _told_move(found: Survey, move: Move) -> str:
+def _told_move(found: StoreSummary, move: Move) -> str:
     there, here, nearest = move.there, move.here, move.nearest
     stood, stands = (", ".join(f"{value:.2f}" for value in xyz) for xyz in (nearest.stood, nearest.here.position))
     landmarks = f"{there.landmark}" if there.landmark == here.landmark else f"{there.landmark}, now {here.landmark},"

@@ -37,7 +37,7 @@ def _options() -> list[click.Option]:
     ]
 
 
-def heard_by(command: click.Command) -> click.Command:
+def received_by(command: click.Command) -> click.Command:
     """The command with both options, if it has not got them.
 
     With -q nothing that it says goes to standard error; what goes wrong is told when it has ended.
@@ -51,13 +51,13 @@ def heard_by(command: click.Command) -> click.Command:
 
 def _hushed(work: Callable[..., Any]) -> Callable[..., Any]:
     @wraps(work)
-    def heard(*words: Any, **options: Any) -> Any:
+    def received(*words: Any, **options: Any) -> Any:
         if not is_quiet():
             return work(*words, **options)
         with _nowhere() as nowhere, redirect_stderr(nowhere):
             return work(*words, **options)
 
-    return heard
+    return received
 
 
 def is_quiet() -> bool:
@@ -77,7 +77,7 @@ def _asked() -> str:
 
 @contextmanager
 def aside() -> Iterator[None]:
-    """What is said within is not the result: with -q it is not heard. It decorates functions too."""
+    """What is said within is not the result: with -q it is not received. It decorates functions too."""
     if not is_quiet():
         yield
         return

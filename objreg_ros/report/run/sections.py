@@ -15,8 +15,8 @@ from objreg_ros.report.run.clouds import Clouds
 from objreg_ros.report.run.pairs import ACCEPTED, Pair, pairs_of
 from objreg_ros.report.run.pictures import Album, chosen_closures, chosen_refusals, data_uri, overlay
 from objreg_ros.report.run.reasons import MEANINGS
+from objreg_ros.report.run.run_summary import RunSummary, Tracks
 from objreg_ros.report.run.scene import NAMES, scene
-from objreg_ros.report.run.story import Story, Tracks
 from objreg_ros.report.run.thumbnails import Thumbnails
 from objreg_ros.report.run.trajectory_error import root_mean_square
 
@@ -28,7 +28,7 @@ OVERLAID = (
 )
 
 
-def chapter(story: Story, album: Album | None, runs: int = 1, spatial: bool = True) -> View:
+def chapter(story: RunSummary, album: Album | None, runs: int = 1, spatial: bool = True) -> View:
     """Everything that a run's part of a page of so many runs shows; ``spatial`` with what is in 3D."""
     tracks = story.tracks()
     pairs = pairs_of(story)
@@ -56,7 +56,7 @@ def spaced(name: str) -> str:
     return name.replace("_", " ")
 
 
-def judged(story: Story) -> tuple[int, int]:
+def judged(story: RunSummary) -> tuple[int, int]:
     """How many constraints are false, and of how many truth tells."""
     errors = sum(story.error(closure) is not None for closure in story.closures)
     return sum(map(story.is_false, story.closures)), errors
@@ -76,12 +76,12 @@ def about_rows(about: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [(name, str(text)) for name, text in rows.items() if text]
 
 
-def _said(story: Story) -> str:
+def _said(story: RunSummary) -> str:
     said = _verdict(story)
     return f"{said} Lens: {lens}." if (lens := story.summary.get("lens")) else said
 
 
-def _verdict(story: Story) -> str:
+def _verdict(story: RunSummary) -> str:
     if not story.closures:
         sure = "" if story.summary.get("findings") or not story.refusals else ": nothing in this run was sure enough"
         return f"No loop was closed{sure}."
@@ -93,7 +93,7 @@ def _verdict(story: Story) -> str:
     return f"{findings.number_of(len(story.closures), 'loop')} closed{by}{truth}."
 
 
-def _tiles(story: Story, tracks: Tracks | None) -> list[View]:
+def _tiles(story: RunSummary, tracks: Tracks | None) -> list[View]:
     false, of = judged(story)
     tiles = [
         _tile(f"{story.summary.get('frames', len(story.glimpses)):,}", "frames", _count_note(story)),
@@ -113,7 +113,7 @@ def _tile(value: str, name: str, note: str, tone: str = "") -> View:
     return {"value": value, "name": name, "note": note, "tone": tone}
 
 
-def _refused_note(story: Story) -> str:
+def _refused_note(story: RunSummary) -> str:
     """How many candidates were tried in vain, and how many more the table of reasons counts that were not tried."""
     counts = story.summary.get("rejected", {})
     untried = sum(counts.get(reason.value, 0) for reason in UNTRIED)
@@ -121,7 +121,7 @@ def _refused_note(story: Story) -> str:
     return f"{tried}, {untried} more not tried" if untried else tried
 
 
-def _count_note(story: Story) -> str:
+def _count_note(story: RunSummary) -> str:
     if "detections" not in story.summary:
         return "with colour and depth"
     return f"{story.summary['detections']:,} detections, {story.summary.get('objects', 0):,} objects"
@@ -132,7 +132,7 @@ def _change(before: float, after: float, source: str) -> str:
     return f"RMS, {abs(share):.0f} % {'less' if share >= 0 else 'more'} than {NAMES.get(source, source)}"
 
 
-def _way(story: Story, tracks: Tracks | None) -> View:
+def _way(story: RunSummary, tracks: Tracks | None) -> View:
     """The drawings of the way; of the truth where there is no odometry, and of our own tracking without either."""
     if tracks is not None:
         stamps_ns, lines, words = tracks.stamps_ns, tracks.lines, _way_words(story)
@@ -167,7 +167,7 @@ def _in_both_widths(draw: Callable[[int], str], wide: int = figures.WIDE) -> Vie
     return {"wide": drawn, "narrow": draw(figures.NARROW)} if drawn else None
 
 
-def _way_words(story: Story) -> str:
+def _way_words(story: RunSummary) -> str:
     source = NAMES.get(story.source, story.source)
     words = f"From above. Closures tie places that were seen twice; the pose graph takes the drift out of {source}."
     if story.by_tracking:
@@ -184,7 +184,7 @@ def _way_words(story: Story) -> str:
     return words
 
 
-def _pieces(story: Story) -> str:
+def _pieces(story: RunSummary) -> str:
     """What of our own tracking is drawn."""
     known = story.map
     words = f"There is no odometry in this run: {len(known.frames)} of {len(story.glimpses)} frames are drawn, which "
@@ -194,7 +194,7 @@ def _pieces(story: Story) -> str:
     return f"{words} {known.frames_apart} frames in {known.sessions_apart} more sessions are not: nothing ties them."
 
 
-def _timeline(story: Story) -> View | None:
+def _timeline(story: RunSummary) -> View | None:
     if not (story.glimpses or story.closures or story.refusals):
         return None
     entries = [("seen", "detected"), ("accepted", "closure"), ("refused", "refused candidate")]
@@ -208,7 +208,7 @@ def _timeline(story: Story) -> View | None:
     return {"words": words, "legend": entries, "drawing": drawing}
 
 
-def _reasons(story: Story) -> list[View]:
+def _reasons(story: RunSummary) -> list[View]:
     counts = story.summary.get("rejected", {})
     examples = {refusal.reason.value: refusal.detail for refusal in reversed(story.refusals)}
     return [
@@ -277,7 +277,7 @@ def _lacking(drawn: Thumbnails, count: int) -> str:
     return " ".join(parts)
 
 
-def _galleries(pairs: Sequence[Pair], story: Story, album: Album) -> list[View]:
+def _galleries(pairs: Sequence[Pair], story: RunSummary, album: Album) -> list[View]:
     """A few accepted and a few refused pairs with their pictures."""
     by_identity = {id(pair.told): pair for pair in pairs}
     accepted = [by_identity[id(closure)] for closure in chosen_closures(story)]
@@ -311,7 +311,7 @@ def _card(pair: Pair, album: Album) -> View | None:
     return {**_row(pair), "words": pair.words, "pictures": pictures}
 
 
-def _objects(story: Story) -> list[View]:
+def _objects(story: RunSummary) -> list[View]:
     views = []
     for caption, corrected in {f"By {NAMES.get(story.source, story.source)}": False, "Corrected": True}.items():
         drawing = _in_both_widths(partial(figures.object_map, story, corrected), figures.HALF)
@@ -321,7 +321,7 @@ def _objects(story: Story) -> list[View]:
     return views
 
 
-def _stages(story: Story) -> list[View]:
+def _stages(story: RunSummary) -> list[View]:
     stages: dict[str, dict[str, float]] = story.summary.get("stage_ms", {})
     longest = max((ms["p95"] for ms in stages.values()), default=1.0) or 1.0
     return [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The books: what is missing is noticed, and ids end."""
+"""The counters: what is missing is noticed, and ids end."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sqlite3
 
 import pytest
 
-from objreg_ros.memory.books import MOST_IDS, Books, read_books
+from objreg_ros.memory.counters import MOST_IDS, Counters, read_counters
 from objreg_ros.memory.store_file import bear
 
 
@@ -19,36 +19,36 @@ def _store() -> sqlite3.Connection:
 
 
 def test_books_come_back_as_they_were_written() -> None:
-    connection, books = _store(), Books(keyframe=7, landmark=9, forgotten=3)
-    books.write(connection)
-    assert read_books(connection) == books and books.next("landmark") == 10
+    connection, counters = _store(), Counters(keyframe=7, landmark=9, forgotten=3)
+    counters.write(connection)
+    assert read_counters(connection) == counters and counters.next("landmark") == 10
 
 
 def test_books_that_do_not_agree_with_the_rows_are_refused() -> None:
-    connection, books = _store(), Books()
-    books.enter("closure", {"id": 4, "seal": 17})
-    books.write(connection)
+    connection, counters = _store(), Counters()
+    counters.enter("closure", {"id": 4, "seal": 17})
+    counters.write(connection)
     with pytest.raises(ValueError, match="expected 1 closures with checksums of 17 in all, got 0 with 0"):
-        read_books(connection)
+        read_counters(connection)
 
 
 def test_books_that_were_changed_are_refused() -> None:
     connection = _store()
     connection.execute("UPDATE books SET landmark = 5")
-    with pytest.raises(ValueError, match=r"the books: expected the checksum .* damaged"):
-        read_books(connection)
+    with pytest.raises(ValueError, match=r"the counters: expected the checksum .* damaged"):
+        read_counters(connection)
 
 
 @pytest.mark.parametrize("what", MOST_IDS)
 def test_ids_end(what: str) -> None:
-    books = Books(**{what: MOST_IDS[what]})
+    counters = Counters(**{what: MOST_IDS[what]})
     with pytest.raises(ValueError, match=f"expected ids of {what}s up to .* used up"):
-        books.next(what)
+        counters.next(what)
 
 
 def test_a_landmark_with_an_id_that_no_message_holds_is_not_booked() -> None:
-    books = Books()
-    books.give_landmark(MOST_IDS["landmark"])
+    counters = Counters()
+    counters.give_landmark(MOST_IDS["landmark"])
     with pytest.raises(ValueError, match="expected ids of landmarks up to 4294967294, got 4294967295"):
-        books.give_landmark(MOST_IDS["landmark"] + 1)
-    assert books.landmark == MOST_IDS["landmark"]
+        counters.give_landmark(MOST_IDS["landmark"] + 1)
+    assert counters.landmark == MOST_IDS["landmark"]

@@ -14,8 +14,8 @@ from typing import Any
 import click
 
 from objreg_ros.cli import NOTHING
-from objreg_ros.cli.loudness import aside, is_verbose
 from objreg_ros.cli.paths import STANDARD_OUTPUT
+from objreg_ros.cli.verbosity import aside, is_verbose
 from objreg_ros.data import Rejected
 from objreg_ros.offline import Run
 from objreg_ros.plausibility.finding import Finding
@@ -40,7 +40,7 @@ def json_to(file: Path | None) -> Iterator[Callable[[Any], None]]:
 
 
 @aside()
-def tell_run(run: Run, summary: Mapping[str, Any]) -> None:
+def print_run(run: Run, summary: Mapping[str, Any]) -> None:
     """What came out of a run, in numbers."""
     click.echo(
         f"{run.frames} frames, {run.detections} detections, {run.objects} objects, {len(run.closures)} constraints"
@@ -85,7 +85,7 @@ def tell_run(run: Run, summary: Mapping[str, Any]) -> None:
 
 
 @aside()
-def tell_trajectory(trajectory: Mapping[str, Any] | None) -> None:
+def print_trajectory(trajectory: Mapping[str, Any] | None) -> None:
     """How much of the trajectory is in one piece, and its error before and after closures correct it."""
     if trajectory is None:
         return
@@ -102,7 +102,7 @@ def tell_trajectory(trajectory: Mapping[str, Any] | None) -> None:
         click.echo(f"  trajectory error: {error['before']:.1f} cm, corrected {error['after']:.1f} cm (RMS)")
 
 
-def tell_reasons(refusals: Iterable[Rejected]) -> None:
+def print_reasons(refusals: Iterable[Rejected]) -> None:
     """With -v a line for each refusal: both moments, the reason and the numbers behind it."""
     for refused in refusals if is_verbose() else ():
         click.echo(f"  {refused.from_ns} to {refused.to_ns} ns: {refused.reason.value}: {refused.detail}")
@@ -122,7 +122,7 @@ def tell(findings: Iterable[Finding], err: bool = False) -> None:
 
 
 @aside()
-def tell_next(*words: str) -> None:
+def print_next(*words: str) -> None:
     """The command that comes after this one, as it may be typed."""
     click.echo(f"next: {shlex.join(words)}")
 

@@ -9,8 +9,8 @@ import pytest
 from click.testing import CliRunner
 
 from objreg_ros.cli import NOTHING
-from objreg_ros.cli.loudness import heard_by
-from objreg_ros.cli.told import closing_lines, exit_code, json_to, tell, tell_next, tell_reasons
+from objreg_ros.cli.run_output import closing_lines, exit_code, json_to, print_next, print_reasons, tell
+from objreg_ros.cli.verbosity import received_by
 from objreg_ros.data import Reason, Rejected
 from objreg_ros.plausibility.finding import Finding
 
@@ -26,7 +26,7 @@ def test_a_finding_is_a_block_and_a_remark_a_line(capsys: pytest.CaptureFixture[
 
 
 def test_the_next_command_may_be_typed_as_it_stands(capsys: pytest.CaptureFixture[str]) -> None:
-    tell_next("objreg", "inspect", "my bag")
+    print_next("objreg", "inspect", "my bag")
     assert capsys.readouterr().out == "next: objreg inspect 'my bag'\n"
 
 
@@ -55,12 +55,12 @@ def test_json_for_standard_output_is_all_that_goes_there(capsys: pytest.CaptureF
     with json_to(Path("-")) as write:
         click.echo("said")
         write({"frames": 1})
-    heard = capsys.readouterr()
-    assert json.loads(heard.out) == {"frames": 1} and heard.err == "said\n"
+    received = capsys.readouterr()
+    assert json.loads(received.out) == {"frames": 1} and received.err == "said\n"
 
 
 def test_reasons_are_told_to_who_asks_for_them() -> None:
     refused = Rejected(reason=Reason.NO_CANDIDATE, from_ns=2, to_ns=1, detail="none is near")
-    command = heard_by(click.Command("run", callback=lambda: tell_reasons([refused])))
+    command = received_by(click.Command("run", callback=lambda: print_reasons([refused])))
     assert CliRunner().invoke(command, []).output == ""
     assert CliRunner().invoke(command, ["-v"]).output == "  2 to 1 ns: no_candidate: none is near\n"

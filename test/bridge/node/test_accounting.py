@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from objreg_ros.bridge.node.accounting import Accounting, percentiles_ms
+
+STEPS = st.lists(st.tuples(st.sampled_from(("receive", "publish", "overtaken", "malformed")), st.integers(0, 3)))
+
+
+@given(STEPS)
+def test_the_books_balance_after_every_step(steps: list[tuple[str, int]]) -> None:
+    accounting, waiting = Accounting(), Counter[int]()
+    for what, stamp_ns in steps:
+        if what == "receive":
+            accounting.receive(stamp_ns)
+            waiting[stamp_ns] += 1
+        elif waiting[stamp_ns]:
+            waiting[stamp_ns] -= 1
+            accounting.publish(stamp_ns) if what == "publish" else accounting.drop(stamp_ns, what)
+        counters = accounting.balance()
+        assert counters.received == counters.published + counters.waiting + sum(counters.dropped.values())
+        assert counters.waiting == waiting.total()
+    assert counters.received == sum(what == "receive" for what, _ in steps) if steps else True
+
+
+def test_a_frame_cannot_end_twice() -> None:
+    accounting = Accounting()
+    accounting.receive(5)
+    accounting.publish(5)
+    with pytest.raises(KeyError, match="no frame of 5 ns waits"):
+        accounting.drop(5, "overtaken")
+    assert accounting.balance().dropped == {}
+
+
+def test_two_frames_of_one_stamp_are_two_frames() -> None:
+    accounting = Accounting()
+    accounting.receive(0)
+    accounting.receive(0)
+    accounting.publish(0)
+    assert accounting.balance().waiting == 1
+    accounting.publish(0)
+    assert accounting.balance().published == 2
+
+
+def test_drops_are_counted_by_reason_and_losses_apart() -> None:
+    accounting = Accounting()
+    for stamp_ns, reason in enumerate(("overtaken", "malformed_image", "overtaken")):
+        accounting.receive(stamp_ns)
+        accounting.drop(stamp_ns, reason)
+    accounting.lose("image", 4)
+    counters = accounting.balance()
+    assert counters.dropped == {"overtaken": 2, "malformed_image": 1} and counters.lost == {"image": 4}
+
+
+def test_percentiles_are_those_of_the_durations() -> None:
+    assert percentiles_ms([n / 1000 for n in range(101)]) == pytest.approx((50.0, 95.0))
+
+
+def test_a_stage_is_measured_and_the_way_from_in_to_out_too() -> None:
+    accounting = Accounting()
+    accounting.receive(1)
+    with accounting.timed("detect"):
+        pass
+    accounting.publish(1)
+    stages = accounting.balance().stage_ms
+    assert set(stages) == {"detect", "total"} and 0 <= stages["detect"][0] <= stages["total"][1] < 10_000.0
