@@ -446,7 +446,7 @@ def test_pictures_and_boxes_of_a_lens_reach_the_segmenter_rectified() -> None:
     straight, as_they_are = seen_of_a_lens(records(3), INPUTS)
     run, rectified = seen_of_a_lens(of_a_lens(3), INPUTS)
     assert run.frames == 3 and run.lens.startswith("plumb_bob, moves a pixel by ") and run.lens.endswith("; rectified")
-    assert run.summary(Truth([]))["lens"] == run.lens and straight.lens == "none told: taken as rectified"
+    assert run.summary(Truth([]))["lens"] == run.lens and straight.lens == "none stated: taken as rectified"
     for (depth, box), (plain, told) in zip(rectified, as_they_are, strict=True):
         assert depth.shown is not None and plain.shown is None and not np.array_equal(box, told)
 

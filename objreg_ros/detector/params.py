@@ -25,7 +25,7 @@ class DetectorParams(Params):
         "auto", "number of the first class: 0 (converted TFLite), 1 (TF detection API)", choices=("auto", "0", "1")
     )
     contract: str = param(
-        "auto", "what the model's outputs mean; auto: told by their names and shapes and the number of labels",
+        "auto", "what the model's outputs mean; auto: by their names and shapes and the number of labels",
         choices=("auto", "tf_detection", "ssd_raw", "yolov5", "yolov8", "end_to_end", "yolox", "nanodet", "detr"),
     )  # fmt: skip
     threshold: float = param(0.5, "least score of a detection", ge=0.0, le=1.0, live=True)

@@ -103,7 +103,7 @@ def test_columns_line_up() -> None:
 
 def test_what_is_assumed_of_the_lens_is_told(tmp_path: Path) -> None:
     folder = tum_folder(tmp_path)
-    assert "lens: none told: taken as rectified" in CliRunner().invoke(command, [str(folder)]).output
+    assert "lens: none stated: taken as rectified" in CliRunner().invoke(command, [str(folder)]).output
     with (folder / "camera.yaml").open("a") as file:
         file.write("\ndistortion: [-0.3, 0.1, 0, 0, 0]\n")
     output = CliRunner().invoke(command, [str(folder)]).output

@@ -33,7 +33,7 @@ Numbers = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Calibration:
-    """A camera as a sensor_msgs/CameraInfo tells of it; ``width`` and ``height`` are 0 where it fits any picture.
+    """A camera as in a sensor_msgs/CameraInfo; ``width`` and ``height`` are 0 where it fits any picture.
 
     ``k`` (9), ``r`` (9) and ``p`` (12) are matrices by rows, in pixels whose centres are on integers, ``d`` the
     coefficients of ``distortion_model``. ValueError for a camera without a focal length, and for a lens that is none.
@@ -117,7 +117,7 @@ def absolute(told: str) -> str:
 
 
 def of_numbers(numbers: Numbers) -> Calibration:
-    """A pinhole camera of fx fy cx cy, and of width and height where these are told."""
+    """A pinhole camera of fx fy cx cy, and of width and height where these are given."""
     if len(numbers) not in (4, 6):
         raise ValueError(f"camera: expected {FORM}, got {len(numbers)} numbers")
     if any(side != int(side) if math.isfinite(side) else True for side in numbers[4:]):
@@ -152,8 +152,8 @@ def of_mapping(values: Mapping[str, Any]) -> Calibration:
 def fitted(camera_info: Any, message: Any) -> Any:
     """A camera for the picture or cloud that it is of: a `Calibration` in its size, a message of ROS as it is.
 
-    None stays None. ValueError for a picture of another shape, and for a cloud that is not organised, of which only the
-    camera could tell how many pixels there are, where that does not.
+    None stays None. ValueError for a picture of another shape, and for a cloud that is not organised where the camera,
+    which alone could give the number of pixels, does not.
     """
     if not isinstance(camera_info, Calibration):
         return camera_info
@@ -169,10 +169,10 @@ def _of_size(camera: Calibration, width: int, height: int) -> Calibration:
     return camera.of_size(width, height)
 
 
-def _numbers_of(told: str) -> Numbers | None:
+def _numbers_of(given: str) -> Numbers | None:
     """The numbers between commas; None where some are none, so that it must be a file's name."""
     try:
-        return tuple(float(text) for text in told.strip().strip("[]").split(","))
+        return tuple(float(text) for text in given.strip().strip("[]").split(","))
     except ValueError:
         return None
 
@@ -194,22 +194,22 @@ def _scaled(matrix: Numbers, columns: int, across: float, down: float) -> Number
 
 def read_camera_text(file: Path) -> str:
     """The text of a file of a camera; ValueError for what is no regular file, too long or no UTF-8."""
-    told = file.stat()
-    if not stat.S_ISREG(told.st_mode):
+    status = file.stat()
+    if not stat.S_ISREG(status.st_mode):
         raise ValueError("expected a regular file, got something else")
-    if told.st_size > FILE_BYTES:
-        raise ValueError(f"expected at most {FILE_BYTES} bytes, got {told.st_size}; is it the right file?")
+    if status.st_size > FILE_BYTES:
+        raise ValueError(f"expected at most {FILE_BYTES} bytes, got {status.st_size}; is it the right file?")
     return file.read_bytes().decode("utf-8-sig")  # what is no UTF-8 is a ValueError
 
 
 def _matrix_of(values: Mapping[str, Any], name: str, count: int | None = None) -> Numbers:
     """The numbers of a matrix, which are its ``data`` or the list itself."""
-    told = values[name]
-    data = told.get("data") if isinstance(told, Mapping) else told
+    given = values[name]
+    data = given.get("data") if isinstance(given, Mapping) else given
     if isinstance(data, list) and data and all(isinstance(row, list) for row in data):
         data = [value for row in data for value in row]
     if not isinstance(data, list) or not all(isinstance(value, int | float) for value in data):
-        raise ValueError(f"expected {name} with its numbers as data: [1.0, 0.0, …], got {brief(told)[:80]}")
+        raise ValueError(f"expected {name} with its numbers as data: [1.0, 0.0, …], got {brief(given)[:80]}")
     if count is not None and len(data) != count:
         raise ValueError(f"expected {count} numbers in {name}, got {len(data)}")
     try:
@@ -218,10 +218,10 @@ def _matrix_of(values: Mapping[str, Any], name: str, count: int | None = None) -
         raise ValueError(f"expected numbers in {name} that are not too long, got: {error}") from error
 
 
-def _model(told: Any) -> str:
-    if not isinstance(told, str):
-        raise ValueError(f"expected a name as distortion_model, got {brief(told)[:80]}")
-    return told
+def _model(given: Any) -> str:
+    if not isinstance(given, str):
+        raise ValueError(f"expected a name as distortion_model, got {brief(given)[:80]}")
+    return given
 
 
 def _pixels(values: Mapping[str, Any], name: str) -> int:

@@ -37,7 +37,7 @@ DEEPEST = 8  # mappings in mappings of OpenCV
 
 @dataclass(frozen=True)
 class CameraFile:
-    """What a file tells of a camera: ``values`` by the keys of camera_calibration, and what those have no key for.
+    """A camera as a file gives it: ``values`` by the keys of camera_calibration, and what those have no key for.
 
     ``depth_scale`` is the steps of depth in a metre, None where the file does not say; ``notes`` are for the user.
     """
@@ -48,7 +48,7 @@ class CameraFile:
 
 
 def parse_camera(text: str) -> CameraFile:
-    """What the text of a file tells of a camera. ValueError, with the forms that are known, for another text."""
+    """The camera in the text of a file. ValueError, with the forms that are known, for another text."""
     for parse in (_of_numbers, _of_ost):
         if (found := parse(text)) is not None:
             return found

@@ -17,10 +17,10 @@ from objreg_ros.plausibility.stream_monitor import StreamMonitor
 
 
 class CameraStream:
-    """Gives frames the pose that odometry tells, and the doubt there is of their camera.
+    """Gives frames their pose by odometry, and the doubt about their camera.
 
-    Odometry that is another's is not used, nor is one whose body is not known to carry the camera until the mount is
-    measured. ``say`` is given what is assumed, once.
+    Odometry of another robot is not used, nor is one whose body is not known to carry the camera until the mount is
+    measured. ``say`` is given each assumption, once.
     """
 
     def __init__(self, mount: Mount, say: Callable[[str], None] = lambda text: None) -> None:

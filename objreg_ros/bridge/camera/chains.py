@@ -41,7 +41,7 @@ def truth_edge(tree: FrameTree, camera: str) -> Edge | None:
 
 
 def body_of(tree: FrameTree, odom_frame: str, camera: str) -> str:
-    """The body of an odometry that does not name it; empty where nothing tells.
+    """The body of an odometry that does not name it; empty where nothing gives it.
 
     It is the frame by which the camera hangs on ``odom_frame``: of those between the highest that moves. Where the
     camera does not hang there, it is the well-known base that carries the camera.

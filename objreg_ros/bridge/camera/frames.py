@@ -28,7 +28,7 @@ GAP_NS = 1_000_000_000  # two samples farther apart do not say what was between 
 END_NS = 200_000_000  # so far beside a sample an edge still is where it was
 STILL = 1e-6  # m, or a part of a quaternion: numbers that are repeated differ by less
 
-# Frames that carry no part of a robot: nothing sits on a body by way of them.
+# Frames that carry no part of a robot: they attach nothing to a body.
 WORLD = re.compile(
     r"(^|[/_])(map\d*|odom\w*|world|earth|global|local_origin|utm|init|ground_?truth|gt|vicon|mocap|optitrack|vrpn"
     r"|qualisys|motion_?capture)([/_]|$)",
@@ -90,7 +90,7 @@ class Edge:
         self.extent = max(self.extent, same)
 
     def at(self, stamp_ns: int | None) -> Array | None:
-        """``T_parent_child (4, 4)`` at a moment; None of an edge that moves where its history does not reach."""
+        """``T_parent_child (4, 4)`` at a time; None of an edge that moves where its history does not reach."""
         if self.fixed is not None:
             return self.fixed
         if not self.moves:
@@ -111,7 +111,7 @@ class Edge:
 
 
 class FrameTree:
-    """Frames with their poses in their parents. May be told of by one thread and asked by another.
+    """Frames with their poses in their parents. One thread may add to it while another one asks.
 
     A child may have several parents: /tf of a robot in a motion-capture room has odometry and the truth of one body.
     The chain above a frame goes by /tf_static first, then by what is no world. Only the chains above frames that were
@@ -126,7 +126,7 @@ class FrameTree:
         self._lock = Lock()
 
     def receive(self, message: Any) -> None:
-        """Take a TFMessage of /tf_static in: the last word on a frame counts.
+        """Take a TFMessage of /tf_static in: the last transform of a frame counts.
 
         ValueError for a transform without a rotation, or beyond all measure; the others are taken.
         """
@@ -219,7 +219,7 @@ class FrameTree:
             return {*self._edges, *(parent for parents in self._edges.values() for parent in parents)}
 
     def between(self, a: str, b: str, stamp_ns: int | None = None, without: str = "") -> Array | None:
-        """``T_a_b (4, 4)`` at a moment; without one only where no edge between them moves.
+        """``T_a_b (4, 4)`` at a time; without one only where no edge between them moves.
 
         None where nothing ties the two frames together but a world (`WORLD`) or the frame ``without``, and where a
         history does not reach.

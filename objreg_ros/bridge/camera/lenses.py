@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pictures of a lens, rectified at the node: what a camera_info says of it, and which pictures are as it made them.
 
-ROS's image_proc gives a rectified picture the camera_info of the raw one, distortion and all. So D alone does not tell.
-The names of topics do, by convention: image_rect, image_rect_color, hw_registered/image_rect_raw. A parameter of the
-segmenter, ``rectified``, overrules them.
+ROS's image_proc gives a rectified picture the camera_info of the raw one, distortion and all. So D alone does not show
+whether a picture is rectified. The names of topics do, by convention: image_rect, image_rect_color,
+hw_registered/image_rect_raw. A parameter of the segmenter, ``rectified``, overrules them.
 
 A PointCloud2 is never remapped: its points are metres already. One that is organised is taken to share its rows and
 columns with the picture of the detector, so boxes stay. One that is not is projected with P, so boxes of a raw picture
@@ -27,7 +27,7 @@ RECTIFIED = re.compile(r"(?<![a-z])(un)?rect|Rect|undist")  # in the name of a t
 UNTURNED = 1e-6  # of an entry of R
 KEPT = 4  # lenses: a driver may change between a few
 OTHERWISE = "set segmenter.rectified to all to take the pictures as they are"
-NONE_TOLD = "none told: taken as rectified"
+NONE_TOLD = "none stated: taken as rectified"
 
 Numbers = tuple[float, ...]
 
@@ -56,7 +56,7 @@ def depth_image(
     most_pixels: int = limits.MOST_PIXELS_OF_PICTURE,
     raw: Raw = Raw(),
 ) -> DepthImage:
-    """As `from_msg.depth_image`, rectified where the camera_info tells of a lens; as it came, to the bit, where not."""
+    """As `from_msg.depth_image`, rectified where the camera_info has a lens; unchanged, to the bit, where not."""
     image = from_msg.depth_image(depth_message, camera_info, colour, most_pixels)
     lens = lens_of(camera_info, raw)
     return image if lens is None else lens.rectify(image, *raw)
@@ -75,23 +75,23 @@ def describe(camera_info: Any, raw: Raw = Raw(), points: bool = False) -> str:
     if not is_distorted(camera_info):
         return NONE_TOLD
     if points:
-        return f"{_model(camera_info)} told; points are taken as they come"
+        return f"{_model(camera_info)} stated; points are taken as they come"
     lens = lens_of(camera_info, raw)
     if lens is None:
         return (
-            f"{_model(camera_info)} told, but the pictures are taken as rectified (topic name or segmenter.rectified)"
+            f"{_model(camera_info)} stated, but the pictures are taken as rectified (topic name or segmenter.rectified)"
         )
     what = "rectified" if all(raw) else f"{'depth' if raw.depth else 'colour'} rectified, the other is so already"
     return f"{lens}; {what}"
 
 
 def is_distorted(camera_info: Any) -> bool:
-    """Whether a CameraInfo tells of a lens: zeros and nothing say that there is none."""
+    """Whether a CameraInfo has a lens: zeros or no coefficients mean that there is none."""
     return bool(np.any(_numbers(camera_info, "d")))
 
 
 def lens_of(camera_info: Any, raw: Raw = Raw()) -> Lens | None:
-    """The lens of a CameraInfo; None where it tells of none, and where nothing is raw. The newest few are kept.
+    """The lens of a CameraInfo; None where it has none, and where nothing is raw. The newest few are kept.
 
     The rectified camera is P, turned by R, as ROS has it; it is K where P is zeros, and where R turns the rays of raw
     depth, which then would not stay along the axis. ValueError for a lens that is unknown or cannot be.
@@ -140,5 +140,5 @@ def _rotation(camera_info: Any) -> Numbers:
 
 
 def _numbers(camera_info: Any, name: str) -> np.ndarray:
-    told = getattr(camera_info, name, None)
-    return np.asarray(getattr(camera_info, name.upper(), ()) if told is None else told, np.float64).ravel()
+    numbers = getattr(camera_info, name, None)
+    return np.asarray(getattr(camera_info, name.upper(), ()) if numbers is None else numbers, np.float64).ravel()

@@ -42,7 +42,7 @@ class Seat(Enum):
     KNOWN = "known"  # a parameter or the tree of frames says where
     ONE_PLACE = "one place"  # the odometry is the camera's own
     UNKNOWN = "unknown"  # nothing ties the two
-    BEYOND = "beyond"  # a joint moves between them, and where it was at the moment is not known
+    BEYOND = "beyond"  # a joint moves between them, and its position at that time is not known
 
 
 class Seated(NamedTuple):
@@ -53,10 +53,10 @@ class Seated(NamedTuple):
 
 
 class Mount:
-    """Where the camera sits on the body that odometry speaks of.
+    """The pose of the camera on the body of the odometry.
 
-    ``told`` is what a parameter says, which wins; ``tree`` is asked without one. ``say`` receives what is assumed, and
-    receives it again only where that changes. ``nameless`` is whose pose an odometry is that names no body.
+    ``told`` is the value of a parameter, which wins; without one, ``tree`` is asked. ``say`` receives each assumption,
+    and receives it again only where it changes. ``nameless`` is the body of an odometry that names none.
     """
 
     def __init__(
@@ -74,12 +74,12 @@ class Mount:
     ) -> Array | None:
         """The pose (4, 4) of the camera on the body of these odometry samples; None where the two are one.
 
-        None too where it is not known: `seated` tells these apart.
+        None too where it is not known: `seated` distinguishes the two.
         """
         return self.seated(words, camera_frame, stamp_ns).T_body_camera
 
     def seated(self, words: Sequence[Odometry] | None, camera_frame: str, stamp_ns: int | None = None) -> Seated:
-        """What is known of the camera on the body of these odometry samples at a moment, by default that of the last.
+        """What is known of the camera on the body of these odometry samples at a time, by default that of the last.
 
         `Seat.ONE_PLACE` without any.
         """
@@ -106,7 +106,7 @@ class Mount:
         tie = self._tree.tie(body, camera, odom) if body and camera else None
         if tie is None:
             what = f"nothing on /tf_static or /tf ties {_the('odometry', body)} to {_the('camera', camera)}"
-            self._tell(
+            self._announce(
                 body, camera, f"{what}: the registrar measures it, others take it to be one place; set T_base_camera"
             )
             return Seated(Seat.UNKNOWN)
@@ -116,12 +116,12 @@ class Mount:
         T = self._tree.between(body, camera, stamp_ns, odom)
         names = f"{WHERE[tie]} {_the('camera', camera)} on {_the('odometry', body)}"
         if tie is Tie.MOVING:
-            self._tell(body, camera, f"{names} by a joint, which is followed")
+            self._announce(body, camera, f"{names} by a joint, which is followed")
         elif T is not None:
-            self._tell(body, camera, f"{names} at {' '.join(f'{metres:.3f}' for metres in T[:3, 3])} m")
+            self._announce(body, camera, f"{names} at {' '.join(f'{metres:.3f}' for metres in T[:3, 3])} m")
         return Seated(Seat.BEYOND) if T is None else Seated(Seat.KNOWN, T)
 
-    def _tell(self, body: str, camera: str, text: str) -> None:
+    def _announce(self, body: str, camera: str, text: str) -> None:
         if text != self._said.get((body, camera)):
             if len(self._said) >= MOST_FRAMES:
                 self._said.clear()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which pictures of a fast camera go on: a keyframe is made of a few, and more of them tell nothing new."""
+"""Which pictures of a fast camera go on: a keyframe is made of a few, and more of them add nothing new."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ class Pace:
     """Lets ``max_rate`` pictures a second through on average, by their stamps; 0: every one.
 
     After every `TURN` one more is left out where some are: depth that comes with every third picture would else always
-    come with one that is left out. A clock that jumps back begins anew. One that stands still tells no pace, so that
-    every picture goes on.
+    come with one that is left out. A clock that jumps back begins anew. One that stands still gives no rate, so every
+    picture goes on.
     """
 
     def __init__(self, max_rate: float) -> None:

@@ -48,5 +48,5 @@ def receive_frames(
 
 
 def receive_mount(node: NodeBase, told: Array | None) -> Mount:
-    """Where the camera sits on the body of the odometry: as ``told`` by a parameter, else as /tf says."""
+    """The pose of the camera on the body of the odometry: ``told``, a parameter's value, else that of /tf."""
     return Mount(told, receive_frames(node, told is None), node.get_logger().info)

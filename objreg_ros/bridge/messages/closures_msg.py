@@ -23,7 +23,7 @@ try:
     from objreg_msgs.msg import Evidence, Moment, ObjectLandmark, ObjectLandmarks, Refusal
     from objreg_msgs.msg import LoopClosure as LoopClosureMsg
     from objreg_msgs.msg import ObjectMatch as ObjectMatchMsg
-except ImportError:  # optional: the topics of common_interfaces tell the poses
+except ImportError:  # optional: the topics of common_interfaces carry the poses
     LoopClosureMsg = Refusal = ObjectLandmarks = None
 
 NAMESPACE = uuid.UUID("5b0f7f86-7a43-4d0b-9c53-0a1de0f6b0c7")  # of the ids of closures
@@ -32,7 +32,7 @@ SESSION = re.compile("[0-9]{1,18}")
 
 
 def closure_id(closure: LoopClosure, robot: str) -> str:
-    """The text of a UUID: the same for the same two moments of the same robots, wherever and whenever it is made."""
+    """The text of a UUID: the same for the same two keyframes of the same robots, wherever and whenever it is made."""
     here = closure.from_session, closure.from_frame_id, closure.from_ns
     there = closure.to_session, closure.to_frame_id, closure.to_ns
     robots = _robots(closure, robot)
@@ -43,7 +43,7 @@ def closure_id(closure: LoopClosure, robot: str) -> str:
 def loop_closure(closure: LoopClosure, robot: str = "") -> Any:
     """An objreg_msgs/LoopClosure; None where objreg_msgs is not installed.
 
-    It is of the robot of this name where the closure tells no robot itself.
+    Where the closure names no robot, ``robot`` is its robot.
     """
     if LoopClosureMsg is None:
         return None
@@ -106,8 +106,8 @@ def _landmark(seen: Observation, class_id: int | None) -> Any:
     return message
 
 
-def _robots(told: LoopClosure | Rejected, robot: str) -> Robots:
-    return told.from_robot or robot, told.to_robot or robot
+def _robots(closure: LoopClosure | Rejected, robot: str) -> Robots:
+    return closure.from_robot or robot, closure.to_robot or robot
 
 
 def _moment(stamp_ns: int, frame_id: str, session: int | None, robot: str) -> Any:
@@ -126,7 +126,7 @@ def _evidence(numbers: Mapping[str, float]) -> list[Any]:
 
 
 def read_loop_closure(message: Any) -> LoopClosure:
-    """The closure that an objreg_msgs/LoopClosure tells. ValueError for a retraction, which tells none."""
+    """The closure in an objreg_msgs/LoopClosure. ValueError for a retraction, which has none."""
     if message.retracted:
         raise ValueError(f"closure: expected one that holds, got the retraction of {message.id[:40]!r}")
     _require_few(message.labels, "labels", limits.MOST_OBJECTS)
@@ -145,7 +145,7 @@ def read_loop_closure(message: Any) -> LoopClosure:
 
 
 def read_refusal(message: Any) -> Rejected:
-    """The refusal that an objreg_msgs/Refusal tells. ValueError for a reason that nobody knows."""
+    """The refusal in an objreg_msgs/Refusal. ValueError for an unknown reason."""
     return Rejected(
         reason=Reason(message.reason),
         detail=from_msg.bounded(message.detail, "detail", limits.MOST_DETAIL),
@@ -156,7 +156,7 @@ def read_refusal(message: Any) -> Rejected:
 
 
 def read_landmarks(message: Any) -> tuple[Observation, ...]:
-    """The objects that an objreg_msgs/ObjectLandmarks tells, in the camera and at the time of its header."""
+    """The objects in an objreg_msgs/ObjectLandmarks, in the camera frame and at the time of its header."""
     _require_few(message.landmarks, "landmarks", limits.MOST_OBJECTS)
     return tuple(
         Observation(
@@ -169,14 +169,14 @@ def read_landmarks(message: Any) -> tuple[Observation, ...]:
 
 
 def _ends(message: Any) -> dict[str, Any]:
-    """Stamp, frame, session and robot of both moments, as fields of a word."""
-    told: dict[str, Any] = {}
+    """Stamp, frame, session and robot of both keyframes, as fields of a value."""
+    fields: dict[str, Any] = {}
     for end, moment in (("from", message.from_moment), ("to", message.to_moment)):
-        told[f"{end}_ns"] = from_msg.stamp_ns(moment)
-        told[f"{end}_frame_id"] = from_msg.bounded(moment.frame_id, "frame_id")
-        told[f"{end}_session"] = _session(moment.session)
-        told[f"{end}_robot"] = from_msg.bounded(moment.robot, "robot")
-    return told
+        fields[f"{end}_ns"] = from_msg.stamp_ns(moment)
+        fields[f"{end}_frame_id"] = from_msg.bounded(moment.frame_id, "frame_id")
+        fields[f"{end}_session"] = _session(moment.session)
+        fields[f"{end}_robot"] = from_msg.bounded(moment.robot, "robot")
+    return fields
 
 
 def _session(text: str) -> int | None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages to words. The only place that knows the fields of a message on its way in, but for `closures_msg`.
+"""Messages to the data types of data.py. Only this module and `closures_msg` know the fields of incoming messages.
 
 Reads attributes only, so the messages of rclpy and of rosbags (ROS 1 and 2) both fit. Pixels are in `pictures`, records
 in `layout`. A message that breaks its contract raises ValueError with what was expected and what came.
@@ -56,7 +56,7 @@ MOMENT = re.compile(r"(?P<name>.*)@(?P<seconds>-?[0-9]{1,10})\.(?P<nanoseconds>[
 
 
 def stamp_ns(message: Any) -> int:
-    """The time of a message with a header, of a Header, of a Time or of a word, in integer nanoseconds.
+    """The time of a message with a header, of a Header, of a Time or of a value, in integer nanoseconds.
 
     ValueError for one that a ROS 2 message cannot carry: seconds of more than 32 bits, a second of nanoseconds.
     """
@@ -83,12 +83,12 @@ def bounded(text: str, of: str, most: int = limits.MOST_NAME) -> str:
 
 
 def frame_id(message: Any) -> str:
-    """The frame of a message with a header, or of a word."""
+    """The frame of a message with a header, or of a value."""
     return str(getattr(message, "header", message).frame_id)
 
 
 def when_and_where(message: Any) -> dict[str, Any]:
-    """``stamp_ns`` and ``frame_id`` of a message with a header, as words take them."""
+    """``stamp_ns`` and ``frame_id`` of a message with a header, as arguments of a data type."""
     return {"stamp_ns": stamp_ns(message), "frame_id": bounded(message.header.frame_id, "frame_id")}
 
 
@@ -96,7 +96,7 @@ def when_and_where(message: Any) -> dict[str, Any]:
 
 
 def image(message: Any, most_pixels: int = limits.MOST_PIXELS_OF_PICTURE) -> ColourImage:
-    """An Image (of an encoding in `pictures.COLOUR` or `PLANES`) or CompressedImage (jpeg, png), or its word."""
+    """An Image (of an encoding in `pictures.COLOUR` or `PLANES`) or CompressedImage (jpeg, png), or its value."""
     if isinstance(message, ColourImage):
         return message
     return ColourImage(rgb=colour_pixels(message, most_pixels), **when_and_where(message))
@@ -110,7 +110,7 @@ def depth(message: Any, most_pixels: int = limits.MOST_PIXELS_OF_PICTURE) -> Arr
 def depth_image(
     depth_message: Any, camera_info: Any, colour: Any = None, most_pixels: int = limits.MOST_PIXELS_OF_PICTURE
 ) -> DepthImage:
-    """The depth word of a depth message, its CameraInfo and, if at hand, the colour message registered to it.
+    """The depth image of a depth message, its CameraInfo and, if given, the colour message registered to it.
 
     Colour of another size is left out: it is not registered to this depth.
     """
@@ -252,9 +252,9 @@ def odometry(message: Any) -> Odometry:
 
 
 def pose_at(moment_ns: int, words: Sequence[Odometry]) -> Array:
-    """``T_odom_body (4, 4)`` at a moment, between the two words of odometry that enclose it; of one word its own.
+    """``T_odom_body (4, 4)`` at a time, between the two odometry samples that enclose it; of one sample its own.
 
-    The nearer one's where they speak of different frames.
+    The nearer one's where their frames differ.
     """
     first, last = words[0], words[-1]
     if first.stamp_ns == last.stamp_ns:
@@ -266,10 +266,10 @@ def pose_at(moment_ns: int, words: Sequence[Odometry]) -> Array:
 
 
 def level_gravity(moment_ns: int, words: Sequence[Odometry] | None, T_body_camera: Array | None = None) -> Array | None:
-    """The way things fall (3,) in the camera frame by an odometry whose frame is level with z up; None without one.
+    """The direction of gravity (3,) in the camera frame by an odometry whose frame is level with z up; else None.
 
-    ``words`` are those of `pose_at`. ``T_body_camera`` is where the camera sits on the body that the odometry speaks
-    of; the same place if None.
+    ``words`` are the samples of `pose_at`. ``T_body_camera`` is the pose of the camera on the body of the odometry;
+    the identity if None.
     """
     if not words:
         return None
@@ -312,9 +312,9 @@ def _tilt_deg(covariance: Any) -> float:
 
 
 def gravity_at(moment_ns: int, words: Sequence[FeltGravity]) -> FeltGravity:
-    """The gravity at a moment, between the two words of a filter that enclose it; of one word its own.
+    """The gravity at a time, between the two samples of a filter that enclose it; of one sample its own.
 
-    The less sure of the two says how sure; the nearer one's where they speak of different frames.
+    Its confidence is the lower of the two. It is the nearer sample's where their frames differ.
     """
     first, last = words[0], words[-1]
     if first.stamp_ns == last.stamp_ns:
@@ -367,7 +367,7 @@ def moment(frame_id: str) -> tuple[str, int]:
     return found["name"], _stamp_within_limits(seconds * limits.NANOSECONDS + nanoseconds)
 
 
-# --------------------------------------------------------------------------------------------------- between the rooms
+# --------------------------------------------------------------------------------------------------- between the nodes
 
 
 def labels(message: Any) -> dict[int, str]:
@@ -375,8 +375,8 @@ def labels(message: Any) -> dict[int, str]:
     if len(message.data) > limits.MOST_LABELS_TEXT:
         raise ValueError(f"labels: expected at most {limits.MOST_LABELS_TEXT} characters, got {len(message.data)}")
     try:
-        told = json.loads(message.data).items()
-        return {_class_id(number): checked_label(name) for number, name in told}
+        pairs = json.loads(message.data).items()
+        return {_class_id(number): checked_label(name) for number, name in pairs}
     except (ValueError, AttributeError, RecursionError) as error:
         got = f"{message.data[:80]!r} ({error})"
         raise ValueError(f'labels: expected JSON like {{"0": "cup"}}, got {got}') from error
@@ -402,9 +402,9 @@ def is_surplus(message: Any) -> bool:
 
 
 def detections(message: Any, names: Mapping[int, str], image_hw: tuple[int, int] = (1, 1)) -> Detections:
-    """A ``detections_table``, or a word. A class without a name is called by its number.
+    """A ``detections_table``, or a `Detections`. The label of a class without a name is its number.
 
-    ``image_hw`` is what to believe where the message does not tell: an empty table.
+    ``image_hw`` is the size where the message has none: that of an empty table.
     """
     if isinstance(message, Detections):
         return message
@@ -491,7 +491,7 @@ def view(message: Any, camera_info: Any) -> View:
 
 
 def gravity(message: Any) -> tuple[Array | None, float]:
-    """The way things fall (3,) of length 1 and the confidence 0..1 of a Vector3Stamped; None and 0 if unknown."""
+    """The unit direction of gravity (3,) and its confidence 0..1 of a Vector3Stamped; None and 0 if unknown."""
     return split_gravity(np.array([message.vector.x, message.vector.y, message.vector.z], float))
 
 
@@ -510,9 +510,9 @@ def frame(
     odometry_words: Sequence[Odometry] | None = None,
     T_body_camera: Array | None = None,
 ) -> Frame:
-    """One moment from the segmenter's four messages, which must carry one stamp, and the odometry around it, if any.
+    """One frame from the segmenter's four messages, which must have one stamp, and the odometry around it, if any.
 
-    ``T_body_camera`` is where the camera sits on the body that the odometry speaks of; the same place if None.
+    ``T_body_camera`` is the pose of the camera on the body of the odometry; the identity if None.
     """
     stamps = [stamp_ns(m) for m in (objects_message, view_message, view_info, gravity_message)]
     if len(set(stamps)) != 1:
@@ -531,7 +531,7 @@ def frame(
 
 
 def followed(word: Frame, odometry_words: Sequence[Odometry] | None, T_body_camera: Array | None = None) -> Frame:
-    """The segmenter's own word of a moment, with the odometry around it as in `frame`."""
+    """The segmenter's own frame, with the odometry around it as in `frame`."""
     return replace(word, T_odom_camera=_camera_pose(word.stamp_ns, odometry_words, T_body_camera))
 
 

@@ -45,12 +45,12 @@ def keyframe(sent: SentKeyframe) -> CompressedImage:
 
 
 def read_keyframe(message: Any) -> SentKeyframe:
-    """What a message tells, not unpacked yet. ValueError for a picture, and for what is too large to be a keyframe."""
-    told = FORMAT.fullmatch(message.format)
-    if told is None:
+    """The keyframe in a message, not unpacked yet. ValueError for a picture, and for what is too large a keyframe."""
+    found = FORMAT.fullmatch(message.format)
+    if found is None:
         raise ValueError(f"keyframe: expected format {FORMAT.pattern!r}, got {message.format[:100]!r}")
     if len(message.data) > limits.MOST_PACKED_KEYFRAME:
         raise ValueError(f"keyframe: expected at most {limits.MOST_PACKED_KEYFRAME} bytes, got {len(message.data)}")
     frame_id = from_msg.bounded(message.header.frame_id, "frame_id")
-    clock = int(told["began"]), int(told["first"])
-    return SentKeyframe(from_msg.stamp_ns(message), frame_id, told["run"], *clock, bytes(message.data))
+    clock = int(found["began"]), int(found["first"])
+    return SentKeyframe(from_msg.stamp_ns(message), frame_id, found["run"], *clock, bytes(message.data))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The numbers that names of classes go by between the rooms, also of names that nobody told beforehand."""
+"""The numbers that stand for class names between the nodes, also for names that no table announced."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ MOST_MET = 4096  # names that are met: a detector with more has put something el
 
 
 class LabelTable:
-    """Keeps the numbers of the names that were told, and gives a number to every other name that is met.
+    """Keeps the numbers of the names that a table announced, and gives a number to every other name.
 
-    ``names`` is the whole table, number → name. It is replaced, never changed, so whoever holds one keeps it. For two
-    threads: tables are told to one, names are met by the other.
+    ``names`` is the whole table, number → name. It is replaced, never changed, so a holder of one keeps it. It serves
+    two threads: one receives the tables, the other meets names.
     """
 
     def __init__(self) -> None:
@@ -26,7 +26,7 @@ class LabelTable:
         self._met: list[str] = []
 
     def adopt(self, told: Mapping[int, str]) -> None:
-        """Take a table that was told; names that were met and that it lacks get new numbers."""
+        """Adopt a received table; names that were met and that it lacks get new numbers."""
         with self._lock:
             self.names = self._with(dict(told), self._met)
 

@@ -34,7 +34,7 @@ DETECTIONS = np.dtype(
         ("image_height", "<u2"),
     ]
 )
-MASK = "mask"  # the column behind these where masks are told: of each box a PNG of 0 and 255, zeros behind it
+MASK = "mask"  # the column behind these where the table has masks: for each box a PNG of 0 and 255, then zeros
 SURPLUS = np.dtype([("surplus", "u1")])  # instead, of a picture that was left out to keep a pace; it has no rows
 
 # rgb is 0x00RRGGBB; the wire calls it FLOAT32, as PCL and RViz do.

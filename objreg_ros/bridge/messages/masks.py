@@ -28,12 +28,12 @@ def with_masks(records: Array, found: Detections) -> Array:
     longest, most = max(map(len, pngs)), limits.MOST_RECORD - records.itemsize
     if longest > most:
         raise ValueError(f"detections: expected masks of at most {most} bytes as PNG, got {longest}")
-    told = np.zeros(records.shape, [*records.dtype.descr, (MASK, "u1", (max(longest, 2),))])
+    masked = np.zeros(records.shape, [*records.dtype.descr, (MASK, "u1", (max(longest, 2),))])
     for name in records.dtype.names or ():
-        told[name] = records[name]
+        masked[name] = records[name]
     for k, png in enumerate(pngs):
-        told[MASK][0, k, : len(png)] = png
-    return told
+        masked[MASK][0, k, : len(png)] = png
+    return masked
 
 
 def read_masks(records: Array, found: Detections) -> Array | None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The words of data.py as ROS messages; the other direction is `from_msg`.
+"""The data types of data.py as ROS messages; the other direction is `from_msg`.
 
-Every function is pure: words in, one message out. Stamps and frame ids are those of the words. What the fields of the
-tables mean is in `layout`.
+Every function is pure: values in, one message out. Stamps and frame ids are those of the values. `layout` explains
+the fields of the tables.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def header(stamp_ns: int, frame_id: str) -> Header:
 
 
 def moment(frame_id: str, stamp_ns: int) -> str:
-    """The name of a camera at one moment, ``"<frame_id>@<sec>.<nsec, 9 digits>"``."""
+    """The name of a camera at one time, ``"<frame_id>@<sec>.<nsec, 9 digits>"``."""
     sec, nanosec = divmod(stamp_ns, 1_000_000_000)
     return f"{frame_id}@{sec}.{nanosec:09d}"
 
@@ -183,7 +183,7 @@ def _table(records: Array, stamp_ns: int, frame_id: str) -> PointCloud2:
     )
 
 
-# Between the rooms
+# Between the nodes
 
 
 def labels(names: Labels) -> String:
@@ -253,7 +253,7 @@ def _is_numbered(label: str, numbers: Mapping[str, int]) -> bool:
 
 
 def _number(label: str, numbers: Mapping[str, int]) -> int:
-    """The id of a label. A class without a name is called by its number on the way in, and so on the way out."""
+    """The id of a label. The label of a class without a name is its number, in both directions."""
     if not _is_numbered(label, numbers):
         raise ValueError(f"label {label!r}: expected one of the {len(numbers)} published labels")
     return UNNAMED_ID if label == UNNAMED else numbers[label] if label in numbers else int(label)
@@ -278,7 +278,7 @@ def view_camera_info(frame: Frame) -> CameraInfo:
 
 
 def gravity(frame: Frame) -> Vector3Stamped:
-    """The way things fall; its length is the confidence, 0 where unknown."""
+    """The direction of gravity; its length is the confidence, 0 where unknown."""
     known = np.zeros(3) if frame.gravity is None else frame.gravity * frame.gravity_confidence
     return Vector3Stamped(header=header(frame.stamp_ns, frame.frame_id), vector=_vector(known))
 
@@ -314,9 +314,9 @@ def _moments(closure: LoopClosure) -> tuple[str, str]:
 
 
 def transforms(closure: LoopClosure) -> list[TransformStamped]:
-    """The registration once for each object that lies upon itself under it.
+    """The registration once for each object that it aligns with itself.
 
-    The child frame is ``"<moment of to>/<label>_<id of the landmark>"``.
+    The child frame is ``"<moment(to)>/<label>_<id of the landmark>"``.
     """
     parent, child = _moments(closure)
     names = [f"{child}/{match.label}_{match.object_id}" for match in closure.matches]
@@ -329,12 +329,12 @@ def landmarks(observations: Sequence[Observation], stamp_ns: int, frame_id: str,
     Without those of a label that ``names`` does not hold: it is of a model that another has replaced meanwhile.
     """
     numbers = _numbers(names)
-    told = [seen for seen in observations if _is_numbered(seen.label, numbers)]
-    records = np.zeros((1, len(told)), LANDMARKS)
+    numbered = [seen for seen in observations if _is_numbered(seen.label, numbers)]
+    records = np.zeros((1, len(numbered)), LANDMARKS)
     for axis, name in enumerate("xyz"):
-        records[name] = [seen.xyz[axis] for seen in told]
-    records["object_id"] = [seen.object_id for seen in told]
-    records["class_id"] = [_number(seen.label, numbers) for seen in told]
+        records[name] = [seen.xyz[axis] for seen in numbered]
+    records["object_id"] = [seen.object_id for seen in numbered]
+    records["class_id"] = [_number(seen.label, numbers) for seen in numbered]
     return _table(records, stamp_ns, frame_id)
 
 

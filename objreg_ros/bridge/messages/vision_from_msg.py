@@ -117,7 +117,7 @@ def _xyxy(bbox: Any) -> tuple[float, float, float, float]:
 def instances(numbers: Array, names: Mapping[int, str], stamp_ns: int, frame_id: str) -> Detections:
     """The box and the mask of every instance in ``numbers (H, W) uint16``, 0 for none.
 
-    An instance without a name is `UNNAMED`: its number tells no class. A mask has no score of its own, so 1 is taken.
+    An instance without a name is `UNNAMED`: its number gives no class. A mask has no score of its own, so 1 is taken.
     """
     places = {number: place for number, place in enumerate(find_objects(numbers), start=1) if place is not None}
     if len(places) > limits.MOST_DETECTIONS:

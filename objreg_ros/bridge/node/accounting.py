@@ -2,7 +2,7 @@
 """The counters of a node: where every input frame is, and how long it took. Knows no ROS.
 
 Every frame that is received ends as published or as dropped with a reason, exactly once, and waits until then:
-received = published + waiting + dropped, at every moment.
+received = published + waiting + dropped, at all times.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ RECENT = 1000  # how many durations of a stage the percentiles look back on
 
 @dataclass(frozen=True)
 class Balance:
-    """The state of the counters at one moment."""
+    """The state of the counters at one time."""
 
     received: int
     published: int
@@ -73,7 +73,7 @@ class Accounting:
         self.spend(stage, time.perf_counter() - start)
 
     def spend(self, stage: str, seconds: float) -> None:
-        """Book the duration of a stage."""
+        """Record the duration of a stage."""
         with self._lock:
             self._stages[stage].append(seconds)
 

@@ -42,7 +42,7 @@ def diagnostic(
 
 
 def refusals(node: str, now: Time, rejected: Iterable[Rejected]) -> DiagnosticArray:
-    """A status for every refusal: the reason with its numbers, the two moments, and the pose that was turned down."""
+    """A status for every refusal: the reason with its numbers, the two keyframes, and the pose that was refused."""
     return DiagnosticArray(header=Header(stamp=now), status=[_refusal(node, item) for item in rejected])
 
 
@@ -59,7 +59,7 @@ def _refusal(node: str, rejected: Rejected) -> DiagnosticStatus:
 
 
 def refusal_of(status: DiagnosticStatus) -> Rejected:
-    """The refusal that a status of `refusals` tells."""
+    """The refusal in a status of `refusals`."""
     values = {pair.key: pair.value for pair in status.values}
     reason, _, detail = status.message.partition(": ")
     pose = json.loads(values["T_from_to"])
@@ -90,7 +90,7 @@ def _counts(balance: Balance, rate_hz: float) -> dict[str, object]:
 
 
 def balance_of(status: DiagnosticStatus) -> Balance:
-    """The counters that a status of `diagnostic` tells."""
+    """The counters in a status of `diagnostic`."""
     values = {pair.key: pair.value for pair in status.values}
     stages = sorted({key.split(" ")[1] for key in values if key.startswith(LATENCY)})
     return Balance(

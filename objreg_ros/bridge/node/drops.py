@@ -14,21 +14,21 @@ from objreg_ros.bridge.node.watch import PERIOD_S
 
 @dataclass
 class _Row:
-    """The drops of an input since something of it got through, and when that was last told to be trouble."""
+    """The drops of an input since its last message that got through, and when they were last reported as trouble."""
 
     since: float = 0.0
     last: float = 0.0
     counts: Counter[str] = field(default_factory=Counter)
     why: dict[str, str] = field(default_factory=dict)  # reason → what was said of the last
-    told_at: float = -float("inf")
-    told: str = ""
+    reported_at: float = -float("inf")
+    report: str = ""
 
 
 class Drops:
-    """The inputs of which nothing gets through, though they speak; safe to use from several threads.
+    """The inputs that send messages of which none gets through; safe to use from several threads.
 
-    It is trouble once nothing but drops came for a period, a single one aside. It is over two periods after something
-    got through, or after the last drops: where one in many gets through now and then, it is told without a break.
+    An input is in trouble after a period in which it had only drops, and more than one. The trouble ends two periods
+    after a message got through, or after the last drops: where one in many gets through, the report has no break.
     """
 
     def __init__(self, period_s: float = PERIOD_S, clock: Callable[[], float] = time.monotonic) -> None:
@@ -59,11 +59,11 @@ class Drops:
             for name, row in self._rows.items():
                 lasted, ago = now - row.since, now - row.last
                 if row.counts and lasted >= self._period_s > ago:
-                    row.told_at, row.told = now, _words(name, row, lasted)
-            return {name: row.told for name, row in self._rows.items() if now - row.told_at < 2 * self._period_s}
+                    row.reported_at, row.report = now, _text(name, row, lasted)
+            return {name: row.report for name, row in self._rows.items() if now - row.reported_at < 2 * self._period_s}
 
 
-def _words(name: str, row: _Row, seconds: float) -> str:
+def _text(name: str, row: _Row, seconds: float) -> str:
     most = row.counts.most_common()
     counts = ", ".join(f"{count} as {reason.replace('_', ' ')}" for reason, count in most)
     why = row.why[most[0][0]]

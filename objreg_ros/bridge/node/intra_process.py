@@ -66,8 +66,8 @@ class ValueQueue:
 
     def _bring(self) -> None:
         while self._waiting:
-            receive, word = self._waiting.popleft()
-            receive(word)
+            receive, value = self._waiting.popleft()
+            receive(value)
 
 
 class LocalSubscription(NamedTuple):

@@ -101,7 +101,7 @@ class Abandoned(KeyboardInterrupt):
 
 
 def await_kernels(prepare: Callable[[], object], say: Callable[[str], object], tell_s: float = TELL_S) -> None:
-    """Let ``prepare`` load the kernels of a room, or compile them, in a thread of its own; say so, and that it goes on.
+    """Let ``prepare`` load or compile the kernels of a node in a thread of its own; report the start and the progress.
 
     A signal is received at once: what it interrupts raises `Abandoned`. What ``prepare`` raises is raised.
     """
@@ -116,15 +116,15 @@ def await_kernels(prepare: Callable[[], object], say: Callable[[str], object], t
             done.set_result(None)
 
     say("loading the kernels; a first start compiles them, which takes minutes on a slow or busy machine")
-    thread, begun, told = threading.Thread(target=work, name="kernels", daemon=True), time.monotonic(), 1
+    thread, begun, reports = threading.Thread(target=work, name="kernels", daemon=True), time.monotonic(), 1
     try:
         thread.start()
         while not done.done():
             thread.join(LOOK_S)
             lasted_s = time.monotonic() - begun
-            if lasted_s >= told * tell_s and not done.done():
+            if lasted_s >= reports * tell_s and not done.done():
                 say(f"still loading or compiling kernels, for {lasted_s:.0f} s now; Ctrl-C ends this at once")
-                told = int(lasted_s / tell_s) + 1
+                reports = int(lasted_s / tell_s) + 1
     except KeyboardInterrupt as signalled:
         raise Abandoned from signalled
     done.result()

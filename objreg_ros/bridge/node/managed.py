@@ -40,7 +40,7 @@ class ManagedNode(LifecycleNodeMixin, OverridableNode):
         """Empty counters; at the start, and whenever the node is configured or was cleaned up."""
 
     def open(self) -> None:
-        """Load what the room needs, publish and listen. ValueError or OSError if it cannot be, and nothing is held."""
+        """Load what the node needs, publish and subscribe. If it fails: ValueError or OSError, and nothing is held."""
 
     def shut(self) -> None:
         """End the work and let go of what `open` took, but for what ROS knows of."""
@@ -59,7 +59,7 @@ class ManagedNode(LifecycleNodeMixin, OverridableNode):
         self.is_managed, self.is_active = params.managed, not params.managed
         if self.is_managed:
             LifecycleNodeMixin.__init__(self)
-        self._lasting = [thing for thing, _ in self._entities()]
+        self._lasting = [entity for entity, _ in self._entities()]
         self.prepare()
         if not self.is_managed:
             self.open()
@@ -126,9 +126,9 @@ class ManagedNode(LifecycleNodeMixin, OverridableNode):
 
     def _clear(self) -> None:
         """Take down all that was made since the life began, and begin the counters anew."""
-        for thing, destroy in list(self._entities()):
-            if not any(thing is lasting for lasting in self._lasting):
-                destroy(thing)
+        for entity, destroy in list(self._entities()):
+            if not any(entity is lasting for lasting in self._lasting):
+                destroy(entity)
         self.end_work()
         self.prepare()
 
@@ -142,4 +142,4 @@ class ManagedNode(LifecycleNodeMixin, OverridableNode):
             (self.timers, self.destroy_timer),
             (self.guards, self.destroy_guard_condition),
         )
-        return ((thing, destroy) for things, destroy in kinds for thing in things)
+        return ((entity, destroy) for entities, destroy in kinds for entity in entities)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every node is: a node. It reads messages, lets its room work, writes messages and keeps the counters."""
+"""The base class of all nodes. It reads messages, runs the node's work, writes messages and keeps the counters."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class NodeBase(ManagedNode):
         self._shared_bus, self._queue = bus, ValueQueue(self)
         self.settings = Parameters(self, *kinds, NodeBaseParams)
         self.settings.changed, self.settings.are_open = self._adopt_if_open, lambda: not self.is_open
-        self._bugs: set[str] = set()  # that the log has told of
+        self._bugs: set[str] = set()  # those that were logged
         self.apart = ReentrantCallbackGroup()  # of services that wait for work that is done `aside`
         self._aside: list[threading.Thread] = []
         self.throttled = ThrottledLog(self.get_logger().warning)
@@ -123,7 +123,7 @@ class NodeBase(ManagedNode):
     ) -> Subscription | LocalSubscription:
         """Subscribe; ``watched`` is the input of `expect` that this topic belongs to.
 
-        Where a node of this process offers the topic, ``received`` is given its words instead of messages.
+        Where a node of this process offers the topic, ``received`` is given its values instead of messages.
         """
         full = self.resolve_topic_name(topic)
         if self.bus.offers(full) and full not in self._passed_on:
@@ -141,9 +141,9 @@ class NodeBase(ManagedNode):
     def _subscribe_in_process(
         self, full: str, topic: str, received: Callable[[Any], None], watched: str
     ) -> LocalSubscription:
-        def receive(word: Any) -> None:
+        def receive(value: Any) -> None:
             self.watch.receive(watched)
-            self._pass(topic, received, word)
+            self._pass(topic, received, value)
 
         subscription = LocalSubscription(full, self._queue, receive)
         self.bus.add(subscription)
@@ -151,11 +151,11 @@ class NodeBase(ManagedNode):
         return subscription
 
     def offer(self, kind: type, topic: str, profile: QoSProfile) -> LocalPublisher:
-        """A topic of which the nodes of this process get the words themselves."""
+        """Publish a topic whose values the nodes of this process get directly."""
         return LocalPublisher(self.create_publisher(kind, topic, profile), self.bus)
 
     def pass_on(self, topic: str) -> None:
-        """Offer to the nodes of this process the words of a topic that this node itself receives from outside."""
+        """Offer the nodes of this process the values of a topic that this node itself receives from outside."""
         self._passed_on.add(self.resolve_topic_name(topic))
         self.bus.offer(self.resolve_topic_name(topic))
 
@@ -176,7 +176,7 @@ class NodeBase(ManagedNode):
         self.throttled.warn(f"malformed_{topic}", f"{topic} ignored: {error}")
 
     def _named(self, reason: str, error: Exception) -> str:
-        """The reason; with the name of the exception if it is no ValueError, which the log then tells once, whole."""
+        """The reason; with the exception's name if it is no ValueError, whose traceback is then logged once."""
         if isinstance(error, ValueError):
             return reason
         named = f"{reason} ({type(error).__name__})"
@@ -202,7 +202,7 @@ class NodeBase(ManagedNode):
         profile: QoSProfile,
         profiles: Mapping[str, QoSProfile] = MappingProxyType({}),
     ) -> None:
-        """Subscribe to topics that carry the same thing; the first is `taken` that sends a message that decodes.
+        """Subscribe to topics of the same content; the first whose message decodes is `taken`.
 
         The others are closed until that one has been silent for the parameter ``silence``. ``received`` is given the
         topic and the message, those too that come before one is taken. ``profiles`` are those of topics that have
@@ -273,7 +273,7 @@ class NodeBase(ManagedNode):
         self._finished.publish(to_msg.finished(self.get_name(), stamp_ns, reason))
 
     def read(self, topic: str, decode: Callable[..., Any], *messages: Any) -> Any:
-        """The word of a message; `DroppedError` as ``malformed_<topic>`` if it breaks its contract.
+        """The value of a message; `DroppedError` as ``malformed_<topic>`` if it breaks its contract.
 
         With the name of the exception behind that if it is one that no decoder should raise.
         """
@@ -284,14 +284,14 @@ class NodeBase(ManagedNode):
             raise DroppedError(self._named(f"malformed_{topic}", error), str(error)) from error
 
     def read_aside(self, topic: str, decode: Callable[..., Any], message: Any) -> Any:
-        """The word of a message that is no frame by itself; None, counted and logged, if it breaks its contract."""
+        """The value of a message that is no frame by itself; None, counted and logged, if it breaks its contract."""
         try:
-            word = decode(message)
+            value = decode(message)
         except Exception as error:
             self._ignore(topic, error, topic)
             return None
         self._drops.let_through(topic)
-        return word
+        return value
 
     def conclude(self, stamp_ns: int, work: Callable[[], bool]) -> None:
         """Do the last work on a frame and settle it in the counters; what nobody expected drops it as a ``bug``."""
@@ -313,7 +313,7 @@ class NodeBase(ManagedNode):
         self.conclude(job[0], partial(self.compute, *job))
 
     def _overtaken(self, job: tuple[int, Any]) -> None:
-        self.drop(job[0], "overtaken")  # by a newer frame: usual where the camera is faster than the room
+        self.drop(job[0], "overtaken")  # by a newer frame: usual where the camera is faster than the node
 
     # Services
 
@@ -406,7 +406,7 @@ class NodeBase(ManagedNode):
         self._diagnostics.publish(diagnostic(name, stamp, balance, rate, troubles, extra))
 
     def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> SetParametersResult:
-        """As rclpy, but refused in the words of `Params`, and with 1 good for 1.0."""
+        """As rclpy, but with the error messages of `Params`, and with 1 accepted as 1.0."""
         try:
             return super().set_parameters_atomically(self.settings.checked(parameter_list))
         except ValueError as error:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ROS parameters of a node, made from its `Params` classes: description, type, range, read-only or live.
 
-What is refused is refused by `Params`, so in the same words as in a test or an offline run. A float accepts 1, and an
-empty list keeps the type that was declared.
+`Params` refuses values, so the messages are those of a test or an offline run. A float accepts 1, and an empty list
+keeps the type that was declared.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Parameters:
         return self._current[kind]  # type: ignore[return-value]
 
     def checked(self, changes: Sequence[Parameter]) -> list[Parameter]:
-        """The changes in their declared types; ValueError with `Params`' words if any is refused."""
+        """The changes in their declared types; ValueError with `Params`' message if any is refused."""
         values = {p.name: p.value for p in changes}
         for kind, current in self._current.items():
             current.replaced(**_part(kind, values))

@@ -47,12 +47,12 @@ class ManagedParams(Params):
 
 @dataclass(frozen=True)
 class RelocalisedParams(Params):
-    """How the registrar tells where it is in the map of an earlier session."""
+    """How the registrar publishes its pose in the map of an earlier session."""
 
     map_frame: str = param(
         "earlier_map", "name of the frame of an earlier session's map, in which `relocalised` is; for Nav2: map"
     )
-    initialpose: bool = param(False, "tell it on `initialpose` too, projected to the plane, as AMCL takes it")
+    initialpose: bool = param(False, "publish the pose on `initialpose` too, projected to the plane, as AMCL takes it")
 
 
 @dataclass(frozen=True)
@@ -85,4 +85,4 @@ class ExchangeParams(Params):
     exchange: str = param(
         "", "namespace of the topics by which registrars of several robots exchange keyframes, as /fleet; empty: none"
     )
-    exchange_kilobytes: float = param(150.0, "most that is told to the others, on average", "kB/s", ge=0.1)
+    exchange_kilobytes: float = param(150.0, "most that is sent to the others, on average", "kB/s", ge=0.1)

@@ -14,7 +14,7 @@ from typing import Generic, NamedTuple, TypeVar
 
 Job = TypeVar("Job")
 
-PRESSED_S = 30.0  # after a job was overtaken the next ones do not give way for so long
+PRESSED_S = 30.0  # for so long after a job was overtaken the next ones run without niceness
 
 
 class Worker(Generic[Job]):
@@ -89,15 +89,15 @@ class _Waiting(NamedTuple, Generic[Job]):
 class Backlog(Generic[Job]):
     """Runs ``work`` on the newest job, and before it ``settle`` on each that it overtook, the oldest first.
 
-    Jobs of different lanes (``lane_of``) take turns, and overtake each other never.
+    Jobs of different lanes (``lane_of``) take turns, and never overtake each other.
 
-    Memory is bounded: who puts a job beyond the ``limit`` waits until there is room, and the work in hand is `hurried`
-    meanwhile. ``nbytes_of`` says how large a job is; one that is larger than the limit waits alone.
+    Memory is bounded: a caller who puts a job beyond the ``limit`` waits until there is space, and the current work is
+    `hurried` meanwhile. ``nbytes_of`` gives the size of a job; one that is larger than the limit waits alone.
 
-    ``nice`` is how far the thread, and all that it starts, gives way to others for the processor (0 to 19; where
-    threads have that). Nobody may take niceness back, and a nice thread never runs on a processor that others fill. So
-    there are two threads, one at a time: the nice one as long as no job is overtaken, the other one from when a job is
-    until none was for `PRESSED_S`.
+    ``nice`` is the niceness of the thread and of all that it starts (0 to 19; where threads have that). Niceness
+    cannot be taken back, and a nice thread never runs on a processor that others fill. So there are two threads, one
+    at a time: the nice one as long as no job is overtaken, the other one from when a job is until none was for
+    `PRESSED_S`.
 
     What ``work`` or ``settle`` raises closes the backlog and goes to ``failed``.
     """
@@ -149,9 +149,9 @@ class Backlog(Generic[Job]):
             self._changed.notify_all()
 
     def hurried(self) -> bool:
-        """Whether the work in hand is to end soon: it is closed, or jobs are overtaken and one waits enough for it.
+        """Whether the current work is to end soon: the worker is closed, or jobs are overtaken and one waits enough.
 
-        Or there is no room for more. To be asked by ``work``.
+        Or there is no space for more. ``work`` asks for this.
         """
         with self._changed:
             if not self._open:
@@ -253,6 +253,6 @@ class Backlog(Generic[Job]):
 
 
 def give_way(nice: int) -> None:
-    """Let this thread, and all that it starts from now on, give way to others (0 to 19; where threads have that)."""
+    """Set the niceness of this thread and of all that it starts from now on (0 to 19; where threads have that)."""
     if nice and sys.platform == "linux":  # elsewhere niceness is a process's
         os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), nice)

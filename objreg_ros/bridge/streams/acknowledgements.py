@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which frames are still on their way through the graph, by the `finished` acknowledgements of its nodes. Knows no ROS.
+"""Which frames are still in flight through the graph, by the `finished` acknowledgements of its nodes. Knows no ROS.
 
 An acknowledgement is a Header: the stamp of the frame, and ``"<node> published"`` or ``"<node> dropped <reason>"``.
 Colour and depth of a frame may have stamps of their own, so they are followed apart: an image until the detector is
@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Collection
 
-ORDER = ("detector", "segmenter", "registrar")  # the way of a frame
+ORDER = ("detector", "segmenter", "registrar")  # the nodes that a frame passes through, in order
 DETECTOR = ORDER[0]
 IMAGE, DEPTH = "image", "depth"
 
@@ -32,7 +32,7 @@ class Acknowledgements:
         self._on_their_way: dict[str, Counter[int]] = {IMAGE: Counter(), DEPTH: Counter()}
 
     def waiting(self, kind: str, after_ns: int | None = None) -> int:
-        """How many images or depths are on their way, of all or of those later than a stamp."""
+        """How many images or depths are in flight, of all or of those later than a stamp."""
         stamps = self._on_their_way[kind].elements()
         return sum(after_ns is None or stamp > after_ns for stamp in stamps)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The topics by which the registrar tells what it found.
+"""The topics on which the registrar publishes what it found.
 
 Those of common_interfaces are always there, those of objreg_msgs where that is installed.
 """
@@ -41,7 +41,7 @@ class Announcements:
         self._last_moved = dict[str, float]()  # m by label
 
     def closures(self, closures: Sequence[LoopClosure]) -> None:
-        """Tell constraints to the mapper and anyone."""
+        """Publish constraints to the mapper and others."""
         self._published.update("agreeing" in closure.evidence for closure in closures)
         for closure in closures:
             self._last_moved = closure.moved or self._last_moved
@@ -52,7 +52,7 @@ class Announcements:
                 self._whole.closures.publish(closures_msg.loop_closure(closure, self._robot))
 
     def refusals(self, rejected: Sequence[Rejected]) -> None:
-        """Tell what was refused; nothing where nothing was."""
+        """Publish the refusals; nothing where there are none."""
         self._refused.update(item.reason.value for item in rejected)
         self._last_refusals.update((item.reason.value, item.detail) for item in rejected)
         if rejected:
@@ -71,7 +71,7 @@ class Announcements:
         session: int | None,
         robot: str = "",
     ) -> None:
-        """Tell the objects of a keyframe, in the camera ``frame_id`` at ``stamp_ns``."""
+        """Publish the objects of a keyframe, in the camera ``frame_id`` at ``stamp_ns``."""
         seen = observations, stamp_ns, frame_id, names
         self._landmarks.publish(to_msg.landmarks(*seen))
         if self._whole is not None:
@@ -91,7 +91,7 @@ class Announcements:
 
 
 class _Whole:
-    """The topics of objreg_msgs, which tell all that is known."""
+    """The topics of objreg_msgs, which carry all that is known."""
 
     def __init__(self, node: Node) -> None:
         kept = qos.latched(qos.KEPT_CONSTRAINTS)

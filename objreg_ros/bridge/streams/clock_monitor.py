@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 
 class ClockMonitor(Generic[T]):
-    """Holds an item whose stamp leaps until the next one of its stream tells whether time has leapt with it.
+    """Holds an item whose stamp leaps until the next one of its stream shows whether time has leapt with it.
 
     A leap is back by `JUMP_NS` or ahead by `AHEAD_NS`: of a looped bag or a clock that was set, or of one message that
     was stamped wrongly, which must not part what came before from what comes after. ``on_alone`` is given the stamp and

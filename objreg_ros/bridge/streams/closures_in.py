@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How a node receives closures: on `loop_closures` of objreg_msgs, on `constraints`, or on both and each once.
 
-Those of one robot come on topics of its own too, whose name tells the robot where the message does not. On
-`constraints` the prefixes of frames tell it. On a robot's topic closures of others alone are refused.
+Those of one robot come on topics of its own too, whose name gives the robot where the message does not. On
+`constraints` the prefixes of frames give it. On a robot's topic closures of others alone are refused.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ MOST_KNOWN = 100_000  # closures that are remembered, so that none is taken twic
 class ClosuresIn:
     """The counters of ``node`` count closures. ValueError for `loop_closures` where objreg_msgs is not installed.
 
-    ``take`` is given what was accepted, ``again`` what is known and now names its sessions, ``withdraw`` the moments
-    and robots of what is taken back. `forget` lets a closure come once more. ``prefixes`` has what stands before the
+    ``take`` is given each accepted closure, ``again`` a known one that now names its sessions, ``withdraw`` the
+    `Moments` and robots of a retracted one. `forget` lets a closure come once more. ``prefixes`` has what precedes the
     topics of each robot.
     """
 
@@ -43,7 +43,7 @@ class ClosuresIn:
         self._node, self._take, self._again, self._withdraw = node, take, again, withdraw
         self._robots = [robot for robot in prefixes if robot]
         self._known: dict[Moments, set[Robots]] = {}  # the oldest first
-        self._told: dict[str, tuple[Moments, Robots]] = {}  # by the id of objreg_msgs
+        self._by_id: dict[str, tuple[Moments, Robots]] = {}  # the id is that of objreg_msgs
         whole, kept = closures_msg.LoopClosureMsg, qos.latched(qos.KEPT_CONSTRAINTS)
         if topic == "loop_closures" and whole is None:
             raise ValueError("input: expected objreg_msgs, got none: build it with colcon, or set input:=constraints")
@@ -59,7 +59,7 @@ class ClosuresIn:
             self._known.setdefault(closure.moments, set()).add(closure.robots)
 
     def forget(self, closure: LoopClosure) -> None:
-        """It was not taken: told otherwise, or later, it may be."""
+        """The closure was not taken: in another form, or later, it may be."""
         left = self._known.pop(closure.moments, set()) - {closure.robots}
         if left:
             self._known[closure.moments] = left
@@ -70,7 +70,7 @@ class ClosuresIn:
 
     def _on_constraint(self, message: Any, robot: str = "") -> None:
         self._receive(
-            "constraints", message, lambda told: self._of(robot, self._by_frames(from_msg.loop_closure(told)))
+            "constraints", message, lambda sent: self._of(robot, self._by_frames(from_msg.loop_closure(sent)))
         )
 
     def _by_frames(self, closure: LoopClosure) -> LoopClosure:
@@ -94,15 +94,15 @@ class ClosuresIn:
 
     def _on_whole(self, message: Any, robot: str = "") -> None:
         if message.retracted:
-            told = self._told.get(message.id)
-            if told is not None and (not robot or robot in told[1] or "" in told[1]):
-                self._withdraw(*told)
+            closed = self._by_id.get(message.id)
+            if closed is not None and (not robot or robot in closed[1] or "" in closed[1]):
+                self._withdraw(*closed)
             return
-        closure = self._receive("loop_closures", message, lambda told: self._of(robot, _whole(told)))
+        closure = self._receive("loop_closures", message, lambda sent: self._of(robot, _whole(sent)))
         if closure is not None:
-            self._told[message.id] = closure.moments, closure.robots
-            while len(self._told) > MOST_KNOWN:
-                del self._told[next(iter(self._told))]
+            self._by_id[message.id] = closure.moments, closure.robots
+            while len(self._by_id) > MOST_KNOWN:
+                del self._by_id[next(iter(self._by_id))]
 
     def _is_known(self, closure: LoopClosure) -> bool:
         return any(may_be_same(closure.robots, robots) for robots in self._known.get(closure.moments, ()))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a node receives the objects in a picture: our detector's table, anyone's vision_msgs boxes, or masks."""
+"""How a node receives the objects in a picture: as our detector's table, as vision_msgs boxes, or as masks."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from objreg_ros.data import DepthImage, Detections, PointCloud
 
 TABLE, BOXES, MASKS = {"detections_table": PointCloud2}, {"detections_in": Detection2DArray}, {"masks": Image}
 SOURCES = {"auto": {**TABLE, **BOXES, **MASKS}, "table": TABLE, "vision_msgs": BOXES, "masks": MASKS}
-HEARD_S = 1.0  # most that a new name waits until everybody has it
+HEARD_S = 1.0  # most that a new name waits until every subscriber has it
 
 
 class Asked(NamedTuple):
@@ -50,10 +50,8 @@ class DetectionsIn:
             )
         self._node, self._labels = node, LabelTable()
         self._out: Publisher | None = None
-        self._told: Mapping[
-            int, str
-        ] = {}  # the table that was received or published last: all that the next room knows
-        self._names: dict[int, str] = {}  # of the numbers that a foreign detector tells
+        self._shared: Mapping[int, str] = {}  # the table that was received or published last: the next node has it
+        self._names: dict[int, str] = {}  # the names of a foreign detector's numbers
         node.listen(String, "labels", self._on_labels, qos.latched())
         if LabelInfo is not None and topics.keys() - TABLE.keys():
             node.listen(LabelInfo, "label_info", self._on_names, qos.latched())
@@ -63,16 +61,16 @@ class DetectionsIn:
     # Receive
 
     def _on_labels(self, message: Any) -> None:
-        told = self._node.read_aside("labels", from_msg.labels, message)
-        if told is not None:
-            self._labels.adopt(told)
-            self._told = told
+        names = self._node.read_aside("labels", from_msg.labels, message)
+        if names is not None:
+            self._labels.adopt(names)
+            self._shared = names
             self._node.feed("labels", 0, self._labels.names)
 
     def _on_names(self, message: Any) -> None:
-        told = self._node.read_aside("label_info", vision_from_msg.label_info, message)
-        if told is not None:
-            self._names = told
+        names = self._node.read_aside("label_info", vision_from_msg.label_info, message)
+        if names is not None:
+            self._names = names
 
     def _decode(self, topic: str, message: Any) -> object:
         if topic in TABLE:
@@ -102,18 +100,18 @@ class DetectionsIn:
         seen = self._node.read("camera_info", lenses.detections, seen, *lens)
         self._labels.include(seen.label)
         names = self._labels.names
-        if names != self._told or self._out is None:  # the next room waits for a table, if of nothing
-            self._tell(names)
+        if names != self._shared or self._out is None:  # the next node waits for a table, even an empty one
+            self._publish(names)
         return Asked(seen, names)
 
     def _foreign(self, message: Any, image_hw: tuple[int, int]) -> Detections:
         return vision_from_msg.detections(message, self._names, image_hw, self._node.most_pixels)
 
-    def _tell(self, names: to_msg.Labels) -> None:
-        """Publish the table of names, and wait until it is there: what is sent next needs it."""
+    def _publish(self, names: to_msg.Labels) -> None:
+        """Publish the table of names, and wait until it has arrived: the next message needs it."""
         if self._out is None:
             self._out = self._node.create_publisher(String, "labels", qos.latched())
-        self._told = names
+        self._shared = names
         self._out.publish(to_msg.labels(names))
         self._out.wait_for_all_acked(Duration(seconds=HEARD_S))
 

@@ -92,7 +92,7 @@ class Exchanging:
         return self._node.create_publisher(CompressedImage, topic, profile)
 
     def tell(self, stamp_ns: int, summary: bytes | None) -> None:
-        """Tell all others of a keyframe."""
+        """Announce a keyframe to all others."""
         self._publish(self._summaries, stamp_ns, summary)
 
     def _read_later(self, stamp_ns: int, packed: bytes) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a node receives frames: what the segmenter says of a moment, by the parts that it comes in, with odometry."""
+"""How a node receives frames: the segmenter's messages of one stamp, together with odometry."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class FramesNode(SynchronisedNode):
         self._camera: str | None = None  # the frame_id of the last frame
 
     def listen_to_frames(self, told: Array | None, odom_slop_ns: int) -> None:
-        """Subscribe. ``told`` says where the camera sits on the body of odometry, else /tf_static and /tf do.
+        """Subscribe. ``told`` is the pose of the camera on the body of odometry; if None, /tf_static and /tf give it.
 
         Odometry is that of a topic, and that of /tf while no topic of it has a publisher.
         """
@@ -54,15 +54,15 @@ class FramesNode(SynchronisedNode):
         self._stream = CameraStream(self._mount, self.get_logger().info)
         self._travel = Travel(tree)
         self._by_topic = False
-        room: dict[str, type] = {"objects": PointCloud2}
+        topics: dict[str, type] = {"objects": PointCloud2}
         if not self.receives_values:  # which hold these too
-            room |= {"view": PointCloud2, "view/camera_info": CameraInfo, "gravity": Vector3Stamped}
+            topics |= {"view": PointCloud2, "view/camera_info": CameraInfo, "gravity": Vector3Stamped}
         self.listen(String, "labels", self.receive_labels, qos.latched())
         self._listen_to_odometry()
-        for topic, kind in room.items():
+        for topic, kind in topics.items():
             self.listen(kind, topic, self._receive(topic), qos.room(), watched=topic)
         self.expect("objects", "objects")
-        exact = [Stream(topic) for topic in room]
+        exact = [Stream(topic) for topic in topics]
         names = "odom", *(["joints"] if is_installed() else [])
         beside = [Stream(name, Need.OPTIONAL, odom_slop_ns, depth=1000, enclosing=True) for name in names]
         self.begin([*exact, Stream("labels", Need.LATCHED), *beside])
@@ -75,7 +75,7 @@ class FramesNode(SynchronisedNode):
 
     @property
     def receives_values(self) -> bool:
-        """Whether the segmenter is in this process and hands its words over."""
+        """Whether the segmenter is in this process and passes its values in memory."""
         return self.bus.offers(self.resolve_topic_name("objects"))
 
     def receive_labels(self, message: Any, robot: str = "") -> None:

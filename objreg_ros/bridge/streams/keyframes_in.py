@@ -40,8 +40,8 @@ class KeyframesIn:
     """The counters of ``node`` count keyframes; ``take`` is given each that may come in.
 
     ``prefixes`` has what stands before the topics of each robot, ``cameras`` the namespaces of each one's keyframers
-    behind that; none where it has one, in its own. Two cameras of a robot are told apart by their frames: of two that
-    have one, the first to come is taken. The topic's namespace names the robot, and with a ``key`` it signed that.
+    behind that; none where it has one, in its own. The frames distinguish two cameras of a robot: of two with the same
+    frame, the first to come is taken. The topic's namespace names the robot, and with a ``key`` it signed that.
     """
 
     def __init__(

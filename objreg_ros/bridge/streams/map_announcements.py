@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The topics by which the mapper tells its map: ``path``, ``correction`` (and TF), ``graph`` and ``pruned``."""
+"""The topics on which the mapper publishes its map: ``path``, ``correction`` (and TF), ``graph`` and ``pruned``."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ class MapAnnouncements:
         self._broadcaster: Any = None
 
     def path(self, robot: str, poses: Iterable[tuple[int, Array]], stamp_ns: int) -> None:
-        """Tell stamp and ``T_map_body`` of a robot's keyframes, as they are known at a moment."""
+        """Publish stamp and ``T_map_body`` of a robot's keyframes, as they are known at a time."""
         self._paths[robot].publish(to_msg.path(poses, stamp_ns, self._map_frame))
 
     def correction(self, robot: str, T_map_odom: Array, stamp_ns: int, odom_frame: str, by_tf: bool) -> None:
-        """Tell where a robot's odometry's frame is in the map; ``by_tf`` on /tf too, where tf2_ros is installed."""
+        """Publish a robot's odometry frame in the map; with ``by_tf`` on /tf too, where tf2_ros is installed."""
         message = to_msg.transform(T_map_odom, stamp_ns, self._map_frame, odom_frame)
         self._corrections[robot].publish(message)
         if by_tf and TransformBroadcaster is not None:
@@ -61,7 +61,7 @@ class MapAnnouncements:
             self._graph.publish(markers.closures(kept, pruned, residuals, stamp_ns, self._map_frame))
 
     def pruned(self, closures: Sequence[LoopClosure], residuals: Sequence[float]) -> None:
-        """Tell the closures that the map goes on without, all that are now, and how far each is from it."""
+        """Publish all closures that the map now leaves out, and how far each is from it."""
         name, now = self._node.get_fully_qualified_name(), self._node.get_clock().now().to_msg()
         status = [_status(name, *row) for row in zip(closures, residuals, strict=True)]
         self._pruned.publish(DiagnosticArray(header=Header(stamp=now), status=status))

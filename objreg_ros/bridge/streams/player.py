@@ -32,7 +32,7 @@ INPUTS = {  # what a node receives the nodes before it
     "registrar": ("objects", "view", "view/camera_info", "gravity", "labels"),
 }
 SETTLE_S = 3.0  # for the nodes to find us and each other, after we have found some of them
-# One image and one depth are on their way at a time, so that none is overtaken. Where the graph stays silent, it may
+# One image and one depth are in flight at a time, so that none is overtaken. Where the graph stays silent, it may
 # wait for what comes next (slow odometry, say): one more goes after each of these times of silence.
 SILENCE_S = (1.0, 10.0, 30.0)
 LAST_S = 5.0  # how long to wait at the end for depth that is newer than any image: it has no partner
@@ -55,7 +55,7 @@ class Item:
 class Player(Node):
     """A node that plays items on ``topics`` (topic → type like ``sensor_msgs/msg/Image``).
 
-    Who subscribes late still gets what was played last on the ``latched`` ones.
+    A late subscriber still gets the last message played on the ``latched`` ones.
     """
 
     def __init__(self, topics: Mapping[str, str], clock: bool = False, latched: Collection[str] = ()) -> None:
@@ -146,10 +146,10 @@ class Player(Node):
             on_item(item)
 
     def play_lossless(self, items: Iterable[Item], patience: float, on_item: Callable[[Item], None]) -> None:
-        """Publish items in order, a frame only when the graph has room for it; returns when all are through.
+        """Publish items in order, a frame only when the graph can take it; returns when all are through.
 
-        When no acknowledgement comes for ``patience`` seconds, what is on its way goes to ``lost`` and the play goes
-        on. ValueError when a node has ended.
+        When no acknowledgement comes for ``patience`` seconds, what is in flight goes to ``lost`` and the play goes on.
+        ValueError when a node has ended.
         """
         acknowledgements = self._acknowledgements
         if acknowledgements is None:
@@ -195,8 +195,8 @@ class Player(Node):
         if ended:
             raise ValueError(f"lossless: {', '.join(sorted(ended))} has ended and takes no more frames; see its log")
 
-    def _wait_until(self, moment: float) -> None:
-        while (left := moment - time.monotonic()) > 0:
+    def _wait_until(self, end_s: float) -> None:
+        while (left := end_s - time.monotonic()) > 0:
             self._executor.spin_once(timeout_sec=left)
 
     def _publish(self, item: Item) -> None:

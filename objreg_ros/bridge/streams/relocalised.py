@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the registrar tells where the robot is in the map of an earlier session: two topics and a service."""
+"""How the registrar publishes the robot's pose in the map of an earlier session: two topics and a service."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ except ImportError:  # optional: std_srvs asks as well
 
 LONGEST_WAIT_S = 60.0  # of the service
 LOOK_S = 0.05  # so often it looks meanwhile
-MOST_WAITING = 16  # who call the service; each has a thread, and beyond them what is known now is told
+MOST_WAITING = 16  # callers of the service; each has a thread, and further ones get what is known now
 PLANE = (0, 1, 5)  # x, y and yaw of a covariance in ROS order
 
 Answer = tuple[Relocalised | None, str]  # where it is, and by what that is known or why it is not
@@ -40,15 +40,15 @@ class Whereabouts:
     After the answer has become unknown nobody who comes late gets the old one, and the next is published once again.
     """
 
-    def __init__(self, door: NodeBase, ask: Callable[[], Answer]) -> None:
-        self._door, self._ask, self._lock = door, ask, threading.RLock()
-        self._params = door.settings.of(RelocalisedParams)
+    def __init__(self, node: NodeBase, ask: Callable[[], Answer]) -> None:
+        self._node, self._ask, self._lock = node, ask, threading.RLock()
+        self._params = node.settings.of(RelocalisedParams)
         self._T_body_camera: Array | None = None
         self._known, self._waiting = False, 0
-        self._publisher = _publisher(door, "relocalised")
-        self._initial: Any = _publisher(door, "initialpose") if self._params.initialpose else None
+        self._publisher = _publisher(node, "relocalised")
+        self._initial: Any = _publisher(node, "initialpose") if self._params.initialpose else None
         serve = (Trigger, self._trigger) if Relocalise is None else (Relocalise, self._relocalise)
-        door.create_service(serve[0], "~/relocalise", serve[1], callback_group=door.apart)
+        node.create_service(serve[0], "~/relocalise", serve[1], callback_group=node.apart)
 
     def mounted(self, T_body_camera: Array | None) -> None:
         """Where the camera of the newest frame sits on the body (4, 4); None where they are one."""
@@ -59,38 +59,38 @@ class Whereabouts:
         with self._lock:
             found, reason = self._ask()
             if found is not None and not self._known:
-                self._door.get_logger().info(f"relocalised in the map of session {found.session}: {reason}")
-                self._tell(found)
+                self._node.get_logger().info(f"relocalised in the map of session {found.session}: {reason}")
+                self._publish(found)
             elif found is None and self._known:
-                self._door.destroy_publisher(self._publisher)  # and with it what it keeps for who comes late
-                self._publisher = _publisher(self._door, "relocalised")
+                self._node.destroy_publisher(self._publisher)  # and with it what it keeps for who comes late
+                self._publisher = _publisher(self._node, "relocalised")
             self._known = found is not None
 
-    def _tell(self, found: Relocalised) -> PoseWithCovarianceStamped:
+    def _publish(self, found: Relocalised) -> PoseWithCovarianceStamped:
         message = with_covariance(*_of_body(found, self._T_body_camera), found.stamp_ns, self._params.map_frame)
         with self._lock:  # a service's thread, too
             self._publisher.publish(message)
         if self._initial is not None:
-            self._tell_plane(found, message)
+            self._publish_on_plane(found, message)
         return message
 
-    def _tell_plane(self, found: Relocalised, message: PoseWithCovarianceStamped) -> None:
+    def _publish_on_plane(self, found: Relocalised, message: PoseWithCovarianceStamped) -> None:
         """On the plane of a level map, for a body whose x axis looks ahead; a camera's frames are neither."""
         if found.by_odometry and self._T_body_camera is not None:
             self._initial.publish(on_plane(message))
             return
-        self._door.throttled.remind(
+        self._node.throttled.remind(
             "initialpose", "expected odometry in both sessions, and to know where the camera sits on a body, got less; "
-            "none is told: publish odom, and set T_base_camera or have it on /tf_static"
+            "no pose is published: publish odom, and set T_base_camera or have it on /tf_static"
         )  # fmt: skip
 
     async def _trigger(self, _: Any, response: Any) -> Any:
         found, response.message = self._ask()
         response.success = found is not None
         if found is not None:
-            told = self._tell(found).pose.pose.position
+            position = self._publish(found).pose.pose.position
             response.message = (
-                f"session {found.session} at {told.x:.3f} {told.y:.3f} {told.z:.3f} m: {response.message}"
+                f"session {found.session} at {position.x:.3f} {position.y:.3f} {position.z:.3f} m: {response.message}"
             )
         return response
 
@@ -103,7 +103,7 @@ class Whereabouts:
         found, response.message = await self._awaited(seconds)
         response.success = found is not None
         if found is not None:
-            response.pose, response.session = self._tell(found), str(found.session)
+            response.pose, response.session = self._publish(found), str(found.session)
         return response
 
     async def _awaited(self, seconds: float) -> Answer:
@@ -112,7 +112,7 @@ class Whereabouts:
             return self._ask()
         self._waiting += 1
         try:
-            answer: Answer = await self._door.aside(lambda: self._await(seconds))
+            answer: Answer = await self._node.aside(lambda: self._await(seconds))
         finally:
             self._waiting -= 1
         return answer
@@ -120,7 +120,7 @@ class Whereabouts:
     def _await(self, seconds: float) -> Answer:
         """The answer as soon as it is known, at most so much later."""
         deadline = time.monotonic() + seconds
-        while (answer := self._ask())[0] is None and time.monotonic() < deadline and self._door.context.ok():
+        while (answer := self._ask())[0] is None and time.monotonic() < deadline and self._node.context.ok():
             time.sleep(LOOK_S)
         return answer
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Streams of stamped things brought together by time; knows neither ROS nor what the things are.
+"""Streams of stamped items synchronised by time; knows neither ROS nor what the items are.
 
 The first stream is the reference: every match is one of its items with the nearest item of each other stream, or with
 those before and after it. Nothing is lost in silence: for every stream
@@ -27,8 +27,8 @@ class Need(Enum):
 
 
 SILENCE_NS = 1_000_000_000  # an optional stream that is so far behind has stopped: nothing waits for it
-PATIENCE_NS = 2_000_000_000  # what waits longer, and is not among the last ``depth``, makes room
-MOST_BYTES = 200_000_000  # so does what is over this size, whatever its time
+PATIENCE_NS = 2_000_000_000  # what waits longer, and is not among the last ``depth``, is dropped
+MOST_BYTES = 200_000_000  # so is what is over this size, whatever its time
 ENCLOSING = 7  # times the slop: 0.14 s for one of 20 ms, so that 10 Hz are enough
 
 
@@ -45,7 +45,7 @@ class Drop(Enum):
 
 @dataclass(slots=True)
 class Item:
-    """One stamped thing that waits."""
+    """One stamped item that waits."""
 
     stamp_ns: int
     payload: Any
@@ -57,9 +57,9 @@ class Stream:
     """How one input is treated: ``slop_ns`` is the largest distance in time to the reference, 0 for exact.
 
     The last ``depth`` items wait as long as it takes, more of them for `PATIENCE_NS` if they are not too large: a slow
-    detector's word comes when its depth image is many images old. Of an ``enclosing`` one a match gets a tuple: the
-    item of its very time, or those before and after it where they are at most `ENCLOSING` times the slop apart, or the
-    nearest. An ``expected`` one is known to speak, and waited for from the start.
+    detector's result comes when its depth image is many images old. Of an ``enclosing`` one a match gets a tuple: the
+    item of exactly its time, or those before and after it where they are at most `ENCLOSING` times the slop apart, or
+    the nearest. An ``expected`` one is known to send, and is waited for from the start.
     """
 
     name: str
@@ -112,7 +112,7 @@ class Queue:
 
     @property
     def crowded(self) -> bool:
-        """Whether the oldest item must make room."""
+        """Whether the oldest item must go."""
         if len(self.items) <= self.stream.depth:
             return False
         waited_ns = self.items[-1].stamp_ns - self.items[0].stamp_ns

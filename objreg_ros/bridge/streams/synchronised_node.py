@@ -101,7 +101,7 @@ class SynchronisedNode(NodeBase):
             self.drop(stamp_ns, why, self._wanting(stamp_ns, why))
 
     def _wanting(self, stamp_ns: int, why: str) -> str:
-        """What a frame that found no partner waited for, in words."""
+        """A description of what a frame without a partner waited for."""
         if why == Drop.LATE.value:
             return "one with a later stamp came before it"
         if why == Drop.ODD_STAMP.value:

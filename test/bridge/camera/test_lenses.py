@@ -51,7 +51,7 @@ def test_without_distortion_every_bit_stays(D: object, model: str) -> None:
     assert np.array_equal(word.depth, millimetres * np.float32(0.001)) and np.array_equal(word.rgb, rgb)
     assert word.intrinsics.fx == 450.0 and word.shown is None
     assert lenses.detections(found, info) is found
-    assert lenses.describe(info) == "none told: taken as rectified"
+    assert lenses.describe(info) == "none stated: taken as rectified"
 
 
 def test_a_camera_info_without_any_word_of_a_lens_tells_of_none() -> None:
@@ -173,5 +173,7 @@ def test_what_is_assumed_is_said() -> None:
     whole = lenses.describe(camera())
     assert whole.startswith("plumb_bob, moves a pixel by ") and whole.endswith(" at most; rectified")
     assert lenses.describe(camera(), Raw(False, True)).endswith("; colour rectified, the other is so already")
-    assert lenses.describe(camera(), Raw(False, False)).startswith("plumb_bob told, but the pictures are taken as rect")
-    assert lenses.describe(camera(), points=True) == "plumb_bob told; points are taken as they come"
+    assert lenses.describe(camera(), Raw(False, False)).startswith(
+        "plumb_bob stated, but the pictures are taken as rect"
+    )
+    assert lenses.describe(camera(), points=True) == "plumb_bob stated; points are taken as they come"
