@@ -23,7 +23,7 @@ from launch import LaunchContext, LaunchDescription
 from objreg_ros import share
 from objreg_ros.bridge.node import profile
 
-ROOMS = ("detector", "segmenter", "registrar")
+NODES = ("detector", "segmenter", "registrar")
 
 TOPICS = {
     "image": "colour image; its compressed form is looked for at <image>/compressed",
@@ -112,7 +112,7 @@ def generate_launch_description() -> LaunchDescription:
 
 def _nodes(context: LaunchContext) -> list[Node]:
     said = {name: LaunchConfiguration(name).perform(context) for name in (*OPTIONS, *TOPICS)}
-    rooms = _rooms(said)
+    names = _names_of_nodes(said)
     alike = {
         "namespace": said["namespace"],
         "remappings": [*TF, *_remappings(said)],
@@ -122,34 +122,34 @@ def _nodes(context: LaunchContext) -> list[Node]:
         "on_exit": None if _is_true(said["respawn"]) else _ended,
     }
     if _is_true(said["composed"]):
-        nodes = [_together(rooms, said, alike)]
+        nodes = [_together(names, said, alike)]
     else:
-        nodes = [_alone(room, said, alike) for room in rooms]
+        nodes = [_alone(node, said, alike) for node in names]
     return [*nodes, *_rviz(said, alike)]
 
 
-def _alone(room: str, said: dict[str, str], alike: dict) -> Node:
-    words = ["-m", f"objreg_ros.{'keyframes' if room == 'keyframer' else room}.node"]
+def _alone(node: str, said: dict[str, str], alike: dict) -> Node:
+    arguments = ["-m", f"objreg_ros.{'keyframes' if node == 'keyframer' else node}.node"]
     kind = LifecycleNode if _is_true(said["managed"]) else Node  # which events of a launch file around this one reach
     return kind(
         executable=sys.executable,
-        arguments=words,
-        name=room,
-        exec_name=room,
-        parameters=_parameters(room, said),
-        ros_arguments=_ros_arguments(room, said),
+        arguments=arguments,
+        name=node,
+        exec_name=node,
+        parameters=_parameters(node, said),
+        ros_arguments=_ros_arguments(node, said),
         **alike,
     )
 
 
-def _together(rooms: tuple[str, ...], said: dict[str, str], alike: dict) -> Node:
+def _together(names: tuple[str, ...], said: dict[str, str], alike: dict) -> Node:
     """One process; launch names no node of it, and so a file says whose each parameter is."""
-    words = ["-m", "objreg_ros.graph", *rooms]
+    arguments = ["-m", "objreg_ros.graph", *names]
     return Node(
         executable=sys.executable,
-        arguments=words,
+        arguments=arguments,
         exec_name="objreg_graph",
-        parameters=_shared(rooms, said),
+        parameters=_shared(names, said),
         ros_arguments=_ros_arguments("graph", said),
         **alike,
     )
@@ -173,10 +173,10 @@ def _ros_arguments(process: str, said: dict[str, str]) -> list[str]:
     return [*level, *enclave]
 
 
-def _shared(rooms: tuple[str, ...], said: dict[str, str]) -> list[str]:
+def _shared(names: tuple[str, ...], said: dict[str, str]) -> list[str]:
     """The user's file, and over it one of what was said on the command line, which goes as the launch ends."""
-    values = {room: _parameters(room, {**said, "params_file": ""}) for room in rooms}
-    owned = {f"/**/{room}": {"ros__parameters": given[0]} for room, given in values.items() if given}
+    values = {node: _parameters(node, {**said, "params_file": ""}) for node in names}
+    owned = {f"/**/{node}": {"ros__parameters": given[0]} for node, given in values.items() if given}
     if not owned:
         return [said["params_file"]] if said["params_file"] else []
     with NamedTemporaryFile("w", prefix="objreg_", suffix=".yaml", delete=False) as file:
@@ -206,22 +206,22 @@ def _rviz(said: dict[str, str], alike: dict) -> list[Node]:
     ]
 
 
-def _rooms(said: dict[str, str]) -> tuple[str, ...]:
-    rooms = tuple(room for room in ROOMS if room != "detector" or said["detections"] not in FOREIGN)
+def _names_of_nodes(said: dict[str, str]) -> tuple[str, ...]:
+    names = tuple(node for node in NODES if node != "detector" or said["detections"] not in FOREIGN)
     if _is_true(said["keyframer"]):
-        rooms = tuple("keyframer" if room == "registrar" else room for room in rooms)
-    return (*rooms, "mapper") if _is_true(said["mapper"]) else rooms
+        names = tuple("keyframer" if node == "registrar" else node for node in names)
+    return (*names, "mapper") if _is_true(said["mapper"]) else names
 
 
 def _is_true(text: str) -> bool:
     return text.lower() == "true"
 
 
-def _parameters(room: str, said: dict[str, str]) -> list:
+def _parameters(node: str, said: dict[str, str]) -> list:
     """The user's file, and over it what was said on the command line."""
     values: dict = {name: _is_true(said[name]) for name in SWITCHES if said[name]}
-    values |= {name: said[name] for name in OWN.get(room, ()) if said[name]}
-    if said["T_base_camera"] and room != "detector":
+    values |= {name: said[name] for name in OWN.get(node, ()) if said[name]}
+    if said["T_base_camera"] and node != "detector":
         values["T_base_camera"] = _numbers("T_base_camera", said["T_base_camera"])
     return [given for given in (said["params_file"], values) if given]
 

@@ -67,8 +67,8 @@ def _command(said: dict[str, str]) -> list[str]:
     command += ["--clock"] if _is_true(said["use_sim_time"]) else []
     rules = [("__ns", f"/{said['namespace'].strip('/')}"), *NODES["TF"]] if said["namespace"] else []
     rules += NODES["_remappings"](said)
-    words = [word for name, topic in rules for word in ("-r", f"{name}:={topic}")]
-    return [*command, "--", "--ros-args", *words] if words else command
+    remaps = [text for name, topic in rules for text in ("-r", f"{name}:={topic}")]
+    return [*command, "--", "--ros-args", *remaps] if remaps else command
 
 
 def _is_true(text: str) -> bool:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Room 1: colour image in, Detections out."""
+"""The detector stage: colour image in, Detections out."""

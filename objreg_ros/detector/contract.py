@@ -18,7 +18,7 @@ from objreg_ros.detector.runtime import Port
 class Candidates:
     """Boxes before suppression, ``xyxy (N, 4)`` in 0..1 of the model's picture: 0 and 1 are its outer edges.
 
-    ``score (N,)`` is as the model gives it, ``index (N,)`` that of the class, from 0. A segmentation head tells masks:
+    ``score (N,)`` is as the model gives it, ``index (N,)`` that of the class, from 0. A segmentation head gives masks:
     ``coefficients (N, M)`` of the ``prototypes (M, h, w)``, which show the model's picture; else both are None.
     """
 
@@ -72,7 +72,7 @@ class Graph:
 
     @property
     def masks(self) -> int:
-        """How many numbers tell a box's mask, by the prototypes of a segmentation head; 0 without."""
+        """How many coefficients a box's mask has, by the prototypes of a segmentation head; 0 without."""
         return 0 if self.prototypes is None else int(self.probe[self.prototypes].shape[1])
 
     def names(self, head: str) -> tuple[str, ...]:
@@ -111,5 +111,5 @@ def require_rows(output: Array, expected: tuple[int, ...]) -> None:
 
 
 def shapes(probe: Mapping[str, Array]) -> str:
-    """Outputs and their shapes in words."""
+    """Outputs and their shapes as text."""
     return ", ".join(f"{name} {list(value.shape)}" for name, value in probe.items())

@@ -21,7 +21,7 @@ TOLD, QUERIED = ("labels", "boxes", "scores"), ("logits", "pred_boxes")
 class DetrOutput:
     """``labels [1,N]``, ``boxes [1,N,4]`` x_min y_min x_max y_max and ``scores [1,N]``, as the authors export them.
 
-    The boxes are in pixels of what the input orig_target_sizes says, which is told the size of the model's picture.
+    The boxes are in pixels of the size in the input orig_target_sizes, which gets that of the model's picture.
     """
 
     labels: int

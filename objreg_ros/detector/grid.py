@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Heads whose rows are the cells of a grid, and whose boxes are told from them: YOLOX and NanoDet."""
+"""Heads whose rows are the cells of a grid, and whose boxes are relative to them: YOLOX and NanoDet."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class YoloX:
     def of(cls, graph: Graph, head: str) -> YoloX:
         """The contract of that output; ValueError where its rows are of no known grid."""
         probe = graph.probe[head]
-        if probe[0, :, :2].max(initial=0) > min(graph.hw) / 2:  # cells do not tell of centres that far away
+        if probe[0, :, :2].max(initial=0) > min(graph.hw) / 2:  # no cell has a centre that far away
             raise ValueError(
                 f"head of the model: expected YOLOX's offsets from cells, got centres up to {probe[0, :, :2].max():g}; "
                 "export it without decode_in_inference, or name yolov5 as its `contract` if it is a YOLOv6"

@@ -12,7 +12,7 @@ from objreg_ros.detector.picture import Place
 
 
 def draw_masks(found: Detections, candidates: Candidates, rows: Array, place: Place) -> Array | None:
-    """The ``instances`` of what was found in these rows of the candidates; None where the model tells no masks.
+    """The ``instances`` of what was found in these rows of the candidates; None where the model gives no masks.
 
     A mask is where the sum is above 0, a sigmoid of more than a half, cut to its box. Of two that overlap the better
     scored one has the pixel.
@@ -35,6 +35,6 @@ def _seen(logits: Array, box: tuple[slice, slice], place: Place) -> Array:
         scale[axis] = inner / place.hw[size] * share
         first[axis] = (box[axis].start + 0.5) * scale[axis] + before * share - 0.5
     rows, columns = (side.stop - side.start for side in box)
-    way = np.array([[scale[1], 0.0, first[1]], [0.0, scale[0], first[0]]])
+    affine = np.array([[scale[1], 0.0, first[1]], [0.0, scale[0], first[0]]])
     how = {"flags": cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, "borderMode": cv2.BORDER_REPLICATE}
-    return cv2.warpAffine(np.asarray(logits, np.float32), way, (columns, rows), **how)
+    return cv2.warpAffine(np.asarray(logits, np.float32), affine, (columns, rows), **how)

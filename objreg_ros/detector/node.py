@@ -38,7 +38,7 @@ class DetectorNode(NodeBase):
         super().__init__("detector", DetectorParams, ManagedParams, bus=bus)
 
     def open(self) -> None:
-        """Load the model, tell its labels, and listen."""
+        """Load the model, publish its labels, and subscribe."""
         params = self.settings.of(DetectorParams)
         self._detector = Detector.of(params, share.model)
         self._pace, self._turns = Pace(params.max_rate), Turns(self._leave_out)
@@ -48,7 +48,7 @@ class DetectorNode(NodeBase):
         self._array = None if array is None else self.create_publisher(array, "detections", qos.room())
         self._labels = self.create_publisher(String, "labels", qos.latched())
         self._labels.publish(to_msg.labels(self._names))
-        for topic in IMAGES:  # what it has decoded is not decoded again next node
+        for topic in IMAGES:  # the next node does not decode again what this one has decoded
             self.pass_on(topic)
         self.listen_to_first("image", IMAGES, self._decode, self._receive, self.sensor())
 
@@ -71,10 +71,10 @@ class DetectorNode(NodeBase):
             self._turns.put_off(stamp_ns, message.header.frame_id)
 
     def _leave_out(self, stamp_ns: int, frame_id: str) -> None:
-        """Tell of a surplus image, after the tables of those before it."""
-        word = Surplus(stamp_ns, frame_id)
-        self._hand_over_picture(word)
-        self._table.tell(word, partial(to_msg.surplus, *word))
+        """Report a surplus image, after the tables of those before it."""
+        surplus = Surplus(stamp_ns, frame_id)
+        self._hand_over_picture(surplus)
+        self._table.tell(surplus, partial(to_msg.surplus, *surplus))
         self.leave_out(stamp_ns, Drop.SURPLUS.value)
 
     def conclude(self, stamp_ns: int, work: Callable[[], bool]) -> None:
@@ -97,10 +97,10 @@ class DetectorNode(NodeBase):
             self._array.publish(vision_to_msg.detections(detections))
         return True
 
-    def _hand_over_picture(self, word: ColourImage | Surplus) -> None:
+    def _hand_over_picture(self, value: ColourImage | Surplus) -> None:
         topic = self.taken("image")
         if topic is not None:
-            self.bus.hand_over(self.resolve_topic_name(topic), word)
+            self.bus.hand_over(self.resolve_topic_name(topic), value)
 
 
 def main() -> int:

@@ -21,7 +21,7 @@ EXPECTED = (
 AGAIN = "export the model again"
 FLOATS = {"float": np.float32, "float16": np.float16}
 SIZES = "orig_target_sizes"
-"""The second input of RT-DETR and D-FINE: the width and height that the boxes are told in."""
+"""The second input of RT-DETR and D-FINE: the width and height whose pixels the boxes are in."""
 
 GREY = 114
 """What surrounds a picture that keeps its proportions."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which contract a model keeps, told by its metadata, the names and shapes of its outputs and the number of labels."""
+"""Which contract a model keeps, by its metadata, the names and shapes of its outputs and the number of labels."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def _is_raw_ssd(graph: Graph) -> bool:
 
 
 def _is_tf_detection(graph: Graph) -> bool:
-    """Whether outputs are several and boxes one of them, or none is a head: what else may be absent is told there."""
+    """Whether there are several outputs and one is boxes, or none is a head: that contract reports what is absent."""
     several = len(graph.probe) > 1 + bool(graph.masks)
     boxes = any(value.ndim == 3 and value.shape[2] == 4 for value in graph.probe.values())
     return graph.head is None or (several and boxes)

@@ -80,12 +80,12 @@ def _roles(outputs: tuple[Port, ...], probe: Mapping[str, Array]) -> dict[str, s
             roles.setdefault("count", name)
     if len(flat) < 2:
         return roles
-    classes, scores = _named(flat) or _told_apart({name: probe[name] for name in flat})
+    classes, scores = _named(flat) or _by_values({name: probe[name] for name in flat})
     return roles | {"classes": classes, "scores": scores}
 
 
 def _named(flat: list[str]) -> tuple[str, str] | None:
-    """The names of classes and scores, where the names tell, or are those of TFLite's own operation; else None."""
+    """The names of classes and scores, where they say it, or are those of TFLite's own operation; else None."""
     if all(name.startswith(TFLITE_OP) for name in flat):
         classes, scores, *_ = sorted(flat)  # :1 and :2; the boxes have no number
         return classes, scores
@@ -97,10 +97,10 @@ def _named(flat: list[str]) -> tuple[str, str] | None:
     return (by_class[-1], by_score[-1]) if by_class and by_score else None
 
 
-def _told_apart(flat: Mapping[str, Array]) -> tuple[str, str]:
-    """The names of classes and scores by their values: whole numbers, and 0 … 1. ValueError where that tells nothing.
+def _by_values(flat: Mapping[str, Array]) -> tuple[str, str]:
+    """The names of classes and scores by their values: whole numbers, and 0 … 1. ValueError unless one pair fits.
 
-    The order tells nothing either: TFLite's operation has classes before scores, TF2's export scores before classes.
+    The order does not help: TFLite's operation has classes before scores, TF2's export scores before classes.
     """
     whole = {name for name, values in flat.items() if (np.rint(values) == values).all()}
     shares = {name for name, values in flat.items() if ((values >= 0) & (values <= 1 + 1e-3)).all()}
@@ -108,7 +108,7 @@ def _told_apart(flat: Mapping[str, Array]) -> tuple[str, str]:
     if len(pairs) != 1:
         may = "either" if pairs else "neither"
         raise ValueError(
-            "outputs of the model: expected names or values that tell the classes from the scores, got "
+            "outputs of the model: expected names or values that distinguish the classes from the scores, got "
             f"{shapes(flat)}, which by their values may be {may}; export it again, or rename "
             "its outputs, with `classes` in the name of the one and `scores` in that of the other"
         )

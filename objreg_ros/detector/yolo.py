@@ -59,8 +59,8 @@ class YoloV5:
         row = outputs[0][0]
         likely = row[row[:, 4] >= threshold]
         rows, score, index = best_class((likely[:, 5 : 5 + self.labels] * likely[:, 4:5]).T, threshold)
-        told = masks_of(outputs, likely[rows, 5 + self.labels :])
-        return Candidates(in_shares(corners(likely[rows, :4]), self.hw), score, index, *told)
+        masks = masks_of(outputs, likely[rows, 5 + self.labels :])
+        return Candidates(in_shares(corners(likely[rows, :4]), self.hw), score, index, *masks)
 
 
 @dataclass(frozen=True)
@@ -90,8 +90,8 @@ class YoloV8:
         require_rows(outputs[0], self.shape)
         column = outputs[0][0].T if self.by_row else outputs[0][0]
         rows, score, index = best_class(column[4 : 4 + self.labels], threshold)
-        told = masks_of(outputs, column[4 + self.labels :, rows].T)
-        return Candidates(in_shares(corners(column[:4, rows].T), self.hw), score, index, *told)
+        masks = masks_of(outputs, column[4 + self.labels :, rows].T)
+        return Candidates(in_shares(corners(column[:4, rows].T), self.hw), score, index, *masks)
 
 
 @dataclass(frozen=True)
@@ -120,5 +120,5 @@ class EndToEnd:
         row = outputs[0][0]
         row = row[row[:, 4] >= threshold]
         index = class_index(row[:, 5], 0, self.labels)
-        told = masks_of(outputs, row[:, 6:])
-        return Candidates(in_shares(row[:, :4], self.hw), row[:, 4].astype(np.float32), index, *told)
+        masks = masks_of(outputs, row[:, 6:])
+        return Candidates(in_shares(row[:, :4], self.hw), row[:, 4].astype(np.float32), index, *masks)

@@ -2,7 +2,7 @@
 """The focal length and the principal point of a camera, and its motion, from corners whose depth is known.
 
 As a camera turns, the picture of a point moves by the focal length times the angle, and its depth changes by the angle
-times how far aside it is, which is the depth times the pixels over the focal length. So both together tell the focal
+times how far aside it is, which is the depth times the pixels over the focal length. So both together give the focal
 length, without any target: a bundle adjustment over pairs of views that share one camera (Triggs et al., "Bundle
 adjustment: a modern synthesis", 2000), with the motions eliminated (Schur complement). The deviations are robust to
 corners of one span that err together (sandwich).
@@ -33,7 +33,7 @@ ROUNDS, SETTLED = 8, 1e-3
 COARSE = 3  # rounds in which every span counts: with a camera that is far off none fits
 LEAST_TRACE = 1e-6
 MOST_MISFIT = 2.0  # of a span that counts: in others something moved, or corners slid along outlines
-FEW = 5.0  # spans, of which the scatter of so few tells no more than half of their variance
+FEW = 5.0  # spans, of which the scatter of so few shows no more than half of their variance
 MOST_POINTS = 40  # of a span
 
 FOCAL_FLOOR = 0.015  # what a focal length errs by beyond what spans scatter: depth that is a little off, a lens
@@ -130,8 +130,8 @@ def _sandwich(information: Array, scores: Array) -> Array:
 
 
 def _rigid_motions(corners: _Corners, camera: Array) -> Array:
-    """The motions (n, 4, 4) that lay the points of the first moments upon those of the last, by their singular values
-    (Arun, Huang and Blostein, 1987), twice: what is far off then counts no more."""
+    """The motions (n, 4, 4) that align the first points of the spans with the last, by their singular values
+    (Arun, Huang and Blostein, 1987). They are found twice: the second time without points that are far off."""
     first, last = (_points(uv, z, camera) for uv, z in ((corners.uv_first, corners.z_first), corners[2:4]))
     weight = corners.known
     for _ in range(2):

@@ -34,7 +34,7 @@ EDGE = 0.06  # depths around a corner that differ by more than this share of the
 
 
 class Span(NamedTuple):
-    """Corners at two moments of a stream: ``uv_first``, ``uv_last (n, 2)`` pixels of the view, and their depths
+    """Corners at two times of a stream: ``uv_first``, ``uv_last (n, 2)`` pixels of the view, and their depths
     ``z_first``, ``z_last (n,)`` in metres."""
 
     first_ns: int

@@ -22,5 +22,5 @@ class Finding:
     @property
     def text(self) -> str:
         """All of it in one line."""
-        told = f"{self.what}: {self.cause}" if self.cause else self.what
-        return f"{told}; {self.todo}" if self.todo else told
+        text = f"{self.what}: {self.cause}" if self.cause else self.what
+        return f"{text}; {self.todo}" if self.todo else text

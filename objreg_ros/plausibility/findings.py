@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What was found of a stream that is not what it says of itself, in words: the same in a terminal, a page and a log."""
+"""The text of findings: where a stream is not what it states. The text is the same in a terminal, a page and a log."""
 
 from __future__ import annotations
 

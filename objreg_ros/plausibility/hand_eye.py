@@ -24,7 +24,7 @@ SHIFT_SIGMA_M, SHIFT_GROWTH = 0.01, 0.03  # of a measured shift, and its growth 
 LEVER_PRIOR_M = 0.5  # cameras sit within so much of the middle of a robot, more or less
 SCALE_PRIOR = 1.0  # deviation of the logarithm of the scale
 SCALE_FLOOR = 0.015  # what a scale errs by beyond what motions scatter: wheels, and depth that is a little off
-FEW = 4.0  # motions, of which the scatter of so few tells no more than half of their variance
+FEW = 4.0  # motions, of which the scatter of so few shows no more than half of their variance
 STARTS = 2  # rotations that a solution is sought from, the best first
 
 
@@ -50,7 +50,7 @@ def turns_of(T: Array) -> Array:
 
 
 def hand_eye(T_body: Array, T_camera: Array, T_body_camera: Array | None = None) -> HandEye:
-    """The mount by the motions (n, 4, 4) from the first to the last moment of each span, of the body and of the camera.
+    """The mount by the motions (n, 4, 4) from the start to the end of each span, of the body and of the camera.
 
     Where ``T_body_camera`` is known, it is kept, and only the scale is measured.
     """
@@ -135,7 +135,7 @@ class _Motions:
         self._shift_sigma = SHIFT_SIGMA_M + SHIFT_GROWTH * shift
 
     def shifts_of_camera(self, T_body_camera: Array) -> tuple[Array, Array]:
-        """The shifts (n, 3) of the camera as it was seen to move, and by way of the body."""
+        """The shifts (n, 3) of the camera as it was seen to move, and as the body's motion gives them."""
         R, lever = T_body_camera[:3, :3], T_body_camera[:3, 3]
         return self.shifts[1], (self._levers @ lever + self.shifts[0]) @ R
 

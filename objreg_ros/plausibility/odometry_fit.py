@@ -15,7 +15,7 @@ import numpy as np
 from objreg_ros.data import Array
 from objreg_ros.plausibility.hand_eye import best_rotation, turns_of
 
-LEAST_TURN = np.radians(3.0)  # a smaller one tells nothing
+LEAST_TURN = np.radians(3.0)  # a smaller one is no evidence
 TURN_TOLERANCE, TURN_SHARE = np.radians(2.0), 0.2  # turns that differ by less, or by that share, are alike
 LEAST_TURNS = 8
 ALIKE, UNLIKE = 0.7, 0.5  # of the turns: above they are of one body, below of two
@@ -26,8 +26,8 @@ ELSEWHERE_S, CLEARLY = 1.0, 0.75  # another shift is so far away, and turns are 
 
 
 class Likeness(NamedTuple):
-    """The ``share`` of turns that are alike, of so many ``turns`` that tell something; by how much they are ``off`` on
-    average, of what alike ones may be."""
+    """The ``share`` of turns that agree, of so many ``turns`` of at least `LEAST_TURN`; by how much they are ``off`` on
+    average, of what turns that agree may be."""
 
     share: float
     turns: int

@@ -42,7 +42,7 @@ GAP_SHARE, LEAST_FRAMES = 0.8, 50  # of so many frames and more, that have odome
 
 
 class _Leg(NamedTuple):
-    """A span with the mounts at its first and last moment, None where they are unknown."""
+    """A span with the mounts at its start and end, None where they are unknown."""
 
     span: Span
     mounts: tuple[Array, Array] | None
@@ -80,8 +80,8 @@ class StreamMonitor:
 
     @property
     def proven(self) -> bool:
-        """Whether enough was seen to believe the camera, and the scale of its depth where odometry tells that, or
-        whether its motion does not tell in a long time."""
+        """Whether enough was seen to believe the camera, and the scale of its depth where odometry gives that, or
+        whether its motion has not shown it in a long time."""
         return self._believed or (
             not self.doubt and self._age_s > (LONG_S if self._spans >= LEAST_SPANS else PATIENCE_S)
         )
@@ -228,7 +228,7 @@ class StreamMonitor:
     def _of_known_mount(
         self, beside: HandEye, last: _Leg, T_by_odometry: Array, T_camera: Array
     ) -> tuple[tuple[Finding, ...], tuple[Finding, ...]]:
-        """A mount that is known is right where the camera by way of odometry moves as it was seen to.
+        """A known mount is right where the camera's motion by odometry agrees with the motion that was seen.
 
         ``beside`` is how the camera sits on where the mount has it: the identity, if that is right.
         """
@@ -270,7 +270,7 @@ class StreamMonitor:
         return (findings.odometry_gaps(share, 1e-9 * covered, 1e-9 * (self._last_ns - self._first_ns)),)
 
     def _motions(self, legs: list[_Leg], later_s: float) -> tuple[Array, Array]:
-        """The motions (n, 4, 4) by odometry from the first to the last moment of spans, by stamps that are so much
+        """The motions (n, 4, 4) by odometry from the start to the end of spans, by stamps that are so much
         later, and which of them are known: of the camera where its mount is known, else of the body."""
         ends, known = [], np.ones(len(legs), bool)
         for end in (0, 1):
@@ -287,6 +287,6 @@ def _is_enough(mount: HandEye) -> bool:
 
 
 def _left_open(mount: HandEye) -> str:
-    """What the motion does not say of a mount, in words."""
+    """A description of what the motion does not show of a mount."""
     axes = [axis for axis, sigma in zip("xyz", mount.lever_sigma_m, strict=True) if sigma > ENOUGH_M]
     return f"; its {' and '.join(axes)} cannot be seen from such motion and is near 0" if axes else ""

@@ -76,7 +76,7 @@ def test_outputs_that_neither_names_nor_values_tell_apart_are_refused(
 ) -> None:
     outputs = tf_outputs([BOX, BOX], classes, scores, names=CALLED)
     with pytest.raises(
-        ValueError, match=r"expected names or values that tell .*got .*rename its outputs, with `classes`"
+        ValueError, match=r"expected names or values that distinguish .*got .*rename its outputs, with `classes`"
     ):
         tf(outputs)
 
