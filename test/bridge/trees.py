@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frames of robots, as /tf and /tf_static tell of them."""
+"""Frames of robots, as on /tf and /tf_static."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def said(*transforms: Any) -> Any:
 
 
 def panning(*degrees: float, step_ns: int = SECOND // 10, start_ns: int = SECOND) -> FrameTree:
-    """A head on a base that turns from moment to moment, and a camera on the head."""
+    """A head on a base that turns over time, and a camera on the head."""
     tree = FrameTree()
     tree.follow("eye")
     tree.receive(said(transform("head", "eye", moved(1))))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""YOLOX and NanoDet: boxes told from the cells of a grid."""
+"""YOLOX and NanoDet: boxes relative to the cells of a grid."""
 
 from __future__ import annotations
 

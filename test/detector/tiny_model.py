@@ -81,7 +81,7 @@ def save_seeing_model(
     outputs: Mapping[str, np.ndarray] | None = None,
     metadata: Mapping[str, str] | None = None,
 ) -> Path:
-    """A network that finds the bright rectangle of its picture, values above 0.9, and tells its edges in ``output0``.
+    """A network that finds the bright rectangle of its picture, values above 0.9, and gives its edges in ``output0``.
 
     ``row_of_xyxy (5, K)`` makes the row of x_min, y_min, x_max, y_max in pixels and 1. ``outputs`` are constants.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Turns tell whether odometry is of the robot that carries the camera, and of the same time."""
+"""Turns show whether odometry is of the robot that carries the camera, and of the same time."""
 
 from __future__ import annotations
 

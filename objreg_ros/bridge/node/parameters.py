@@ -98,14 +98,14 @@ def _part(kind: type[Params], values: dict[str, Any]) -> dict[str, Any]:
 
 def _refuse_dropped(node: Node, kinds: Sequence[type[Params]]) -> None:
     """ValueError for a start value of a parameter that the last release had; it would be ignored in silence."""
-    given = getattr(node, "_parameter_overrides", {})  # rclpy tells of them nowhere else
+    given = getattr(node, "_parameter_overrides", {})  # rclpy exposes them nowhere else
     for kind in kinds:
         kind.refuse_dropped(given)
 
 
 def _warn_of_unknown(node: Node, known: Sequence[str]) -> None:
     """Say which start values nobody asked for: ROS drops them in silence, and with them a slip of the pen."""
-    given = getattr(node, "_parameter_overrides", {})  # rclpy tells of them nowhere else
+    given = getattr(node, "_parameter_overrides", {})  # rclpy exposes them nowhere else
     for name in given:
         if not node.has_parameter(name) and not name.startswith(OF_ROS):
             near = get_close_matches(name, known, n=1)

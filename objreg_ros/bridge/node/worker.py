@@ -138,7 +138,7 @@ class Backlog(Generic[Job]):
         """Hand over a job; waits while the limit is reached, unless the backlog is closed."""
         nbytes = self._nbytes_of(job)
         with self._changed:
-            self._changed.wait_for(lambda: not self._open or self._has_room(nbytes))
+            self._changed.wait_for(lambda: not self._open or self._has_space(nbytes))
             now, lane = time.monotonic(), self._lane_of(job)
             if self._is_behind(lane):
                 self._overtaken_at = now
@@ -149,9 +149,9 @@ class Backlog(Generic[Job]):
             self._changed.notify_all()
 
     def hurried(self) -> bool:
-        """Whether the current work is to end soon: the worker is closed, or jobs are overtaken and one waits enough.
+        """Whether the current work is to end soon: the backlog is closed, or jobs are overtaken and more must wait.
 
-        Or there is no space for more. ``work`` asks for this.
+        That is where the oldest job has waited for the limit's patience, or the newest has no space. ``work`` asks.
         """
         with self._changed:
             if not self._open:
@@ -159,7 +159,7 @@ class Backlog(Generic[Job]):
             if not self._pressed or not self._waiting:
                 return False
             waited_s = time.monotonic() - max(self._waiting[0].since, self._begun_at)  # for this work, not others
-            return waited_s >= self._limit.patience_s or not self._has_room(self._waiting[-1].nbytes)
+            return waited_s >= self._limit.patience_s or not self._has_space(self._waiting[-1].nbytes)
 
     def rest(self) -> list[Job]:
         """Take back every job that has not begun, the oldest first."""
@@ -198,7 +198,7 @@ class Backlog(Generic[Job]):
             if thread is not threading.current_thread():
                 thread.join()
 
-    def _has_room(self, nbytes: int) -> bool:
+    def _has_space(self, nbytes: int) -> bool:
         if not self._waiting:
             return True
         return len(self._waiting) < self._limit.jobs and self._nbytes + nbytes <= self._limit.nbytes

@@ -58,7 +58,7 @@ def there() -> None:
 
 
 def assert_same(one: Any, other: Any) -> None:
-    """Two words agree in every field, poses to what quaternions keep."""
+    """Two values agree in every field, poses to the precision of quaternions."""
     for field in fields(one):
         a, b = getattr(one, field.name), getattr(other, field.name)
         if isinstance(a, np.ndarray):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The numbers of names that nobody told beforehand."""
+"""The numbers of names that no table announced."""
 
 from __future__ import annotations
 

@@ -254,7 +254,7 @@ def test_a_chunk_that_claims_gigabytes_is_refused_before_memory_is_taken_for_it(
 
 
 def png_that_claims(width: int, height: int, bits: int, colour: int) -> bytes:
-    """A PNG whose header tells of so many pixels, and which has next to none."""
+    """A PNG whose header states so many pixels, and which has next to none."""
     parts = (
         (b"IHDR", struct.pack(">IIBBBBB", width, height, bits, colour, 0, 0, 0)),
         (b"IDAT", zlib.compress(bytes(100))),

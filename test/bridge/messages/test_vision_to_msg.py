@@ -16,7 +16,7 @@ from objreg_ros.data import Detections
 
 @pytest.fixture
 def types(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where vision_msgs is not installed, things with the same fields stand in."""
+    """Where vision_msgs is not installed, stubs with the same fields stand in."""
     if vision_to_msg.Detection2DArray is not None:
         return
 

@@ -19,7 +19,7 @@ DONE, REFUSED = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILU
 
 
 class Shop(NodeBase):
-    """Opens unless it is told otherwise, and notes what becomes of it."""
+    """Opens unless it is set to fail, and records what becomes of it."""
 
     trouble: Exception | None = None
     at_the_end: Exception | None = None

@@ -61,7 +61,7 @@ def stumble(message: Any) -> None:
 
 @pytest.fixture
 def said(node: NodeBase) -> list[str]:
-    """What the log of the node is told, warnings and errors."""
+    """The warnings and errors in the log of the node."""
     lines: list[str] = []
     node.throttled = ThrottledLog(lines.append)
     node.get_logger = lambda: SimpleNamespace(error=lines.append)  # type: ignore[method-assign]

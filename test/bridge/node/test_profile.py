@@ -89,7 +89,7 @@ def test_fast_dds_says_what_it_cannot_read(tmp_path: Path, domain: int) -> None:
 
 
 def test_the_flow_controller_of_the_profile_for_wifi_is_in_force(domain: int) -> None:
-    """It refuses a synchronous writer, so a refusal tells that writers are under it."""
+    """It refuses a synchronous writer, so a refusal shows that it applies to writers."""
     done = made_with(find(profile.WIFI), domain, mode="SYNCHRONOUS")
     assert done.returncode != 0 and "flow controller" in done.stdout + done.stderr
 

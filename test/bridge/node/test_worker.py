@@ -237,7 +237,7 @@ def test_once_a_job_was_overtaken_the_next_ones_do_not_give_way() -> None:
     backlog.put(3)
     go.set()
     backlog.drain()
-    backlog.put(4)  # a moment later: still pressed
+    backlog.put(4)  # soon after: still pressed
     backlog.drain()
     backlog.close()
     plain = os.getpriority(os.PRIO_PROCESS, threading.get_native_id())

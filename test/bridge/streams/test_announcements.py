@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the registrar tells, on topics of common_interfaces and, where it is installed, of objreg_msgs."""
+"""What the registrar publishes, on topics of common_interfaces and, where it is installed, of objreg_msgs."""
 
 from __future__ import annotations
 

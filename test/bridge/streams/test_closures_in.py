@@ -19,7 +19,7 @@ CLOSURE = LoopClosure(from_ns=5, to_ns=9, T_from_to=np.eye(4), covariance=np.eye
 
 
 class Hearer:
-    """Stands in for a node, keeps what it is told, and is given messages by topic."""
+    """Stands in for a node, keeps what it receives, and is given messages by topic."""
 
     def __init__(self, topic: str = "auto", robots: tuple[str, ...] = ()) -> None:
         self.received: dict[str, Callable[[Any], None]] = {}

@@ -153,7 +153,7 @@ def test_a_table_that_another_tells_meanwhile_is_told_again_with_the_names_that_
     node.received["labels"](to_msg.labels(NAMES))  # our own detector was started beside
     assert read(inputs, masks()).names == {**NAMES, 2: "sofa"}
     assert from_msg.labels(node.published[-1]) == {**NAMES, 2: "sofa"} and len(node.published) == 2
-    node.received["labels"](node.published[-1])  # its own word
+    node.received["labels"](node.published[-1])  # its own message
     read(inputs, masks())
     assert len(node.published) == 2
 

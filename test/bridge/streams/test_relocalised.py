@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the registrar tells of where it is in an earlier map: topics, the plane, and the service."""
+"""What the registrar publishes of its pose in an earlier map: topics, the plane, and the service."""
 
 from __future__ import annotations
 
